@@ -31,7 +31,7 @@ class CauseHead(SoftmaxHead):
 
 
 CAUSE_EXPLAINERS = {
-    "gpca": ExplainerEntry("GP-CA (aligned source)", CauseGPCA, reads="embeddings"),
-    "softmax_head": ExplainerEntry("Softmax head (aligned source)", CauseHead, reads="embeddings"),
-    "concept_vectors": ExplainerEntry("Concept activation vectors", CauseVectors, reads="embeddings"),
+    "gpca": ExplainerEntry("GP-CA (aligned source)", CauseGPCA, ("source",), reads="embeddings"),
+    "softmax_head": ExplainerEntry("Softmax head (aligned source)", CauseHead, ("source",), reads="embeddings"),
+    "concept_vectors": ExplainerEntry("Concept activation vectors", CauseVectors, ("source",), reads="embeddings"),
 }

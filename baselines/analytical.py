@@ -67,8 +67,8 @@ class AnalyticalGPC(GPCA):
 
 
 EXPLAINERS = {
-    "analytical_gpc": ExplainerEntry("Analytical features (GPC)", AnalyticalGPC),
+    "analytical_gpc": ExplainerEntry("Analytical features (GPC)", AnalyticalGPC, ("pair",)),
     "analytical_gpc_no_counts": ExplainerEntry(
-        "Analytical features without point counts (GPC)", partial(AnalyticalGPC, point_count=False)
+        "Analytical features without point counts (GPC)", partial(AnalyticalGPC, point_count=False), ("pair",)
     ),
 }

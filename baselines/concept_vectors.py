@@ -62,4 +62,6 @@ class ConceptVectors(ScoringExplainer):
         return softmax(positions_N_C, axis=1)
 
 
-EXPLAINERS = {"concept_vectors": ExplainerEntry("Concept activation vectors", ConceptVectors, reads="embeddings")}
+EXPLAINERS = {
+    "concept_vectors": ExplainerEntry("Concept activation vectors", ConceptVectors, ("source",), reads="embeddings")
+}

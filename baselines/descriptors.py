@@ -1,69 +1,76 @@
 """Classifiers of causes on the descriptors of a pair (:mod:`gpca.features`): regressions on a few, trees on many.
 
 ``pair_forest`` reads what needs no further registration than the runs that tell the spread: 52 distances, ICP's motion,
-fitness and spread. ``pair_boosting`` reads every descriptor.
+fitness and spread. ``pair_boosting`` reads every descriptor. Names that end in ``_clouds`` see the two clouds alone,
+where ICP put them, and not how it moved them there.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
 from gpca.causes.dataset import LABELS
 from gpca.classifier.settings import LearningRate
 from gpca.explainers.concept_classifier import ClassifierExplainer, standardized_regression
-from gpca.explainers.interface import ExplainerEntry, attached
-from gpca.features.settings import DENSITIES, GROUPS, RESIDUALS
+from gpca.explainers.interface import ConceptExplainer, ExplainerEntry, attached
+from gpca.explainers.sight import Sees
+from gpca.features.parts import EVERY, EVERYTHING, RESIDUALS, Columns, seen
+from gpca.features.settings import DENSITIES
 from gpca.pairs.dataset import Registrations
 from gpca.seeds import seed_of
 from gpca.settings import Count, Positive
 
+CLOUDS: Sees = ("pair",)
+WITH_RUNS: Sees = ("pair", "motion", "runs")
+ALL: Sees = (*WITH_RUNS, "remedies")
+WITHOUT = "clouds alone"  # in titles: no motion of ICP, no further runs, no remedies
+
 
 class DescriptorClassifier(ClassifierExplainer):
-    """Scores are the probabilities of a scikit-learn classifier on some groups of descriptors.
+    """Scores are the probabilities of a scikit-learn classifier on some descriptors.
 
     Args:
         classifier: an unfitted classifier with ``predict_proba``.
-        groups: names in :data:`gpca.features.settings.GROUPS`.
-        columns: of all of them together, those that it reads; None for all.
+        sees: the parts that it reads descriptors of.
+        wanted: of these, its columns.
     """
 
     labels = LABELS
 
-    def __init__(self, classifier, groups: Sequence[str], columns: Sequence[int] | None = None) -> None:
+    def __init__(self, classifier, sees: Sees, wanted: Columns = EVERYTHING) -> None:
         super().__init__(classifier)
-        self._groups = groups
-        self._columns = columns
+        self._sees = sees
+        self._wanted = wanted
 
     def features(self, registrations: Registrations) -> np.ndarray:
         """Return the columns that the classifier reads."""
-        joined_N_F = joined(registrations, self._groups)
-        return joined_N_F if self._columns is None else joined_N_F[:, list(self._columns)]
+        return described(registrations, self._sees, self._wanted)
 
 
-def joined(registrations: Registrations, groups: Sequence[str]) -> np.ndarray:
-    """Return these groups of descriptors, attached to the registrations, side by side (N, F)."""
-    return np.hstack([attached(registrations, group) for group in groups])
+def described(registrations: Registrations, sees: Sees, wanted: Columns = EVERYTHING) -> np.ndarray:
+    """Return the descriptors that are attached to the registrations, see :func:`gpca.features.parts.seen`."""
+    return seen({group: attached(registrations, group) for group in wanted}, sees, wanted)
 
 
-def residuals(source: str, seed: int, inverse_regularisation: Positive = 1.0) -> DescriptorClassifier:
+def residuals(sees: Sees, source: str, seed: int, inverse_regularisation: Positive = 1.0) -> DescriptorClassifier:
     """Make the rival that reads residuals at several scales, in both directions, and the spread.
 
     Quantiles of the distances are residuals of trimmed pairs, so they stand apart from how much of the clouds overlaps.
     """
-    regression = standardized_regression(inverse_regularisation)
-    return DescriptorClassifier(regression, ("distances", "motion"), RESIDUALS)
+    return DescriptorClassifier(standardized_regression(inverse_regularisation), sees, RESIDUALS)
 
 
-def density(source: str, seed: int, inverse_regularisation: Positive = 1.0) -> DescriptorClassifier:
+def density(sees: Sees, source: str, seed: int, inverse_regularisation: Positive = 1.0) -> DescriptorClassifier:
     """Make the control that reads spacings and numbers of points: the shortcut that a fixed draw of points opens."""
-    return DescriptorClassifier(standardized_regression(inverse_regularisation), ("planes",), DENSITIES)
+    return DescriptorClassifier(standardized_regression(inverse_regularisation), sees, {"planes": DENSITIES})
 
 
-def entropies(source: str, seed: int, inverse_regularisation: Positive = 1.0) -> DescriptorClassifier:
+def entropies(sees: Sees, source: str, seed: int, inverse_regularisation: Positive = 1.0) -> DescriptorClassifier:
     """Make the rival that reads the entropies of the clouds, joint and apart (CorAl, Adolfsson et al. 2021)."""
-    return DescriptorClassifier(standardized_regression(inverse_regularisation), ("entropy",))
+    return DescriptorClassifier(standardized_regression(inverse_regularisation), sees, {"entropy": EVERY})
 
 
 def randomized_trees(source: str, seed: int, trees: int = 300, smallest_leaf: int = 2):
@@ -93,22 +100,33 @@ def boosted_trees(source: str, seed: int, iterations: int = 150, learning_rate: 
     )
 
 
-def pair_forest(source: str, seed: int, trees: Count = 300, smallest_leaf: Count = 2) -> DescriptorClassifier:
+def pair_forest(
+    sees: Sees, source: str, seed: int, trees: Count = 300, smallest_leaf: Count = 2
+) -> DescriptorClassifier:
     """Make the forest."""
-    return DescriptorClassifier(randomized_trees(source, seed, trees, smallest_leaf), ("distances", "motion"))
+    wanted = {"distances": EVERY, "motion": EVERY}
+    return DescriptorClassifier(randomized_trees(source, seed, trees, smallest_leaf), sees, wanted)
 
 
 def pair_boosting(
-    source: str, seed: int, iterations: Count = 150, learning_rate: LearningRate = 0.06
+    sees: Sees, source: str, seed: int, iterations: Count = 150, learning_rate: LearningRate = 0.06
 ) -> DescriptorClassifier:
     """Make the boosted trees."""
-    return DescriptorClassifier(boosted_trees(source, seed, iterations, learning_rate), GROUPS)
+    return DescriptorClassifier(boosted_trees(source, seed, iterations, learning_rate), sees)
+
+
+def entry(title: str, make: Callable[..., ConceptExplainer], sees: Sees) -> ExplainerEntry:
+    """Return the entry of an explainer that is made with what it sees."""
+    return ExplainerEntry(title, partial(make, sees), sees, reads="descriptors")
 
 
 CAUSE_EXPLAINERS = {
-    "residuals": ExplainerEntry("Residuals (regression)", residuals, reads="descriptors"),
-    "density": ExplainerEntry("Density alone (control)", density, reads="descriptors"),
-    "entropies": ExplainerEntry("Entropies, CorAl (regression)", entropies, reads="descriptors"),
-    "pair_forest": ExplainerEntry("Distances of the pair (forest)", pair_forest, reads="descriptors"),
-    "pair_boosting": ExplainerEntry("All descriptors (boosting)", pair_boosting, reads="descriptors"),
+    "residuals": entry("Residuals (regression)", residuals, WITH_RUNS),
+    "residuals_clouds": entry(f"Residuals (regression), {WITHOUT}", residuals, CLOUDS),
+    "density": entry("Density alone (control)", density, CLOUDS),
+    "entropies": entry("Entropies, CorAl (regression)", entropies, CLOUDS),
+    "pair_forest": entry("Distances of the pair (forest)", pair_forest, WITH_RUNS),
+    "pair_forest_clouds": entry(f"Distances of the pair (forest), {WITHOUT}", pair_forest, CLOUDS),
+    "pair_boosting": entry("All descriptors (boosting)", pair_boosting, ALL),
+    "pair_boosting_clouds": entry(f"Descriptors (boosting), {WITHOUT}", pair_boosting, CLOUDS),
 }

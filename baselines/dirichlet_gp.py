@@ -133,4 +133,6 @@ def _squared_distances(a_A_d: np.ndarray, b_B_d: np.ndarray) -> np.ndarray:
     return squared_distances(torch.from_numpy(a_A_d), torch.from_numpy(b_B_d)).numpy()
 
 
-EXPLAINERS = {"learner_dirichlet_gp": ExplainerEntry("Dirichlet exact GP", DirichletGP, reads="embeddings")}
+EXPLAINERS = {
+    "learner_dirichlet_gp": ExplainerEntry("Dirichlet exact GP", DirichletGP, ("source",), reads="embeddings")
+}

@@ -20,7 +20,13 @@ from gpca.pairs.perturbation import CONCEPTS
 
 
 class NominalThreshold:
-    """Turns an alarm (larger is worse) and the scores of the causes into scores over `LABELS`."""
+    """Turns an alarm (larger is worse) and the scores of the causes into scores over `LABELS`.
+
+    Attributes:
+        accuracy: balanced, of the threshold on the labeled samples; a half where it cannot be told.
+    """
+
+    accuracy = 0.5
 
     def fit(self, alarm_N: np.ndarray, label_N: np.ndarray) -> NominalThreshold:
         """Find the threshold of the best balanced accuracy on labeled samples, and the scale of the alarm.
@@ -35,6 +41,7 @@ class NominalThreshold:
             kept_N = np.cumsum(nominal_N[order]) / nominal_N.sum()
             lost_N = np.cumsum(~nominal_N[order]) / (~nominal_N).sum()
             best = int(np.argmax(kept_N - lost_N))
+            self.accuracy = float(1 + kept_N[best] - lost_N[best]) / 2
             following = min(best + 1, len(order) - 1)
             self._threshold = float(alarm_N[order[[best, following]]].mean())
         self._scale = max(float(np.quantile(alarm_N, 0.75) - np.quantile(alarm_N, 0.25)), 1e-9)
@@ -69,12 +76,11 @@ class Gate(ScoringExplainer):
     labels = LABELS
 
     def __init__(self, name: str, source: str, seed: int) -> None:
-        self._column = MOTION.index(name)
-        self._sign = -1 if name == "fitness" else 1  # of the others, large values are bad
+        self._name = name
 
     def fit(self, registrations: Registrations) -> None:
         """Learn the threshold."""
-        self._threshold = NominalThreshold().fit(self._alarm(registrations), registrations.concept)
+        self._threshold = NominalThreshold().fit(alarm(registrations, self._name), registrations.concept)
 
     def explain(self, registrations: Registrations) -> Attribution:
         """Score every registration, and name no cause of any."""
@@ -83,15 +89,20 @@ class Gate(ScoringExplainer):
     def scores(self, registrations: Registrations) -> np.ndarray:
         """Score nominal by the alarm, and all causes alike."""
         even_N_3 = np.full((len(registrations), len(CONCEPTS)), 1 / len(CONCEPTS))
-        return self._threshold.scores(self._alarm(registrations), even_N_3)
-
-    def _alarm(self, registrations: Registrations) -> np.ndarray:
-        return self._sign * attached(registrations, "motion")[:, self._column]
+        return self._threshold.scores(alarm(registrations, self._name), even_N_3)
 
 
+def alarm(registrations: Registrations, name: str) -> np.ndarray:
+    """Return one of the numbers of the motion (N,), with the sign by which large values are bad."""
+    return (-1 if name == "fitness" else 1) * attached(registrations, "motion")[:, MOTION.index(name)]
+
+
+# The determinant of the covariance over other starts needs no clean run.
+GATES = ("inlier_rmse", "fitness", "log_determinant")
 CAUSE_EXPLAINERS = {
-    "gate_rmse": ExplainerEntry("Inlier RMSE (gate)", partial(Gate, "inlier_rmse"), reads="descriptors"),
-    "gate_fitness": ExplainerEntry("Fitness (gate)", partial(Gate, "fitness"), reads="descriptors"),
-    # The determinant of the covariance over other starts needs no clean run.
-    "gate_spread": ExplainerEntry("Spread of the runs (gate)", partial(Gate, "log_determinant"), reads="descriptors"),
+    "gate_rmse": ExplainerEntry("Inlier RMSE (gate)", partial(Gate, "inlier_rmse"), ("pair",), reads="descriptors"),
+    "gate_fitness": ExplainerEntry("Fitness (gate)", partial(Gate, "fitness"), ("pair",), reads="descriptors"),
+    "gate_spread": ExplainerEntry(
+        "Spread of the runs (gate)", partial(Gate, "log_determinant"), ("runs",), reads="descriptors"
+    ),
 }

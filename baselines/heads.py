@@ -168,6 +168,6 @@ class Dropout(HeadLearner):
 
 
 EXPLAINERS = {
-    "learner_ensemble": ExplainerEntry("Deep ensemble of heads", Ensemble, reads="embeddings"),
-    "learner_dropout": ExplainerEntry("MC dropout of the head", Dropout, reads="embeddings"),
+    "learner_ensemble": ExplainerEntry("Deep ensemble of heads", Ensemble, ("source",), reads="embeddings"),
+    "learner_dropout": ExplainerEntry("MC dropout of the head", Dropout, ("source",), reads="embeddings"),
 }

@@ -99,5 +99,7 @@ def _log_softmax(logits_N_C: np.ndarray) -> np.ndarray:
 
 
 EXPLAINERS = {
-    "learner_laplace_head": ExplainerEntry("Last-layer Laplace of the head", LastLayerLaplace, reads="embeddings"),
+    "learner_laplace_head": ExplainerEntry(
+        "Last-layer Laplace of the head", LastLayerLaplace, ("source",), reads="embeddings"
+    ),
 }

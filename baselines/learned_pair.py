@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from baselines.pair import PairDescription
+from baselines.pair import CLOUDS, WITH_MOTION, WITHOUT, PairDescription
 from gpca.classifier.settings import GPCArguments
 from gpca.explainers.gpca import GPCA
 from gpca.explainers.interface import ExplainerEntry
@@ -22,6 +22,7 @@ class LearnedPairGPCA(PairDescription, GPCA):
 
     Args:
         encoder: one of :data:`gpca.encoders.pair.PAIR_ENCODERS`.
+        motion: whether it is told how far ICP moved the cloud.
         source, seed: name what is random.
         points: of each cloud, each described by how it lies to the other cloud.
         draw_points, epochs, encoder_learning_rate: of the encoder's training, each epoch on other ones of the points.
@@ -31,6 +32,7 @@ class LearnedPairGPCA(PairDescription, GPCA):
     def __init__(
         self,
         encoder: str,
+        motion: bool,
         source: str,
         seed: int,
         points: DescribedPoints = 512,
@@ -39,28 +41,35 @@ class LearnedPairGPCA(PairDescription, GPCA):
         encoder_learning_rate: PositiveShare = 4e-3,
         **settings: GPCArguments,
     ) -> None:
-        PairDescription.__init__(self, source, seed, "relations", points)
+        PairDescription.__init__(self, source, seed, "relations", points, motion)
         GPCA.__init__(self, source, seed, **settings)
         self._encoder = encoder
         self._training = (min(draw_points, points), epochs, encoder_learning_rate)
-        self._embedding = f"{self._prefix}embedding_by_{encoder}"
+        self._embedding = f"{self._prefix}embedding_by_{encoder}" + ("" if motion else "_without_motion")
         self._embed: Callable[[Registrations], Registrations] | None = None
 
     def learn_encoder(self, registrations: Registrations) -> Callable[[Registrations], Registrations]:
         """Train the encoder on the labeled pairs, and return a function that attaches its embeddings."""
         from gpca.encoders.settings import EncoderSettings
         from gpca.explainers.pair_encoder import PairDraw, learn_pair_encoder
-        from gpca.features.registered import MOTION
+        from gpca.features.registered import FIT, MOTION
 
-        draw = PairDraw(self._prefix + "points", self._prefix + "motion")
+        told = MOTION if self._motion else FIT
+        draw = PairDraw(self._prefix + "points", f"{self._prefix}last_{told}")
 
         def seen(pairs: Registrations) -> Registrations:
             described = self.describe(pairs)
-            motion = self.features(described)[:, -MOTION:]
+            motion = self.features(described)[:, -told:]
             return replace(described, attached={**described.attached, draw.motion: motion})
 
         draw_points, epochs, learning_rate = self._training
-        settings = EncoderSettings(self._encoder, draw_points, draws=2, epochs=epochs, learning_rate=learning_rate)
+        settings = EncoderSettings(
+            *(self._encoder, draw_points),
+            draws=2,
+            epochs=epochs,
+            learning_rate=learning_rate,
+            options={"motion": told},
+        )
         encoder = learn_pair_encoder(seen(registrations), settings, draw, *self._axes)
 
         def embed(pairs: Registrations) -> Registrations:
@@ -79,9 +88,15 @@ class LearnedPairGPCA(PairDescription, GPCA):
         return (self._embed(registrations) if self._embed else registrations).attached[self._embedding]
 
 
+ENCODERS = {"dgcnn": "DGCNN", "attention": "cross-attention"}
 EXPLAINERS = {
-    "gpca_pair_dgcnn": ExplainerEntry("GP-CA on the pair (DGCNN)", partial(LearnedPairGPCA, "pair_dgcnn")),
-    "gpca_pair_attention": ExplainerEntry(
-        "GP-CA on the pair (cross-attention)", partial(LearnedPairGPCA, "pair_attention")
-    ),
+    f"gpca_pair_{name}": ExplainerEntry(
+        f"GP-CA on the pair ({words})", partial(LearnedPairGPCA, f"pair_{name}", True), WITH_MOTION
+    )
+    for name, words in ENCODERS.items()
+} | {
+    f"gpca_pair_{name}_clouds": ExplainerEntry(
+        f"GP-CA on the pair ({words}), {WITHOUT}", partial(LearnedPairGPCA, f"pair_{name}", False), CLOUDS
+    )
+    for name, words in ENCODERS.items()
 }

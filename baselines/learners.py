@@ -120,10 +120,12 @@ def _standardized(*steps):
 
 
 EXPLAINERS = {
-    "learner_forest": ExplainerEntry("Random forest on the embedding", forest, reads="embeddings"),
-    "learner_linear_svm": ExplainerEntry("Linear SVM on the embedding", linear_svm, reads="embeddings"),
-    "learner_rbf_svm": ExplainerEntry("RBF SVM on the embedding", rbf_svm, reads="embeddings"),
-    "learner_logistic": ExplainerEntry("Logistic regression on the embedding", logistic, reads="embeddings"),
-    "learner_nearest": ExplainerEntry("k nearest embeddings", nearest, reads="embeddings"),
-    "learner_laplace_gpc": ExplainerEntry("Laplace GPC on the embedding", laplace_gpc, reads="embeddings"),
+    "learner_forest": ExplainerEntry("Random forest on the embedding", forest, ("source",), reads="embeddings"),
+    "learner_linear_svm": ExplainerEntry("Linear SVM on the embedding", linear_svm, ("source",), reads="embeddings"),
+    "learner_rbf_svm": ExplainerEntry("RBF SVM on the embedding", rbf_svm, ("source",), reads="embeddings"),
+    "learner_logistic": ExplainerEntry(
+        "Logistic regression on the embedding", logistic, ("source",), reads="embeddings"
+    ),
+    "learner_nearest": ExplainerEntry("k nearest embeddings", nearest, ("source",), reads="embeddings"),
+    "learner_laplace_gpc": ExplainerEntry("Laplace GPC on the embedding", laplace_gpc, ("source",), reads="embeddings"),
 }

@@ -1,11 +1,14 @@
-"""Explainers that see the pair, both clouds and the motion of ICP, and not the aligned source alone.
+"""Explainers that see the pair, both clouds and the motion of ICP or without it, and not the aligned source alone.
 
 `gpca_pair` is the paper's classifier with other eyes: a row of its own, never "GP-CA (paper)". What it reads does not
-depend on which object is registered (:func:`gpca.features.registered.relations`). Beside it stand the plainest form
-of the same idea, a forest on distances, and a rival that knows only the density of the cloud.
+depend on which object is registered (:func:`gpca.features.registered.relations`). `gpca_pair_clouds` is the same
+without how far ICP moved the cloud, which gives pose errors away where nothing else starts off. Beside them stand the
+plainest form of the same idea, a forest on distances, and a rival that knows only the density of the cloud.
 """
 
 from __future__ import annotations
+
+from functools import partial
 
 import numpy as np
 
@@ -13,10 +16,15 @@ from gpca.classifier.settings import GPCArguments
 from gpca.explainers.concept_classifier import ClassifierExplainer, standardized_regression
 from gpca.explainers.gpca import DescriptorGPCA
 from gpca.explainers.interface import ExplainerEntry, measured
+from gpca.explainers.sight import Sees
 from gpca.features.settings import DescribedPoints
 from gpca.pairs.dataset import Registrations
 from gpca.seeds import seed_of
 from gpca.settings import Count, Positive
+
+CLOUDS: Sees = ("pair",)
+WITH_MOTION: Sees = ("pair", "motion")
+WITHOUT = "without ICP's motion"  # in titles
 
 
 class PairDescription:
@@ -26,11 +34,13 @@ class PairDescription:
         source, seed: name the draws from the clouds.
         group: one of :data:`gpca.features.registered.WIDTHS`.
         points: drawn from each cloud.
+        motion: whether the relations tell how far ICP moved the cloud.
     """
 
-    def __init__(self, source: str, seed: int, group: str, points: int) -> None:
+    def __init__(self, source: str, seed: int, group: str, points: int, motion: bool = True) -> None:
         self._axes = (source, seed)
         self._group = group
+        self._motion = motion
         self._points = points
         self._prefix = f"pair_{source}_{seed}_{points}_"
 
@@ -46,20 +56,26 @@ class PairDescription:
 
     def features(self, registrations: Registrations) -> np.ndarray:
         """Return the group (N, F)."""
-        return self.describe(registrations).attached[self._prefix + self._group]
+        from gpca.features.registered import MOVED
+
+        features_N_F = self.describe(registrations).attached[self._prefix + self._group]
+        return features_N_F if self._motion else np.delete(features_N_F, MOVED, axis=1)
 
 
 class PairGPCA(PairDescription, DescriptorGPCA):
     """GP-CA on the relations of the pair.
 
     Args:
+        motion: whether they tell how far ICP moved the cloud.
         source, seed: name the draws.
         points: drawn from each cloud.
         settings: those of the GPC, as for GP-CA.
     """
 
-    def __init__(self, source: str, seed: int, points: DescribedPoints = 512, **settings: GPCArguments) -> None:
-        PairDescription.__init__(self, source, seed, "relations", points)
+    def __init__(
+        self, motion: bool, source: str, seed: int, points: DescribedPoints = 512, **settings: GPCArguments
+    ) -> None:
+        PairDescription.__init__(self, source, seed, "relations", points, motion)
         DescriptorGPCA.__init__(self, (source, seed, "gpca_pair"), source, seed, **settings)
 
 
@@ -89,7 +105,8 @@ def density(
 
 
 EXPLAINERS = {
-    "gpca_pair": ExplainerEntry("GP-CA on the pair", PairGPCA),
-    "pair_forest": ExplainerEntry("Distances of the pair (random forest)", pair_forest),
-    "density": ExplainerEntry("Density alone (logistic regression)", density),
+    "gpca_pair": ExplainerEntry("GP-CA on the pair", partial(PairGPCA, True), WITH_MOTION),
+    "gpca_pair_clouds": ExplainerEntry(f"GP-CA on the pair, {WITHOUT}", partial(PairGPCA, False), CLOUDS),
+    "pair_forest": ExplainerEntry("Distances of the pair (random forest)", pair_forest, CLOUDS),
+    "density": ExplainerEntry("Density alone (logistic regression)", density, CLOUDS),
 }

@@ -69,6 +69,10 @@ def _single_remedies(errors_N_8: np.ndarray) -> np.ndarray:
 
 
 CAUSE_EXPLAINERS = {
-    "shap_removal": ExplainerEntry("SHAP, remedies", partial(RemovalValues, shapley_values), reads="descriptors"),
-    "sa_removal": ExplainerEntry("SA, remedies", partial(RemovalValues, _single_remedies), reads="descriptors"),
+    "shap_removal": ExplainerEntry(
+        "SHAP, remedies", partial(RemovalValues, shapley_values), ("remedies",), reads="descriptors"
+    ),
+    "sa_removal": ExplainerEntry(
+        "SA, remedies", partial(RemovalValues, _single_remedies), ("remedies",), reads="descriptors"
+    ),
 }

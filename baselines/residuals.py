@@ -104,7 +104,7 @@ def residuals_forest(source: str, seed: int, trees: Count = 200, floor: Positive
     return Residuals(RandomForestClassifier(n_estimators=trees, random_state=random_state), floor)
 
 
-_entry = partial(ExplainerEntry, reads="uncertainty/removal", observed_only=True)
+_entry = partial(ExplainerEntry, sees=("pair", "runs"), reads="uncertainty/removal", observed_only=True)
 EXPLAINERS = {
     "residuals_logistic": _entry("Residuals (logistic regression)", residuals_logistic),
     "residuals_forest": _entry("Residuals (random forest)", residuals_forest),

@@ -69,6 +69,6 @@ class ResidualRules(Residuals):
 
 EXPLAINERS = {
     "residuals_rules": ExplainerEntry(
-        "Residuals (rules)", ResidualRules, reads="uncertainty/removal", observed_only=True
+        "Residuals (rules)", ResidualRules, ("pair", "runs"), reads="uncertainty/removal", observed_only=True
     )
 }

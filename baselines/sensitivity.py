@@ -84,12 +84,12 @@ sa_sobol_additive = partial(KnobValues, partial(_over_settings, total_indices, "
 sa_local_removal = partial(ScaledValues, single_drops, ONE_AT_A_TIME)
 sa_supervised = partial(LearnedValues, single_drops, ONE_AT_A_TIME)
 EXPLAINERS = {
-    "sa_local_additive": ExplainerEntry("SA", sa_local_additive, reads="uncertainty/additive"),
-    "sa_prcc_additive": ExplainerEntry("SA, PRCC", sa_prcc_additive, reads="uncertainty/latin"),
-    "sa_sobol_additive": ExplainerEntry("SA, Sobol", sa_sobol_additive, reads="uncertainty/saltelli"),
-    "sa_local_removal": ExplainerEntry("SA, remedies", sa_local_removal, reads="uncertainty/removal"),
+    "sa_local_additive": ExplainerEntry("SA", sa_local_additive, ("runs",), reads="uncertainty/additive"),
+    "sa_prcc_additive": ExplainerEntry("SA, PRCC", sa_prcc_additive, ("runs",), reads="uncertainty/latin"),
+    "sa_sobol_additive": ExplainerEntry("SA, Sobol", sa_sobol_additive, ("runs",), reads="uncertainty/saltelli"),
+    "sa_local_removal": ExplainerEntry("SA, remedies", sa_local_removal, ("remedies",), reads="uncertainty/removal"),
     "sa_local_removal_residual": ExplainerEntry(
-        "SA, remedies, residual", sa_local_removal, reads="uncertainty/removal"
+        "SA, remedies, residual", sa_local_removal, ("remedies",), reads="uncertainty/removal"
     ),
-    "sa_supervised": ExplainerEntry("SA, remedies, learned", sa_supervised, reads="uncertainty/removal"),
+    "sa_supervised": ExplainerEntry("SA, remedies, learned", sa_supervised, ("remedies",), reads="uncertainty/removal"),
 }

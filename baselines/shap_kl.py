@@ -44,9 +44,15 @@ shap_removal = partial(ScaledValues, shapley_values, ALL_CORNERS)
 shap_supervised = partial(LearnedValues, shapley_values, ALL_CORNERS)
 
 EXPLAINERS = {
-    "shap_additive": ExplainerEntry("SHAP", shap_over_knobs, reads="uncertainty/additive"),
-    "shap_oracle": ExplainerEntry("SHAP (oracle)", shap_over_knobs, reads="uncertainty/oracle", oracle=True),
-    "shap_removal": ExplainerEntry("SHAP, remedies", shap_removal, reads="uncertainty/removal"),
-    "shap_removal_residual": ExplainerEntry("SHAP, remedies, residual", shap_removal, reads="uncertainty/removal"),
-    "shap_supervised": ExplainerEntry("SHAP, remedies, learned", shap_supervised, reads="uncertainty/removal"),
+    "shap_additive": ExplainerEntry("SHAP", shap_over_knobs, ("runs",), reads="uncertainty/additive"),
+    "shap_oracle": ExplainerEntry(
+        "SHAP (oracle)", shap_over_knobs, ("runs", "truth"), reads="uncertainty/oracle", oracle=True
+    ),
+    "shap_removal": ExplainerEntry("SHAP, remedies", shap_removal, ("remedies",), reads="uncertainty/removal"),
+    "shap_removal_residual": ExplainerEntry(
+        "SHAP, remedies, residual", shap_removal, ("remedies",), reads="uncertainty/removal"
+    ),
+    "shap_supervised": ExplainerEntry(
+        "SHAP, remedies, learned", shap_supervised, ("remedies",), reads="uncertainty/removal"
+    ),
 }

@@ -30,4 +30,4 @@ class SoftmaxHead(ScoringExplainer):
         return softmax(attached(registrations, "head_logits"), axis=1)
 
 
-EXPLAINERS = {"softmax_head": ExplainerEntry("Softmax head", SoftmaxHead, reads="embeddings")}
+EXPLAINERS = {"softmax_head": ExplainerEntry("Softmax head", SoftmaxHead, ("source",), reads="embeddings")}

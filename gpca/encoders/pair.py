@@ -13,7 +13,7 @@ from gpca.encoders.dgcnn import DGCNN
 from gpca.encoders.edge_conv import NEGATIVE_SLOPE
 from gpca.encoders.layers import PointLinear, stacked_product
 
-CHANNELS, MOTION = 7, 5  # numbers of a point, and of the motion
+CHANNELS, MOTION = 7, 5  # numbers of a point, and of the motion where all of it is told
 SCALE = 0.1  # of all but the coordinates, so that neighbors in the first graph are neighbors on the surface
 
 
@@ -24,18 +24,21 @@ class PairDGCNN(nn.Module):
         k: neighbors per point, of either cloud.
         widths: of the EdgeConvs.
         point_features: width of the point-wise layer.
+        motion: numbers of the motion that it is told.
     """
 
-    def __init__(self, k: int = 10, widths: tuple[int, ...] = (32, 32, 64), point_features: int = 64) -> None:
+    def __init__(
+        self, k: int = 10, widths: tuple[int, ...] = (32, 32, 64), point_features: int = 64, motion: int = MOTION
+    ) -> None:
         super().__init__()
         self.dgcnn = DGCNN(k, point_features, widths, CHANNELS + 1)
-        self.embedding_size = self.dgcnn.embedding_size + MOTION
+        self.embedding_size = self.dgcnn.embedding_size + motion
 
     def forward(self, pairs: tuple[torch.Tensor, torch.Tensor]) -> torch.Tensor:
         """Return embeddings (B, d).
 
         Args:
-            pairs: points (B, 2, T, `CHANNELS`) of the observed cloud and of the model, and motions (B, `MOTION`).
+            pairs: points (B, 2, T, `CHANNELS`) of the observed cloud and of the model, and motions (B, M).
         """
         points_B_2_T_F, motion_B_M = pairs
         batch, _, count, _ = points_B_2_T_F.shape
@@ -51,15 +54,16 @@ class PairAttention(nn.Module):
 
     Args:
         width: of all layers.
+        motion: numbers of the motion that it is told.
     """
 
-    def __init__(self, width: int = 64) -> None:
+    def __init__(self, width: int = 64, motion: int = MOTION) -> None:
         super().__init__()
         self.first = _PointLayer(CHANNELS, width)
         self.second = _PointLayer(width, width)
         self.query, self.key, self.value = (PointLinear(width, width, bias=False) for _ in range(3))
         self.last = _PointLayer(2 * width, width)
-        self.embedding_size = 4 * width + MOTION
+        self.embedding_size = 4 * width + motion
 
     def forward(self, pairs: tuple[torch.Tensor, torch.Tensor]) -> torch.Tensor:
         """Return embeddings (B, d): maximum and mean of either cloud, and the motion; see :class:`PairDGCNN`."""

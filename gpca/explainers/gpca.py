@@ -66,7 +66,7 @@ class DescriptorGPCA(GPCA):
 
 
 EXPLAINERS = {
-    "gpca_paper": ExplainerEntry("GP-CA (paper's setting)", GPCA, reads="embeddings"),
-    "gpca": ExplainerEntry("GP-CA (trained longer)", GPCA, reads="embeddings"),
+    "gpca_paper": ExplainerEntry("GP-CA (paper's setting)", GPCA, ("source",), reads="embeddings"),
+    "gpca": ExplainerEntry("GP-CA (trained longer)", GPCA, ("source",), reads="embeddings"),
 }
 GPCA_FORMS = tuple(EXPLAINERS)

@@ -3,7 +3,7 @@
 An explainer is a class with ``fit`` and ``explain`` in a file of ``baselines/``, listed in that file's
 ``EXPLAINERS`` by the name under which the config switches it on::
 
-    EXPLAINERS = {"my_explainer": ExplainerEntry("My explainer", MyExplainer)}
+    EXPLAINERS = {"my_explainer": ExplainerEntry("My explainer", MyExplainer, sees=("pair",))}
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import numpy as np
 
 from gpca.attribution.scores import Attribution
 from gpca.errors import InputError
+from gpca.explainers.sight import Sees, in_words, require_parts
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 
@@ -122,6 +123,7 @@ class ExplainerEntry:
     Attributes:
         title: what tables call it.
         make: what makes it from source, seed and the settings of the config.
+        sees: all that its answer depends on, parts of :data:`gpca.explainers.sight.PARTS`; empty where it is nothing.
         reads: what it needs attached: ``embeddings`` those of the encoder, ``uncertainty/<design>`` the outcomes of
             that design (:mod:`gpca.uncertainty.designs`); ``registrations`` nothing.
         observed_only: of a design's outcomes it reads those of the observed pair alone, the first.
@@ -130,9 +132,18 @@ class ExplainerEntry:
 
     title: str
     make: Callable[..., ConceptExplainer]
+    sees: Sees
     reads: str = BARE
     oracle: bool = False
     observed_only: bool = False
+
+    def __post_init__(self) -> None:
+        require_parts(f"explainer '{self.title}'", self.sees)
+
+    @property
+    def sight(self) -> str:
+        """What it sees, in words."""
+        return in_words(self.sees)
 
     @property
     def design(self) -> str | None:

@@ -16,8 +16,8 @@ from gpca.features.distances import describe_distances
 from gpca.features.entropy import ENTROPY, describe_entropy
 from gpca.features.motion import STARTS, describe_motion, describe_starts
 from gpca.features.pair import ObservedPair, observed_pair
-from gpca.features.remedied import REMEDIED, describe_remedied
-from gpca.features.settings import DENSITIES, GROUPS, MOTION, QUANTILES, DescriptorSettings
+from gpca.features.remedied import describe_remedied
+from gpca.features.settings import DENSITIES, GROUPS, MOTION, QUANTILES, REMEDIED, DescriptorSettings
 from gpca.io.arrays import REAL, REGENERATE, TEXT, WHOLE, load_arrays, save_arrays
 from gpca.io.names import Axes
 from gpca.pairs.dataset import Registrations

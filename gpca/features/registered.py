@@ -17,7 +17,9 @@ SMALLEST = 1e-5  # diameters; nothing is nearer that could be told from zero
 COARSE = slice(0, QUANTILES, 3)  # five of the thirteen quantiles say as much of a relation
 WIDTHS = {"distances": 4 * QUANTILES, "relations": 35, "densities": 2}
 POINTS = "points"
-MOTION = 5  # of the relations, the last: what ICP did
+MOTION = 5  # of the relations, the last: how far ICP moved the cloud, and how well it then fits
+FIT = 2  # of these, the last: the clouds as ICP left them tell as much
+MOVED = slice(-MOTION, -FIT)
 
 
 def describe_registrations(registrations: Registrations, *axes: object, points: int) -> dict[str, np.ndarray]:

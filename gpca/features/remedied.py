@@ -21,22 +21,13 @@ from gpca.causes.shapley import SUBSETS, shapley_values
 from gpca.causes.truth import LARGEST_ERROR
 from gpca.features.pair import ObservedPair, displacements
 from gpca.features.settings import DescriptorSettings
-from gpca.pairs.perturbation import CONCEPTS, NOISE, OVERLAP, POSE
+from gpca.pairs.perturbation import NOISE, OVERLAP, POSE
 from gpca.seeds import generator
 from gpca.uncertainty.remedies import denoise
 
-REMEDIED = (
-    *(f"error_{subset}" for subset in range(len(SUBSETS))),
-    *(f"phi_{concept}" for concept in CONCEPTS),
-    *(f"moved_{subset}" for subset in range(len(SUBSETS))),
-    *(f"cost_{subset}" for subset in range(len(SUBSETS))),
-    *(f"fitness_{subset}" for subset in range(len(SUBSETS))),
-    *("outliers", "smoothed"),
-)
-
 
 def describe_remedied(pair: ObservedPair, settings: DescriptorSettings, icp: ICPSettings) -> np.ndarray:
-    """Return `REMEDIED`.
+    """Return the numbers of :data:`gpca.features.settings.REMEDIED`.
 
     For each subset of the causes that are left alone: v̂ in diameters; after the Shapley values of v̂, how far the best
     result moves the observed cloud from where it lies, and the best result's cost (squared diameters) and fitness.

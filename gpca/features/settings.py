@@ -10,6 +10,8 @@ from typing import Annotated
 
 import numpy as np
 
+from gpca.causes.shapley import SUBSETS
+from gpca.pairs.perturbation import CONCEPTS
 from gpca.settings import Bounds, Positive
 from gpca.uncertainty.settings import start_deviation
 
@@ -19,9 +21,15 @@ MOTION = (
     *("rotation", "translation", "displacement", "fitness", "inlier_rmse"),
     *("spread_rotation", "spread_translation", "log_determinant"),
 )
-# Of the groups distances and motion, joined: every other quantile of the three distances, and all of the motion.
-RESIDUALS = (*range(0, 3 * QUANTILES, 2), *range(4 * QUANTILES, 4 * QUANTILES + len(MOTION)))
-DENSITIES = tuple(range(3 * QUANTILES, 3 * QUANTILES + 6))  # of the planes: spacings, extents, numbers of points
+REMEDIED = (
+    *(f"error_{subset}" for subset in range(len(SUBSETS))),
+    *(f"phi_{concept}" for concept in CONCEPTS),
+    *(f"moved_{subset}" for subset in range(len(SUBSETS))),
+    *(f"cost_{subset}" for subset in range(len(SUBSETS))),
+    *(f"fitness_{subset}" for subset in range(len(SUBSETS))),
+    *("outliers", "smoothed"),
+)
+DENSITIES = list(range(3 * QUANTILES, 3 * QUANTILES + 6))  # of the planes: spacings, extents, numbers of points
 DescribedPoints = Annotated[int, Bounds(minimum=16, maximum=65536)]  # of each cloud
 
 
@@ -44,6 +52,16 @@ class DescriptorSettings:
     restart_rotation_deg: Annotated[float, Bounds(exclusiveMinimum=0, maximum=180)] = 50.0
     restart_translation: Positive = 0.25
     icp_points: Annotated[int, Bounds(minimum=16, maximum=65536)] = 512
+
+    @property
+    def quick_remedy_calls(self) -> int:
+        """The runs of ICP without a restart: with or without denoising, and with the clouds' roles either way."""
+        return 4 * self.starts
+
+    @property
+    def remedy_calls(self) -> int:
+        """All runs of ICP with remedies: with a restart each combination of the others has more starts."""
+        return self.quick_remedy_calls + 4 * self.restarts
 
     def twists(self, near_k_6: np.ndarray, far_k_6: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the twists of the starts near by and farther off, of standard normal numbers (k, 6)."""

@@ -12,6 +12,7 @@ from gpca.causes.truth import BORDERLINE, NOMINAL
 from gpca.errors import InputError
 from gpca.explainers.registry import CAUSES, explainer_entry, explainer_module, explainers
 from gpca.features.dataset import describe_all
+from gpca.features.parts import COLUMNS
 from gpca.features.settings import DescriptorSettings
 
 FAST = {
@@ -21,7 +22,9 @@ FAST = {
     "pair_forest": {"trees": 10},
     "pair_boosting": {"iterations": 3},
 }
-NAMES = sorted(set(explainers(CAUSES)) - {"pair_committee"})  # it is made of three of the others, and slow
+FAST |= {f"{name}_clouds": settings for name, settings in FAST.items()}
+COMMITTEES = {"pair_committee", "pair_committee_clouds"}  # each is made of three of the others, and slow
+NAMES = sorted(set(explainers(CAUSES)) - COMMITTEES)
 
 
 @pytest.fixture(scope="module")
@@ -60,10 +63,26 @@ def test_who_learns_finds_the_labels_of_the_samples_that_it_learned(name, seen):
     assert (attribution.predicted_N == seen.concept).mean() > 0.5
 
 
+@pytest.mark.parametrize("name", NAMES)
+def test_scores_depend_on_nothing_but_what_the_entry_says_it_sees(name, seen):
+    sees = explainer_entry(name, CAUSES).sees
+    blind = {group: array.copy() for group, array in seen.attached.items()}
+    shown = set(sees) | ({"quick_remedies"} if "remedies" in sees else set())
+    for part in set(COLUMNS) - shown - {"source"}:
+        for group, columns in COLUMNS[part].items():
+            blind[group][:, columns] = 7.0
+    if not {"pair", "remedies"} & set(sees):
+        blind["distances"][:] = 7.0
+    if "source" not in sees:
+        blind |= {"embedding": np.full((len(seen), 6), 7.0), "head_logits": np.full((len(seen), 4), 7.0)}
+    found = explained(name, replace(seen, attached=blind))
+    assert np.array_equal(found.scores_N_C, explained(name, seen).scores_N_C)
+
+
 def test_a_committee_says_the_mean_of_what_its_members_say(seen):
     from baselines.descriptor_gpca import Committee
 
-    committee = Committee("four", 100)
+    committee = Committee(("pair", "motion", "runs", "remedies"), "four", 100)
     committee.fit(seen)
     members = [member.explain(seen).scores_N_C for member in committee._members]
     assert committee.explain(seen).scores_N_C == pytest.approx(np.mean(members, axis=0))

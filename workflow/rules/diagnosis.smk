@@ -44,6 +44,7 @@ rule diagnose:
     params:
         step="gpca.experiments.diagnosis.step",
         explainer=lambda wildcards: wildcards.cause_explainer,
+        remedies=as_json(DIAGNOSIS["descriptors"]),
         settings=lambda wildcards: as_json(
             DIAGNOSIS["explainers"][wildcards.cause_explainer] or {}
         ),

@@ -42,8 +42,8 @@ def other_sources(wildcards):
 
 def read_by(cause_explainer):
     """Return the folder of what an explainer of causes reads."""
-    entry = explainer_entry(cause_explainer, CAUSES)
-    return "cause_embeddings" if entry.reads == "embeddings" else "descriptors"
+    folders = {"embeddings": "cause_embeddings", BARE: "causes"}
+    return folders.get(explainer_entry(cause_explainer, CAUSES).reads, "descriptors")
 
 
 def encoders_of_others(wildcards):

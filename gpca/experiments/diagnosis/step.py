@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,9 +12,11 @@ from gpca.attribution.predictions import read_timings, write_predictions, write_
 from gpca.causes.dataset import Causes, labeled
 from gpca.causes.truth import BORDERLINE
 from gpca.errors import InputError
-from gpca.explainers.interface import ExplainerEntry
+from gpca.explainers.interface import BARE, ExplainerEntry
 from gpca.explainers.registry import CAUSES, explainer_entry
+from gpca.explainers.sight import icp_calls
 from gpca.features.dataset import Descriptors
+from gpca.features.settings import DescriptorSettings
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
@@ -22,6 +25,7 @@ from gpca.process.provenance import record_provenance
 def run(job: Job) -> None:
     """Fit on the training rows that have a label and explain every row, seed by seed."""
     entry = explainer_entry(job.explainer, CAUSES)
+    remedies = DescriptorSettings(**json.loads(job.remedies))
     files = ("causes", "read", "read_timings", "predictions", "timings")
     for seed, causes_file, read, read_timing, predictions, timings in job.per_seed(*files):
         explainer = entry.make(job.source, seed, **job.settings)
@@ -32,6 +36,8 @@ def run(job: Job) -> None:
             seconds_S, icp_seconds_S = read_timings(read_timing, registrations)
             explainer.fit(registrations.subset(training_rows(registrations, causes_file)))
             attribution = explainer.explain(observed_only(registrations))
+            calls = icp_calls(entry.sees, causes.T_target_source_runs.shape[1], remedies)
+            attribution = replace(attribution, icp_calls_N=np.full(len(registrations), calls))
             write_predictions(predictions, causes.registrations, attribution)
             write_timings(timings, registrations, seconds_S + attribution.seconds_N, icp_seconds_S)
 
@@ -50,6 +56,8 @@ def observed_only(registrations: Registrations) -> Registrations:
 
 
 def with_what_it_reads(registrations: Registrations, entry: ExplainerEntry, path: Path) -> Registrations:
+    if entry.reads == BARE:
+        return registrations
     if entry.reads == "embeddings":
         read = read_embedding(path, registrations, logits=True)
     else:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,6 +21,7 @@ from gpca.causes.settings import CauseSettings, FrameCauseSettings
 from gpca.encoders.settings import EncoderSettings
 from gpca.experiments.diagnosis.step import observed_only, training_rows, with_what_it_reads
 from gpca.explainers.registry import CAUSES, explainer_entry
+from gpca.explainers.sight import icp_calls
 from gpca.features.dataset import Descriptors, describe_all
 from gpca.features.settings import DescriptorSettings
 from gpca.frames.instances import Instances
@@ -48,11 +50,13 @@ def run(job: Job) -> None:
         causes, samples = _measure(job)
         axes = (job.source, job.seed)
         icp = ICPSettings(**job.section("icp"))
-        described, _, _ = describe_all(causes, *axes, DescriptorSettings(**job.section("descriptors")), icp)
-        explained = _FramesToExplain(causes, described, EncoderSettings(**job.section("encoder")), axes, lessons)
+        settings = DescriptorSettings(**job.section("descriptors"))
+        described, _, _ = describe_all(causes, *axes, settings, icp)
+        encoder = EncoderSettings(**job.section("encoder"))
+        explained = _FramesToExplain(causes, described, settings, encoder, axes, lessons)
         said_of: list[pd.DataFrame] = []
-        for name, settings in job.section("explainers").items():
-            attribution = explained.attribution(name, settings or {})
+        for name, own in job.section("explainers").items():
+            attribution = explained.attribution(name, own or {})
             said_of.append(prediction_frame(causes.registrations, attribution).assign(explainer=name))
         causes.save(job.frame_causes)
         write_csv(job.samples, samples)
@@ -75,13 +79,20 @@ class _FramesToExplain:
     """Registrations of frames to be explained, and the training data of the explainers."""
 
     def __init__(
-        self, causes: Causes, described: Descriptors, encoder: EncoderSettings, axes: tuple[str, int], lessons: list
+        self,
+        causes: Causes,
+        described: Descriptors,
+        settings: DescriptorSettings,
+        encoder: EncoderSettings,
+        axes: tuple[str, int],
+        lessons: list,
     ) -> None:
         self._registrations = observed_only(labeled(causes))
         self._described = described
         self._encoder = encoder
         self._axes = axes
         self._lessons = lessons
+        self._calls = partial(icp_calls, starts=causes.T_target_source_runs.shape[1], descriptors=settings)
         self._embedded: list[tuple[Registrations, Registrations]] = []
         self._of_descriptors: list[tuple[Registrations, Registrations]] = []
 
@@ -100,7 +111,8 @@ class _FramesToExplain:
             attributions.append(explainer.explain(explained))
         abstained_N = np.all([each.abstained_N for each in attributions], axis=0)
         scores_N_4 = np.mean([each.scores_N_C for each in attributions], axis=0)
-        return Attribution.of_scores(LABELS, scores_N_4, seconds=0.0, abstained_N=abstained_N)
+        calls = self._calls(entry.sees)
+        return Attribution.of_scores(LABELS, scores_N_4, seconds=0.0, icp_calls=calls, abstained_N=abstained_N)
 
     def _pairs_described(self) -> list[tuple[Registrations, Registrations]]:
         if not self._of_descriptors:

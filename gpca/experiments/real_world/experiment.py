@@ -8,7 +8,7 @@ from typing import Any
 from gpca.encoders.reduction import make_reduction, require_room
 from gpca.encoders.settings import OPTIONS, EncoderSettings
 from gpca.errors import InputError, require_names, with_key
-from gpca.experiments.experiment import Experiment, LeftOut, Names, Tidy
+from gpca.experiments.experiment import EXPLAINERS, Experiment, LeftOut, Names, Tidy
 from gpca.experiments.explained import titles
 from gpca.experiments.real_world.settings import RealWorldSettings
 from gpca.experiments.real_world.tables import CLASSIC, encoder_title
@@ -143,7 +143,7 @@ EXPERIMENT = Experiment(
     names=names,
     shown=shown,
     check=check,
-    leavable={"real_world.datasets": Names("dataset")},
+    leavable={"real_world.datasets": Names("dataset"), "real_world.explainers": EXPLAINERS},
     lists={
         "real_world.backbones": "encoders",
         "real_world.condition_backbones": "encoders",
