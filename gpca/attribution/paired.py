@@ -53,28 +53,40 @@ def best_of(values: Mapping[str, np.ndarray], names: Collection[str], smaller_is
     return max(known, key=lambda name: sign * values[name][0], default="")
 
 
-def difference(values: Mapping[str, np.ndarray], name: str, other: str) -> Difference:
+def difference(
+    values: Mapping[str, np.ndarray], name: str, other: str, drawn_B_N: np.ndarray | None = None
+) -> Difference:
     """Return how far an explainer lies above another.
 
     Args:
         values: explainer -> its measure (B,), first on the samples as they are, and then on every draw.
         name, other: the two; no other has no difference.
+        drawn_B_N: how often each draw has each sample, where the measure is a share of them, see
+            :func:`gpca.attribution.confidence.bounds`.
     """
     if not other:
         return Difference()
     apart_B = values[name] - values[other]
-    return Difference(other, float(apart_B[0]), *bounds(apart_B[1:]))
+    return Difference(other, float(apart_B[0]), *bounds(apart_B[1:], drawn_B_N, difference=True))
 
 
-def from_untrained(values: Mapping[str, np.ndarray], name: str, smaller_is_better: bool = False) -> Difference:
+def from_untrained(
+    values: Mapping[str, np.ndarray],
+    name: str,
+    smaller_is_better: bool = False,
+    drawn_B_N: np.ndarray | None = None,
+) -> Difference:
     """Return how far an explainer lies above the best untrained one, other than itself."""
-    others = [other for other in UNTRAINED if other != name]
-    return difference(values, name, best_of(values, others, smaller_is_better))
+    return from_rival(values, name, UNTRAINED, smaller_is_better, drawn_B_N)
 
 
 def from_rival(
-    values: Mapping[str, np.ndarray], name: str, rivals: Collection[str], smaller_is_better: bool = False
+    values: Mapping[str, np.ndarray],
+    name: str,
+    rivals: Collection[str],
+    smaller_is_better: bool = False,
+    drawn_B_N: np.ndarray | None = None,
 ) -> Difference:
     """Return how far an explainer lies above the best of its rivals, other than itself."""
     others = [other for other in rivals if other != name]
-    return difference(values, name, best_of(values, others, smaller_is_better))
+    return difference(values, name, best_of(values, others, smaller_is_better), drawn_B_N)

@@ -10,6 +10,7 @@ import numpy as np
 
 from gpca.attribution.confidence import bounds, pigeonhole_weights
 from gpca.attribution.metrics import ABSTAINED, ALL, PREDICTED_AS, confusion, tidy
+from gpca.attribution.paired import Difference, from_rival, from_untrained
 from gpca.causes.dataset import LABELS
 from gpca.causes.truth import BORDERLINE
 from gpca.experiments.diagnosis.judged import CEILING, POOLED, Judged, joined, read_judged
@@ -24,7 +25,9 @@ TABLE = "causes"
 COLUMNS = (
     *("source", "method", "metric", "samples", "seeds", "value", "low", "high"),
     *("rival", "difference", "difference_low", "difference_high"),
+    *("untrained", "gain", "gain_low", "gain_high"),
 )
+NUMBERS = tuple(name for name in COLUMNS[3:] if name not in ("rival", "untrained"))
 
 
 def collect(prediction_files: Iterable[str | Path], causes_files: Iterable[str | Path]) -> pd.DataFrame:
@@ -78,8 +81,8 @@ def _confusion(samples: Judged) -> list[tuple[str, str, float]]:
 def collect_intervals(prediction_files: Iterable[str | Path], causes_files: Iterable[str | Path]) -> pd.DataFrame:
     """Return for every source, explainer and measure the value over all seeds and its 95 % interval.
 
-    The rival is the best other explainer by that measure; the difference from it is that of the same draws. The
-    ceiling is no rival.
+    The rival is the best other explainer by that measure, and ``untrained`` the best of those that need no training;
+    ``difference`` and ``gain`` are how far the explainer lies above them, on the same draws. The ceiling is no rival.
     """
     import pandas as pd
 
@@ -95,12 +98,12 @@ def collect_intervals(prediction_files: Iterable[str | Path], causes_files: Iter
 
 
 def read_intervals(path: str | Path) -> pd.DataFrame:
-    """Read what :func:`collect_intervals` returned; where there is no rival, the difference is NaN.
+    """Read what :func:`collect_intervals` returned; where there is no other, the difference from it is NaN.
 
     Raises:
         InputError: missing, empty or unreadable file, missing column, a value that is no finite number.
     """
-    return read_numbers(path, COLUMNS, (*COLUMNS[3:8], *COLUMNS[9:]), optional=(*COLUMNS[6:8], *COLUMNS[9:]))
+    return read_numbers(path, COLUMNS, NUMBERS, optional=NUMBERS[3:])
 
 
 def _of_source(source: str, samples_of: dict[str, Judged]) -> list[tuple]:
@@ -136,19 +139,15 @@ def rows_of(
     seeds = len(set(any_samples.seed.tolist()))
     rows = []
     for metric in metrics:
-        ranked = sorted(
-            (explainer for explainer in values if explainer != CEILING and metric in values[explainer]),
-            key=lambda explainer: values[explainer][metric][0] * (1 if metric in SMALLER_IS_BETTER else -1),
-        )
+        of_metric = {name: of_explainer[metric] for name, of_explainer in values.items() if metric in of_explainer}
+        rivals, smaller = [name for name in of_metric if name != CEILING], metric in SMALLER_IS_BETTER
         counted_N = counted(any_samples, metric)
         drawn_B_n = drawn_B_N[:, counted_N] if metric in SHARES else None
-        for explainer, of_explainer in values.items():
-            if metric not in of_explainer:
-                continue
-            rival = next((name for name in ranked if name != explainer), "") if explainer != CEILING else ""
-            apart = of_explainer[metric] - values[rival][metric] if rival else np.full(len(weights_B_N), np.nan)
-            of_value = bounds(of_explainer[metric][1:], drawn_B_n)
-            of_difference = bounds(apart[1:], drawn_B_n, difference=True)
+        for explainer, value_B in of_metric.items():
+            lead = gain = Difference()
+            if explainer != CEILING:
+                lead = from_rival(of_metric, explainer, rivals, smaller, drawn_B_n)
+                gain = from_untrained(of_metric, explainer, smaller, drawn_B_n)
             own = (source, explainer, metric, int(counted_N.sum()), seeds)
-            rows.append((*own, of_explainer[metric][0], *of_value, rival, apart[0], *of_difference))
+            rows.append((*own, value_B[0], *bounds(value_B[1:], drawn_B_n), *lead.cells, *gain.cells))
     return rows

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpca.attribution.confidence import pigeonhole_weights
+from gpca.attribution.paired import Difference
 from gpca.attribution.predictions import read_predictions
 from gpca.causes.dataset import LABELS, Causes, labels_of
 from gpca.causes.truth import BORDERLINE, FAILED, GEOMETRY
@@ -99,5 +100,5 @@ def _counts(source: str, rows: pd.DataFrame) -> list[tuple]:
     counts = Counter(rows["kind"].tolist())
     counts["scenes"] = len(set(zip(rows["dataset"], rows["scene"], strict=True)))
     counts["objects"] = rows["object"].nunique()
-    own, nothing = (len(rows), rows["seed"].nunique()), (np.nan, np.nan, "", np.nan, np.nan, np.nan)
+    own, nothing = (len(rows), rows["seed"].nunique()), (np.nan, np.nan, *Difference().cells, *Difference().cells)
     return [(source, TRUTH, f"count_{kind}", *own, float(counts[kind]), *nothing) for kind in KINDS]

@@ -91,7 +91,9 @@ def test_what_is_measured_of_a_registration_is_measured_once_for_all_controls(si
         registered, "describe_registrations", lambda r, *a, **k: measured.append(len(r)) or describe(r, *a, **k)
     )
     rivals = {
-        "pair": Rival(partial(PairGPCA, "tiny", 100, points=32, iterations=2, inducing=4, draws=10), "registrations"),
+        "pair": Rival(
+            partial(PairGPCA, True, "tiny", 100, points=32, iterations=2, inducing=4, draws=10), "registrations"
+        ),
         "residuals": Rival(partial(residuals_logistic, "tiny", 100), "uncertainty/removal"),
     }
     found = experiment(six, "label_noise_10", "shuffled", rivals=rivals).run(six, {})

@@ -78,6 +78,17 @@ def test_of_two_explainers_the_better_leads_by_what_the_other_lacks():
     assert record["samples"] == (good.label != BORDERLINE).sum() < len(good)
 
 
+def test_the_gain_is_over_the_best_that_needs_no_training():
+    good, poor, guess = (random_judged(200, skill=skill) for skill in (2.0, 0.3, 0.0))
+    said = {"good": good, "rule": poor, "chance": guess, CEILING: good}
+    rows = {row[1]: dict(zip(metrics.COLUMNS, row, strict=True)) for row in metrics._of_source("tiny", said)
+            if row[2] == "balanced_accuracy"}  # fmt: skip
+    assert rows["good"]["untrained"] == "rule"
+    assert rows["good"]["gain"] == pytest.approx(rows["good"]["value"] - rows["rule"]["value"])
+    assert 0 < rows["good"]["gain_low"] < rows["good"]["gain"] < rows["good"]["gain_high"]
+    assert [rows[name]["untrained"] for name in ("rule", "chance", CEILING)] == ["chance", "rule", ""]
+
+
 def test_a_run_is_collected_written_and_read(causes, tmp_path):
     rows = collect_intervals(*write_run(tmp_path, causes))
     assert set(rows["method"]) == {CEILING, "right", "always_pose"}
