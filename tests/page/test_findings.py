@@ -3,6 +3,7 @@
 import pytest
 
 from gpca.errors import InputError
+from gpca.experiments.diagnosis.metrics import COLUMNS
 from gpca.page.findings import Titles, findings_of
 
 TITLES = Titles(
@@ -55,10 +56,10 @@ def folder(tmp_path):
     ]
     write_metrics(tmp_path / "active_learning.csv", labels, "active_learning/pretrained", "pose")
     lines = [
-        f"pooled,{method},balanced_accuracy,90,1,{value},{value - 0.05},{value + 0.05},,,,"
+        f"pooled,{method},balanced_accuracy,90,1,{value},{value - 0.05},{value + 0.05},,,,,,,,"
         for method, value in (("ceiling", 0.9), ("gpca", 0.5), ("pair", 0.7))
     ]
-    head = "source,method,metric,samples,seeds,value,low,high,rival,difference,difference_low,difference_high"
+    head = ",".join(COLUMNS)
     (tmp_path / "cause_intervals.csv").write_text("\n".join([head, *lines, ""]))
     return tmp_path
 

@@ -77,7 +77,8 @@ def test_instances_from_other_initial_poses_have_a_name_of_their_own_and_the_dra
 
 def test_the_table_says_how_few_there_are(asked):
     titles = {name: name for name in SETTINGS["explainers"]}
-    table = table9_frames(collect(*asked), {"title": "Tiny", "stand_in": True}, titles)
+    costs = {name: {"sees": "pair", "icp_calls": 0} for name in titles}
+    table = table9_frames(collect(*asked), {"title": "Tiny", "stand_in": True}, titles, costs)
     assert "Of 6 registrations" in table.footnotes[0]
     assert "procedural stand-in" in table.caption
     judged = collect(*asked)["metric"].isin([f"count_{kind}" for kind in LABELS])

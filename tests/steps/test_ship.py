@@ -5,11 +5,11 @@ import json
 import shutil
 from dataclasses import replace
 
-import numpy as np
 import pandas as pd
 import pytest
 import yaml
 
+from gpca.attribution.paired import Difference
 from gpca.code_files import ROOT
 from gpca.commands import ship
 from gpca.experiments.diagnosis.metrics import COLUMNS
@@ -53,7 +53,7 @@ def run(model, objects, tmp_path_factory):
     ):
         objects.save(folder / f"objects/{name}.npz", name)
         record(folder / f"objects/{name}.npz", inputs, settings)
-    values = ("balanced_accuracy", 300, 5, 0.7519, 0.7018, 0.8017, "", np.nan, np.nan, np.nan)
+    values = ("balanced_accuracy", 300, 5, 0.7519, 0.7018, 0.8017, *Difference().cells, *Difference().cells)
     rows = [("tiny", explainer, *values) for explainer in ("gpca_multilabel", "ceiling", "residuals")]
     pd.DataFrame(rows, columns=list(COLUMNS)).to_csv(folder / "cause_intervals.csv", index=False)
     return folder
@@ -160,7 +160,7 @@ def provenance(name, inputs=(MESH,), **settings):
         ),
         (written("real/cause_intervals.csv", f"{','.join(COLUMNS)}\n"), ["cause_intervals.csv: has no rows"]),
         (
-            written("real/cause_intervals.csv", f"{','.join(COLUMNS)}\ntiny,gpca,auroc_failed,9,1,0.5,,,,,,\n"),
+            written("real/cause_intervals.csv", f"{','.join(COLUMNS)}\ntiny,gpca,auroc_failed,9,1,0.5,,,,,,,,,,\n"),
             ["cause_intervals.csv: has no scores of gpca_multilabel"],
         ),
     ],

@@ -11,6 +11,7 @@ from gpca.encoders.settings import NamedEncoder, require_draws
 from gpca.errors import with_key
 from gpca.experiments.experiment import ByName, Experiment, LeftOut, Names, Tidy
 from gpca.explainers.registry import CAUSES, explainer_entry, explainers, require_settings
+from gpca.explainers.sight import icp_calls
 from gpca.features.settings import DescriptorSettings
 from gpca.settings import part_of
 
@@ -39,9 +40,14 @@ def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
 
 
 def shown(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
-    """Return the titles of the explainers."""
-    titles = {name: explainer_entry(name, CAUSES).title for name in config["diagnosis"]["explainers"]}
-    return {"cause_explainers": titles}
+    """Return the titles of the explainers, and what each sees and costs."""
+    entries = {name: explainer_entry(name, CAUSES) for name in config["diagnosis"]["explainers"]}
+    starts, descriptors = config["causes"]["starts"], DescriptorSettings(**config["diagnosis"]["descriptors"])
+    costs = {
+        name: {"sees": entry.sight, "icp_calls": icp_calls(entry.sees, starts, descriptors)}
+        for name, entry in entries.items()
+    }
+    return {"cause_explainers": {name: entry.title for name, entry in entries.items()}, "cause_costs": costs}
 
 
 DIAGNOSED = {

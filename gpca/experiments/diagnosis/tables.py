@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import inf
+from math import inf, isfinite
 from typing import TYPE_CHECKING
 
 from gpca.attribution.confidence import REPEATS
 from gpca.causes.truth import BORDERLINE, GEOMETRY, NOMINAL
 from gpca.experiments.diagnosis.judged import CEILING, POOLED
 from gpca.experiments.frame_causes.metrics import KINDS, STATE, TRUTH
+from gpca.explainers.sight import WORDS
 from gpca.frames.source import REAL_WORLD
 from gpca.objects.title import title_of
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.reporting.tables.builder import TableBuilder, crossed, titles_of
+from gpca.reporting.tables.builder import Label, TableBuilder, crossed, titles_of
 from gpca.reporting.tables.cells import interval_cell, plain_cell, rows_where
 from gpca.reporting.tables.table import Cell, Column, Table
 from gpca.reporting.words import plural
@@ -25,6 +26,7 @@ SHOWN = {
     "regret": Column("Regret (%)", limits=(0.0, inf), least_is_best=True),
     "tied_accuracy": Column("With ties (%)"),
     "balanced_accuracy": Column("Balanced (%)"),
+    "gain": Column("Over untrained (points)", limits=(-100.0, 100.0)),
     "lead": Column("Lead (points)", limits=(-100.0, 100.0)),
     "dominant_accuracy": Column("Dominant (%)"),
     "false_alarm_rate": Column("False alarms (%)", least_is_best=True),
@@ -32,43 +34,52 @@ SHOWN = {
     "average_precision": Column("mAP (%)", interval=False),
     "spearman_attribution": Column("Spearman", decimals=2, interval=False, limits=(-1.0, 1.0)),
     "nominal_calibration": Column("ECE (share)", 3, False, (0.0, 1.0), least_is_best=True),
+    "icp_calls": Column("ICP calls", decimals=0, interval=False, limits=(0.0, inf)),
     "samples": Column("n", decimals=0, interval=False, limits=(0.0, inf)),
 }
 SHOWN_OF_FRAMES = {
     STATE: Column("State (%)"),
-    **{
-        key: SHOWN[key]
-        for key in (
-            "regret",
-            "tied_accuracy",
-            "dominant_accuracy",
-            "false_alarm_rate",
-            "auroc_failed",
-            "average_precision",
-        )
-    },
-    **{key: SHOWN[key] for key in ("spearman_attribution", "nominal_calibration", "samples")},
+    "gain": SHOWN["gain"],
+    **{key: SHOWN[key] for key in ("regret", "tied_accuracy", "dominant_accuracy", "false_alarm_rate")},
+    **{key: SHOWN[key] for key in ("auroc_failed", "average_precision", "spearman_attribution")},
+    **{key: SHOWN[key] for key in ("nominal_calibration", "icp_calls", "samples")},
 }
+DIFFERENCES = {  # column -> its difference, and the names of its bounds, in a row of the intervals
+    "gain": ("gain", ("gain_low", "gain_high")),
+    "lead": ("difference", ("difference_low", "difference_high")),
+}
+NOT_COMPARED = (*DIFFERENCES, "icp_calls", "samples")
 AGAIN = {CEILING: "Truth from other starts (counterfactual access)"}
+COSTS = {CEILING: {"sees": WORDS["truth"], "icp_calls": None}}
+ROW_HEADS = {"explainer": "Explainer", "reads": "Reads"}
+COST_NOTE = "Reads: what an explainer sees of a registration. ICP calls: runs beyond the one that it explains."
 _SHARES = (  # These are printed in %.
     STATE,
     *("regret", "tied_accuracy", "balanced_accuracy", "dominant_accuracy", "false_alarm_rate", "average_precision"),
 )
 
 
-def table9_causes(intervals: pd.DataFrame, sources: Mapping[str, Mapping], explainers: Mapping[str, str]) -> Table:
+def table9_causes(
+    intervals: pd.DataFrame,
+    sources: Mapping[str, Mapping],
+    explainers: Mapping[str, str],
+    costs: Mapping[str, Mapping],
+) -> Table:
     """Return every measure of every explainer, by source and pooled, the ceiling last.
 
     Args:
         intervals: What :func:`gpca.experiments.diagnosis.metrics.collect_intervals` returned.
+        costs: What each explainer ``sees``, in words, and its number of ``icp_calls``.
     """
     stand_ins = any(entry["stand_in"] for entry in sources.values())
     titles = titles_of(sources) | {POOLED: "All together"}
-    table = TableBuilder("table9_causes", {"source": "Dataset", "explainer": "Explainer"})
+    costs = {**costs, **COSTS}
+    table = TableBuilder("table9_causes", {"source": "Dataset", **ROW_HEADS})
     for (source, explainer), labels in crossed(titles, {**explainers, **AGAIN}):
         rows = rows_where(intervals, source=source, method=explainer).set_index("metric")
-        table.add_row(labels, _cells(rows, SHOWN), rival=explainer != CEILING)
-    table.compare_down([key for key in SHOWN if key not in ("lead", "samples")], same=1)
+        cells = _cells(rows, SHOWN, "balanced_accuracy", costs[explainer])
+        table.add_row([*labels, _reads(costs[explainer])], cells, rival=explainer != CEILING)
+    table.compare_down([key for key in SHOWN if key not in NOT_COMPARED], same=1)
     return table.build(
         caption="What is wrong with a registration, if anything: objects that no explainer was trained on"
         + (", procedural stand-ins among them" if stand_ins else ""),
@@ -81,33 +92,40 @@ def table9_causes(intervals: pd.DataFrame, sources: Mapping[str, Mapping], expla
             "Regret: of the failed, the share of the error that removing the best single cause would take away and "
             "removing the named one does not; who names nominal removes nothing. With ties: as Dominant, but any cause "
             "counts whose φ is within the limit of a cause (1 % of the diameter by default) of the largest.",
-            "Balanced: mean share named rightly of nominal and of the three dominant causes. Lead: balanced accuracy "
-            "minus that of the best other explainer, on the same draws: it wins where the interval is above 0. "
+            "Balanced: mean share named rightly of nominal and of the three dominant causes. Over untrained: balanced "
+            "accuracy minus that of the best of chance, the most frequent label and the rule; lead: minus that of the "
+            "best other explainer; both on the same draws, so that it is better where the interval is above 0. "
             "Dominant: of the failed, the share whose main cause has the highest score among the causes.",
             "False alarms: share of the nominal above the alarm that finds 90 % of the failed. AUROC: of failed "
             "against nominal. mAP: mean average precision of the sets of causes. Spearman: of scores and measured "
             "attributions of the failed. ECE: expected calibration error of the score of nominal.",
             "Gates only say whether something is wrong. The last row is the truth measured again from other starts; it "
             "has the true pose and the clean clouds, which no observer has: nothing says that it can be reached.",
+            COST_NOTE,
         ),
     )
 
 
-def table9_frames(intervals: pd.DataFrame, frames: Mapping, explainers: Mapping[str, str]) -> Table:
+def table9_frames(
+    intervals: pd.DataFrame, frames: Mapping, explainers: Mapping[str, str], costs: Mapping[str, Mapping]
+) -> Table:
     """Return how explainers that learned from simulated causes name those measured in frames, the ceiling last.
 
     Args:
         intervals: What :func:`gpca.experiments.frame_causes.metrics.collect` returned.
         frames: The ``{"title": str, "stand_in": bool}`` of the frames.
+        costs: As for :func:`table9_causes`.
     """
+    costs = {**costs, **COSTS}
     of_frames = rows_where(intervals, source=REAL_WORLD)
-    table = TableBuilder("table9_frames", {"explainer": "Explainer"})
+    table = TableBuilder("table9_frames", ROW_HEADS)
     for (explainer,), labels in crossed({**explainers, **AGAIN}):
         rows = rows_where(of_frames, method=explainer).set_index("metric")
-        table.add_row(labels, _cells(rows, SHOWN_OF_FRAMES), rival=explainer != CEILING)
+        cells = _cells(rows, SHOWN_OF_FRAMES, STATE, costs[explainer])
+        table.add_row([*labels, _reads(costs[explainer])], cells, rival=explainer != CEILING)
     counted = rows_where(of_frames, method=TRUTH).set_index("metric")
     table.require_rows()
-    table.compare_down([key for key in SHOWN_OF_FRAMES if key != "samples"])
+    table.compare_down([key for key in SHOWN_OF_FRAMES if key not in NOT_COMPARED])
     of = {kind: int(counted["value"][f"count_{kind}"]) for kind in KINDS}
     failed = {concept: of[concept] for concept in CONCEPTS}
     total = sum(failed.values())
@@ -124,7 +142,9 @@ def table9_frames(intervals: pd.DataFrame, frames: Mapping, explainers: Mapping[
             f"{of[NOMINAL]} nominal; Regret, With ties, Dominant and Spearman are over the {total} failed.",
             f"In brackets: the 95 % interval of {REPEATS} bootstrap draws over {plural(of['scenes'], 'scene')}, "
             f"{plural(of['objects'], 'object')} and {plural(table.most_seeds(), 'seed')}. Bold: best of a column.",
-            "State: mean share of the nominal and of the failed that is called so. The others as in Table IX.",
+            "State: mean share of the nominal and of the failed that is called so; over untrained: minus that of the "
+            "best untrained row. The others as in Table IX.",
+            COST_NOTE,
         ),
     )
 
@@ -146,15 +166,22 @@ def _list_of(failed: Mapping[str, int]) -> str:
     return ", ".join(f"{count} mostly by {concept}" for concept, count in failed.items())
 
 
-def _cells(rows: pd.DataFrame, shown: Mapping[str, Column]) -> dict[str, Cell | None]:
-    """Return the cells of one source and explainer, from rows whose index is the metric."""
+def _reads(cost: Mapping) -> Label:
+    return cost["sees"], cost["sees"]
+
+
+def _cells(rows: pd.DataFrame, shown: Mapping[str, Column], compared: str, cost: Mapping) -> dict[str, Cell | None]:
+    """Return the cells of one source and explainer, from rows whose index is the metric; one of them is compared."""
     cells: dict[str, Cell | None] = {}
     for metric in (name for name in shown if name in rows.index):
         row, scale = rows.loc[metric], 100 if metric in _SHARES else 1
         cells[metric] = interval_cell(row, factor=scale)
-        if metric == "balanced_accuracy" and row["rival"] and "lead" in shown:
-            cells["lead"] = interval_cell(row, "difference", ("difference_low", "difference_high"), scale)
+        for key, names in DIFFERENCES.items():
+            if metric == compared and key in shown and isfinite(row[names[0]]):
+                cells[key] = interval_cell(row, *names, scale)
     if len(rows):
-        judged = rows["samples"].max()
-        cells["samples"] = plain_cell(judged, int(rows["seeds"].iloc[0]), int(judged))
+        judged, seeds = rows["samples"].max(), int(rows["seeds"].iloc[0])
+        cells["samples"] = plain_cell(judged, seeds, int(judged))
+        if cost["icp_calls"] is not None:
+            cells["icp_calls"] = plain_cell(cost["icp_calls"], seeds, int(judged))
     return cells

@@ -10,12 +10,16 @@ from gpca.experiments.frame_causes.metrics import KINDS, TRUTH
 
 SOURCES = {"ycb": {"title": "YCB", "stand_in": True}}
 EXPLAINERS = {"good": "Good", "poor": "Poor", "gate": "Gate"}
+CALLS = {"good": 0, "poor": 56, "gate": 12}
+COSTS = {name: {"sees": "pair + motion", "icp_calls": calls} for name, calls in CALLS.items()}
+APART = (0.2, 0.15, 0.3)
 
 
 def rows(source, method, rival, **values):
     samples = {"false_alarm_rate": 90, "dominant_accuracy": 160}
+    others = (rival, *APART, "rule", *APART)
     return [
-        (source, method, metric, samples.get(metric, 250), 5, value, value - 0.1, value + 0.05, rival, 0.2, 0.15, 0.3)
+        (source, method, metric, samples.get(metric, 250), 5, value, value - 0.1, value + 0.05, *others)
         for metric, value in values.items()
     ]
 
@@ -30,67 +34,65 @@ def intervals():
         found += rows(source, "gate", "good", auroc_failed=0.75, false_alarm_rate=0.3)
     frame = pd.DataFrame(found, columns=list(COLUMNS))
     without = frame["method"] == CEILING
-    frame.loc[without, ["difference", "difference_low", "difference_high"]] = np.nan
+    frame.loc[without, ["difference", "difference_low", "difference_high", "gain", "gain_low", "gain_high"]] = np.nan
     return frame
 
 
 def test_the_best_rival_is_bold_and_the_ceiling_is_none(intervals):
-    table = table9_causes(intervals, SOURCES, EXPLAINERS)
+    table = table9_causes(intervals, SOURCES, EXPLAINERS, COSTS)
     text = table.markdown()
     assert (
-        "| YCB (procedural stand-in) | Good | **10.0 (0.0 to 15.0)** | – | **80.0 (70.0 to 85.0)** | 20.0 (15" in text
+        "| Good | pair + motion | **10.0 (0.0 to 15.0)** | – | **80.0 (70.0 to 85.0)** | 20.0 (15.0 to 30.0) |" in text
     )
-    assert (
-        "| All together | Truth from other starts (counterfactual access) | – | – | 95.0 (85.0 to 100.0) | – |" in text
-    )
+    assert "| Truth from other starts (counterfactual access) | truth | – | – | 95.0 (85.0 to 100.0) | – | – |" in text
     assert "**10.0 (0.0 to 15.0)**" in text and "**40.0 (30.0 to 45.0)**" not in text  # the fewest false alarms
-    assert "Gate | – | – | – | – | – | 30.0 (20.0 to 35.0) | 0.750 (0.650 to 0.800) |" in text
+    assert "Gate | pair + motion | – | – | – | – | – | – | 30.0 (20.0 to 35.0) | 0.750 (0.650 to 0.800) |" in text
 
 
 def test_what_is_judged_is_counted_by_measure(intervals):
-    table = table9_causes(intervals, SOURCES, EXPLAINERS)
+    table = table9_causes(intervals, SOURCES, EXPLAINERS, COSTS)
     assert table.cells[0, "samples"].mean == 250
     assert table.cells[0, "false_alarm_rate"].test_samples == 90
     assert "over 5 seeds" in table.footnotes[0]
     assert "90 are nominal and 160 failed on YCB (procedural stand-in)" in table.footnotes[0]
     twice = pd.concat([intervals, intervals[intervals["source"] == "ycb"].assign(source="cups")])
-    of_both = table9_causes(twice, SOURCES | {"cups": {"title": "Cups", "stand_in": False}}, EXPLAINERS)
+    of_both = table9_causes(twice, SOURCES | {"cups": {"title": "Cups", "stand_in": False}}, EXPLAINERS, COSTS)
     assert "90 are nominal and 160 failed on each dataset." in of_both.footnotes[0]
 
 
 def test_the_calibration_error_is_a_share(intervals):
     found = rows("ycb", "good", "poor", nominal_calibration=0.0284)
     both = pd.concat([intervals, pd.DataFrame(found, columns=list(COLUMNS))])
-    text = table9_causes(both, SOURCES, EXPLAINERS).markdown()
-    assert "| ECE (share) | n |" in text and "| 0.028 | 250 |" in text
+    text = table9_causes(both, SOURCES, EXPLAINERS, COSTS).markdown()
+    assert "| ECE (share) | ICP calls | n |" in text and "| 0.028 | 0 | 250 |" in text
 
 
 def test_the_bounds_in_the_csv_are_those_of_the_bootstrap(intervals):
-    table = table9_causes(intervals, SOURCES, EXPLAINERS)
-    [record] = [r for r in table.records() if r[:3] == ("ycb", "good", "balanced_accuracy")]
-    assert record[3:6] == pytest.approx((80, 70, 85))
+    table = table9_causes(intervals, SOURCES, EXPLAINERS, COSTS)
+    [record] = [r for r in table.records() if (*r[:2], r[3]) == ("ycb", "good", "balanced_accuracy")]
+    assert record[4:7] == pytest.approx((80, 70, 85))
 
 
 def test_intervals_of_other_explainers_make_no_table(intervals):
     with pytest.raises(InputError, match="has nothing to show"):
-        table9_causes(intervals[intervals["method"] == "other"], SOURCES, EXPLAINERS)
+        table9_causes(intervals[intervals["method"] == "other"], SOURCES, EXPLAINERS, COSTS)
 
 
 def test_frames_are_counted_below_the_table(intervals):
     counts = {"nominal": 120, "noise": 6, "pose": 30, "overlap": 14, "borderline": 130, "scenes": 13, "objects": 32}
     found = [
-        ("real_rgbd", TRUTH, f"count_{kind}", 300, 1, counts.get(kind, 0), *[np.nan] * 2, "", *[np.nan] * 3)
+        ("real_rgbd", TRUTH, f"count_{kind}", 300, 1, counts.get(kind, 0), *[np.nan] * 2, *["", *[np.nan] * 3] * 2)
         for kind in KINDS
     ]
     found += rows("real_rgbd", "good", "poor", state_accuracy=0.8, dominant_accuracy=0.6, auroc_failed=0.9)
     found += rows("real_rgbd", "poor", "good", state_accuracy=0.6, dominant_accuracy=0.4)
     found += rows("real_rgbd", CEILING, "", state_accuracy=0.95)
     of_frames = pd.concat([intervals, pd.DataFrame(found, columns=list(COLUMNS))])
-    table = table9_frames(of_frames, {"title": "Frames", "stand_in": False}, EXPLAINERS)
+    table = table9_frames(of_frames, {"title": "Frames", "stand_in": False}, EXPLAINERS, COSTS)
     text = table.markdown()
-    assert "| Good | **80.0 (70.0 to 85.0)** | – | – | **60.0 (50.0 to 65.0)** |" in text
+    assert "| Good | pair + motion | **80.0 (70.0 to 85.0)** | 20.0 (15.0 to 30.0) | – | – | **60.0 (50.0" in text
     for counted in ("120 nominal", "50 failed", "300 registrations", "130 borderline", "30 mostly by pose", "60 %"):
         assert counted in text
     assert "over 13 scenes, 32 objects and" in text
     with pytest.raises(InputError, match="has nothing to show"):
-        table9_frames(intervals, {"title": "Frames", "stand_in": False}, EXPLAINERS)
+        table9_frames(intervals, {"title": "Frames", "stand_in": False}, EXPLAINERS, COSTS)
