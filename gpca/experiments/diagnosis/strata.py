@@ -13,7 +13,7 @@ from gpca.causes.shapley import ALL
 from gpca.causes.truth import BORDERLINE, FAILED, NOMINAL
 from gpca.experiments.diagnosis.judged import POOLED, Judged, joined, read_judged
 from gpca.experiments.diagnosis.measures import of_decisions
-from gpca.experiments.diagnosis.metrics import COLUMNS, rows_of, with_pooled
+from gpca.experiments.diagnosis.metrics import COLUMNS, NUMBERS, rows_of, with_pooled
 from gpca.io.csv_file import read_numbers
 from gpca.seeds import generator
 
@@ -76,7 +76,7 @@ def read_strata(path: str | Path) -> pd.DataFrame:
     Raises:
         InputError: missing, empty or unreadable file, missing column, a value that is no finite number.
     """
-    return read_numbers(path, STRATUM_COLUMNS, (*COLUMNS[3:8], *COLUMNS[9:]), optional=(*COLUMNS[6:8], *COLUMNS[9:]))
+    return read_numbers(path, STRATUM_COLUMNS, NUMBERS, optional=NUMBERS[3:])
 
 
 def _rows(source: str, samples_of: Mapping[str, Judged]) -> list[tuple]:
