@@ -9,9 +9,9 @@ from gpca.page.findings import Titles, findings_of
 TITLES = Titles(
     explainers={
         name: {"title": name.upper(), "oracle": name == "shap_oracle"}
-        for name in ("gpca_paper", "shap_additive", "forest", "shap_oracle")
+        for name in ("gpca_paper", "shap_additive", "forest", "shap_oracle", "rule")
     },
-    cause_explainers={"gpca": "GP-CA (aligned source)", "pair": "GP-CA on the pair"},
+    cause_explainers={"gpca": "GP-CA (aligned source)", "pair": "GP-CA on the pair", "rule": "Rule and gate"},
     budget=3,
 )
 RESULTS = (
@@ -34,6 +34,7 @@ def folder(tmp_path):
         "shap_additive": (0.30, 0.30),
         "forest": (0.98, 0.99),
         "shap_oracle": (1, 1),
+        "rule": (1, 0.99),
     }
     rows = [
         (source, method, "accuracy", value)
@@ -56,8 +57,16 @@ def folder(tmp_path):
     ]
     write_metrics(tmp_path / "active_learning.csv", labels, "active_learning/pretrained", "pose")
     lines = [
-        f"pooled,{method},balanced_accuracy,90,1,{value},{value - 0.05},{value + 0.05},,,,,,,,"
-        for method, value in (("ceiling", 0.9), ("gpca", 0.5), ("pair", 0.7))
+        f"pooled,{method},balanced_accuracy,90,1,{value},{value - 0.05},{value + 0.05},,,,,{gain}"
+        for method, value, gain in (
+            ("ceiling", 0.9, ",,,"),
+            ("rule", 0.4, "chance,0.15,0.1,0.2"),
+            ("gpca", 0.5, "rule,0.1,0.0,0.2"),
+            ("pair", 0.7, "rule,0.3,0.2,0.4"),
+        )
+    ]
+    lines += [
+        f"pooled,{method},regret,60,1,{value},0.0,1.0,,,,,,,," for method, value in (("rule", 0.6), ("pair", 0.25))
     ]
     head = ",".join(COLUMNS)
     (tmp_path / "cause_intervals.csv").write_text("\n".join([head, *lines, ""]))
@@ -66,7 +75,7 @@ def folder(tmp_path):
 
 def test_every_number_is_that_of_the_files(folder):
     said = {finding.number: finding.text for finding in findings_of(folder, TITLES, RESULTS)}
-    assert list(said) == ["94 to 97 %", "98.5 %", "12 %", "70 %", "50 to 80 %", "12 labels"]
+    assert list(said) == ["99 to 100 %", "94 to 97 %", "98.5 %", "12 %", "70 %", "25 %", "50 to 80 %", "12 labels"]
     assert "SHAP 30 %" in said["94 to 97 %"]
     for words in ("FOREST", "the 2 other explainers", "GPCA_PAPER has 95.5 %"):
         assert words in said["98.5 %"]
@@ -75,11 +84,14 @@ def test_every_number_is_that_of_the_files(folder):
 
 def test_findings_of_causes_and_of_recovery_stand_apart(folder):
     texts = [finding.text for finding in findings_of(folder, TITLES, ("table9_causes", "table8_recovery"))]
-    assert len(texts) == 2
+    assert len(texts) == 3
     for words in ("70 % (95 % interval 65 to 75 %): GP-CA on the pair", "GP-CA (aligned source) has 50 %", "90 %"):
         assert words in texts[0]
-    for words in ("70 % of the failed", "3 actions", "random actions 40 %"):
+    assert "Its lead over the best that needs no training, Rule and gate, is 30 points (20 to 40)." in texts[0]
+    for words in ("25 % of the error", "GP-CA on the pair", "the untrained rule leaves 60 %"):
         assert words in texts[1]
+    for words in ("70 % of the failed", "3 actions", "random actions 40 %"):
+        assert words in texts[2]
 
 
 def test_what_a_run_has_not_is_not_spoken_of(folder):
