@@ -56,7 +56,10 @@ def settings_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, An
         "shown_dataset": datasets[shown_source],
         "model": model,
         "model_title": title_of(model),
-        "explainers": {name: {"title": entry.title, "oracle": entry.oracle} for name, entry in explainers.items()},
+        "explainers": {
+            name: {"title": entry.title, "oracle": entry.oracle, "sees": entry.sight}
+            for name, entry in explainers.items()
+        },
         "explainer_titles": explainer_titles,
         "cause_settings": {**config["causes"], "icp": config["registrations"]["icp"]},
         "encoder_title": encoder_title(**config["embedding"]),

@@ -1,4 +1,4 @@
-"""Makes the tables of explainers, of which each is ``{"title": str, "oracle": bool}`` here, from tidy metrics."""
+"""Makes the tables of explainers, each ``{"title": str, "oracle": bool, "sees": str}`` here, from tidy metrics."""
 
 from __future__ import annotations
 
@@ -57,10 +57,11 @@ def table1_extended(metrics: pd.DataFrame, sources: Mapping[str, Mapping], expla
 
     The best accuracy of a source is bold, oracles apart: they are told what the others have to find out.
     """
-    table = TableBuilder("table1_extended", {"source": "Dataset", "explainer": "Explainer"})
+    table = TableBuilder("table1_extended", {"source": "Dataset", "explainer": "Explainer", "reads": "Reads"})
     for (source, explainer), labels in crossed(titles_of(sources), _titles(explainers)):
         cells = {metric: _cell(metrics, source, explainer, metric=metric) for metric in EXTENDED}
-        table.add_row(labels, cells, rival=not explainers[explainer]["oracle"])
+        sees = explainers[explainer]["sees"]
+        table.add_row([*labels, (sees, sees)], cells, rival=not explainers[explainer]["oracle"])
     table.compare_down(["accuracy"], same=1)
     measured = {metric for _, metric in table.cells}
     apart = ", oracles apart" if any(entry["oracle"] for entry in explainers.values()) else ""
@@ -89,6 +90,7 @@ def table1_extended(metrics: pd.DataFrame, sources: Mapping[str, Mapping], expla
         columns={metric: column for metric, column in EXTENDED.items() if metric in measured},
         footnotes=(
             _repeats(table, metrics, explainers),
+            "Reads: what an explainer sees of a registration; chance and the most frequent label see nothing.",
             *(note for metric, note in notes.items() if metric in measured),
         ),
     )

@@ -53,6 +53,7 @@ def shown(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str
     titles_of_sources = ", ".join(entry["title"] for entry in sources.values())
     return {
         "control_explainers": titles(config["controls"]["explainers"]),
+        "control_sees": {name: explainer_entry(name).sight for name in config["controls"]["explainers"]},
         "controls": list(config["controls"]["controls"]),
         "controls_title": titles_of_sources + stand_in_clause(sources.values()),
     }

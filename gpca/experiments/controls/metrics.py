@@ -7,7 +7,7 @@ samples.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,6 +15,7 @@ import numpy as np
 
 from gpca.attribution.confidence import bounds, pigeonhole_weights
 from gpca.attribution.metrics import ALL, source_method_seed, tidy
+from gpca.attribution.paired import Difference, from_rival, from_untrained
 from gpca.attribution.predictions import read_predictions
 from gpca.errors import InputError
 from gpca.experiments.controls.protocol import LABELS
@@ -27,15 +28,19 @@ from gpca.seeds import generator
 if TYPE_CHECKING:
     import pandas as pd
 
+CALLS = "icp_calls"
 KEYS = ("control", "source", "trained_on", "explainer", "seed")
 COLUMNS = (
     *("control", "source", "trained_on", "method", "metric", "samples", "seeds", "value", "low", "high"),
     *("change", "change_low", "change_high"),
+    *("rival", "lead", "lead_low", "lead_high"),
+    *("untrained", "gain", "gain_low", "gain_high"),
 )
+NUMBERS = tuple(name for name in COLUMNS[5:] if name not in ("rival", "untrained"))
 
 
 def read_controls(prediction_files: Iterable[str | Path]) -> pd.DataFrame:
-    """Return the columns `KEYS`, sample, instance, concept, right, entropy and bald (NaN where there is none).
+    """Return the columns `KEYS`, sample, instance, concept, right, entropy, bald (NaN where none is) and icp_calls.
 
     ``source`` is the one tested; ``instance`` names the object with its source, views of one instance together. An
     abstained sample is wrong.
@@ -67,6 +72,7 @@ def read_controls(prediction_files: Iterable[str | Path]) -> pd.DataFrame:
                     "right": (rows["concept_true"] == rows["concept_predicted"]) & ~rows["abstained"],
                     "entropy": numbers(path, rows, "entropy"),
                     "bald": numbers(path, rows, "bald", needed=rows["bald"] != ""),
+                    "icp_calls": rows["icp_calls"],
                 }
             )
         )
@@ -117,7 +123,8 @@ def collect_intervals(prediction_files: Iterable[str | Path]) -> pd.DataFrame:
     By the source tested, and pooled over all. Of transfer there is a row for each source trained on, and one for all
     others together, whose ``trained_on`` is pooled. The change is the value minus the paper's protocol's, for the
     same seeds; of an explainer whose encoder is trained otherwise, minus its own with the paper's training, on the same
-    samples.
+    samples. The lead is the accuracy minus that of the best other explainer, the gain minus that of the best that needs
+    no training, under the same control and on the same draws. The number of ICP calls is of the paper's protocol.
     """
     import pandas as pd
 
@@ -126,6 +133,7 @@ def collect_intervals(prediction_files: Iterable[str | Path]) -> pd.DataFrame:
     records: list[tuple] = []
     for source in (*sources, POOLED) if len(sources) > 1 else sources:
         of_source = judged if source == POOLED else judged[judged["source"] == source]
+        measured: list[tuple[str, Group, Measured, Mapping[str, np.ndarray]]] = []
         for explainer, rows in of_source.groupby("explainer", sort=False):
             weights_B_N = _weights(source, rows)
             groups = _groups(rows, source)
@@ -139,7 +147,8 @@ def collect_intervals(prediction_files: Iterable[str | Path]) -> pd.DataFrame:
                     rows["seed"][mask]
                 )
                 against, _, _ = _measures(compared[other], weights_of_compared[:, other.to_numpy()])
-                records += _records(source, str(explainer), (control, trained_on), own, against)
+                measured.append((str(explainer), (control, trained_on), own, against))
+        records += _records(source, measured)
     return pd.DataFrame(records, columns=list(COLUMNS))
 
 
@@ -149,7 +158,7 @@ def read_intervals(path: str | Path) -> pd.DataFrame:
     Raises:
         InputError: missing, empty or unreadable file, missing column, a value that is no finite number.
     """
-    return read_numbers(path, COLUMNS, COLUMNS[5:], optional=COLUMNS[8:])
+    return read_numbers(path, COLUMNS, NUMBERS, optional=NUMBERS[3:])
 
 
 # Values by metric; numbers of samples and seeds; how often each draw has each sample.
@@ -164,18 +173,27 @@ def _weights(source: str, rows: pd.DataFrame) -> np.ndarray:
     return np.vstack([np.ones(len(rows)), drawn_B_N])
 
 
-def _records(
-    source: str, explainer: str, group: Group, measured: Measured, against: Mapping[str, np.ndarray]
-) -> Iterator[tuple]:
-    (control, trained_on), (values, counts, drawn_B_N) = group, measured
-    for metric, value_B in values.items():
-        if np.isfinite(value_B[0]):
+def _records(source: str, measured: Sequence[tuple[str, Group, Measured, Mapping[str, np.ndarray]]]) -> Iterator[tuple]:
+    """Yield the rows of a source, of the measures of every explainer in every group and what it is compared with."""
+    accuracies: dict[Group, dict[str, np.ndarray]] = {}
+    for explainer, group, (values, _, _), _ in measured:
+        accuracies.setdefault(group, {})[explainer] = values["accuracy"]
+    for explainer, group, (values, counts, drawn_B_N), against in measured:
+        control, trained_on = group
+        rivals = [name for name in accuracies[group] if not plain_of(name)]
+        for metric, value_B in values.items():
+            if not np.isfinite(value_B[0]):
+                continue
             change_B = value_B - against[metric]
             own = (control, source, trained_on, explainer, metric, *counts)
-            of_value = bounds(value_B[1:], drawn_B_N)
+            of_value = bounds(value_B[1:], None if metric == CALLS else drawn_B_N)
             is_itself = control == PAPER and not plain_of(explainer)  # of which there is nothing to doubt
             of_change = bounds(change_B[1:], None if is_itself else drawn_B_N, difference=True)
-            yield (*own, value_B[0], *of_value, change_B[0], *of_change)
+            lead = gain = Difference()
+            if metric == "accuracy":
+                lead = from_rival(accuracies[group], explainer, rivals, drawn_B_N=drawn_B_N)
+                gain = from_untrained(accuracies[group], explainer, drawn_B_N=drawn_B_N)
+            yield (*own, value_B[0], *of_value, change_B[0], *of_change, *lead.cells, *gain.cells)
 
 
 def _groups(rows: pd.DataFrame, source: str) -> dict[Group, np.ndarray]:
@@ -196,4 +214,6 @@ def _measures(rows: pd.DataFrame, weights_B_N: np.ndarray) -> Measured:
     with np.errstate(divide="ignore", invalid="ignore"):
         accuracy_B = (weights_B_N * right_N).sum(axis=1) / weights_B_N.sum(axis=1)
     measures = {"accuracy": accuracy_B, "auroc_error": auroc_error(rows, "entropy", weights_B_N)}
+    if (rows["control"] == PAPER).all():
+        measures[CALLS] = np.full(len(weights_B_N), rows["icp_calls"].mean())
     return measures, (len(rows), rows["seed"].nunique()), weights_B_N[1:]

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import inf
+from math import inf, isfinite
 from typing import TYPE_CHECKING
 
 from gpca.attribution.confidence import REPEATS
+from gpca.experiments.controls.metrics import CALLS
 from gpca.experiments.controls.settings import PAPER, TRANSFER, UNSEEN, WRONG_LABELS
 from gpca.experiments.diagnosis.judged import POOLED
 from gpca.objects.title import stand_in_clause
@@ -29,30 +30,43 @@ TITLES = {
     "shuffled": "Shuffled labels",
 }
 CHANGE = "_change"  # behind a control's name: the key of the column of its differences
+COMPARED = (PAPER, UNSEEN)  # with the best untrained explainer and the best rival, in columns of their own
+DIFFERENCES = {"_gain": ("gain", "over untrained (points)"), "_lead": ("lead", "lead (points)")}
 WRONG = "_wrong"  # behind the key of an AUROC: the column of the answers that it has to detect
 BOOTSTRAP = f"the 95 % interval of a bootstrap over objects and seeds ({REPEATS} draws)"
 ALL_TOGETHER = {POOLED: "All together"}
 
 
 def table10_controls(
-    intervals: pd.DataFrame, sources: Mapping[str, Mapping], explainers: Mapping[str, str], controls: Sequence[str]
+    intervals: pd.DataFrame,
+    sources: Mapping[str, Mapping],
+    explainers: Mapping[str, str],
+    controls: Sequence[str],
+    sees: Mapping[str, str],
 ) -> Table:
     """Return accuracy under every control with its change against the paper's protocol, pooled and by source.
 
     Args:
         intervals: What :func:`gpca.experiments.controls.metrics.collect_intervals` returned.
         controls: The names of those that were run.
+        sees: What each explainer sees, in words.
     """
-    table = TableBuilder("table10_controls", {"source": "Dataset", "explainer": "Explainer"})
+    table = TableBuilder("table10_controls", {"source": "Dataset", "explainer": "Explainer", "reads": "Reads"})
     names = [PAPER, *(name for name in TITLES if name in controls)]
     for (source, explainer), labels in crossed(ALL_TOGETHER | titles_of(sources), explainers):
         rows = rows_where(intervals, source=source, method=explainer)
-        table.add_row(labels, _cells(rows, source, names))
+        table.add_row([*labels, (sees[explainer], sees[explainer])], _cells(rows, source, names))
     table.compare_down([name for name in names if name != "shuffled"], same=1)
     columns = {name: Column(TITLES[name], interval=False) for name in names}
     columns |= {
         name + CHANGE: Column(f"{TITLES[name]}: change", limits=(-100.0, 100.0), beside=name) for name in names[1:]
     }
+    for name in (name for name in COMPARED if name in names):
+        columns |= {
+            name + suffix: Column(f"{TITLES[name].removesuffix(' (%)')}: {words}", limits=(-100.0, 100.0))
+            for suffix, (_, words) in DIFFERENCES.items()
+        }
+    columns[CALLS] = Column("ICP calls", 0, False, (0.0, inf))
     for name, words in _AUROCS.items() if UNSEEN in names else ():
         key = f"{name}_auroc"
         columns[key] = Column(words, 2, False, (0.0, 1.0))
@@ -71,6 +85,10 @@ def table10_controls(
             "and explainer learned from other objects. Other sources: they learned from one other source. Wrong "
             "labels: among the explainer's training samples. Shuffled labels teach nothing: guessing gives "
             "33.3, although in a single source and seed whole clusters of samples may be named by chance.",
+            "Over untrained: accuracy minus that of the best of chance, the most frequent label and the rule under the "
+            "same control; lead: minus that of the best other explainer; both on the same draws, so that it is better "
+            "where the interval is above 0. Reads: what an explainer sees of a registration. ICP calls: runs beyond "
+            "the one that it explains.",
             "AUROC: how well the entropy of the scores separates wrong from right answers; in brackets how many of the "
             "test samples are wrong, and a dash where none is. Elsewhere a dash marks a head that is trained with the "
             "encoder and learns no labels, and a source that does not admit a control.",
@@ -109,6 +127,11 @@ def _cells(rows: pd.DataFrame, source: str, names: Sequence[str]) -> dict[str, C
         accuracy = of_control.loc["accuracy"]
         cells[name] = interval_cell(accuracy)
         cells[name + CHANGE] = change_cell(accuracy) if name != PAPER else None
+        for suffix, (key, _) in DIFFERENCES.items() if name in COMPARED else ():
+            if isfinite(accuracy[key]):
+                cells[name + suffix] = interval_cell(accuracy, key, (f"{key}_low", f"{key}_high"))
+        if CALLS in of_control.index:
+            cells[CALLS] = plain_cell(of_control.loc[CALLS]["value"], int(accuracy["seeds"]), int(accuracy["samples"]))
         if name in _AUROCS and "auroc_error" in of_control.index:
             key, samples = f"{name}_auroc", int(accuracy["samples"])
             cells[key] = interval_cell(of_control.loc["auroc_error"], factor=1)

@@ -15,7 +15,7 @@ from gpca.reporting.tables.table import Cell, Column, Table
 REAL = {"linemod": {"title": "LINEMOD", "stand_in": False}, "ycb": {"title": "YCB", "stand_in": False}}
 STAND_INS = {name: entry | {"stand_in": True} for name, entry in REAL.items()}
 TITLES = {"gpca_paper": "GP-CA (paper)", "gpca": "GP-CA", "shap_additive": "SHAP", "shap_oracle": "SHAP (oracle)"}
-EXPLAINERS = {name: {"title": title, "oracle": name == "shap_oracle"} for name, title in TITLES.items()}
+EXPLAINERS = {name: {"title": title, "oracle": name == "shap_oracle", "sees": "pair"} for name, title in TITLES.items()}
 
 
 def tidy(accuracies, test_samples=200):
@@ -186,7 +186,7 @@ def test_latex_spans_both_columns_only_where_it_must(metrics):
 
 
 def test_metrics_without_these_explainers_are_refused(metrics):
-    unknown = {"sa_local_additive": {"title": "SA", "oracle": False}}
+    unknown = {"sa_local_additive": {"title": "SA", "oracle": False, "sees": "runs"}}
     for make in (table1_single_baselines, table1_extended, table2_per_concept):
         with pytest.raises(InputError, match=make.__name__):
             make(metrics, REAL, unknown)
@@ -226,13 +226,13 @@ def test_extended_has_a_row_per_explainer_and_a_unit_per_column(everything):
     table = table1_extended(everything, REAL, EXPLAINERS)
     lines = table.markdown().splitlines()
     assert lines[2] == (
-        "| Dataset | Explainer | Accuracy (%) | Relabeled (%) | Causal (%) | n causal "
+        "| Dataset | Explainer | Reads | Accuracy (%) | Relabeled (%) | Causal (%) | n causal "
         "| Abstained (%) | ICP calls | Seconds | n |"
     )
     constant = "90.0 (85.1 to 93.4) | 50.0 (39.3 to 60.7) | 80 | 12.5"
-    assert lines[4] == f"| LINEMOD | GP-CA | 80.0 ± 2.5 | {constant} | 400 | 0.250 | 200 |"
-    assert lines[5] == f"| YCB | GP-CA | **90.0 ± 2.5** | {constant} | 0 | 0.020 | 200 |"
-    assert lines[6].startswith("| YCB | SHAP | 35.0 ± 12.4 |")
+    assert lines[4] == f"| LINEMOD | GP-CA | pair | 80.0 ± 2.5 | {constant} | 400 | 0.250 | 200 |"
+    assert lines[5] == f"| YCB | GP-CA | pair | **90.0 ± 2.5** | {constant} | 0 | 0.020 | 200 |"
+    assert lines[6].startswith("| YCB | SHAP | pair | 35.0 ± 12.4 |")
     assert lines[6].endswith("| 21 | 12.5 | 400 | 0.250 | 60 |")
     assert "60 to 200 test samples each" in table.footnotes[0]
     assert "the one column that differs from run to run" in table.markdown()
@@ -249,12 +249,13 @@ def test_extended_sets_the_best_rival_in_bold_and_never_an_oracle(everything):
 
 def test_extended_csv_is_one_line_per_number(everything):
     records = table1_extended(everything, REAL, EXPLAINERS).records()
-    assert records[0] == ("source", "explainer", "metric", "mean", "ci_low", "ci_high", "n_seeds", "n_test", "at_least")
+    heads = ("metric", "mean", "ci_low", "ci_high", "n_seeds", "n_test", "at_least")
+    assert records[0] == ("source", "explainer", "reads", *heads)
     assert len(records) == 1 + 4 * 8
-    assert ("ycb", "gpca", "seconds_per_sample", 0.0204, 0.0204, 0.0204, 3, 600, False) in records
-    assert ("ycb", "shap_additive", "causal_accuracy", 50.0, 30.337916, 69.662084, 3, 63, False) in records
-    assert ("ycb", "shap_additive", "accuracy", 35.0, 22.579311, 47.420689, 3, 180, False) in records
-    assert ("ycb", "gpca", "icp_calls", 0.0, 0.0, 0.0, 3, 600, False) in records
+    assert ("ycb", "gpca", "pair", "seconds_per_sample", 0.0204, 0.0204, 0.0204, 3, 600, False) in records
+    assert ("ycb", "shap_additive", "pair", "causal_accuracy", 50.0, 30.337916, 69.662084, 3, 63, False) in records
+    assert ("ycb", "shap_additive", "pair", "accuracy", 35.0, 22.579311, 47.420689, 3, 180, False) in records
+    assert ("ycb", "gpca", "pair", "icp_calls", 0.0, 0.0, 0.0, 3, 600, False) in records
 
 
 def test_extended_leaves_out_what_was_not_measured(everything):

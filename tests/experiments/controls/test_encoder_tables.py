@@ -2,6 +2,7 @@ import pandas as pd
 import pytest
 
 from gpca.attribution.metrics import TIDY_COLUMNS
+from gpca.attribution.paired import Difference
 from gpca.errors import InputError
 from gpca.experiments.controls.encoder_tables import table10_costs, table10_encoders
 from gpca.experiments.controls.metrics import COLUMNS
@@ -13,7 +14,7 @@ EXPLAINERS = {"gpca": "GP-CA", "gpca_pair": "GP-CA on the pair"}
 
 def row(control, source, trained_on, method, value, change, seeds=3):
     bounds = (value, value - 0.03, value + 0.01, change, change - 0.02, change + 0.02)
-    return (control, source, trained_on, method, "accuracy", 200 * seeds, seeds, *bounds)
+    return (control, source, trained_on, method, "accuracy", 200 * seeds, seeds, *bounds, *Difference().cells * 2)
 
 
 @pytest.fixture

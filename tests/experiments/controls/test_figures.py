@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from gpca.attribution.paired import Difference
 from gpca.errors import InputError
 from gpca.experiments.controls.figures import SUCCEEDS, draw_severity_curves, draw_transfer
 from gpca.experiments.controls.metrics import COLUMNS as INTERVALS
@@ -25,7 +26,18 @@ def severities():
 
 def intervals():
     rows = [
-        ("paper" if one == other else "transfer", one, other, method, "accuracy", 9, 1, 0.5, *[np.nan] * 5)
+        (
+            "paper" if one == other else "transfer",
+            one,
+            other,
+            method,
+            "accuracy",
+            9,
+            1,
+            0.5,
+            *[np.nan] * 5,
+            *Difference().cells * 2,
+        )
         for one in SOURCES
         for other in SOURCES
         for method in EXPLAINERS

@@ -82,6 +82,24 @@ def test_a_change_is_that_of_the_same_draws_of_objects_and_seeds(files, tmp_path
     assert rows.loc["paper", POOLED, POOLED, "gpca", "accuracy"]["samples"] == 120
 
 
+def test_what_an_explainer_adds_is_that_of_the_same_control_and_draws(files):
+    for path in files:
+        known = pd.read_csv(path, keep_default_na=False)
+        source = path.parent.name
+        guesses = [said(source, source, control, "rule", 18).assign(icp_calls=4) for control in ("paper", "density")]
+        write_csv(path, pd.concat([known, *guesses]))
+    rows = collect_intervals(files).set_index(["control", "source", "method", "metric"])
+    density = rows.loc["density", "a", "gpca", "accuracy"]
+    assert (density["untrained"], density["rival"]) == ("rule", "rule")
+    assert density["gain"] == density["lead"] == pytest.approx(0.3)
+    assert 0 < density["gain_low"] <= 0.3 <= density["gain_high"]
+    of_rule = rows.loc["paper", POOLED, "rule", "accuracy"]
+    assert (of_rule["untrained"], of_rule["rival"]) == ("", "head")
+    assert np.isnan(of_rule["gain"]) and of_rule["lead"] == pytest.approx(-0.6)
+    assert rows.loc["paper", "a", "rule", "icp_calls"]["value"] == 4
+    assert ("density", "a", "rule", "icp_calls") not in rows.index
+
+
 def test_a_control_of_some_seeds_is_compared_with_the_same_seeds_of_the_papers_protocol(files):
     parts = [said("a", "a", "paper", "gpca", 27)]
     write_csv(files[1], pd.concat(parts))  # another seed, in which all goes wrong
