@@ -35,21 +35,27 @@ class Unmeasurable(Exception):
 
 
 class Registrar:
-    """Registers one candidate from any starts; what several calls share is computed once."""
+    """Registers one candidate from any starts; what several calls share is computed once.
 
-    def __init__(self, candidate: Candidate, settings: CauseSettings) -> None:
+    Args:
+        misses: whether runs may all find no correspondence, and so stay where they started; else that is refused.
+    """
+
+    def __init__(self, candidate: Candidate, settings: CauseSettings, misses: bool = False) -> None:
         self.candidate = candidate
         self._settings = settings
+        self._misses = misses
         self._targets: dict[tuple[int, ...], BatchedICP] = {}
 
     def run(self, causes: tuple[int, ...], xi_n_6: np.ndarray) -> Runs:
         """Register with these causes from the starts exp(ξ) T_init.
 
         Returns:
-            the runs, whose poses take what was observed to the model: the identity is right.
+            the runs, whose poses take what was observed to the model: the identity is right. The inlier RMSE of a run
+            without any correspondence is the correspondence distance: 0 would be the best there is.
 
         Raises:
-            Unmeasurable: no run found a correspondence, or a pose is not finite.
+            Unmeasurable: no run found a correspondence, unless that is allowed, or a pose is not finite.
         """
         starts_n = exp(xi_n_6) @ self.candidate.start(causes)
         observed, model = self.candidate.observed(causes), self.candidate.reference(causes)
@@ -64,8 +70,9 @@ class Registrar:
         seconds = perf_counter() - started
         if not np.isfinite(poses_n).all():
             raise Unmeasurable("not finite")
-        if not fitness_n.any():
+        if not (fitness_n.any() or self._misses):
             raise Unmeasurable("no correspondences")
+        rmse_n = np.where(fitness_n > 0, rmse_n, self._settings.icp.correspondence_distance)
         return Runs(poses_n, fitness_n, rmse_n, len(poses_n), seconds)
 
     def _target(self, causes: tuple[int, ...], points: np.ndarray) -> BatchedICP:

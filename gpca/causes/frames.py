@@ -1,7 +1,8 @@
 """Registrations of depth frames whose causes are measured: nothing about them was simulated.
 
-An instance was seen by a real (or the virtual) sensor, behind whatever stood in front of it, and an estimator said
-where it is. Mesh, pose and camera are known, so each of the three can be taken away:
+An instance was seen by a real (or the virtual) sensor, behind whatever stood in front of it, and its registration
+starts where an estimator took it to be, or off the truth. Mesh, pose and camera are known, so each of the three can be
+taken away:
 
 - without noise: where the rays of the same pixels meet the mesh at the true pose;
 - without missing surface: the whole side that the camera would see, with residuals like those measured where noise is;
@@ -31,7 +32,9 @@ from gpca.errors import InputError
 from gpca.frames.camera import MeshScene
 from gpca.frames.clean_view import clean_view, rendered_side
 from gpca.frames.instances import Instances
+from gpca.frames.starts import KINDS, Starts
 from gpca.objects.canonical import ObjectClouds
+from gpca.objects.splits import TRAINING
 from gpca.pairs.perturbation import CONCEPTS, SEVERITIES
 from gpca.process.progress import progress
 from gpca.seeds import generator
@@ -42,16 +45,27 @@ if TYPE_CHECKING:
 OUTLINE_POINTS = 2048  # of an object, which tell where in the image it lies
 
 
-def chosen_instances(instances: Instances, source: str, settings: FrameCauseSettings) -> np.ndarray:
-    """Return the numbers of the instances that are measured, in order."""
-    if settings.instances is None or settings.instances >= len(instances):
-        return np.arange(len(instances))
-    return np.sort(generator(source, "frame causes").permutation(len(instances))[: settings.instances])
+def chosen_starts(starts: Starts, instances: Instances, source: str, settings: FrameCauseSettings) -> Starts:
+    """Return the starts that are measured, in order: of each kind a draw, of instances in scenes that may be tested.
+
+    The draw takes turns with the scenes, or the longest sequence would have most of it.
+    """
+    is_tested_K = instances.fold[starts.instance] != TRAINING
+    scene_K = instances.cluster[starts.instance]
+    chosen: list[int] = []
+    for kind in KINDS:
+        rows = generator(source, "frame causes", kind).permutation(np.flatnonzero(is_tested_K & (starts.kind == kind)))
+        turn = np.zeros(len(rows), int)
+        for scene in np.unique(scene_K[rows]):
+            of_scene = scene_K[rows] == scene
+            turn[of_scene] = np.arange(of_scene.sum())
+        chosen += np.sort(rows[np.argsort(turn, kind="stable")][: settings.starts]).tolist()
+    return starts.subset(np.array(chosen, int))
 
 
 def measure_frames(
     instances: Instances,
-    rows: np.ndarray,
+    starts: Starts,
     objects: ObjectClouds,
     meshes: Mapping[int, MeshScene],
     source: str,
@@ -59,55 +73,70 @@ def measure_frames(
     settings: CauseSettings,
     points: int,
 ) -> tuple[Causes, pd.DataFrame]:
-    """Measure the causes of these instances.
+    """Measure the causes of registrations from these starts.
 
-    Instances that cannot be measured are left out and named on stderr.
+    One that finds no correspondence is measured where it started. Those that cannot be measured, since the object's own
+    clean pairs are off or its mesh is not in sight, are left out and named on stderr.
 
     Args:
-        meshes: of the objects that they show, see :func:`gpca.frames.meshes.meshes_of`.
+        meshes: of the objects that the instances show, see :func:`gpca.frames.meshes.meshes_of`.
         points: of what was measured, at most, and of the model.
 
     Returns:
-        the registrations, all of them test samples with the number of their instance; a row for each of where it was
-        seen and what was found.
+        the registrations, all of them test samples with the number of their start; a row for each of where it was
+        seen, what it started from and what was found.
 
     Raises:
-        InputError: no instance can be measured.
+        InputError: no registration can be measured.
     """
-    subjects, limit = measure_clean_pairs(_subjects(instances, rows, objects), source, seed, settings)
+    subjects, limit = measure_clean_pairs(_subjects(instances, starts.instance, objects), source, seed, settings)
     measuring, of_object = Measuring(settings, limit), {subject.index: subject for subject in subjects}
     records: list[dict[str, Any]] = []
-    for i in progress(rows.tolist(), f"causes of {source}, seed {seed}"):
-        axes = (source, seed, "frame causes", i)
+    for k in progress(range(len(starts)), f"causes of {source}, seed {seed}"):
+        i, began = int(starts.instance[k]), f"{starts.kind[k]}, {starts.init_from[k]}"
+        axes = (source, seed, "frame causes", i, began)
         try:
             if (subject := of_object.get(int(instances.object_index[i]))) is None:
                 raise Unmeasurable("its clean pairs are misaligned")
-            candidate = frame_candidate(instances, i, subject, meshes[subject.index], points, generator(*axes))
-            records.append(_measured(candidate, measuring, subject, axes) | {"sample": i, "split": "test"})
+            T_init = starts.T_camera_object_init[k]
+            candidate = frame_candidate(instances, i, T_init, subject, meshes[subject.index], points, generator(*axes))
+            records.append(_measured(candidate, measuring, subject, axes) | {"sample": k, "split": "test"})
         except Unmeasurable as fault:
-            print(f"causes of {source}: instance {i} is skipped: {fault}", file=sys.stderr)
+            print(f"causes of {source}: instance {i} ({began}) is skipped: {fault}", file=sys.stderr)
     if not records:
         raise InputError(
             f"causes of {source}", "no instance in the frames can be measured", "check the meshes and poses"
         )
     causes, _ = as_causes(records, (source, seed))
-    return causes, _table(instances, causes)
+    return causes, _table(instances, starts, causes)
 
 
 def frame_candidate(
-    instances: Instances, i: int, subject: Subject, mesh: MeshScene, points: int, random: np.random.Generator
+    instances: Instances,
+    i: int,
+    T_init: np.ndarray,
+    subject: Subject,
+    mesh: MeshScene,
+    points: int,
+    random: np.random.Generator,
 ) -> Candidate:
     """Return an instance with everything that may be taken away from it, in diameters.
+
+    Args:
+        T_init: where the registration starts, ``T_camera_object`` in meters.
 
     Raises:
         Unmeasurable: no ray of its pixels meets the mesh, or the model cannot be seen at the initial pose.
     """
     diameter_m, camera_3_3 = subject.diameter_m, instances.camera_3_3[i]
-    T_true, T_init = instances.T_camera_object_true[i], instances.T_camera_object_init[i]
+    T_true = instances.T_camera_object_true[i]
     outline_m = subject.surface[:OUTLINE_POINTS] * diameter_m
     if (view := clean_view(instances, i, mesh, outline_m)) is None:
         raise Unmeasurable("its pixels show none of the mesh at the true pose")
-    models = [_drawn(rendered_side(mesh, camera_3_3, T, outline_m), points, random) for T in (T_true, T_init)]
+    sides = [rendered_side(mesh, camera_3_3, T, outline_m) for T in (T_true, T_init)]
+    # The same numbers draw the points of both, so that another draw alone is no effect of the pose.
+    order = random.random(max(map(len, sides)))
+    models = [side[np.argsort(order[: len(side)])[:points]] for side in sides]
     if min(map(len, models)) < FEWEST_POINTS:
         raise Unmeasurable("its mesh is not visible at the pose that ICP starts from")
     kept = random.permutation(len(view.clean))[:points]
@@ -140,13 +169,13 @@ def _drawn(points_N_3: np.ndarray, most: int, random: np.random.Generator) -> np
 
 
 def _measured(candidate: Candidate, measuring: Measuring, subject: Subject, axes: tuple) -> dict[str, Any]:
-    registrar = Registrar(candidate, measuring.settings)
+    registrar = Registrar(candidate, measuring.settings, misses=True)
     truths = [
         measuring.truth(measuring.counterfactuals(registrar, subject, axes, starts))
         for starts in ("starts", "other starts")
     ]
     observed = measuring.observed(registrar, subject, axes)
-    return {**observed, "truth": truths[0], "again": truths[1], "candidate": axes[-1]}
+    return {**observed, "truth": truths[0], "again": truths[1], "candidate": axes[3]}
 
 
 def _subjects(instances: Instances, rows: np.ndarray, objects: ObjectClouds) -> list[Subject]:
@@ -157,14 +186,17 @@ def _subjects(instances: Instances, rows: np.ndarray, objects: ObjectClouds) -> 
     ]
 
 
-def _table(instances: Instances, causes: Causes) -> pd.DataFrame:
+def _table(instances: Instances, starts: Starts, causes: Causes) -> pd.DataFrame:
     import pandas as pd
 
     registrations, truth = causes.registrations, causes.truth
-    rows = registrations.sample
-    seen = {name: getattr(instances, name)[rows] for name in ("dataset", "scene", "image", "init_from")}
+    started = starts.subset(registrations.sample)
+    seen = {"instance": started.instance, "start": started.kind, "init_from": started.init_from}
+    seen |= {name: getattr(instances, name)[started.instance] for name in ("dataset", "scene", "image")}
     severities = {name: getattr(registrations, f"severity_{name}") for name in SEVERITIES}
-    judged = {"state": truth.state, "dominant": truth.dominant}
+    judged = {"missed": ~causes.fitness_runs.any(axis=1), "state": truth.state, "dominant": truth.dominant}
     judged |= {"error": truth.error[:, ALL], "error_clean": truth.error[:, NONE]}
     judged |= {f"phi_{concept}": truth.phi[:, c] for c, concept in enumerate(CONCEPTS)}
-    return pd.DataFrame({"sample": rows, **seen, "object": registrations.object_name, **severities, **judged})
+    return pd.DataFrame(
+        {"sample": registrations.sample, **seen, "object": registrations.object_name, **severities, **judged}
+    )

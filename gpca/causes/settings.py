@@ -13,16 +13,18 @@ from gpca.uncertainty.settings import FEWEST_STARTS, UncertaintySettings
 
 @dataclass(frozen=True)
 class FrameCauseSettings:
-    """Which instances are measured, and with how many points.
+    """Which starts of instances are measured, and with how many points.
 
     Attributes:
-        seeds: the first so many of the run's, each with other points, starts and explainers.
-        instances: drawn of all, at most; None for all.
+        seeds: the first so many of the run's, each with other points, starts around these and explainers.
+        starts: drawn of each kind, at most; None for all.
+        rungs: of the ladder of errors that the true pose is given: turns in degrees, and shifts in diameters.
         points: of what was measured, at most, and of the model.
     """
 
     seeds: Count = 1
-    instances: Count | None = None
+    starts: Count | None = None
+    rungs: tuple[tuple[HalfTurn, Shift], ...] = ((5.0, 0.03), (15.0, 0.08), (30.0, 0.15), (60.0, 0.3))
     points: CloudPoints = 512
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from gpca.errors import InputError
 from gpca.frames.bop import Frame, read_frames
+from gpca.frames.estimates import PosesByObject, read_bop_results
 from gpca.objects import bop
 from gpca.objects.splits import DRAWN, EVALUATION, TRAINING, Place
 from gpca.seeds import generator
@@ -59,12 +60,26 @@ class Dataset:
             raise InputError(f"dataset {self.name}", fault, "add it to the file of scenes, or set splits.scenes: null")
         return self.role == EVALUATION or self.places[frame.scene].role == self.role
 
+    def place(self, scene: int) -> Place:
+        """Return where a scene stands; where no file says so, it may be tested and its poses are good."""
+        return self.places.get(scene, Place(f"{self.name} {scene}", self.role, DRAWN))
+
     def fold(self, scene: int) -> int:
         """Return the fold that a scene is tested with, `DRAWN` where no file says so, `TRAINING` if it never is."""
-        if not self.places:
-            return DRAWN
-        place = self.places[scene]
+        place = self.place(scene)
         return place.fold if place.role == self.role else TRAINING
+
+    def estimators(self) -> dict[str, PosesByObject]:
+        """Return the poses of each of its results files, by the name of the file."""
+        if not self.results:
+            return {}
+        # Against all images, not only the drawn ones: a results file covers the whole dataset.
+        distances_m = {
+            frame.place: [float(np.linalg.norm(annotation.T_camera_model[:3, 3])) for annotation in frame.annotations]
+            for frame in read_frames(self.folders, self.split)
+        }
+        known = bop.read_models_info(self.models_folder() / "models_info.json").keys()
+        return {path.stem: read_bop_results(path, distances_m, known) for path in self.results}
 
     def models_folder(self) -> Path:
         """Return the folder of its models."""

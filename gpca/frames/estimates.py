@@ -124,14 +124,10 @@ def _require_unit(subject: object, ratio: float, most: float) -> None:
     )
 
 
-def choose_estimate(
-    poses_by_estimator: Mapping[str, PosesByObject],
-    place: tuple[int, int, int],
-    alone: bool,
-    seen: Mapping,
-    random: np.random.Generator,
-) -> tuple[str, np.ndarray] | None:
-    """Return one estimator that found an object and its pose ``T_camera_model``, drawn of all that did.
+def estimates_of(
+    poses_by_estimator: Mapping[str, PosesByObject], place: tuple[int, int, int], alone: bool, seen: Mapping
+) -> list[tuple[str, np.ndarray]]:
+    """Return every estimator that found an object, by name, and its pose ``T_camera_model``.
 
     Args:
         poses_by_estimator: of one dataset.
@@ -140,14 +136,14 @@ def choose_estimate(
             was measured is of another one.
         seen: ``points_m`` (P, 3) in the camera's frame, ``pixels`` (P, 2), ``camera_3_3`` and ``diameter_m``.
     """
-    candidates = []
+    estimates = []
     for name in sorted(poses_by_estimator):
         if poses := poses_by_estimator[name].get(place):
             pose = nearest_to(poses, seen["pixels"], seen["camera_3_3"])
             away_m = np.linalg.norm(pose[:3, 3] - np.median(seen["points_m"], axis=0))
             if alone or away_m <= seen["diameter_m"]:
-                candidates.append((name, pose))
-    return candidates[int(random.integers(len(candidates)))] if candidates else None
+                estimates.append((name, pose))
+    return estimates
 
 
 @dataclass

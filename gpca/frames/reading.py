@@ -12,14 +12,12 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from gpca.errors import InputError
-from gpca.frames.bop import Frame, TooFewPoints, measured_points, read_frames, without_background
+from gpca.frames.bop import Frame, TooFewPoints, measured_points, without_background
 from gpca.frames.dataset import Dataset
 from gpca.frames.estimates import (
     EstimatorErrors,
-    PosesByObject,
-    choose_estimate,
     error_of,
-    read_bop_results,
+    estimates_of,
     read_pose_errors,
 )
 from gpca.frames.initial_pose import GlobalRegistration, InitialPoseSettings, displace
@@ -143,7 +141,7 @@ def read_instances(
 
 def _from_results(datasets: Mapping[str, tuple[Dataset, list[Frame], dict]], seen: list) -> Any:
     """Return a function to initial poses: an estimator's if one found the object, else the truth with an error."""
-    estimators = {name: _estimators(dataset) for name, (dataset, _, _) in datasets.items()}
+    estimators = {name: dataset.estimators() for name, (dataset, _, _) in datasets.items()}
     estimates: dict[int, tuple[str, np.ndarray]] = {}
     symmetric = {(catalog.name, number) for catalog, _, _, _ in seen for number in catalog.symmetric_ids()}
     errors = EstimatorErrors(symmetric)
@@ -156,7 +154,8 @@ def _from_results(datasets: Mapping[str, tuple[Dataset, list[Frame], dict]], see
         alone = Counter(of.object_id for of in frame.annotations)[number] == 1
         random = generator(catalog.name, *frame.place, n, "estimator")
         shown = row | {"diameter_m": catalog.diameter_m(number)}
-        if chosen := choose_estimate(estimators[catalog.name], (*frame.place, number), alone, shown, random):
+        if candidates := estimates_of(estimators[catalog.name], (*frame.place, number), alone, shown):
+            chosen = candidates[int(random.integers(len(candidates)))]
             estimates[place] = chosen
             errors.add((catalog.name, number), error_of(annotation.T_camera_model, chosen[1]))
     places = {(catalog.name, *frame.place, n): place for place, (catalog, frame, n, _) in enumerate(seen)}
@@ -245,16 +244,3 @@ class _Objects:
         return bool(
             find_symmetries(self._objects.points(i), self._objects.diameters_m[i]) if listed is None else listed
         )
-
-
-def _estimators(dataset: Dataset) -> dict[str, PosesByObject]:
-    """Return the poses of each results file of a dataset, by the name of the file."""
-    if not dataset.results:
-        return {}
-    # Against all images, not only the drawn ones: a results file covers the whole dataset.
-    distances_m = {
-        frame.place: [float(np.linalg.norm(annotation.T_camera_model[:3, 3])) for annotation in frame.annotations]
-        for frame in read_frames(dataset.folders, dataset.split)
-    }
-    known = bop.read_models_info(dataset.models_folder() / "models_info.json").keys()
-    return {path.stem: read_bop_results(path, distances_m, known) for path in dataset.results}

@@ -39,12 +39,6 @@ def conditions_of(config: Mapping) -> dict[str, dict]:
     return {name: entry for name, entry in conditions if estimated or entry.get("form") != "results"}
 
 
-def estimated(config: Mapping) -> str:
-    """Return the source whose initial poses are those of estimators: a condition's, or else that of all frames."""
-    conditions = conditions_of(config).items()
-    return next((f"{REAL_WORLD}_{name}" for name, entry in conditions if entry.get("form") == "results"), REAL_WORLD)
-
-
 def patterns(split: str = "test") -> list[str]:
     """Return the patterns of the files that are read of a dataset, below its folder."""
     return [f"{split}*/*/*.json", f"{split}*/*/depth/*", f"{split}*/*/mask_visib/*", "models/*"]

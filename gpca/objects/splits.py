@@ -5,9 +5,11 @@ test at once where objects or scenes are unseen, and intervals are over clusters
 into *folds*; with a seed, those of one fold are unseen. A file with these columns says how:
 
     objects: source, object, name, family, role, fold
-    scenes:  dataset, scene, role, fold
+    scenes:  dataset, scene, role, fold[, truth, estimates]
 
-The role is ``development`` (what settings are chosen by), ``evaluation`` or, of objects, ``unused``.
+The role is ``development`` (what settings are chosen by), ``evaluation`` or, of objects, ``unused``. The true poses of
+a scene were ``annotated`` or made by ``icp``; poses of estimators are those on its very ``image`` or were ``carried``
+over from another one of the sequence.
 """
 
 from __future__ import annotations
@@ -26,14 +28,19 @@ from gpca.seeds import generator
 DRAWN = -1  # the fold of what no file deals into folds
 TRAINING = -2  # the fold of scenes for development, which are never tested but may be trained on
 DEVELOPMENT, EVALUATION, UNUSED = ROLES = ("development", "evaluation", "unused")
+ANNOTATED, BY_ICP = TRUTHS = ("annotated", "icp")
+ON_IMAGE, CARRIED = ESTIMATES = ("image", "carried")
+WORTH = {"truth": TRUTHS, "estimates": ESTIMATES}  # columns of scenes that may be missing
 
 
 class Place(NamedTuple):
-    """Where an object or a scene stands: its cluster, its role and its fold."""
+    """Where an object or a scene stands: its cluster, its role and its fold; of a scene, what its poses are worth."""
 
     cluster: str
     role: str
     fold: int
+    truth: str = ANNOTATED
+    estimates: str = ON_IMAGE
 
 
 def read_object_splits(path: str | Path, source: str) -> dict[str, Place]:
@@ -52,12 +59,18 @@ def read_scene_splits(path: str | Path, dataset: str) -> dict[int, Place]:
     """Return the place of each scene of a dataset by number; none where the file says nothing of the dataset.
 
     Raises:
-        InputError: as :func:`read_object_splits`.
+        InputError: as :func:`read_object_splits`, and an unknown word for the truth or the estimates.
     """
-    rows = read_csv(path, ("dataset", "scene", "role", "fold"), remedy="restore it")
+    rows = read_csv(path, ("dataset", "scene", "role", "fold"), others=tuple(WORTH), remedy="restore it")
     of_dataset = rows[rows["dataset"] == dataset]
     clusters = [f"{dataset} {scene}" for scene in of_dataset["scene"]]
     places = _places(path, of_dataset["scene"], clusters, of_dataset["role"], of_dataset["fold"])
+    for column, words in WORTH.items():
+        for scene, word in zip(of_dataset["scene"], of_dataset.get(column, ()), strict=False):
+            if word not in words:
+                fault = f"scene {scene} of {dataset} has '{word}' as {column}"
+                raise InputError(path, fault, f"choose one of {', '.join(words)}")
+            places[scene] = places[scene]._replace(**{column: word})
     return {int(scene): place for scene, place in places.items()}
 
 

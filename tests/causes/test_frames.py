@@ -6,13 +6,16 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from gpca.causes.frames import chosen_instances, frame_candidate, measure_frames
+from gpca.causes.frames import chosen_starts, frame_candidate, measure_frames
 from gpca.causes.settings import CauseSettings, FrameCauseSettings
 from gpca.causes.shapley import ALL
+from gpca.causes.truth import LARGEST_ERROR
 from gpca.errors import InputError
 from gpca.frames.clean_view import clean_view
 from gpca.frames.meshes import meshes_of
 from gpca.frames.reading import Dataset, read_models
+from gpca.frames.starts import Starts
+from gpca.objects.splits import TRAINING
 
 SETTINGS = CauseSettings(clean_pairs=20, points=(96, 128))
 POINTS = 256
@@ -51,8 +54,13 @@ def only(instances, i, points_m=None, pixels=None):
 
 
 def measured(instances, objects, meshes):
-    rows = np.arange(len(instances))
-    return measure_frames(instances, rows, objects, meshes, "tiny", 100, SETTINGS, POINTS)
+    starts = own_starts(instances)
+    return measure_frames(instances, starts, objects, meshes, "tiny", 100, SETTINGS, POINTS)
+
+
+def own_starts(instances, kind="native"):
+    numbers = np.arange(len(instances))
+    return Starts(numbers, np.full(len(numbers), kind), instances.init_from, instances.T_camera_object_init)
 
 
 def hidden(seen):
@@ -106,7 +114,8 @@ def test_the_model_is_what_the_camera_would_see_where_icp_starts(seen, tiny, mes
     from gpca.causes.frames import _subjects
 
     [subject] = _subjects(seen, np.arange(1), tiny[1])
-    candidate = frame_candidate(misplaced(seen), 0, subject, meshes[subject.index], POINTS, np.random.default_rng(100))
+    T_init, random = misplaced(seen).T_camera_object_init[0], np.random.default_rng(100)
+    candidate = frame_candidate(seen, 0, T_init, subject, meshes[subject.index], POINTS, random)
     assert candidate.reference((1,)) is candidate.model
     assert candidate.reference((0, 2)) is candidate.model_at_truth
     assert np.abs(candidate.model.mean(axis=0) - candidate.model_at_truth.mean(axis=0)).max() > 0.01
@@ -119,12 +128,27 @@ def test_what_has_no_mesh_or_lies_beside_it_is_refused_or_left_out(seen, tiny, m
     beside = replace(seen, points_m=seen.points_m + np.float32([5, 0, 0]))
     with pytest.raises(InputError, match="no instance in the frames can be measured"):
         measured(beside, tiny[1], meshes)
-    assert "instance 0 is skipped: its pixels show none of the mesh" in capsys.readouterr().err
+    assert "instance 0 (native, true_pose) is skipped: its pixels show none of the mesh" in capsys.readouterr().err
 
 
-def test_as_many_instances_are_drawn_as_are_wanted(tiny):
+def test_what_finds_no_correspondence_failed_by_its_pose(seen, tiny, meshes):
+    T_away = np.eye(4)
+    T_away[0, 3] = 3.0
+    away = replace(seen, T_camera_object_init=T_away @ seen.T_camera_object_true)
+    causes, table = measured(away, tiny[1], meshes)
+    assert table[["missed", "state", "dominant"]].to_numpy().tolist() == [[True, "failed", "pose"]]
+    assert causes.truth.error[0, ALL] == LARGEST_ERROR
+    assert (causes.inlier_rmse_runs == SETTINGS.icp.correspondence_distance).all()  # 0 would look like a perfect fit
+
+
+def test_as_many_starts_are_drawn_of_each_kind_as_are_wanted_in_turns_of_the_scenes(tiny):
     instances = tiny[0]
-    assert chosen_instances(instances, "tiny", FrameCauseSettings()).tolist() == list(range(len(instances)))
-    some = chosen_instances(instances, "tiny", FrameCauseSettings(instances=5))
-    assert len(set(some.tolist())) == 5
-    assert (np.diff(some) > 0).all()
+    numbers = np.tile(np.arange(len(instances)), 2)
+    kinds = np.repeat(["native", "ladder"], len(instances))
+    starts = Starts(numbers, kinds, kinds, instances.T_camera_object_true[numbers])
+    assert len(chosen_starts(starts, instances, "tiny", FrameCauseSettings())) == len(starts)
+    some = chosen_starts(starts, instances, "tiny", FrameCauseSettings(starts=3))
+    assert some.kind.tolist() == ["native"] * 3 + ["ladder"] * 3
+    assert len(set(instances.scene[some.instance[:3]])) == min(3, len(set(instances.scene)))
+    trained = replace(instances, fold=np.full(len(instances), TRAINING))
+    assert len(chosen_starts(starts, trained, "tiny", FrameCauseSettings())) == 0

@@ -2,12 +2,14 @@
 
 import json
 
+import pandas as pd
 import pytest
 
 from gpca.causes.dataset import LABELS, Causes
+from gpca.causes.truth import BORDERLINE, GEOMETRY
 from gpca.errors import InputError
-from gpca.experiments.diagnosis.tables import table9_frames
-from gpca.experiments.frame_causes.metrics import KINDS, STATE, TRUTH, collect
+from gpca.experiments.frame_causes.metrics import STATE, TRUTH, collect
+from gpca.experiments.frame_causes.tables import table9_frames
 from tests.steps.by_words import main
 
 from ..hostile import refusal
@@ -15,7 +17,7 @@ from .command_lines import CAUSES, ENCODER
 
 FEW = {"iterations": 5, "inducing": 6, "draws": 20}
 SETTINGS = {
-    "frames": {"instances": 6, "points": 128},
+    "frames": {"starts": 6, "points": 128, "rungs": [[20, 0.1]]},
     "causes": CAUSES,
     "icp": {"max_iterations": 30},
     "descriptors": {"starts": 1, "restarts": 2, "icp_points": 64},
@@ -55,35 +57,43 @@ def test_every_explainer_is_judged_on_the_frames(asked):
     assert len(causes) == 6
     assert set(causes.registrations.split) == {"test"}
     rows = collect(*asked)
-    counts = rows[(rows["method"] == TRUTH) & (rows["source"] == "real_rgbd")]
+    counts = rows[(rows["method"] == TRUTH) & (rows["source"] == "real_rgbd/ladder")]
     counts = dict(zip(counts["metric"], counts["value"], strict=True))
-    assert sum(counts[f"count_{kind}"] for kind in KINDS[:-2]) == 6
+    assert sum(counts[f"count_{state}"] for state in (*LABELS, BORDERLINE, GEOMETRY)) == 6
+    assert counts["count_starts"] == 6
     assert set(rows["method"]) <= {TRUTH, "ceiling", *SETTINGS["explainers"]}
     both = counts["count_nominal"] and any(counts[f"count_{kind}"] for kind in ("noise", "pose", "overlap"))
     assert bool(both) == (STATE in set(rows["metric"]))
 
 
-def test_instances_from_other_initial_poses_have_a_name_of_their_own_and_the_draws_of_the_frames(call, asked, tiny):
-    folder, words = call
-    tiny[0].save(folder / "estimated.npz", "tiny_estimated")
-    tiny[1].save(folder / "their_objects.npz", "tiny_estimated")
-    renamed = {"instances.npz": "estimated.npz", "objects.npz": "their_objects.npz", "said.csv": "said_too.csv"}
-    renamed |= {"seed100.npz": "other.npz", "seed100.csv": "other.csv"}
-    with pytest.MonkeyPatch.context() as patch:
-        patch.chdir(folder)
-        assert main([renamed.get(word, word) for word in words] + ["--name", "tiny_estimated"]) == 0
-    assert (folder / "said_too.csv").read_bytes() == (folder / "said.csv").read_bytes()
+def test_a_scene_counts_as_one_and_an_instance_once(asked, tmp_path):
+    """Each sample a second time, as the start of another estimator: values and intervals stay."""
+    once = collect(*asked)
+    again = [tmp_path / path.name for [path] in asked]
+    for [path], copy in zip(asked, again, strict=True):
+        copy.write_bytes(path.read_bytes())
+    twice = collect(*([path, copy] for [path], copy in zip(asked, again, strict=True)))
+    measured = [rows[rows["method"] != TRUTH].reset_index(drop=True) for rows in (once, twice)]
+    columns = ["value", "low", "high", "difference", "difference_low", "difference_high"]
+    kept = measured[0]["metric"] != "test_samples"
+    pd.testing.assert_frame_equal(measured[0].loc[kept, columns], measured[1].loc[kept, columns])
+
+
+def test_scenes_whose_truth_icp_made_are_counted_and_measure_nothing(asked, tmp_path):
+    samples = tmp_path / "seed100.csv"
+    samples.write_text(asked[1][0].read_text().replace("annotated", "icp"))
+    rows = collect(asked[0], [samples], asked[2])
+    assert set(rows["method"]) == {TRUTH}
+    assert set(rows["source"]) == {"real_rgbd/pseudo_truth", "real_rgbd/pseudo_truth/tiny"}
 
 
 def test_the_table_says_how_few_there_are(asked):
     titles = {name: name for name in SETTINGS["explainers"]}
     costs = {name: {"sees": "pair", "icp_calls": 0} for name in titles}
     table = table9_frames(collect(*asked), {"title": "Tiny", "stand_in": True}, titles, costs)
-    assert "Of 6 registrations" in table.footnotes[0]
+    assert "6 starts of" in table.footnotes[0]
+    assert "too few" in table.rows[0][0][1]
     assert "procedural stand-in" in table.caption
-    judged = collect(*asked)["metric"].isin([f"count_{kind}" for kind in LABELS])
-    of_all = collect(*asked)[judged]
-    assert table.cells[0, "samples"].mean == of_all.loc[of_all["source"] == "real_rgbd", "value"].sum()
 
 
 def test_files_of_other_samples_are_refused(asked, tmp_path):

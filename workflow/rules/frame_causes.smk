@@ -1,14 +1,10 @@
 # Instances of depth frames -> registrations with measured causes -> what explainers of simulated causes say of them.
-from gpca.frames.source import estimated
-
-ESTIMATED = estimated(config)
-
-
 rule measure_frame_causes:
     input:
         **FRAMES_FROM,
-        instances=f"<results>/instances/{ESTIMATED}.npz",
-        objects=f"<results>/objects/{ESTIMATED}.npz",
+        splits=split_file("scenes") if REAL_WORLD["datasets"] else [],
+        instances=f"<results>/instances/{FRAMES}.npz",
+        objects=f"<results>/objects/{FRAMES}.npz",
         causes=collect("<results>/causes/{source}/seed{{seed}}.npz", source=SOURCES),
         descriptors=collect(
             "<results>/descriptors/{source}/seed{{seed}}.npz", source=SOURCES
@@ -40,13 +36,13 @@ rule measure_frame_causes:
             {
                 "frames": REAL_WORLD["causes"],
                 "datasets": REAL_WORLD["datasets"],
+                "role": config["splits"]["role"],
                 "causes": config["causes"],
                 **ICP,
                 **DIAGNOSIS,
             }
         ),
         source=FRAMES,
-        name=ESTIMATED,
         folders=DATA_FOLDERS,
     script:
         "../scripts/step.py"

@@ -7,13 +7,9 @@ from math import inf, isfinite
 from typing import TYPE_CHECKING
 
 from gpca.attribution.confidence import REPEATS
-from gpca.causes.truth import BORDERLINE, GEOMETRY, NOMINAL
 from gpca.experiments.diagnosis.judged import CEILING, POOLED
-from gpca.experiments.frame_causes.metrics import KINDS, STATE, TRUTH
+from gpca.experiments.frame_causes.metrics import STATE
 from gpca.explainers.sight import WORDS
-from gpca.frames.source import REAL_WORLD
-from gpca.objects.title import title_of
-from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.tables.builder import Label, TableBuilder, crossed, titles_of
 from gpca.reporting.tables.cells import interval_cell, plain_cell, rows_where
 from gpca.reporting.tables.table import Cell, Column, Table
@@ -36,13 +32,6 @@ SHOWN = {
     "nominal_calibration": Column("ECE (share)", 3, False, (0.0, 1.0), least_is_best=True),
     "icp_calls": Column("ICP calls", decimals=0, interval=False, limits=(0.0, inf)),
     "samples": Column("n", decimals=0, interval=False, limits=(0.0, inf)),
-}
-SHOWN_OF_FRAMES = {
-    STATE: Column("State (%)"),
-    "gain": SHOWN["gain"],
-    **{key: SHOWN[key] for key in ("regret", "tied_accuracy", "dominant_accuracy", "false_alarm_rate")},
-    **{key: SHOWN[key] for key in ("auroc_failed", "average_precision", "spearman_attribution")},
-    **{key: SHOWN[key] for key in ("nominal_calibration", "icp_calls", "samples")},
 }
 DIFFERENCES = {  # column -> its difference, and the names of its bounds, in a row of the intervals
     "gain": ("gain", ("gain_low", "gain_high")),
@@ -77,8 +66,8 @@ def table9_causes(
     table = TableBuilder("table9_causes", {"source": "Dataset", **ROW_HEADS})
     for (source, explainer), labels in crossed(titles, {**explainers, **AGAIN}):
         rows = rows_where(intervals, source=source, method=explainer).set_index("metric")
-        cells = _cells(rows, SHOWN, "balanced_accuracy", costs[explainer])
-        table.add_row([*labels, _reads(costs[explainer])], cells, rival=explainer != CEILING)
+        cells = cells_of(rows, SHOWN, "balanced_accuracy", costs[explainer])
+        table.add_row([*labels, reads(costs[explainer])], cells, rival=explainer != CEILING)
     table.compare_down([key for key in SHOWN if key not in NOT_COMPARED], same=1)
     return table.build(
         caption="What is wrong with a registration, if anything: objects that no explainer was trained on"
@@ -106,49 +95,6 @@ def table9_causes(
     )
 
 
-def table9_frames(
-    intervals: pd.DataFrame, frames: Mapping, explainers: Mapping[str, str], costs: Mapping[str, Mapping]
-) -> Table:
-    """Return how explainers that learned from simulated causes name those measured in frames, the ceiling last.
-
-    Args:
-        intervals: What :func:`gpca.experiments.frame_causes.metrics.collect` returned.
-        frames: The ``{"title": str, "stand_in": bool}`` of the frames.
-        costs: As for :func:`table9_causes`.
-    """
-    costs = {**costs, **COSTS}
-    of_frames = rows_where(intervals, source=REAL_WORLD)
-    table = TableBuilder("table9_frames", ROW_HEADS)
-    for (explainer,), labels in crossed({**explainers, **AGAIN}):
-        rows = rows_where(of_frames, method=explainer).set_index("metric")
-        cells = _cells(rows, SHOWN_OF_FRAMES, STATE, costs[explainer])
-        table.add_row([*labels, _reads(costs[explainer])], cells, rival=explainer != CEILING)
-    counted = rows_where(of_frames, method=TRUTH).set_index("metric")
-    table.require_rows()
-    table.compare_down([key for key in SHOWN_OF_FRAMES if key not in NOT_COMPARED])
-    of = {kind: int(counted["value"][f"count_{kind}"]) for kind in KINDS}
-    failed = {concept: of[concept] for concept in CONCEPTS}
-    total = sum(failed.values())
-    most = max(failed, key=lambda concept: failed[concept])
-    return table.build(
-        caption=f"What is wrong with registrations of depth frames: {title_of(frames)}; learned from simulated causes",
-        column_head="metric",
-        columns=SHOWN_OF_FRAMES,
-        footnotes=(
-            f"Of {counted['samples'].iloc[0]:.0f} registrations {of[NOMINAL]} are nominal, {of[BORDERLINE]} "
-            f"borderline, and {total} failed: {_list_of(failed)}. {of[GEOMETRY]} more are off without a cause. Always "
-            f"naming {most} would be right for {100 * failed[most] / max(1, total):.0f} % of the failed.",
-            "n: the nominal and the failed together, which are judged. False alarms are a share of the "
-            f"{of[NOMINAL]} nominal; Regret, With ties, Dominant and Spearman are over the {total} failed.",
-            f"In brackets: the 95 % interval of {REPEATS} bootstrap draws over {plural(of['scenes'], 'scene')}, "
-            f"{plural(of['objects'], 'object')} and {plural(table.most_seeds(), 'seed')}. Bold: best of a column.",
-            "State: mean share of the nominal and of the failed that is called so; over untrained: minus that of the "
-            "best untrained row. The others as in Table IX.",
-            COST_NOTE,
-        ),
-    )
-
-
 def _parts(intervals: pd.DataFrame, titles: Mapping[str, str]) -> str:
     """Return how many samples of each source are nominal and how many failed, in words."""
     parts = {}
@@ -162,15 +108,12 @@ def _parts(intervals: pd.DataFrame, titles: Mapping[str, str]) -> str:
     return "; ".join(f"{words} on {title}" for title, words in parts.items())
 
 
-def _list_of(failed: Mapping[str, int]) -> str:
-    return ", ".join(f"{count} mostly by {concept}" for concept, count in failed.items())
-
-
-def _reads(cost: Mapping) -> Label:
+def reads(cost: Mapping) -> Label:
+    """Return the label of what an explainer sees."""
     return cost["sees"], cost["sees"]
 
 
-def _cells(rows: pd.DataFrame, shown: Mapping[str, Column], compared: str, cost: Mapping) -> dict[str, Cell | None]:
+def cells_of(rows: pd.DataFrame, shown: Mapping[str, Column], compared: str, cost: Mapping) -> dict[str, Cell | None]:
     """Return the cells of one source and explainer, from rows whose index is the metric; one of them is compared."""
     cells: dict[str, Cell | None] = {}
     for metric in (name for name in shown if name in rows.index):

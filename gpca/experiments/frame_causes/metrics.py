@@ -19,17 +19,20 @@ from gpca.experiments.diagnosis.judged import CEILING, Judged, ceiling_of, joine
 from gpca.experiments.diagnosis.measures import MEASURES, measure
 from gpca.experiments.diagnosis.metrics import COLUMNS, rows_of
 from gpca.frames.source import REAL_WORLD
+from gpca.frames.starts import KINDS
 from gpca.io.csv_file import ANY, read_csv
+from gpca.objects.splits import BY_ICP
 from gpca.seeds import generator, seed_of_file
 
 if TYPE_CHECKING:
     import pandas as pd
 
-SAMPLE_COLUMNS = ("sample", "dataset", "scene")
+SAMPLE_COLUMNS = ("sample", "instance", "start", "dataset", "scene", "truth", "missed")
 SAMPLES = "test_samples"
 STATE = "state_accuracy"
 TRUTH = "truth"  # in the place of an explainer: how many there are of a kind, ``count_<kind>``
-KINDS = (*LABELS, GEOMETRY, BORDERLINE, "scenes", "objects")
+PSEUDO = "pseudo_truth"  # in the place of a kind of start: those whose true pose was made by ICP
+COUNTED = ("starts", "instances", "scenes", "objects", *LABELS, BORDERLINE, GEOMETRY, "missed")
 
 
 def collect(
@@ -37,10 +40,13 @@ def collect(
 ) -> pd.DataFrame:
     """Return the intervals of the diagnosis for explainers that learned from no frame.
 
-    The columns are those of :func:`gpca.experiments.diagnosis.metrics.collect_intervals`. Beside its measures
+    The columns are those of :func:`gpca.experiments.diagnosis.metrics.collect_intervals`; the source is
+    ``real_rgbd/{kind}`` of the kind of start, each a condition by itself. Beside its measures
     stands the number of `SAMPLES`; what has no value, as there are no samples for it, has no row.
-    Intervals are over scenes, objects and seeds, which are drawn with replacement each. The counts of `KINDS` are those
-    of all frames, and of each dataset alone, ``real_rgbd/{dataset}``.
+
+    An instance counts once in a measure, however many starts and seeds it has, and intervals are over scenes, since
+    frames of one scene are alike. Counts, of `COUNTED`, are of starts, and also those of each dataset,
+    ``real_rgbd/{kind}/{dataset}``. Scenes whose truth was made by ICP are counted as `PSEUDO` and measure nothing.
 
     Args:
         causes_files, sample_files, prediction_files: one of each seed, in the same order, named ``…/seed{seed}.…``.
@@ -53,22 +59,41 @@ def collect(
     samples_of: dict[str, list[Judged]] = {}
     seen: list[pd.DataFrame] = []
     for seed, causes, samples, predictions in _seeds(causes_files, sample_files, prediction_files):
-        for explainer, rows in predictions.groupby("explainer", sort=False):
-            samples_of.setdefault(str(explainer), []).append(judged_by(rows, causes, seed))
+        for explainer, said in predictions.groupby("explainer", sort=False):
+            samples_of.setdefault(str(explainer), []).append(judged_by(said, causes, seed))
         samples_of.setdefault(CEILING, []).append(ceiling_of(causes, seed))
         truth = causes.truth
-        kind = np.where((truth.state == FAILED) & (truth.dominant == GEOMETRY), GEOMETRY, labels_of(truth))
-        seen.append(samples.assign(kind=kind, seed=seed, object=causes.registrations.object_name))
+        state = np.where((truth.state == FAILED) & (truth.dominant == GEOMETRY), GEOMETRY, labels_of(truth))
+        seen.append(samples.assign(state=state, seed=seed, object=causes.registrations.object_name))
     judged = {explainer: joined(parts) for explainer, parts in samples_of.items()}
-    of_all = pd.concat(seen)
-    scene_N = (of_all["dataset"] + " " + of_all["scene"]).to_numpy(str)
-    factors = of_all["seed"].to_numpy(), scene_N, of_all["object"].to_numpy(str)
-    drawn_B_N = pigeonhole_weights(generator("frame cause intervals"), *factors)
-    rows = _counts(REAL_WORLD, of_all)
-    for dataset, of_dataset in of_all.groupby("dataset"):
-        rows += _counts(f"{REAL_WORLD}/{dataset}", of_dataset)
-    rows += rows_of(REAL_WORLD, judged, drawn_B_N, _measured, (SAMPLES, *MEASURES))
+    of_all = pd.concat(seen, ignore_index=True)
+    of_all["scene"] = of_all["dataset"] + " " + of_all["scene"]
+    rows: list[tuple] = []
+    for kind, of_kind in _by_kind(of_all):
+        rows += _counts(f"{REAL_WORLD}/{kind}", of_kind)
+        for dataset, of_dataset in of_kind.groupby("dataset"):
+            rows += _counts(f"{REAL_WORLD}/{kind}/{dataset}", of_dataset)
+        if kind != PSEUDO:
+            rows += _measures(kind, of_kind, {name: every.subset(of_kind.index) for name, every in judged.items()})
     return pd.DataFrame(rows, columns=list(COLUMNS))
+
+
+def _by_kind(samples: pd.DataFrame) -> Iterator[tuple[str, pd.DataFrame]]:
+    """Yield the samples of each kind of start that there are, and those that say nothing of ICP."""
+    pseudo_N = samples["truth"] == BY_ICP
+    chosen = {kind: (samples["start"] == kind) & ~pseudo_N for kind in KINDS} | {PSEUDO: pseudo_N}
+    yield from ((kind, samples[rows]) for kind, rows in chosen.items() if rows.any())
+
+
+def _measures(kind: str, samples: pd.DataFrame, judged: dict[str, Judged]) -> list[tuple]:
+    random = generator("frame cause intervals", kind)
+    drawn_B_N = pigeonhole_weights(random, samples["scene"].to_numpy(str))
+    once_N = 1 / samples.groupby("instance")["instance"].transform("size").to_numpy(float)
+
+    def measured(of_explainer: Judged, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
+        return _measured(of_explainer, weights_B_N * once_N)
+
+    return rows_of(f"{REAL_WORLD}/{kind}", judged, drawn_B_N, measured, (SAMPLES, *MEASURES))
 
 
 def _seeds(*file_lists: Iterable[str | Path]) -> Iterator[tuple[int, Causes, pd.DataFrame, pd.DataFrame]]:
@@ -95,10 +120,10 @@ def _measured(samples: Judged, weights_B_N: np.ndarray) -> dict[str, np.ndarray]
     return measures
 
 
-def _counts(source: str, rows: pd.DataFrame) -> list[tuple]:
-    """Return how many there are of each kind, with no interval and no rival."""
-    counts = Counter(rows["kind"].tolist())
-    counts["scenes"] = len(set(zip(rows["dataset"], rows["scene"], strict=True)))
-    counts["objects"] = rows["object"].nunique()
-    own, nothing = (len(rows), rows["seed"].nunique()), (np.nan, np.nan, *Difference().cells, *Difference().cells)
-    return [(source, TRUTH, f"count_{kind}", *own, float(counts[kind]), *nothing) for kind in KINDS]
+def _counts(source: str, samples: pd.DataFrame) -> list[tuple]:
+    """Return how many there are of each of `COUNTED`, with no interval and no rival."""
+    counts = Counter(samples["state"].tolist())
+    counts |= Counter({f"{name}s": samples[name].nunique() for name in ("instance", "scene", "object")})
+    counts |= Counter(starts=len(samples), missed=int((samples["missed"] == "True").sum()))
+    own, nothing = (len(samples), samples["seed"].nunique()), (np.nan, np.nan, *Difference().cells, *Difference().cells)
+    return [(source, TRUTH, f"count_{kind}", *own, float(counts[kind]), *nothing) for kind in COUNTED]

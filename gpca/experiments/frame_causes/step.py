@@ -1,4 +1,4 @@
-"""Step ``frame_causes``: instances of depth frames -> their measured causes, and the explainers' predictions.
+"""Step ``frame_causes``: instances of depth frames -> causes of their registrations, and explainers' predictions.
 
 The explainers have learned from registrations whose causes were drawn, those of all sources; no frame is among them.
 """
@@ -16,7 +16,7 @@ from gpca.alignment.icp import ICPSettings
 from gpca.attribution.predictions import prediction_frame
 from gpca.attribution.scores import Attribution
 from gpca.causes.dataset import LABELS, Causes, labeled
-from gpca.causes.frames import chosen_instances, measure_frames
+from gpca.causes.frames import chosen_starts, measure_frames
 from gpca.causes.settings import CauseSettings, FrameCauseSettings
 from gpca.encoders.settings import EncoderSettings
 from gpca.experiments.diagnosis.step import observed_only, training_rows, with_what_it_reads
@@ -27,11 +27,14 @@ from gpca.features.settings import DescriptorSettings
 from gpca.frames.instances import Instances
 from gpca.frames.meshes import datasets_of, files_behind, meshes_of, models_of
 from gpca.frames.plausibility import require_of_objects
+from gpca.frames.starts import all_starts
 from gpca.io.csv_file import write_csv
 from gpca.objects.canonical import ObjectClouds
+from gpca.objects.splits import EVALUATION
 from gpca.pairs.dataset import Registrations, joined
 from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
+from gpca.settings import read_settings
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -64,15 +67,18 @@ def run(job: Job) -> None:
 
 
 def _measure(job: Job) -> tuple[Causes, pd.DataFrame]:
-    name = job.get("name", job.source)  # of the initial poses; the draws are those of the frames
-    instances, objects = Instances.load(job.instances, name), ObjectClouds.load(job.objects, name)
+    instances, objects = Instances.load(job.instances, job.source), ObjectClouds.load(job.objects, job.source)
     require_of_objects(instances, objects, job.instances)
-    chosen = FrameCauseSettings(**job.section("frames"))
-    rows = chosen_instances(instances, job.source, chosen)
-    datasets = datasets_of(job.section("datasets"), job.data_dir, job.downloads, job.get("scenes"))
-    meshes = meshes_of(models_of(datasets), objects, instances.object_index[rows].tolist())
+    own = read_settings(FrameCauseSettings, job.section("frames"))
+    places = job.get("scenes"), job.get("splits"), job.settings.get("role", EVALUATION)
+    datasets = datasets_of(job.section("datasets"), job.data_dir, job.downloads, *places)
+    models = models_of(datasets)
+    starts = chosen_starts(all_starts(instances, objects, datasets, models, own.rungs), instances, job.source, own)
+    meshes = meshes_of(models, objects, instances.object_index[starts.instance].tolist())
     settings = CauseSettings.from_dict(job.section("causes"), job.section("icp"))
-    return measure_frames(instances, rows, objects, meshes, job.source, job.seed, settings, chosen.points)
+    causes, samples = measure_frames(instances, starts, objects, meshes, job.source, job.seed, settings, own.points)
+    seen = zip(samples["dataset"], samples["scene"], strict=True)
+    return causes, samples.assign(truth=[datasets[name].place(scene).truth for name, scene in seen])
 
 
 class _FramesToExplain:

@@ -5,8 +5,7 @@ import pytest
 from gpca.errors import InputError
 from gpca.experiments.diagnosis.judged import CEILING, POOLED
 from gpca.experiments.diagnosis.metrics import COLUMNS
-from gpca.experiments.diagnosis.tables import table9_causes, table9_frames
-from gpca.experiments.frame_causes.metrics import KINDS, TRUTH
+from gpca.experiments.diagnosis.tables import table9_causes
 
 SOURCES = {"ycb": {"title": "YCB", "stand_in": True}}
 EXPLAINERS = {"good": "Good", "poor": "Poor", "gate": "Gate"}
@@ -76,23 +75,3 @@ def test_the_bounds_in_the_csv_are_those_of_the_bootstrap(intervals):
 def test_intervals_of_other_explainers_make_no_table(intervals):
     with pytest.raises(InputError, match="has nothing to show"):
         table9_causes(intervals[intervals["method"] == "other"], SOURCES, EXPLAINERS, COSTS)
-
-
-def test_frames_are_counted_below_the_table(intervals):
-    counts = {"nominal": 120, "noise": 6, "pose": 30, "overlap": 14, "borderline": 130, "scenes": 13, "objects": 32}
-    found = [
-        ("real_rgbd", TRUTH, f"count_{kind}", 300, 1, counts.get(kind, 0), *[np.nan] * 2, *["", *[np.nan] * 3] * 2)
-        for kind in KINDS
-    ]
-    found += rows("real_rgbd", "good", "poor", state_accuracy=0.8, dominant_accuracy=0.6, auroc_failed=0.9)
-    found += rows("real_rgbd", "poor", "good", state_accuracy=0.6, dominant_accuracy=0.4)
-    found += rows("real_rgbd", CEILING, "", state_accuracy=0.95)
-    of_frames = pd.concat([intervals, pd.DataFrame(found, columns=list(COLUMNS))])
-    table = table9_frames(of_frames, {"title": "Frames", "stand_in": False}, EXPLAINERS, COSTS)
-    text = table.markdown()
-    assert "| Good | pair + motion | **80.0 (70.0 to 85.0)** | 20.0 (15.0 to 30.0) | – | – | **60.0 (50.0" in text
-    for counted in ("120 nominal", "50 failed", "300 registrations", "130 borderline", "30 mostly by pose", "60 %"):
-        assert counted in text
-    assert "over 13 scenes, 32 objects and" in text
-    with pytest.raises(InputError, match="has nothing to show"):
-        table9_frames(intervals, {"title": "Frames", "stand_in": False}, EXPLAINERS, COSTS)

@@ -1,0 +1,155 @@
+"""Starts: where registrations of instances begin, and where these poses are from.
+
+Each kind is a condition of its own, since errors of one kind say little about those of another:
+
+- native: a pose that an estimator found in that very image; every estimator's is a start by itself;
+- carried: the same, found in a neighboring image and carried over by its error;
+- transplanted: the truth with an error that an estimator made elsewhere, where none found the instance;
+- ladder: the truth with an error of a fixed size in a drawn direction, one start for each rung.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from gpca.alignment.rigid import inverse, scale_translation
+from gpca.frames.dataset import Dataset
+from gpca.frames.estimates import EstimatorErrors, error_of, estimates_of, read_pose_errors
+from gpca.frames.instances import Instances
+from gpca.frames.reading import CenteredModel
+from gpca.objects import splits
+from gpca.objects.canonical import ObjectClouds
+from gpca.pairs.perturbation import misplacement
+from gpca.seeds import generator
+
+NATIVE, CARRIED, TRANSPLANTED, LADDER = KINDS = ("native", "carried", "transplanted", "ladder")
+GLOBAL = "global_registration"  # runs on the very image, as estimators do
+
+
+@dataclass(frozen=True)
+class Starts:
+    """K starts.
+
+    Attributes:
+        instance: (K,) number of the instance.
+        kind: (K,) one of `KINDS`.
+        init_from: (K,) the estimator, ``errors`` of estimators, or the rung.
+        T_camera_object_init: (K, 4, 4) meters.
+    """
+
+    instance: np.ndarray
+    kind: np.ndarray
+    init_from: np.ndarray
+    T_camera_object_init: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.instance)
+
+    def subset(self, rows: np.ndarray) -> Starts:
+        """Return the given rows."""
+        return Starts(*(getattr(self, field.name)[rows] for field in fields(self)))
+
+
+def all_starts(
+    instances: Instances,
+    objects: ObjectClouds,
+    datasets: Mapping[str, Dataset],
+    models: Mapping[str, Mapping[int, CenteredModel]],
+    rungs: Sequence[tuple[float, float]],
+) -> Starts:
+    """Return every start of every instance, by kind.
+
+    Where no dataset has results, an estimate is the frames' own initial pose if global registration found it.
+
+    Args:
+        objects: their canonical clouds.
+        datasets, models: those that the instances were read from, by name; the models by id.
+        rungs: of the ladder: turns in degrees and shifts in diameters.
+
+    Raises:
+        InputError: a faulty file of results or errors.
+    """
+    found = _estimated(instances, objects, datasets, models)
+    found += [(i, NATIVE, GLOBAL, instances.T_camera_object_init[i]) for i in np.flatnonzero(_is_global(instances))]
+    for number, (turn_deg, shift) in enumerate(rungs):
+        name = f"{turn_deg:g} deg, {shift:g} d"
+        for i in range(len(instances)):
+            random = generator(*_axes(instances, i), "rung", number)
+            T_error = misplacement(np.deg2rad(turn_deg), shift, random)
+            diameter_m = float(objects.diameters_m[instances.object_index[i]])
+            T_init = instances.T_camera_object_true[i] @ scale_translation(T_error, diameter_m)
+            found.append((i, LADDER, name, T_init))
+    found.sort(key=lambda start: (KINDS.index(start[1]), start[0]))
+    instance_K, kind_K, from_K, T_K = zip(*found, strict=True) if found else ((), (), (), ())
+    return Starts(
+        np.array(instance_K, int), np.array(kind_K, str), np.array(from_K, str), np.array(T_K, float).reshape(-1, 4, 4)
+    )
+
+
+def _is_global(instances: Instances) -> np.ndarray:
+    return instances.init_from == GLOBAL
+
+
+def _axes(instances: Instances, i: int) -> tuple:
+    """Return what names the random numbers of an instance, however many others there are."""
+    u, v = instances.pixels_of(i)[0].tolist()  # several of one object may be in an image
+    return str(instances.dataset[i]), int(instances.scene[i]), int(instances.image[i]), u, v
+
+
+def _estimated(
+    instances: Instances,
+    objects: ObjectClouds,
+    datasets: Mapping[str, Dataset],
+    models: Mapping[str, Mapping[int, CenteredModel]],
+) -> list[tuple]:
+    """Return the estimators' poses, and for instances without any the truth with an error made elsewhere."""
+    numbers = {
+        (name, objects.names.index(model.surface.name)): number
+        for name, of_dataset in models.items()
+        for number, model in of_dataset.items()
+    }
+    place_I = [
+        (str(instances.dataset[i]), numbers[str(instances.dataset[i]), int(instances.object_index[i])])
+        for i in range(len(instances))
+    ]
+    errors = EstimatorErrors(
+        {place for place, symmetric in zip(place_I, instances.symmetric, strict=True) if symmetric}
+    )
+    for name, dataset in datasets.items():
+        for number, T_error in read_pose_errors(dataset.errors, models[name]) if dataset.errors else ():
+            errors.add((name, number), T_error)
+    estimators = {name: dataset.estimators() for name, dataset in datasets.items()}
+    annotated = Counter(
+        (name, *frame.place, annotation.object_id)
+        for name, dataset in datasets.items()
+        if estimators[name]
+        for frame in dataset.frames()
+        for annotation in frame.annotations
+    )
+    found: list[tuple] = []
+    for i, (name, number) in enumerate(place_I):
+        place = (int(instances.scene[i]), int(instances.image[i]), number)
+        seen = {
+            "points_m": instances.cloud_m(i),
+            "pixels": instances.pixels_of(i),
+            "camera_3_3": instances.camera_3_3[i],
+            "diameter_m": objects.diameters_m[instances.object_index[i]],
+        }
+        T_model_object = models[name][number].T_model_object
+        kind = CARRIED if datasets[name].place(place[0]).estimates == splits.CARRIED else NATIVE
+        for estimator, T_camera_model in estimates_of(estimators[name], place, annotated[name, *place] == 1, seen):
+            found.append((i, kind, estimator, T_camera_model @ T_model_object))
+            T_camera_model_true = instances.T_camera_object_true[i] @ inverse(T_model_object)
+            errors.add((name, number), error_of(T_camera_model_true, T_camera_model))
+    without = sorted(set(range(len(instances))) - {start[0] for start in found}) if errors.of_object else []
+    for i in without:
+        name, number = place_I[i]
+        T_model_object = models[name][number].T_model_object
+        T_error = errors.draw((name, number), generator(*_axes(instances, i), "error"))
+        T_init = instances.T_camera_object_true[i] @ inverse(T_model_object) @ T_error @ T_model_object
+        found.append((i, TRANSPLANTED, "errors", T_init))
+    return found
