@@ -8,13 +8,13 @@ For pictures, :func:`replay` draws a sample's candidate again and registers it w
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from time import perf_counter
 
 import numpy as np
 
 from gpca.alignment.batched_icp import BatchedICP
-from gpca.alignment.pose_error import PoseErrors
 from gpca.alignment.rigid import inverses, transform
 from gpca.alignment.twist import exp
 from gpca.causes.candidate import Candidate, draw_applied, draw_candidate
@@ -86,12 +86,16 @@ class Counterfactuals:
 
     Args:
         registrar: of the candidate.
-        errors: of poses of its object's points, in diameters.
+        errors: of poses (n, 4, 4) of its object's points, in diameters.
         xi_n_6: twists of the starts, the same for every subset.
     """
 
     def __init__(
-        self, registrar: Registrar, errors: PoseErrors, xi_n_6: np.ndarray, settings: UncertaintySettings
+        self,
+        registrar: Registrar,
+        errors: Callable[[np.ndarray], np.ndarray],
+        xi_n_6: np.ndarray,
+        settings: UncertaintySettings,
     ) -> None:
         self._registrar = registrar
         self._errors = errors

@@ -49,12 +49,12 @@ class LocalPlanes:
         distances_N_k, rows_N_k = tree.query(points, neighbors)
         around_N_k_3 = points[rows_N_k]
         offsets_N_k_3 = around_N_k_3 - around_N_k_3.mean(axis=1, keepdims=True)
-        squares_N_3, axes_N_3_3 = np.linalg.eigh(_second_moments(offsets_N_k_3))
+        squares_N_3, axes_N_3_3 = np.linalg.eigh(second_moments(offsets_N_k_3))
         spread_N_3 = np.sqrt(np.maximum(squares_N_3, 0) / neighbors)
         return cls(tree, distances_N_k[:, 1], axes_N_3_3[:, :, 0], spread_N_3[:, 0], spread_N_3[:, 2])
 
 
-def _second_moments(offsets_N_k_3: np.ndarray) -> np.ndarray:
+def second_moments(offsets_N_k_3: np.ndarray) -> np.ndarray:
     """Return Σ x xᵀ (N, 3, 3), summed in one order on every processor."""
     x, y, z = np.moveaxis(offsets_N_k_3, -1, 0)
     rows = [[(a * b).sum(axis=1) for b in (x, y, z)] for a in (x, y, z)]

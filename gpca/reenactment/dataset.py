@@ -1,0 +1,136 @@
+"""Re-enactments of registrations, and the file that holds them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+
+from gpca.alignment.rigid import transform
+from gpca.causes.dataset import LABELS, Causes
+from gpca.causes.settings import CauseSettings
+from gpca.causes.shapley import SUBSETS
+from gpca.errors import InputError
+from gpca.features.pair import ObservedPair, displacements, observed_pair
+from gpca.io.arrays import REAL, REGENERATE, TEXT, WHOLE, load_arrays, save_arrays
+from gpca.io.names import Axes
+from gpca.pairs.dataset import Registrations
+from gpca.process.progress import progress
+from gpca.reenactment.enactment import Enactment, reenact
+from gpca.reenactment.settings import ReenactmentSettings
+from gpca.reenactment.verdict import verdict
+
+MEASURED = ("log_likelihood", "width", "covered", "noise", "outliers", "missing", "to_start", "to_result")
+SHAPES: dict[str, tuple[int | str, ...]] = {
+    "weight": ("S", "K"),
+    "T_model_observed": ("S", "K", 4, 4),
+    "error": ("S", "K", len(SUBSETS)),
+    "uncertainty": ("S", "K", len(SUBSETS)),
+    "measured": ("S", "K", len(MEASURED)),
+}
+
+
+@dataclass(frozen=True)
+class Reenactments:
+    """The re-enactments of S registrations under K hypotheses each, the most probable first.
+
+    Where a pair has fewer hypotheses, its first stands in the place of the others, with weight 0.
+
+    Attributes:
+        sample, split: (S,) as in the registrations.
+        weight: (S, K) probabilities of the hypotheses.
+        T_model_observed: (S, K, 4, 4) takes what was observed from where the registration began to where a hypothesis
+            has it in the model, in diameters.
+        error, uncertainty: (S, K, 8) v̂ and û of every subset of the causes.
+        measured: (S, K, 8) the numbers of `MEASURED`: those of :class:`gpca.reenactment.hypotheses.Hypothesis` and of
+            :class:`gpca.reenactment.observation.Observation`; and how far (root mean square, diameters) the observed
+            points then lie from where the registration began, and from where it ended.
+        verdict: (S, 4) of :func:`gpca.reenactment.verdict.verdict`.
+        axes: the source and the seed of the registrations.
+    """
+
+    sample: np.ndarray
+    split: np.ndarray
+    weight: np.ndarray
+    T_model_observed: np.ndarray
+    error: np.ndarray
+    uncertainty: np.ndarray
+    measured: np.ndarray
+    verdict: np.ndarray
+    axes: Axes | None
+
+    def save(self, path: str | Path) -> None:
+        """Write the npz described in results/README.md."""
+        names = ("sample", "split", *SHAPES, "verdict")
+        save_arrays(path, {name: getattr(self, name) for name in names}, self.axes)
+
+    @classmethod
+    def load(cls, path: str | Path, registrations: Registrations) -> Reenactments:
+        """Read the npz of these registrations.
+
+        Raises:
+            InputError: the file is missing, damaged, of other samples, of another source or seed, or holds wrong
+                shapes or NaN.
+        """
+        shapes = SHAPES | {"sample": ("S",), "split": ("S",), "verdict": ("S", len(LABELS))}
+        kinds = dict.fromkeys(shapes, REAL) | {"sample": WHOLE, "split": TEXT}
+        arrays = load_arrays(path, shapes, kinds, registrations.axes)
+        if not all(np.array_equal(arrays[name], getattr(registrations, name)) for name in ("sample", "split")):
+            raise InputError(path, "its samples differ from those of the registrations", REGENERATE)
+        return cls(**{name: arrays[name] for name in shapes}, axes=registrations.axes)
+
+
+def reenact_all(
+    causes: Causes, source: str, seed: int, settings: ReenactmentSettings, truth: CauseSettings
+) -> tuple[Reenactments, np.ndarray, np.ndarray]:
+    """Return the re-enactments of every row, the seconds (S,) that each took, and those of its registrations.
+
+    Args:
+        truth: how counterfactuals are registered, and the limits of the states.
+    """
+    rows, seconds, icp_seconds = [], [], []
+    for row in progress(range(len(causes)), f"re-enactments of {source}, seed {seed}"):
+        started = perf_counter()
+        pair = observed_pair(causes, row, source, seed, "reenactment")
+        enactments = reenact(pair, settings, truth)
+        rows.append(as_arrays(enactments, pair, settings.hypotheses))
+        seconds.append(perf_counter() - started)
+        icp_seconds.append(sum(enactment.icp_seconds for enactment in enactments))
+    arrays = {name: np.array([of_row[name] for of_row in rows]) for name in SHAPES}
+    registrations = causes.registrations
+    found = Reenactments(
+        sample=registrations.sample,
+        split=registrations.split,
+        **arrays,
+        verdict=verdict(arrays["error"], arrays["weight"], truth.limits),
+        axes=registrations.axes,
+    )
+    return found, np.array(seconds), np.array(icp_seconds)
+
+
+def as_arrays(enactments: list[Enactment], pair: ObservedPair, most: int) -> dict[str, np.ndarray]:
+    """Return the arrays of one pair (K, …), see :class:`Reenactments`, for K = `most` hypotheses."""
+    posterior_k = np.array([enactment.hypothesis.log_posterior for enactment in enactments])
+    weight_k = np.exp(posterior_k - posterior_k.max())
+    rows_K = np.where(np.arange(most) < len(enactments), np.arange(most), 0)
+    measured_k = [_measured(enactment, pair) for enactment in enactments]
+    return {
+        "weight": np.pad(weight_k / weight_k.sum(), (0, most - len(enactments))),
+        "T_model_observed": np.array([enactment.hypothesis.T for enactment in enactments])[rows_K],
+        "error": np.array([enactment.error_8 for enactment in enactments])[rows_K],
+        "uncertainty": np.array([enactment.uncertainty_8 for enactment in enactments])[rows_K],
+        "measured": np.array(measured_k)[rows_K],
+    }
+
+
+def _measured(enactment: Enactment, pair: ObservedPair) -> list[float]:
+    hypothesis, observation = enactment.hypothesis, enactment.observation
+    before = transform(pair.T_init, pair.observed)
+    return [
+        *(hypothesis.log_likelihood, hypothesis.width, hypothesis.covered),
+        *(observation.noise, observation.outliers, observation.missing),
+        displacements(hypothesis.T[None], before)[0],
+        displacements((hypothesis.T @ pair.T_init)[None], pair.observed)[0],
+    ]

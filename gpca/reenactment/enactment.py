@@ -1,0 +1,86 @@
+"""The truth's counterfactuals under the hypotheses of an observer: v̂, û and φ̂."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from time import perf_counter
+
+import numpy as np
+
+from gpca.alignment.rigid import inverse, transform
+from gpca.causes.candidate import Candidate
+from gpca.causes.counterfactuals import Counterfactuals, Registrar, Unmeasurable
+from gpca.causes.settings import CauseSettings
+from gpca.causes.shapley import SUBSETS, shapley_values
+from gpca.causes.truth import LARGEST_ERROR
+from gpca.features.pair import ObservedPair
+from gpca.reenactment.hypotheses import Hypothesis, find_hypotheses
+from gpca.reenactment.observation import NoiseScale, Observation, observe
+from gpca.reenactment.rebuilding import rebuild
+from gpca.reenactment.settings import ReenactmentSettings
+from gpca.reenactment.surface import ModelSurface
+from gpca.seeds import generator
+
+
+@dataclass(frozen=True)
+class Enactment:
+    """One hypothesis and what the registration would have done, were it true.
+
+    Attributes:
+        error_8, uncertainty_8: v̂ and û of every subset of the causes, as in :class:`gpca.causes.truth.Truth`.
+        icp_seconds: that the registrations took.
+    """
+
+    hypothesis: Hypothesis
+    observation: Observation
+    candidate: Candidate
+    error_8: np.ndarray
+    uncertainty_8: np.ndarray
+    icp_seconds: float
+
+    @cached_property
+    def phi_3(self) -> np.ndarray:
+        """φ̂, what each cause adds to the error."""
+        return shapley_values(self.error_8[None])[0]
+
+
+def reenact(pair: ObservedPair, settings: ReenactmentSettings, truth: CauseSettings) -> list[Enactment]:
+    """Find hypotheses of the true pose and enact each, the most probable first.
+
+    Args:
+        truth: how the truth's counterfactuals are registered; what it says of candidates is not read.
+    """
+    surface = ModelSurface(pair.model)
+    before = transform(pair.T_init, pair.observed)
+    T_found_n = pair.T_runs @ inverse(pair.T_init)
+    random = generator(*pair.axes, "hypotheses")
+    hypotheses = find_hypotheses(before, surface, T_found_n, settings, random)
+    xi_n_6 = generator(*pair.axes, "starts").normal(size=(truth.starts, 6)) * truth.deviation_6()
+    scale = NoiseScale(surface, random)
+    return [enact(before, hypothesis, surface, scale, xi_n_6, truth, random) for hypothesis in hypotheses]
+
+
+def enact(
+    before: np.ndarray,
+    hypothesis: Hypothesis,
+    surface: ModelSurface,
+    scale: NoiseScale,
+    xi_n_6: np.ndarray,
+    truth: CauseSettings,
+    random: np.random.Generator,
+) -> Enactment:
+    """Register every subset of the causes from the same starts, as if a hypothesis were true."""
+    observation = observe(before, hypothesis, surface, scale, random)
+    candidate = rebuild(hypothesis.T, observation, surface, random)
+    started = perf_counter()
+    measured = Counterfactuals(Registrar(candidate, truth), surface.errors, xi_n_6, truth)
+    error_8, uncertainty_8 = np.array([_measured(measured, subset) for subset in range(len(SUBSETS))]).T
+    return Enactment(hypothesis, observation, candidate, error_8, uncertainty_8, perf_counter() - started)
+
+
+def _measured(measured: Counterfactuals, subset: int) -> tuple[float, float]:
+    try:
+        return measured.error(subset), measured.uncertainty(subset)
+    except Unmeasurable:
+        return LARGEST_ERROR, 0.0

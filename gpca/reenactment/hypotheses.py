@@ -1,0 +1,175 @@
+"""Hypotheses of the true pose, with the probability of each.
+
+ICP from many starts, on few points, finds where the observed cloud may lie in the model; the mixture
+(:mod:`gpca.reenactment.mixture`) refines the best of these ends, at last on all points, and says how likely each is.
+Poses take what was observed, where it lay before the registration, to the model: the identity is the initial pose.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gpca.alignment.batched_icp import BatchedICP
+from gpca.alignment.icp import ICPSettings, clipped_cost
+from gpca.alignment.rigid import inverses, rotation_angle_rad, transform
+from gpca.reenactment.half_space import share_within
+from gpca.reenactment.mixture import Anchor, Fits, Mixture
+from gpca.reenactment.settings import ReenactmentSettings
+from gpca.reenactment.starts import search_starts
+from gpca.reenactment.surface import ModelSurface
+
+# Points of the observed cloud and of the model that ICP sees from all starts, and the mixture from the best ends.
+SEARCHED, SEARCHED_MODEL = 128, 256
+FITTED, FITTED_MODEL = 256, 512
+WIDE, NARROW = ICPSettings("point_to_point", 0.25, 12), ICPSettings("point_to_point", 0.10, 20)
+ENDS, MOST_COMPARED = 12, 70  # ends that are kept, and of how many, the best by their cost
+ITERATIONS, LAST_ITERATIONS = 12, 30  # of the mixture
+SAME = 0.012  # diameters; poses of the surface that are no farther apart are one hypothesis
+CLOSE = 3e-3  # entries of matrices that differ no more are the same without looking at the surface
+INDEPENDENT = 30  # points that the likelihood counts as: the mixture is no exact model
+NEGLIGIBLE = 4.5  # nats below the best hypothesis
+LEAST_COVERED = 0.2  # share of the model
+FEWEST_INLIERS = 8
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """A pose that may be the true one.
+
+    Attributes:
+        T: 4×4, takes what was observed, before the registration, to the model.
+        inlier_N: probability of each observed point to be no outlier.
+        log_likelihood: mean over the points, nats.
+        width: of the mixture's normals, diameters per axis.
+        covered: share of the model that was observed, at most.
+        log_posterior: tempered, up to a constant.
+    """
+
+    T: np.ndarray
+    inlier_N: np.ndarray
+    log_likelihood: float
+    width: float
+    covered: float
+    log_posterior: float
+
+
+def find_hypotheses(
+    observed: np.ndarray,
+    surface: ModelSurface,
+    T_found_n: np.ndarray,
+    settings: ReenactmentSettings,
+    random: np.random.Generator,
+) -> list[Hypothesis]:
+    """Return the probable hypotheses, the best first.
+
+    Args:
+        observed: (N, 3) before the registration, in the model's frame.
+        T_found_n: (n, 4, 4) poses that registrations ended at.
+    """
+    search = _Search(observed, surface, settings, random)
+    fits = search.fit(_ends(observed, surface, T_found_n, random), few=True)
+    ranked = sorted(fits, key=lambda hypothesis: -hypothesis.log_posterior)
+    rows = distinct_rows(surface, np.stack([hypothesis.T for hypothesis in ranked]), settings.hypotheses, SAME)
+    found = search.fit(np.stack([ranked[row].T for row in rows]), few=False)
+    found.sort(key=lambda hypothesis: -hypothesis.log_posterior)
+    rows = distinct_rows(surface, np.stack([hypothesis.T for hypothesis in found]), settings.hypotheses, SAME / 2)
+    least = found[0].log_posterior - NEGLIGIBLE
+    return [found[row] for row in rows if found[row].log_posterior > least]
+
+
+class _Search:
+    """Fits poses to some of the points, or to all; the initial pose is always among them, held by what is believed."""
+
+    def __init__(
+        self, observed: np.ndarray, surface: ModelSurface, settings: ReenactmentSettings, random: np.random.Generator
+    ) -> None:
+        self._surface, self._settings, self._random = surface, settings, random
+        few = observed[np.sort(random.permutation(len(observed))[:FITTED])]
+        few_model = surface.points[:FITTED_MODEL]
+        spacing = surface.spacing * np.sqrt(len(surface.points) / len(few_model))
+        self._few = few, Mixture(few_model, spacing / 2), ITERATIONS
+        self._all = observed, Mixture(surface.points, surface.spacing / 2), LAST_ITERATIONS
+
+    def fit(self, T_n: np.ndarray, few: bool) -> list[Hypothesis]:
+        observed, mixture, iterations = self._few if few else self._all
+        anchor = Anchor(
+            np.deg2rad(self._settings.good_rotation_deg) / np.sqrt(3),
+            self._settings.good_translation / np.sqrt(3),
+            max(len(observed) / INDEPENDENT, 1.0),
+        )
+        free = mixture.fit(observed, T_n, iterations)
+        held = mixture.fit(observed, np.eye(4)[None], iterations, anchor=anchor)
+        return [
+            _hypothesis(fits, i, observed, self._surface, self._settings, self._random)
+            for fits in (free, held)
+            for i in range(len(fits.T_n))
+        ]
+
+
+def _ends(observed: np.ndarray, surface: ModelSurface, T_found_n: np.ndarray, random: np.random.Generator):
+    """Return distinct poses (n, 4, 4) that ICP finds from all starts."""
+    few = observed[np.sort(random.permutation(len(observed))[:SEARCHED])]
+    few_model = surface.points[:SEARCHED_MODEL]
+    known_n = np.concatenate([np.eye(4)[None], T_found_n])
+    starts_n = np.concatenate([search_starts(few, few_model), T_found_n])
+    near_n, _, _ = BatchedICP(few_model, WIDE).register(few, starts_n)
+    ends_n, fitness_n, rmse_n = BatchedICP(few_model, NARROW).register(few, np.concatenate([near_n, known_n]))
+    cost_n = clipped_cost(fitness_n, rmse_n, NARROW.correspondence_distance)
+    best_n = np.argsort(cost_n, kind="stable")[:MOST_COMPARED]
+    return ends_n[best_n][distinct_rows(surface, ends_n[best_n], ENDS, 2 * SAME)]
+
+
+def _hypothesis(
+    fits: Fits,
+    i: int,
+    observed: np.ndarray,
+    surface: ModelSurface,
+    settings: ReenactmentSettings,
+    random: np.random.Generator,
+) -> Hypothesis:
+    T, inlier_N, width = fits.T_n[i], fits.inlier_n_N[i], float(fits.width_n[i])
+    seen = transform(T, observed)
+    if (inlier_N > 0.5).sum() >= FEWEST_INLIERS:
+        seen = seen[inlier_N > 0.5]
+    # The width is that of the noise and of the gaps between the model's points.
+    covered = share_within(surface.points, seen, 0.7 * width, random)
+    # Points of the part that was seen are the denser, the smaller it is.
+    density = (1 - fits.outliers_n[i]) * np.log(max(covered, LEAST_COVERED))
+    likelihood = float(fits.log_likelihood_n[i])
+    log_posterior = min(len(observed), INDEPENDENT) * (likelihood - density) + log_prior(T, settings)
+    return Hypothesis(T, inlier_N, likelihood, width, covered, float(log_posterior))
+
+
+def log_prior(T: np.ndarray, settings: ReenactmentSettings) -> float:
+    """Return the logarithm of how probable a pose error is beforehand, up to a constant.
+
+    A good start's error is small, any other's large; both are normal in angle and length. Their weights are those of
+    the two kinds of start, not densities: a hypothesis stands for all poses around it.
+    """
+    angle, length = rotation_angle_rad(T), float(np.sqrt(np.square(T[:3, 3]).sum()))
+
+    def log_normal(rotation_deg: float, translation: float) -> float:
+        # A root mean square over three axes.
+        return -1.5 * ((angle / np.deg2rad(rotation_deg)) ** 2 + (length / translation) ** 2)
+
+    good = np.log(settings.good_starts) + log_normal(settings.good_rotation_deg, settings.good_translation)
+    bad = np.log(1 - settings.good_starts) + log_normal(settings.bad_rotation_deg, settings.bad_translation)
+    return float(np.logaddexp(good, bad))
+
+
+def distinct_rows(surface: ModelSurface, T_n: np.ndarray, most: int, limit: float) -> list[int]:
+    """Return the rows of the first poses (n, 4, 4) that put the surface elsewhere than all before them."""
+    chosen: list[int] = []
+    back_n = inverses(T_n)
+    for i, T in enumerate(T_n):
+        if chosen:
+            if (np.abs(T - T_n[chosen]).max(axis=(1, 2)) <= CLOSE).any():
+                continue
+            if (surface.apart(np.stack([T @ back_n[k] for k in chosen])) <= limit).any():
+                continue
+        chosen.append(i)
+        if len(chosen) == most:
+            break
+    return chosen

@@ -1,0 +1,29 @@
+"""Settings of the re-enactment (docs/reenactment.md); nothing here needs the code that it runs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from gpca.settings import Bounds, OpenShare, Positive
+
+Angle = Annotated[float, Bounds(exclusiveMinimum=0, maximum=180)]  # degrees
+
+
+@dataclass(frozen=True)
+class ReenactmentSettings:
+    """What is believed of a pose error beforehand, and how many hypotheses of the true pose are enacted.
+
+    Attributes:
+        hypotheses: enacted of each pair, at most.
+        good_starts: how probable it is that the initial pose is good.
+        good_rotation_deg, good_translation: root mean square angle and length (diameters) of a good start's error.
+        bad_rotation_deg, bad_translation: the same of any other's.
+    """
+
+    hypotheses: Annotated[int, Bounds(minimum=2, maximum=20)] = 4
+    good_starts: OpenShare = 0.5
+    good_rotation_deg: Angle = 3.0
+    good_translation: Positive = 0.017
+    bad_rotation_deg: Angle = 70.0
+    bad_translation: Positive = 0.35

@@ -1,0 +1,117 @@
+"""A model cloud as a surface: the plane around each of its points, their spacing, and how rough the planes are.
+
+All lengths are relative to the diameter, all points lie in the model's frame.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from gpca.alignment.icp_target import make_target
+from gpca.alignment.rigid import transform
+from gpca.causes.truth import LARGEST_ERROR
+from gpca.features.distances import second_moments
+from gpca.objects.symmetry import find_symmetries
+from gpca.reenactment.surface_kernels import nearest_rows
+
+JUDGED = 256  # points over which an error is the mean
+COMPARED = 64  # points that tell whether two poses are the same
+TRIMMED = 0.94  # share of the residuals that count, the smallest: outliers are at most a twentieth
+CORNER = 1.5  # of the spacing: so far from a point, along its plane, its surface reaches
+
+
+class ModelSurface:
+    """A model (M, 3) with its local planes.
+
+    Attributes:
+        points: (M, 3).
+        spacing: median distance to the nearest other point; spacing_M: mean distance (M,) to the three nearest.
+        centers: (M, 3) of the planes, the means of each point and its neighbors.
+        normals, tangents: (M, 3) and (M, 2, 3) unit vectors.
+        roughness: variance of the distance between a plane and points of the surface that had no part in it, beyond
+            that of the points that had.
+        tree: of the points.
+    """
+
+    def __init__(self, points: np.ndarray) -> None:
+        self.points = np.ascontiguousarray(points, np.float64)
+        self.tree = cKDTree(self.points)
+        neighbors = min(_neighbors(len(points)), len(points) - 1)
+        distances, rows = self.tree.query(self.points, neighbors + 1)
+        self.spacing = float(np.median(distances[:, 1]))
+        self.spacing_M = distances[:, 1:4].mean(axis=1)
+        around = self.points[rows]  # each point first
+        self.centers, axes = _planes(around)
+        others, other_axes = _planes(around[:, 1:])
+        self.normals, self.tangents = axes[:, :, 0], np.swapaxes(axes[:, :, 1:], 1, 2)
+        own = _dots(self.points - self.centers, self.normals)
+        left_out = _dots(self.points - others, other_axes[:, :, 0])
+        self.roughness = max(trimmed_square(left_out) - trimmed_square(own), 0.0)
+
+    @cached_property
+    def symmetric(self) -> bool:
+        """Whether some turn leaves the shape as it is; errors then are those of the nearest points."""
+        return bool(find_symmetries(self.points, 1.0))
+
+    def residuals(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the signed distances (N,) of points (N, 3) from the plane of the nearest model point, and its row."""
+        rows = self.tree.query(points)[1]
+        return _dots(points - self.centers[rows], self.normals[rows]), rows
+
+    def distances(self, points: np.ndarray) -> np.ndarray:
+        """Return the distances (N,) of points (N, 3) from the surface: from the plane of the nearest model point, and
+        along it as far as the points' spacing does not reach."""
+        target, rows_M = self._target
+        rows, distance = np.empty(len(points), np.int64), np.empty(len(points))
+        nearest_rows(np.ascontiguousarray(points), target, rows, distance)
+        near = rows >= 0
+        rows = rows_M[rows]
+        off = np.abs(_dots(points - self.points[rows], self.normals[rows]))
+        along = np.sqrt(np.maximum(distance**2 - off**2, 0))
+        reached = np.hypot(off, np.maximum(along - CORNER * self.spacing_M[rows], 0))
+        return np.where(near, np.minimum(reached, distance), LARGEST_ERROR)
+
+    def errors(self, T_n: np.ndarray) -> np.ndarray:
+        """Return the errors (n,) of poses (n, 4, 4) where the identity is right: ADD, or for symmetric models the mean
+        distance from the surface, which does not grow with the points' spacing as ADD-S does."""
+        points = self.points[:JUDGED]
+        moved = np.stack([transform(T, points) for T in T_n])
+        if self.symmetric:
+            return self.distances(moved.reshape(-1, 3)).reshape(moved.shape[:2]).mean(axis=1)
+        return np.sqrt(np.square(moved - points).sum(axis=2)).mean(axis=1)
+
+    def apart(self, T_between_n: np.ndarray) -> np.ndarray:
+        """Return how far (n,) the surface lies from itself after each motion (n, 4, 4)."""
+        points = self.points[:COMPARED]
+        moved = np.concatenate([transform(T, points) for T in T_between_n])
+        return self.distances(moved).reshape(len(T_between_n), -1).mean(axis=1)
+
+    @cached_property
+    def _target(self):
+        """The points for compiled searches, and the row of each in `points`."""
+        target = make_target(self.points, LARGEST_ERROR)
+        return target, self.tree.query(target.points)[1]
+
+
+def trimmed_square(values: np.ndarray) -> float:
+    """Return the mean square of the smallest values (N,), `TRIMMED` of them."""
+    squares = np.sort(np.square(values))
+    return float(squares[: max(1, int(TRIMMED * len(squares)))].mean())
+
+
+def _neighbors(points: int) -> int:
+    return 8 if points < 256 else 10 if points < 512 else 12
+
+
+def _planes(around_M_k_3: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return centers (M, 3) and axes (M, 3, 3) of the points around each, the normal's column first."""
+    centers = around_M_k_3.mean(axis=1)
+    moments = second_moments(around_M_k_3 - centers[:, None])
+    return centers, np.linalg.eigh(moments)[1]
+
+
+def _dots(a_N_3: np.ndarray, b_N_3: np.ndarray) -> np.ndarray:
+    return a_N_3[:, 0] * b_N_3[:, 0] + a_N_3[:, 1] * b_N_3[:, 1] + a_N_3[:, 2] * b_N_3[:, 2]

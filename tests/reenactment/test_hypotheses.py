@@ -1,0 +1,61 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gpca.alignment.rigid import inverse, rotation_angle_rad, transform
+from gpca.alignment.twist import exp
+from gpca.reenactment.hypotheses import distinct_rows, find_hypotheses, log_prior
+from gpca.reenactment.settings import ReenactmentSettings
+from gpca.reenactment.surface import ModelSurface
+from tests.reenactment.conftest import candidate_of, pair_of
+
+SETTINGS = ReenactmentSettings()
+
+
+def found(pair, surface, settings=SETTINGS):
+    before = transform(pair.T_init, pair.observed)
+    return find_hypotheses(before, surface, pair.T_runs @ inverse(pair.T_init), settings, np.random.default_rng(0))
+
+
+@pytest.mark.parametrize("causes", [(), ("noise",), ("pose",), ("overlap",), ("pose", "overlap")])
+def test_the_true_pose_is_the_most_probable(drill, causes):
+    candidate = candidate_of(drill, *causes, seed=101)
+    pair, T_true = pair_of(candidate)
+    surface = ModelSurface(candidate.model)
+    hypotheses = found(pair, surface)
+    assert surface.errors((hypotheses[0].T @ inverse(T_true))[None])[0] < 0.03
+    posterior = [hypothesis.log_posterior for hypothesis in hypotheses]
+    assert posterior == sorted(posterior, reverse=True) and posterior[0] - posterior[-1] < 4.5
+
+
+def test_a_can_has_one_hypothesis_however_it_is_turned_about_its_axis(can):
+    candidate = candidate_of(can, "pose")
+    pair, _ = pair_of(candidate)
+    surface = ModelSurface(candidate.model)
+    hypotheses = found(pair, surface)
+    between = [h.T @ inverse(hypotheses[0].T) for h in hypotheses[1:]]
+    # It also fits upside down: those are no farther apart than its points tell.
+    assert all(surface.apart(T[None])[0] > 0.006 for T in between)
+    assert surface.errors((hypotheses[0].T @ inverse(pair_of(candidate)[1]))[None])[0] < 0.02
+
+
+def test_no_more_are_kept_than_the_settings_say(drill):
+    candidate = candidate_of(drill, "noise", "pose", "overlap")
+    pair, _ = pair_of(candidate)
+    assert len(found(pair, ModelSurface(candidate.model), replace(SETTINGS, hypotheses=2))) <= 2
+
+
+def test_poses_that_leave_the_surface_where_it_is_are_one(can):
+    surface = ModelSurface(can[:400])
+    turns = exp(np.array([[0, 0, 0, 0, 0, 0], [0, 0, 0.7, 0, 0, 0], [0, 0, 0, 0.1, 0, 0], [1e-4, 0, 0, 0.1, 0, 0]]))
+    assert distinct_rows(surface, turns, most=4, limit=0.02) == [0, 2]
+    assert distinct_rows(surface, turns, most=1, limit=0.02) == [0]
+
+
+def test_good_starts_are_probable_and_errors_beyond_all_bounds_are_not():
+    poses = [exp(np.array([[angle, 0, 0, length, 0, 0]]))[0] for angle, length in ((0, 0), (0.03, 0.01), (0.7, 0.2))]
+    near, small, large = (log_prior(T, SETTINGS) for T in poses)
+    assert near >= small > large
+    assert log_prior(exp(np.array([[0, 0, 0, 2.0, 0, 0]]))[0], SETTINGS) < large - 10
+    assert rotation_angle_rad(poses[2]) == pytest.approx(0.7)

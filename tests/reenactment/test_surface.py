@@ -1,0 +1,48 @@
+import numpy as np
+import pytest
+
+from gpca.alignment.pose_error import PoseErrors
+from gpca.alignment.twist import exp
+from gpca.reenactment.surface import ModelSurface
+
+
+def test_planes_lie_in_the_surface(drill, model):
+    others = drill[400:1000]
+    residuals, rows = model.residuals(others)
+    nearest = np.linalg.norm(model.points[:, None] - others, axis=2)
+    assert np.array_equal(rows, nearest.argmin(axis=0))
+    assert np.median(np.abs(residuals)) < 0.5 * np.median(nearest.min(axis=0))
+    assert np.abs((model.normals[:, None] * model.tangents).sum(axis=2)).max() < 1e-9
+
+
+def test_spacing_is_that_of_the_points(model):
+    apart = np.linalg.norm(model.points[:, None] - model.points, axis=2)
+    apart = np.sort(apart, axis=1)
+    assert model.spacing == pytest.approx(np.median(apart[:, 1]))
+    assert model.spacing_M == pytest.approx(apart[:, 1:4].mean(axis=1))
+
+
+def test_errors_are_add_where_nothing_is_symmetric(drill, model):
+    poses = exp(np.random.default_rng(100).normal(scale=0.1, size=(6, 6)))
+    assert not model.symmetric
+    assert model.errors(poses) == pytest.approx(PoseErrors(model.points, 256, symmetric=False)(poses))
+
+
+def test_a_can_that_is_turned_about_its_axis_is_where_it_was_however_few_its_points(can):
+    surface = ModelSurface(can[:200])
+    turned = exp(np.array([[0, 0, 1.0, 0, 0, 0], [1.0, 0, 0, 0, 0, 0]]))
+    assert surface.symmetric
+    nearest = PoseErrors(surface.points, 200, symmetric=True)(turned)
+    found = surface.errors(turned)
+    assert found[0] < 0.3 * nearest[0]
+    assert found[1] > 0.05
+
+
+def test_poses_are_apart_as_far_as_their_surfaces_are(can, drill):
+    turned = exp(np.array([[0, 0, 1.0, 0, 0, 0]]))
+    assert ModelSurface(can[:400]).apart(turned)[0] < 0.01
+    assert ModelSurface(drill[:400]).apart(turned)[0] > 0.05
+
+
+def test_what_is_beyond_reach_counts_as_far_as_errors_do(model):
+    assert model.distances(np.array([[5.0, 0, 0]]))[0] == 0.5
