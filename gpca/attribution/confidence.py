@@ -35,8 +35,10 @@ def pigeonhole_weights(random: np.random.Generator, *factors: np.ndarray) -> np.
     return weights_B_N
 
 
-def bounds(values_B: np.ndarray, drawn_B_N: np.ndarray | None = None, difference: bool = False) -> tuple[float, float]:
-    """Return the bounds of `LEVEL` of the draws; those without a value are left out, and NaN is returned for none.
+def bounds(
+    values_B: np.ndarray, drawn_B_N: np.ndarray | None = None, difference: bool = False, level: float = LEVEL
+) -> tuple[float, float]:
+    """Return the bounds of the draws' middle `level`; those without a value are left out, and NaN is returned for none.
 
     Args:
         values_B: of every draw.
@@ -47,14 +49,14 @@ def bounds(values_B: np.ndarray, drawn_B_N: np.ndarray | None = None, difference
     known = values_B[np.isfinite(values_B)]
     if not len(known):
         return np.nan, np.nan
-    low, high = (float(bound) for bound in np.quantile(known, [(1 - LEVEL) / 2, (1 + LEVEL) / 2]))
+    low, high = (float(bound) for bound in np.quantile(known, [(1 - level) / 2, (1 + level) / 2]))
     if drawn_B_N is None or high - low > NO_WIDTH or not (trials := independent(drawn_B_N)):
         return low, high
     value = (low + high) / 2
     if not difference:
-        return wilson_interval(min(max(value, 0.0), 1.0) * trials, trials)
+        return wilson_interval(min(max(value, 0.0), 1.0) * trials, trials, level)
     # As many samples are right by one only as the difference says, and up to the upper bound of that share may be.
-    least, most = wilson_interval(min(abs(value), 1.0) * trials, trials)
+    least, most = wilson_interval(min(abs(value), 1.0) * trials, trials, level)
     return (-most, most) if abs(value) <= NO_WIDTH else (least, most) if value > 0 else (-most, -least)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
@@ -12,6 +12,7 @@ from gpca.io.structured_text import load_own_yaml
 
 CLAIMS = Path(__file__).with_name("claims.yaml")
 PREDICTIONS = "predictions"  # stands for a file: the calibration that is computed from predictions
+FIRST_SET = "2026-11-22"  # a day after the first reference on real objects, which had shown the differences
 Value = str | float | Mapping  # a method, a number, or what differs from the rest of the place
 
 
@@ -35,6 +36,8 @@ class Claim:
     Attributes:
         test: greater, less, not_worse or equivalent.
         margin: the smallest difference that counts, in `unit`; with `ratio`, a factor.
+        margin_set: the day on which the margin entered git.
+        values_known: whether the differences that it judges had been seen by then.
         compared: the comparisons, all of which have to hold; empty where nothing was run, and then `note` says why.
     """
 
@@ -45,6 +48,8 @@ class Claim:
     margin: float = 0.0
     unit: str = ""
     ratio: bool = False
+    margin_set: str = FIRST_SET
+    values_known: bool = True
     compared: tuple[Compared, ...] = ()
     note: str = ""
 
@@ -52,6 +57,11 @@ class Claim:
 def read_claims() -> list[Claim]:
     """Return the claims, in the order of the file; a test holds it to what its head says."""
     return [_claim(entry) for entry in load_own_yaml(CLAIMS)]
+
+
+def counterparts_of(claims: Iterable[Claim]) -> list[Counterpart]:
+    """Return all values of a run that the claims compare."""
+    return [place for claim in claims for compared in claim.compared for place in compared.counterparts]
 
 
 def _claim(entry: Mapping) -> Claim:

@@ -9,14 +9,15 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from gpca.attribution.confidence import bounds, pigeonhole_weights
+from gpca.attribution.confidence import LEVEL, bounds, pigeonhole_weights
 from gpca.attribution.metrics import ALL, PREDICTED_AS, source_method_seed
 from gpca.attribution.predictions import read_predictions
-from gpca.comparison.published import Counterpart, Number
+from gpca.comparison.published import Counterpart
 from gpca.seeds import generator
 
 FOLDERS = {"metrics.csv": "predictions", "real_world.csv": "predictions", "diagnostics.csv": "learners"}
@@ -33,38 +34,62 @@ def folder_behind(counterpart: Counterpart | None) -> Folder | None:
     return FOLDERS[counterpart.file], counterpart.sources[0], counterpart.methods[0]
 
 
-def folders_behind(numbers: Iterable[Number]) -> list[Folder]:
+def folders_behind(counterparts: Iterable[Counterpart | None]) -> list[Folder]:
     """Return the folders of all of them, each once."""
-    return sorted({folder for number in numbers if (folder := folder_behind(number.counterpart))})
+    return sorted({folder for counterpart in counterparts if (folder := folder_behind(counterpart))})
 
 
-def cluster_intervals(
-    numbers: Iterable[Number], prediction_files: Iterable[str | Path]
-) -> dict[Counterpart, tuple[float, float]]:
-    """Return counterpart -> bounds of its share by the pigeonhole bootstrap over clusters and seeds.
+@dataclass(frozen=True)
+class Drawn:
+    """The share that a counterpart is, in every draw of clusters and seeds; the draws of one source are the same.
+
+    Attributes:
+        share_B: in [0, 1], NaN in a draw without any sample.
+        weights_B_N: how often each draw has each sample of the folder.
+        of_N: which of these the share is of.
+    """
+
+    share_B: np.ndarray
+    weights_B_N: np.ndarray
+    of_N: np.ndarray
+
+    def bounds(self, level: float = LEVEL) -> tuple[float, float]:
+        """Return the bounds of the share."""
+        return bounds(self.share_B, self.weights_B_N[:, self.of_N], level=level)
+
+    def bounds_of_difference(self, other: Drawn, level: float = LEVEL) -> tuple[float, float]:
+        """Return the bounds of the share minus another, draw by draw."""
+        drawn_B_n = self.weights_B_N[:, self.of_N]
+        return bounds(self.share_B - other.share_B, drawn_B_n, difference=True, level=level)
+
+
+def cluster_draws(
+    counterparts: Iterable[Counterpart | None], prediction_files: Iterable[str | Path]
+) -> dict[Counterpart, Drawn]:
+    """Return the draws of the shares by the pigeonhole bootstrap over clusters and seeds.
 
     Args:
-        numbers: the printed numbers; those whose folder has no file are left out.
+        counterparts: those that are no shares of samples, or whose folder has no file, are left out.
         prediction_files: named ``…/{predictions or learners}/{source}/{method}/seed{seed}.csv``.
 
     Raises:
         InputError: a name of another form, a file that :func:`gpca.attribution.predictions.read_predictions` refuses.
     """
-    counterparts: dict[Folder, set[Counterpart]] = defaultdict(set)
-    for number in numbers:
-        if number.counterpart and (folder := folder_behind(number.counterpart)):
-            counterparts[folder].add(number.counterpart)
+    in_folder: dict[Folder, set[Counterpart]] = defaultdict(set)
+    for counterpart in counterparts:
+        if counterpart and (folder := folder_behind(counterpart)):
+            in_folder[folder].add(counterpart)
     files: dict[Folder, list[str | Path]] = defaultdict(list)
     for path in prediction_files:
         source, method, _ = source_method_seed(path)
         files[Path(path).parts[-4], source, method].append(path)
-    intervals: dict[Counterpart, tuple[float, float]] = {}
-    for folder, of_folder in counterparts.items():
+    drawn: dict[Counterpart, Drawn] = {}
+    for folder, of_folder in in_folder.items():
         if folder in files:
             rows = _samples(files[folder])
-            weights_B_N = pigeonhole_weights(generator("printed", *folder), rows["seed"], rows["cluster"])
-            intervals |= {counterpart: _bounds_of(counterpart, rows, weights_B_N) for counterpart in of_folder}
-    return intervals
+            weights_B_N = pigeonhole_weights(generator("printed", folder[1]), rows["seed"], rows["cluster"])
+            drawn |= {counterpart: _drawn(counterpart, rows, weights_B_N) for counterpart in of_folder}
+    return drawn
 
 
 def _samples(paths: list[str | Path]):
@@ -79,7 +104,7 @@ def _samples(paths: list[str | Path]):
     return pd.concat(parts, ignore_index=True)
 
 
-def _bounds_of(counterpart: Counterpart, rows, weights_B_N: np.ndarray) -> tuple[float, float]:
+def _drawn(counterpart: Counterpart, rows, weights_B_N: np.ndarray) -> Drawn:
     of_concept = (rows["concept_true"] == counterpart.concept) | (counterpart.concept == ALL)
     if "set" in rows:
         of_concept &= rows["set"] == counterpart.table.partition("/")[2]
@@ -87,7 +112,7 @@ def _bounds_of(counterpart: Counterpart, rows, weights_B_N: np.ndarray) -> tuple
     if counterpart.metrics[0].startswith(PREDICTED_AS):
         named = counterpart.metrics[0].removeprefix(PREDICTED_AS)
     hits_N = ((rows["concept_predicted"] == named) & ~rows["abstained"]).to_numpy(float)
-    weights_B_n = weights_B_N[:, of_concept.to_numpy()]
+    of_N = of_concept.to_numpy()
+    weights_B_n = weights_B_N[:, of_N]
     with np.errstate(invalid="ignore"):  # a draw without any sample of the concept has no share
-        share_B = weights_B_n @ hits_N[of_concept.to_numpy()] / weights_B_n.sum(axis=1)
-    return bounds(share_B, weights_B_n)
+        return Drawn(weights_B_n @ hits_N[of_N] / weights_B_n.sum(axis=1), weights_B_N, of_N)

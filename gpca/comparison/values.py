@@ -13,6 +13,7 @@ import numpy as np
 
 from gpca.active_learning.metrics import CENSORED_BY
 from gpca.attribution.metrics import mean_interval, read_metrics
+from gpca.comparison.clusters import Drawn
 from gpca.comparison.published import UNITS, Counterpart, Number
 from gpca.model.runtime_file import read_runtime
 
@@ -59,14 +60,14 @@ class Reproduced:
 def value_of_run(
     number: Number,
     results: Mapping[str, pd.DataFrame],
-    clusters: Mapping[Counterpart, tuple[float, float]] | None = None,
+    clusters: Mapping[Counterpart, Drawn] | None = None,
 ) -> Reproduced | None:
     """Return the run's value in place of the number, in its unit; None where it has none.
 
     Args:
         number: the printed one.
         results: file name -> its rows, as :func:`read_results` reads them.
-        clusters: counterpart -> bounds over objects and seeds, in the unit of the files.
+        clusters: counterpart -> its draws of clusters and seeds (:func:`gpca.comparison.clusters.cluster_draws`).
     """
     counterpart = number.counterpart
     if counterpart is None or counterpart.file not in results:
@@ -75,7 +76,8 @@ def value_of_run(
     reproduced = of_file(results[counterpart.file], counterpart)
     if reproduced is None:
         return None
-    cluster_low, cluster_high = (clusters or {}).get(counterpart, (math.nan, math.nan))
+    drawn = (clusters or {}).get(counterpart)
+    cluster_low, cluster_high = drawn.bounds() if drawn else (math.nan, math.nan)
     unit = UNITS[number.unit]
     reproduced = replace(reproduced, cluster_low=cluster_low, cluster_high=cluster_high).times(unit.factor)
     low, high = (

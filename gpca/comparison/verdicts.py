@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gpca.comparison.clusters import Drawn
 from gpca.comparison.published import TIMES, Counterpart, Number, Reason, reason_of
 from gpca.comparison.values import RUNTIME, Reproduced, deviation_interval, value_of_run
 from gpca.errors import InputError
@@ -69,7 +70,7 @@ def compare(
     tolerances: Mapping[str, Tolerance],
     reasons: Sequence[Reason],
     hardware: str = "",
-    clusters: Mapping[Counterpart, tuple[float, float]] | None = None,
+    clusters: Mapping[Counterpart, Drawn] | None = None,
 ) -> pd.DataFrame:
     """Return `COMPARISON_COLUMNS`, a row per printed number, in its unit.
 
@@ -80,7 +81,7 @@ def compare(
         tolerances: one for each unit.
         reasons: why printed numbers were not reached.
         hardware: the machine of the measured times, where their file does not say.
-        clusters: counterpart -> bounds over objects and seeds (:mod:`gpca.comparison.clusters`).
+        clusters: counterpart -> its draws of clusters and seeds (:func:`gpca.comparison.clusters.cluster_draws`).
 
     Raises:
         InputError: a unit without tolerance.

@@ -42,14 +42,15 @@ def settings_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, An
     titled = {name: {"title": entry["title"], "stand_in": entry["stand_in"]} for name, entry in sources.items()}
     titles = {name: title_of(entry) for name, entry in titled.items()}
     datasets = {name: dataset_of(entry) for name, entry in sources.items()}
+    tables = {"title": "Virtual tables", "stand_in": titled[config["recovery"]["objects"]]["stand_in"]}
     model = (titled | frames)[config["model"]["source"]]
     explainers = {name: explainer_entry(name) for name in config["explainers"]}
     explainer_titles = {name: entry.title for name, entry in explainers.items()}
     shown_source = config["figures"]["source"]
     return {
         "sources": titled,
-        "compared_sources": {**titled, **frames, ONE_ENCODER: own["frames"], "model": model},
-        "compared_titles": own["learners"] | own["strategies"] | explainer_titles,
+        "compared_sources": {**titled, **frames, ONE_ENCODER: own["frames"], "model": model, "recovery": tables},
+        "compared_titles": own["policies"] | own["learners"] | own["strategies"] | explainer_titles,
         "source_titles": titles,
         "shown_title": titles[shown_source],
         "source_datasets": datasets,

@@ -2,12 +2,15 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pandas as pd
 import pytest
 
 from gpca.attribution.predictions import PREDICTION_COLUMNS
+from gpca.comparison.claim_values import separability
 from gpca.comparison.claim_verdicts import CLAIM_COLUMNS, judge, read_verdicts, verdict_of_interval
 from gpca.comparison.claims import PREDICTIONS, Claim, Compared
+from gpca.comparison.clusters import Drawn
 
 from .conftest import write
 from .made_up import ACCURACY, LABELS, OBJECTS, TIME, runtime, tidy
@@ -34,8 +37,10 @@ def rows_of(*differences, base=0.8):
         ("greater", 0.1, 3, "supported"),
         ("greater", -0.1, 3, "inconclusive"),
         ("greater", -3, -0.1, "refuted"),
-        ("greater", -0.5, 0.9, "refuted"),  # not greater by what counts
-        ("greater", 0.1, 0.9, "refuted"),
+        ("greater", -0.5, 0.9, "smaller than the margin"),  # not greater by what counts
+        ("greater", 0.1, 0.9, "smaller than the margin"),
+        ("greater", 0.1, 1.0, "supported"),
+        ("less", -0.9, -0.1, "smaller than the margin"),
         ("less", -3, -0.1, "supported"),
         ("less", -3, 0.1, "inconclusive"),
         ("less", 0.1, 3, "refuted"),
@@ -69,6 +74,8 @@ def test_every_verdict_on_a_claim():
 
     assert verdict(2.0, 2.2, 1.8) == "supported"
     assert verdict(-2.0, -2.2, -1.8) == "refuted"
+    assert verdict(2.0, 2.0, 2.0) == "inconclusive"  # an interval of a share is never of no width
+    assert verdict(0.5, 0.51, 0.49) == "smaller than the margin"
     assert verdict(3.0, -2.0, 4.0) == "inconclusive"
     assert verdict(2.0) == "inconclusive"  # one seed
     assert judged(CLAIM)["claim_verdict"][0] == "not run"
@@ -122,6 +129,47 @@ def test_labels_that_ended_before_the_target_leave_one_answer_open():
     assert verdict([60, 61], [10, 11], reached_random=0) == "inconclusive"
 
 
+def test_both_at_the_first_batch_of_labels_say_nothing():
+    bald = replace(LABELS, methods=("bald",))
+    claim = Claim("fewer", "s", "p", "less", 1.25, "labels", ratio=True, compared=(Compared(bald, LABELS),))
+    table = {"concept": "overlap", "table": "active_learning/pretrained"}
+
+    def row(of_bald, of_random, floors):
+        rows = [
+            tidy(values, method=method, metric=metric, **table)
+            for method, values in (("bald", of_bald), ("random", of_random))
+            for metric, values in (("labels_to_target", values), ("reached", [1] * len(values)))
+        ]
+        [row] = judge([claim], {"active_learning.csv": pd.concat(rows)}, OBJECTS, floors=floors).itertuples()
+        return row
+
+    first = row([4, 4, 4], [4, 4, 4], {"labels": 4})
+    assert (first.verdict, first.at_floor, first.claim_verdict) == ("inconclusive", True, "inconclusive")
+    assert row([4, 4, 4], [4, 4, 4], {}).verdict == "smaller than the margin"
+    assert row([4, 4, 4], [4, 4, 60], {"labels": 4}).at_floor  # in at least half of the seeds
+    apart = row([4, 4, 4], [58, 60, 62], {"labels": 4})
+    assert (apart.verdict, apart.at_floor) == ("supported", False)
+
+
+def test_shares_have_the_farther_bounds_of_seeds_and_clusters():
+    draws = {place: Drawn(share_B, np.ones((4, 1)), np.array([True])) for place, share_B in
+             ((ACCURACY, np.array([0.9, 0.8, 0.7, 0.6])), (OTHER, np.full(4, 0.7)))}  # fmt: skip
+    alike = {"metrics.csv": pd.concat(rows_of(5.0, 5.0, 5.0))}
+    [row] = judge([CLAIM], alike, OBJECTS, clusters=draws).itertuples()
+    assert (row.value, row.verdict) == (pytest.approx(5), "inconclusive")
+    assert (row.low, row.high) == pytest.approx((-8.5, 18.5), abs=0.8)
+    against_number = replace(CLAIM, compared=(Compared(ACCURACY, 50.0), Compared(50.0, ACCURACY)))
+    one, other = judge([against_number], alike, OBJECTS, clusters=draws).itertuples()
+    assert (one.low, one.high) == pytest.approx((-other.high, -other.low))
+
+
+def test_scores_that_tell_all_classes_apart_have_an_area_of_one():
+    p_S_C = np.array([[0.8, 0.1, 0.1], [0.7, 0.2, 0.1], [0.1, 0.8, 0.1], [0.2, 0.1, 0.7]])
+    assert separability(p_S_C, np.array([0, 0, 1, 2])) == 1
+    assert separability(np.full((4, 3), 1 / 3), np.array([0, 0, 1, 2])) == 0.5
+    assert np.isnan(separability(p_S_C, np.zeros(4, int)))
+
+
 def test_times_are_compared_by_their_means_and_scatter():
     compared = (Compared(TIME, replace(TIME, methods=("scores",))),)
     claim = Claim("slow", "s", "p", "greater", 2.0, "s", ratio=True, compared=compared)
@@ -140,7 +188,7 @@ def test_calibration_comes_from_predictions(tmp_path):
                      *((sure, 1 - sure) if i < 75 else (1 - sure, sure))) for i in range(100)]  # fmt: skip
             paths.append(tmp_path / PREDICTIONS / "ycb" / method / f"seed{seed}.csv")
             write(paths[-1], heads, rows)
-    place = replace(ACCURACY, file=PREDICTIONS, table="calibration", metrics=("ece",))
+    place = replace(ACCURACY, file=PREDICTIONS, table="scores", metrics=("ece",))
     compared = (Compared(place, replace(place, methods=("other",))),)
     claim = Claim("calibrated", "s", "p", "less", 0.01, "share", compared=compared)
     [row] = judge([claim], {}, OBJECTS, paths).itertuples()

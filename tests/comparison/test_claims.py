@@ -1,9 +1,11 @@
 """The file of the paper's sentences: what it holds, and which values each of its comparisons is of."""
 
+from datetime import date
+
 import yaml
 
 from gpca.comparison import claims as claims_file
-from gpca.comparison.claims import CLAIMS, PREDICTIONS, read_claims
+from gpca.comparison.claims import CLAIMS, FIRST_SET, PREDICTIONS, counterparts_of, read_claims
 from gpca.comparison.clusters import folders_behind
 from gpca.comparison.published import UNITS, read_published
 from gpca.io.structured_text import load_own_yaml
@@ -28,15 +30,18 @@ def test_the_file_keeps_the_rules_of_its_head():
         assert all((claim.name, claim.sentence, claim.place)), claim
         assert claim.unit in UNITS if claim.compared else claim.note, claim
         assert claim.margin >= claim.ratio, claim
+        assert date.fromisoformat(claim.margin_set) >= date.fromisoformat(FIRST_SET), claim
+        assert claim.values_known or claim.margin_set > FIRST_SET, claim
         for place in (place for compared in claim.compared for place in compared.counterparts):
             assert place.file in {*FILES, PREDICTIONS}, claim
             assert all((place.table, *place.sources, *place.methods, *place.metrics, place.concept)), claim
 
 
 def test_calibration_is_asked_for_where_predictions_are_read_anyhow():
-    folders = set(folders_behind(read_published()))
-    places = [place for claim in read_claims() for compared in claim.compared for place in compared.counterparts]
-    asked = {("predictions", place.sources[0], place.methods[0]) for place in places if place.file == PREDICTIONS}
+    printed = (number.counterpart for number in read_published())
+    folders = set(folders_behind([*printed, *counterparts_of(read_claims())]))
+    places = [place for place in counterparts_of(read_claims()) if place.file == PREDICTIONS]
+    asked = {("predictions", place.sources[0], place.methods[0]) for place in places}
     assert asked
     assert asked <= folders
 

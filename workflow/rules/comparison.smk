@@ -2,6 +2,7 @@
 from os.path import relpath
 
 from gpca.code_files import ROOT
+from gpca.comparison.claims import counterparts_of, read_claims
 from gpca.comparison.clusters import folders_behind
 from gpca.comparison.published import read_published
 from gpca.experiments.registry import experiments
@@ -11,11 +12,10 @@ COLLECTED = [
 ]
 ENDS = ["model.pt", "comparison.md", "index.html"]
 PUBLISHED = read_published()
-# Those of the collected that hold a counterpart of a printed number.
-COMPARED = sorted(
-    {number.counterpart.file for number in PUBLISHED if number.counterpart}
-    & set(COLLECTED)
-)
+# What stands beside printed numbers and sentences.
+COUNTERPARTS = [number.counterpart for number in PUBLISHED if number.counterpart]
+COUNTERPARTS += counterparts_of(read_claims())
+COMPARED = sorted({counterpart.file for counterpart in COUNTERPARTS} & set(COLLECTED))
 # Predictions of single samples that these are shares of, where the config makes them.
 PREDICTED = {
     *(
@@ -28,7 +28,7 @@ PREDICTED = {
 }
 COMPARED_PREDICTIONS = [
     f"<results>/{'/'.join(folder)}/seed{seed}.csv"
-    for folder in folders_behind(PUBLISHED)
+    for folder in folders_behind(COUNTERPARTS)
     if folder in PREDICTED
     for seed in SEEDS
 ]
@@ -76,8 +76,14 @@ rule comparison:
     conda:
         "../envs/gpca.yaml"
     params:
-        objects={**SHOWN["sources"], FRAMES: SHOWN["frames"], "model": SHOWN["model"]},
+        objects={
+            **SHOWN["sources"],
+            FRAMES: SHOWN["frames"],
+            "model": SHOWN["model"],
+            "recovery": SHOWN["compared_sources"]["recovery"],
+        },
         tolerances=config["comparison"]["tolerances"],
+        floors={"labels": config["active_learning"]["batch"]},
     script:
         "../scripts/comparison.py"
 

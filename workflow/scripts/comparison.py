@@ -2,8 +2,8 @@
 
 from gpca.attribution.metrics import read_metrics
 from gpca.comparison.claim_verdicts import judge
-from gpca.comparison.claims import read_claims
-from gpca.comparison.clusters import cluster_intervals
+from gpca.comparison.claims import counterparts_of, read_claims
+from gpca.comparison.clusters import cluster_draws
 from gpca.comparison.published import read_published, read_reasons
 from gpca.comparison.readings import judge_readings, with_readings
 from gpca.comparison.values import measured_on, read_results
@@ -15,9 +15,11 @@ from gpca.reporting.tables.comparison import comparison_markdown
 
 with workflow_script(snakemake):
     given, params = snakemake.input, snakemake.params
-    numbers = read_published()
+    numbers, sentences = read_published(), read_claims()
     tolerances = {unit: Tolerance(**tolerance) for unit, tolerance in params.tolerances.items()}
     results = read_results(given.collected)
+    counterparts = [*(number.counterpart for number in numbers), *counterparts_of(sentences)]
+    clusters = cluster_draws(counterparts, given.predictions)
     comparison = compare(
         numbers,
         results,
@@ -25,11 +27,11 @@ with workflow_script(snakemake):
         tolerances,
         read_reasons(),
         measured_on(given.collected),
-        cluster_intervals(numbers, given.predictions),
+        clusters,
     )
     judged = judge_readings(numbers, comparison, read_metrics(given.readings), tolerances)
     comparison = with_readings(comparison, judged)
-    claims = judge(read_claims(), results, params.objects, given.predictions)
+    claims = judge(sentences, results, params.objects, given.predictions, clusters, params.floors)
     out = snakemake.output
     for frame, path in ((comparison, out.csv), (claims, out.claims), (judged, out.readings)):
         write_csv(path, frame, form=None)

@@ -12,10 +12,12 @@ from gpca.comparison.verdicts import NOT_RUN
 from gpca.objects.title import title_of
 from gpca.reporting.tables.builder import TableBuilder
 from gpca.reporting.tables.table import Cell, Column, Table
+from gpca.reporting.words import plural, span
 
 if TYPE_CHECKING:
     import pandas as pd
 
+COMPONENTS = "components"  # of the runtime
 _TESTS = {"greater": "greater", "less": "less", "not_worse": "not worse", "equivalent": "the same"}
 
 
@@ -53,7 +55,7 @@ def claims(verdicts: pd.DataFrame, sources: Mapping[str, Mapping], titles: Mappi
     for row in verdicts[verdicts["verdict"] != NOT_RUN].itertuples():
         first = row.claim not in seen
         seen.add(row.claim)
-        compared = f"{titles.get(row.one, row.one)} against {titles.get(row.other, row.other)}"
+        compared = f"{_titled(row.one, titles)} against {_titled(row.other, titles)}"
         source = title_of(sources[row.source]) if row.source in sources else row.source
         table.add_row(
             [
@@ -63,7 +65,7 @@ def claims(verdicts: pd.DataFrame, sources: Mapping[str, Mapping], titles: Mappi
                 (row.table, row.table.rpartition("/")[2].replace("_", " ")),
                 (f"{row.one} against {row.other}", compared),
                 (row.test, _expected(row)),
-                (row.verdict, row.verdict),
+                (row.verdict, f"{row.verdict} (floor)" if row.at_floor == "True" else row.verdict),
             ],
             {"difference": Cell(row.value, row.high - row.value, int(row.n), 0, bounds=(row.low, row.high))},
         )
@@ -74,9 +76,13 @@ def claims(verdicts: pd.DataFrame, sources: Mapping[str, Mapping], titles: Mappi
         columns={"difference": Difference("First minus second, or their ratio", limits=(-math.inf, math.inf))},
         footnotes=(
             counted(verdicts),
-            "In brackets: the 95 % interval over the seeds, of differences of the same seed. A sentence is supported "
-            "if all of its comparisons are, and refuted if one is, by an interval that allows for their number. Not "
-            "worse and the same: the whole interval lies within the margin. docs/comparison.md has the whole rule.",
+            f"In brackets: the 95 % interval over {_seeds(verdicts)} of differences of the same seed, or of accuracies "
+            "the farther bounds of it and of one over clusters of objects or scenes. A sentence is supported if all of "
+            "its comparisons are, and refuted or smaller than the margin if one is, by an interval that allows for "
+            "their number. Smaller than the margin: not below 0, but below what is expected. Floor: both are at the "
+            "first labels, so that nothing can be said. Not worse and the same: the whole interval lies within the "
+            "margin. docs/comparison.md has the whole rule.",
+            *margins_in_words(verdicts),
             *(_not_run(row) for row in open_ones.itertuples()),
         ),
     )
@@ -87,6 +93,29 @@ def counted(verdicts: pd.DataFrame) -> str:
     counts = verdicts.drop_duplicates("claim")["claim_verdict"].value_counts(sort=False)
     phrases = (f"{counts[verdict]} {verdict}" for verdict in CLAIM_VERDICTS if verdict in counts)
     return f"Of {counts.sum()} sentences: {', '.join(phrases)}."
+
+
+def margins_in_words(verdicts: pd.DataFrame) -> list[str]:
+    """Return a sentence on when the margins of the claims were set, and what was known by then."""
+    once = verdicts.drop_duplicates("claim")
+    once = once[once["test"] != ""]
+    phrases = []
+    for (day, known), claims_of_day in once.groupby(["margin_set", "values_known"], sort=True):
+        before = "after the differences had been seen" if known == "True" else "before the differences were looked at"
+        phrases.append(f"{len(claims_of_day)} on {day}, {before}")
+    return [f"Margins were set for {'; '.join(phrases)}."] if phrases else []
+
+
+def _seeds(verdicts: pd.DataFrame) -> str:
+    """Return over how many seeds the differences are; those of the components' times are of repeats."""
+    of_seeds = verdicts[verdicts["n"].notna() & (verdicts["table"] != COMPONENTS)]
+    return plural(span(of_seeds["n"]), "seed") if len(of_seeds) else "repeats"
+
+
+def _titled(name: str, titles: Mapping[str, str]) -> str:
+    """Return what the tables call a method, before the concept that it is of, if one is named."""
+    method, _, concept = name.partition(" ")
+    return f"{titles[method]} {concept}".rstrip() if method in titles else name
 
 
 def _expected(row) -> str:
