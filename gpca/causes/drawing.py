@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -77,6 +77,28 @@ def draw_geometry(
     return as_causes([record for records in of_splits for record in records], (source, seed))[0]
 
 
+def draw_further(
+    objects: ObjectClouds, source: str, seed: int, settings: CauseSettings, chunk: int, wanted: int
+) -> Causes:
+    """Draw training samples of the same objects as those of :func:`draw_causes`, and of the same states but borderline.
+
+    Args:
+        settings: those of the other causes.
+        chunk: names the draws: two chunks have no candidate in common, and neither depends on the other.
+        wanted: how many.
+
+    Raises:
+        InputError: see :func:`draw_causes`.
+    """
+    shares = asdict(settings.shares) | {"borderline": 0.0, "geometry": 0.0}
+    labeled = {name: share / sum(shares.values()) for name, share in shares.items()}
+    own = replace(settings, train=wanted, shares=Shares(**labeled))
+    subjects, uncertainty_limit = measure_clean_pairs(read_subjects(objects), source, seed, settings)
+    drawing = _Drawing(source, seed, own, Measuring(own, uncertainty_limit), part=("further", chunk))
+    train = split_by_object(subjects, source, seed, settings)["train"]
+    return as_causes(drawing.of_split("train", train), (source, seed))[0]
+
+
 @dataclass
 class _Drawing:
     source: str
@@ -84,6 +106,7 @@ class _Drawing:
     settings: CauseSettings
     measuring: Measuring
     tally: Tally = field(default_factory=Tally)
+    part: tuple = ()  # more axes of the draws
 
     def of_split(self, split: str, subjects: list[Subject]) -> list[dict[str, Any]]:
         """Return the rows of one split; its candidates show its objects in turn."""
@@ -111,7 +134,7 @@ class _Drawing:
 
     def _try(self, split: str, number: int, subject: Subject, quotas: Quotas) -> tuple[dict[str, Any] | None, Group]:
         """Return the row of a candidate and its group; no row where it is refused, as soon as it cannot be wanted."""
-        axes = (self.source, self.seed, "causes", split, number)
+        axes = (self.source, self.seed, "causes", *self.part, split, number)
         random = generator(*axes)
         applied = draw_applied(self.settings, random)
         if not quotas.wants_applied(applied):

@@ -100,5 +100,6 @@ def as_causes(records: list[dict[str, Any]], axes: Axes) -> tuple[Causes, np.nda
         [record | {"concept": concept} for record, concept in zip(records, concept_S, strict=True)], axes
     )
     columns = {name: np.array([record[name] for record in records]) for name in COLUMNS}
-    again = joined([record["again"] for record in records if "again" in record])
+    tested = [record["again"] for record in records if "again" in record]
+    again = joined(tested) if tested else truth.subset(np.array([], int))
     return Causes(registrations, **columns, truth=truth, truth_again=again), icp_seconds_S

@@ -26,6 +26,8 @@ MODULES = {  # of steps whose module is not gpca.steps.<name>
     "frame_labels": IN + "frame_labels.step",
     "gradients": IN + "gradients.step",
     "kernel_grid": IN + "kernel_grid.step",
+    "learning_curve": IN + "learning_curve.step",
+    "learning_samples": IN + "learning_curve.samples_step",
     "new_concepts": IN + "new_concepts.step",
     "shift": IN + "out_of_distribution.shift_step",
     "learners": IN + "out_of_distribution.learners",
@@ -45,6 +47,7 @@ LISTS = {  # which names of a step are lists, and not of one seed, file or name
     "frame_labels": "backbones embeddings strategies out",
     "gradients": "seeds registrations encoders embeddings deletions maps tcav",
     "kernel_grid": "seeds registrations embeddings out",
+    "learning_curve": "samples",
     "new_concepts": "encoders encoders_of strategies out",
     "shift": "seeds registrations other_registrations embeddings encoders out",
     "learners": "seeds learners sets out",
@@ -61,7 +64,7 @@ NUMBERS = {"seed", "seeds", "files_seed", "surface_points", "threads"}
 TEXTS = {
     *("source", "explainer", "control", "design", "reduction", "group", "title", "name", "files_of", "encoder_of"),
     *("registrations_of", "retrained", "others", "strategies", "concepts", "estimators", "backbones", "learners"),
-    *("remedies", "methods", "encoders_of", "data_dir"),
+    *("remedies", "methods", "encoders_of", "data_dir", "chunk"),
 }
 SWITCHES = {"stand_in"}
 CODE = "import sys; from tests.steps.by_words import main; sys.exit(main(sys.argv[1:]))"

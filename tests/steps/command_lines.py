@@ -24,6 +24,12 @@ SHIFT = {
     "samples": 6, "severities": {"noise": [0.03, 0.05], "crop": [0.6, 0.7]}, "held_out_share": 0.5, "train": 9,
     "encoder": {"epochs": 1, "draws": 1}, "neighbours": 3, "shape_points": 16,
 }  # fmt: skip
+CURVE = {
+    "further": 12,
+    "sizes": [20],
+    "orders": 1,
+    "classifier": {"learning_rate": 0.1, "iterations": 5, "inducing": 6, "draws": 20},
+}
 CAUSES = {  # of two symmetric objects with few points: only pose errors make them fail
     "train": 12, "test": 6, "points": [64, 128], "limits": {"nominal": 0.05, "failed": 0.06},
     "shares": {"nominal": 0.5, "borderline": 0.1, "noise": 0, "pose": 0.4, "overlap": 0}, "several": [0, 0],
@@ -72,6 +78,14 @@ STEP_OPTIONS = {
         "--remedies": {"starts": 1, "restarts": 2, "icp_points": 64},
         "--causes": "causes.npz", "--read": "descriptors.npz", "--read-timings": "descriptors.csv",
         "--predictions": "diagnosis.csv", "--timings": "diagnosis_timings.csv",
+    },
+    "learning_samples": COMMON | {
+        "--settings": {"learning_curve": CURVE, "causes": CAUSES, "icp": {"max_iterations": 30}}, "--seed": 0,
+        "--chunk": 0, "--objects": "objects.npz", "--samples": "learning_samples.npz",
+    },
+    "learning_curve": COMMON | {
+        "--settings": {"learning_curve": CURVE}, "--seed": 0, "--causes": "causes.npz",
+        "--descriptors": "descriptors.npz", "--samples": "learning_samples.npz", "--out": "learning_curve.csv",
     },
     "register_methods": COMMON | {
         "--settings": {

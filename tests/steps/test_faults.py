@@ -97,6 +97,19 @@ FAULTS = {
         (arrays_changed("descriptors.npz", motion=nan), {}, "array 'motion' contains NaN"),
         (untouched, {"--explainer": "gpca", "--read": "descriptors.npz"}, "descriptors.npz: array 'h' is missing"),
     ],
+    "learning_samples": [
+        (removed("objects.npz"), {}, "objects.npz: no such file"),
+        (one_object, {}, "causes of tiny: has objects of one family alone, which cannot be split"),
+    ],
+    "learning_curve": [
+        (arrays_changed("descriptors.npz", motion=nan), {}, "array 'motion' contains NaN"),
+        (untouched, {"--samples": "causes.npz"}, "causes.npz: array 'distances' is missing"),
+        (
+            untouched,
+            section("learning_curve", "learning_curve", sizes=[900]),
+            "training samples are fewer than the largest size, 900",
+        ),
+    ],
     "register_methods": [
         (removed("registrations.npz"), {}, "registrations.npz: no such file"),
         (arrays_changed("registrations.npz", points=nan), {}, "array 'points' contains NaN"),

@@ -1,0 +1,1 @@
+"""How the diagnosis of causes grows with the number of training samples."""
