@@ -58,7 +58,7 @@ def test_every_entry_can_be_headed_and_fed():
 def test_every_entry_says_what_it_sees(kind):
     for name, entry in explainers(kind).items():
         assert entry.sight, name
-        assert ("source" in entry.sees) == (entry.reads == "embeddings"), name
+        assert "source" in entry.sees or entry.reads != "embeddings", name
         assert ("truth" in entry.sees) == entry.oracle, name
         if kind == CONCEPTS_KIND:  # what runs ICP again reads the outcomes, and reads them for that alone
             assert bool({"runs", "remedies"} & set(entry.sees)) == bool(entry.design), name

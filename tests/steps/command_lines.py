@@ -73,6 +73,14 @@ STEP_OPTIONS = {
         "--weights": "cause_weights.pt", "--curve": "cause_curve.csv", "--embeddings": "cause_embeddings.npz",
         "--timings": "cause_embeddings.csv",
     },
+    "diagnose_by_features": COMMON | {
+        "--settings": {
+            "by_features": {"trees_on_pair": {"trees": 5}, "trees_on_runs": {"trees": 5}},
+            "descriptors": {"starts": 1, "restarts": 2, "icp_points": 64},
+        },
+        "--seeds": 0, "--causes": "causes.npz", "--descriptors": "descriptors.npz",
+        "--predictions": ["by/trees_on_pair/seed0.csv", "by/trees_on_runs/seed0.csv"],
+    },
     "diagnose": COMMON | {
         "--settings": {"iterations": 5, "inducing": 6, "draws": 20}, "--explainer": "gpca_pair", "--seeds": 0,
         "--remedies": {"starts": 1, "restarts": 2, "icp_points": 64},

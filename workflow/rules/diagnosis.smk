@@ -51,3 +51,36 @@ rule diagnose:
         seeds=SEEDS,
     script:
         "../scripts/step.py"
+
+
+# Learners that see more and more parts of a pair, all of a source in one job.
+rule diagnose_by_features:
+    input:
+        causes=collect("<results>/causes/{{source}}/seed{seed}.npz", seed=SEEDS),
+        descriptors=collect(
+            "<results>/descriptors/{{source}}/seed{seed}.npz", seed=SEEDS
+        ),
+        code=code_files(
+            "gpca.experiments.diagnosis.by_features",
+            *(explainer_module(name, CAUSES) for name in DIAGNOSIS["by_features"]),
+        ),
+    output:
+        predictions=collect(
+            "<results>/feature_diagnoses/{{source}}/{feature_explainer}/seed{seed}.csv",
+            feature_explainer=DIAGNOSIS["by_features"],
+            seed=SEEDS,
+        ),
+    log:
+        "<logs>/feature_diagnoses/{source}.log",
+    benchmark:
+        "<benchmarks>/feature_diagnoses/{source}.tsv"
+    conda:
+        "../envs/gpca.yaml"
+    params:
+        step="gpca.experiments.diagnosis.by_features",
+        settings=as_json(
+            {name: DIAGNOSIS[name] for name in ("by_features", "descriptors")}
+        ),
+        seeds=SEEDS,
+    script:
+        "../scripts/step.py"

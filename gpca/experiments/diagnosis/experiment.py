@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 from gpca.encoders.registry import require_backbone
 from gpca.encoders.settings import NamedEncoder, require_draws
-from gpca.errors import with_key
+from gpca.errors import InputError, with_key
 from gpca.experiments.experiment import ByName, Experiment, LeftOut, Names, Tidy
 from gpca.explainers.registry import CAUSES, explainer_entry, explainers, require_settings
 from gpca.explainers.sight import icp_calls
@@ -23,6 +23,7 @@ class Section:
     descriptors: Annotated[dict, part_of(DescriptorSettings)]
     encoder: NamedEncoder
     explainers: ByName
+    by_features: ByName
 
 
 def check(config: dict, _left_out: LeftOut) -> None:
@@ -30,40 +31,57 @@ def check(config: dict, _left_out: LeftOut) -> None:
     encoder = config["diagnosis"]["encoder"]
     with_key("diagnosis.encoder.backbone", require_backbone, encoder["backbone"])
     require_draws("diagnosis.encoder", encoder, config["causes"]["points"][1], "causes.points")
-    for name, settings in config["diagnosis"]["explainers"].items():
-        with_key(f"diagnosis.explainers.{name}", require_settings, name, settings or {}, CAUSES)
+    for key in ("explainers", "by_features"):
+        for name, settings in config["diagnosis"][key].items():
+            with_key(f"diagnosis.{key}.{name}", require_settings, name, settings or {}, CAUSES)
+    for name in config["diagnosis"]["by_features"]:
+        if explainer_entry(name, CAUSES).reads != "descriptors":
+            fault = "reads no descriptors, by whose parts the explainers of this table differ"
+            raise InputError(f"config key diagnosis.by_features.{name}", fault, "move it to diagnosis.explainers")
 
 
 def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
-    """Return the explainers of causes."""
-    return {"cause_explainer": list(config["diagnosis"]["explainers"])}
+    """Return the explainers of causes, and those that differ in the parts that they see."""
+    section = config["diagnosis"]
+    return {"cause_explainer": list(section["explainers"]), "feature_explainer": list(section["by_features"])}
 
 
 def shown(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
     """Return the titles of the explainers, and what each sees and costs."""
-    entries = {name: explainer_entry(name, CAUSES) for name in config["diagnosis"]["explainers"]}
     starts, descriptors = config["causes"]["starts"], DescriptorSettings(**config["diagnosis"]["descriptors"])
-    costs = {
-        name: {"sees": entry.sight, "icp_calls": icp_calls(entry.sees, starts, descriptors)}
-        for name, entry in entries.items()
+    titles, costs = {}, {}
+    for key in ("explainers", "by_features"):
+        entries = {name: explainer_entry(name, CAUSES) for name in config["diagnosis"][key]}
+        titles[key] = {name: entry.title for name, entry in entries.items()}
+        costs |= {
+            name: {"sees": entry.sight, "icp_calls": icp_calls(entry.sees, starts, descriptors)}
+            for name, entry in entries.items()
+        }
+    return {
+        "cause_explainers": titles["explainers"],
+        "feature_explainers": titles["by_features"],
+        "cause_costs": costs,
     }
-    return {"cause_explainers": {name: entry.title for name, entry in entries.items()}, "cause_costs": costs}
 
 
 DIAGNOSED = {
     "prediction_files": "diagnoses/{source}/{cause_explainer}/seed{seed}.csv",
     "causes_files": "causes/{source}/seed{seed}.npz",
 }
+BY_FEATURES = DIAGNOSED | {"prediction_files": "feature_diagnoses/{source}/{feature_explainer}/seed{seed}.csv"}
 EXPERIMENT = Experiment(
     name="diagnosis",
     tidy=(
         Tidy("causes.csv", "gpca.experiments.diagnosis.metrics:collect", DIAGNOSED, rule="cause_metrics"),
         Tidy("cause_intervals.csv", "gpca.experiments.diagnosis.metrics:collect_intervals", DIAGNOSED),
+        Tidy("feature_intervals.csv", "gpca.experiments.diagnosis.metrics:collect_intervals", BY_FEATURES),
         Tidy("cause_strata.csv", "gpca.experiments.diagnosis.strata:collect_strata", DIAGNOSED),
     ),
     sections={"diagnosis": Section},
     names=names,
     shown=shown,
     check=check,
-    leavable={"diagnosis.explainers": Names("explainer", lambda: explainers(CAUSES))},
+    leavable={
+        f"diagnosis.{key}": Names("explainer", lambda: explainers(CAUSES)) for key in ("explainers", "by_features")
+    },
 )

@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from gpca.attribution.predictions import read_timings, write_predictions, write_timings
+from gpca.attribution.scores import Attribution
 from gpca.causes.dataset import Causes, labeled
 from gpca.causes.truth import BORDERLINE
 from gpca.errors import InputError
-from gpca.explainers.interface import BARE, ExplainerEntry
+from gpca.explainers.interface import BARE, ConceptExplainer, ExplainerEntry
 from gpca.explainers.registry import CAUSES, explainer_entry
 from gpca.explainers.sight import icp_calls
 from gpca.features.dataset import Descriptors
@@ -34,12 +35,29 @@ def run(job: Job) -> None:
             causes = Causes.load(causes_file, (job.source, seed))
             registrations = with_what_it_reads(labeled(causes), entry, read)
             seconds_S, icp_seconds_S = read_timings(read_timing, registrations)
-            explainer.fit(registrations.subset(training_rows(registrations, causes_file)))
-            attribution = explainer.explain(observed_only(registrations))
-            calls = icp_calls(entry.sees, causes.T_target_source_runs.shape[1], remedies)
-            attribution = replace(attribution, icp_calls_N=np.full(len(registrations), calls))
+            attribution = explained(explainer, entry, registrations, causes, remedies, causes_file)
             write_predictions(predictions, causes.registrations, attribution)
             write_timings(timings, registrations, seconds_S + attribution.seconds_N, icp_seconds_S)
+
+
+def explained(
+    explainer: ConceptExplainer,
+    entry: ExplainerEntry,
+    registrations: Registrations,
+    causes: Causes,
+    remedies: DescriptorSettings,
+    path: Path,
+) -> Attribution:
+    """Let an explainer learn from the training rows and explain all, and count the runs of ICP that it needs.
+
+    Args:
+        registrations: with labels, and with what it reads attached.
+        causes, path: these registrations, and their file.
+        remedies: the settings of the registrations with remedies.
+    """
+    explainer.fit(registrations.subset(training_rows(registrations, path)))
+    calls = icp_calls(entry.sees, causes.T_target_source_runs.shape[1], remedies)
+    return replace(explainer.explain(observed_only(registrations)), icp_calls_N=np.full(len(registrations), calls))
 
 
 def training_rows(registrations: Registrations, path: Path) -> np.ndarray:

@@ -3,6 +3,7 @@ import pandas as pd
 import pytest
 
 from gpca.errors import InputError
+from gpca.experiments.diagnosis.feature_tables import table9_features
 from gpca.experiments.diagnosis.judged import CEILING, POOLED
 from gpca.experiments.diagnosis.metrics import COLUMNS
 from gpca.experiments.diagnosis.tables import table9_causes
@@ -70,6 +71,16 @@ def test_the_bounds_in_the_csv_are_those_of_the_bootstrap(intervals):
     table = table9_causes(intervals, SOURCES, EXPLAINERS, COSTS)
     [record] = [r for r in table.records() if (*r[:2], r[3]) == ("ycb", "good", "balanced_accuracy")]
     assert record[4:7] == pytest.approx((80, 70, 85))
+
+
+def test_what_is_read_is_shown_with_its_price(intervals):
+    table = table9_features(intervals, SOURCES, EXPLAINERS, COSTS)
+    text = table.markdown()
+    assert text.index("All together") < text.index("YCB (procedural")
+    assert "| All together | Poor | 56 | 30.0 (20.0 to 35.0) | – | 60.0 (50.0 to 65.0) | 20.0 (15.0 to 30.0) |" in text
+    assert "Truth" not in text
+    with pytest.raises(InputError, match="has nothing to show"):
+        table9_features(intervals[intervals["method"] == "other"], SOURCES, EXPLAINERS, COSTS)
 
 
 def test_intervals_of_other_explainers_make_no_table(intervals):
