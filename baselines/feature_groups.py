@@ -6,8 +6,11 @@ runs of ICP with the default settings, so that these two compare at the same pri
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from baselines.descriptor_gpca import CausePairGPCA
 from baselines.descriptors import ALL, CLOUDS, WITH_RUNS, DescriptorClassifier, entry, randomized_trees
+from gpca.explainers.interface import ConceptExplainer
 from gpca.explainers.sight import Sees, in_words
 from gpca.settings import Count
 
@@ -26,7 +29,8 @@ def trees(sees: Sees, source: str, seed: int, trees: Count = 300, smallest_leaf:
     return DescriptorClassifier(randomized_trees(source, seed, trees, smallest_leaf), sees)
 
 
-LEARNERS = {"trees": ("Forest", trees), "gpca": ("GP-CA's classifier", CausePairGPCA)}
+Make = Callable[..., ConceptExplainer]
+LEARNERS: dict[str, tuple[str, Make]] = {"trees": ("Forest", trees), "gpca": ("GP-CA's classifier", CausePairGPCA)}
 CAUSE_EXPLAINERS = {
     f"{name}_on_{level}": entry(f"{title} on {in_words(sees)}", make, sees)
     for name, (title, make) in LEARNERS.items()

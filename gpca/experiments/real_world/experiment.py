@@ -12,7 +12,7 @@ from gpca.experiments.experiment import EXPLAINERS, Experiment, LeftOut, Names, 
 from gpca.experiments.explained import titles
 from gpca.experiments.real_world.settings import RealWorldSettings
 from gpca.experiments.real_world.tables import CLASSIC, encoder_title
-from gpca.explainers.registry import require_settings
+from gpca.explainers.registry import explainer_entry, require_settings
 from gpca.frames.source import ONE_ENCODER, REAL_WORLD, conditions_of, has_estimates, resolve_datasets
 from gpca.objects import procedural
 from gpca.objects.title import title_of
@@ -103,12 +103,19 @@ def shown(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
         "frame_conditions": {name: POSES.get(entry.get("form", ""), GLOBAL_POSE) for name, entry in poses.items()},
         "frame_methods": reduced_backbones(frames),
         "frame_explainers": titles(frames["explainers"]),
+        "frame_sees": {name: explainer_entry(explainer).sight for name, explainer in _behind(frames).items()},
         "frame_encoders": {name: encoder_title(name, "none") for name in frames["backbones"]},
         "unreduced_methods": unreduced_methods(frames),
         "backbones": {name: config["encoders"][name] for name in frames["backbones"]},
         "shown_backbones": [f"{backbone}-{first_reduction}" for backbone in frames["backbones"]],
         "backbone_reductions": list(frames["reductions"]),
     }
+
+
+def _behind(frames: Mapping) -> dict[str, str]:
+    """Return the explainer behind each method: itself, or GP-CA for a ``{backbone}-{reduction}``."""
+    own = {name: name for name in (*CLASSIC, *frames["explainers"])}
+    return dict.fromkeys(reduced_backbones(frames), "gpca") | own
 
 
 def _title(config: Mapping[str, Any]) -> str:

@@ -27,6 +27,7 @@ CLASSIC = {
     "analytical_gpc": "Classic features",
     "analytical_gpc_no_counts": "Classic features without point counts",
 }
+NOT_SHARES = ("ece", "nll", "icp_calls")  # of which there is one number for all samples
 EVERYTHING_SEEN = {TOGETHER: "All (%)", SEEN: "Seen objects (%)", UNSEEN: "Unseen objects (%)"}
 
 
@@ -152,6 +153,7 @@ def table6_seen_unseen(
     conditions: Mapping[str, str],
     backbones: Sequence[str],
     explainers: Mapping[str, str],
+    sees: Mapping[str, str],
     rendered: bool = False,
 ) -> Table:
     """Return the accuracy on depth frames, for seen and unseen objects and by dataset, under every condition.
@@ -160,19 +162,23 @@ def table6_seen_unseen(
         metrics: The tidy metrics (:func:`gpca.experiments.real_world.metrics.collect`).
         conditions: Source of each condition -> its title, in order.
         backbones: The names of the methods ``{backbone}-{reduction}``, in order.
+        sees: What each method sees, in words.
         rendered: Whether the encoders learned from frames rendered of the models first.
     """
     titles = {name: encoder_title(*name.split("-")) for name in backbones} | CLASSIC | dict(explainers)
     datasets = sorted({name for name in metrics["table"] if name.startswith(DATASET)})
-    table = TableBuilder("table6_seen_unseen", {"condition": "Initial poses", "method": "Method"})
+    heads = {"condition": "Initial poses", "method": "Method", "reads": "Reads"}
+    table = TableBuilder("table6_seen_unseen", heads)
     for (source, method), labels in crossed(conditions, titles):
-        table.add_row(labels, _cells_by_objects(rows_where(metrics, source=source, method=method), datasets))
+        cells = _cells_by_objects(rows_where(metrics, source=source, method=method), datasets)
+        table.add_row([*labels, (sees[method], sees[method])], cells)
     table.compare_down(EVERYTHING_SEEN, same=1)
     columns = {name: Column(head) for name, head in EVERYTHING_SEEN.items()}
     titles_of = {name: dataset_in_words(name.removeprefix(DATASET)) for name in datasets}
     columns |= {name: Column(f"{words} (%)", interval=False) for name, words in titles_of.items()}
     columns |= {"ece": Column("ECE, all (share)", decimals=2, interval=False, limits=(0.0, 1.0))}
     columns |= {"nll": Column("NLL, all (nats)", decimals=2, interval=False, limits=(0.0, inf))}
+    columns |= {"icp_calls": Column("ICP calls", decimals=0, interval=False, limits=(0.0, inf))}
     seeds = table.most_seeds()
     pretrained = "The pretraining renders the models of both. " if rendered else ""
     first = rows_where(metrics, source=next(iter(conditions)), metric="test_samples", concept=ALL)
@@ -188,7 +194,8 @@ def table6_seen_unseen(
             f"No scene is in both training and test. Seen objects ({shares[0]} of the test samples) are shown in a "
             f"scene of the training too, unseen ones ({shares[1]}) are not. {pretrained}Instances take turns, so that "
             "objects and datasets are as unequally frequent as in the frames.",
-            "ECE: expected calibration error, NLL: mean negative log likelihood, both of all; means over the seeds.",
+            "ECE: expected calibration error, NLL: mean negative log likelihood, both of all; means over the seeds. "
+            "Reads: what a method sees of a registration. ICP calls: runs beyond the one that it explains.",
         ),
     )
 
@@ -196,7 +203,7 @@ def table6_seen_unseen(
 def _cells_by_objects(of_method: pd.DataFrame, datasets: Sequence[str]) -> dict[str, Cell | None]:
     cells = {name: _cell(rows_where(of_method, table=name), "accuracy") for name in (*EVERYTHING_SEEN, *datasets)}
     together = rows_where(of_method, table=TOGETHER)
-    return cells | {metric: _cell(together, metric, scale=1) for metric in ("ece", "nll")}
+    return cells | {metric: _cell(together, metric, scale=1) for metric in NOT_SHARES}
 
 
 def _cell(rows: pd.DataFrame, metric: str, scale: float = 100) -> Cell | None:
@@ -217,7 +224,7 @@ def _counts(table: TableBuilder, columns: Mapping[str, Column], conditions: Mapp
         counts = [
             f"{columns[key].title.removesuffix(' (%)')} {cells[key].test_samples} ({plural(cells[key].seeds, 'seed')})"
             for key in columns
-            if key in cells and key not in ("ece", "nll")
+            if key in cells and key not in NOT_SHARES
         ]
         if counts:
             conditions_of.setdefault(", ".join(counts), []).append(words)

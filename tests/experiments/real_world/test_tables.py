@@ -95,7 +95,9 @@ def seen_metrics(values):
 
 def make_seen(values, **options):
     explainers = {"gpca_pair": "GP-CA on the pair"}
-    return table6_seen_unseen(seen_metrics(values), "frames", CONDITIONS, ["dgcnn-none"], explainers, **options)
+    sees = dict.fromkeys(("dgcnn-none", "analytical_gpc", "analytical_gpc_no_counts"), "aligned source")
+    sees["gpca_pair"] = "pair + motion"
+    return table6_seen_unseen(seen_metrics(values), "frames", CONDITIONS, ["dgcnn-none"], explainers, sees, **options)
 
 
 def test_rows_are_conditions_by_methods_and_columns_what_was_seen():
@@ -109,7 +111,7 @@ def test_rows_are_conditions_by_methods_and_columns_what_was_seen():
         }
     )
     assert [tuple(key for key, _ in row) for row in table.rows] == [
-        ("real_rgbd", "dgcnn-none"), ("real_rgbd_estimated", "gpca_pair"),
+        ("real_rgbd", "dgcnn-none", "aligned source"), ("real_rgbd_estimated", "gpca_pair", "pair + motion"),
     ]  # fmt: skip
     assert table.cells[0, "seen"].mean == pytest.approx(87.5)  # of 60 and 20 samples
     assert table.cells[0, "unseen"].mean == pytest.approx(80 * 8 / 12 + 40 * 4 / 12)
