@@ -49,7 +49,8 @@ def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
 def shown(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
     """Return the titles of the explainers, and what each sees and costs."""
     starts, descriptors = config["causes"]["starts"], DescriptorSettings(**config["diagnosis"]["descriptors"])
-    titles, costs = {}, {}
+    titles: dict[str, dict[str, str]] = {}
+    costs: dict[str, dict[str, Any]] = {}
     for key in ("explainers", "by_features"):
         entries = {name: explainer_entry(name, CAUSES) for name in config["diagnosis"][key]}
         titles[key] = {name: entry.title for name, entry in entries.items()}
