@@ -1,23 +1,25 @@
 """Makes the tables of new concepts where no encoder has seen the samples, or the concept.
 
-The metrics are those of ``active_learning.csv``, with which the others are compared, and of ``new_concepts.csv``. The
+The metrics are those of ``active_learning.csv``, with which the others are compared, of ``new_concepts.csv``, and of
+``metrics.csv``, where what needs no labels stands. The
 ``conditions`` are the sections ``active_learning`` and ``new_concepts`` of the config, with the ``seeds`` that the
 latter was run for, ``test`` of its ``registrations``, and its section ``causes`` as ``of_causes``.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
 from gpca.active_learning.metrics import TABLE
 from gpca.active_learning.settings import ALL_LABELS
+from gpca.attribution.metrics import ALL
 from gpca.causes.quotas import apportion
 from gpca.causes.truth import BORDERLINE, GEOMETRY, NOMINAL
 from gpca.experiments.active_learning.tables import COUNT, Quantity, cell_of
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.tables.builder import TableBuilder, crossed, mean_over, titles_of
-from gpca.reporting.tables.cells import cell_of_repeats, rows_where
+from gpca.reporting.tables.cells import cell_of_repeats, plain_cell, rows_where
 from gpca.reporting.tables.table import Cell, Column, Table
 from gpca.reporting.words import plural
 
@@ -32,6 +34,7 @@ SEEN = {
     "self_supervised": "same samples, no labels",
     "pair": "nothing: measurements of the pair",
 }
+NO_LABELS = {"chance": "no labels: chance", "rule": "no labels: rule of three lines"}  # what needs none
 NEW_CAUSES = (NOMINAL, GEOMETRY)
 PAPERS, WITHIN = "bald_kmeans", 20  # labels that a new concept may cost
 
@@ -59,6 +62,10 @@ def table15_new_concepts(metrics: pd.DataFrame, sources: Mapping[str, Mapping], 
         cells["within"] = _within(of_concepts, test)
         cells |= {key: cell_of(of_row, quantity, tests[str(quantity.concept)]) for key, quantity in of_causes.items()}
         table.add_row(row_labels, cells, rival=setting != "pretrained")
+    for (source, explainer), row_labels in crossed(titles_of(sources), NO_LABELS):
+        of_row = rows_where(metrics, source=source, table="attribution", method=explainer, concept=ALL)
+        cells = _without_labels(of_row, labels, conditions)
+        table.add_row(row_labels, cells, rival=False)
     table.compare_down([*labels, "within", *NEW_CAUSES], same=1)
     columns = {key: quantity.column for key, quantity in labels.items()} | {"within": within}
     columns |= {key: quantity.column for key, quantity in (accuracies | of_causes).items()}
@@ -74,6 +81,7 @@ def table15_new_concepts(metrics: pd.DataFrame, sources: Mapping[str, Mapping], 
             "Labels: by BALD with k-means, for each concept as the new one, and by random choice, mean over the three. "
             f"Within {WITHIN} labels: share of the runs that reached the target with so few. Pool labeled: accuracy "
             "when the whole pool is labeled, mean over the three.",
+            "No labels: the accuracy that needs none, and 0 labels where it reaches the target.",
             "Nominal, Geometry: the new concept in registrations with measured causes, of objects that no method saw; "
             "accuracy over all causes after all queries by BALD, and with the whole pool labeled. No encoder saw "
             f"Geometry. Test samples of a seed: {tests[NOMINAL]}, with Geometry up to {tests[GEOMETRY]}, if any of its "
@@ -144,6 +152,22 @@ def _within(metrics: pd.DataFrame, test: int) -> Cell | None:
     done = (wide["labels_to_target"] <= WITHIN) & (wide["reached"] == 1)
     shares = 100 * done.groupby(level="seed").mean()
     return cell_of_repeats(shares, test * len(shares))
+
+
+def _without_labels(metrics: pd.DataFrame, labels: Iterable[str], conditions: Mapping) -> dict[str, Cell | None]:
+    """Return the accuracy of what needs no labels as that of the whole pool, and where it is enough, that it has none.
+
+    Args:
+        metrics: those of one source and explainer.
+        labels: the columns of numbers of labels.
+    """
+    accuracy_R = rows_where(metrics, metric="accuracy")["value"].to_numpy()
+    cells: dict[str, Cell | None] = {
+        "all_labels": cell_of_repeats(100 * accuracy_R, conditions["test"] * len(accuracy_R))
+    }
+    if len(accuracy_R) and accuracy_R.mean() >= conditions["target"]:
+        cells |= {key: plain_cell(0, len(accuracy_R), conditions["test"] * len(accuracy_R)) for key in labels}
+    return cells
 
 
 def _protocol(conditions: Mapping) -> str:

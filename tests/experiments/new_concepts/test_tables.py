@@ -44,6 +44,22 @@ def test_labels_are_counted_by_concept_and_all_within_a_limit(metrics):
     assert "(procedural stand-in)" in markdown
 
 
+def test_what_needs_no_labels_stands_below_the_encoders(metrics):
+    known = [
+        ("attribution", "ycb", name, metric, "all", seed, value)
+        for name, accuracy in (("rule", 1.0), ("chance", 0.34), ("gpca", 0.99))
+        for seed in (0, 1, 2)
+        for metric, value in (("accuracy", accuracy), ("test_samples", 200))
+    ]
+    both = pd.concat([metrics, pd.DataFrame(known, columns=list(TIDY_COLUMNS))])
+    table = table15_new_concepts(both, SOURCES, CONDITIONS)
+    found = {record[1:3]: record[3] for record in table.records()}
+    assert (found["rule", "labels_noise"], found["rule", "labels_random"], found["rule", "all_labels"]) == (0, 0, 100)
+    assert found["chance", "all_labels"] == 34 and ("chance", "labels_noise") not in found
+    assert [labels[1][0] for labels in table.rows][-2:] == ["chance", "rule"]
+    assert table15_new_concepts(metrics, SOURCES, CONDITIONS).best() == table.best()
+
+
 def test_rows_are_of_the_seeds_of_the_new_concepts(metrics):
     records = table15_new_concepts(metrics, SOURCES, CONDITIONS).records()
     assert [record[3] for record in records if record[1:3] == ("pretrained", "labels_pose")] == [4]
