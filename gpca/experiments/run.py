@@ -70,7 +70,7 @@ def settings_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, An
 
 def explainer_of(method: str, names: Mapping[str, Any]) -> str:
     """Return the explainer behind a row of predictions: itself, or GP-CA for a ``{backbone}-{reduction}``."""
-    return "gpca" if method in names["backbone"] else method
+    return "gpca" if method in (*names["backbone"], *names["rendered"]) else method
 
 
 def files_behind(method: str, names: Mapping[str, Any]) -> dict[str, str]:
@@ -79,7 +79,8 @@ def files_behind(method: str, names: Mapping[str, Any]) -> dict[str, str]:
     ``input_timings`` are the seconds that were spent before it starts.
     """
     entry = explainer_entry(explainer_of(method, names))
-    encoder, reduction = method.split("-") if method in names["backbone"] else names["embedding"].split("/")
+    of_frames = method in (*names["backbone"], *names["rendered"])
+    encoder, reduction = method.split("-") if of_frames else names["embedding"].split("/")
     if entry.reads == "embeddings":
         return {
             "input_timings": f"timings/{{source}}/{encoder}/seed{{seed}}.csv",

@@ -9,11 +9,19 @@ import numpy as np
 
 from gpca.errors import InputError
 from gpca.frames.camera import MeshScene
-from gpca.frames.reading import CenteredModel, Dataset, distinct_surfaces, read_models, with_shared_models
+from gpca.frames.reading import (
+    CenteredModel,
+    Dataset,
+    distinct_surfaces,
+    models_of_ids,
+    read_models,
+    shape_of,
+    with_shared_models,
+)
 from gpca.frames.source import frame_files, patterns, resolve_datasets
 from gpca.objects.canonical import ObjectClouds
 from gpca.objects.source import folders
-from gpca.objects.splits import EVALUATION, read_scene_splits
+from gpca.objects.splits import EVALUATION, TRAINING, read_scene_splits
 from gpca.objects.surface import Surface
 from gpca.process.environment import require_open3d
 
@@ -56,6 +64,23 @@ def datasets_of(
 def models_of(datasets: Mapping[str, Dataset]) -> dict[str, dict[int, CenteredModel]]:
     """Return the models of the objects that each dataset's frames show; those that datasets share bear one name."""
     return with_shared_models({name: read_models(dataset, dataset.frames()) for name, dataset in datasets.items()})
+
+
+def untested_surfaces(datasets: Mapping[str, Dataset]) -> list[Surface]:
+    """Return the models of the objects that no frame shows that may be tested, those that datasets share once."""
+    models = with_shared_models({name: models_of_ids(dataset) for name, dataset in datasets.items()})
+    tested = {
+        shape_of(models[name][annotation.object_id])
+        for name, dataset in datasets.items()
+        for frame in dataset.frames()
+        for annotation in frame.annotations
+        if dataset.fold(frame.scene) != TRAINING and annotation.object_id in models[name]
+    }
+    untested = {
+        name: {number: model for number, model in of_dataset.items() if shape_of(model) not in tested}
+        for name, of_dataset in models.items()
+    }
+    return distinct_surfaces(untested)
 
 
 def files_behind(datasets: Mapping[str, dict] | None, data_dir: str | None, scenes: Path | None) -> list[Path]:

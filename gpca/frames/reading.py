@@ -51,10 +51,20 @@ def read_models(dataset: Dataset, frames: Iterable[Frame]) -> dict[int, Centered
         raise InputError(
             dataset.name, "its scene_gt.json files list no object in any frame", "check split, or fetch it again"
         )
+    return models_of_ids(dataset, ids)
+
+
+def models_of_ids(dataset: Dataset, ids: Iterable[int] | None = None) -> dict[int, CenteredModel]:
+    """Return the models of these objects of a dataset by id, of all that it lists where none are named.
+
+    Raises:
+        InputError: as :func:`read_models`.
+    """
     folder = dataset.models_folder()
+    info = bop.read_models_info(folder / "models_info.json")
+    ids = sorted(info if ids is None else ids)
     if unknown := [number for number in ids if not (folder / f"obj_{number:06d}.ply").is_file()]:
         raise InputError(f"{dataset.name}: object {unknown[0]}", f"has no model in {folder}", "fetch the models again")
-    info = bop.read_models_info(folder / "models_info.json")
     models = {}
     for number, surface in zip(ids, bop.surfaces(folder, dataset.unit, ids), strict=True):
         T_model_object = np.eye(4)
@@ -75,18 +85,19 @@ def with_shared_models(models_of: Mapping[str, dict[int, CenteredModel]]) -> dic
     for name, models in models_of.items():
         shared[name] = {}
         for number, model in models.items():
-            known = first.setdefault(_shape(model), model.surface.name)
+            known = first.setdefault(shape_of(model), model.surface.name)
             shared[name][number] = replace(model, surface=replace(model.surface, name=known))
     return shared
 
 
 def distinct_surfaces(models_of: Mapping[str, dict[int, CenteredModel]]) -> list[Surface]:
     """Return the surfaces of all datasets' models, those that datasets share once."""
-    of = {(model.surface.name, _shape(model)): model.surface for each in models_of.values() for model in each.values()}
-    return list(of.values())
+    models = [model for of_dataset in models_of.values() for model in of_dataset.values()]
+    return list({(model.surface.name, shape_of(model)): model.surface for model in models}.values())
 
 
-def _shape(model: CenteredModel) -> bytes:
+def shape_of(model: CenteredModel) -> bytes:
+    """Return what tells whether two models are the same."""
     return np.asarray(model.surface.vertices_m).tobytes()
 
 

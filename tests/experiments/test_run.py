@@ -113,12 +113,16 @@ def test_a_stand_in_says_so_wherever_its_title_stands(stand_ins):
         ({"pretraining": None}, ""),
         ({}, "whole objects"),
         (
-            {"virtual": {"count": 2, "views": 1, "train": 9}},
+            {"virtual": {"objects": "all", "count": 2, "views": 1, "train": 9}},
             "whole objects and on frames rendered of the models of all objects",
+        ),
+        (
+            {"virtual": {"objects": "training", "count": 2, "views": 1, "train": 9}},
+            "whole objects and on frames rendered of models of objects that no tested frame shows",
         ),
     ],
 )
 def test_tables_tell_what_encoders_of_frames_were_pretrained_on(stand_ins, sources, changes, told):
     settings = settings_of(stand_ins | {"real_world": stand_ins["real_world"] | changes}, sources)
     assert settings["frames_pretrained_on"] == told
-    assert settings["frames_rendered"] == ("virtual" in changes)
+    assert settings["frames_rendered"] == ("of all objects" in told)

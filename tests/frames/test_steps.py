@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 import trimesh
 
+from gpca.frames.dataset import Dataset
 from gpca.frames.instances import Instances
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations
@@ -82,6 +83,31 @@ def test_scenes_are_drawn_of_the_models_of_datasets(scenes, tmp_path):
     )
     told = json.loads((tmp_path / "drawn/dataset_info.json").read_text())
     assert (told["title"], told["families"]) == ("virtual", [])
+
+
+def test_objects_that_are_tested_are_rendered_only_if_that_is_asked(scenes, tmp_path, capsys):
+    shutil.copytree(scenes, tmp_path / "set")
+    dataset = Dataset("set", (tmp_path / "set",), most_frames=None)
+    tested = min(frame.scene for frame in dataset.frames())
+    for path in (tmp_path / "set/test").glob("*/scene_gt.json"):  # of the tested scene, all but one annotation goes
+        if int(path.parent.name) == tested:
+            path.write_text(json.dumps({image: of[:1] for image, of in json.loads(path.read_text()).items()}))
+    ids = {annotation.object_id for f in dataset.frames() if f.scene == tested for annotation in f.annotations}
+    splits = tmp_path / "scenes.csv"
+    roles = {frame.scene: "evaluation" if frame.scene == tested else "development" for frame in dataset.frames()}
+    splits.write_text("dataset,scene,role,fold\n" + "".join(f"set,{n},{role},0\n" for n, role in roles.items()))
+    camera = {"width": 64, "height": 48, "focal_px": 60}
+    of_set = {"datasets": {"set": {"location": str(tmp_path / "set")}}, "rendered": "training"}
+    given = settings(count=2, views=1, objects=[2, 2], camera=camera, **of_set)
+    words = ["scenes", "--source", "virtual", "--settings", given, "--out", str(tmp_path / "drawn")]
+    assert main([*words, "--splits", str(splits)]) == 0
+    listed = json.loads((scenes / "models/models_info.json").read_text())
+    drawn = json.loads((tmp_path / "drawn/models/models_info.json").read_text())
+    untested_mm = [model["diameter"] for number, model in listed.items() if int(number) not in ids]
+    assert sorted(model["diameter"] for model in drawn.values()) == pytest.approx(sorted(untested_mm), rel=0.01)
+    shutil.rmtree(tmp_path / "drawn")
+    assert main(words) == 2  # without splits every scene may be tested
+    assert "no model of an object that is not tested can be rendered on a table" in capsys.readouterr().err
 
 
 def test_models_that_cannot_stand_on_a_table_are_skipped(scenes, tmp_path, capsys):

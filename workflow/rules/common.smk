@@ -10,6 +10,7 @@ from gpca.encoders.registry import ENCODERS
 from gpca.objects.procedural import FAMILIES
 from gpca.objects.source import find_file
 from gpca.experiments.run import names_of, settings_of
+from gpca.frames.source import RENDERED
 
 # An own kind of source is a file in sources/ that writes <results>/objects/<name>.npz and adds itself to SOURCES.
 CONFIGURED_SOURCES = list(SOURCES)
@@ -29,10 +30,17 @@ REDUCTIONS = [name for name in config["reductions"] if name != "none"]
 wildcard_constraints:
     source="|".join([*SOURCES, FRAMES, *NAMES["condition"]]),
     seed=r"\d+",
-    backbone="|".join(config["encoders"]),
+    backbone="|".join(
+        [*config["encoders"], *(name.split("-")[0] for name in NAMES["rendered"])]
+    ),
     reduction="|".join(REDUCTIONS),
     explainer="|".join(
-        [*config["explainers"], *NAMES["frame_explainer"], *NAMES["backbone"]]
+        [
+            *config["explainers"],
+            *NAMES["frame_explainer"],
+            *NAMES["backbone"],
+            *NAMES["rendered"],
+        ]
     ),
     cause_explainer="|".join(config["diagnosis"]["explainers"]),
     design="|".join(config["uncertainty"]),
@@ -61,7 +69,7 @@ def as_json(section):
 
 
 def encoder_module(encoder):
-    return backbone_module(config["encoders"][encoder])
+    return backbone_module(config["encoders"][encoder.removesuffix(RENDERED)])
 
 
 def backbone_module(settings):

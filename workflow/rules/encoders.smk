@@ -57,7 +57,7 @@ rule train_encoder:
 
 rule pretrain_encoder:
     input:
-        registrations=PRETRAINED_ON,
+        registrations=lambda wildcards: pretrained_on(wildcards.backbone)[1],
         code=encoder_code("train"),
     output:
         weights="<results>/encoders/pretrained/{backbone}.pt",
@@ -79,7 +79,7 @@ rule pretrain_encoder:
             wildcards, REAL_WORLD["pretraining"]
         ),
         seed=SEEDS[0],
-        registrations_of=PRETRAINING_SOURCES,
+        registrations_of=lambda wildcards: pretrained_on(wildcards.backbone)[0],
     script:
         "../scripts/step.py"
 
@@ -109,7 +109,7 @@ rule train_on_frames:
     params:
         step="gpca.steps.train",
         settings=lambda wildcards: encoder_settings(
-            wildcards, (REAL_WORLD["training"] or {}).get(wildcards.backbone)
+            wildcards, (REAL_WORLD["training"] or {}).get(unrendered(wildcards))
         ),
         source=FRAMES,
     script:

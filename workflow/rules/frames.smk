@@ -17,7 +17,12 @@ DATA_FOLDERS = (
 )
 # What is asked about frames: source -> methods.
 ASKED = {
-    FRAMES: [*NAMES["backbone"], *NAMES["classic"], *NAMES["frame_explainer"]],
+    FRAMES: [
+        *NAMES["backbone"],
+        *NAMES["rendered"],
+        *NAMES["classic"],
+        *NAMES["frame_explainer"],
+    ],
     **{
         condition: [*NAMES["condition_backbone"], *NAMES["frame_explainer"]]
         for condition in NAMES["condition"]

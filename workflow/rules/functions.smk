@@ -4,7 +4,23 @@
 def encoder_settings(wildcards, changes=None):
     """Return an encoder's section of the config, with changes and the ICP that a reading repeats."""
     icp = {"icp": config["registrations"]["icp"]}
-    return as_json(config["encoders"][wildcards.backbone] | (changes or {}) | icp)
+    return as_json(config["encoders"][unrendered(wildcards)] | (changes or {}) | icp)
+
+
+def unrendered(wildcards):
+    """Return the name of an encoder in the config, whatever it was pretrained on."""
+    return wildcards.backbone.removesuffix(RENDERED)
+
+
+def pretrained_on(backbone):
+    """Return the sources that an encoder of frames is pretrained on, and the files of their registrations."""
+    tested = backbone.endswith(RENDERED)
+    virtual = [VIRTUAL_TESTED if tested else VIRTUAL] if REAL_WORLD["virtual"] else []
+    sources = [*SOURCES, *virtual]
+    seed = SEEDS[0]
+    return sources, [
+        f"<results>/registrations/{name}/seed{seed}.npz" for name in sources
+    ]
 
 
 def explainer_settings(wildcards):
@@ -103,7 +119,7 @@ def read_by_frame_input():
     return {
         "registrations": [
             *collect("<results>/registrations/{source}/seed{seed}.npz", **of),
-            *(PRETRAINED_ON if REAL_WORLD["pretraining"] else []),
+            *(pretrained_on(BACKBONE)[1] if REAL_WORLD["pretraining"] else []),
         ],
         "poses": collect("<results>/poses/{source}/seed{seed}.csv", **of),
         "predictions": collect(

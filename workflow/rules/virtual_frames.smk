@@ -1,63 +1,72 @@
 # Frames rendered of the datasets' own models -> registrations that encoders are pretrained on.
-from gpca.frames.source import VIRTUAL
+from gpca.frames.source import RENDERED, VIRTUAL, VIRTUAL_TESTED
 
 SCENES = REAL_WORLD["scenes"]
 TABLES = {name: (REAL_WORLD["virtual"] or SCENES)[name] for name in ("count", "views")}
-PRETRAINING_SOURCES = [*SOURCES, *([VIRTUAL] if REAL_WORLD["virtual"] else [])]
-PRETRAINED_ON = [
-    f"<results>/registrations/{source}/seed{SEEDS[0]}.npz"
-    for source in PRETRAINING_SOURCES
-]
+OBJECTS = {VIRTUAL: (REAL_WORLD["virtual"] or {}).get("objects"), VIRTUAL_TESTED: "all"}
+
+
+wildcard_constraints:
+    virtual="|".join(OBJECTS),
 
 
 use rule render_scenes as render_models with:
     input:
         **FRAMES_FROM,
+        splits=split_file("scenes"),
         code=code_files("gpca.steps.scenes"),
     output:
-        out=directory(f"<results>/scenes/{VIRTUAL}"),
+        out=directory("<results>/scenes/{virtual}"),
     log:
-        f"<logs>/scenes/{VIRTUAL}.log",
+        "<logs>/scenes/{virtual}.log",
     benchmark:
-        f"<benchmarks>/scenes/{VIRTUAL}.tsv"
+        "<benchmarks>/scenes/{virtual}.tsv"
     params:
-        settings=as_json({**SCENES, **TABLES, "datasets": REAL_WORLD["datasets"]}),
-        source=VIRTUAL,
+        settings=lambda wildcards: as_json(
+            {
+                **SCENES,
+                **TABLES,
+                "datasets": REAL_WORLD["datasets"],
+                "role": config["splits"]["role"],
+                "rendered": OBJECTS[wildcards.virtual],
+            }
+        ),
+        source="{virtual}",
         folders=DATA_FOLDERS,
 
 
 use rule instances as virtual_instances with:
     input:
-        scenes=f"<results>/scenes/{VIRTUAL}",
+        scenes="<results>/scenes/{virtual}",
         code=code_files("gpca.steps.instances"),
     output:
-        instances=f"<results>/instances/{VIRTUAL}.npz",
-        objects=f"<results>/objects/{VIRTUAL}.npz",
+        instances="<results>/instances/{virtual}.npz",
+        objects="<results>/objects/{virtual}.npz",
     log:
-        f"<logs>/instances/{VIRTUAL}.log",
+        "<logs>/instances/{virtual}.log",
     benchmark:
-        f"<benchmarks>/instances/{VIRTUAL}.tsv"
+        "<benchmarks>/instances/{virtual}.tsv"
     params:
         settings=as_json({"initial_pose": {"form": "true_pose"}}),
-        source=VIRTUAL,
-        name=VIRTUAL,
+        source="{virtual}",
+        name="{virtual}",
         folders={},
         surface_points=config["objects"]["surface_points"],
 
 
 use rule register_frames as register_virtual_frames with:
     input:
-        instances=f"<results>/instances/{VIRTUAL}.npz",
-        objects=f"<results>/objects/{VIRTUAL}.npz",
+        instances="<results>/instances/{virtual}.npz",
+        objects="<results>/objects/{virtual}.npz",
         code=code_files("gpca.steps.frame_registrations"),
     output:
-        registrations=f"<results>/registrations/{VIRTUAL}/seed{{seed}}.npz",
-        poses=f"<results>/poses/{VIRTUAL}/seed{{seed}}.csv",
-        timings=f"<results>/timings/{VIRTUAL}/icp/seed{{seed}}.csv",
+        registrations="<results>/registrations/{virtual}/seed{seed}.npz",
+        poses="<results>/poses/{virtual}/seed{seed}.csv",
+        timings="<results>/timings/{virtual}/icp/seed{{seed}}.csv",
     log:
-        f"<logs>/registrations/{VIRTUAL}/seed{{seed}}.log",
+        "<logs>/registrations/{virtual}/seed{seed}.log",
     benchmark:
-        f"<benchmarks>/registrations/{VIRTUAL}/seed{{seed}}.tsv"
+        "<benchmarks>/registrations/{virtual}/seed{seed}.tsv"
     params:
         settings=as_json(
             config["registrations"]
@@ -68,5 +77,5 @@ use rule register_frames as register_virtual_frames with:
                 "occluders": REAL_WORLD["occluders"],
             }
         ),
-        source=VIRTUAL,
-        name=VIRTUAL,
+        source="{virtual}",
+        name="{virtual}",

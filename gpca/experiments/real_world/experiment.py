@@ -13,7 +13,7 @@ from gpca.experiments.explained import titles
 from gpca.experiments.real_world.settings import RealWorldSettings
 from gpca.experiments.real_world.tables import CLASSIC, encoder_title
 from gpca.explainers.registry import explainer_entry, require_settings
-from gpca.frames.source import ONE_ENCODER, REAL_WORLD, conditions_of, has_estimates, resolve_datasets
+from gpca.frames.source import ONE_ENCODER, REAL_WORLD, RENDERED, conditions_of, has_estimates, resolve_datasets
 from gpca.objects import procedural
 from gpca.objects.title import title_of
 from gpca.reporting.words import dataset_in_words
@@ -36,6 +36,10 @@ def check(config: dict, left_out: LeftOut) -> None:
         fault = "form 'results' needs a dataset with results or errors"
         raise InputError("config key real_world.initial_pose", fault, "name the files or choose another form")
     _check_training(config)
+    require_names("real_world.rendered", section["rendered"], section["backbones"], "backbone", encoders_left_out)
+    if section["rendered"] and (section["virtual"] or {}).get("objects") != "training":
+        fault = "stands beside encoders that saw no tested object, so it needs real_world.virtual.objects: training"
+        raise InputError("config key real_world.rendered", fault, "set that, or rendered to []")
     key, backbones = "real_world.condition_backbones", section["backbones"]
     require_names(key, section["condition_backbones"], backbones, "backbone", encoders_left_out)
     for name, settings in (section["explainers"] or {}).items():
@@ -78,6 +82,7 @@ def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
         "frames": REAL_WORLD,
         "backbone": backbones,
         "first_backbone": backbones[0],
+        "rendered": rendered_backbones(frames),
         "classic": [name for name in CLASSIC if name in config["explainers"]],
         "frame_explainer": list(frames["explainers"]),
         "compared_backbone": list(frames["backbones"])[1:],
@@ -99,9 +104,10 @@ def shown(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
         "frames": source,
         "frames_title": title_of(source),
         "frames_pretrained_on": _pretrained_on(frames),
-        "frames_rendered": bool(frames["virtual"]),
+        "frames_rendered": (frames["virtual"] or {}).get("objects") == "all",
         "frame_conditions": {name: POSES.get(entry.get("form", ""), GLOBAL_POSE) for name, entry in poses.items()},
-        "frame_methods": reduced_backbones(frames),
+        "frame_methods": [*reduced_backbones(frames), *rendered_backbones(frames)],
+        "rendered": list(frames["rendered"]),
         "frame_explainers": titles(frames["explainers"]),
         "frame_sees": {name: explainer_entry(explainer).sight for name, explainer in _behind(frames).items()},
         "frame_encoders": {name: encoder_title(name, "none") for name in frames["backbones"]},
@@ -115,7 +121,7 @@ def shown(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
 def _behind(frames: Mapping) -> dict[str, str]:
     """Return the explainer behind each method: itself, or GP-CA for a ``{backbone}-{reduction}``."""
     own = {name: name for name in (*CLASSIC, *frames["explainers"])}
-    return dict.fromkeys(reduced_backbones(frames), "gpca") | own
+    return dict.fromkeys([*reduced_backbones(frames), *rendered_backbones(frames)], "gpca") | own
 
 
 def _title(config: Mapping[str, Any]) -> str:
@@ -130,6 +136,11 @@ def reduced_backbones(frames: Mapping) -> list[str]:
     return [f"{backbone}-{reduction}" for backbone in frames["backbones"] for reduction in frames["reductions"]]
 
 
+def rendered_backbones(frames: Mapping) -> list[str]:
+    """Return the rows whose encoders were pretrained on renderings of the tested objects' models."""
+    return [f"{name}{RENDERED}-none" for name in frames["rendered"]]
+
+
 def unreduced_methods(frames: Mapping) -> dict[str, str]:
     """Return the titles of the explainers that read a whole embedding of a frame, or none."""
     backbones = [name for name in reduced_backbones(frames) if name.endswith("-none")]
@@ -140,7 +151,11 @@ def _pretrained_on(frames: Mapping) -> str:
     """Return the data that the encoders of frames are trained on before the frames; empty where there is none."""
     if not frames["pretraining"]:
         return ""
-    return "whole objects" + (" and on frames rendered of the models of all objects" if frames["virtual"] else "")
+    if not frames["virtual"]:
+        return "whole objects"
+    tested = frames["virtual"]["objects"] == "all"
+    of = "the models of all objects" if tested else "models of objects that no tested frame shows"
+    return f"whole objects and on frames rendered of {of}"
 
 
 EXPERIMENT = Experiment(
@@ -154,6 +169,7 @@ EXPERIMENT = Experiment(
     lists={
         "real_world.backbones": "encoders",
         "real_world.condition_backbones": "encoders",
+        "real_world.rendered": "encoders",
         "real_world.training": "encoders",
         "real_world.reductions": "reductions",
     },

@@ -40,8 +40,13 @@ class FrameDataset:
 
 @dataclass(frozen=True)
 class VirtualFrames:
-    """Frames rendered of the datasets' own models: numbers of scenes, of views of each, and of training samples."""
+    """Frames rendered of the datasets' own models: numbers of scenes, of views of each, and of training samples.
 
+    Attributes:
+        objects: ``training``: those that no frame shows which may be tested; ``all``: those of all frames.
+    """
+
+    objects: Literal["training", "all"]
     count: Annotated[int, Bounds(minimum=2)]
     views: Count
     train: TrainSamples
@@ -65,6 +70,7 @@ class RealWorldSettings:
     reductions: Distinct[Literal["none", "pca", "umap", "autoencoder"]]
     pretraining: Pretraining | None
     virtual: VirtualFrames | None
+    rendered: list[str]
     training: dict[str, Training] | None
     explainers: dict[str, dict | None] | None
     one_encoder: bool

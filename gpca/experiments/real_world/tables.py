@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpca.attribution.metrics import ALL
+from gpca.attribution.paired import UNTRAINED
 from gpca.encoders.registry import make_encoder, parameter_count
 from gpca.experiments.real_world.metrics import DATASET, SEEN, TOGETHER, UNSEEN
-from gpca.frames.source import ONE_ENCODER, REAL_WORLD
+from gpca.frames.source import ONE_ENCODER, REAL_WORLD, RENDERED
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.tables.builder import TableBuilder, crossed, interval_over
 from gpca.reporting.tables.cells import cell_of_all_samples, cell_of_repeats, plain_cell, rows_where
@@ -28,12 +29,18 @@ CLASSIC = {
     "analytical_gpc_no_counts": "Classic features without point counts",
 }
 NOT_SHARES = ("ece", "nll", "icp_calls")  # of which there is one number for all samples
+RENDERED_TITLE = ", tested objects rendered"
+RENDERED_NOTE = (
+    "Tested objects rendered: pretrained on frames rendered of the tested objects' own models, which is no row of the "
+    "paper's and is not compared with it."
+)
 EVERYTHING_SEEN = {TOGETHER: "All (%)", SEEN: "Seen objects (%)", UNSEEN: "Unseen objects (%)"}
 
 
 def encoder_title(encoder: str, reduction: str) -> str:
     """Return the name of an encoder and the reduction after it in figures."""
-    named = BACKBONES.get(encoder, encoder)
+    name = encoder.removesuffix(RENDERED)
+    named = BACKBONES.get(name, name) + (RENDERED_TITLE if name != encoder else "")
     return named if reduction == "none" else f"{named}, {REDUCTIONS.get(reduction, reduction)}"
 
 
@@ -43,13 +50,15 @@ def table6_of_encoders(
     encoders: Mapping[str, Mapping],
     reductions: Sequence[str],
     pretrained_on: str = "",
+    rendered: Sequence[str] = (),
+    explainers: Mapping[str, str] | None = None,
 ) -> Table:
     """Return :func:`table6_backbones` with the parameters counted of encoders that are made from their settings."""
     backbones = {
         name: parameter_count(make_encoder(settings["backbone"], settings.get("options", {})))
         for name, settings in encoders.items()
     }
-    return table6_backbones(metrics, title, backbones, reductions, pretrained_on)
+    return table6_backbones(metrics, title, backbones, reductions, pretrained_on, rendered, explainers)
 
 
 def table6_backbones(
@@ -58,6 +67,8 @@ def table6_backbones(
     backbones: Mapping[str, int],
     reductions: Sequence[str],
     pretrained_on: str = "",
+    rendered: Sequence[str] = (),
+    explainers: Mapping[str, str] | None = None,
 ) -> Table:
     """Return the accuracy on depth frames by backbones × reductions, and of the classic features.
 
@@ -68,6 +79,8 @@ def table6_backbones(
             with the first reduction.
         reductions: The names of the reductions, in order.
         pretrained_on: What the encoders learned from before the frames, if anything.
+        rendered: Those that stand here once more, pretrained on frames rendered of the tested objects' models.
+        explainers: The titles of the other explainers on frames, of which those without training stand last.
     """
     together = rows_where(metrics, table=TOGETHER)
     metrics, one_encoder = (rows_where(together, source=source) for source in (REAL_WORLD, ONE_ENCODER))
@@ -80,7 +93,13 @@ def table6_backbones(
             method = f"{backbone}-{reduction}"
             cells = _cells(metrics, method, reference_R, not table.rows, parameters)
             table.add_row(labels, cells | {"classifiers": _deviation(one_encoder, method)} if cells else {})
-    for method, name in CLASSIC.items():
+    for backbone in rendered:
+        name = f"{backbone}{RENDERED}"
+        labels = [(name, encoder_title(name, "none")), ("none", REDUCTIONS["none"])]
+        cells = _cells(metrics, f"{name}-none", reference_R, not table.rows, backbones[backbone])
+        table.add_row(labels, cells, rival=False)
+    untrained = {name: title for name, title in (explainers or {}).items() if name in UNTRAINED}
+    for method, name in {**CLASSIC, **untrained}.items():
         labels = [(method, name), ("none", REDUCTIONS["none"])]
         table.add_row(labels, _cells(metrics, method, reference_R, not table.rows))
     table.compare_down(["accuracy"])
@@ -107,6 +126,7 @@ def table6_backbones(
             "the seeds of the mean.",
             f"{rival}: paired difference to it{other}. By concept: the share of its samples that is attributed to it. "
             "Parameters: of the encoder.",
+            *([RENDERED_NOTE] if rendered else ()),
         ),
     )
 

@@ -77,6 +77,16 @@ def test_the_note_says_what_encoders_were_pretrained_on():
     assert "perturbations, encoder, and GPC" in " ".join(table6_backbones(*of).footnotes)
 
 
+def test_what_saw_the_tested_objects_stands_below_and_is_never_the_best():
+    values = VALUES | {"dgcnn_rendered-none": (0.9, 0.9, 0.9), "chance": (0.3, 0.3, 0.4), "gpca_pair": (0.9, 0.9, 0.9)}
+    of = metrics(values), "frames", BACKBONES, ("none", "pca")
+    table = table6_backbones(*of, rendered=["dgcnn"], explainers={"chance": "Chance", "gpca_pair": "Pair"})
+    assert [row[0][1] for row in table.rows][-3:] == ["DGCNN, tested objects rendered", "Classic features", "Chance"]
+    assert table.best() == make().best()
+    assert "Tested objects rendered: pretrained on" in " ".join(table.footnotes)
+    assert "rendered" not in " ".join(make(values).footnotes)
+
+
 def test_a_backbone_without_a_title_has_its_name():
     values = {"mine-none": (0.8, 0.8, 0.8), "pointnet-none": (0.6, 0.7, 0.65)}
     table = table6_backbones(metrics(values), "frames", {"mine": 1000, "pointnet": 150_000}, ("none",))
