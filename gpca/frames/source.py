@@ -6,8 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from gpca.errors import InputError
-from gpca.objects.repository import folders_of_data
-from gpca.objects.source import data_files, require_place, resolve
+from gpca.objects.source import data_files, places_of, resolve
 
 REAL_WORLD = "real_rgbd"  # the source that the frames of a run are
 VIRTUAL = "virtual_rgbd"  # frames rendered of models of a run's datasets
@@ -57,7 +56,7 @@ def frame_files(datasets: Mapping[str, dict], data_dir: str | None) -> list[Path
 
 def _is_absent(entry: dict, data_dir: str | None) -> bool:
     """Return whether a dataset that a run can do without is not there."""
-    return bool(entry.get("optional")) and not any(path.is_dir() for path in _places(data_dir, entry["location"]))
+    return bool(entry.get("optional")) and not any(path.is_dir() for path in places_of(entry["location"], data_dir))
 
 
 def _resolved(name: str, entry: dict, data_dir: str | None) -> dict:
@@ -67,7 +66,7 @@ def _resolved(name: str, entry: dict, data_dir: str | None) -> dict:
     resolved["results"] = [str(path) for pattern in named for path in _matching(data_dir, pattern)]
     errors = _matching(data_dir, resolved["errors"]) if resolved.get("errors") else []
     if models := resolved.get("models"):
-        places = _places(data_dir, models)
+        places = places_of(models, data_dir)
         resolved["models"] = str(next((path for path in places if path.is_dir()), places[0]))
     resolved["errors"] = str(errors[0]) if errors else None
     for path in (*resolved["results"], resolved["errors"]):
@@ -76,14 +75,9 @@ def _resolved(name: str, entry: dict, data_dir: str | None) -> dict:
     return resolved
 
 
-def _places(data_dir: str | None, path: str) -> list[Path]:
-    """Return where a path may lead that a config names."""
-    return [require_place(base / require_place(path)).absolute() for base in folders_of_data(data_dir)]
-
-
 def _matching(data_dir: str | None, name: str) -> list[Path]:
     """Return the files that a name with an asterisk matches, which may be none, or the one that is named in full."""
-    places = _places(data_dir, name)
+    places = places_of(name, data_dir)
     if "*" not in name:
         return [next((path for path in places if path.is_file()), places[0])]
     return next((paths for path in places if (paths := sorted(path.parent.glob(path.name)))), [])

@@ -158,12 +158,17 @@ def find_file(place: str, data_dir: str | None) -> Path:
     Raises:
         InputError: neither has it.
     """
-    paths = [require_place(base / require_place(place)) for base in folders_of_data(data_dir)]
+    paths = places_of(place, data_dir)
     path = next((path for path in paths if path.is_file()), None)
     if path is None:
         raise InputError(paths[-1], "no such file", "correct the config, or restore it: git checkout -- data")
     require_whole_if_ours(path)
     return path
+
+
+def places_of(place: str, data_dir: str | None) -> list[Path]:
+    """Return where a place may be that a config names: below `data_dir`, then in the repository's data."""
+    return [require_place(base / require_place(place)).absolute() for base in folders_of_data(data_dir)]
 
 
 def require_place(place: str | Path) -> Path:

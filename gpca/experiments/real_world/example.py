@@ -71,7 +71,8 @@ def draw_real_world_example(
     own_px = instances.pixels_of(i)
     everything = np.concatenate([own_px, *seen.values()])
     for panel, times in zip(drawn, (AROUND[0], AROUND[1], AROUND[1]), strict=False):
-        panel.imshow(image, alpha=1.0 if panel is drawn[0] else 0.55)
+        # Not interpolated, a photo makes the PNG a third as large.
+        panel.imshow(image, alpha=1.0 if panel is drawn[0] else 0.55, interpolation="nearest")
         _zoom(panel, everything, times, image.shape)
     (left, top), (right, bottom) = everything.min(axis=0), everything.max(axis=0)
     region = Rectangle((left, top), right - left, bottom - top, fill=False, edgecolor=YELLOW, linewidth=1.2)
