@@ -7,7 +7,6 @@ import numpy as np
 from gpca.alignment.rigid import transform
 
 JUDGED_POINTS = 1000  # of an object, the first ones, over which an error is usually the mean
-CORRECT = 0.1  # diameters: the usual limit of a correct pose
 
 
 def add_error(points_N_3: np.ndarray, T_estimated: np.ndarray, T_true: np.ndarray) -> float:

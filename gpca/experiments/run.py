@@ -63,6 +63,8 @@ def settings_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, An
         },
         "explainer_titles": explainer_titles,
         "cause_settings": {**config["causes"], "icp": config["registrations"]["icp"]},
+        "success": config["success"]["error"],
+        "success_curve": list(config["success"]["curve"]),
         "encoder_title": encoder_title(**config["embedding"]),
         **own,
     }

@@ -101,6 +101,7 @@ class Situation:
         T_object_estimated: how far the pose estimator is off, whatever it is shown: the cause pose.
         camera, noise: those of every shot.
         cause: what disturbs the registration; empty for nothing.
+        table: number of the table among those of its part.
         axes: names of its random numbers.
     """
 
@@ -111,6 +112,7 @@ class Situation:
     camera: Camera
     noise: DepthNoise
     cause: str
+    table: int
     axes: tuple
 
     @property
@@ -221,6 +223,7 @@ class Situations:
             scenes.camera,
             scenes.noise,
             "",
+            number,
             axes,
         )
         whole = self._silhouette(situation, situation.standing[0]).sum()

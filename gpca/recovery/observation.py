@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from gpca.alignment.pose_error import CORRECT, adds_error
+from gpca.alignment.pose_error import adds_error
 from gpca.alignment.rigid import inverse, rotation_angle_rad
 from gpca.features.distances import LocalPlanes
 from gpca.frames.shots import agreement, fuse
@@ -17,6 +17,7 @@ OBSERVED = (
     *("thickness", "on_model", "explained", "hidden", "log_points", "rotation_rad", "translation", "shots", "filtered"),
     *("rival_gain", "rival_distance", "rivals"),
 )
+ELSEWHERE = 0.1  # diameters; a rival farther off than this is another pose, and no variant of the same
 PROBED = 16  # so many orientations are tried to find rivals of a pose
 
 
@@ -67,7 +68,7 @@ def _rivals(
     points_m = _thinned(robot.points_m, CLOUD_POINTS)
     distances = [adds_error(points_m, T, holding.T_world_object) / robot.diameter_m for T in poses]
     best = int(np.argmax(worth := [explained(T) for T in poses]))
-    elsewhere = np.mean([distance > CORRECT for distance in distances])
+    elsewhere = np.mean([distance > ELSEWHERE for distance in distances])
     return worth[best] - explained(holding.T_world_object), distances[best], float(elsewhere)
 
 

@@ -1,53 +1,31 @@
-"""Policies of recovery by name: which action they take next about a failed registration.
+"""Policies of recovery by name: how they decide about a failed registration, and what they need for it.
 
-A policy sees what a robot has: what an explainer says of the case after every action, and what was done before. It
-never sees the truth; ``oracle``, which is told the cause, is there as a bound.
+A policy is told that the pose is wrong unless it finds that out itself or asks the gate. ``oracle``, which is told the
+cause, is there as a bound.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
-import numpy as np
-
-from gpca.errors import InputError
-from gpca.pairs.perturbation import CONCEPTS
-from gpca.recovery.chances import ExpectedUtility
-from gpca.recovery.policy import NOTHING, Decision, RecoveryPolicy, Thresholds, Treated
-
-
-@dataclass(frozen=True)
-class Case:
-    """The knowledge of a policy when it decides.
-
-    Attributes:
-        actions: those that were taken, in order.
-        scores_T_C, bald_T: what its explainer said at the start and after each action; None where it reads none.
-        known_F: all that is known of the registration (:func:`gpca.experiments.recovery.rehearsal.known`), for
-            policies that learn.
-        cause: of a failure, for the oracle alone; empty for all others.
-        random: the case's own numbers for policies, from their start: the same at every decision.
-    """
-
-    actions: tuple[str, ...]
-    scores_T_C: np.ndarray | None
-    bald_T: np.ndarray | None
-    known_F: np.ndarray | None
-    cause: str
-    random: np.random.Generator
-
-
-Decide = Callable[[Case], Decision]
-
-
-@dataclass(frozen=True)
-class Means:
-    """The ingredients of policies: the robot's thresholds and treatments, its actions, and its rehearsed utility."""
-
-    policy: RecoveryPolicy
-    actions: Sequence[str]
-    utility: ExpectedUtility | None = None
+from gpca.errors import require_known
+from gpca.recovery.deciders import (
+    Decide,
+    Means,
+    act_at_random,
+    act_in_turn,
+    always_act,
+    follow_rehearsed,
+    follow_scores,
+    follow_sequence,
+    follow_truth,
+    gated,
+    never_queue,
+    weigh_alarmed,
+    weigh_chances,
+)
+from gpca.recovery.sequences import sequences, title_of_sequence
 
 
 @dataclass(frozen=True)
@@ -59,7 +37,10 @@ class PolicyEntry:
         make: function that makes it.
         explainer: the one that it reads (:mod:`gpca.explainers.registry`), empty for none.
         queues: whether it leaves cases to a person, whose labels its explainer can learn.
-        learns: whether it needs rehearsals.
+        learns: whether it weighs chances that the rehearsals taught.
+        rehearsed: whether it takes the best order of the rehearsals.
+        gated: whether it asks the gate first.
+        told: whether it is told that the pose is wrong, so that it would act on every good registration too.
         oracle: whether it is told the cause.
     """
 
@@ -68,94 +49,25 @@ class PolicyEntry:
     explainer: str = ""
     queues: bool = False
     learns: bool = False
+    rehearsed: bool = False
+    gated: bool = False
+    told: bool = True
     oracle: bool = False
 
 
-def follow_scores(means: Means) -> Decide:
-    """Follow the scores of an explainer, and queue what is uncertain (:class:`gpca.recovery.policy.RecoveryPolicy`)."""
-    policy = means.policy
-    concept_of = {action: concept for concept, action in policy.treatments.items()}
-
-    def decide(case: Case) -> Decision:
-        scores_T_C, bald_T = case.scores_T_C, case.bald_T
-        assert scores_T_C is not None and bald_T is not None  # policies that read an explainer are given both
-        bald_T = np.zeros(len(scores_T_C)) if np.isnan(bald_T).any() else bald_T
-        before = []
-        for step, action in enumerate(case.actions):
-            column = CONCEPTS.index(concept_of[action])
-            fall = scores_T_C[step, column] - scores_T_C[step + 1, column]
-            before.append(Treated(concept_of[action], float(fall)))
-        return policy.decide(scores_T_C[-1], float(bald_T[-1]), before)
-
-    return decide
-
-
-def never_queue(means: Means) -> Decide:
-    """Follow the scores, however uncertain they are, so that explainers are compared by their actions alone."""
-    limits = means.policy.thresholds
-    sure = Thresholds(uncertain=np.inf, dominant=0.0, improvement=limits.improvement, attempts=1_000_000)
-    return follow_scores(replace(means, policy=replace(means.policy, thresholds=sure)))
-
-
-def weigh_chances(means: Means) -> Decide:
-    """Take what is worth most by its learned chance and its cost (:class:`gpca.recovery.chances.ExpectedUtility`)."""
-    return _weigh(means, alarmed=False)
-
-
-def weigh_alarmed(means: Means) -> Decide:
-    """Do the same as if told that the pose is wrong, so that actions are compared apart from recognizing failures."""
-    return _weigh(means, alarmed=True)
-
-
-def _weigh(means: Means, alarmed: bool) -> Decide:
-    utility = means.utility
-    assert utility is not None  # policies that learn are given rehearsals
-
-    def decide(case: Case) -> Decision:
-        assert case.known_F is not None
-        return utility.decide(case.known_F, case.actions, alarmed)
-
-    return decide
-
-
-def act_at_random(means: Means) -> Decide:
-    """Take any action at random; the same one may come again."""
-
-    def decide(case: Case) -> Decision:
-        # The case's numbers start anew at every decision, so the draws before are drawn again.
-        drawn = case.random.integers(len(means.actions), size=len(case.actions) + 1)[-1]
-        return Decision(means.actions[int(drawn)], "", "at random")
-
-    return decide
-
-
-def act_in_turn(means: Means) -> Decide:
-    """Take all actions in turn, in an order drawn for each case."""
-
-    def decide(case: Case) -> Decision:
-        order = case.random.permutation(len(means.actions))
-        return Decision(means.actions[order[len(case.actions) % len(means.actions)]], "", "in turn")
-
-    return decide
-
-
-def follow_truth(means: Means) -> Decide:
-    """Take the action that treats the true cause, again and again; without a cause, none."""
-    treatments = means.policy.treatments
-    return lambda case: Decision(treatments.get(case.cause, NOTHING), case.cause, "told the cause")
-
-
-def always_act(action: str) -> Callable[[Means], Decide]:
-    """Return a maker of the policy that always takes this action."""
-    return lambda means: lambda case: Decision(action, "", "always")
-
-
 ALWAYS = "always_"  # with an action's name behind it, the policy that always takes this action
+ERROR_ONLY = {True: "error_only_acting", False: "error_only"}  # whether it is told that the pose is wrong -> policy
 POLICIES = {
-    "gpca": PolicyEntry("GP-CA", follow_scores, explainer="gpca", queues=True),
+    "gpca": PolicyEntry("GP-CA", follow_scores, explainer="gpca", queues=True, told=False),
     "gpca_acting": PolicyEntry("GP-CA, never queued", never_queue, explainer="gpca"),
-    "utility": PolicyEntry("Expected utility, learned", weigh_chances, explainer="gpca", learns=True),
+    "gpca_gated": PolicyEntry("GP-CA, gated", gated(never_queue), explainer="gpca", gated=True, told=False),
+    "utility": PolicyEntry("Expected utility, learned", weigh_chances, explainer="gpca", learns=True, told=False),
     "utility_acting": PolicyEntry("Expected utility, alarmed", weigh_alarmed, explainer="gpca", learns=True),
+    "utility_gated": PolicyEntry(
+        "Expected utility, gated", gated(weigh_alarmed), explainer="gpca", learns=True, gated=True, told=False
+    ),
+    "error_only": PolicyEntry("Error only, gated", gated(follow_rehearsed), rehearsed=True, gated=True, told=False),
+    "error_only_acting": PolicyEntry("Error only, alarmed", follow_rehearsed, rehearsed=True),
     "shap_removal": PolicyEntry("SHAP, remedies, residual", never_queue, explainer="shap_removal_residual"),
     "softmax_head": PolicyEntry("Softmax head", never_queue, explainer="softmax_head"),
     "random": PolicyEntry("Random action", act_at_random),
@@ -164,16 +76,27 @@ POLICIES = {
 }
 
 
+def is_fixed(name: str, actions: Sequence[str]) -> bool:
+    """Return whether the policy takes the same actions in the same order whatever it is told and observes."""
+    return name in policies(actions) and name not in POLICIES
+
+
+def policies(actions: Sequence[str]) -> dict[str, PolicyEntry]:
+    """Return all policies by name, those that always take one of these actions or a sequence of them included."""
+    always = {ALWAYS + a: PolicyEntry(f"Always: {a.replace('_', ' ')}", always_act(a)) for a in actions}
+    fixed = {
+        name: PolicyEntry(title_of_sequence(order), follow_sequence(order))
+        for name, order in sequences(actions).items()
+    }
+    return POLICIES | always | fixed
+
+
 def policy_entry(name: str, actions: Sequence[str]) -> PolicyEntry:
     """Return the policy of that name.
 
     Raises:
-        InputError: unknown policy, or one that always takes an unknown action.
+        InputError: unknown policy, or one that takes an unknown action.
     """
-    if name in POLICIES:
-        return POLICIES[name]
-    action = name.removeprefix(ALWAYS)
-    if name != action and action in actions:
-        return PolicyEntry(f"Always: {action.replace('_', ' ')}", always_act(action))
-    known = ", ".join((*POLICIES, *(ALWAYS + known for known in actions)))
-    raise InputError(f"recovery policy '{name}'", "unknown", f"choose one of {known}")
+    known = policies(actions)
+    require_known("recovery policy", name, known)
+    return known[name]

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Annotated
 
 from gpca.alignment.icp import ICPSettings
+from gpca.alignment.success import SuccessSettings
 from gpca.encoders.settings import EncoderSettings
 from gpca.frames.camera import Camera
 from gpca.frames.rgbd_scene import SceneSettings
@@ -21,16 +22,19 @@ class LoopSettings:
     """How the closed loop runs.
 
     Attributes:
-        failures: how many are wanted for each cause.
+        failures, good: how many registrations that failed, and that did not, are wanted for each cause.
         tries: how many situations may be registered to find them, for each cause.
         budget: how many actions each failure may take.
+        success: error of the pose from which a registration failed, in diameters.
         cloud_points: how many source and target have.
         icp: how ICP runs.
     """
 
     failures: Count = 8
+    good: Count = 8
     tries: Count = 120
     budget: Annotated[int, Bounds(minimum=1, maximum=9)] = 3
+    success: float = SuccessSettings.error
     cloud_points: int = 2048
     icp: ICPSettings = field(default_factory=ICPSettings)
 
@@ -65,7 +69,12 @@ class RecoverySettings:
         return cls(
             section=recovery,
             objects=sections["objects"],
-            loop=LoopSettings(**recovery["loop"], cloud_points=registration.cloud_points, icp=registration.icp),
+            loop=LoopSettings(
+                **recovery["loop"],
+                success=sections["success"]["error"],
+                cloud_points=registration.cloud_points,
+                icp=registration.icp,
+            ),
             situation=SituationSettings(
                 replace(scenes, count=recovery["tables"], camera=Camera(**recovery["camera"])),
                 noise_scale=tuple(recovery["noise_scale"]),

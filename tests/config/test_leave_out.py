@@ -42,6 +42,7 @@ def test_an_action_takes_its_own_policy_along():
     assert list(recovery["actions"]) == ["reinitialize", "denoise"]
     assert "always_denoise" in recovery["policies"]
     assert "always_new_view" not in recovery["policies"]
+    assert not any("new_view" in policy for policy in recovery["policies"])
 
 
 def test_a_policy_goes_with_the_uncertainty_that_its_explainer_reads():

@@ -3,7 +3,8 @@ import pytest
 
 from gpca.errors import InputError
 from gpca.recovery.chances import Chances, ExpectedUtility, Trial
-from gpca.recovery.policies import Case, Means, policy_entry
+from gpca.recovery.deciders import Case, Means
+from gpca.recovery.policies import is_fixed, policies, policy_entry
 from gpca.recovery.policy import NOTHING, QUEUE, RecoveryPolicy, Thresholds
 from gpca.seeds import generator
 
@@ -11,14 +12,14 @@ ACTIONS = ("reinitialize", "new_view", "denoise")
 POLICY = RecoveryPolicy(Thresholds(uncertain=0.2, dominant=0.4))
 
 
-def case(actions=(), scores=None, bald=None, known=None, cause="", episode=0):
+def case(actions=(), scores=None, bald=None, observed=None, known=None, cause="", episode=0):
     scores = None if scores is None else np.array(scores, float)
     bald = None if bald is None else np.array(bald, float)
-    return Case(actions, scores, bald, known, cause, generator("test", episode))
+    return Case(actions, scores, bald, observed, known, cause, generator("test", episode))
 
 
-def made(name, utility=None):
-    return policy_entry(name, ACTIONS).make(Means(POLICY, ACTIONS, utility))
+def made(name, **means):
+    return policy_entry(name, ACTIONS).make(Means(POLICY, ACTIONS, **means))
 
 
 def test_gpca_follows_the_scores_and_queues_what_is_uncertain_while_the_acting_one_never_does():
@@ -43,15 +44,15 @@ def test_scores_without_uncertainty_are_followed():
 def test_the_learned_policy_decides_by_what_is_known_and_done():
     trials = [Trial(np.zeros(1), action, action == "new_view") for action in ACTIONS for _ in range(8)]
     utility = ExpectedUtility(Chances(trials, ACTIONS), dict.fromkeys(ACTIONS, 0.01))
-    assert made("utility", utility)(case(known=np.zeros(1))).action == "new_view"
-    assert made("utility", utility)(case(("new_view",), known=np.zeros(1))).action != "new_view"
+    assert made("utility", utility=utility)(case(known=np.zeros(1))).action == "new_view"
+    assert made("utility", utility=utility)(case(("new_view",), known=np.zeros(1))).action != "new_view"
 
 
 def test_the_learned_policy_leaves_alone_what_seems_right_unless_it_is_alarmed():
     trials = [Trial(np.zeros(1), NOTHING, True)] * 30 + [Trial(np.zeros(1), "denoise", True)] * 8
     utility = ExpectedUtility(Chances(trials, ACTIONS), dict.fromkeys(ACTIONS, 0.05))
-    assert made("utility", utility)(case(known=np.zeros(1))).action == NOTHING
-    assert made("utility_acting", utility)(case(known=np.zeros(1))).action == "denoise"
+    assert made("utility", utility=utility)(case(known=np.zeros(1))).action == NOTHING
+    assert made("utility_acting", utility=utility)(case(known=np.zeros(1))).action == "denoise"
 
 
 def test_round_robin_takes_every_action_once_in_an_order_of_the_case():
@@ -72,6 +73,50 @@ def test_random_actions_are_even_and_do_not_repeat_by_the_step():
     assert 70 < sum(a == b for a, b in zip(first, second, strict=True)) < 130
 
 
+class Gate:
+    """Takes for failed what has a positive number."""
+
+    def alarms(self, observed_F):
+        return observed_F[0] > 0
+
+
+@pytest.mark.parametrize("name", ["gpca_gated", "utility_gated", "error_only"])
+def test_gated_policies_leave_alone_what_the_gate_takes_for_good_and_act_on_the_rest(name):
+    trials = [Trial(np.zeros(1), action, action == "new_view") for action in ACTIONS for _ in range(8)]
+    utility = ExpectedUtility(Chances(trials, ACTIONS), dict.fromkeys(ACTIONS, 0.01))
+    decide = made(name, utility=utility, gate=Gate(), order=("new_view", "denoise", "reinitialize"))
+    seen = {"scores": [[0.1, 0.2, 0.7]], "bald": [0.9], "known": np.zeros(1)}
+    assert decide(case(observed=np.array([-1.0]), **seen)).action == NOTHING
+    assert decide(case(observed=np.array([1.0]), **seen)).action == "new_view"
+    again = seen | {"scores": seen["scores"] * 2, "bald": [0.9, 0.9]}
+    assert decide(case(("new_view",), observed=np.array([-1.0]), **again)).action != NOTHING  # it is known to be wrong
+
+
+def test_the_error_alone_is_followed_by_the_rehearsed_order():
+    decide = made("error_only_acting", order=("new_view", "denoise", "reinitialize"))
+    assert [decide(case(taken)).action for taken in ((), ("new_view",))] == ["new_view", "denoise"]
+
+
+def test_a_sequence_takes_its_actions_in_turn_and_begins_anew():
+    decide = made("sequence_new_view_denoise")
+    taken = ()
+    for _ in range(3):
+        taken += (decide(case(taken)).action,)
+    assert taken == ("new_view", "denoise", "new_view")
+    assert policy_entry("sequence_new_view_denoise", ACTIONS).title == "New view, then denoise"
+    assert [
+        name for name in ("sequence_new_view_denoise", "always_denoise", "random", "gpca") if is_fixed(name, ACTIONS)
+    ] == [
+        "sequence_new_view_denoise",
+        "always_denoise",
+    ]
+
+
+def test_who_is_told_that_the_pose_is_wrong():
+    alone = {name for name, entry in policies(ACTIONS).items() if not entry.told}
+    assert alone == {"gpca", "gpca_gated", "utility", "utility_gated", "error_only"}
+
+
 def test_fixed_actions_and_the_oracle():
     assert made("always_denoise")(case()).action == "denoise"
     assert [made("oracle")(case(cause=cause)).action for cause in ("noise", "pose", "overlap")] == [
@@ -84,7 +129,9 @@ def test_fixed_actions_and_the_oracle():
     assert not any(policy_entry(name, ACTIONS).oracle for name in ("gpca", "random", "always_denoise"))
 
 
-@pytest.mark.parametrize("name", ["gpac", "always_pray", "always_", "denoise"])
+@pytest.mark.parametrize(
+    "name", ["gpac", "always_pray", "always_", "denoise", "sequence_denoise", "sequence_denoise_denoise"]
+)
 def test_an_unknown_policy_is_refused_and_the_known_are_named(name):
     with pytest.raises(InputError, match=rf"recovery policy '{name}': unknown; choose one of gpca, .*always_denoise"):
         policy_entry(name, ACTIONS)

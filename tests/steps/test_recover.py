@@ -23,17 +23,18 @@ def tiny_objects(monkeypatch):
 def settings(**changed):
     config = load("smoke")
     recovery = config["recovery"] | {
-        "policies": ["gpca_acting", "utility", "softmax_head", "always_new_view"],
-        "loop": {"failures": 1, "tries": 6, "budget": 1},
+        "policies": ["gpca_gated", "utility", "error_only", "softmax_head", "always_new_view"],
+        "loop": {"failures": 1, "good": 2, "tries": 8, "budget": 1},
         "rehearsals": 1,
         "train": 9,
         "calibration": 6,
-        "tables": 1,
+        "tables": 2,
         "noise_scale": [5, 8],
     }
     encoder = config["encoders"]["dgcnn"] | {"draw_points": 32, "epochs": 1, "draws": 1, "options": {"k": 4}}
     given = {
         "recovery": recovery | changed,
+        "success": config["success"],
         "objects": config["sources"]["ycb"],
         "scenes": config["real_world"]["scenes"] | {"objects": [3, 3]},
         "registrations": config["registrations"] | {"cloud_points": 256},
@@ -53,16 +54,19 @@ def call(folder, given):
 def test_the_step_writes_rows_seconds_thresholds_and_an_example(tmp_path):
     assert call(tmp_path, settings()) == 0
     rows, seconds = (pd.read_csv(tmp_path / name) for name in ("seed7.csv", "t/seed7.csv"))
-    assert set(rows["policy"]) == {"gpca_acting", "utility", "softmax_head", "always_new_view"}
-    assert set(rows["cause"]) <= set(CONCEPTS)
+    assert set(rows["policy"]) == {"gpca_gated", "utility", "error_only", "softmax_head", "always_new_view"}
+    assert set(rows.loc[rows["failed"], "cause"]) <= set(CONCEPTS)
+    assert set(rows["table"]) <= {0, 1}
     assert len(seconds) == len(rows)
-    assert (rows["failed"] == (rows.groupby(["episode", "policy"])["error_before"].transform("first") > 0.1)).all()
+    assert (rows["failed"] == (rows.groupby(["episode", "policy"])["error_before"].transform("first") >= 0.03)).all()
     queue = pd.read_csv(tmp_path / "q/seed7.csv")
     assert set(queue["policy"]) == {"utility"}
     assert queue["labels"].min() == 0
     policy = json.loads((tmp_path / "policy.json").read_text())
     assert set(policy["calibration_accuracy"]) == {"gpca", "softmax_head"}
     assert 0 <= policy["thresholds"]["uncertain"] < 1.1
+    assert 0 <= policy["thresholds"]["gate"] <= 1
+    assert sorted(policy["order"]) == ["denoise", "new_view", "reinitialize"]
     assert call(tmp_path / "again", settings()) == 0
     for name in ("seed7.csv", "q/seed7.csv", "policy.json", "example.npz"):
         assert (tmp_path / name).read_bytes() == (tmp_path / "again" / name).read_bytes()

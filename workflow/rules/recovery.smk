@@ -13,6 +13,7 @@ RECOVERY_EXPLAINERS = sorted(
 )
 RECOVERY_SETTINGS = {
     "recovery": RECOVERY,
+    "success": config["success"],
     "objects": config["sources"][RECOVERY["objects"]],
     "scenes": config["real_world"]["scenes"],
     "registrations": config["registrations"],

@@ -1,8 +1,8 @@
 """Episodes: registrations disturbed by a known cause, failed or fine, and everything that is tried about each.
 
-A failure is a registration whose pose is wrong (ADD, or ADD-S of symmetric objects, above 10 % of the diameter) and
-whose cause is known: without it, the same registration succeeds. An action gives the same result whichever policy
-takes it after the same actions, so every outcome is kept.
+A failure is a registration whose pose is wrong (ADD, or ADD-S of symmetric objects, not below the limit of a success)
+and whose cause is known: without it, the same registration succeeds. An action gives the same result whichever policy
+takes it after the same actions, so every outcome is kept, and sequences share what their first actions gave.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from gpca.alignment.pose_error import CORRECT
 from gpca.errors import InputError
 from gpca.experiments.recovery.cases import Attempt, RobotIn, register_after, register_first, register_misplaced
 from gpca.frames.situations import Situation, Situations
@@ -24,6 +23,7 @@ from gpca.seeds import generator
 
 POSE = "pose"  # the cause that disturbs nothing but ICP's start
 MISPLACED = 40  # its starts that are tried in a situation until one fails; in every other one, only the first
+Case = tuple[Situation, Attempt]
 
 
 class Episode:
@@ -31,20 +31,26 @@ class Episode:
 
     Args:
         number: its own among all of a run.
+        success: error of the pose from which it is wrong, in diameters.
         tries: registrations that were made for all failures of its cause.
     """
 
-    def __init__(self, number: int, situation: Situation, start: Attempt, tries: int) -> None:
+    def __init__(self, number: int, situation: Situation, start: Attempt, success: float, tries: int = 1) -> None:
         self.number = number
         self.situation = situation
         self.tries = tries
+        self._success = success
         self.outcomes: dict[tuple[str, ...], Attempt] = {(): start}
         self._observed: dict[tuple[str, ...], np.ndarray] = {}
 
     @property
     def failed(self) -> bool:
         """Whether there is anything to recover."""
-        return not is_right(self.outcomes[()])
+        return not self.is_right()
+
+    def is_right(self, actions: tuple[str, ...] = ()) -> bool:
+        """Return whether the pose is right after these actions, which were taken."""
+        return is_right(self.outcomes[actions], self._success)
 
     def observe(self, actions: tuple[str, ...]) -> np.ndarray:
         """Return what the robot observes after these actions, see :func:`gpca.recovery.observation.observe`."""
@@ -53,6 +59,11 @@ class Episode:
             random = generator(*self.situation.axes, "observe", *actions)
             self._observed[actions] = observe(attempt.holding, attempt.record, RobotIn(self.situation), random)
         return self._observed[actions]
+
+    def solved_by(self, actions: tuple[str, ...], known: Mapping[str, Action], settings: LoopSettings) -> bool:
+        """Return whether the pose is right after these actions, of which all but the last were taken."""
+        self.take(actions, known, settings)
+        return self.is_right(actions)
 
     def take(self, actions: tuple[str, ...], known: Mapping[str, Action], settings: LoopSettings) -> Attempt:
         """Return the outcome after these actions, of which all but the last were taken."""
@@ -64,16 +75,16 @@ class Episode:
         return self.outcomes[actions]
 
 
-def is_right(attempt: Attempt | None) -> bool:
+def is_right(attempt: Attempt | None, success: float) -> bool:
     """Return whether there is a pose, and a right one."""
-    return attempt is not None and attempt.error <= CORRECT
+    return attempt is not None and attempt.error < success
 
 
 def find_episodes(situations: Situations, settings: LoopSettings) -> list[Episode]:
-    """Draw situations of every cause until enough of their registrations have failed for it.
+    """Draw situations of every cause until enough of their registrations have failed for it, and enough are good.
 
-    Of those that did not fail, as many are kept at most. The failures of a cause come first, and each situation gives
-    one episode.
+    Each situation gives one good registration at most: the disturbed one if it is right, or else that without the
+    cause. The failures of a cause come first.
 
     Raises:
         InputError: no failure at all.
@@ -81,18 +92,20 @@ def find_episodes(situations: Situations, settings: LoopSettings) -> list[Episod
     episodes: list[Episode] = []
     tries: dict[str, int] = {}
     for cause in CONCEPTS:
-        cases: dict[bool, list[tuple[Situation, Attempt]]] = {True: [], False: []}
+        failures: list[Case] = []
+        good: list[Case] = []
         tries[cause] = 0
         for number in progress(range(settings.tries), f"failures by {cause}"):
-            if len(cases[True]) == settings.failures:
+            if len(failures) == settings.failures and len(good) >= settings.good:
                 break
-            misplaced = 1 if number % 2 and len(cases[False]) < settings.failures else MISPLACED
-            case, tried = _try_situation(situations, cause, number, settings, misplaced)
-            tries[cause] += tried
-            if case and len(of_kind := cases[not is_right(case[1])]) < settings.failures:
-                of_kind.append(case)
-        for situation, start in (*cases[True], *cases[False]):
-            episodes.append(Episode(len(episodes), situation, start, tries[cause]))
+            searching = len(failures) < settings.failures
+            misplaced = MISPLACED if searching and not (number % 2 and len(good) < settings.good) else 1
+            failure, right, tried = _try_situation(situations, cause, number, settings, misplaced)
+            tries[cause] += tried if searching else 0
+            failures += [failure] if failure and searching else []
+            good += [right] if right and len(good) < settings.good else []
+        for situation, start in (*failures, *good):
+            episodes.append(Episode(len(episodes), situation, start, settings.success, tries[cause]))
     if not any(episode.failed for episode in episodes):
         counts = ", ".join(f"{n} of {cause}" for cause, n in tries.items())
         raise InputError("recovery", f"no registration failed ({counts})", "raise recovery.tries or the disturbances")
@@ -101,7 +114,7 @@ def find_episodes(situations: Situations, settings: LoopSettings) -> list[Episod
 
 def _try_situation(
     situations: Situations, cause: str, number: int, settings: LoopSettings, misplaced: int
-) -> tuple[tuple[Situation, Attempt] | None, int]:
+) -> tuple[Case | None, Case | None, int]:
     """Register a disturbed situation, and the clean one where that failed; of bad poses, until one fails.
 
     A pose error changes nothing but ICP's start, so several are tried on the same measurement and the same estimate.
@@ -110,23 +123,30 @@ def _try_situation(
         misplaced: how many of these, at most.
 
     Returns:
-        the situation with its registration, or None where that failed without the cause too; how many were made.
+        the failure by the cause, and a good registration, each None where there is none; how many were made.
     """
-    points, icp = settings.cloud_points, settings.icp
+    points, icp, success = settings.cloud_points, settings.icp, settings.success
     disturbed, clean = situations.draw(cause, cause, number)
     if cause != POSE:
         start = register_first(disturbed, points, icp)
-        if start is None or not (is_right(start) or is_right(register_first(clean, points, icp))):
-            return None, 1
-        return (disturbed, start), 1
+        if start is None:
+            return None, None, 1
+        if is_right(start, success):
+            return None, (disturbed, start), 1
+        without = register_first(clean, points, icp)
+        if without is None or not is_right(without, success):
+            return None, None, 1
+        return (disturbed, start), (clean, without), 1
     estimated = register_first(clean, points, icp)
-    if estimated is None or not is_right(estimated):
-        return None, 1
+    if estimated is None or not is_right(estimated, success):
+        return None, None, 1
     tried = 0
     while True:
         tried += 1
         situation = situations.misplaced(clean, tried)
         attempt = register_misplaced(situation, estimated, points, icp)
         assert attempt is not None  # the same points were registered before
-        if tried == misplaced or not is_right(attempt):
-            return (situation, attempt), tried
+        if not is_right(attempt, success):
+            return (situation, attempt), (clean, estimated), tried
+        if tried == misplaced:
+            return None, (situation, attempt), tried

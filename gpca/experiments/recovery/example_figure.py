@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.alignment.pose_error import CORRECT
 from gpca.experiments.real_world.frame_views import draw_score_bars
 from gpca.io.arrays import load_arrays
 from gpca.pairs.perturbation import CONCEPTS
@@ -45,11 +44,12 @@ SHAPES: dict[str, tuple[int | str, ...]] = {
 }
 
 
-def draw_recovery_example(title: str, example_npz: str | Path, dataset: str = "") -> Figure:
+def draw_recovery_example(title: str, example_npz: str | Path, success: float, dataset: str = "") -> Figure:
     """Draw (a) the first view, (b) the concept scores, (c) the viewpoints to choose from, (d) the new view.
 
     Both views show the outlines of the object, where it is and where ICP put it: between them lies the misfit. The
-    object's name in words follows from its `dataset` of the BOP benchmark.
+    object's name in words follows from its `dataset` of the BOP benchmark. A pose is solved if its error is below
+    `success`, in diameters.
     """
     example = load_arrays(example_npz, SHAPES)
     figure = use_style().figure(figsize=(TEXT_WIDTH_IN, 2.0), layout="constrained")
@@ -63,7 +63,7 @@ def draw_recovery_example(title: str, example_npz: str | Path, dataset: str = ""
     axes["b"].set(xlim=(min(0, shown.min()), max(1, shown.max())), box_aspect=1)
     _draw_viewpoints(figure, axes["c"], example)
     before, after = (100 * error for error in example["errors"])
-    solved = "solved" if after <= 100 * CORRECT else "not solved"
+    solved = "solved" if after < 100 * success else "not solved"
     chosen, first = (100 * share for share in (example["surface_n"][int(example["chosen"])], example["surface_first"]))
     captions = (
         f"(a) Occluded: pose {before:.0f} % $d$ off"

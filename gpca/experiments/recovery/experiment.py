@@ -12,7 +12,7 @@ from gpca.explainers.registry import explainer_entry, require_settings
 from gpca.frames.situations import SituationSettings
 from gpca.objects.title import dataset_of, title_of
 from gpca.recovery.actions import ACTIONS, action_of
-from gpca.recovery.policies import ALWAYS, POLICIES, policy_entry
+from gpca.recovery.policies import POLICIES, policies, policy_entry
 from gpca.recovery.policy import Thresholds
 
 DECLARED = ("uncertain", "dominant", "improvement")  # thresholds that are given; null leaves one to the calibration
@@ -57,8 +57,9 @@ def policies_without(left_out: LeftOut) -> set[str]:
     """Return the policies that go with the actions and the uncertainty that the config leaves out."""
     designs = left_out("uncertainty")
     reading = {name: entry.explainer for name, entry in POLICIES.items() if entry.explainer}
+    actions = [action for action in ACTIONS if action not in left_out("recovery.actions")]
     return {
-        *(f"{ALWAYS}{action}" for action in left_out("recovery.actions")),
+        *(policies(tuple(ACTIONS)).keys() - policies(actions).keys()),
         *(name for name, explainer in reading.items() if explainer_entry(explainer).design in designs),
     }
 
@@ -71,7 +72,7 @@ def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
 
 
 def shown(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str, Any]:
-    """Return the titles of the policies and of the objects on the tables, the treatments, and the budget of actions."""
+    """Return titles of policies and objects, treatments, the budget of actions and the cost of a needless one."""
     recovery = config["recovery"]
     objects = sources[recovery["objects"]]
     return {
@@ -80,6 +81,7 @@ def shown(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str
         "recovery_dataset": dataset_of(objects),
         "treatments": recovery["treatments"],
         "budget": recovery["loop"]["budget"],
+        "needless": recovery["needless"],
     }
 
 
@@ -91,13 +93,24 @@ EXPERIMENT = Experiment(
             "recovery.csv",
             "gpca.experiments.recovery.metrics:collect_recovery",
             {"files": "recovery/seed{seed}.csv"},
-            {"treatments": "recovery.treatments", "costs": "recovery.costs", "budget": "recovery.loop.budget"},
+            {
+                "treatments": "recovery.treatments",
+                "costs": "recovery.costs",
+                "budget": "recovery.loop.budget",
+                "curve": "success.curve",
+            },
+        ),
+        Tidy(
+            "recovery_differences.csv",
+            "gpca.experiments.recovery.differences:collect_differences",
+            {"files": "recovery/seed{seed}.csv"},
+            {"actions": "recovery.actions", "budget": "recovery.loop.budget"},
         ),
     ),
     names=names,
     shown=shown,
     check=check,
     leavable={"recovery.actions": Names("action", lambda: ACTIONS)},
-    switches={"recovery.policies": Names("policy", lambda: (*POLICIES, *(ALWAYS + action for action in ACTIONS)))},
+    switches={"recovery.policies": Names("policy", lambda: policies(tuple(ACTIONS)))},
     lists={"recovery.policies": policies_without},
 )

@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpca.experiments.recovery.answers import Answer, Answers, CaseKey, Explain
-from gpca.experiments.recovery.episodes import Episode, is_right
+from gpca.experiments.recovery.episodes import Episode
 from gpca.experiments.recovery.rehearsal import known
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.recovery.actions import Action
-from gpca.recovery.policies import Case, Decide, Means, PolicyEntry, policy_entry
+from gpca.recovery.deciders import Case, Decide, Means
+from gpca.recovery.policies import PolicyEntry, policy_entry
 from gpca.recovery.settings import LoopSettings
 from gpca.seeds import generator
 
@@ -92,6 +93,7 @@ class Loop:
                 actions=before,
                 scores_T_C=np.array([answer.scores_C for answer in history]) if history else None,
                 bald_T=np.array([answer.bald for answer in history]) if history else None,
+                observed_F=episode.observe(()) if entry.gated else None,
                 known_F=known(episode.observe(before), history[-1]) if entry.learns else None,
                 cause=episode.situation.cause if entry.oracle and episode.failed else "",
                 random=generator(*self._axes, "policy", episode.number),
@@ -99,16 +101,18 @@ class Loop:
         )
         spent = perf_counter() - started
         last = history[-1] if history else UNEXPLAINED
-        old, new, action_seconds = episode.outcomes[before], None, 0.0
+        old, new, action_seconds, recovered = episode.outcomes[before], None, 0.0, False
         if episode.failed and decision.action in self._actions:
-            new = episode.take((*before, decision.action), self._actions, self._settings)
-            action_seconds = new.seconds
+            after = (*before, decision.action)
+            new = episode.take(after, self._actions, self._settings)
+            action_seconds, recovered = new.seconds, episode.is_right(after)
         shelf, model = episode.situation.shelf, episode.situation.model
         row = {
             "episode": episode.number,
             "cause": episode.situation.cause,
             "object": shelf.objects.names[model],
             "symmetric": shelf.symmetric[model],
+            "table": episode.situation.table,
             "tries": episode.tries,
             "failed": episode.failed,
             "policy": name,
@@ -118,6 +122,6 @@ class Loop:
             "bald": last.bald,
             "error_before": old.error,
             "error_after": (new or old).error,
-            "recovered": new is not None and is_right(new),
+            "recovered": recovered,
         }
         return row, {"explanation_seconds": spent + last.seconds, "action_seconds": action_seconds}

@@ -1,18 +1,22 @@
-"""Before a policy decides: every action is tried on failures of the training tables, and the thresholds are settled."""
+"""Before a policy decides: every action is tried on failures of the training tables, and thresholds are settled."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gpca.experiments.recovery.answers import Answer, Answers, CaseKey, Explain
-from gpca.experiments.recovery.episodes import Episode, is_right
+from gpca.experiments.recovery.episodes import Episode
 from gpca.recovery.actions import Action
 from gpca.recovery.chances import Trial
+from gpca.recovery.deciders import Means
+from gpca.recovery.gate import FailureGate, learn_gate
 from gpca.recovery.policy import NOTHING, RecoveryPolicy
+from gpca.recovery.sequences import Order, best_order
 from gpca.recovery.settings import LoopSettings
 
 if TYPE_CHECKING:
@@ -57,7 +61,7 @@ def rehearse(
         for n, first in enumerate(names if episode.failed else ()):
             taken.append((episode, (first,)))
             others = [name for name in names if name != first]
-            if others and settings.budget > 1 and not is_right(episode.take((first,), actions, settings)):
+            if others and settings.budget > 1 and not episode.solved_by((first,), actions, settings):
                 taken.append((episode, (first, others[(episode.number + n) % len(others)])))
     answers = Answers(episodes, {explainer: explain}, names, settings.budget)
     answers.ask(CaseKey(explainer, episode.number, ()) for episode in episodes)
@@ -68,9 +72,29 @@ def rehearse(
 
     trials = {e.number: [Trial(state(e, ()), NOTHING, not e.failed)] for e in episodes}
     for episode, sequence in taken:
-        right = is_right(episode.take(sequence, actions, settings))
+        right = episode.solved_by(sequence, actions, settings)
         trials[episode.number].append(Trial(state(episode, sequence[:-1]), sequence[-1], right))
     return Rehearsal(episodes, trials, {e.number: answers.history(explainer, e.number, ())[0].bald for e in episodes})
+
+
+def rehearsed_order(
+    failures: Sequence[Episode], actions: Mapping[str, Action], costs: Mapping[str, float], settings: LoopSettings
+) -> Order:
+    """Return the order of all actions that recovers these failures soonest, see :func:`best_order`."""
+    solved = [partial(_solved, episode, actions, settings) for episode in failures]
+    return best_order(tuple(actions), costs, solved, settings.budget)
+
+
+def _solved(episode: Episode, actions: Mapping[str, Action], settings: LoopSettings, taken: Order) -> bool:
+    return episode.solved_by(taken, actions, settings)
+
+
+def rehearsed_gate(episodes: Mapping[str, Sequence[Episode]], false_alarms: float) -> FailureGate:
+    """Return the gate that learned the first registrations of these episodes, by the part that their tables are of."""
+    together = [(part, episode) for part, of_part in episodes.items() for episode in of_part]
+    observed_N_F = np.array([episode.observe(()) for _, episode in together])
+    failed_N = np.array([episode.failed for _, episode in together])
+    return learn_gate(observed_N_F, failed_N, [(part, e.situation.table) for part, e in together], false_alarms)
 
 
 def robot_policy(recovery: Mapping, rehearsal: Rehearsal | None) -> RecoveryPolicy:
@@ -87,11 +111,14 @@ def robot_policy(recovery: Mapping, rehearsal: Rehearsal | None) -> RecoveryPoli
     return RecoveryPolicy.of_settings(recovery["thresholds"], recovery["treatments"], attempts, bald_N)
 
 
-def summary(policy: RecoveryPolicy, explainers: LoopExplainers) -> dict:
-    """Return thresholds, treatments and the accuracy of every explainer on the calibration samples, for JSON."""
+def summary(means: Means, explainers: LoopExplainers) -> dict:
+    """Return thresholds, treatments, order and the explainers' accuracy on the calibration samples, for JSON."""
+    policy, gate = means.policy, means.gate
+    thresholds = asdict(policy.thresholds) | ({"gate": gate.threshold} if gate else {})
     return {
-        "thresholds": {name: round(value, 6) for name, value in asdict(policy.thresholds).items()},
+        "thresholds": {name: round(value, 6) for name, value in thresholds.items()},
         "treatments": dict(policy.treatments),
+        "order": list(means.order),
         "calibration_samples": len(explainers.concepts),
         "calibration_accuracy": {
             name: round(float(explainers.right(name).mean()), 6) for name in explainers.calibration

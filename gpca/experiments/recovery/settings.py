@@ -28,6 +28,13 @@ class DeclaredThresholds:
 
 
 @dataclass(frozen=True)
+class Gate:
+    """How many of the good registrations gated policies may act on."""
+
+    false_alarms: Annotated[float, Bounds(exclusiveMinimum=0, exclusiveMaximum=1)]
+
+
+@dataclass(frozen=True)
 class Estimator(InitialPoseSettings):
     """The settings of the robot's pose estimate."""
 
@@ -45,8 +52,9 @@ class RecoverySettings:
     costs: dict[str, Share]
     needless: Share
     thresholds: DeclaredThresholds
+    gate: Gate
     rehearsals: Count
-    loop: Annotated[dict, part_of(LoopSettings, without=("cloud_points", "icp"))]
+    loop: Annotated[dict, part_of(LoopSettings, without=("success", "cloud_points", "icp"))]
     train: TrainSamples
     calibration: TestSamples
     remedied: TestSamples

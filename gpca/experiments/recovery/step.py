@@ -4,27 +4,38 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from gpca.experiments.recovery.episodes import find_episodes, is_right
+from gpca.experiments.recovery.episodes import Episode, find_episodes
 from gpca.experiments.recovery.example import ACTION, save_example
 from gpca.experiments.recovery.loop import Loop
-from gpca.experiments.recovery.loop_explainers import learn_explainers
+from gpca.experiments.recovery.loop_explainers import LoopExplainers, learn_explainers
 from gpca.experiments.recovery.queueing import error_by_labels, learners_of
-from gpca.experiments.recovery.rehearsal import rehearse, robot_policy, summary
-from gpca.experiments.recovery.virtual_tables import lay_tables, register_situations
+from gpca.experiments.recovery.rehearsal import (
+    Rehearsal,
+    rehearse,
+    rehearsed_gate,
+    rehearsed_order,
+    robot_policy,
+    summary,
+)
+from gpca.experiments.recovery.virtual_tables import as_samples, lay_tables, register_situations
 from gpca.io.csv_file import write_csv
 from gpca.io.files import whole_file
 from gpca.objects.source import data_files, resolve, surfaces
 from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
-from gpca.recovery.actions import action_of
+from gpca.recovery.actions import Action, action_of
 from gpca.recovery.chances import learn_utility
-from gpca.recovery.policies import Means, policy_entry
-from gpca.recovery.settings import RecoverySettings
+from gpca.recovery.deciders import Means
+from gpca.recovery.policies import PolicyEntry, policy_entry
+from gpca.recovery.settings import LoopSettings, RecoverySettings
 
-SOURCE = "recovery"  # names every random number of this step, tables included
+# Names every random number of this step, tables included. The number is that of the draw: on the tables and cases of
+# draw 1, results were seen between versions of the policies.
+SOURCE = "recovery 2"
 
 
 def run(job: Job) -> None:
@@ -39,35 +50,65 @@ def run(job: Job) -> None:
     axes = (SOURCE, job.seed)
     with record_provenance(outputs, data_files(objects), job.settings, seed=job.seed):
         tables = lay_tables(surfaces(objects, job.downloads), settings, *axes)
-        registrations = register_situations(tables, recovery["train"], recovery["calibration"], loop)
+        registered = register_situations(tables, recovery["train"], recovery["calibration"], loop)
         explainers = learn_explainers(
             [name for name in dict.fromkeys(entry.explainer for entry in entries) if name],
-            registrations,
+            as_samples(registered),
             settings.encoder,
             settings.explainers,
             settings.uncertainty,
             recovery["remedied"],
             *axes,
         )
-        rehearsal = utility = None
-        if learner := next((entry.explainer for entry in entries if entry.learns or entry.queues), ""):
-            training = find_episodes(tables["rehearsals"], replace(loop, failures=recovery["rehearsals"]))
-            rehearsal = rehearse(training, actions, learner, explainers.explain[learner], loop)
-            taught = rehearsal.trials.values()
-            utility = learn_utility(taught, recovery["costs"], tuple(actions), recovery["needless"])
-        policy = robot_policy(recovery, rehearsal)
-        _write_summary(job.policy, summary(policy, explainers))
-        means = Means(policy, tuple(actions), utility)
+        learning = any(entry.learns or entry.queues or entry.rehearsed or entry.gated for entry in entries)
+        rehearsals = replace(loop, failures=recovery["rehearsals"])
+        rehearsed = find_episodes(tables["rehearsals"], rehearsals) if learning else []
+        rehearsal = _rehearse(rehearsed, entries, actions, explainers, loop)
+        means = _means(recovery, entries, actions, registered, rehearsed, rehearsal, loop)
+        _write_summary(job.policy, summary(means, explainers))
         episodes = find_episodes(tables["failures"], loop)
         rows, seconds = Loop(episodes, actions, explainers.explain, means, loop, axes).run(recovery["policies"])
         judged = [episode for episode in episodes if episode.failed]
-        solved = [{name: is_right(e.take((name,), actions, loop)) for name in actions} for e in judged]
+        solved = [{name: episode.solved_by((name,), actions, loop) for name in actions} for episode in judged]
         learners = learners_of(recovery["policies"], means, rehearsal, judged, explainers, loop.budget)
         write_csv(job.queue, error_by_labels(learners, solved, rehearsal, axes))
         write_csv(job.rows, rows)
         write_csv(job.timings, seconds)
         views = recovery["actions"].get(ACTION) or {}
         save_example(job.example, episodes, rows, {ACTION: action_of(ACTION, views)} | actions, views, loop, axes)
+
+
+def _rehearse(
+    rehearsed: Sequence[Episode],
+    entries: Sequence[PolicyEntry],
+    actions: Mapping[str, Action],
+    explainers: LoopExplainers,
+    loop: LoopSettings,
+) -> Rehearsal | None:
+    """Return the trials of the rehearsals, if there is a policy that learns from them."""
+    learner = next((entry.explainer for entry in entries if entry.learns or entry.queues), "")
+    return rehearse(rehearsed, actions, learner, explainers.explain[learner], loop) if learner else None
+
+
+def _means(
+    recovery: Mapping,
+    entries: Sequence[PolicyEntry],
+    actions: Mapping[str, Action],
+    registered: Mapping[str, Sequence[Episode]],
+    rehearsed: Sequence[Episode],
+    rehearsal: Rehearsal | None,
+    loop: LoopSettings,
+) -> Means:
+    """Return what the policies are made from; what none of them needs is not learned."""
+    costs, failures = recovery["costs"], [episode for episode in rehearsed if episode.failed]
+    utility = order = gate = None
+    if rehearsal:
+        utility = learn_utility(rehearsal.trials.values(), costs, tuple(actions), recovery["needless"])
+    if any(entry.rehearsed for entry in entries):
+        order = rehearsed_order(failures, actions, costs, loop)
+    if any(entry.gated for entry in entries):
+        gate = rehearsed_gate({**registered, "rehearsals": rehearsed}, recovery["gate"]["false_alarms"])
+    return Means(robot_policy(recovery, rehearsal), tuple(actions), utility, order or (), gate)
 
 
 def _write_summary(path: Path, content: dict) -> None:

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping
 
 from gpca.errors import InputError
 from gpca.experiments.recovery.cases import FEWEST_POINTS, register_first
+from gpca.experiments.recovery.episodes import Episode
 from gpca.frames.initial_pose import InitialPoseSettings
 from gpca.frames.meshes import simplified
 from gpca.frames.situations import REDRAWS, Shelf, Situations
@@ -38,10 +39,10 @@ def lay_tables(
 
 def register_situations(
     situations: Mapping[str, Situations], train: int, calibration: int, settings: LoopSettings
-) -> Registrations:
-    """Register situations of all causes, failed or not, from which the classifier learns and is calibrated.
+) -> dict[str, list[Episode]]:
+    """Register situations of all causes, failed or not, from which explainers and the gate learn and are calibrated.
 
-    Samples 3t to 3t + 2 of a split are of the three causes. The calibration samples are the split ``test``.
+    Episodes 3t to 3t + 2 of a split are of the three causes. The calibration samples are the split ``test``.
 
     Args:
         situations: those of ``train`` and ``test``, which share no table.
@@ -49,7 +50,7 @@ def register_situations(
     Raises:
         InputError: the camera sees too little of the objects.
     """
-    records = []
+    registered: dict[str, list[Episode]] = {"train": [], "test": []}
     for split, count in (("train", train), ("test", calibration)):
         for number in progress(range(count), f"situations of split {split}"):
             cause = CONCEPTS[number % len(CONCEPTS)]
@@ -61,5 +62,15 @@ def register_situations(
             else:
                 fault = f"{REDRAWS} views of its objects show fewer than {FEWEST_POINTS} points of them"
                 raise InputError("the virtual camera", fault, "give recovery.camera more pixels")
-            records.append(start.record | {"sample": number, "split": split})
+            registered[split].append(Episode(number, situation, start, settings.success))
+    return registered
+
+
+def as_samples(registered: Mapping[str, Iterable[Episode]]) -> Registrations:
+    """Return the registrations of every split as samples of it."""
+    records = [
+        episode.outcomes[()].record | {"sample": episode.number, "split": split}
+        for split, of_split in registered.items()
+        for episode in of_split
+    ]
     return as_registrations(records)[0]

@@ -42,7 +42,6 @@ def shown(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
         "methods": {name: {"title": entry.title, "is_global": entry.is_global} for name, entry in entries.items()},
         "methods_left_out": {method_entry(name).title: of for name, of in left_out(config["methods"]).items()},
         "global_start": config["method_pairs"]["global_start"],
-        "success_curve": list(config["success"]["curve"]),
     }
 
 

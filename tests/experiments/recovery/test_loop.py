@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gpca.alignment.pose_error import CORRECT
 from gpca.attribution.scores import Attribution
 from gpca.experiments.recovery.episodes import Episode
 from gpca.experiments.recovery.loop import Loop
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.recovery.actions import ACTIONS, action_of
-from gpca.recovery.policies import POLICIES, Means
+from gpca.recovery.deciders import Means
+from gpca.recovery.policies import POLICIES
 from gpca.recovery.policy import NOTHING, QUEUE, RecoveryPolicy, Thresholds
 from tests.failures import LOOP
 
@@ -33,7 +33,7 @@ def stub(concept):
 
 @pytest.fixture
 def loop(start):
-    episode = Episode(0, *start, tries=5)
+    episode = Episode(0, *start, LOOP.success, tries=5)
     actions = {name: action_of(name, {}) for name in ACTIONS}
 
     def run(policies, concept="overlap", others=(), **thresholds):
@@ -59,7 +59,7 @@ def test_policies_share_what_an_action_gives_and_end_with_success_or_the_budget(
         assert not of_policy["recovered"].iloc[:-1].any()
         assert of_policy["recovered"].iloc[-1] or len(of_policy) == LOOP.budget
         assert (of_policy["error_before"].iloc[1:].to_numpy() == of_policy["error_after"].iloc[:-1].to_numpy()).all()
-    assert (rows["recovered"] == (rows["error_after"] <= CORRECT)).all()
+    assert (rows["recovered"] == (rows["error_after"] < LOOP.success)).all()
     assert (seconds.loc[rows["policy"] == "gpca", "explanation_seconds"] >= 0.5).all()
 
 
@@ -78,7 +78,7 @@ def test_a_queued_case_ends_there(loop):
 
 def test_about_what_did_not_fail_a_policy_only_decides(loop, start):
     situation, outcome = start
-    fine = Episode(1, situation, replace(outcome, error=0.01), tries=5)
+    fine = Episode(1, situation, replace(outcome, error=0.01), LOOP.success)
     rows, *_ = loop(["gpca_acting", "oracle"], others=[fine])
     assert rows[rows["episode"] == 1].set_index("policy")["action"].to_dict() == {
         "gpca_acting": "new_view",

@@ -7,6 +7,8 @@ from gpca.attribution.scores import Attribution
 from gpca.experiments.recovery.loop_explainers import LoopExplainers
 from gpca.experiments.recovery.rehearsal import Rehearsal, robot_policy, summary
 from gpca.pairs.perturbation import CONCEPTS
+from gpca.recovery.deciders import Means
+from gpca.recovery.gate import FailureGate
 
 SECTION = {
     "thresholds": {"uncertain": None, "queued_share": 0.5, "dominant": 0.4, "improvement": 0.3},
@@ -43,7 +45,11 @@ def test_a_declared_threshold_stays_and_without_a_rehearsal_nothing_is_too_uncer
 def test_the_summary_says_how_often_each_explainer_is_right(rehearsal):
     said = Attribution.of_scores(CONCEPTS, np.tile([0.8, 0.1, 0.1], (30, 1)), seconds=0.0)
     explainers = LoopExplainers({}, {}, {}, {"gpca": said}, np.array([CONCEPTS[0]] * 15 + [CONCEPTS[1]] * 15))
-    content = summary(robot_policy(SECTION, rehearsal), explainers)
+    gate = FailureGate(None, 0.75)
+    means = Means(robot_policy(SECTION, rehearsal), ("denoise", "new_view"), None, ("new_view", "denoise"), gate)
+    content = summary(means, explainers)
+    assert content["order"] == ["new_view", "denoise"]
+    assert content["thresholds"]["gate"] == 0.75
     assert content["calibration_accuracy"] == {"gpca": 0.5}
     assert content["calibration_samples"] == 30
     assert content["treatments"] == SECTION["treatments"]

@@ -9,6 +9,8 @@ import pytest
 from gpca.attribution.confidence import wilson_interval
 from gpca.attribution.metrics import tidy
 from gpca.errors import InputError
+from gpca.experiments.recovery.curves import draw_recovery_costs, draw_recovery_thresholds, losses
+from gpca.experiments.recovery.differences import COLUMNS
 from gpca.experiments.recovery.example_figure import draw_recovery_example
 from gpca.experiments.recovery.figures import draw_mitigation, draw_queued_labels, draw_recovery_rates
 from gpca.experiments.recovery.tables import table8_recovery
@@ -40,14 +42,30 @@ def metrics():
                 "cost": 0.03,
                 "nominal": episodes,
                 "acted_nominal": 0.25,
+                "cost_nominal": 0.02,
             }
+            for limit in (2, 10):
+                values |= {f"failures_at_{limit}": episodes} | {
+                    f"recovered_within_{k}_at_{limit}": 0.5 for k in (1, 2, 3)
+                }
             for seed in (0, 1):
                 records += [("recovery", "recovery", policy, m, cause, seed, v) for m, v in values.items()]
     return tidy(records, "recovery")
 
 
-def test_table8_pools_the_seeds_and_holds_the_wilson_bounds(metrics):
-    table = table8_recovery(metrics, {"gpca": 0.25}, TITLE, POLICIES, 3)
+@pytest.fixture
+def differences():
+    keys = [
+        (metric, against)
+        for metric in ("recovered_within_1", "recovered_within_3")
+        for against in ("sequence", "error")
+    ]
+    rows = [("gpca", *key, "random", 2, 24, 0.125 * n, -0.1, 0.4) for n, key in enumerate(keys)]
+    return pd.DataFrame(rows, columns=[*COLUMNS])
+
+
+def test_table8_pools_the_seeds_and_holds_the_wilson_bounds(metrics, differences):
+    table = table8_recovery(metrics, differences, {"gpca": 0.25}, TITLE, POLICIES, 3, 0.03)
     assert [labels[0][0] for labels in table.rows] == ["gpca", "random"]
     cell = table.cells[0, "recovered_within_1"]
     low, high = wilson_interval(12, 24)
@@ -60,6 +78,9 @@ def test_table8_pools_the_seeds_and_holds_the_wilson_bounds(metrics):
     assert table.cells[0, "acted_nominal"].mean == pytest.approx(25)
     assert table.cells[0, "cost"].mean == pytest.approx(0.03)
     assert (1, "seconds") not in table.cells
+    lead = records["gpca", "recovered_within_3_sequence"]
+    assert lead[2:5] == (pytest.approx(25), pytest.approx(-10), pytest.approx(40))
+    assert (1, "recovered_within_3_sequence") not in table.cells
     assert {key for key in table.best() if key[1].startswith("recovered")} == {
         (0, f"recovered_within_{k}") for k in (1, 2, 3)
     }
@@ -67,10 +88,15 @@ def test_table8_pools_the_seeds_and_holds_the_wilson_bounds(metrics):
     assert "24 failures over 2 seeds: 8 by noise among 80 registrations" in text
     assert TITLE in text
     assert "| GP-CA | **50.0 (31.4 to 68.6)** |" in text
-    for told in ("as if all failures were independent", "fixed by design", "a repaired pose is worth 1"):
+    assert "| 25 (12 to 45) |" in text  # the share of good registrations that are acted on has an interval
+    for told in (
+        "off by 3 % of the diameter or more",
+        "as if all cases were independent",
+        "a repaired pose is worth 1",
+    ):
         assert told in text
     with pytest.raises(InputError, match="has nothing to show"):
-        table8_recovery(metrics, {}, TITLE, {"absent": "Absent"}, 3)
+        table8_recovery(metrics, differences, {}, TITLE, {"absent": "Absent"}, 3, 0.03)
 
 
 def test_rates_are_drawn(metrics, same_bytes):
@@ -78,6 +104,35 @@ def test_rates_are_drawn(metrics, same_bytes):
     assert np.ptp(image) > 100
     with pytest.raises(InputError, match="have no recovery rates"):
         draw_recovery_rates(metrics, TITLE, {"absent": "Absent"}, 3)
+
+
+def test_thresholds_and_costs_are_drawn_for_the_policies_that_there_are(metrics, same_bytes):
+    titles = {"gpca_acting": "GP-CA, never queued", "error_only": "Error only", "always_denoise": "Always: denoise"}
+    methods = {"gpca": "gpca_acting", "random": "error_only"}
+    renamed = metrics.assign(method=metrics["method"].map(methods))
+    fixed = renamed[renamed["method"] == "error_only"].assign(method="always_denoise")
+    both = pd.concat([renamed, fixed])
+    by_limit = draw_recovery_thresholds(both, TITLE, titles, 3, (0.02, 0.1), 0.03)
+    assert [text.get_text() for text in by_limit.legends[0].get_texts()] == [
+        titles["gpca_acting"],
+        titles["always_denoise"],
+    ]
+    assert "failures: 24 at 2 %, 24 at 10 %" in by_limit.get_suptitle()
+    by_factor = draw_recovery_costs(both, TITLE, titles, 3, 0.2)
+    assert [text.get_text() for text in by_factor.legends[0].get_texts()] == [
+        titles["error_only"],
+        titles["always_denoise"],
+    ]
+    assert np.ptp(same_bytes(lambda: draw_recovery_costs(both, TITLE, titles, 3, 0.2))) > 100
+    for draw, last in ((draw_recovery_thresholds, ((0.02,), 0.03)), (draw_recovery_costs, (0.2,))):
+        with pytest.raises(InputError, match="have no recovery rates"):
+            draw(metrics, TITLE, {"absent": "Absent"}, 3, *last)
+
+
+def test_a_loss_by_hand(metrics):
+    loss_F = losses(metrics, "gpca", 3, 0.2, 0.1, np.array([1.0, 2.0]))
+    assert loss_F[0] == pytest.approx(0.1 * (0.25 + 0.03) + 0.9 * (0.25 * 0.2 + 0.02))
+    assert loss_F[1] - loss_F[0] == pytest.approx(0.1 * 0.03 + 0.9 * 0.02)
 
 
 def test_rates_by_cause_say_of_how_many_failures_they_are(metrics):
@@ -139,8 +194,8 @@ def test_the_example_is_drawn_and_one_without_its_second_view_refused(tmp_path, 
         placed = np.roll(mask, 8 if view == "first" else 1, axis=1)
         arrays |= {f"image_{view}": image, f"mask_{view}": mask, f"true_{view}": mask, f"placed_{view}": placed}
     save_arrays(tmp_path / "example.npz", arrays)
-    shown = same_bytes(lambda: draw_recovery_example(TITLE, tmp_path / "example.npz"))
+    shown = same_bytes(lambda: draw_recovery_example(TITLE, tmp_path / "example.npz", 0.03))
     assert np.ptp(shown) > 100
     save_arrays(tmp_path / "half.npz", {name: a for name, a in arrays.items() if not name.endswith("_next")})
     with pytest.raises(InputError, match="_next' is missing"):
-        draw_recovery_example(TITLE, tmp_path / "half.npz")
+        draw_recovery_example(TITLE, tmp_path / "half.npz", 0.03)
