@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -26,9 +27,10 @@ if TYPE_CHECKING:
     import pandas as pd
 
 READINGS = "readings.csv"
+OF_GROUP = ["table", "row", "column", "group"]  # what the readings of one group for one number share
 READING_COLUMNS = (
     *("table", "row", "column", "unit", "published", "upper", "reproduced", "verdict"),
-    *("group", "reading", "value", "at_least", "n", "distance", "close"),
+    *("group", "reading", "value", "at_least", "n", "distance", "close", "chance"),
 )
 
 
@@ -47,7 +49,7 @@ def judge_readings(
     Returns:
         value: of the reading, in the number's unit. distance: of the value from what is printed, in units of what
         counts as close; of a tolerance that is a ratio, by logarithms. close: whether the mean is within it, whatever
-        its interval.
+        its interval. chance: the share of the span of the group's values that is within the tolerance of one of them.
     """
     import pandas as pd
 
@@ -82,7 +84,39 @@ def judge_readings(
                     verdict_of(printed, _exact(reproduced), tolerance) in (REPRODUCED, CLOSE),
                 )
             )
-    return pd.DataFrame(records, columns=list(READING_COLUMNS))
+    judged = pd.DataFrame(records, columns=list(READING_COLUMNS[:-1]))
+    chances = {
+        key: chance_of(rows.loc[~rows["at_least"], "value"], rows["value"], tolerances[rows["unit"].iloc[0]])
+        for key, rows in judged.groupby(OF_GROUP, sort=False)
+    }
+    return judged.assign(chance=[chances[key] for key in judged[OF_GROUP].itertuples(index=False, name=None)])
+
+
+def chance_of(values: Sequence[float], span: Sequence[float], tolerance: Tolerance) -> float:
+    """Return the chance that a number drawn from the readings' span, whatever the paper did, has a close reading.
+
+    It is |∪_r [v_r - c, v_r + c] ∩ [v_min, v_max]| / (v_max - v_min), by logarithms of a tolerance that is a ratio,
+    where c is the close tolerance. Of a span of no width it is 1.
+
+    Args:
+        values: those of the readings that may be close; lower bounds cannot.
+        span: those of all readings.
+        tolerance: of their unit.
+    """
+    scale = math.log if tolerance.factor else float
+    # Nothing has no logarithm; it is as far from all else as a hundredth of the least.
+    least_positive = min((value for value in span if value > 0), default=1.0)
+    floor = least_positive / 100 if tolerance.factor else -math.inf
+    scaled, inside = (sorted(scale(max(float(value), floor)) for value in part) for part in (span, values))
+    least, most, close = scaled[0], scaled[-1], scale(tolerance.close)
+    if most == least:
+        return 1.0 if inside else 0.0
+    covered, end = 0.0, least
+    for value in inside:
+        start, stop = max(value - close, end), min(value + close, most)
+        covered += max(stop - start, 0.0)
+        end = max(end, stop)
+    return round(covered / (most - least), 6)
 
 
 @dataclass(frozen=True)
@@ -93,6 +127,7 @@ class OfGroup:
         readings: how many there are. close: how many of them are close to what is printed.
         least, most: of their values.
         nearest, value: the reading that is nearest, and what it gives.
+        chance: of having a close reading by chance alone, as :func:`chance_of` defines it.
         joint, fitted, touched: the reading of the group that is close to the most of its numbers, to how many, and of
             how many.
     """
@@ -103,6 +138,7 @@ class OfGroup:
     most: float
     nearest: str
     value: float
+    chance: float
     joint: str
     fitted: int
     touched: int
@@ -127,7 +163,7 @@ def summarize(judged: pd.DataFrame) -> dict[tuple[str, str, str], dict[str, OfGr
         touched = len(rows[["table", "row", "column"]].drop_duplicates())
         joint[group] = (str(fitted.idxmax()), int(fitted.max()), touched)
     summaries: dict[tuple[str, str, str], dict[str, OfGroup]] = {}
-    by_group = asked_about(judged).groupby(["table", "row", "column", "group"], sort=False)
+    by_group = asked_about(judged).groupby(OF_GROUP, sort=False)
     for (table, row, column, group), rows in by_group:
         nearest = rows.loc[rows["distance"].abs().idxmin()]
         least, most = rows["value"].min(), rows["value"].max()
@@ -138,6 +174,7 @@ def summarize(judged: pd.DataFrame) -> dict[tuple[str, str, str], dict[str, OfGr
             float(most),
             nearest["reading"],
             float(nearest["value"]),
+            float(nearest["chance"]),
             *joint[group],
             inside=bool(least <= nearest["upper"] and most >= nearest["published"]),
         )
@@ -150,7 +187,10 @@ def sentence(groups: Mapping[str, OfGroup]) -> str:
     for group, of in groups.items():
         span, nearest = f"{of.least:.3g} to {of.most:.3g}", f"{of.nearest}, {of.value:.3g}"
         if of.close:
-            sentences.append(f"Readings of {group}: {of.close} of {of.readings} are close, the nearest {nearest}.")
+            by_chance = f"{of.chance:.0%} of their span is, so that this may be chance"
+            sentences.append(
+                f"Readings of {group}: {of.close} of {of.readings} are close, the nearest {nearest}; {by_chance}."
+            )
         elif of.inside:
             sentences.append(f"Readings of {group}: none of {of.readings} is close, {span}, the nearest {nearest}.")
         else:
@@ -176,7 +216,7 @@ def read_judged(path: str | Path) -> pd.DataFrame:
         InputError: missing, empty or unreadable file, missing column, something that is not a number.
     """
     rows = read_csv(path, READING_COLUMNS)
-    for column in ("published", "upper", "value", "n", "distance"):
+    for column in ("published", "upper", "value", "n", "distance", "chance"):
         rows[column] = numbers_in(path, rows, column)
     rows["reproduced"] = numbers_in(path, rows, "reproduced", needed=rows["reproduced"] != "")
     for column in ("close", "at_least"):

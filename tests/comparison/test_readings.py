@@ -4,7 +4,7 @@ import pandas as pd
 import pytest
 
 from gpca.attribution.metrics import TIDY_COLUMNS
-from gpca.comparison.readings import judge_readings, read_judged, summarize, with_readings
+from gpca.comparison.readings import chance_of, judge_readings, read_judged, summarize, with_readings
 from gpca.errors import InputError
 
 from .made_up import ACCURACY, LABELS, TOLERANCES, compared, number, tidy
@@ -86,3 +86,17 @@ def test_what_was_judged_is_read_back_or_refused(tmp_path):
     path.write_text(path.read_text().replace("50.0", "half"))
     with pytest.raises(InputError, match="column 'published' contains values that are not finite numbers"):
         read_judged(path)
+
+
+def test_the_chance_is_the_share_of_the_span_within_the_tolerance():
+    percent, labels = TOLERANCES["%"], TOLERANCES["labels"]
+    assert chance_of([10, 50], [10, 50], percent) == pytest.approx(2 * 3 / 40)
+    assert chance_of([10, 12, 50], [10, 12, 50], percent) == pytest.approx((2 + 3 + 3) / 40)  # overlaps count once
+    assert chance_of([10, 14, 18], [10, 14, 18], percent) == 1
+    assert chance_of([10], [10, 50], percent) == pytest.approx(3 / 40)  # the other is a lower bound
+    assert chance_of([4, 36], [4, 36], labels) == 1  # by logarithms: a factor of 3 to either side
+    assert chance_of([7], [7], percent) == 1
+    assert chance_of([], [7], percent) == 0
+    found, comparison = judged(50.0, {"random": 0.515, "kmeans": 0.97})
+    assert summarize(found)[KEY]["start"].chance == pytest.approx(6 / 45.5)
+    assert "13% of their span is" in with_readings(comparison, found)["reason"][0]

@@ -58,6 +58,36 @@ def shap(run_files: RunFiles, readings: Sequence[Reading], sizes: ReadingSizes) 
             yield reading, source, "shap_additive", "accuracy", ALL, seed, value
 
 
+def magnitudes(run_files: RunFiles, readings: Sequence[Reading], sizes: ReadingSizes) -> Iterator[Row]:
+    """Yield the accuracies of SHAP and of local sensitivity analysis by how far each knob is turned.
+
+    SHAP turns it so far or not at all; sensitivity analysis divides by that step, in units of the knob's range.
+    """
+    settings = run_files.uncertainty()
+    turned_R_3 = np.array([[reading[name] for name in Knobs._fields] for reading in readings])
+    for source, seed, pairs in _pairs(run_files, sizes, settings, settings.starts, "knobs"):
+        concept_S, worths = [], []
+        for concept, runs in pairs:
+            concept_S.append(concept)
+            spread_R_8 = np.array([_turned(runs["observed"], turned_3) for turned_3 in turned_R_3])
+            worths.append(_worth(spread_R_8, "divergence", settings.floor))
+        for number, reading in enumerate(readings):
+            worth_S_8 = np.array([worth_R_8[number] for worth_R_8 in worths])
+            change_S_3 = worth_S_8[:, [1 << knob for knob in range(3)]] - worth_S_8[:, :1]
+            derivative_S_3 = change_S_3 / ((turned_R_3[number] - UNTOUCHED) / KNOB_RANGE)
+            named = {"shap_additive": shapley_values(worth_S_8), "sa_local_additive": derivative_S_3}
+            for method, value_S_3 in named.items():
+                value = _accuracy(np.array(concept_S), value_S_3, "signed")
+                yield reading, source, method, "accuracy", ALL, seed, value
+
+
+def _turned(pair: tuple, turned_3: np.ndarray) -> np.ndarray:
+    """Return the covariances (8, 6, 6) of the corners between the untouched knobs and these."""
+    (_, _, _, T_ref), knob_runs = pair
+    corners = (Knobs(*np.where(switches, turned_3, UNTOUCHED)) for switches in CORNERS)
+    return np.array([knob_runs.runs(corner)[0].covariance(T_ref) for corner in corners])
+
+
 def _pairs(
     run_files: RunFiles, sizes: ReadingSizes, settings: UncertaintySettings, starts: int, title: str
 ) -> Iterator[tuple[str, int, Iterator[tuple[str, dict[str, tuple[RegisteredRow, KnobRuns]]]]]]:

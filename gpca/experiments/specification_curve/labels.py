@@ -24,7 +24,7 @@ EVERY, MOST = 5, 200  # epochs between looks at the accuracy, and the most of th
 
 def pool(run_files: RunFiles, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iterator[Row]:
     """Yield labels and epochs to the target under each reading, by BALD with k-means and by random choice."""
-    base, target = _base(run_files)
+    base, target = base_settings(run_files)
     for source, seed, _, registrations in run_files.in_distribution():
         started: dict[tuple, tuple[LabelingTask, GPC] | None] = {}
         labeled: dict[tuple, dict[str, float]] = {}
@@ -76,7 +76,7 @@ def until(
 
 def epochs(run_files: RunFiles, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iterator[Row]:
     """Yield the passes of Adam that a classifier started anew takes to the target."""
-    base, target = _base(run_files)
+    base, target = base_settings(run_files)
     for source, seed, _, registrations in run_files.in_distribution():
         task = make_task(registrations, NEW, base, source, seed)
         begun = (task, initial_gpc(task, base, source, seed, "reading"))
@@ -103,6 +103,7 @@ def passes(
     return {"epochs_to_target": float(MOST), "reached": 0.0}
 
 
-def _base(run_files: RunFiles) -> tuple[ActiveLearningSettings, float]:
+def base_settings(run_files: RunFiles) -> tuple[ActiveLearningSettings, float]:
+    """Return the protocol's settings and its target accuracy."""
     section = run_files.section("active_learning")
     return ActiveLearningSettings.from_dict(section), section["target"]

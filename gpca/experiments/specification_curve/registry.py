@@ -16,6 +16,7 @@ from gpca.settings import Bounds, Count, Distinct, Keys, OpenShare, Positive
 
 FRAME_INPUT = "frame_input"  # the group that trains an encoder of frames for each of its readings
 ALL_SOURCES = ("coffee_cup", "linemod", "ycb")
+AboveOne = Annotated[float, Bounds(exclusiveMinimum=1)]
 AtLeastTwo = Annotated[int, Bounds(minimum=2)]
 Divergence = Literal["divergence", "divergence_reversed", "log_determinant"]
 Quantity = Literal[Divergence, "trace", "residual", "inlier_rmse", "inlier_rmse_of_one"]
@@ -90,6 +91,12 @@ GROUPS = {
         "knobs:shap",
         ("registrations",),
     ),
+    "knob_sizes": Group(
+        "How far SHAP and SA turn the knobs",
+        {"noise": OpenShare, "spread": AboveOne, "overlap": OpenShare},
+        "knobs:magnitudes",
+        ("registrations",),
+    ),
     "severities": Group(
         "How strong the perturbations are",
         {"part": Literal["all", "weakest", "middle", "strongest"], "classifier": Literal["paper", "converged"]},
@@ -146,6 +153,17 @@ GROUPS = {
         "Pool, batch and start of active learning",
         {"new_share": OpenShare, "batch": Count, "initial": AtLeastTwo},
         "labels:pool",
+        ("sets",),
+    ),
+    "labels_classifier": Group(
+        "Classifier of active learning",
+        {
+            "learning_rate": LearningRate,
+            "iterations": Count,
+            "start": Literal["warm", "cold"],
+            "inputs": Literal["pool", "labeled"],
+        },
+        "labels_classifier:run",
         ("sets",),
     ),
     "epochs": Group(

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 COLUMNS = {"published": "Paper", "reproduced": "Here", "least": "Least", "most": "Most", "value": "Nearest"}
+CHANCE = "chance"
 _BEST = "Reading that is close to the most numbers"
 INPUTS = {
     "aligned": "observed cloud, aligned by ICP",
@@ -68,20 +69,37 @@ def table13_readings(judged: pd.DataFrame, groups: Mapping[str, str], sources: M
                 (of.joint, f"{reading_in_words(group, of.joint)} ({of.fitted} of {of.touched})"),
             )
             numbers = {"published": first["published"], "reproduced": first["reproduced"]}
-            numbers |= {"least": of.least, "most": of.most, "value": of.value}
+            numbers |= {"least": of.least, "most": of.most, "value": of.value, CHANCE: 100 * of.chance}
             cells = {name: None if math.isnan(x) else plain_cell(float(x), seeds, 0) for name, x in numbers.items()}
             table.add_row(labels, cells)
     return table.build(
         "The numbers that are not reproduced, under other readings of what the paper leaves unstated"
         + stand_in_clause(sources.values()),
         "value",
-        {name: Plain(title, interval=False, limits=(-math.inf, math.inf)) for name, title in COLUMNS.items()},
+        {
+            **{name: Plain(title, interval=False, limits=(-math.inf, math.inf)) for name, title in COLUMNS.items()},
+            CHANCE: Column("Chance (%)", decimals=0, interval=False),
+        },
         (
+            "Chance: the share of the span of a group's values, from Least to Most, that is close to one of its "
+            "readings: how likely a number from anywhere in it would be produced (docs/comparison.md). "
+            f"{_by_chance(judged)}",
             "Paper to Nearest are in the row's unit; Least, Most and Nearest are means over the seeds of single "
             "readings. Of a range, Paper is the lower end. No reading is the reproduction.",
             f"{_BEST}: of all printed numbers that the same choices touch, also those that are reproduced; in brackets "
             "to how many of how many it is close.",
         ),
+    )
+
+
+def _by_chance(judged: pd.DataFrame) -> str:
+    """Return how many numbers are produced by some group, beside how many would be by chance, groups taken apart."""
+    of_groups = [of for groups in summarize(judged).values() for of in groups.values()]
+    produced, expected = sum(of.close > 0 for of in of_groups), sum(of.chance for of in of_groups if of.inside)
+    inside = sum(of.inside for of in of_groups)
+    return (
+        f"Of the {len(of_groups)} rows, {inside} lie within the span of their group; {expected:.1f} of these would be "
+        f"produced by chance. Produced are {produced}, also by readings beside the span."
     )
 
 

@@ -4,7 +4,13 @@ from __future__ import annotations
 
 from gpca.experiments.specification_curve.registry import GROUPS
 
-_INPUTS = {"standardised": "standardized inputs", "unit_norm": "inputs of unit norm", "raw": "raw inputs"}
+_INPUTS = {
+    "pool": "inputs scaled by the pool too",
+    "labeled": "inputs scaled by the labeled samples alone",
+    "standardised": "standardized inputs",
+    "unit_norm": "inputs of unit norm",
+    "raw": "raw inputs",
+}
 _SETS = {
     "in_distribution": "samples as in training",
     "severity": "severer perturbations",
@@ -38,6 +44,7 @@ WORDS = {  # field of a group's choices -> what its values are called
     "lengthscale": {"median": "lengthscale from the median distance", "default": "default lengthscale"},
     "batch": {"full": "all samples at once", "minibatch": "minibatches"},
     "kernel": {"rbf": "RBF", "matern32": "Matérn 3/2", "polynomial": "polynomial"},
+    "start": {"warm": "warm start", "cold": "cold start"},
     "machine": {"svc": "SVC", "linear_svc": "LinearSVC"},
     "probability": {"platt": "Platt scaling", "softmax": "softmax of the decision values"},
     "head": {"linear": "linear head", "two_layer": "head of two layers"},
@@ -72,6 +79,9 @@ WORDS = {  # field of a group's choices -> what its values are called
 }
 NUMBERS = {  # field -> the words around a number
     "starts": "{} starts",
+    "noise": "noise of {}",
+    "spread": "starts spread × {}",
+    "overlap": "{} cut off",
     "floor": "variances of at least {}",
     "iterations": "{} iterations",
     "batch": "batches of {}",

@@ -19,6 +19,7 @@ from gpca.experiments.specification_curve import (
     frames,
     gpc_start,
     labels,
+    labels_classifier,
     learners,
     severities,
 )
@@ -208,3 +209,32 @@ def test_a_group_that_needs_more_samples_than_there_are_says_how_to_get_on(run_f
     assert "readings of pool: need more training samples than the run has; raise registrations.train, or" in said
     assert "or set readings.groups.pool to false" in said
     assert not (tmp_path / "pool.csv").exists()
+
+
+def test_the_warm_classifier_that_sees_the_pool_is_the_protocols(run_files):
+    choices = {"learning_rate": [0.1], "iterations": [20], "start": ["warm"], "inputs": ["pool"]}
+    found = rows_of(labels_classifier.run, run_files, choices)
+    base, target = labels.base_settings(run_files)
+    [(source, seed, _, registrations)] = run_files.in_distribution()
+    task = labels.make_task(registrations, labels.NEW, base, source, seed)
+    steps, _ = labels.until(
+        target, task, labels.initial_gpc(task, base, source, seed, "reading"), "bald_kmeans", base, source, seed
+    )
+    assert found[(0.1, 20, "warm", "pool"), "bald_kmeans", "labels_to_target", "overlap"] == steps[-1]["labels"]
+
+
+def test_a_cold_start_learns_from_all_labels_and_asks_for_every_sample_once(run_files):
+    base, _ = labels.base_settings(run_files)
+    [(source, seed, _, registrations)] = run_files.in_distribution()
+    task = labels.make_task(registrations, labels.NEW, base, source, seed)
+    whole = replace(base, labels=len(task.pool), batch=max(2, len(task.pool) // 2))
+    steps = list(labels_classifier.cold(task, "random", whole, False, source, seed))
+    assert steps[0]["labels"] == 0
+    assert steps[-1]["labels"] == len(task.pool)
+    assert steps[-1]["new_labels"] == (task.pool.concept_N == labels.NEW).sum()
+    assert steps[0]["accuracy"] < steps[-1]["accuracy"]
+    seen, alone = (
+        labels_classifier._fitted(task, [], base, sees_pool, source, seed).attribute(task.test.h)[0]
+        for sees_pool in (True, False)
+    )
+    assert np.abs(seen - alone).max() > 1e-3

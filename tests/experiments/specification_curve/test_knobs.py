@@ -43,6 +43,21 @@ def test_the_protocols_readings_are_what_the_explainers_say(run_files, outcomes)
     assert len(found) == 4
 
 
+def test_knobs_that_are_turned_as_far_as_the_protocols_say_what_shap_says(run_files, outcomes):
+    concept_S, uncertainty_S_K = outcomes
+    choices = {"noise": [0.02, 0.03], "spread": [3.75], "overlap": [0.4, 0.6]}
+    found = rows_of(knobs.magnitudes, run_files, choices)
+    assert found[(0.02, 3.75, 0.4), "shap_additive", "accuracy", "all"] == accuracy(
+        concept_S, shapley_values(uncertainty_S_K[:, :8])
+    )
+    assert {(reading, method) for reading, method, _, _ in found} == {
+        ((noise, 3.75, overlap), method)
+        for noise in (0.02, 0.03)
+        for overlap in (0.4, 0.6)
+        for method in ("shap_additive", "sa_local_additive")
+    }
+
+
 def test_every_quantity_is_measured_in_every_condition(run_files):
     quantities = ["divergence", "divergence_reversed", "log_determinant", "trace", "residual", "inlier_rmse",
                   "inlier_rmse_of_one"]  # fmt: skip
