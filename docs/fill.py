@@ -33,11 +33,12 @@ from gpca.errors import InputError  # noqa: E402
 from gpca.io.files import whole_file  # noqa: E402
 
 DEFINITIONS = Path(__file__).with_name("numbers.yaml")
-REFERENCE = ROOT / "results/reference/full"
+REFERENCES = ROOT / "results/reference"
 NUMBER = re.compile(r"(?<![\w.])(-?\d[\d.]*)<!--(\w+)-->")
 PASSAGE = re.compile(r"(?<=<!--begin )(\w+)-->\n(.*?)(?=<!--end \1-->)", re.DOTALL)
 CONDITION = re.compile(r"<!--if (\w+)-->")
 MARKER = re.compile(r"<!--(?:begin |if )?(\w+)-->")
+LINK = re.compile(r"\]\([^)\s]*results/reference/(\w+)/")
 OF_SEVERAL_ROWS: dict[str, Callable] = {"min": min, "max": max, "mean": fmean}
 LINE = 120  # letters
 
@@ -47,10 +48,15 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--check", action="store_true", help="write nothing; exit with 1 if a page differs")
     check = parser.parse_args(arguments).check
     try:
-        pages = yaml.safe_load(DEFINITIONS.read_text(encoding="utf-8"))
+        reference, pages = read_definitions()
         texts = {page: (ROOT / page).read_text(encoding="utf-8") for page in pages}
-        new = {page: filled(texts[page], pages[page], page, REFERENCE) for page in pages}
-        untrue = {page: no_longer_true(texts[page], pages[page], REFERENCE) for page in pages}
+        folder = REFERENCES / reference
+        new = {page: filled(texts[page], pages[page], page, folder) for page in pages}
+        untrue = {page: no_longer_true(texts[page], pages[page], folder) for page in pages}
+        untrue = {page: [*lines, *links_elsewhere(texts[page], reference)] for page, lines in untrue.items()}
+    except KeyError as fault:
+        print(f"fill: {DEFINITIONS.name}: lacks the key {fault}; add it", file=sys.stderr)
+        return 2
     except (InputError, OSError, yaml.YAMLError) as fault:
         print(f"fill: {fault}", file=sys.stderr)
         return 2
@@ -60,6 +66,18 @@ def main(arguments: list[str] | None = None) -> int:
             with whole_file(ROOT / page) as partial:
                 partial.write_text(text, encoding="utf-8")
     return int(any(untrue.values()) or (check and any(changes for _, changes in new.values())))
+
+
+def read_definitions() -> tuple[str, dict[str, dict]]:
+    """Return the name of the reference that numbers are read from, and of every page what its markers are."""
+    pages = yaml.safe_load(DEFINITIONS.read_text(encoding="utf-8"))
+    return pages.pop("reference"), pages
+
+
+def links_elsewhere(text: str, reference: str) -> list[str]:
+    """Return a line about each link of a page to results of another reference than the one its numbers are of."""
+    others = sorted({name for name in LINK.findall(text) if name != reference})
+    return [f"links to results/reference/{name}, but its numbers are of {reference}" for name in others]
 
 
 def filled(text: str, definitions: dict, page: str, folder: Path) -> tuple[str, list[str]]:

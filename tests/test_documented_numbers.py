@@ -120,17 +120,24 @@ def test_a_marker_without_a_definition_a_number_or_an_end_is_refused(reference, 
 
 def test_what_differs_is_written_unless_it_is_only_checked(reference, monkeypatch, capsys):
     page, definitions = reference / "page.md", reference / "numbers.yaml"
+    own = f"reference: {reference.name}\n"
     page.write_text("A share of 1<!--own--> %.\n")
-    definitions.write_text("page.md: {own: table9 cups gpca .1f}\n")
-    for name, value in (("ROOT", reference), ("DEFINITIONS", definitions), ("REFERENCE", reference)):
+    definitions.write_text(own + "page.md: {own: table9 cups gpca .1f}\n")
+    for name, value in (("ROOT", reference), ("DEFINITIONS", definitions), ("REFERENCES", reference.parent)):
         monkeypatch.setattr(fill, name, value)
     assert (fill.main(["--check"]), page.read_text()) == (1, "A share of 1<!--own--> %.\n")
     assert (fill.main([]), page.read_text()) == (0, "A share of 98.7<!--own--> %.\n")
     assert capsys.readouterr().out.splitlines() == ["page.md: own: 1 -> 98.7"] * 2
     page.write_text("The best<!--if best-->.\n")
-    definitions.write_text("page.md: {best: [table9 mine above 0]}\n")
+    definitions.write_text(own + "page.md: {best: [table9 mine above 0]}\n")
     assert fill.main([]) == 1
     page.write_text("A share of 1<!--own--> %.\n")
-    definitions.write_text("page.md: {own: table8 cups .1f}\n")
+    definitions.write_text(own + "page.md: {own: table8 cups .1f}\n")
     assert fill.main([]) == 2
     assert "no such file" in capsys.readouterr().err
+
+
+def test_links_go_to_the_reference_that_the_numbers_are_of():
+    page = "[one](results/reference/full/tables/a.md) [two](../results/reference/default/b.md) results/reference/old/"
+    assert fill.links_elsewhere(page, "default") == ["links to results/reference/full, but its numbers are of default"]
+    assert len(fill.links_elsewhere(page, "full")) == 1
