@@ -32,6 +32,7 @@ FEWEST_POINTS = 16  # that a crop leaves of a cloud, at least; as few as Monte-C
 Moved = Literal["model", "observed"]  # the cloud that ICP moves onto the other
 MODEL: Moved = "model"
 OBSERVED: Moved = "observed"
+NOT_OF_CAUSES = ("icp", "icp_points")  # which sections of the config lack: registrations has them
 CloudPoints = Annotated[int, Bounds(minimum=64, maximum=65536)]
 
 

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from gpca.alignment.success import SuccessSettings
-from gpca.causes.settings import CauseSettings
+from gpca.causes.settings import NOT_OF_CAUSES, CauseSettings
 from gpca.classifier.settings import GPCSettings
 from gpca.comparison.published import UNITS
 from gpca.comparison.reference import Allowance
@@ -24,7 +24,6 @@ from gpca.settings import Bounds, Distinct, Keys, OpenShare, changes_of, part_of
 from gpca.uncertainty.settings import UncertaintySettings
 
 DESIGNS = ("additive", "latin", "saltelli", "oracle", "removal", "causal")  # gpca.uncertainty.designs needs numba
-NOT_OF_CAUSES = ("icp", "icp_points")  # the section registrations has them
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,5 @@
 # Registrations -> encoders trained under a control -> what every explainer says under all of them.
-from gpca.experiments.controls.settings import RETRAINED, TRAININGS, UNSEEN
+from gpca.experiments.controls.settings import HARD, OF_EVERY_SEED, RETRAINED, TRAININGS
 
 CONTROLS = config["controls"]
 CONTROL_SEEDS = NAMES["control_seed"]
@@ -19,9 +19,22 @@ rule controls:
         ),
 
 
+use rule sample_causes as sample_hard with:
+    output:
+        causes="<results>/hard/{source}/seed{seed}.npz",
+        candidates="<results>/hard/{source}/seed{seed}.csv",
+        timings="<results>/timings/{source}/hard/seed{seed}.csv",
+    log:
+        "<logs>/hard/{source}/seed{seed}.log",
+    benchmark:
+        "<benchmarks>/hard/{source}/seed{seed}.tsv"
+    params:
+        settings=as_json(config["causes"] | CONTROLS["hard"] | ICP),
+
+
 rule train_control:
     input:
-        registrations="<results>/registrations/{source}/seed{seed}.npz",
+        registrations=lambda wildcards: samples_of_control(wildcards),
         code=code_files(
             "gpca.experiments.controls.encoding", encoder_module(CONTROL_ENCODER)
         ),
@@ -52,6 +65,7 @@ rule explain_controls:
             f"<results>/registrations/{{source}}/seed{wildcards.seed}.npz",
             source=other_sources(wildcards),
         ),
+        hard=lambda wildcards: hard_samples(wildcards),
         encoder=f"<results>/encoders/{{source}}/{CONTROL_ENCODER}/seed{{seed}}.pt",
         embeddings=f"<results>/embeddings/{{source}}/{CONTROL_ENCODER}/none/seed{{seed}}.npz",
         retrained_embeddings=lambda wildcards: collect(

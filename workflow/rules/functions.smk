@@ -33,7 +33,9 @@ def controls_of(seed):
     """Return the controls of a seed: all, but those that need a further encoder for the first seeds alone."""
     further = int(seed) in CONTROL_SEEDS[: CONTROLS["encoder_seeds"]]
     return [
-        n for n in CONTROLS["controls"] if further or n == UNSEEN or n not in RETRAINED
+        name
+        for name in CONTROLS["controls"]
+        if further or name in OF_EVERY_SEED or name not in RETRAINED
     ]
 
 
@@ -45,10 +47,24 @@ def retrained(wildcards):
 
 
 def control_settings(wildcards, **further):
-    own = {name: CONTROLS[name] for name in CONTROLS if name != "explainers"}
+    own = {n: CONTROLS[n] for n in CONTROLS if n not in ("explainers", "hard")}
     own["controls"] = controls_of(wildcards.seed)
     encoder = config["encoders"][CONTROL_ENCODER]
     return as_json({"controls": own, "encoder": encoder, **further})
+
+
+def samples_of_control(wildcards):
+    """Return the registrations that the encoder of a control learns from."""
+    folder = "hard" if wildcards.control == HARD else "registrations"
+    return f"<results>/{folder}/{wildcards.source}/seed{wildcards.seed}.npz"
+
+
+def hard_samples(wildcards):
+    """Return the samples of the hard control, where it is among those of the seed."""
+    asked = HARD in controls_of(wildcards.seed)
+    return (
+        f"<results>/hard/{wildcards.source}/seed{wildcards.seed}.npz" if asked else []
+    )
 
 
 def other_sources(wildcards):

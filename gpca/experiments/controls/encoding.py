@@ -11,7 +11,7 @@ import pandas as pd
 
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.training import embed, train_encoder
-from gpca.experiments.controls.settings import ControlSettings
+from gpca.experiments.controls.settings import HARD, ControlSettings
 from gpca.experiments.controls.variants import left_out, of_unseen_objects
 from gpca.io.arrays import save_arrays
 from gpca.io.csv_file import write_csv
@@ -36,7 +36,7 @@ def encode(
 
     With matched density every draw from a cloud has a random number of points; the clouds are whole, as each epoch
     draws anew. An encoder for unseen objects sees no sample of them; nor does one that is trained in another way, by
-    such draws or with a head of two layers.
+    such draws or with a head of two layers. Hard samples are of unseen objects as they are.
 
     Returns:
         the arrays of a file of embeddings, and the training curve.
@@ -46,7 +46,7 @@ def encode(
         encoder = replace(encoder, fewest_points=fewest, draw_points=most)
     if control == "two_layer_head":
         encoder = replace(encoder, head="two_layer")
-    if control != "density":
+    if control not in ("density", HARD):
         registrations = of_unseen_objects(registrations, settings.folds, source, seed)
     name = f"{source} under {control}"
     model, curve = train_encoder(registrations, name, seed, encoder, checkpoint)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
-from gpca.errors import InputError
+from gpca.causes.settings import NOT_OF_CAUSES, CauseSettings
+from gpca.errors import InputError, with_key
 from gpca.experiments.controls.settings import TRANSFER, UNSEEN, ControlSettings
 from gpca.experiments.experiment import EXPLAINERS, ByName, Experiment, LeftOut, Tidy
 from gpca.experiments.explained import require_explained, titles
@@ -14,17 +15,25 @@ from gpca.explainers.gpca import GPCA_FORMS
 from gpca.explainers.interface import BARE
 from gpca.explainers.registry import explainer_entry
 from gpca.objects.title import stand_in_clause
+from gpca.settings import changes_of
 
 
 @dataclass(frozen=True, kw_only=True)
 class Section(ControlSettings):
-    """The controls, and the explainers under them, with settings beyond those that they have elsewhere."""
+    """The controls, and the explainers under them, with settings beyond those that they have elsewhere.
+
+    Attributes:
+        hard: how the hard samples are drawn: as the causes, with these changes.
+    """
 
     explainers: ByName
+    hard: Annotated[dict, changes_of(CauseSettings, without=NOT_OF_CAUSES)]
 
 
 def check(config: dict, _left_out: LeftOut) -> None:
-    """Check that every explainer finds what it reads under a control."""
+    """Check that every explainer finds what it reads under a control, and that hard samples can be drawn."""
+    hard = config["causes"] | config["controls"]["hard"]
+    with_key("controls.hard", CauseSettings.from_dict, hard, config["registrations"]["icp"])
     for key, name in require_explained(config, "controls.explainers"):
         entry = explainer_entry(name)
         if entry.design and not entry.observed_only:

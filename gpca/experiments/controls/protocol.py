@@ -14,6 +14,7 @@ from gpca.attribution.predictions import prediction_frame
 from gpca.experiments.controls.costs import ASKED, Costs
 from gpca.experiments.controls.rivals import Embed, Rival, described_for
 from gpca.experiments.controls.settings import (
+    HARD,
     PAPER,
     RELABELED,
     RETRAINED,
@@ -52,6 +53,7 @@ class ControlRun:
         embed: registrations and the name of their source -> embeddings and head's logits by the paper's encoder.
         embeddings: ``embedding`` and ``head_logits`` by the paper's encoder, and by that of each control that has one,
             and by those trained in other ways, of the samples of unseen objects.
+        hard: the samples of that control, if it is among them.
         costs: the seconds of the explainers under the paper's protocol.
     """
 
@@ -63,6 +65,7 @@ class ControlRun:
     rivals: Mapping[str, Rival]
     embed: Embed
     embeddings: Mapping[str, Mapping[str, np.ndarray]] = field(default_factory=dict)
+    hard: Registrations | None = None
     costs: Costs = field(default_factory=Costs)
 
     def run(self, registrations: Registrations, others: Mapping[str, Registrations]) -> pd.DataFrame:
@@ -101,6 +104,8 @@ class ControlRun:
         why = left_out(control, registrations, self.settings, self.backbone)
         if control == TRANSFER and not others:
             why = "it needs at least two sources"
+        if control == HARD and self.hard is None:
+            why = "it needs samples of its own"
         if why:
             print(f"controls of {self.source}: '{control}' is skipped: {why}", file=sys.stderr)
         return not why
@@ -112,7 +117,10 @@ class ControlRun:
 
     def _changed(self, control: str, plain: Registrations, embeds: Mapping[str, Attach]) -> Registrations:
         """Return the registrations under a control, with all that explainers read attached."""
-        changed = variant(control, plain, self.source, self.seed, self.settings, self.uncertainty.icp)
+        if control == HARD and self.hard is not None:
+            changed = self.hard
+        else:
+            changed = variant(control, plain, self.source, self.seed, self.settings, self.uncertainty.icp)
         if control == UNSEEN:  # the measurements of each stay
             changed = replace(changed, attached={**changed.attached, **self.embeddings[control]})
         elif control in RETRAINED:

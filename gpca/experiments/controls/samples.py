@@ -1,14 +1,15 @@
-"""The severity of each test sample's perturbation, and the final error of its registration."""
+"""The severity of each test sample's perturbations, and the final error of its registration."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gpca.alignment.rigid import inverse
-from gpca.causes.subjects import read_subjects
+from gpca.causes.subjects import Subject, read_subjects
 from gpca.io.csv_file import read_numbers
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations
@@ -18,14 +19,24 @@ if TYPE_CHECKING:
 
 OF_CONCEPT = {"noise": ("noise",), "pose": ("rotation_deg", "translation"), "overlap": ("crop",)}
 SEVERITIES = tuple(name for names in OF_CONCEPT.values() for name in names)
-COLUMNS = ("sample", "object", "concept", *SEVERITIES, "error")
+COLUMNS = ("control", "sample", "object", "concept", *SEVERITIES, "error")
 
 
-def sample_table(registrations: Registrations, objects: ObjectClouds) -> pd.DataFrame:
-    """Return severities and final error of the test samples: ADD, or ADD-S where symmetric, in diameters."""
+def sample_table(asked: Mapping[str, Registrations], objects: ObjectClouds) -> pd.DataFrame:
+    """Return severities and final error of the test samples: ADD, or ADD-S where symmetric, in diameters.
+
+    Args:
+        asked: the registrations of each control that has samples of its own, the paper's protocol among them.
+    """
     import pandas as pd
 
     subjects = {subject.name: subject for subject in read_subjects(objects)}
+    return pd.concat([_of_control(name, own, subjects) for name, own in asked.items()], ignore_index=True)
+
+
+def _of_control(control: str, registrations: Registrations, subjects: Mapping[str, Subject]) -> pd.DataFrame:
+    import pandas as pd
+
     rows = registrations.rows("test")
     errors = []
     for row in rows:
@@ -33,6 +44,7 @@ def sample_table(registrations: Registrations, objects: ObjectClouds) -> pd.Data
         errors.append(subjects[str(registrations.object_name[row])].errors(left[None])[0])
     return pd.DataFrame(
         {
+            "control": control,
             "sample": registrations.sample[rows],
             "object": registrations.object_name[rows],
             "concept": registrations.concept[rows],

@@ -12,6 +12,7 @@ PAPER = "paper"  # the protocol itself, which every control is compared with
 Control = Literal[
     "density",
     "unseen_objects",
+    "hard",
     "reversed",
     "label_noise_5",
     "label_noise_10",
@@ -23,7 +24,9 @@ Control = Literal[
 CONTROLS: tuple[str, ...] = get_args(Control)
 UNSEEN = "unseen_objects"
 SEEN = "seen_objects"  # tests of the explainers for unseen objects on new samples of known objects
-RETRAINED = ("density", UNSEEN)  # need an encoder of their own
+HARD = "hard"  # samples of its own, in which no state is perfect and the label is what was measured
+RETRAINED = ("density", UNSEEN, HARD)  # need an encoder of their own
+OF_EVERY_SEED = (UNSEEN, HARD)  # of these, the ones for which every seed has one
 Training = Literal["random_draws", "two_layer_head"]
 TRAININGS: tuple[str, ...] = get_args(Training)  # other ways to train the encoder, on the samples for unseen objects
 WRONG_LABELS = {f"label_noise_{percent}": percent / 100 for percent in (5, 10, 20, 30)}  # share of the training labels
@@ -39,7 +42,7 @@ class ControlSettings:
     Attributes:
         controls: their names.
         encoders: other ways to train GP-CA's encoder, compared on known and on unseen objects.
-        encoder_seeds: how many of `seeds`, from the first, train more encoders than the one for unseen objects.
+        encoder_seeds: how many of `seeds`, from the first, train more encoders than those of `OF_EVERY_SEED`.
         seeds: how many of the run's seeds are used, from the first.
         draw_points: range of the random number of points of a cloud where density is matched.
         folds: the number of folds of a source's objects, of which one is unseen.

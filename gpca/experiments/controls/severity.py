@@ -50,7 +50,8 @@ def collect(
     samples = []
     for path in sample_files:
         _, source, seed = source_method_seed(path)
-        own = read_samples(path).assign(source=source, seed=seed)
+        own = read_samples(path)
+        own = own[own["control"] == PAPER].assign(source=source, seed=seed)
         samples.append(_with_bins(own, ranges, bins))
     table = pd.concat(samples, ignore_index=True)
     with_severity = judged.merge(

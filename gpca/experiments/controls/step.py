@@ -9,7 +9,7 @@ from gpca.encoders.weights import load_model
 from gpca.experiments.controls.protocol import ControlRun
 from gpca.experiments.controls.rivals import make_rivals
 from gpca.experiments.controls.samples import sample_table
-from gpca.experiments.controls.settings import PAPER, ControlSettings
+from gpca.experiments.controls.settings import HARD, PAPER, ControlSettings
 from gpca.experiments.controls.variants import left_out, variant
 from gpca.io.csv_file import write_csv
 from gpca.objects.canonical import ObjectClouds
@@ -31,13 +31,16 @@ def run(job: Job) -> None:
     others = dict(zip(job.others, job.other_registrations, strict=True))
     axes = (job.source, job.seed)
     inputs = [job.objects, job.registrations, job.encoder, job.embeddings]
-    inputs += [*retrained.values(), *others.values()]
+    inputs += [*retrained.values(), *others.values(), *filter(None, [job.get("hard")])]
     with record_provenance([job.predictions, job.samples, job.timings], inputs, job.settings, seed=job.seed):
         registrations = Registrations.load(job.registrations, axes)
+        hard = Registrations.load(job.hard, axes) if job.get("hard") else None
         model = load_model(job.encoder, encoder, axes=axes)
         embeddings = {PAPER: read_embedding(job.embeddings, registrations, logits=True)}
         for control, path in retrained.items():
-            if not left_out(control, registrations, settings, encoder.backbone):
+            if control == HARD and hard:
+                embeddings[control] = read_embedding(path, hard, logits=True)
+            elif not left_out(control, registrations, settings, encoder.backbone):
                 changed = variant(control, registrations, job.source, job.seed, settings, icp)
                 embeddings[control] = read_embedding(path, changed, logits=True)
         experiment = ControlRun(
@@ -51,10 +54,12 @@ def run(job: Job) -> None:
                 model, registrations_of_others, source, job.seed, encoder
             ),
             embeddings=embeddings,
+            hard=hard,
         )
         registrations_of_others = {name: Registrations.load(path, (name, job.seed)) for name, path in others.items()}
         rows = experiment.run(registrations, registrations_of_others)
-        samples = sample_table(registrations, ObjectClouds.load(job.objects, job.source))
+        asked = {PAPER: registrations} | ({HARD: hard} if hard else {})
+        samples = sample_table(asked, ObjectClouds.load(job.objects, job.source))
         write_csv(job.predictions, rows)
         write_csv(job.samples, samples)
         write_csv(job.timings, experiment.costs.rows())

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from gpca.attribution.confidence import REPEATS
 from gpca.experiments.controls.metrics import CALLS
-from gpca.experiments.controls.settings import PAPER, TRANSFER, UNSEEN, WRONG_LABELS
+from gpca.experiments.controls.settings import HARD, PAPER, TRANSFER, UNSEEN, WRONG_LABELS
 from gpca.experiments.diagnosis.judged import POOLED
 from gpca.objects.title import stand_in_clause
 from gpca.reporting.tables.builder import TableBuilder, crossed, titles_of
@@ -24,13 +24,14 @@ TITLES = {
     PAPER: "Paper's protocol (%)",
     "density": "Matched density",
     UNSEEN: "Unseen objects",
+    HARD: "Hard",
     TRANSFER: "Other sources",
     "reversed": "ICP reversed",
     **{name: f"{100 * share:g} % wrong labels" for name, share in WRONG_LABELS.items()},
     "shuffled": "Shuffled labels",
 }
 CHANGE = "_change"  # behind a control's name: the key of the column of its differences
-COMPARED = (PAPER, UNSEEN)  # with the best untrained explainer and the best rival, in columns of their own
+COMPARED = (PAPER, UNSEEN, HARD)  # with the best untrained explainer and the best rival, in columns of their own
 DIFFERENCES = {"_gain": ("gain", "over untrained (points)"), "_lead": ("lead", "lead (points)")}
 WRONG = "_wrong"  # behind the key of an AUROC: the column of the answers that it has to detect
 BOOTSTRAP = f"the 95 % interval of a bootstrap over objects and seeds ({REPEATS} draws)"
@@ -89,6 +90,9 @@ def table10_controls(
             "same control; lead: minus that of the best other explainer; both on the same draws, so that it is better "
             "where the interval is above 0. Reads: what an explainer sees of a registration. ICP calls: runs beyond "
             "the one that it explains.",
+            "Hard: samples of unseen objects with one to three perturbations, labeled with the one that adds most to "
+            "the error by counterfactuals. No start is right, no sensor free of noise, no surface whole, and the "
+            "number of points tells nothing.",
             "AUROC: how well the entropy of the scores separates wrong from right answers; in brackets how many of the "
             "test samples are wrong, and a dash where none is. Elsewhere a dash marks a head that is trained with the "
             "encoder and learns no labels, and a source that does not admit a control.",

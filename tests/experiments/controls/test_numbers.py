@@ -145,13 +145,14 @@ def severity_files(folder, paths, **changed):
     for path in paths:
         number = np.arange(30)
         concept = np.array(CONCEPTS)[number % 3]
-        columns = {"sample": number, "object": "part", "concept": concept}
+        columns = {"control": "paper", "sample": number, "object": "part", "concept": concept}
         columns |= {"noise": np.where(concept == "noise", np.linspace(0.01, 0.03, 30), 0)}
         columns |= {"rotation_deg": np.where(concept == "pose", 20.0, 0)}
         columns |= {"translation": np.where(concept == "pose", np.linspace(0.05, 0.3, 30), 0)}
         columns |= {"crop": np.where(concept == "overlap", 0.6, 0), "error": np.where(concept == "pose", 0.1, 0.001)}
         written.append(folder / "control_samples" / path.parent.name / path.name)
-        write_csv(written[-1], pd.DataFrame(columns | changed))
+        own = pd.DataFrame(columns | changed)
+        write_csv(written[-1], pd.concat([own, own.assign(control="hard", error=0.1)]))  # has no bins
     return written
 
 
@@ -176,9 +177,11 @@ def test_severities_of_other_samples_are_refused(files, tmp_path):
 
 def test_a_perfect_pose_has_no_error(registrations, objects):
     there = replace(registrations, T_target_source_icp=registrations.T_target_source_true)
-    table = sample_table(there, objects)
+    table = sample_table({"paper": there}, objects)
     assert len(table) == 18
     # The error of a symmetric object is to the nearest point, which is the point itself.
     assert table["error"].max() == pytest.approx(0, abs=1e-9)
     assert table["rotation_deg"][table["concept"] == "pose"].between(15, 60).all()
-    assert sample_table(registrations, objects)["error"].max() > 0.001
+    both = sample_table({"paper": there, "hard": registrations}, objects)
+    assert both["control"].tolist() == ["paper"] * 18 + ["hard"] * 18
+    assert both["error"][18:].max() > 0.001

@@ -43,12 +43,25 @@ def test_every_explainer_says_something_of_every_test_sample_under_every_control
     assert share_right(found, control="shuffled", explainer="nearest") < 1
 
 
+def test_hard_samples_are_learned_from_and_asked_about_as_they_are(six):
+    hard = six.subset(np.arange(len(six) - 1, -1, -2))  # others than those of the paper's protocol
+    made = experiment(six, "hard", "shuffled", embeddings={"hard": attached(hard)})
+    found = replace(made, hard=hard).run(six, {})
+    assert found.groupby("control")["sample"].nunique().to_dict() == {"paper": 18, "hard": 9, "shuffled": 18}
+    of_hard = found[(found["control"] == "hard") & (found["explainer"] == "nearest")]
+    tested = hard.subset(hard.rows("test"))
+    assert of_hard["sample"].tolist() == tested.sample.tolist()
+    assert of_hard["concept_true"].tolist() == tested.concept.tolist()
+    assert share_right(found, control="hard", explainer="nearest") == 1
+
+
 def test_what_a_source_does_not_admit_is_left_out_and_named(registrations, capsys):
-    found = experiment(registrations, "unseen_objects", "shuffled", "transfer").run(registrations, {})
+    found = experiment(registrations, "unseen_objects", "hard", "shuffled", "transfer").run(registrations, {})
     assert set(found["control"]) == {"paper", "shuffled"}
     lines = capsys.readouterr().err.splitlines()
     assert lines == [
         "controls of tiny: 'unseen_objects' is skipped: it needs at least 5 objects, but there are 3",
+        "controls of tiny: 'hard' is skipped: it needs samples of its own",
         "controls of tiny: 'transfer' is skipped: it needs at least two sources",
     ]
 
