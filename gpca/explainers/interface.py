@@ -114,6 +114,7 @@ def attached(registrations: Registrations, name: str) -> np.ndarray:
 
 
 BARE = "registrations"  # `reads` of an explainer that needs nothing attached
+REENACTED = "reenactments"  # `reads` of one that needs those of each pair
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from gpca.errors import InputError
 if TYPE_CHECKING:
     from gpca.features.settings import DescriptorSettings
 
-Part = Literal["source", "pair", "motion", "runs", "quick_remedies", "remedies", "truth"]
+Part = Literal["source", "pair", "motion", "runs", "quick_remedies", "remedies", "reenactment", "truth"]
 PARTS: tuple[str, ...] = get_args(Part)
 Sees = tuple[Part, ...]
 WORDS = {
@@ -20,6 +20,7 @@ WORDS = {
     "runs": "further runs",  # of the same registration, from other starts or with knobs turned
     "quick_remedies": "remedies",  # those without restarts
     "remedies": "remedies",  # the registration again, with each combination of them
+    "reenactment": "re-enactment",  # the registration again under hypotheses of the true pose
     "truth": "truth",
 }
 NOTHING = "nothing"
@@ -36,15 +37,17 @@ def in_words(sees: Collection[str]) -> str:
     return " + ".join(WORDS[part] for part in PARTS if part in sees) or NOTHING
 
 
-def icp_calls(sees: Collection[str], starts: int, descriptors: DescriptorSettings) -> int:
+def icp_calls(sees: Collection[str], starts: int, descriptors: DescriptorSettings, reenactment: int = 0) -> int:
     """Return how many runs of ICP an explainer of causes needs beyond the one that it explains.
 
     Args:
         sees: what it sees.
         starts: of each registration, the observed one among them.
         descriptors: the settings of the registrations with remedies.
+        reenactment: the runs of a re-enactment, at most.
     """
     further = starts - 1 if "runs" in sees else 0
+    further += reenactment if "reenactment" in sees else 0
     if "remedies" in sees:
         return further + descriptors.remedy_calls
     return further + (descriptors.quick_remedy_calls if "quick_remedies" in sees else 0)

@@ -13,6 +13,9 @@ from gpca.causes.dataset import LABELS, Causes
 from gpca.causes.settings import CauseSettings
 from gpca.causes.shapley import SUBSETS
 from gpca.errors import InputError
+from gpca.features.dataset import WIDTHS
+from gpca.features.distances import describe_distances
+from gpca.features.motion import describe_motion, describe_starts
 from gpca.features.pair import ObservedPair, displacements, observed_pair
 from gpca.io.arrays import REAL, REGENERATE, TEXT, WHOLE, load_arrays, save_arrays
 from gpca.io.names import Axes
@@ -23,12 +26,14 @@ from gpca.reenactment.settings import ReenactmentSettings
 from gpca.reenactment.verdict import verdict
 
 MEASURED = ("log_likelihood", "width", "covered", "noise", "outliers", "missing", "to_start", "to_result")
+DESCRIBED = ("distances", "planes", "motion", "starts")  # groups of descriptors, without further registrations
 SHAPES: dict[str, tuple[int | str, ...]] = {
     "weight": ("S", "K"),
     "T_model_observed": ("S", "K", 4, 4),
     "error": ("S", "K", len(SUBSETS)),
     "uncertainty": ("S", "K", len(SUBSETS)),
     "measured": ("S", "K", len(MEASURED)),
+    "described": ("S", sum(WIDTHS[group] for group in DESCRIBED)),
 }
 
 
@@ -47,6 +52,7 @@ class Reenactments:
         measured: (S, K, 8) the numbers of `MEASURED`: those of :class:`gpca.reenactment.hypotheses.Hypothesis` and of
             :class:`gpca.reenactment.observation.Observation`; and how far (root mean square, diameters) the observed
             points then lie from where the registration began, and from where it ended.
+        described: (S, F) the groups `DESCRIBED` of descriptors (:mod:`gpca.features`), side by side.
         verdict: (S, 4) of :func:`gpca.reenactment.verdict.verdict`.
         axes: the source and the seed of the registrations.
     """
@@ -58,6 +64,7 @@ class Reenactments:
     error: np.ndarray
     uncertainty: np.ndarray
     measured: np.ndarray
+    described: np.ndarray
     verdict: np.ndarray
     axes: Axes | None
 
@@ -95,7 +102,8 @@ def reenact_all(
         started = perf_counter()
         pair = observed_pair(causes, row, source, seed, "reenactment")
         enactments = reenact(pair, settings, truth)
-        rows.append(as_arrays(enactments, pair, settings.hypotheses))
+        described = np.concatenate([*describe_distances(pair), describe_motion(pair), describe_starts(pair, truth.icp)])
+        rows.append(as_arrays(enactments, pair, settings.hypotheses) | {"described": described})
         seconds.append(perf_counter() - started)
         icp_seconds.append(sum(enactment.icp_seconds for enactment in enactments))
     arrays = {name: np.array([of_row[name] for of_row in rows]) for name in SHAPES}

@@ -21,7 +21,7 @@ FEATURES = (
 
 
 def reenactment_features(reenactments: Reenactments) -> np.ndarray:
-    """Return `FEATURES` (S, F).
+    """Return `FEATURES` (S, F), and after them the descriptors of each pair.
 
     Logarithms of v̂ and φ̂ of the two most probable hypotheses and of the mean over all; the shares of that mean φ̂; û,
     compressed, of the first; what was measured under both; how sure the hypotheses are, and how far v̂(all) varies.
@@ -43,5 +43,6 @@ def reenactment_features(reenactments: Reenactments) -> np.ndarray:
             *(reenactments.measured[:, k] for k in range(2)),
             *(weight_S_K[:, k] for k in range(2)),
             *(entropy_S, deviation_S, all_S_K.min(axis=1), all_S_K.max(axis=1)),
+            reenactments.described,
         ]
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
+from gpca.pairs.perturbation import CONCEPTS
 from gpca.settings import Bounds, OpenShare, Positive
 
 Angle = Annotated[float, Bounds(exclusiveMinimum=0, maximum=180)]  # degrees
@@ -27,3 +28,7 @@ class ReenactmentSettings:
     good_translation: Positive = 0.017
     bad_rotation_deg: Angle = 70.0
     bad_translation: Positive = 0.35
+
+    def calls(self, starts: int) -> int:
+        """Return how many runs of ICP take whole clouds, at most: of all subsets of the causes from so many starts."""
+        return self.hypotheses * 2 ** len(CONCEPTS) * starts

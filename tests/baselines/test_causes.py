@@ -25,7 +25,8 @@ FAST = {
 FAST |= {name: FAST["gpca"] for name in explainers(CAUSES) if name.startswith("gpca_on_")}
 FAST |= {name: FAST["pair_forest"] for name in explainers(CAUSES) if name.startswith("trees_on_")}
 FAST |= {f"{name}_clouds": settings for name, settings in FAST.items()}
-COMMITTEES = {"pair_committee", "pair_committee_clouds"}  # each is made of three of the others, and slow
+# Each is made of three of the others, and slow.
+COMMITTEES = {"pair_committee", "pair_committee_clouds", "reenact_committee"}
 NAMES = sorted(set(explainers(CAUSES)) - COMMITTEES)
 
 
@@ -39,6 +40,8 @@ def seen(causes):
     for i, label in enumerate(LABELS):
         embedding[registrations.concept == label, i] += 3
     read = {"embedding": embedding, "head_logits": embedding[:, :4], **descriptors.groups}
+    exponentials = np.exp(embedding[:, :4])
+    read |= {"verdict": exponentials / exponentials.sum(axis=1, keepdims=True), "reenactment": embedding}
     registrations = replace(registrations, attached={**registrations.attached, **read})
     return registrations.subset(np.flatnonzero(registrations.concept != BORDERLINE))
 
@@ -70,8 +73,10 @@ def test_scores_depend_on_nothing_but_what_the_entry_says_it_sees(name, seen):
     entry = explainer_entry(name, CAUSES)
     blind = {array: np.full_like(numbers, 7.0) for array, numbers in seen.attached.items() if array != "causes"}
     blind["causes"] = seen.attached["causes"]
-    for group, columns in ((group, columns) for part in entry.sees for group, columns in COLUMNS[part].items()):
+    for group, columns in (shown for part in entry.sees for shown in COLUMNS.get(part, {}).items()):
         blind[group][:, columns] = seen.attached[group][:, columns]
+    if "reenactment" in entry.sees:
+        blind |= {array: seen.attached[array] for array in ("verdict", "reenactment")}
     if entry.reads == "embeddings":
         blind |= {array: seen.attached[array] for array in ("embedding", "head_logits")}
     found = explained(name, replace(seen, attached=blind))
@@ -85,6 +90,20 @@ def test_a_committee_says_the_mean_of_what_its_members_say(seen):
     committee.fit(seen)
     members = [member.explain(seen).scores_N_C for member in committee._members]
     assert committee.explain(seen).scores_N_C == pytest.approx(np.mean(members, axis=0))
+
+
+def test_what_is_untrained_says_what_the_re_enactment_says(seen):
+    assert np.array_equal(explained("reenact", seen).scores_N_C, seen.attached["verdict"])
+
+
+def test_a_committee_on_the_re_enactment_reads_its_numbers_alone(seen):
+    said = explained("reenact_committee", seen)
+    assert (said.predicted_N == seen.concept).mean() > 0.5
+    blind = {group: np.full_like(array, 7.0) for group, array in seen.attached.items()}
+    again = explained(
+        "reenact_committee", replace(seen, attached=blind | {"reenactment": seen.attached["reenactment"]})
+    )
+    assert np.array_equal(said.scores_N_C, again.scores_N_C)
 
 
 def test_one_label_is_nothing_to_learn(seen):

@@ -29,7 +29,7 @@ def test_every_row_has_finite_numbers_probabilities_that_add_up_and_seconds(some
     assert found.weight.sum(axis=1) == pytest.approx(1) and (np.diff(found.weight, axis=1) <= 0).all()
     assert found.verdict.sum(axis=1) == pytest.approx(1)
     features = reenactment_features(found)
-    assert features.shape == (len(some), len(FEATURES)) and np.isfinite(features).all()
+    assert features.shape == (len(some), len(FEATURES) + found.described.shape[1]) and np.isfinite(features).all()
     assert (seconds_S > icp_seconds_S).all() and (icp_seconds_S > 0).all()
 
 

@@ -66,7 +66,7 @@ NUMBERS = {"seed", "seeds", "files_seed", "surface_points", "threads"}
 TEXTS = {
     *("source", "explainer", "control", "design", "reduction", "group", "title", "name", "files_of", "encoder_of"),
     *("registrations_of", "retrained", "others", "strategies", "concepts", "estimators", "backbones", "learners"),
-    *("remedies", "methods", "encoders_of", "data_dir", "chunk"),
+    *("remedies", "reenactment", "methods", "encoders_of", "data_dir", "chunk"),
 }
 SWITCHES = {"stand_in"}
 CODE = "import sys; from tests.steps.by_words import main; sys.exit(main(sys.argv[1:]))"

@@ -55,6 +55,13 @@ STEP_OPTIONS = {
         "--causes": "causes.npz", "--causes-timings": "causes_timings.csv", "--descriptors": "descriptors.npz",
         "--timings": "descriptors.csv",
     },
+    "reenact": COMMON | {
+        "--settings": {
+            "reenactment": {"hypotheses": 2}, "causes": CAUSES, "icp": {"max_iterations": 30},
+        },
+        "--seed": 0, "--causes": "causes.npz", "--causes-timings": "causes_timings.csv",
+        "--reenactments": "reenactments.npz", "--timings": "reenactments.csv",
+    },
     "estimate": COMMON | {
         "--settings": {
             "estimator_pairs": {
@@ -83,7 +90,7 @@ STEP_OPTIONS = {
     },
     "diagnose": COMMON | {
         "--settings": {"iterations": 5, "inducing": 6, "draws": 20}, "--explainer": "gpca_pair", "--seeds": 0,
-        "--remedies": {"starts": 1, "restarts": 2, "icp_points": 64},
+        "--remedies": {"starts": 1, "restarts": 2, "icp_points": 64}, "--reenactment": {"hypotheses": 2},
         "--causes": "causes.npz", "--read": "descriptors.npz", "--read-timings": "descriptors.csv",
         "--predictions": "diagnosis.csv", "--timings": "diagnosis_timings.csv",
     },

@@ -52,6 +52,29 @@ rule describe:
         "../scripts/step.py"
 
 
+rule reenact:
+    input:
+        causes="<results>/causes/{source}/seed{seed}.npz",
+        causes_timings="<results>/timings/{source}/causes/seed{seed}.csv",
+        code=code_files("gpca.steps.reenact"),
+    output:
+        reenactments="<results>/reenactments/{source}/seed{seed}.npz",
+        timings="<results>/timings/{source}/reenactments/seed{seed}.csv",
+    log:
+        "<logs>/reenactments/{source}/seed{seed}.log",
+    benchmark:
+        "<benchmarks>/reenactments/{source}/seed{seed}.tsv"
+    conda:
+        "../envs/gpca.yaml"
+    params:
+        step="gpca.steps.reenact",
+        settings=as_json(
+            {"reenactment": DIAGNOSIS["reenactment"], "causes": config["causes"]} | ICP
+        ),
+    script:
+        "../scripts/step.py"
+
+
 rule train_on_causes:
     input:
         causes="<results>/causes/{source}/seed{seed}.npz",

@@ -2,7 +2,7 @@
 import json
 from pathlib import Path
 
-from gpca.explainers.interface import BARE
+from gpca.explainers.interface import BARE, REENACTED
 from gpca.explainers.registry import CAUSES, explainer_entry, explainer_module
 from gpca.alignment.methods.registry import method_module
 from gpca.code_files import code_files

@@ -45,6 +45,7 @@ rule diagnose:
         step="gpca.experiments.diagnosis.step",
         explainer=lambda wildcards: wildcards.cause_explainer,
         remedies=as_json(DIAGNOSIS["descriptors"]),
+        reenactment=as_json(DIAGNOSIS["reenactment"]),
         settings=lambda wildcards: as_json(
             DIAGNOSIS["explainers"][wildcards.cause_explainer] or {}
         ),

@@ -18,7 +18,7 @@ rule measure_frame_causes:
         code=code_files(
             "gpca.experiments.frame_causes.step",
             backbone_module(DIAGNOSIS["encoder"]),
-            *(explainer_module(name, CAUSES) for name in DIAGNOSIS["explainers"]),
+            *(explainer_module(name, CAUSES) for name in explained_on_frames()),
         ),
     output:
         frame_causes="<results>/frame_causes/seed{seed}.npz",
@@ -40,6 +40,7 @@ rule measure_frame_causes:
                 "causes": config["causes"],
                 **ICP,
                 **DIAGNOSIS,
+                "explainers": explained_on_frames(),
             }
         ),
         source=FRAMES,

@@ -74,8 +74,21 @@ def other_sources(wildcards):
 
 def read_by(cause_explainer):
     """Return the folder of what an explainer of causes reads."""
-    folders = {"embeddings": "cause_embeddings", BARE: "causes"}
+    folders = {
+        "embeddings": "cause_embeddings",
+        REENACTED: "reenactments",
+        BARE: "causes",
+    }
     return folders.get(explainer_entry(cause_explainer, CAUSES).reads, "descriptors")
+
+
+def explained_on_frames():
+    """Return the explainers of causes that depth frames are explained by: all but those that read re-enactments."""
+    return {
+        name: own
+        for name, own in config["diagnosis"]["explainers"].items()
+        if explainer_entry(name, CAUSES).reads != REENACTED
+    }
 
 
 def encoders_of_others(wildcards):

@@ -13,14 +13,16 @@ from gpca.experiments.experiment import ByName, Experiment, LeftOut, Names, Tidy
 from gpca.explainers.registry import CAUSES, explainer_entry, explainers, require_settings
 from gpca.explainers.sight import icp_calls
 from gpca.features.settings import DescriptorSettings
+from gpca.reenactment.settings import ReenactmentSettings
 from gpca.settings import part_of
 
 
 @dataclass(frozen=True)
 class Section:
-    """The settings by which explainers of causes describe, encode and explain a pair."""
+    """The settings by which explainers of causes describe, re-enact, encode and explain a pair."""
 
     descriptors: Annotated[dict, part_of(DescriptorSettings)]
+    reenactment: Annotated[dict, part_of(ReenactmentSettings)]
     encoder: NamedEncoder
     explainers: ByName
     by_features: ByName
@@ -49,13 +51,14 @@ def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
 def shown(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
     """Return the titles of the explainers, and what each sees and costs."""
     starts, descriptors = config["causes"]["starts"], DescriptorSettings(**config["diagnosis"]["descriptors"])
+    reenactment = ReenactmentSettings(**config["diagnosis"]["reenactment"]).calls(starts)
     titles: dict[str, dict[str, str]] = {}
     costs: dict[str, dict[str, Any]] = {}
     for key in ("explainers", "by_features"):
         entries = {name: explainer_entry(name, CAUSES) for name in config["diagnosis"][key]}
         titles[key] = {name: entry.title for name, entry in entries.items()}
         costs |= {
-            name: {"sees": entry.sight, "icp_calls": icp_calls(entry.sees, starts, descriptors)}
+            name: {"sees": entry.sight, "icp_calls": icp_calls(entry.sees, starts, descriptors, reenactment)}
             for name, entry in entries.items()
         }
     return {

@@ -13,7 +13,7 @@ from gpca.attribution.scores import Attribution
 from gpca.causes.dataset import Causes, labeled
 from gpca.causes.truth import BORDERLINE
 from gpca.errors import InputError
-from gpca.explainers.interface import BARE, ConceptExplainer, ExplainerEntry
+from gpca.explainers.interface import BARE, REENACTED, ConceptExplainer, ExplainerEntry
 from gpca.explainers.registry import CAUSES, explainer_entry
 from gpca.explainers.sight import icp_calls
 from gpca.features.dataset import Descriptors
@@ -21,12 +21,16 @@ from gpca.features.settings import DescriptorSettings
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
+from gpca.reenactment.dataset import Reenactments
+from gpca.reenactment.features import reenactment_features
+from gpca.reenactment.settings import ReenactmentSettings
 
 
 def run(job: Job) -> None:
     """Fit on the training rows that have a label and explain every row, seed by seed."""
     entry = explainer_entry(job.explainer, CAUSES)
     remedies = DescriptorSettings(**json.loads(job.remedies))
+    reenactment = ReenactmentSettings(**json.loads(job.reenactment))
     files = ("causes", "read", "read_timings", "predictions", "timings")
     for seed, causes_file, read, read_timing, predictions, timings in job.per_seed(*files):
         explainer = entry.make(job.source, seed, **job.settings)
@@ -35,7 +39,7 @@ def run(job: Job) -> None:
             causes = Causes.load(causes_file, (job.source, seed))
             registrations = with_what_it_reads(labeled(causes), entry, read)
             seconds_S, icp_seconds_S = read_timings(read_timing, registrations)
-            attribution = explained(explainer, entry, registrations, causes, remedies, causes_file)
+            attribution = explained(explainer, entry, registrations, causes, remedies, causes_file, reenactment)
             write_predictions(predictions, causes.registrations, attribution)
             write_timings(timings, registrations, seconds_S + attribution.seconds_N, icp_seconds_S)
 
@@ -47,6 +51,7 @@ def explained(
     causes: Causes,
     remedies: DescriptorSettings,
     path: Path,
+    reenactment: ReenactmentSettings | None = None,
 ) -> Attribution:
     """Let an explainer learn from the training rows and explain all, and count the runs of ICP that it needs.
 
@@ -54,9 +59,11 @@ def explained(
         registrations: with labels, and with what it reads attached.
         causes, path: these registrations, and their file.
         remedies: the settings of the registrations with remedies.
+        reenactment: those of the re-enactments, if it may see them.
     """
     explainer.fit(registrations.subset(training_rows(registrations, path)))
-    calls = icp_calls(entry.sees, causes.T_target_source_runs.shape[1], remedies)
+    starts = causes.T_target_source_runs.shape[1]
+    calls = icp_calls(entry.sees, starts, remedies, reenactment.calls(starts) if reenactment else 0)
     return replace(explainer.explain(observed_only(registrations)), icp_calls_N=np.full(len(registrations), calls))
 
 
@@ -78,6 +85,9 @@ def with_what_it_reads(registrations: Registrations, entry: ExplainerEntry, path
         return registrations
     if entry.reads == "embeddings":
         read = read_embedding(path, registrations, logits=True)
+    elif entry.reads == REENACTED:
+        enacted = Reenactments.load(path, registrations)
+        read = {"verdict": enacted.verdict, "reenactment": reenactment_features(enacted)}
     else:
         read = dict(Descriptors.load(path, registrations).groups)
     return replace(registrations, attached={**registrations.attached, **read})
