@@ -48,12 +48,12 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--check", action="store_true", help="write nothing; exit with 1 if a page differs")
     check = parser.parse_args(arguments).check
     try:
-        reference, pages = read_definitions()
+        references, pages = read_definitions()
         texts = {page: (ROOT / page).read_text(encoding="utf-8") for page in pages}
-        folder = REFERENCES / reference
-        new = {page: filled(texts[page], pages[page], page, folder) for page in pages}
-        untrue = {page: no_longer_true(texts[page], pages[page], folder) for page in pages}
-        untrue = {page: [*lines, *links_elsewhere(texts[page], reference)] for page, lines in untrue.items()}
+        folders = {page: REFERENCES / reference for page, reference in references.items()}
+        new = {page: filled(texts[page], pages[page], page, folders[page]) for page in pages}
+        untrue = {page: no_longer_true(texts[page], pages[page], folders[page]) for page in pages}
+        untrue = {page: [*lines, *links_elsewhere(texts[page], references[page])] for page, lines in untrue.items()}
     except KeyError as fault:
         print(f"fill: {DEFINITIONS.name}: lacks the key {fault}; add it", file=sys.stderr)
         return 2
@@ -68,10 +68,11 @@ def main(arguments: list[str] | None = None) -> int:
     return int(any(untrue.values()) or (check and any(changes for _, changes in new.values())))
 
 
-def read_definitions() -> tuple[str, dict[str, dict]]:
-    """Return the name of the reference that numbers are read from, and of every page what its markers are."""
+def read_definitions() -> tuple[dict[str, str], dict[str, dict]]:
+    """Return of every page the name of the reference that its numbers are of, and what its markers are."""
     pages = yaml.safe_load(DEFINITIONS.read_text(encoding="utf-8"))
-    return pages.pop("reference"), pages
+    usual = pages.pop("reference")
+    return {page: markers.pop("reference", usual) for page, markers in pages.items()}, pages
 
 
 def links_elsewhere(text: str, reference: str) -> list[str]:

@@ -132,6 +132,8 @@ def test_what_differs_is_written_unless_it_is_only_checked(reference, monkeypatc
     definitions.write_text(own + "page.md: {best: [table9 mine above 0]}\n")
     assert fill.main([]) == 1
     page.write_text("A share of 1<!--own--> %.\n")
+    definitions.write_text(f"reference: none\npage.md: {{reference: {reference.name}, own: table9 cups gpca .1f}}\n")
+    assert fill.main([]) == 0
     definitions.write_text(own + "page.md: {own: table8 cups .1f}\n")
     assert fill.main([]) == 2
     assert "no such file" in capsys.readouterr().err
