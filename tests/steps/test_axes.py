@@ -12,7 +12,8 @@ from gpca.io.arrays import save_arrays
 from gpca.pairs.dataset import Registrations
 from tests.steps.by_words import main
 
-from .command_lines import OF_ANOTHER_SOURCE, STEP_OPTIONS, arguments, refused
+from .command_lines import OF_ANOTHER_SOURCE, STEP_OPTIONS, arguments
+from .spoiling import refused
 
 FREE = {  # what a user may take from anywhere
     ("shift", "--other-registrations"),

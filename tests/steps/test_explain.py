@@ -12,7 +12,8 @@ from gpca.model.location import SHIPPED
 from tests.steps.by_words import main
 
 from ..documents import ROOT
-from .command_lines import arguments, refused, removed, truncated, untouched, written
+from .command_lines import arguments
+from .spoiling import refused, removed, truncated, untouched, written
 
 FAULTS = [
     (removed("model.pt"), {}, r"model.pt: no such model; make one with 'make results'"),

@@ -3,18 +3,8 @@
 import numpy as np
 import pytest
 
-from .command_lines import (
-    STEP_OPTIONS,
-    arrays_changed,
-    lines_kept,
-    pickled,
-    refused,
-    removed,
-    settings,
-    truncated,
-    untouched,
-    written,
-)
+from .command_lines import STEP_OPTIONS, settings
+from .spoiling import arrays_changed, lines_kept, pickled, refused, removed, truncated, untouched, written
 
 
 def one_object(folder):

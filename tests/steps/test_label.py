@@ -10,7 +10,7 @@ from gpca.io.arrays import save_arrays
 from gpca.pairs.perturbation import CONCEPTS
 from tests.steps.by_words import main
 
-from .command_lines import refused, removed, untouched, written
+from .spoiling import refused, removed, untouched, written
 
 
 @pytest.fixture

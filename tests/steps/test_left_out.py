@@ -5,7 +5,8 @@ import pandas as pd
 import pytest
 
 from .by_words import main
-from .command_lines import CONTROLS, STEP_OPTIONS, arguments, refused, settings, untouched
+from .command_lines import CONTROLS, STEP_OPTIONS, arguments, settings
+from .spoiling import refused, untouched
 
 
 def test_a_control_that_the_source_does_not_admit_is_named_and_its_file_holds_no_samples(folder, capsys):

@@ -18,7 +18,7 @@ from gpca.model.file import Model
 from gpca.model.origin import licenses_of
 from tests.steps.by_words import main
 
-from .command_lines import content, removed, written
+from .spoiling import content, removed, written
 
 SHIP = ["ship", "--model", "real/model.pt", "--out", "shipped.pt", "--card", "shipped.md"]
 MESH = "/data/bop/lm/models/obj_000001.ply"
