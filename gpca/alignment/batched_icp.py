@@ -9,6 +9,8 @@ Open3D's steps and stopping rule.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+
 import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
@@ -105,33 +107,58 @@ class BatchedPlaneICP:
         # The kernel has the points in the order of its cells.
         rows_P = cKDTree(target).query(self._target.points)[1]
         self._normals = np.ascontiguousarray(target_normals[rows_P], np.float64)
-        self._iterations = settings.max_iterations
+        self.iterations = settings.max_iterations
 
     def register(self, source: np.ndarray, T_target_source_init_n: np.ndarray) -> tuple[np.ndarray, ...]:
         """Align `source` (N, 3) from n initial poses (n, 4, 4); see :meth:`gpca.alignment.batched_icp.BatchedICP`."""
         require_cloud("source cloud", source)
         source = np.ascontiguousarray(source, np.float64)
         poses_n = np.array(T_target_source_init_n, np.float64)
-        hessian_n, gradient_n, fitness_n, rmse_n = self._sums(source, poses_n)
-        active = np.flatnonzero(fitness_n > 0)
-        for _ in range(self._iterations):
-            if not len(active):
-                break
-            poses_n[active] = _steps(hessian_n[active], gradient_n[active]) @ poses_n[active]
-            of_active = self._sums(source, poses_n[active])
-            settled = (np.abs(of_active[2] - fitness_n[active]) < CONVERGED) & (
-                np.abs(of_active[3] - rmse_n[active]) < CONVERGED
-            )
-            for kept, new in zip((hessian_n, gradient_n, fitness_n, rmse_n), of_active, strict=True):
-                kept[active] = new
-            active = active[~settled & (of_active[2] > 0)]
-        return poses_n, fitness_n, rmse_n
+        return _descend(lambda rows_m: self.sums(source, poses_n[rows_m]), poses_n, self.iterations)
 
-    def _sums(self, source: np.ndarray, poses_n: np.ndarray) -> tuple[np.ndarray, ...]:
+    def sums(self, source: np.ndarray, poses_n: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Return Σ JᵀJ (n, 6, 6) and Σ Jᵀd (n, 6) of the planes' distances, fitness (n,) and inlier RMSE (n,)."""
         n = len(poses_n)
         sums = np.empty((n, 6, 6)), np.empty((n, 6)), np.empty(n), np.empty(n)
         plane_all(source, self._target, self._normals, np.ascontiguousarray(poses_n), *sums)
         return sums
+
+
+def register_each_to_planes(
+    icps: Sequence[BatchedPlaneICP], sources: Sequence[np.ndarray], T_target_source_init_n: np.ndarray
+) -> tuple[np.ndarray, ...]:
+    """Align n sources, each (N, 3), to a target of its own from one pose each, all of them one step at a time.
+
+    Returns what :meth:`BatchedPlaneICP.register` returns, the same numbers as one after the other.
+    """
+    sources = [np.ascontiguousarray(source, np.float64) for source in sources]
+    poses_n = np.array(T_target_source_init_n, np.float64)
+
+    def sums(rows_m: np.ndarray) -> tuple[np.ndarray, ...]:
+        each = [icps[row].sums(sources[row], poses_n[row : row + 1]) for row in rows_m]
+        return tuple(np.concatenate(parts) for parts in zip(*each, strict=True))
+
+    return _descend(sums, poses_n, icps[0].iterations)
+
+
+def _descend(
+    sums: Callable[[np.ndarray], tuple[np.ndarray, ...]], poses_n: np.ndarray, iterations: int
+) -> tuple[np.ndarray, ...]:
+    """Move the poses (n, 4, 4), in place, until they settle; `sums` are those of the rows (m,) that it is given."""
+    hessian_n, gradient_n, fitness_n, rmse_n = sums(np.arange(len(poses_n)))
+    active = np.flatnonzero(fitness_n > 0)
+    for _ in range(iterations):
+        if not len(active):
+            break
+        poses_n[active] = _steps(hessian_n[active], gradient_n[active]) @ poses_n[active]
+        of_active = sums(active)
+        settled = (np.abs(of_active[2] - fitness_n[active]) < CONVERGED) & (
+            np.abs(of_active[3] - rmse_n[active]) < CONVERGED
+        )
+        for kept, new in zip((hessian_n, gradient_n, fitness_n, rmse_n), of_active, strict=True):
+            kept[active] = new
+        active = active[~settled & (of_active[2] > 0)]
+    return poses_n, fitness_n, rmse_n
 
 
 def _steps(hessian_n_6_6: np.ndarray, gradient_n_6: np.ndarray) -> np.ndarray:

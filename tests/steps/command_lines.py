@@ -29,6 +29,7 @@ CAUSES = {  # of two symmetric objects with few points: only pose errors make th
     "severities": {"noise": [0.01, 0.05]}, "clean_pairs": 20, "candidates": 50,
 }  # fmt: skip
 CONTROLS = {"controls": ["density", "shuffled", "transfer"], "draw_points": [32, 64]}
+ESTIMATES = ("reference_starts", "reference_data", "reference_all", "brossard", "cello", "cello_mild")
 COMMON = {"--source": "tiny"}
 STEP_OPTIONS = {
     "objects": COMMON | {
@@ -58,15 +59,15 @@ STEP_OPTIONS = {
     "estimate": COMMON | {
         "--settings": {
             "estimator_pairs": {
-                "methods": {"point_to_point": 2}, "train": 8, "train_starts": 7, "points": 64, "starts": 20,
+                "methods": {"point_to_point": 2}, "train": 8, "train_starts": 7, "points": 64, "repeats": 20,
                 "start_rotation_deg": 10.0, "start_translation": 0.05, "floor": 1e-6,
             },
             "success": {"error": 0.03},
-            "estimators": {"brossard": {}, "cello": {"steps": 2}},
+            "estimators": {"brossard": {}, "cello": {"steps": 2}}, "causes": CAUSES, "icp": {"max_iterations": 30},
         },
         "--seeds": 0, "--estimators": ["brossard", "cello"], "--objects": "objects.npz", "--causes": "causes.npz",
-        "--samples": "reference_samples.npz", "--rows": ["reference_said.csv", "brossard_said.csv", "cello_said.csv"],
-        "--timings": ["reference_seconds.csv", "brossard_seconds.csv", "cello_seconds.csv"],
+        "--samples": "reference_samples.npz", "--rows": [f"{name}_said.csv" for name in ESTIMATES],
+        "--timings": [f"{name}_seconds.csv" for name in ESTIMATES],
     },
     "train_on_causes": COMMON | {
         "--settings": ENCODER, "--seed": 0, "--causes": "causes.npz", "--causes-timings": "causes_timings.csv",

@@ -1,8 +1,7 @@
 # Registrations with measured causes -> what every estimator says of their uncertainty -> estimators.csv.
-from gpca.experiments.estimators.covariances import REFERENCE
 from gpca.uncertainty.estimators.registry import estimator_module
 
-ESTIMATORS = [REFERENCE, *NAMES["estimator"]]
+ESTIMATES = NAMES["estimate"]
 
 
 rule estimates:
@@ -10,7 +9,7 @@ rule estimates:
         collect(
             "<results>/estimates/{source}/{estimator}/seed{seed}.csv",
             source=SOURCES,
-            estimator=ESTIMATORS,
+            estimator=ESTIMATES,
             seed=SEEDS,
         ),
 
@@ -19,6 +18,14 @@ rule estimate:
     input:
         objects="<results>/objects/{source}.npz",
         causes=collect("<results>/causes/{{source}}/seed{seed}.npz", seed=SEEDS),
+        other_objects=lambda wildcards: collect(
+            "<results>/objects/{source}.npz", source=next_source(wildcards)
+        ),
+        other_causes=lambda wildcards: collect(
+            "<results>/causes/{source}/seed{seed}.npz",
+            source=next_source(wildcards),
+            seed=SEEDS,
+        ),
         code=code_files(
             "gpca.experiments.estimators.step",
             *map(estimator_module, NAMES["estimator"]),
@@ -27,12 +34,12 @@ rule estimate:
     output:
         rows=collect(
             "<results>/estimates/{{source}}/{estimator}/seed{seed}.csv",
-            estimator=ESTIMATORS,
+            estimator=ESTIMATES,
             seed=SEEDS,
         ),
         timings=collect(
             "<results>/timings/{{source}}/estimator_{estimator}/seed{seed}.csv",
-            estimator=ESTIMATORS,
+            estimator=ESTIMATES,
             seed=SEEDS,
         ),
         samples=collect(
@@ -52,9 +59,11 @@ rule estimate:
         settings=as_json(
             {
                 name: config[name]
-                for name in ("estimator_pairs", "estimators", "success")
+                for name in ("estimator_pairs", "estimators", "causes", "success")
             }
+            | ICP
         ),
+        other=lambda wildcards: "".join(next_source(wildcards)),
         estimators=NAMES["estimator"],
         seeds=SEEDS,
     script:

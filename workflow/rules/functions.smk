@@ -110,6 +110,12 @@ def following_one(names, name):
     return names[(names.index(name) + 1) % len(names)]
 
 
+def next_source(wildcards):
+    """Return the source after this one, by which estimators are taught otherwise; none where it is the only one."""
+    sources = list(SOURCES)
+    return [following_one(sources, wildcards.source)] if len(sources) > 1 else []
+
+
 def read_by_readings(wildcards):
     """Return what a group of readings reads, by kind of file; those on depth frames see all seeds."""
     group = GROUPS[wildcards.reading_group]

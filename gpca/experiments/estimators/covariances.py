@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpca.attribution.metrics import source_method_seed
+from gpca.experiments.estimators.settings import KINDS
 from gpca.io.arrays import REAL, TEXT, WHOLE, load_arrays, save_arrays
 from gpca.io.csv_file import numbers, read_csv
 from gpca.io.names import Axes
@@ -17,13 +18,20 @@ from gpca.io.names import Axes
 if TYPE_CHECKING:
     import pandas as pd
 
-REFERENCE = "reference"  # Monte-Carlo from many starts, which has rows of its own among the estimators
 SIXTH = np.triu_indices(6)
 # Upper triangle of Σ, row by row, in squared milliradians and thousandths of the diameter.
 COVARIANCE = tuple(f"covariance_{i + 1}{j + 1}" for i, j in zip(*SIXTH, strict=True))
 MILLI = 1e3
-KNOWN = ("sample", "object", "method", "add_relative", "failed", "failure")
-JUDGED = ("kl_rotation", "kl_translation", "error_ratio", "mahalanobis", "spread")
+KNOWN = ("sample", "object", "cluster", "method", "add_relative", "failed", "inlier_rmse", "fitness", "failure")
+OF_ROW = ("add_relative", "inlier_rmse", "fitness")  # numbers that a row has without an estimate
+COMPARED = ("kl_rotation", "kl_translation", "error_ratio", "mahalanobis", "covered")  # with each reference
+OF_REFERENCES = tuple(f"{name}_{kind}" for kind in KINDS for name in COMPARED)
+JUDGED = (*OF_REFERENCES, "error_ratio", "mahalanobis", "spread")  # the last three: by the true pose, and of none
+
+
+def reference_name(kind: str) -> str:
+    """Return the name by which a reference stands among the estimators."""
+    return f"reference_{kind}"
 
 
 def covariance_columns(covariance_6_6: np.ndarray | None) -> dict[str, float]:
@@ -43,9 +51,9 @@ def read_estimates(path: str | Path) -> pd.DataFrame:
     """Read a file of the step ``estimate``: `failed` as booleans, numbers as numbers, NaN where an estimate failed."""
     rows = read_csv(path, (*KNOWN, *JUDGED, *COVARIANCE))
     has_estimate = rows["failure"] == ""
-    for name in ("add_relative", *JUDGED, *COVARIANCE):
-        # Where the reference itself has none, no estimate diverges from it by any number.
-        needed = name == "add_relative" or has_estimate & ((rows[name] != "") | (name in COVARIANCE))
+    for name in (*OF_ROW, *JUDGED, *COVARIANCE):
+        # Where a reference itself has none, no estimate is compared with it.
+        needed = name in OF_ROW or has_estimate & ((rows[name] != "") | (name not in OF_REFERENCES))
         rows[name] = numbers(path, rows, name, needed)
     return rows.assign(failed=rows["failed"] == "True")
 
@@ -57,16 +65,17 @@ def read_estimate_files(files: Iterable[str | Path]) -> dict[tuple[str, str, int
 
 @dataclass(frozen=True)
 class ReferenceSamples:
-    """The results of the reference for S registrations, as twists about the pose, in radians and diameters.
+    """The results of references for registrations, S in all, as twists about the pose, in radians and diameters.
 
     Attributes:
-        sample, method: (S,) which registration.
+        sample, method, kind: (S,) which registration, and which reference.
         twists: (ΣN, 6) float32, those of registration i are ``twists[offsets[i]:offsets[i + 1]]``.
         true_twist: (S, 6) of the true pose.
     """
 
     sample: np.ndarray
     method: np.ndarray
+    kind: np.ndarray
     twists: np.ndarray
     offsets: np.ndarray
     true_twist: np.ndarray
@@ -87,7 +96,8 @@ class ReferenceSamples:
             InputError: the file is missing, damaged, or holds wrong shapes or NaN.
         """
         shapes: dict[str, tuple[int | str, ...]] = {
-            **{"sample": ("S",), "method": ("S",), "twists": ("N", 6), "offsets": ("O",), "true_twist": ("S", 6)}
+            **dict.fromkeys(("sample", "method", "kind"), ("S",)),
+            **{"twists": ("N", 6), "offsets": ("O",), "true_twist": ("S", 6)},
         }
-        kinds = {"sample": WHOLE, "method": TEXT, "twists": REAL, "offsets": WHOLE, "true_twist": REAL}
+        kinds = {"sample": WHOLE, "method": TEXT, "kind": TEXT, "twists": REAL, "offsets": WHOLE, "true_twist": REAL}
         return cls(**load_arrays(path, shapes, kinds))

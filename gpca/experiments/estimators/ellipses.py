@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from gpca.experiments.estimators.covariances import REFERENCE, ReferenceSamples, covariance_of
+from gpca.experiments.estimators.covariances import ReferenceSamples, covariance_of
+from gpca.experiments.estimators.settings import REFERENCES
 from gpca.reporting.figures.style import (
     BLACK,
     BLUE,
@@ -22,7 +23,9 @@ from gpca.reporting.figures.style import (
 )
 
 STYLES: dict[str, tuple[str, Any]] = {  # An estimator has a color and a line everywhere in the figure.
-    REFERENCE: (GRAY, "-"),
+    "reference_starts": (GRAY, (0, (1, 1))),
+    "reference_data": (GRAY, (0, (4, 1.5))),
+    "reference_all": (GRAY, "-"),
     "monte_carlo": (BLACK, "-"),
     "censi": (VERMILION, "-"),
     "bonnabel": (VERMILION, (0, (1, 1))),
@@ -53,12 +56,12 @@ def ellipse(covariance_2_2: np.ndarray) -> np.ndarray:
 def draw_ellipses(
     panel, samples: ReferenceSamples, place: int, estimates: Mapping, block: slice, factor: float
 ) -> None:
-    """Draw one registration in the plane in which the reference's results spread most.
+    """Draw one registration in the plane in which the results of other starts and data spread most.
 
     Args:
         panel: the matplotlib axes.
-        samples: the reference's results.
-        place: the registration's row in the samples.
+        samples: the references' results.
+        place: the row in the samples of the registration and of that reference.
         estimates: estimator -> its row about the registration, None where it has none.
         block: the numbers of a twist that are drawn, rotation or translation.
         factor: their factor to the panel's unit.
@@ -76,7 +79,7 @@ def draw_ellipses(
         outline_n_2 = ellipse(factor**2 * plane_3_2.T @ covariance_of(row)[block, block] @ plane_3_2)
         reach = max(reach, min(np.abs(outline_n_2).max(), most))
         color, line = style_of(name)
-        look = {"linewidth": 1.8, "zorder": 2} if name == REFERENCE else {"linewidth": 0.9, "zorder": 3}
+        look = {"linewidth": 1.8, "zorder": 2} if name in REFERENCES else {"linewidth": 0.9, "zorder": 3}
         panel.plot(*outline_n_2.T, color=color, linestyle=line, **look)
     panel.plot(*true_2, marker="*", color=BLACK, markersize=7, markeredgecolor="white", markeredgewidth=0.5, zorder=4)
     panel.set(xlim=(-1.05 * reach, 1.05 * reach), ylim=(-1.05 * reach, 1.05 * reach), aspect="equal")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Literal
 
 import numpy as np
@@ -15,7 +16,6 @@ from gpca.features.entropy import describe_entropy
 from gpca.features.pair import ObservedPair
 from gpca.objects.symmetry import symmetric_turn
 from gpca.uncertainty.estimators.interface import Example, FailedEstimate, RegisteredPair, intrinsic_frame
-from gpca.uncertainty.estimators.monte_carlo import sample
 
 Moved = Literal["model", "observed"]  # which cloud the source is
 
@@ -57,14 +57,18 @@ def true_twist(registered: RegisteredPair, T_true: np.ndarray, judge: Judge, mov
     return log((turn @ T_true @ inverse(T_found))[None])[0]
 
 
-def example(
-    registered: RegisteredPair, T_true: np.ndarray, judge: Judge, moved: Moved, starts: int, *axes: object
-) -> Example:
-    """Return a training registration with the results of a few starts, all at the pose where there are none."""
+def twists_or_none(draw: Callable[[], np.ndarray], runs: int) -> np.ndarray:
+    """Return the twists (n, 6) of a few results; where too few runs have any, zeros: all are at the pose."""
     try:
-        twists_n_6 = sample(registered, starts, *axes, "examples")
+        return draw()
     except FailedEstimate:
-        twists_n_6 = np.zeros((starts, 6))
+        return np.zeros((runs, 6))
+
+
+def example(
+    registered: RegisteredPair, T_true: np.ndarray, judge: Judge, moved: Moved, twists_n_6: np.ndarray
+) -> Example:
+    """Return a training registration with the results (n, 6) of a few others, as twists about its pose."""
     return Example(
         describe(registered.pair, registered.outcome, moved),
         twists_n_6,

@@ -1,4 +1,4 @@
-"""Estimators of a pose's covariance against many Monte-Carlo runs and against the error (Table XII)."""
+"""Estimators of a pose's covariance against further registrations and against the error (Table XII)."""
 
 from __future__ import annotations
 
@@ -7,8 +7,7 @@ from typing import Annotated, Any
 
 from gpca.alignment.methods.registry import method_entry, methods, require_local
 from gpca.errors import InputError, with_key
-from gpca.experiments.estimators.covariances import REFERENCE
-from gpca.experiments.estimators.settings import EstimatorPairSettings
+from gpca.experiments.estimators.settings import MILD, OTHER_SOURCE, REFERENCES, SHIFTS, EstimatorPairSettings
 from gpca.experiments.experiment import ByName, Experiment, LeftOut, Names, Tidy
 from gpca.settings import part_of
 from gpca.uncertainty.estimators.registry import estimator_entry, estimators, require_estimator_settings
@@ -24,19 +23,34 @@ def check(config: dict, _left_out: LeftOut) -> None:
         with_key(f"estimator_pairs.methods.{name}", require_local, name)
 
 
-def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
-    """Return the estimators, and with the reference before them those that have files of estimates."""
+def names(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str, Any]:
+    """Return the estimators, and with them and the references before them all that have files of estimates."""
     compared = list(config["estimators"])
-    return {"estimator": compared, "estimate": [REFERENCE, *compared]}
+    return {"estimator": compared, "estimate": [*REFERENCES, *compared, *_taught_otherwise(config, sources)]}
 
 
-def shown(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
-    """Return the titles of the estimators and of the methods whose registrations they see, and the conditions."""
+def shown(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str, Any]:
+    """Return the titles of the estimators and of the methods whose registrations they see, and the conditions.
+
+    Of `estimates`, those that are taught otherwise among them, also what they model.
+    """
+    entries = {name: estimator_entry(name) for name in config["estimators"]}
+    estimates = {name: {"title": entry.title, "models": entry.models} for name, entry in entries.items()}
+    for name, (learner, shift) in _taught_otherwise(config, sources).items():
+        estimates[name] = estimates[learner] | {"title": f"{entries[learner].title}, {SHIFTS[shift]}"}
     return {
-        "estimators": {name: estimator_entry(name).title for name in config["estimators"]},
+        "estimators": {name: entry.title for name, entry in entries.items()},
+        "estimates": estimates,
         "estimated_methods": {name: method_entry(name).title for name in config["estimator_pairs"]["methods"]},
-        "estimator_pairs": config["estimator_pairs"],
+        "estimator_pairs": config["estimator_pairs"] | {"failed": config["success"]["error"]},
     }
+
+
+def _taught_otherwise(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str, tuple[str, str]]:
+    """Return name -> what learns, and with what else than the training samples of its own source."""
+    shifts = (MILD, OTHER_SOURCE) if len(sources) > 1 else (MILD,)
+    learners = [name for name in config["estimators"] if estimator_entry(name).learn]
+    return {f"{name}_{shift}": (name, shift) for name in learners for shift in shifts}
 
 
 Pairs = Annotated[dict, part_of(EstimatorPairSettings, without=("failed",))]  # success.error says what has failed
@@ -49,6 +63,11 @@ EXPERIMENT = Experiment(
             "gpca.experiments.estimators.calibration:collect_estimates",
             {"files": "estimates/{source}/{estimate}/seed{seed}.csv"},
             rule="estimator_metrics",
+        ),
+        Tidy(
+            "estimator_intervals.csv",
+            "gpca.experiments.estimators.calibration:collect_intervals",
+            {"files": "estimates/{source}/{estimate}/seed{seed}.csv"},
         ),
     ),
     names=names,

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gpca.errors import InputError
-from gpca.experiments.estimators.covariances import REFERENCE, ReferenceSamples
+from gpca.experiments.estimators.covariances import ReferenceSamples
 from gpca.experiments.estimators.ellipses import draw_ellipses, style_of
+from gpca.experiments.estimators.settings import REFERENCES
 from gpca.reporting.figures.panels import label_outer
 from gpca.reporting.figures.style import BLACK, GRAY, LIGHT_GRAY, SMALL_PT, TEXT_WIDTH_IN, use_style, write_title
 from gpca.seeds import seed_of_file
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
 
 LEVELS = np.linspace(0.01, 0.99, 99)
 FEWEST_SAMPLES = 20  # of the reference, that a registration shows
+SHOWN = "reference_all"  # the reference whose results are dots
+TITLES = dict(zip(REFERENCES, ("Other starts", "Other data", "Other starts and data"), strict=True))
 
 
 def draw_estimators(
@@ -36,24 +39,24 @@ def draw_estimators(
     Above stand the registration that failed and the one that did not whose error is the median of its kind.
 
     Args:
-        estimates: rows by source, estimator and seed; the reference is among the estimators.
-        samples_npz: the reference's samples of the shown source and seed, which its path names.
+        estimates: rows by source, estimator and seed; the references are among the estimators.
+        samples_npz: the references' samples of the shown source and seed, which its path names.
     """
     source, seed = Path(samples_npz).parent.name, seed_of_file(samples_npz)
     samples = ReferenceSamples.load(samples_npz)
     method = next(iter(methods))
-    titles = {REFERENCE: "Reference", **estimators}
+    titles = TITLES | dict(estimators)
     of_shown = {name: _of_method(estimates, (source, name, seed), method, samples_npz) for name in titles}
-    shown = _chosen(of_shown[REFERENCE], samples, method, samples_npz)
+    shown = _chosen(of_shown[SHOWN], samples, method, samples_npz)
     pooled = {name: _pooled(estimates, name, method) for name in titles}
     plt = use_style()
     figure = plt.figure(figsize=(TEXT_WIDTH_IN, 5.35), layout="constrained")
     upper, lower = figure.subfigures(2, 1, height_ratios=(2.1, 3))
     _draw_shown(upper.subplots(1, 2 * len(shown)), shown, samples, of_shown)
     names = [name for name in titles if len(pooled[name])]
-    informative = [REFERENCE, *(name for name in names if name != REFERENCE)][:8]
+    informative = [SHOWN, *(name for name in names if name not in REFERENCES)][:8]
     left, right = lower.subfigures(1, 2, width_ratios=(0.69, 0.31))
-    limits = _limits([pooled[name] for name in names if name != REFERENCE or len(names) == 1])
+    limits = _limits([pooled[name] for name in informative])
     scatters = left.subplots(2, 4, sharex=True, sharey=True).flat
     for panel, name in zip(scatters, informative, strict=False):
         _draw_scatter(panel, pooled[name], titles[name], style_of(name)[0], limits)
@@ -67,7 +70,7 @@ def draw_estimators(
     _draw_coverage(right.subplots(), pooled, names)
     handles = [plt.Line2D([], [], color=style_of(n)[0], linestyle=style_of(n)[1], label=titles[n]) for n in names]
     signs: list[tuple[str, str, dict[str, Any]]] = [
-        ("the reference's results", ".", {"color": LIGHT_GRAY}),
+        ("results of other starts and data", ".", {"color": LIGHT_GRAY}),
         ("true pose", "*", {}),
         ("succeeded", "o", {"markerfacecolor": "none", "markersize": 3}),
         ("failed", "x", {"markersize": 3}),
@@ -77,7 +80,7 @@ def draw_estimators(
         for label, marker, look in signs
     ]
     upper.legend(handles=handles, loc="outside upper left", ncols=6, columnspacing=1.2)
-    write_title(figure, f"{title}, {methods[method]}: 95 % ellipses over the reference's results; below, all datasets")
+    write_title(figure, f"{title}, {methods[method]}: 95 % ellipses over further results; below, all datasets")
     return figure
 
 
@@ -124,6 +127,7 @@ def _pooled(rows: Mapping, name: str, method: str) -> pd.DataFrame:
 def _chosen(reference: pd.DataFrame, samples: ReferenceSamples, method: str, path: str | Path) -> dict[str, int]:
     """Return the row in the samples of the registration of each kind whose error is the median."""
     enough_S = (np.diff(samples.offsets) >= FEWEST_SAMPLES) & (samples.method == method)
+    enough_S &= samples.kind == SHOWN.removeprefix("reference_")
     place_of = {str(samples.sample[i]): int(i) for i in np.flatnonzero(enough_S)}
     known = reference[reference["sample"].isin(list(place_of))]
     if known.empty:
@@ -165,13 +169,16 @@ def _draw_coverage(panel, pooled: Mapping, names: Sequence[str]) -> None:
     panel.plot([0, 100], [0, 100], color=GRAY, linewidth=0.6)
     for name in names:
         color, line = style_of(name)
-        width = 1.8 if name == REFERENCE else 1.1
-        shares = 100 * coverages(pooled[name]["mahalanobis"].to_numpy())
+        width = 1.8 if name in REFERENCES else 1.1
+        succeeded = ~pooled[name]["failed"].to_numpy()
+        if not succeeded.any():
+            continue
+        shares = 100 * coverages(pooled[name]["mahalanobis"].to_numpy()[succeeded])
         panel.plot(100 * LEVELS, shares, color=color, linestyle=line, linewidth=width)
     panel.set(xlim=(0, 100), ylim=(0, 100))
     panel.set_xlabel("said to hold (%)", fontsize=SMALL_PT, labelpad=1)
     panel.set_ylabel("true poses within (%)", fontsize=SMALL_PT, labelpad=1)
-    panel.set_title("Coverage", fontsize=8, pad=3)
+    panel.set_title("Coverage, succeeded", fontsize=8, pad=3)
     panel.tick_params(pad=1.5, length=2)
     _write(panel, (0.04, 0.97), "too cautious")  # Curves lie in the other corner.
 

@@ -3,12 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Literal, get_args
 
 import numpy as np
 
 from gpca.settings import Bounds, PositiveShare
 from gpca.uncertainty.settings import start_deviation
+
+Kind = Literal["starts", "data", "all"]  # of a reference: what varies in it
+KINDS: tuple[Kind, ...] = get_args(Kind)
+REFERENCES = tuple(f"reference_{kind}" for kind in KINDS)  # by these names they have rows among the estimators
+# By which an estimator is judged, by what it models. No posterior can be drawn here; a right one is about as wide as
+# the results of other data.
+REFERENCE_OF: dict[str, Kind] = {
+    **{"starts": "starts", "data": "data", "posterior": "data"},
+    **{"starts and data": "all", "error": "all"},
+}
+OTHER_SOURCE, MILD = "other_source", "mild"  # what a learner is taught with, for its name
+SHIFTS = {OTHER_SOURCE: "taught on another dataset", MILD: "taught on mild severities"}
 
 
 @dataclass(frozen=True)
@@ -18,9 +30,9 @@ class EstimatorPairSettings:
     Attributes:
         methods: registration method -> test registrations of each source and seed, at most.
         train: training registrations by each method, for estimators that learn, at most.
-        train_starts: runs of each of them.
+        train_starts: runs of each of them, with other data and starts.
         points: of source and of target (fewer where a cloud has fewer).
-        starts: of the reference, Monte-Carlo.
+        repeats: registrations of each reference.
         start_rotation_deg, start_translation: root mean square angle and length of all starts' offsets.
         floor: variance that is added to every covariance before it is judged; a spread below it counts as none.
         failed: error from which a registration has failed, ADD or ADD-S in diameters: the config's ``success.error``.
@@ -30,7 +42,7 @@ class EstimatorPairSettings:
     train: Annotated[int, Bounds(minimum=8)]
     train_starts: Annotated[int, Bounds(minimum=7, maximum=1000)]
     points: Annotated[int, Bounds(minimum=64, maximum=65536)]
-    starts: Annotated[int, Bounds(minimum=20, maximum=100_000)]
+    repeats: Annotated[int, Bounds(minimum=20, maximum=100_000)]
     start_rotation_deg: Annotated[float, Bounds(exclusiveMinimum=0, maximum=180)]
     start_translation: Annotated[float, Bounds(exclusiveMinimum=0, maximum=10)]
     floor: Annotated[float, Bounds(exclusiveMinimum=0, maximum=1)]

@@ -8,20 +8,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 
 from gpca.alignment.features import estimate_normals
 from gpca.alignment.methods.interface import Pair
 from gpca.alignment.methods.registry import make_method
-from gpca.experiments.estimators.examples import Moved, describe, example
+from gpca.experiments.estimators.examples import Moved, describe, example, twists_or_none
 from gpca.experiments.judge import Judges
 from gpca.pairs.dataset import Registrations
 from gpca.process.progress import progress
 from gpca.seeds import generator, seed_of
 from gpca.uncertainty.designs import ADDITIVE_KNOBS, RegisteredRow
 from gpca.uncertainty.estimators.interface import POINT_TO_POINT, Estimate, Example, RegisteredPair
+from gpca.uncertainty.estimators.monte_carlo import sample
 from gpca.uncertainty.knobs import UNTOUCHED, KnobbedSource, Knobs
 from gpca.uncertainty.settings import UncertaintySettings
 from gpca.uncertainty.spread import divergence
@@ -92,7 +93,9 @@ class KnobbedRegistrar:
             [registered] = self.under(row, OBSERVED)
             T_true = self._registrations.T_target_source("true", row)
             judge = judges.of(self._registrations, row)
-            examples.append(example(registered, T_true, judge, MOVED, self._settings.starts, *self._axes))
+            draw = partial(sample, registered, self._settings.starts, *self._axes, "examples")
+            twists_n_6 = twists_or_none(draw, self._settings.starts)
+            examples.append(example(registered, T_true, judge, MOVED, twists_n_6))
         return examples
 
     def estimates(

@@ -1,4 +1,8 @@
-"""Bayesian ICP (Maken, Ramos & Ott 2020): stochastic gradient Langevin dynamics on mini-batches of the source."""
+"""Bayesian ICP (Maken, Ramos & Ott 2020): stochastic gradient Langevin dynamics on mini-batches of the source.
+
+It models the posterior of the pose given these clouds (ICRA 2020). Where the likelihood is right and points are many,
+that is as wide as the estimate's distribution over clouds measured again (the theorem of Bernstein and von Mises).
+"""
 
 from __future__ import annotations
 
@@ -56,4 +60,4 @@ def langevin(
     return np.concatenate(visited) if visited else x_n_6
 
 
-ESTIMATORS = {"bayesian_icp": EstimatorEntry("Bayesian ICP (SGLD)", estimate)}
+ESTIMATORS = {"bayesian_icp": EstimatorEntry("Bayesian ICP (SGLD)", "posterior", estimate)}

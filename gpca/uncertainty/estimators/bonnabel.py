@@ -2,6 +2,8 @@
 
 Between points and planes a match may slide along its plane and costs nothing, so that matches that change do no harm to
 Σ = σ² H⁻¹. Between points it makes the pose look held where it is not.
+
+It models the data: the sensor's noise, and that of nothing else (Bonnabel et al., ACC 2016, whose σ² is its variance).
 """
 
 from __future__ import annotations
@@ -39,4 +41,4 @@ def estimate(registered: RegisteredPair, noise: float = 0.0) -> np.ndarray:
     return variance * inverse_hessian(np.einsum("ni,nj->ij", rows_n_6, rows_n_6))
 
 
-ESTIMATORS = {"bonnabel": EstimatorEntry("Bonnabel, point-to-plane", estimate)}
+ESTIMATORS = {"bonnabel": EstimatorEntry("Bonnabel, point-to-plane", "data", estimate)}

@@ -3,6 +3,8 @@
 The starts' spread goes through the method by 2·6 sigma points and their middle, 13 runs. The sensor's white noise w and
 a bias b, the same for all points along their normals, move the minimum by A⁻¹ Σ Jᵀ (w + b) with A = Σ JᵀJ; the bias is
 what remains when there are many points.
+
+It models starts and data: the paper (RA-L 2020) adds the covariance of the initial pose and that of sensor's errors.
 """
 
 from __future__ import annotations
@@ -42,4 +44,4 @@ def unscented(registered: RegisteredPair) -> np.ndarray:
     return np.cov(twists_m_6, rowvar=False, bias=True)
 
 
-ESTIMATORS = {"brossard": EstimatorEntry("Brossard, unscented", estimate)}
+ESTIMATORS = {"brossard": EstimatorEntry("Brossard, unscented", "starts and data", estimate)}

@@ -2,6 +2,9 @@
 
 A learned metric of descriptors tells which pairs are alike: a weight exp(-|L (φ - φ')|²) for each training pair, L
 diagonal and chosen so that the runs of each training pair are likely under the covariance that the others give it.
+
+It models how results vary between the runs that it is taught with (ICRA 2019): starts and data where these vary both.
+That all runs of a pair may be wrong alike is no part of it.
 """
 
 from __future__ import annotations
@@ -119,4 +122,4 @@ def _variances(example: Example) -> np.ndarray:
     return twists_along_axes(example.twists, example.T_target_intrinsic).var(axis=0) + FLOOR
 
 
-ESTIMATORS = {"cello": Entry("CELLO-3D", learn=learn)}
+ESTIMATORS = {"cello": Entry("CELLO-3D", "starts and data", learn=learn)}

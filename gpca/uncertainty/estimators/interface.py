@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
@@ -21,6 +22,9 @@ from gpca.alignment.twist import exp, log, point_jacobians
 SINGULAR = 1e-9  # ratio of eigenvalues below which a direction counts as open
 FEWEST_RUNS = 7  # that give a 6×6 covariance its rank
 POINT_TO_POINT, POINT_TO_PLANE = "point_to_point", "point_to_plane"
+# What a covariance is that of: results from other starts, results of clouds measured again, both at once; poses that
+# are likely given these very clouds; or errors, whatever they come from.
+Modeled = Literal["starts", "data", "starts and data", "posterior", "error"]
 Starter = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
@@ -113,7 +117,10 @@ class RegisteredPair:
         """
         if method_entry(self.method).is_global:
             raise FailedEstimate(f"'{self.method}' reads no initial pose, so that its results do not spread")
-        poses_n, found_n = self._register(exp(xi_n_6) @ self.pair.T_target_source_init)
+        return self.twists_of(*self._register(exp(xi_n_6) @ self.pair.T_target_source_init))
+
+    def twists_of(self, poses_n: np.ndarray, found_n: np.ndarray) -> np.ndarray:
+        """Return those of the poses (n, 4, 4) that were found (n,) as twists about this one; too few are a failure."""
         if found_n.sum() < FEWEST_RUNS:
             raise FailedEstimate(f"fewer than {FEWEST_RUNS} runs found a correspondence")
         return log(poses_n[found_n] @ inverse(self.T_target_source))
@@ -166,11 +173,13 @@ class EstimatorEntry:
 
     Attributes:
         title: as tables name the row.
+        models: what the covariance is that of, by which it is judged.
         estimate: ``estimate(registered, **settings)`` returns Σ (6, 6) or raises :class:`FailedEstimate`.
         learn: ``learn(examples, **settings)`` returns such a function of a registered pair.
     """
 
     title: str
+    models: Modeled
     estimate: Callable[..., np.ndarray] | None = None
     learn: Callable[..., Estimator] | None = None
 

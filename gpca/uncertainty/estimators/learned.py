@@ -3,6 +3,8 @@
 Each network gives the mean and the variances of the error from a pair's descriptors. What they say on average is how
 much registrations of such a pair differ (aleatoric); how much they contradict each other, how little they know of such
 pairs (epistemic, Lakshminarayanan et al. 2017). Theirs is variational, on clouds.
+
+It models the error, whatever it comes from: it is taught with errors against true poses (ICRA 2022).
 """
 
 from __future__ import annotations
@@ -130,4 +132,4 @@ def _errors(example: Example) -> np.ndarray:
     return twists_along_axes(log(away_n), example.T_target_intrinsic)
 
 
-ESTIMATORS = {"learned": EstimatorEntry("Learned ensemble", learn=learn)}
+ESTIMATORS = {"learned": EstimatorEntry("Learned ensemble", "error", learn=learn)}

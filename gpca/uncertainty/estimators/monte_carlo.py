@@ -1,4 +1,7 @@
-"""Monte-Carlo: the covariance of what the method finds from many initial poses."""
+"""Monte-Carlo: the covariance of what the method finds from many initial poses, with the clouds as they are.
+
+It models the starts alone, as the uncertainty of ICP in the paper that this suite is about.
+"""
 
 from __future__ import annotations
 
@@ -19,4 +22,4 @@ def sample(registered: RegisteredPair, starts: int, *axes: object) -> np.ndarray
     return registered.twists_from(random.normal(size=(starts, 6)) * registered.deviation_6)
 
 
-ESTIMATORS = {"monte_carlo": EstimatorEntry("Monte-Carlo", estimate)}
+ESTIMATORS = {"monte_carlo": EstimatorEntry("Monte-Carlo", "starts", estimate)}

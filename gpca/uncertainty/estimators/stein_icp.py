@@ -1,7 +1,7 @@
 """Stein ICP (Maken, Ramos & Ott 2022): Stein variational gradient descent from the prior to the posterior.
 
 The particles attract each other to where the posterior is high and repel each other by the kernel's slope (Liu & Wang
-2016).
+2016). It models the posterior of the pose given these clouds (RA-L 2022), as Bayesian ICP does.
 """
 
 from __future__ import annotations
@@ -53,4 +53,4 @@ def descend(
     return x_n_6
 
 
-ESTIMATORS = {"stein_icp": EstimatorEntry("Stein ICP (SVGD)", estimate)}
+ESTIMATORS = {"stein_icp": EstimatorEntry("Stein ICP (SVGD)", "posterior", estimate)}

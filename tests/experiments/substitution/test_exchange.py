@@ -101,7 +101,7 @@ def test_an_explainer_that_learns_is_untaught_by_an_estimator_that_failed_in_tra
 
     registrar = KnobbedRegistrar(registrations, "tiny", 100, UNCERTAINTY)
     asked = {next(registrar.under(row, OBSERVED)).pair.seed for row in registrations.rows("test")[:3]}
-    entries = {"m": {"late": EstimatorEntry("Late", of_test_pairs)}}
+    entries = {"m": {"late": EstimatorEntry("Late", "starts", of_test_pairs)}}
     monkeypatch.setattr(estimator_registry.REGISTRY, "by_module", lambda: entries)
     rows = exchange(estimators=("late",)).run(registrations, judges).set_index("explainer")
     assert set(rows.loc["residuals_logistic", "failure"]) == {UNTAUGHT}

@@ -85,7 +85,7 @@ def test_without_normals_what_needs_them_fails():
 
 
 def test_a_covariance_that_is_not_finite_is_a_failure(monkeypatch):
-    entry = EstimatorEntry("Wild", estimate=lambda registered: np.full((6, 6), np.nan))
+    entry = EstimatorEntry("Wild", "starts", estimate=lambda registered: np.full((6, 6), np.nan))
     monkeypatch.setattr(registry.REGISTRY, "by_module", lambda: {"wild": {"wild": entry}})
     assert make_estimator("wild")(registered()).failure == "the covariance is not finite"
 
