@@ -44,7 +44,7 @@ LISTS = {  # which names of a step are lists, and not of one seed, file or name
     "controls": "retrained retrained_embeddings others other_registrations",
     "diagnose": "seeds causes read read_timings predictions timings",
     "diagnose_by_features": "seeds causes descriptors predictions",
-    "estimate": "seeds estimators causes samples rows timings",
+    "estimate": "seeds estimators causes other_objects other_causes samples rows timings",
     "frame_causes": "causes descriptors encoders embeddings",
     "frame_labels": "backbones embeddings strategies out",
     "gradients": "seeds registrations encoders embeddings deletions maps tcav",
@@ -66,7 +66,7 @@ NUMBERS = {"seed", "seeds", "files_seed", "surface_points", "threads"}
 TEXTS = {
     *("source", "explainer", "control", "design", "reduction", "group", "title", "name", "files_of", "encoder_of"),
     *("registrations_of", "retrained", "others", "strategies", "concepts", "estimators", "backbones", "learners"),
-    *("remedies", "reenactment", "methods", "encoders_of", "data_dir", "chunk"),
+    *("remedies", "reenactment", "other", "methods", "encoders_of", "data_dir", "chunk"),
 }
 SWITCHES = {"stand_in"}
 CODE = "import sys; from tests.steps.by_words import main; sys.exit(main(sys.argv[1:]))"

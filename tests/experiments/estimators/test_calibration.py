@@ -3,9 +3,18 @@
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.stats import trim_mean
 
 from gpca.errors import InputError
-from gpca.experiments.estimators.calibration import collect_estimate_seconds, collect_estimates, measure
+from gpca.experiments.estimators.calibration import (
+    TRUTH,
+    collect_estimate_seconds,
+    collect_estimates,
+    collect_intervals,
+    measure,
+    read_intervals,
+    trimmed_mean,
+)
 from gpca.experiments.estimators.covariances import (
     JUDGED,
     ReferenceSamples,
@@ -13,6 +22,7 @@ from gpca.experiments.estimators.covariances import (
     covariance_of,
     read_estimates,
 )
+from gpca.experiments.estimators.settings import KINDS, REFERENCES
 from gpca.io.csv_file import write_csv
 
 SIGMA = 1e-4 * np.eye(6) + 1e-5
@@ -20,10 +30,15 @@ SIGMA = 1e-4 * np.eye(6) + 1e-5
 
 def rows(n=20, method="point_to_point", **changes):
     of_all = {
-        "sample": np.arange(n), "object": "cup", "method": method, "add_relative": np.linspace(0.01, 0.1, n),
-        "failed": np.arange(n) >= n // 2, "failure": "", "kl_rotation": 2.0, "kl_translation": 3.0,
+        "sample": np.arange(n), "object": "cup",
+        "cluster": np.array(["cups", "cans", "boxes", "cars"])[np.arange(n) % 4],
+        "method": method, "add_relative": np.linspace(0.01, 0.1, n), "failed": np.arange(n) >= n // 2,
+        "inlier_rmse": np.linspace(0.01, 0.02, n), "fitness": 0.9, "failure": "",
         "error_ratio": 4.0, "mahalanobis": 12.0, "spread": np.linspace(0.02, 0.2, n),
     }  # fmt: skip
+    for k, kind in enumerate(KINDS):
+        of_all |= {f"kl_rotation_{kind}": 2.0 + k, f"kl_translation_{kind}": 3.0 + k, f"error_ratio_{kind}": 9.0}
+        of_all |= {f"mahalanobis_{kind}": 6.0 * (1 + k), f"covered_{kind}": 0.9 - 0.1 * k}
     return pd.DataFrame(of_all | changes | covariance_columns(SIGMA))
 
 
@@ -33,6 +48,10 @@ def without(frame, chosen):
     frame.loc[chosen, "failure"] = "singular"
     frame.loc[chosen, [*JUDGED, *covariance_columns(None)]] = np.nan
     return frame
+
+
+def ones(n=20):
+    return np.ones((1, n))
 
 
 @pytest.fixture
@@ -47,67 +66,127 @@ def file(tmp_path):
 
 
 def test_every_metric_by_hand(file):
-    metrics = measure(read_estimates(file(rows())))
-    assert metrics == {
-        "no_estimate": 0, "test_samples": 20, "kl_rotation": 2, "kl_translation": 3, "nne": 2, "nees": 2,
-        "coverage": 1, "auroc_failed": 1, "spearman_error": pytest.approx(1),
-    }  # fmt: skip
+    metrics = {name: value[0] for name, value in measure(read_estimates(file(rows())), ones()).items()}
+    expected = {"no_estimate": 0, "test_samples": 20, "auroc_failed": 1, "spearman_error": 1}
+    expected |= {f"nne_{TRUTH}": 2, f"nees_{TRUTH}": 2, f"coverage_{TRUTH}": 1}
+    for k, kind in enumerate(KINDS):
+        expected |= {f"kl_rotation_{kind}": 2 + k, f"kl_translation_{kind}": 3 + k, f"nne_{kind}": 3}
+        expected |= {f"nees_{kind}": 1 + k, f"coverage_{kind}": 0.9 - 0.1 * k}
+    assert metrics == pytest.approx(expected)
 
 
-def test_means_leave_out_a_tenth_at_either_end():
-    wild = np.where(np.arange(20) < 2, 1e9, 3.0)
-    metrics = measure(rows(kl_rotation=wild, mahalanobis=wild, error_ratio=wild))
-    assert (metrics["kl_rotation"], metrics["nees"]) == (3, 0.5)
-    assert metrics["nne"] == pytest.approx(3**0.5)
-    assert metrics["coverage"] == 0.9  # and this does not
+def test_means_leave_out_a_tenth_at_either_end_by_weight():
+    values = np.random.default_rng(0).normal(size=30) ** 3
+    assert trimmed_mean(pd.Series(values), ones(30))[0] == pytest.approx(trim_mean(values, 0.1))
+    twice = trimmed_mean(pd.Series(values), 2.0 * (np.arange(30) < 10)[None])[0]
+    assert twice == pytest.approx(trim_mean(np.repeat(values[:10], 2), 0.1))
+    assert trimmed_mean(pd.Series([1.0, np.nan, 3.0]), ones(3))[0] == pytest.approx(2)
+    assert np.isnan(trimmed_mean(pd.Series([np.nan]), ones(1))[0])
 
 
 def test_the_coverage_is_by_the_quantile_of_six_degrees():
-    assert measure(rows(mahalanobis=np.where(np.arange(20) < 5, 12.591, 12.592)))["coverage"] == 0.25
+    metrics = measure(rows(mahalanobis=np.where(np.arange(20) < 5, 12.591, 12.592)), ones())
+    assert metrics[f"coverage_{TRUTH}"] == pytest.approx(0.25)
 
 
 def test_of_gaussian_errors_a_right_covariance_scores_right():
     random = np.random.default_rng(0)
     errors = random.multivariate_normal(np.zeros(6), SIGMA, size=4000)
     squares = np.einsum("ni,ij,nj->n", errors, np.linalg.inv(SIGMA), errors)
-    metrics = measure(rows(4000, mahalanobis=squares, error_ratio=np.square(errors).sum(axis=1) / np.trace(SIGMA)))
-    assert metrics["coverage"] == pytest.approx(0.95, abs=0.01)
+    right = rows(4000, mahalanobis=squares, error_ratio=np.square(errors).sum(axis=1) / np.trace(SIGMA))
+    metrics = measure(right, ones(4000))
+    assert metrics[f"coverage_{TRUTH}"][0] == pytest.approx(0.95, abs=0.01)
     # The distribution is skewed, so that its middle lies below its mean.
-    assert metrics["nees"] == pytest.approx(0.93, abs=0.02)
-    assert metrics["nne"] == pytest.approx(0.96, abs=0.04)
+    assert metrics[f"nees_{TRUTH}"][0] == pytest.approx(0.93, abs=0.02)
+    assert metrics[f"nne_{TRUTH}"][0] == pytest.approx(0.96, abs=0.04)
 
 
-def test_what_failed_is_counted_and_left_out_of_the_rest(file):
+def test_what_has_no_estimate_is_counted_and_left_out_of_the_rest(file):
     some = without(rows(spread=np.linspace(0.2, 0.02, 20)), slice(0, 3))
-    metrics = measure(read_estimates(file(some)))
+    metrics = measure(read_estimates(file(some)), ones())
     assert metrics["no_estimate"] == pytest.approx(0.2)
     assert metrics["test_samples"] == 20
     assert metrics["auroc_failed"] == 0
     assert metrics["spearman_error"] == pytest.approx(-1)
-    assert measure(read_estimates(file(without(rows(), slice(None))))) == {"no_estimate": 1, "test_samples": 20}
+    none = measure(read_estimates(file(without(rows(), slice(None)))), ones())
+    assert {name: value[0] for name, value in none.items()} == {"no_estimate": 1, "test_samples": 20}
+
+
+def test_failed_and_other_registrations_stand_apart(file):
+    wrong = rows(mahalanobis=np.where(np.arange(20) < 10, 1.0, 100.0))
+    tidy = collect_estimates([file(wrong)]).set_index(["metric", "concept"])["value"]
+    assert tidy[f"coverage_{TRUTH}", "point_to_point/succeeded"] == 1
+    assert tidy[f"coverage_{TRUTH}", "point_to_point/failed"] == 0
+    assert tidy["test_samples", "point_to_point/failed"] == 10
+    assert tidy["auroc_failed", "point_to_point/both"] == 1
+    assert ("auroc_failed", "point_to_point/failed") not in tidy.index
+    assert (f"coverage_{TRUTH}", "point_to_point/both") not in tidy.index
 
 
 def test_what_is_not_defined_has_no_row(file):
     tidy = collect_estimates([file(rows(failed=False))])
     assert "auroc_failed" not in set(tidy["metric"])
-    assert set(tidy["source"]) | set(tidy["method"]) | set(tidy["concept"]) == {"ycb", "brossard", "point_to_point"}
+    assert set(tidy["source"]) | set(tidy["method"]) == {"ycb", "brossard"}
     assert set(tidy["seed"]) == {3}
-    without_reference = rows(kl_rotation=np.nan, kl_translation=np.nan)
-    assert "kl_rotation" not in set(collect_estimates([file(without_reference)])["metric"])
+    without_reference = rows(kl_rotation_data=np.nan, covered_data=np.nan)
+    metrics = set(collect_estimates([file(without_reference)])["metric"])
+    assert not {"kl_rotation_data", "coverage_data"} & metrics
+    assert "kl_rotation_all" in metrics
 
 
-def test_registration_methods_stand_apart(file):
-    both = pd.concat([rows(), rows(10, "point_to_plane", kl_rotation=7.0)])
-    tidy = collect_estimates([file(both)]).set_index(["metric", "concept"])["value"]
-    assert tidy["kl_rotation", "point_to_point"] == 2
-    assert tidy["kl_rotation", "point_to_plane"] == 7
-    assert tidy["test_samples", "point_to_plane"] == 10
+def intervals_of(file, **of_estimators):
+    """Of two sources and two seeds."""
+    paths = [
+        file(frame, f"{source}/{name}/seed{seed}.csv")
+        for name, frame in {REFERENCES[0]: rows(), **of_estimators}.items()
+        for source in ("cups", "ycb")
+        for seed in (0, 1)
+    ]
+    return collect_intervals(paths)
 
 
-def test_seconds_are_medians(file):
-    seconds = pd.DataFrame({"sample": [0, 1, 2], "method": "point_to_point", "seconds": [0.1, 0.2, 9.0]})
-    tidy = collect_estimate_seconds([file(seconds, "ycb/estimator_brossard/seed3.csv")])
-    assert tidy[["method", "concept", "value"]].to_numpy().tolist() == [["brossard", "point_to_point", 0.2]]
+def test_intervals_are_over_all_sources_and_seeds(file, tmp_path):
+    found = intervals_of(file, brossard=rows(mahalanobis=np.where(np.arange(20) % 3, 1.0, 100.0)))
+    write_csv(tmp_path / "intervals.csv", found)
+    found = read_intervals(tmp_path / "intervals.csv")
+    of = found[found["estimator"] == "brossard"].set_index(["state", "metric"])
+    row = of.loc["succeeded", f"coverage_{TRUTH}"]
+    assert (row["samples"], row["seeds"], row["value"]) == (40, 2, pytest.approx(0.6))
+    assert row["low"] < 0.6 < row["high"]
+    assert of.loc[("failed", "no_estimate"), "value"] == 0
+    again = intervals_of(file, brossard=rows(mahalanobis=np.where(np.arange(20) % 3, 1.0, 100.0)))
+    assert again.equals(intervals_of(file, brossard=rows(mahalanobis=np.where(np.arange(20) % 3, 1.0, 100.0))))
+
+
+def test_an_area_is_compared_with_the_best_gate_on_the_same_draws(file):
+    """The residual tells all, the spread of the starts half, the estimator nothing."""
+    spread = {"brossard": np.ones(20), "monte_carlo": np.where(np.arange(20) >= 15, 1.0, 0.5)}
+    found = intervals_of(file, **{name: rows(spread=values) for name, values in spread.items()})
+    of = found[found["metric"] == "auroc_failed"].set_index("estimator")
+    assert of["value"].to_dict() == pytest.approx(
+        {REFERENCES[0]: 1, "brossard": 0.5, "monte_carlo": 0.75, "gate_rmse": 1, "gate_fitness": 0.5}
+    )
+    assert of.loc["brossard", ["rival", "difference", "difference_high"]].tolist() == ["gate_rmse", -0.5, -0.5]
+    assert of.loc["gate_rmse", ["rival", "difference"]].tolist() == ["monte_carlo", 0.25]
+    assert set(found[found["estimator"] == "gate_rmse"]["metric"]) == {"auroc_failed", "spearman_error"}
+
+
+def test_a_registration_without_correspondences_scores_worst_at_every_gate(file):
+    lost = rows(fitness=np.where(np.arange(20) == 19, 0.0, 0.9), inlier_rmse=np.where(np.arange(20) == 19, 0.0, 0.01))
+    of = collect_intervals([file(lost, f"ycb/{REFERENCES[0]}/seed0.csv")]).set_index(["estimator", "metric"])
+    assert of.loc[("gate_rmse", "auroc_failed"), "value"] == pytest.approx(0.55)
+
+
+def test_few_families_have_no_interval(file):
+    found = intervals_of(file, brossard=rows(cluster="cups"), **{REFERENCES[0]: rows(cluster="cups")})
+    assert found["low"].isna().all()
+
+
+def test_seconds_are_medians_over_all_files(file):
+    first = pd.DataFrame({"sample": [0, 1, 2], "method": "point_to_point", "seconds": [0.1, 0.2, 9.0]})
+    other = pd.DataFrame({"sample": [0, 1], "method": "point_to_point", "seconds": [0.3, 0.4]})
+    files = [file(first, "ycb/estimator_brossard/seed3.csv"), file(other, "ycb/estimator_brossard/seed4.csv")]
+    assert collect_estimate_seconds(files).to_numpy().tolist() == [["brossard", "point_to_point", 0.3]]
 
 
 def test_a_covariance_survives_the_file(file):
@@ -121,6 +200,7 @@ def test_a_covariance_survives_the_file(file):
     [
         ({"mahalanobis": "many"}, "column 'mahalanobis' contains values that are not finite numbers"),
         ({"add_relative": ""}, "column 'add_relative'"),
+        ({"inlier_rmse": ""}, "column 'inlier_rmse'"),
     ],
 )
 def test_a_faulty_file_is_one_line(file, changes, message):
@@ -128,13 +208,12 @@ def test_a_faulty_file_is_one_line(file, changes, message):
         read_estimates(file(rows(**changes)))
 
 
-SAMPLES = ReferenceSamples(
-    np.array([4, 5]), np.array(["gicp", "gicp"]), np.ones((5, 6), np.float32), np.array([0, 3, 5]), np.zeros((2, 6))
-)
-
-
 def test_samples_survive_the_file(tmp_path):
-    SAMPLES.save(tmp_path / "a.npz", ("cups", 0))
+    samples = ReferenceSamples(
+        np.array([4, 5]), np.array(["gicp", "gicp"]), np.array(["data", "all"]), np.ones((5, 6), np.float32),
+        np.array([0, 3, 5]), np.zeros((2, 6)),
+    )  # fmt: skip
+    samples.save(tmp_path / "a.npz", ("cups", 0))
     loaded = ReferenceSamples.load(tmp_path / "a.npz")
     assert loaded.twists_of(1).shape == (2, 6)
-    assert loaded.sample.tolist() == [4, 5]
+    assert loaded.kind.tolist() == ["data", "all"]

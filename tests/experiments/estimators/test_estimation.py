@@ -7,49 +7,98 @@ import pytest
 
 from gpca.alignment.rigid import inverse, transform
 from gpca.alignment.twist import exp
+from gpca.causes.settings import CauseSettings
 from gpca.errors import InputError
-from gpca.experiments.estimators.covariances import COVARIANCE, REFERENCE, covariance_of
-from gpca.experiments.estimators.estimation import mahalanobis, predicted_spread, try_estimators
-from gpca.experiments.estimators.settings import EstimatorPairSettings
+from gpca.experiments.estimators.covariances import COVARIANCE, covariance_of
+from gpca.experiments.estimators.estimation import mild, most_tested, reference_samples, try_estimators
+from gpca.experiments.estimators.judging import compared, mahalanobis, predicted_spread
+from gpca.experiments.estimators.references import Reference
+from gpca.experiments.estimators.settings import KINDS, REFERENCES, EstimatorPairSettings
+from gpca.experiments.estimators.situations import Situations
 from gpca.experiments.judge import Judges
 from gpca.uncertainty.spread import divergence
+from tests.conftest import FEW_CAUSES
 
 SETTINGS = EstimatorPairSettings(
-    **{"methods": {"point_to_point": 4, "point_to_plane": 2}, "train": 8, "train_starts": 7, "points": 64},
-    **{"starts": 40, "start_rotation_deg": 10.0, "start_translation": 0.05, "floor": 1e-6, "failed": 0.03},
+    **{"methods": {"point_to_plane": 2, "point_to_point": 4}, "train": 8, "train_starts": 7, "points": 64},
+    **{"repeats": 20, "start_rotation_deg": 10.0, "start_translation": 0.05, "floor": 1e-6, "failed": 0.03},
 )
 ESTIMATORS = {"censi": {}, "brossard": {}, "cello": {"steps": 2}}
+OTHERWISE = ["cello_mild", "cello_other_source"]
 
 
 @pytest.fixture(scope="module")
-def judges(four):
-    return Judges(four, "objects of four")
+def situations(causes, four):
+    return Situations("four", 100, causes, CauseSettings(**FEW_CAUSES), four, Judges(four, "objects of four"))
 
 
 @pytest.fixture(scope="module")
-def tried(causes, judges):
-    return try_estimators(causes, judges, "four", 100, ESTIMATORS, SETTINGS)
+def tried(situations):
+    """The same source stands for another one; half of its few training samples suffice to learn from."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("gpca.uncertainty.estimators.cello.FEWEST_EXAMPLES", 6)
+        return try_estimators(situations, situations, ESTIMATORS, SETTINGS)
 
 
-def test_every_estimator_has_a_row_per_registration_and_so_has_the_reference(tried):
+def test_every_estimator_has_a_row_per_registration_and_so_have_the_references(tried):
     rows, cases = tried
-    assert list(rows) == [REFERENCE, *ESTIMATORS]
-    for of_estimator in rows.values():
-        assert of_estimator["method"].tolist() == ["point_to_point"] * 4 + ["point_to_plane"] * 2
-        assert of_estimator["sample"].tolist() == [case.known["sample"] for case in cases]
-        assert (of_estimator["seconds"] > 0).all()
+    assert list(rows) == [*REFERENCES, *ESTIMATORS, *OTHERWISE]
+    for name in (*REFERENCES, *ESTIMATORS):
+        assert rows[name]["method"].tolist() == ["point_to_plane"] * 2 + ["point_to_point"] * 4
+        assert rows[name]["sample"].tolist() == [case.known["sample"] for case in cases]
+        assert (rows[name]["seconds"] > 0).all()
     refusal = "the closed form is that of point-to-point, not of 'point_to_plane'"
-    assert rows["censi"].loc[4:, "failure"].tolist() == [refusal] * 2
-    assert rows["censi"].loc[4:, "mahalanobis"].isna().all()
+    assert rows["censi"].loc[:1, "failure"].tolist() == [refusal] * 2
+    assert rows["censi"].loc[:1, "mahalanobis"].isna().all()
 
 
-def test_the_reference_is_the_covariance_of_its_results_and_does_not_diverge_from_itself(tried):
+def test_what_is_taught_otherwise_sees_the_method_with_most_registrations_and_says_something_else(tried):
+    rows, _ = tried
+    assert most_tested(SETTINGS) == "point_to_point"
+    own = rows["cello"][rows["cello"]["method"] == "point_to_point"].reset_index(drop=True)
+    for name in OTHERWISE:
+        assert rows[name]["method"].tolist() == ["point_to_point"] * 4
+        assert rows[name]["sample"].tolist() == own["sample"].tolist()
+    assert np.abs(rows["cello_mild"]["spread"] - own["spread"]).max() > 1e-4
+    assert rows["cello_other_source"]["spread"].tolist() == own["spread"].tolist()  # which is the same one here
+
+
+def test_mild_is_the_half_with_the_weakest_perturbations(situations):
+    rows = situations.causes.rows("train")
+    chosen = mild(situations, rows)
+    rest = np.setdiff1d(rows, chosen)
+    assert len(chosen) == (len(rows) + 1) // 2
+    registrations = situations.causes.registrations
+    for name, largest in (("crop", 0.75), ("translation", 0.4), ("noise", 0.08)):
+        of = getattr(registrations, f"severity_{name}") / largest
+        assert of[chosen].max() <= max(of[rest].max(), of[chosen].max())
+    strongest = np.max(
+        [
+            registrations.severity_noise / 0.08, registrations.severity_crop / 0.75,
+            registrations.severity_translation / 0.4, registrations.severity_rotation_rad / np.deg2rad(90),
+        ], axis=0,
+    )  # fmt: skip
+    assert strongest[chosen].max() <= strongest[rest].min()
+
+
+def test_without_another_source_there_are_no_lessons_of_one(situations):
+    rows, _ = try_estimators(
+        situations, None, {"cello": {"steps": 2}}, replace(SETTINGS, methods={"point_to_point": 1})
+    )
+    assert list(rows) == [*REFERENCES, "cello", "cello_mild"]
+
+
+def test_a_reference_is_the_covariance_of_its_results_and_does_not_diverge_from_itself(tried):
     rows, cases = tried
     for i, case in enumerate(cases):
-        row = rows[REFERENCE].iloc[i]
-        assert len(case.reference_twists) <= 40
-        assert covariance_of(row) == pytest.approx(np.cov(case.reference_twists, rowvar=False))
-        assert row["kl_rotation"] == row["kl_translation"] == pytest.approx(0, abs=1e-9)
+        for kind in KINDS:
+            row, twists = rows[f"reference_{kind}"].iloc[i], case.references[kind].twists
+            assert len(twists) <= SETTINGS.repeats
+            assert covariance_of(row) == pytest.approx(np.cov(twists, rowvar=False))
+            for name in ("kl_rotation", "kl_translation"):
+                assert row[f"{name}_{kind}"] == pytest.approx(0, abs=1e-9)
+            assert row[f"error_ratio_{kind}"] == pytest.approx(1)
+            assert row[f"mahalanobis_{kind}"] == pytest.approx(6)
 
 
 def test_what_is_measured_is_what_the_estimate_says(tried):
@@ -63,11 +112,27 @@ def test_what_is_measured_is_what_the_estimate_says(tried):
         floored = sigma + SETTINGS.floor * np.eye(6)
         assert row["mahalanobis"] == pytest.approx(e @ np.linalg.inv(floored) @ e)
         assert row["error_ratio"] == pytest.approx(e @ e / np.trace(floored))
-        reference = np.cov(case.reference_twists, rowvar=False)
-        assert row["kl_translation"] == pytest.approx(divergence(reference[3:, 3:], sigma[3:, 3:], SETTINGS.floor))
+        for kind in KINDS:
+            reference = np.cov(case.references[kind].twists, rowvar=False)
+            expected = divergence(reference[3:, 3:], sigma[3:, 3:], SETTINGS.floor)
+            assert row[f"kl_translation_{kind}"] == pytest.approx(expected)
 
 
-def test_the_true_twist_leads_to_the_truth(tried, causes, judges):
+def test_a_covariance_is_compared_with_results_about_their_mean():
+    """As often within its region as the quantile says, and half as wide as it should be: four times the square."""
+    random = np.random.default_rng(0)
+    twists = 3.0 + random.normal(size=(20_000, 6))
+    right = compared(np.eye(6), Reference(twists), 1e-9)
+    assert right["covered"] == pytest.approx(0.95, abs=0.01)
+    assert (right["error_ratio"], right["mahalanobis"]) == pytest.approx((1, 6), rel=0.02)
+    sure = compared(np.eye(6) / 4, Reference(twists), 1e-9)
+    assert (sure["error_ratio"], sure["mahalanobis"]) == pytest.approx((4, 24), rel=0.02)
+    assert sure["covered"] < 0.4
+    assert sure["kl_rotation"] == pytest.approx(0.5 * (3 * 4 - 3 * np.log(4) - 3), rel=0.03)
+    assert compared(np.eye(6), Reference(), 1e-9) == {}
+
+
+def test_the_true_twist_leads_to_the_truth(tried, causes, situations):
     """Up to a symmetry of the object, and the error is that of the pose."""
     _, cases = tried
     registrations = causes.registrations
@@ -76,7 +141,7 @@ def test_the_true_twist_leads_to_the_truth(tried, causes, judges):
         T_true = exp(case.true_twist[None])[0] @ case.registered.T_target_source
         T_expected = registrations.T_target_source("icp", row) @ inverse(registrations.T_target_source("true", row))
         off = inverse(T_expected) @ T_true
-        judge = judges.of(registrations, row)
+        judge = situations.judges.of(registrations, row)
         if not judge.symmetric:
             assert off == pytest.approx(np.eye(4), abs=1e-5)
         assert np.linalg.norm(off[:3, 3]) < 1e-5
@@ -89,6 +154,7 @@ def test_the_model_is_registered_to_what_was_observed(tried, causes):
     registrations = causes.registrations
     for case in cases:
         [row] = np.flatnonzero((registrations.sample == case.known["sample"]) & (registrations.split == "test"))
+        assert case.known["cluster"] == registrations.cluster[row]
         for cloud, whole in (
             (case.registered.pair.source, registrations.target(row)),
             (case.registered.pair.target, registrations.cloud(row)),
@@ -97,30 +163,50 @@ def test_the_model_is_registered_to_what_was_observed(tried, causes):
             assert {tuple(p) for p in cloud.tolist()} <= {tuple(p) for p in whole.astype(float).tolist()}
 
 
-def test_the_same_seed_gives_the_same_numbers_and_other_estimators_change_none(tried, causes, judges):
-    again, _ = try_estimators(causes, judges, "four", 100, {"brossard": {}}, SETTINGS)
-    for name in (REFERENCE, "brossard"):
+def test_the_same_seed_gives_the_same_numbers_and_other_estimators_change_none(tried, situations):
+    again, _ = try_estimators(situations, None, {"brossard": {}}, SETTINGS)
+    for name in (*REFERENCES, "brossard"):
         left, right = (rows[name].drop(columns="seconds") for rows in (tried[0], again))
         assert left.equals(right)
 
 
-def test_objects_that_are_not_the_registrations_are_refused(causes, objects):
+def test_the_results_of_every_reference_are_kept(tried):
+    _, cases = tried
+    samples = reference_samples(cases)
+    assert samples.kind.tolist() == [*KINDS] * len(cases)
+    for i in range(len(samples.kind)):
+        expected = cases[i // len(KINDS)].references[KINDS[i % len(KINDS)]].twists
+        assert samples.twists_of(i) == pytest.approx(expected, abs=1e-6)
+
+
+def test_objects_that_are_not_the_registrations_are_refused(situations, objects):
     with pytest.raises(
         InputError, match=r"objects of tiny: object .* give the objects that the registrations were made from"
     ):
-        try_estimators(causes, Judges(objects, "objects of tiny"), "four", 100, {"censi": {}}, SETTINGS)
+        try_estimators(replace(situations, judges=Judges(objects, "objects of tiny")), None, {"censi": {}}, SETTINGS)
 
 
-def test_registrations_that_fail_are_counted_and_raise_nothing(causes, judges):
+def test_settings_that_the_causes_were_not_drawn_with_are_refused(situations):
+    other = CauseSettings(**FEW_CAUSES | {"points": (128, 200)})
+    with pytest.raises(InputError, match=r"sample \d+ of four, seed 100: is not reproduced by these settings"):
+        try_estimators(replace(situations, drawn_by=other), None, {"censi": {}}, SETTINGS)
+
+
+def test_registrations_that_fail_are_counted_and_raise_nothing(situations):
     """From nowhere near: no start finds anything."""
-    lost = replace(causes.registrations, T_target_source_init=causes.registrations.T_target_source_init.copy())
+    registrations = situations.causes.registrations
+    lost = replace(registrations, T_target_source_init=registrations.T_target_source_init.copy())
     lost.T_target_source_init[:, :3, 3] += 100
+    nowhere = replace(situations, causes=replace(situations.causes, registrations=lost))
     few = replace(SETTINGS, methods={"point_to_point": 1})
-    rows, cases = try_estimators(replace(causes, registrations=lost), judges, "four", 100, {"brossard": {}}, few)
-    assert rows[REFERENCE]["failure"].tolist() == ["too few of the reference's runs found a correspondence"]
+    rows, cases = try_estimators(nowhere, None, {"brossard": {}}, few)
+    for kind in KINDS:
+        assert rows[f"reference_{kind}"]["failure"].tolist() == [
+            "too few of the reference's runs found a correspondence"
+        ]
+        assert cases[0].references[kind].twists.shape == (0, 6)
     assert rows["brossard"]["failure"].str.contains("no source point has a target point").all()
     assert rows["brossard"]["failed"].all()
-    assert cases[0].reference_twists.shape == (0, 6)
 
 
 def test_the_measures_by_hand():

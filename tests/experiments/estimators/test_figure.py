@@ -6,9 +6,10 @@ import pytest
 from scipy.stats import chi2
 
 from gpca.errors import InputError
-from gpca.experiments.estimators.covariances import ReferenceSamples, covariance_columns, read_estimate_files
+from gpca.experiments.estimators.covariances import JUDGED, ReferenceSamples, covariance_columns, read_estimate_files
 from gpca.experiments.estimators.ellipses import STYLES, WIDEST, draw_ellipses, ellipse
 from gpca.experiments.estimators.figure import LEVELS, coverages, draw_estimators
+from gpca.experiments.estimators.settings import KINDS, REFERENCES
 from gpca.io.csv_file import write_csv
 from gpca.reporting.figures.style import GRAY
 
@@ -21,19 +22,20 @@ def files(tmp_path):
     frame = pd.DataFrame(
         {
             "sample": np.arange(8), "object": "cup", "method": "point_to_point", "failed": np.arange(8) > 3,
-            "add_relative": np.linspace(0.005, 0.2, 8), "failure": "", "kl_rotation": 0.1, "kl_translation": 0.1,
-            "error_ratio": 1.0, "mahalanobis": chi2.ppf(np.linspace(0.1, 0.9, 8), 6), "spread": 0.03,
+            "add_relative": np.linspace(0.005, 0.2, 8), "failure": "", "cluster": "cups",
+            "inlier_rmse": 0.01, "fitness": 1,
+            **dict.fromkeys(JUDGED, 1.0), "mahalanobis": chi2.ppf(np.linspace(0.1, 0.9, 8), 6), "spread": 0.03,
         } | covariance_columns(1e-3 * np.eye(6))
     )  # fmt: skip
     paths = []
-    for name in ("reference", *ESTIMATORS):
+    for name in (*REFERENCES, *ESTIMATORS):
         path = tmp_path / "cups" / name / "seed0.csv"
         path.parent.mkdir(parents=True)
         write_csv(path, frame)
         paths.append(path)
     samples = ReferenceSamples(
-        np.arange(8), np.full(8, "point_to_point"), 0.03 * random.normal(size=(240, 6)), np.arange(0, 241, 30),
-        0.01 * np.ones((8, 6)),
+        np.repeat(np.arange(8), 3), np.full(24, "point_to_point"), np.tile(KINDS, 8),
+        0.03 * random.normal(size=(720, 6)), np.arange(0, 721, 30), 0.01 * np.ones((24, 6)),
     )  # fmt: skip
     (tmp_path / "samples" / "cups").mkdir(parents=True)
     samples.save(tmp_path / "samples/cups/seed0.npz", ("cups", 0))
@@ -54,18 +56,20 @@ def test_samples_without_their_estimates_are_refused(files):
         drawn(paths[1:], samples)
 
 
-def test_the_reference_is_seen_above_and_the_axes_are_named(files):
+def test_the_references_are_seen_above_and_the_axes_are_named(files):
     figure = drawn(*files)
     names = [text.get_text() for text in figure.subfigs[0].legends[0].get_texts()]
-    assert names == ["Reference", "Censi", "Own", "the reference's results", "true pose", "succeeded", "failed"]
+    references = ["Other starts", "Other data", "Other starts and data"]
+    assert names[:5] == [*references, "Censi", "Own"]
+    assert names[5:] == ["results of other starts and data", "true pose", "succeeded", "failed"]
     upper = figure.axes[:4]
     assert [panel.get_ylabel() for panel in upper] == [
         f"second axis ({unit})" for unit in ("degrees", "% of the diameter") * 2
     ]
     assert all(GRAY in [line.get_color() for line in panel.get_lines()] for panel in upper)
     sides = {panel.get_title(): [text.get_text() for text in panel.texts] for panel in figure.axes[4:]}
-    assert sides["Reference"] == ["too confident", "too cautious"]  # above the diagonal, and below
-    assert sides["Coverage"] == ["too cautious"]  # above it
+    assert sides["Other starts and data"] == ["too confident", "too cautious"]  # above the diagonal, and below
+    assert sides["Coverage, succeeded"] == ["too cautious"]  # above it
 
 
 def test_estimators_of_one_color_differ_in_their_line():
@@ -80,7 +84,9 @@ def test_a_panel_holds_whole_ellipses_unless_they_are_far_wider(times, whole):
 
     random = np.random.default_rng(0)
     twists = random.normal(size=(400, 6))
-    samples = ReferenceSamples(np.array([0]), np.array(["icp"]), twists, np.array([0, 400]), np.zeros((1, 6)))
+    samples = ReferenceSamples(
+        np.array([0]), np.array(["icp"]), np.array(["all"]), twists, np.array([0, 400]), np.zeros((1, 6))
+    )
     deviation = times * 2.6 / np.sqrt(-2 * np.log(0.05))  # of an ellipse that is so many times as wide as the dots
     row = pd.Series(covariance_columns(deviation**2 * np.eye(6)))
     figure, panel = plt.subplots()

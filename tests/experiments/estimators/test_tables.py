@@ -1,90 +1,107 @@
-"""Table XII."""
+"""Tables XII."""
 
+import numpy as np
+import pandas as pd
 import pytest
 
-from gpca.attribution.metrics import tidy
 from gpca.errors import InputError
-from gpca.experiments.estimators.tables import table12_uncertainty
+from gpca.experiments.estimators.calibration import COLUMNS, GATES, TRUTH
+from gpca.experiments.estimators.settings import KINDS, REFERENCES
+from gpca.experiments.estimators.tables import table12_failures, table12_references, table12_uncertainty
 
 SOURCES = {"ycb": {"title": "YCB", "stand_in": False}, "cups": {"title": "Cups", "stand_in": True}}
-ESTIMATORS, METHODS = {"censi": "Censi", "brossard": "Brossard"}, {"point_to_point": "ICP", "point_to_plane": "Plane"}
-VALUES = {"kl_rotation": 2.0, "nees": 3.0, "coverage": 0.5, "auroc_failed": 0.7, "no_estimate": 0.25}
-
-
-def records(metric, value, step=0.01):
-    return [
-        ("estimators", source, name, metric, method, seed, value(source, name) + step * seed)
-        for source in SOURCES
-        for name in ("reference", *ESTIMATORS)
-        for method in METHODS
-        for seed in range(3)
-    ]
+ESTIMATES = {
+    "censi": {"title": "Censi", "models": "data"},
+    "brossard": {"title": "Brossard", "models": "starts and data"},
+    "stein_icp": {"title": "Stein", "models": "posterior"},
+}
+METHODS = {"point_to_point": "ICP", "point_to_plane": "Plane"}
+PAIRS = {"repeats": 200, "failed": 0.03}
+OF_KIND = {"starts": 1.0, "data": 2.0, "all": 4.0, TRUTH: 8.0}
 
 
 @pytest.fixture
-def metrics():
-    found = records("test_samples", lambda source, _: {"ycb": 30, "cups": 10}[source], step=0)
-    for metric, size in VALUES.items():
-        of = {name: size * (1 + (name == "censi")) for name in ("reference", *ESTIMATORS)}
-        found += records(metric, lambda source, name, of=of: of[name] * (1 + (source == "cups")))
-    return tidy(found, "estimates")
+def intervals():
+    rows = []
+    for method in METHODS:
+        for k, name in enumerate((*REFERENCES, *ESTIMATES)):
+            for state, samples in (("succeeded", 30), ("failed", 10)):
+                own = (method, state, name)
+                for kind, size in OF_KIND.items():
+                    for metric in ("nne", "nees", *(() if kind == TRUTH else ("kl_rotation", "kl_translation"))):
+                        value = size + k / 10 + 100 * (state == "failed")
+                        rows.append((*own, f"{metric}_{kind}", samples, 3, value, 0.5 * value, 1.2 * value))
+                    share = size / 10
+                    rows.append((*own, f"coverage_{kind}", samples, 3, share, 0.9 * share, 1.1 * share))
+                rows.append((*own, "no_estimate", samples + 2, 3, 0.125 * (state == "failed"), np.nan, np.nan))
+        for name in (*ESTIMATES, *GATES):
+            rows.append((method, "both", name, "auroc_failed", 40, 3, 0.7, 0.6, 0.8, "gate_rmse", -0.1, -0.2, 0.05))
+            rows.append((method, "both", name, "spearman_error", 40, 3, 0.5, np.nan, np.nan))
+    return pd.DataFrame(
+        [(*row, *("", np.nan, np.nan, np.nan)[: len(COLUMNS) - len(row)]) for row in rows], columns=COLUMNS
+    )
 
 
 @pytest.fixture
 def seconds():
-    return tidy(records("seconds", lambda *_: 0.02), "seconds")
+    return pd.DataFrame(
+        [(name, method, 0.02) for name in ESTIMATES for method in METHODS], columns=["estimator", "method", "seconds"]
+    )
 
 
-def made(metrics, seconds, sources=SOURCES):
-    return table12_uncertainty(metrics, seconds, sources, ESTIMATORS, METHODS, {"starts": 1000})
-
-
-def test_methods_stand_apart_and_the_reference_comes_first(metrics, seconds):
-    table = made(metrics, seconds)
+def test_an_estimator_is_judged_by_what_it_models_and_states_stand_apart(intervals):
+    table = table12_uncertainty(intervals, SOURCES, ESTIMATES, METHODS, PAIRS)
     names = [tuple(key for key, _ in labels) for labels in table.rows]
-    assert names == [(m, n) for m in METHODS for n in ("reference", "censi", "brossard")]
-    assert table.rows[0][1][1] == "Reference, 1000 starts"
-
-
-def test_sources_count_by_their_registrations(metrics, seconds):
-    cell = made(metrics, seconds).cells[2, "kl_rotation"]  # Brossard's: 2 and, of a quarter, 4
-    assert cell.mean == pytest.approx(2.5 + 0.01)
-    assert (cell.seeds, cell.test_samples) == (3, 120)
-    assert made(metrics, seconds).cells[2, "milliseconds"].mean == pytest.approx(30)
-
-
-def test_the_reference_has_no_divergence_and_competes_with_none(metrics, seconds):
-    table = made(metrics, seconds)
-    assert (0, "kl_rotation") not in table.cells
-    assert table.best() == {(2, "kl_rotation"), (5, "kl_rotation"), (1, "auroc_failed"), (4, "auroc_failed")}
-
-
-def test_an_estimator_that_refuses_all_has_no_row_and_is_named(metrics, seconds):
-    refused = (metrics["method"] == "censi") & ~metrics["metric"].isin(["no_estimate", "test_samples"])
-    table = made(metrics[~(refused & (metrics["concept"] == "point_to_plane"))], seconds)
-    assert [labels[1][0] for labels in table.rows] == ["reference", "censi", "brossard", "reference", "brossard"]
-    assert "Left out, as they refuse every registration: Censi, of Plane." in table.markdown()
-    assert "Left out" not in made(metrics, seconds).markdown()
-
-
-def test_an_interval_beyond_the_value_of_a_divergence_is_left_out(metrics, seconds):
-    wide = (metrics["metric"] == "kl_rotation") & (metrics["seed"] == 2) & (metrics["method"] == "brossard")
-    metrics.loc[wide, "value"] *= 100
-    table = made(metrics, seconds)
-    assert table.cells[2, "kl_rotation"].half_width > table.cells[2, "kl_rotation"].mean
-    assert "| Brossard | 85.67 | – |" in table.markdown()
-    [record] = [r for r in table.records() if r[:3] == ("point_to_point", "brossard", "kl_rotation")]
-    assert record[4] == 0 and record[5] > 2 * record[3]  # the CSV has it
-
-
-def test_the_notes_say_what_was_counted(metrics, seconds):
-    text = made(metrics, seconds).markdown()
-    assert "Mean over 3 seeds; ±" in text
-    assert "Registrations of each seed: 40 by ICP; 40 by Plane." in text
-    assert "Monte-Carlo with 1000 starts" in text
+    assert names[:4] == [
+        ("point_to_point", "succeeded", "censi", "data"),
+        ("point_to_point", "succeeded", "brossard", "starts and data"),
+        ("point_to_point", "succeeded", "stein_icp", "posterior"),
+        ("point_to_point", "failed", "censi", "data"),
+    ]
+    assert [table.cells[row, "kl_rotation"].mean for row in range(4)] == pytest.approx([2.3, 4.4, 2.5, 102.3])
+    assert [table.cells[row, "coverage"].mean for row in range(3)] == pytest.approx([20, 40, 20])
+    assert table.cells[0, f"coverage_{TRUTH}"].mean == pytest.approx(80)
+    assert [table.cells[row, "samples"].mean for row in (0, 3)] == [30, 10]
+    assert {row for row, key in table.best() if key == "kl_rotation"} == {0, 3, 6, 9}
+    text = table.markdown()
+    assert "Failed: an error of 3 % of the diameter or more" in text
+    assert "judged by 200 further registrations" in text
     assert "stand-in" in text
 
 
-def test_nothing_to_show_is_one_line(metrics, seconds):
+def test_every_estimator_stands_beside_every_reference_and_these_beside_each_other(intervals):
+    table = table12_references(intervals, SOURCES, ESTIMATES, METHODS, PAIRS)
+    names = [labels[1][0] for labels in table.rows]
+    assert names[:6] == [*REFERENCES, *ESTIMATES]
+    assert [table.cells[3, f"kl_rotation_{kind}"].mean for kind in KINDS] == pytest.approx([1.3, 2.3, 4.3])
+    for row, kind in enumerate(KINDS):
+        assert (row, f"kl_rotation_{kind}") not in table.cells  # of itself from itself
+    assert min(row for row, _ in table.best()) >= len(REFERENCES)  # they compete with none
+    assert table.printed()["heads"][3] == "Other starts: KL, rotation"
+    assert table.printed()["heads"][-1] == "True pose: coverage (%)"
+
+
+def test_an_alarm_stands_beside_the_gates(intervals, seconds):
+    table = table12_failures(intervals, seconds, SOURCES, ESTIMATES, METHODS)
+    assert [labels[1][0] for labels in table.rows] == [*ESTIMATES, *GATES] * 2
+    assert table.rows[0][0] == ("point_to_point", "ICP: 32 succeeded, 12 failed")
+    lead = table.cells[0, "lead"]
+    assert (lead.mean, lead.bounds) == (-0.1, (-0.2, 0.05))
+    assert table.cells[0, "milliseconds"].mean == pytest.approx(20)
+    assert table.cells[0, "no_estimate"].mean == pytest.approx(100 * 0.125 * 12 / 44)
+    assert (3, "milliseconds") not in table.cells  # a gate costs nothing
+    assert "| 0.700 (0.600 to 0.800) | -0.100 (-0.200 to 0.050) |" in table.markdown()
+
+
+def test_an_estimator_that_refuses_all_has_no_row_and_is_named(intervals):
+    refused = (intervals["estimator"] == "censi") & (intervals["method"] == "point_to_plane")
+    left = intervals[~(refused & (intervals["metric"] != "no_estimate"))]
+    table = table12_uncertainty(left, SOURCES, ESTIMATES, METHODS, PAIRS)
+    assert ("point_to_plane", "censi") not in {(labels[0][0], labels[2][0]) for labels in table.rows}
+    assert "Left out, as they refuse every registration: Censi, of Plane." in table.markdown()
+    assert "Left out" not in table12_uncertainty(intervals, SOURCES, ESTIMATES, METHODS, PAIRS).markdown()
+
+
+def test_nothing_to_show_is_one_line(intervals):
     with pytest.raises(InputError, match="has nothing to show"):
-        made(metrics[metrics["source"] == "none"], seconds)
+        table12_uncertainty(intervals[intervals["method"] == "none"], SOURCES, ESTIMATES, METHODS, PAIRS)

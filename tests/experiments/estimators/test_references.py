@@ -1,0 +1,123 @@
+"""References: what varies in each, and what does not."""
+
+from itertools import islice
+
+import numpy as np
+import pytest
+
+from gpca.alignment.methods.interface import Pair
+from gpca.alignment.methods.registry import make_method
+from gpca.alignment.rigid import transform
+from gpca.alignment.twist import exp
+from gpca.causes.candidate import draw_candidate
+from gpca.causes.settings import CauseSettings
+from gpca.experiments.estimators.references import Redraws, draw_twists
+from gpca.uncertainty.estimators.interface import RegisteredPair
+from gpca.uncertainty.estimators.monte_carlo import sample
+
+SETTINGS = CauseSettings(points=(256, 512))
+POINTS = 10_000  # more than there are
+TURNED = exp(np.array([[0.1, 0, 0, 0, 0.05, 0]]))[0]
+
+
+@pytest.fixture(scope="module")
+def surface():
+    """A brick with a step, dense enough that other points of it are near: it holds a pose."""
+    random = np.random.default_rng(0)
+    points = random.uniform(-0.5, 0.5, size=(6000, 3)) * (0.5, 0.7, 0.4)
+    side = random.integers(3, size=len(points))
+    points[np.arange(len(points)), side] = (
+        np.sign(points[np.arange(len(points)), side]) * np.array([0.25, 0.35, 0.2])[side]
+    )
+    return points
+
+
+def redraws_of(surface, *applied, seed=0):
+    candidate = draw_candidate(surface, np.array(applied), SETTINGS, np.random.default_rng(seed))
+    return Redraws(candidate, surface, TURNED, POINTS)
+
+
+def registered_of(redraws, method="point_to_point"):
+    causes = tuple(np.flatnonzero(redraws.candidate.applied).tolist())
+    observed = transform(TURNED, redraws.candidate.observed(causes))
+    pair = Pair(redraws.candidate.model, observed, TURNED, seed=7).with_normals()
+    return RegisteredPair(pair, make_method(method)(pair), method, np.full(6, 0.05))
+
+
+def test_other_data_has_the_same_causes_severities_and_numbers_of_points(surface):
+    redraws = redraws_of(surface, True, True, True)
+    candidate = redraws.candidate
+    whole = {tuple(point) for point in surface.tolist()}
+    before = transform(TURNED, candidate.observed((0, 2)))
+    for source, target in islice(redraws.clouds("a"), 5):
+        assert source.shape == candidate.model.shape
+        assert {tuple(point) for point in source.tolist()} <= whole
+        assert target.shape == before.shape
+        assert not np.array_equal(np.sort(target, axis=0), np.sort(before, axis=0))
+        back = transform(np.linalg.inv(TURNED), target)
+        along = back @ candidate.toward_hidden  # nearly all that is left lies on this side, up to noise and outliers
+        limit = (candidate.clean[candidate.kept] @ candidate.toward_hidden).max()
+        assert np.mean(along > limit + 4 * candidate.severity["noise"]) < 0.1
+
+
+def test_noise_and_outliers_are_as_strong_as_before(surface):
+    from scipy.spatial import cKDTree
+
+    redraws = redraws_of(surface, True, False, False)
+    tree = cKDTree(surface)
+    before, *after = (
+        np.median(tree.query(cloud)[0])
+        for cloud in (
+            redraws.candidate.observed((0,)),
+            *(transform(np.linalg.inv(TURNED), target) for _, target in islice(redraws.clouds("a"), 4)),
+        )
+    )
+    assert np.array(after) == pytest.approx(before, rel=0.4)
+
+
+def test_each_of_sampling_noise_and_outliers_has_numbers_of_its_own(surface):
+    """What is not noisy shows the same points as what is, drawn by the same axes."""
+    noisy, clean = redraws_of(surface, True, False, False), redraws_of(surface, False, False, False)
+    (source_1, target_1), (source_2, target_2) = (next(each.clouds("a")) for each in (noisy, clean))
+    assert np.array_equal(source_1, source_2)
+    assert np.median(np.abs(target_1 - target_2)) < 3 * noisy.candidate.severity["noise"]
+    assert not np.array_equal(next(noisy.clouds("b"))[0], source_1)
+
+
+def test_the_reference_of_starts_is_monte_carlo_on_the_same_clouds(surface):
+    redraws = redraws_of(surface, True, False, False)
+    registered = registered_of(redraws)
+    expected = sample(registered, 12, "four", 100, "reference")
+    assert np.array_equal(draw_twists("starts", registered, redraws, 12, "four", 100, "reference"), expected)
+
+
+@pytest.mark.parametrize("method", ["point_to_point", "point_to_plane", "trimmed"])
+def test_what_is_determined_hardly_varies_with_the_data(surface, method):
+    redraws = redraws_of(surface, False, False, False)
+    registered = registered_of(redraws, method)
+    twists = draw_twists("data", registered, redraws, 10, "a")
+    assert len(twists) == 10
+    assert np.abs(twists).max() < 0.1
+
+
+def test_all_varies_the_starts_as_well(surface):
+    redraws = redraws_of(surface, False, False, False)
+    registered = registered_of(redraws)
+    assert (
+        draw_twists("all", registered, redraws, 10, "a").std() > draw_twists("data", registered, redraws, 10, "a").std()
+    )
+
+
+def test_runs_of_planes_are_those_one_after_the_other(surface):
+    from gpca.alignment.batched_icp import BatchedPlaneICP, register_each_to_planes
+    from gpca.alignment.features import estimate_normals
+    from gpca.experiments.estimators.references import SETTINGS as ICP
+
+    pairs = list(islice(redraws_of(surface, True, True, False).clouds("a"), 4))
+    icps = [BatchedPlaneICP(target, estimate_normals(target), ICP) for _, target in pairs]
+    starts = np.tile(TURNED, (4, 1, 1))
+    together = register_each_to_planes(icps, [source for source, _ in pairs], starts)
+    for i, (source, _) in enumerate(pairs):
+        alone = icps[i].register(source, starts[i : i + 1])
+        for one, all_ in zip(alone, together, strict=True):
+            assert one[0] == pytest.approx(all_[i], abs=1e-12)
