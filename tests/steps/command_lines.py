@@ -54,7 +54,7 @@ STEP_OPTIONS = {
             "reenactment": {"hypotheses": 2}, "causes": CAUSES, "icp": {"max_iterations": 30},
         },
         "--seed": 0, "--causes": "causes.npz", "--causes-timings": "causes_timings.csv",
-        "--reenactments": "reenactments.npz", "--timings": "reenactments.csv",
+        "--reenactments": "reenactments.npz", "--timings": "reenactments_seconds.csv",
     },
     "estimate": COMMON | {
         "--settings": {

@@ -47,8 +47,8 @@ NEEDS = {  # a table: what is made for it, and what is not
     "table12_uncertainty": ("causes/ycb estimates/ycb", "registrations encoders embeddings uncertainty/ predictions"),
     "table14_method_matrix": ("encoders/ycb exchange/", "coffee_cup predictions uncertainty/ causes/ embeddings"),
     "table15_new_concepts": (
-        "causes/ycb cause_encoders/ycb embeddings/ycb active_learning/ycb new_concepts/ycb",
-        "predictions diagnoses controls/ uncertainty/",
+        "causes/ycb cause_encoders/ycb embeddings/ycb active_learning/ycb new_concepts/ycb predictions/ycb/rule",
+        "predictions/ycb/gpca diagnoses controls/ uncertainty/",
     ),
 }
 
