@@ -1,7 +1,6 @@
 """Makes the tables of new concepts where no encoder has seen the samples, or the concept.
 
-The metrics are those of ``active_learning.csv``, with which the others are compared, of ``new_concepts.csv``, and of
-``metrics.csv``, where what needs no labels stands. The
+The metrics are those of ``active_learning.csv``, with which the others are compared, and of ``new_concepts.csv``. The
 ``conditions`` are the sections ``active_learning`` and ``new_concepts`` of the config, with the ``seeds`` that the
 latter was run for, ``test`` of its ``registrations``, and its section ``causes`` as ``of_causes``.
 """
@@ -39,9 +38,15 @@ NEW_CAUSES = (NOMINAL, GEOMETRY)
 PAPERS, WITHIN = "bald_kmeans", 20  # labels that a new concept may cost
 
 
-def table15_new_concepts(metrics: pd.DataFrame, sources: Mapping[str, Mapping], conditions: Mapping) -> Table:
-    """Return the labels that each new concept costs in each embedding, and the accuracy that labels can reach."""
-    metrics = metrics[metrics["seed"].isin(conditions["seeds"])]
+def table15_new_concepts(
+    metrics: pd.DataFrame, without_labels: pd.DataFrame, sources: Mapping[str, Mapping], conditions: Mapping
+) -> Table:
+    """Return the labels that each new concept costs in each embedding, and the accuracy that labels can reach.
+
+    Args:
+        without_labels: Metrics of the explainers of `NO_LABELS`, under the paper's protocol.
+    """
+    metrics, without_labels = (rows[rows["seed"].isin(conditions["seeds"])] for rows in (metrics, without_labels))
     labels = {f"labels_{c}": Quantity("labels_to_target", Column(f"Labels, {c}", **COUNT), PAPERS, c) for c in CONCEPTS}
     labels["labels_random"] = Quantity("labels_to_target", Column("Labels, random choice", **COUNT), "random")
     accuracies = {"all_labels": Quantity("final_accuracy", Column("Acc., pool labeled (%)"), ALL_LABELS)}
@@ -63,7 +68,7 @@ def table15_new_concepts(metrics: pd.DataFrame, sources: Mapping[str, Mapping], 
         cells |= {key: cell_of(of_row, quantity, tests[str(quantity.concept)]) for key, quantity in of_causes.items()}
         table.add_row(row_labels, cells, rival=setting != "pretrained")
     for (source, explainer), row_labels in crossed(titles_of(sources), NO_LABELS):
-        of_row = rows_where(metrics, source=source, table="attribution", method=explainer, concept=ALL)
+        of_row = rows_where(without_labels, source=source, method=explainer, concept=ALL)
         cells = _without_labels(of_row, labels, conditions)
         table.add_row(row_labels, cells, rival=False)
     table.compare_down([*labels, "within", *NEW_CAUSES], same=1)
