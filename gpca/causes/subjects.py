@@ -26,6 +26,7 @@ JUDGED_POINTS = 256  # of the model, over which an error is the mean
 # Of an object's clean pairs. Where more are off, hardly any of its candidates would be kept; of the others, those whose
 # own clean pair is off are refused one by one. Half would be a matter of chance for mugs, at so few pairs each.
 MOST_FAILING = 0.9
+MORE = 3  # times as many pairs again before an object is left out: a few may all be off by chance
 FEWEST_FAMILIES = 2  # one for training, one for testing; intervals over objects need more
 
 
@@ -113,22 +114,29 @@ def measure_clean_pairs(
     count = -(-settings.clean_pairs // len(subjects))
     for subject in progress(subjects, f"clean pairs of {source}, seed {seed}"):
         measured = [_clean_pair(subject, source, seed, number, settings) for number in range(count)]
-        usable = [pair for pair in measured if pair is not None]
-        off = count - sum(error < settings.limits.nominal for error, _ in usable)
-        if off > MOST_FAILING * count and not settings.shares.geometry:
-            print(
-                f"causes of {source}: object '{subject.name}' is skipped: {off} of {count} clean pairs have an error "
-                f"of at least {100 * settings.limits.nominal:g} % of the diameter or cannot be registered",
-                file=sys.stderr,
-            )
-            continue
+        if _most_are_off(measured, settings) and not settings.shares.geometry:
+            further = [_clean_pair(subject, source, seed, count + number, settings) for number in range(MORE * count)]
+            if _most_are_off(looked_at := measured + further, settings):
+                print(
+                    f"causes of {source}: object '{subject.name}' is skipped: nearly all of {len(looked_at)} clean "
+                    f"pairs have an error of at least {100 * settings.limits.nominal:g} % of the diameter or cannot be "
+                    "registered",
+                    file=sys.stderr,
+                )
+                continue
         left.append(subject)
-        uncertainties += [uncertainty for _, uncertainty in usable]
+        uncertainties += [pair[1] for pair in measured if pair is not None]
     if not uncertainties:
         limit = f"{100 * settings.limits.nominal:g} % of the diameter"
         fault = f"nearly all clean pairs of every object have an error of at least {limit} or cannot be registered"
         raise InputError(f"causes of {source}", fault, "raise causes.limits.nominal or causes.points")
     return left, float(np.quantile(uncertainties, settings.limits.clean))
+
+
+def _most_are_off(pairs: list[tuple[float, float] | None], settings: CauseSettings) -> bool:
+    """Return whether the share of the pairs that are off, or have no error, is above `MOST_FAILING`."""
+    right = sum(pair is not None and pair[0] < settings.limits.nominal for pair in pairs)
+    return len(pairs) - right > MOST_FAILING * len(pairs)
 
 
 def _clean_pair(

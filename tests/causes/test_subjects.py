@@ -65,9 +65,21 @@ def test_objects_whose_clean_pairs_are_off_are_left_out_by_name(subjects, capsys
     left, _ = measure_clean_pairs([*subjects[:1], wrong, *subjects[2:]], "four", 100, SETTINGS)
     assert names(left) == [name for name in names(subjects) if name != wrong.name]
     said = capsys.readouterr().err
-    assert (
-        "causes of four: object '019_pitcher_base' is skipped: 5 of 5 clean pairs have an error of at least 2 %" in said
-    )
+    skipped = "object '019_pitcher_base' is skipped: nearly all of 20 clean pairs have an error of at least 2 %"
+    assert f"causes of four: {skipped}" in said
+
+
+def test_a_few_pairs_that_are_off_by_chance_do_not_leave_an_object_out(subjects, monkeypatch):
+    """As LINEMOD's cup, of whose clean pairs a quarter are right: none of the first ten of a seed."""
+    unlucky = subjects[1].name
+
+    def clean_pair(subject, _source, _seed, number, _settings):
+        return 0.03 if subject.name == unlucky and number % 8 < 6 else 0.01, 0.5
+
+    monkeypatch.setattr("gpca.causes.subjects._clean_pair", clean_pair)
+    left, limit = measure_clean_pairs(subjects, "four", 100, SETTINGS)
+    assert left == subjects
+    assert limit == 0.5
 
 
 def test_they_stay_where_that_kind_is_asked_for(subjects, capsys):
