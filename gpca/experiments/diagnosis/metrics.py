@@ -63,6 +63,15 @@ def with_pooled(judged: dict[tuple[str, str, int], Judged]) -> dict[tuple[str, s
     }
 
 
+def over_seeds(judged: dict[tuple[str, str, int], Judged], source: str) -> dict[str, Judged]:
+    """Return the samples of all seeds of a source together, by explainer."""
+    parts: dict[str, list[Judged]] = {}
+    for (own, explainer, _), samples in judged.items():
+        if own == source:
+            parts.setdefault(explainer, []).append(samples)
+    return {explainer: joined(of_explainer) for explainer, of_explainer in parts.items()}
+
+
 def _confusion(samples: Judged) -> list[tuple[str, str, float]]:
     """Return (metric, true label, count) of every label that is taken for another, borderline left out."""
     if not samples.names_causes:
@@ -89,11 +98,7 @@ def collect_intervals(prediction_files: Iterable[str | Path], causes_files: Iter
     judged = with_pooled(read_judged(prediction_files, causes_files))
     rows: list[tuple] = []
     for source in dict.fromkeys(source for source, _, _ in judged):
-        of_source: dict[str, list[Judged]] = {}
-        for (own, explainer, _), samples in judged.items():
-            if own == source:
-                of_source.setdefault(explainer, []).append(samples)
-        rows += _of_source(source, {explainer: joined(parts) for explainer, parts in of_source.items()})
+        rows += _of_source(source, over_seeds(judged, source))
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 

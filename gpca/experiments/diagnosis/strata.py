@@ -11,9 +11,9 @@ import numpy as np
 from gpca.attribution.confidence import pigeonhole_weights
 from gpca.causes.shapley import ALL
 from gpca.causes.truth import BORDERLINE, FAILED, NOMINAL
-from gpca.experiments.diagnosis.judged import POOLED, Judged, joined, read_judged
+from gpca.experiments.diagnosis.judged import POOLED, Judged, read_judged
 from gpca.experiments.diagnosis.measures import of_decisions
-from gpca.experiments.diagnosis.metrics import COLUMNS, NUMBERS, rows_of, with_pooled
+from gpca.experiments.diagnosis.metrics import COLUMNS, NUMBERS, over_seeds, rows_of, with_pooled
 from gpca.io.csv_file import read_numbers
 from gpca.seeds import generator
 
@@ -62,12 +62,7 @@ def collect_strata(prediction_files: Iterable[str | Path], causes_files: Iterabl
 
     judged = with_pooled(read_judged(prediction_files, causes_files))
     pooled = POOLED if any(source == POOLED for source, _, _ in judged) else next(iter(judged))[0]
-    parts: dict[str, list[Judged]] = {}
-    for (source, explainer, _), samples in judged.items():
-        if source == pooled:
-            parts.setdefault(explainer, []).append(samples)
-    rows = _rows(pooled, {explainer: joined(of_explainer) for explainer, of_explainer in parts.items()})
-    return pd.DataFrame(rows, columns=list(STRATUM_COLUMNS))
+    return pd.DataFrame(_rows(pooled, over_seeds(judged, pooled)), columns=list(STRATUM_COLUMNS))
 
 
 def read_strata(path: str | Path) -> pd.DataFrame:
