@@ -1,0 +1,117 @@
+"""The guarantee of an explainer of causes: sets of states and an alarm, calibrated on families that it never saw."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from math import inf, isfinite
+from typing import Any
+
+import numpy as np
+
+from gpca.causes.truth import BORDERLINE
+from gpca.errors import InputError
+from gpca.guarantee.alarm import FailureAlarm, calibrate_alarm
+from gpca.guarantee.sets import PROBABILITY, Nonconformity, StateSets, calibrate_sets
+from gpca.guarantee.states import STATES
+
+REMEDY = "calibrate it again"
+
+
+@dataclass(frozen=True)
+class Guarantee:
+    """What was calibrated, and on how much.
+
+    Attributes:
+        state_sets, failure_alarm: how sets and calls are made, and what they promise.
+        samples, families: that it was calibrated on; 0 families where samples counted one by one.
+    """
+
+    state_sets: StateSets
+    failure_alarm: FailureAlarm
+    samples: int
+    families: int
+
+    def sets(self, scores_M_K: np.ndarray) -> np.ndarray:
+        """Return which states (M, K) are in the set of each of M registrations, from their scores."""
+        return self.state_sets.of(scores_M_K)
+
+    def alarm(self, failure_M: np.ndarray) -> np.ndarray:
+        """Return what each is called, of :data:`gpca.guarantee.alarm.OUTCOMES`, from its score of failure (M,)."""
+        return self.failure_alarm.of(failure_M)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain numbers, words and lists, in which an infinite bound is None."""
+        sets, alarm = asdict(self.state_sets), asdict(self.failure_alarm)
+        sets |= {"states": list(self.state_sets.states), "limits": [_plain(x) for x in self.state_sets.limits]}
+        alarm |= {name: _plain(alarm[name]) for name in ("good_below", "failed_from")}
+        return {"sets": sets, "alarm": alarm, "samples": self.samples, "families": self.families}
+
+    @classmethod
+    def from_dict(cls, plain: Mapping[str, Any]) -> Guarantee:
+        """Return what :meth:`to_dict` was called on.
+
+        Raises:
+            InputError: something is missing, or is no such value.
+        """
+        try:
+            sets, alarm = dict(plain["sets"]), dict(plain["alarm"])
+            sets |= {"states": tuple(sets["states"])}
+            sets |= {"limits": tuple(inf if x is None else float(x) for x in sets["limits"])}
+            alarm |= {"good_below": -inf if alarm["good_below"] is None else float(alarm["good_below"])}
+            alarm |= {"failed_from": inf if alarm["failed_from"] is None else float(alarm["failed_from"])}
+            read = cls(StateSets(**sets), FailureAlarm(**alarm), int(plain["samples"]), int(plain["families"]))
+        except (KeyError, TypeError, ValueError) as fault:
+            raise InputError("guarantee", f"is damaged ({type(fault).__name__}: {fault})", REMEDY) from fault
+        if len(read.state_sets.limits) != len(read.state_sets.states):
+            raise InputError("guarantee", "has not one limit for each state", REMEDY)
+        return read
+
+
+def calibrate(
+    scores_N_K: np.ndarray,
+    state_N: np.ndarray,
+    family_N: np.ndarray | None = None,
+    *,
+    states: Sequence[str] = STATES,
+    level: float = 0.9,
+    missed: float = 0.05,
+    false_alarms: float = 0.05,
+    nonconformity: Nonconformity = PROBABILITY,
+    by_state: bool = False,
+    confidence: float | None = None,
+) -> Guarantee:
+    """Return the guarantee for a further sample, from samples that nothing was learned from.
+
+    With families, the promises hold for a sample of a family that is among neither these nor those that were learned
+    from, if the families are exchangeable: K of them can promise at most K / (K + 1). Without, they hold if single
+    samples are, which those of a new family are only as far as it is like the others.
+
+    Args:
+        scores_N_K: of the states, as :func:`gpca.guarantee.states.state_scores` returns them. The score of failure is 1
+            minus that of the first state, nominal.
+        state_N: the true states; ``borderline`` samples, which have none, are left out.
+        family_N: of every sample, or None.
+        level: promised probability that a set holds the true state.
+        missed, false_alarms, confidence: of the alarm, see :func:`gpca.guarantee.alarm.calibrate_alarm`.
+        nonconformity, by_state: of the sets, see :class:`gpca.guarantee.sets.StateSets`.
+
+    Raises:
+        InputError: arrays of other lengths, unknown states, scores that are not finite, shares out of range.
+    """
+    state_N = np.asarray(state_N)
+    if len(state_N) != len(scores_N_K) or (family_N is not None and len(family_N) != len(state_N)):
+        raise InputError(
+            "samples to calibrate on", "have other numbers of scores, states and families", "give one each"
+        )
+    known_N = state_N != BORDERLINE
+    own = None if family_N is None else np.asarray(family_N)[known_N]
+    scores_n_K, state_n = np.asarray(scores_N_K, float)[known_N], state_N[known_N]
+    sets = calibrate_sets(scores_n_K, state_n, own, states, level, nonconformity, by_state)
+    failed_n = state_n != states[0]
+    alarm = calibrate_alarm(1 - scores_n_K[:, 0], failed_n, own, missed, false_alarms, confidence)
+    return Guarantee(sets, alarm, len(state_n), 0 if own is None else len(np.unique(own)))
+
+
+def _plain(number: float) -> float | None:
+    return number if isfinite(number) else None
