@@ -27,11 +27,13 @@ from gpca.seeds import seed_of_file
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-PANEL_IN = 1.02
+PANEL_IN = 1.3
+PANELS_IN = 3.0  # of the eight counterfactuals, two in each of four rows
 HEAD_IN = 0.3
 CAPTION_IN = 0.17
 TRUTH = "measured share φ"
 ROW_IN = 0.19
+CLEAR = 0.6  # share of the largest φ in the sum of all from which a cause is clear
 GAP = 0.5  # of a row, between the measured shares and the scores, which are none
 
 
@@ -47,8 +49,9 @@ def draw_causes_example(
     """Draw the counterfactuals on the left, and on the right the measured shares and the scores of every explainer.
 
     Left is the observed cloud over the model after ICP with every subset of the causes, and the error v of each.
-    The sample is the failed test sample of several causes whose margin, by which its largest φ exceeds the next one, is
-    the median of all these: a usual case with a clear cause, whoever is right about it.
+    Of the failed test samples of several causes whose largest φ is at least 0.6 of the sum of all, the sample is the one
+    whose margin, by which its largest φ exceeds the next one, is the median: a usual case with a clear cause, whoever
+    is right about it. Where none is so clear, all that have several causes count, or else all that failed.
 
     Args:
         objects_npz, causes_npz: Of the shown source and seed, which their paths name.
@@ -63,14 +66,14 @@ def draw_causes_example(
     shown = replay(ObjectClouds.load(objects_npz), causes, row, source, seed, own)
     names, scores_R_4, verdicts = _scores(causes, row, predictions_csv, explainers)
     rows_in = 0.35 + ROW_IN * (len(names) + GAP)
-    height_in = HEAD_IN + max(2 * (PANEL_IN + CAPTION_IN), rows_in)
+    height_in = HEAD_IN + max(4 * (0.75 * PANEL_IN + CAPTION_IN), rows_in)
     figure = use_style().figure(figsize=(TEXT_WIDTH_IN, height_in), layout="constrained")
-    left, right = figure.subfigures(1, 2, width_ratios=(4 * PANEL_IN, TEXT_WIDTH_IN - 4 * PANEL_IN))
+    left, right = figure.subfigures(1, 2, width_ratios=(PANELS_IN, TEXT_WIDTH_IN - PANELS_IN))
     view = widest_views(shown.model)[0]
     everything = np.concatenate([shown.model @ view.T, *(cloud @ view.T for cloud in shown.observed)])
     corners = np.quantile(everything, (0.001, 0.999), axis=0)
     subsets = sorted(range(len(SUBSETS)), key=lambda subset: (len(SUBSETS[subset]), subset))
-    for panel, subset in zip(left.subplots(2, 4).flat, subsets, strict=True):
+    for panel, subset in zip(left.subplots(4, 2).flat, subsets, strict=True):
         draw_clouds(panel, shown.model @ view.T, shown.observed[subset] @ view.T, size=0.9, corners=corners)
         words = " + ".join(CONCEPTS[i] for i in SUBSETS[subset]) or "none"
         words = "all three" if subset == ALL else words
@@ -80,8 +83,7 @@ def draw_causes_example(
     _draw_scores(table, names, scores_R_4, verdicts)
     object_name = object_in_words(causes.registrations.object_name[row], dataset)
     shown_error = f"{100 * causes.error_shown[row]:.1f} %"
-    words = f"{title}: {object_name}. Mean error in % of the diameter with each subset of the causes"
-    write_title(figure, f"{words} (the registration shown: {shown_error})")
+    write_title(figure, f"{title}: {object_name}. Errors relative to the diameter; registration shown: {shown_error}")
     legend_of_clouds(figure, "model", "observed", gap=0.2)
     return figure
 
@@ -91,8 +93,10 @@ def choose_sample(causes: Causes, path: str | Path) -> int:
     failed = np.flatnonzero((causes.registrations.split == "test") & (causes.truth.state == FAILED))
     if not len(failed):
         raise InputError(path, "has no failed test sample", "raise causes.test")
+    phi_F_3 = np.maximum(causes.truth.phi[failed], 0)
     of_several = causes.truth.causes[failed].sum(axis=1) > 1
-    rows = failed[of_several] if of_several.any() else failed
+    clear = of_several & (phi_F_3.max(axis=1) >= CLEAR * phi_F_3.sum(axis=1))
+    rows = next(failed[chosen] for chosen in (clear, of_several, failed >= 0) if chosen.any())
     return int(rows[np.argsort(causes.truth.margin[rows], kind="stable")[len(rows) // 2]])
 
 
