@@ -11,6 +11,7 @@ from gpca.attribution.confidence import REPEATS
 from gpca.experiments.controls.metrics import CALLS
 from gpca.experiments.controls.settings import HARD, PAPER, TRANSFER, UNSEEN, WRONG_LABELS
 from gpca.experiments.diagnosis.judged import POOLED
+from gpca.experiments.diagnosis.near_chance import rule_near_chance
 from gpca.objects.title import stand_in_clause
 from gpca.reporting.tables.builder import TableBuilder, crossed, titles_of
 from gpca.reporting.tables.cells import interval_cell, plain_cell, rows_where
@@ -92,7 +93,8 @@ def table10_controls(
             "the one that it explains.",
             "Hard: samples of unseen objects with one to three perturbations, labeled with the one that adds most to "
             "the error by counterfactuals. No start is right, no sensor free of noise, no surface whole, and the "
-            "number of points tells nothing.",
+            "number of points tells nothing. Guessing is right in 33.3 %."
+            + rule_near_chance(intervals, sources, control=HARD, metric="accuracy"),
             "AUROC: how well the entropy of the scores separates wrong from right answers; in brackets how many of the "
             "test samples are wrong, and a dash where none is. Elsewhere a dash marks a head that is trained with the "
             "encoder and learns no labels, and a source that does not admit a control.",

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from gpca.attribution.confidence import REPEATS
 from gpca.experiments.diagnosis.judged import CEILING, POOLED
+from gpca.experiments.diagnosis.near_chance import rule_near_chance
 from gpca.experiments.frame_causes.metrics import STATE
 from gpca.explainers.sight import WORDS
 from gpca.reporting.tables.builder import Label, TableBuilder, crossed, titles_of
@@ -24,7 +25,7 @@ SHOWN = {
     "balanced_accuracy": Column("Balanced (%)"),
     "gain": Column("Over untrained (points)", limits=(-100.0, 100.0)),
     "lead": Column("Lead (points)", limits=(-100.0, 100.0)),
-    "dominant_accuracy": Column("Dominant (%)"),
+    "dominant_accuracy": Column("Dominant (%), chance 33.3"),
     "false_alarm_rate": Column("False alarms (%)", least_is_best=True),
     "auroc_failed": Column("AUROC", decimals=3, limits=(0.0, 1.0)),
     "average_precision": Column("mAP (%)", interval=False),
@@ -84,7 +85,9 @@ def table9_causes(
             "Balanced: mean share named rightly of nominal and of the three dominant causes. Over untrained: balanced "
             "accuracy minus that of the best of chance, the most frequent label and the rule; lead: minus that of the "
             "best other explainer; both on the same draws, so that it is better where the interval is above 0. "
-            "Dominant: of the failed, the share whose main cause has the highest score among the causes.",
+            "Dominant: of the failed alone, the share whose main cause has the highest score among the causes. No gate "
+            "of nominal helps with that, and guessing is right in 33.3 %."
+            + rule_near_chance(intervals, sources, metric="dominant_accuracy"),
             "False alarms: share of the nominal above the alarm that finds 90 % of the failed. AUROC: of failed "
             "against nominal. mAP: mean average precision of the sets of causes. Spearman: of scores and measured "
             "attributions of the failed. ECE: expected calibration error of the score of nominal.",

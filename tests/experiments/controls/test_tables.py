@@ -82,6 +82,17 @@ def test_what_an_explainer_adds_stands_beside_under_two_controls(intervals):
     )
 
 
+def test_how_near_to_chance_the_rule_is_under_hard_is_said(intervals):
+    of_rule = [row("hard", source, source, "rule", value) for source, value in (("ycb", 0.5), (POOLED, 0.4))]
+    both = pd.concat([intervals, pd.DataFrame(of_rule, columns=list(COLUMNS))])
+    text = table10_controls(both, SOURCES, EXPLAINERS, ["hard"], SEES).markdown()
+    told = (
+        "Guessing is right in 33.3 %. There the untrained rule is right in 40.0 % (36.0 to 42.0), which is +6.7 points"
+    )
+    assert f"{told} from chance; the interval ends within 10 points above chance." in text
+    assert "There the untrained rule" not in table10_controls(intervals, SOURCES, EXPLAINERS, [], SEES).markdown()
+
+
 def test_a_transfer_has_the_source_learnt_from_in_its_row(intervals):
     text = table10_transfer(intervals, SOURCES, EXPLAINERS).markdown()
     assert "| Good | YCB (procedural stand-in) | 98.0 (94.0 to 100.0) | 60.0 (56.0 to 62.0) | – |" in text

@@ -83,6 +83,18 @@ def test_what_is_read_is_shown_with_its_price(intervals):
         table9_features(intervals[intervals["method"] == "other"], SOURCES, EXPLAINERS, COSTS)
 
 
+def test_how_near_to_chance_the_rule_is_among_the_failed_is_said(intervals):
+    def told(value):
+        of_rule = [row for source in ("ycb", POOLED) for row in rows(source, "rule", "good", dominant_accuracy=value)]
+        both = pd.concat([intervals, pd.DataFrame(of_rule, columns=list(COLUMNS))])
+        return table9_causes(both, SOURCES, EXPLAINERS | {"rule": "Rule"}, COSTS | {"rule": COSTS["good"]}).markdown()
+
+    assert "right in 36.0 % (26.0 to 41.0), which is +2.7 points from chance; the interval ends within 10" in told(0.36)
+    assert "right in 40.0 % (30.0 to 45.0), which is +6.7 points from chance; the interval reaches beyond" in told(0.4)
+    assert "| Dominant (%), chance 33.3 |" in told(0.36) and "| 36.0 (26.0 to 41.0) |" in told(0.36)
+    assert "There the untrained rule" not in table9_causes(intervals, SOURCES, EXPLAINERS, COSTS).markdown()
+
+
 def test_intervals_of_other_explainers_make_no_table(intervals):
     with pytest.raises(InputError, match="has nothing to show"):
         table9_causes(intervals[intervals["method"] == "other"], SOURCES, EXPLAINERS, COSTS)
