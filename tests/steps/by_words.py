@@ -48,7 +48,7 @@ LISTS = {  # which names of a step are lists, and not of one seed, file or name
     "frame_causes": "causes descriptors encoders embeddings",
     "frame_labels": "backbones embeddings strategies out",
     "gradients": "seeds registrations encoders embeddings deletions maps tcav",
-    "kernel_grid": "seeds registrations embeddings out",
+    "kernel_grid": "seeds registrations embeddings out predictions",
     "learning_curve": "samples",
     "new_concepts": "encoders encoders_of strategies out",
     "shift": "seeds registrations other_registrations embeddings encoders out",

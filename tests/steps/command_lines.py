@@ -194,6 +194,7 @@ STEP_OPTIONS = {
     "kernel_grid": COMMON | {
         "--settings": {"kernels": ["rbf", "polynomial"], "iterations": [2, 4], "inducing": 6, "draws": 20},
         "--seeds": 0, "--registrations": "registrations.npz", "--embeddings": "embeddings.npz", "--out": "grid.csv",
+        "--predictions": "grid_predictions.csv",
     },
     "shift": COMMON | {
         "--settings": {"shift": SHIFT, "registrations": {"cloud_points": 128}, "encoder": ENCODER}, "--seeds": 0,

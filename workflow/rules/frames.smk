@@ -162,3 +162,26 @@ rule real_world:
         targets=config["frame_labels"]["targets"],
     script:
         "../scripts/collect.py"
+
+
+rule real_world_intervals:
+    input:
+        prediction_files=FRAME_PREDICTIONS,
+        pose_files=collect(
+            "<results>/poses/{source}/seed{seed}.csv", source=CONDITIONS, seed=SEEDS
+        ),
+        code=collector_code("gpca.experiments.real_world.intervals:collect_intervals"),
+    output:
+        "<results>/real_world_intervals.csv",
+    log:
+        "<logs>/real_world_intervals.log",
+    benchmark:
+        "<benchmarks>/real_world_intervals.tsv"
+    localrule: True
+    conda:
+        "../envs/gpca.yaml"
+    params:
+        collector="gpca.experiments.real_world.intervals:collect_intervals",
+        first=NAMES["first_backbone"],
+    script:
+        "../scripts/collect.py"

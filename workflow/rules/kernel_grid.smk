@@ -11,6 +11,9 @@ rule fit_kernel_grid:
         code=code_files("gpca.experiments.kernel_grid.step"),
     output:
         out=collect("<results>/kernels/{{source}}/seed{seed}.csv", seed=SEEDS),
+        predictions=collect(
+            "<results>/kernel_predictions/{{source}}/seed{seed}.csv", seed=SEEDS
+        ),
     log:
         "<logs>/kernels/{source}.log",
     benchmark:

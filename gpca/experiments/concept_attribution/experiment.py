@@ -14,6 +14,14 @@ EXPERIMENT = Experiment(
             },
         ),
         Tidy(
+            "attribution_intervals.csv",
+            "gpca.experiments.concept_attribution.intervals:collect_intervals",
+            {
+                "prediction_files": "predictions/{source}/{explainer}/seed{seed}.csv",
+                "causal_files": "uncertainty/{source}/causal/seed{seed}.csv",
+            },
+        ),
+        Tidy(
             "timings.csv",
             "gpca.attribution.metrics:collect_timings",
             {"timing_files": "timings/{source}/{explainer}/seed{seed}.csv"},

@@ -1,4 +1,7 @@
-"""Makes the tables of explainers, each ``{"title": str, "oracle": bool, "sees": str}`` here, from tidy metrics."""
+"""Makes the tables of explainers, each ``{"title": str, "oracle": bool, "sees": str}`` here.
+
+The intervals are what :func:`gpca.experiments.concept_attribution.intervals.collect_intervals` returned.
+"""
 
 from __future__ import annotations
 
@@ -8,8 +11,8 @@ from typing import TYPE_CHECKING
 
 from gpca.attribution.metrics import ALL
 from gpca.explainers.gpca import GPCA_FORMS
-from gpca.reporting.tables.builder import TableBuilder, crossed, mean_over, titles_of
-from gpca.reporting.tables.cells import cell_of_repeats, rows_where
+from gpca.reporting.tables.builder import TableBuilder, crossed, over_clusters, titles_of
+from gpca.reporting.tables.cells import cell_of_repeats, clustered_cell, rows_where
 from gpca.reporting.tables.table import EMPTY, Cell, Column, Table
 from gpca.reporting.words import span
 
@@ -27,39 +30,50 @@ EXTENDED = {  # Each of these metrics has a column in table1_extended.
     "seconds_per_sample": Column("Seconds", decimals=3, interval=False, limits=(0, inf)),
     "test_samples": Column("n", decimals=0, interval=False, limits=(0, inf)),
 }
-_SHARES = ("accuracy", "permuted_accuracy", "causal_accuracy", "abstention_rate")  # These are printed in %.
+_WITH_INTERVALS = ("accuracy", "permuted_accuracy", "causal_accuracy")
 _LEAST_CAUSAL = 30  # causal samples of all seeds; the accuracy on fewer says nothing
 
 
 def table1_single_baselines(
-    metrics: pd.DataFrame, sources: Mapping[str, Mapping], explainers: Mapping[str, Mapping]
+    intervals: pd.DataFrame, sources: Mapping[str, Mapping], explainers: Mapping[str, Mapping]
 ) -> Table:
     """Return the accuracy of single-concept attribution (Table I): sources by those of `TABLE1` with predictions."""
-    shown = [name for name in TABLE1 if name in explainers and (metrics["method"] == name).any()]
+    shown = [name for name in TABLE1 if name in explainers and (intervals["method"] == name).any()]
     table = TableBuilder("table1_single_baselines", {"source": "Dataset"})
     for (source,), labels in crossed(titles_of(sources)):
-        table.add_row(labels, {name: _cell(metrics, source, name) for name in shown})
+        table.add_row(labels, {name: _cell(intervals, source, name) for name in shown})
     table.compare_across(shown)
     return table.build(
         caption="Mean accuracy of single-concept attribution (%)" + table.stand_in_clause(sources),
         column_head="explainer",
         columns={name: Column(explainers[name]["title"]) for name in shown},
         footnotes=(
-            _repeats(table, metrics, shown),
-            *_different_samples(metrics, explainers, shown),
+            _repeats(table, intervals, shown),
+            *_different_samples(intervals, explainers, shown),
             "Abstained samples count as wrong.",
         ),
     )
 
 
-def table1_extended(metrics: pd.DataFrame, sources: Mapping[str, Mapping], explainers: Mapping[str, Mapping]) -> Table:
+def table1_extended(
+    intervals: pd.DataFrame,
+    metrics: pd.DataFrame,
+    sources: Mapping[str, Mapping],
+    explainers: Mapping[str, Mapping],
+) -> Table:
     """Return every explainer on every source by the metrics of `EXTENDED` that were measured.
 
     The best accuracy of a source is bold, oracles apart: they are told what the others have to find out.
+
+    Args:
+        metrics: Tidy metrics and timings.
     """
     table = TableBuilder("table1_extended", {"source": "Dataset", "explainer": "Explainer", "reads": "Reads"})
     for (source, explainer), labels in crossed(titles_of(sources), _titles(explainers)):
-        cells = {metric: _cell(metrics, source, explainer, metric=metric) for metric in EXTENDED}
+        cells = {metric: _cell(intervals, source, explainer, metric=metric) for metric in _WITH_INTERVALS}
+        cells |= {
+            metric: _mean(metrics, source, explainer, metric) for metric in EXTENDED if metric not in _WITH_INTERVALS
+        }
         sees = explainers[explainer]["sees"]
         table.add_row([*labels, (sees, sees)], cells, rival=not explainers[explainer]["oracle"])
     table.compare_down(["accuracy"], same=1)
@@ -89,7 +103,7 @@ def table1_extended(metrics: pd.DataFrame, sources: Mapping[str, Mapping], expla
         column_head="metric",
         columns={metric: column for metric, column in EXTENDED.items() if metric in measured},
         footnotes=(
-            _repeats(table, metrics, explainers),
+            _repeats(table, intervals, explainers),
             "Reads: what an explainer sees of a registration; chance and the most frequent label see nothing.",
             *(note for metric, note in notes.items() if metric in measured),
         ),
@@ -97,24 +111,24 @@ def table1_extended(metrics: pd.DataFrame, sources: Mapping[str, Mapping], expla
 
 
 def table2_per_concept(
-    metrics: pd.DataFrame, sources: Mapping[str, Mapping], explainers: Mapping[str, Mapping]
+    intervals: pd.DataFrame, sources: Mapping[str, Mapping], explainers: Mapping[str, Mapping]
 ) -> Table:
     """Return the accuracy per concept (Table II): sources × those of `GPCA_FORMS` with predictions, by concepts.
 
     The best concept of a row is bold, as in the paper.
     """
-    concepts = [concept for concept in metrics["concept"].unique() if concept != ALL]
+    concepts = [concept for concept in intervals["concept"].unique() if concept != ALL]
     shown = {name: title for name, title in _titles(explainers).items() if name in GPCA_FORMS}
     table = TableBuilder("table2_per_concept", {"source": "Dataset", "explainer": "Explainer"})
     for (source, explainer), labels in crossed(titles_of(sources), shown):
-        table.add_row(labels, {c: _cell(metrics, source, explainer, c) for c in (*concepts, ALL)})
+        table.add_row(labels, {c: _cell(intervals, source, explainer, c) for c in (*concepts, ALL)})
     table.compare_across(concepts)
     return table.build(
         caption="Mean accuracy per concept (%)" + table.stand_in_clause(sources),
         column_head="concept",
         columns={concept: Column(concept.capitalize()) for concept in (*concepts, ALL)},
         footnotes=(
-            _repeats(table, metrics, shown),
+            _repeats(table, intervals, shown),
             "Of the test samples that truly are of a concept, the share that is attributed to it.",
         ),
     )
@@ -125,33 +139,39 @@ def _titles(explainers: Mapping[str, Mapping]) -> dict[str, str]:
 
 
 def _cell(
-    metrics: pd.DataFrame, source: str, explainer: str, concept: str = ALL, metric: str = "accuracy"
+    intervals: pd.DataFrame, source: str, explainer: str, concept: str = ALL, metric: str = "accuracy"
 ) -> Cell | None:
-    of_cell = rows_where(metrics, source=source, method=explainer, concept=concept)
-    values_R = rows_where(of_cell, metric=metric)["value"].to_numpy() * (100 if metric in _SHARES else 1)
+    cell = clustered_cell(intervals, source=source, method=explainer, metric=metric, concept=concept)
+    return None if cell and metric == "causal_accuracy" and cell.test_samples < _LEAST_CAUSAL else cell
+
+
+def _mean(metrics: pd.DataFrame, source: str, explainer: str, metric: str) -> Cell | None:
+    """Return the mean over the seeds of what has no interval."""
+    of_cell = rows_where(metrics, source=source, method=explainer, concept=ALL)
+    values_R = rows_where(of_cell, metric=metric)["value"].to_numpy() * (100 if metric == "abstention_rate" else 1)
     counted = "causal_samples" if metric.startswith("causal") else "test_samples"
-    samples, clusters = (int(rows_where(of_cell, metric=name)["value"].sum()) for name in (counted, "clusters"))
-    if metric == "causal_accuracy" and samples < _LEAST_CAUSAL:
-        return None
-    return cell_of_repeats(values_R, samples, clusters=clusters)
+    return cell_of_repeats(values_R, int(rows_where(of_cell, metric=counted)["value"].sum()))
 
 
-def _repeats(table: TableBuilder, metrics: pd.DataFrame, explainers: Iterable[str]) -> str:
+def _repeats(table: TableBuilder, intervals: pd.DataFrame, explainers: Iterable[str]) -> str:
     """Return the footnote on the repeats; seeds and test samples may differ from cell to cell."""
-    of_test = _test_samples(metrics, explainers)
-    samples = span(of_test.loc[of_test["source"].isin(table.first_labels()), "value"])
-    return f"{mean_over(table.span_of_seeds(), samples)}."
+    of_test = _accuracies(intervals, explainers)
+    samples = span(_per_seed(of_test[of_test["source"].isin(table.first_labels())]))
+    return f"{over_clusters(table.span_of_seeds(), samples)}."
 
 
-def _different_samples(metrics: pd.DataFrame, explainers: Mapping[str, Mapping], shown: Iterable[str]) -> list[str]:
+def _different_samples(intervals: pd.DataFrame, explainers: Mapping[str, Mapping], shown: Iterable[str]) -> list[str]:
     """Return the footnote on the test samples of each explainer, where their numbers differ."""
-    of_test = _test_samples(metrics, shown)
     names: dict[str, list[str]] = {}
-    for explainer, values in of_test.groupby("method", sort=False)["value"]:
-        names.setdefault(span(values), []).append(explainers[explainer]["title"])
+    for explainer, rows in _accuracies(intervals, shown).groupby("method", sort=False):
+        names.setdefault(span(_per_seed(rows)), []).append(explainers[explainer]["title"])
     explained = "; ".join(f"{samples} by {', '.join(titles)}" for samples, titles in names.items())
     return [f"Test samples explained: {explained}."] if len(names) > 1 else []
 
 
-def _test_samples(metrics: pd.DataFrame, explainers: Iterable[str]) -> pd.DataFrame:
-    return rows_where(metrics[metrics["method"].isin(list(explainers))], metric="test_samples", concept=ALL)
+def _accuracies(intervals: pd.DataFrame, explainers: Iterable[str]) -> pd.DataFrame:
+    return rows_where(intervals[intervals["method"].isin(list(explainers))], metric="accuracy", concept=ALL)
+
+
+def _per_seed(rows: pd.DataFrame) -> pd.Series:
+    return rows["samples"] // rows["seeds"]

@@ -39,7 +39,7 @@ def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
 
 
 def shown(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str, Any]:
-    """Return the titles of the sources, and the number of test samples."""
+    """Return the titles of the sources."""
     shown_sources = {
         name: {"title": entry["title"], "stand_in": entry["stand_in"]}
         for name, entry in sources.items()
@@ -48,7 +48,6 @@ def shown(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str
     return {
         "kernel_sources": shown_sources,
         "kernel_source_titles": {name: title_of(entry) for name, entry in shown_sources.items()},
-        "test_samples": config["registrations"]["test"],
     }
 
 
@@ -60,6 +59,11 @@ EXPERIMENT = Experiment(
             "kernels.csv",
             "gpca.experiments.kernel_grid.grid:collect_grids",
             {"files": "kernels/{kernel_source}/seed{seed}.csv"},
+        ),
+        Tidy(
+            "kernel_intervals.csv",
+            "gpca.experiments.kernel_grid.intervals:collect_intervals",
+            {"prediction_files": "kernel_predictions/{kernel_source}/seed{seed}.csv"},
         ),
     ),
     names=names,

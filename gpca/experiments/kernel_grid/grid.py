@@ -11,6 +11,8 @@ import numpy as np
 
 from gpca.attribution.diagnostics import calibration_error, negative_log_likelihood
 from gpca.attribution.metrics import ALL, source_method_seed, tidy
+from gpca.attribution.predictions import prediction_frame
+from gpca.attribution.scores import Attribution
 from gpca.classifier.settings import Draws, Kernel, LearningRate
 from gpca.errors import InputError
 from gpca.io.csv_file import numbers, read_csv, write_csv
@@ -23,7 +25,8 @@ if TYPE_CHECKING:
 
 MEASURES = ("accuracy", "elbo", "confidence", "ece", "nll")
 TABLE = "kernels"  # `table` of the tidy rows reads this
-GRID_COLUMNS = ("kernel", "learning_rate", "iterations", *MEASURES)
+SETTING = ("kernel", "learning_rate", "iterations")
+GRID_COLUMNS = (*SETTING, *MEASURES)
 
 
 @dataclass(frozen=True)
@@ -43,11 +46,14 @@ class KernelGrid:
     draws: Draws = 1000
 
 
-def evaluate_grid(registrations: Registrations, grid: KernelGrid, source: str, seed: int) -> pd.DataFrame:
-    """Return the rows of :data:`GRID_COLUMNS`: fitted to the training samples, judged on the test samples.
+def evaluate_grid(
+    registrations: Registrations, grid: KernelGrid, source: str, seed: int
+) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Return the rows of :data:`GRID_COLUMNS`, and the predictions of the test samples that they are judged by.
 
-    Each is what a fit of that many iterations alone would give. `elbo` is per training sample in nats, `confidence`
-    the mean of the largest score.
+    Each row is what a fit of that many iterations to the training samples alone would give. `elbo` is per training
+    sample in nats, `confidence` the mean of the largest score. The predictions have the columns of a prediction file
+    after `SETTING`.
 
     Raises:
         InputError: no training or no test samples.
@@ -64,13 +70,19 @@ def evaluate_grid(registrations: Registrations, grid: KernelGrid, source: str, s
     h_S_d = registrations.embedding
     concept_S = registrations.concept
     target_N = np.array([CONCEPTS.index(concept) for concept in concept_S[test]])
+    tested, predictions = registrations.subset(test), []
     rows = []
     for kernel in grid.kernels:
         for rate in grid.learning_rates:
             settings = GPCSettings(kernel, rate, max(grid.iterations), grid.inducing, grid.draws)
             gpc = GPC(CONCEPTS, settings, source, seed)
             for iterations in gpc.fit_up_to(grid.iterations, h_S_d[train], concept_S[train]):
-                scores_N_C, _, _ = gpc.attribute(h_S_d[test])
+                scores_N_C, variances_N_C, bald_N = gpc.attribute(h_S_d[test])
+                attribution = Attribution.of_scores(
+                    CONCEPTS, scores_N_C, seconds=0.0, variances_N_C=variances_N_C, bald_N=bald_N
+                )
+                setting = dict(zip(SETTING, (kernel, rate, iterations), strict=True))
+                predictions.append(prediction_frame(tested, attribution).assign(**setting))
                 judged = (
                     np.mean(scores_N_C.argmax(axis=1) == target_N),
                     gpc.elbo(),
@@ -79,11 +91,12 @@ def evaluate_grid(registrations: Registrations, grid: KernelGrid, source: str, s
                     negative_log_likelihood(scores_N_C, target_N),
                 )
                 rows.append((kernel, rate, iterations, *judged))
-    return pd.DataFrame(rows, columns=list(GRID_COLUMNS))
+    of_samples = pd.concat(predictions, ignore_index=True)
+    return pd.DataFrame(rows, columns=list(GRID_COLUMNS)), of_samples[[*SETTING, *of_samples.columns.drop([*SETTING])]]
 
 
 def write_grid(path: str | Path, rows: pd.DataFrame) -> None:
-    """Write what :func:`evaluate_grid` returned."""
+    """Write the rows that :func:`evaluate_grid` returned."""
     write_csv(path, rows)
 
 

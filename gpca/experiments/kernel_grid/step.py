@@ -1,10 +1,14 @@
-"""Step ``kernel_grid``: embeddings -> accuracy and calibration by kernel, learning rate and number of iterations."""
+"""Step ``kernel_grid``: embeddings -> accuracy and calibration by kernel, learning rate and number of iterations.
+
+With the predictions of the test samples.
+"""
 
 from __future__ import annotations
 
 from dataclasses import fields, replace
 
 from gpca.experiments.kernel_grid.grid import KernelGrid, evaluate_grid, write_grid
+from gpca.io.csv_file import write_csv
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
@@ -14,8 +18,11 @@ def run(job: Job) -> None:
     """Evaluate the grid, seed by seed."""
     known = {field.name for field in fields(KernelGrid)}
     grid = KernelGrid(**{name: value for name, value in job.settings.items() if name in known})
-    for seed, registrations, embeddings, out in job.per_seed("registrations", "embeddings", "out"):
-        with record_provenance([out], [registrations, embeddings], job.settings, seed=seed):
+    files = job.per_seed("registrations", "embeddings", "out", "predictions")
+    for seed, registrations, embeddings, out, predictions in files:
+        with record_provenance([out, predictions], [registrations, embeddings], job.settings, seed=seed):
             loaded = Registrations.load(registrations, (job.source, seed))
             loaded = replace(loaded, attached=read_embedding(embeddings, loaded))
-            write_grid(out, evaluate_grid(loaded, grid, job.source, seed))
+            rows, of_samples = evaluate_grid(loaded, grid, job.source, seed)
+            write_grid(out, rows)
+            write_csv(predictions, of_samples)

@@ -1,4 +1,7 @@
-"""Makes the tables of kernels and schedules (Table IV) from :mod:`gpca.experiments.kernel_grid.grid`."""
+"""Makes the tables of kernels and schedules (Table IV).
+
+The intervals are what :func:`gpca.experiments.kernel_grid.intervals.collect_intervals` returned.
+"""
 
 from __future__ import annotations
 
@@ -6,9 +9,10 @@ from collections.abc import Mapping
 from math import inf
 from typing import TYPE_CHECKING
 
+from gpca.experiments.kernel_grid.grid import TABLE, setting_name
 from gpca.objects.title import stand_in_clause, title_of
-from gpca.reporting.tables.builder import TableBuilder, mean_over
-from gpca.reporting.tables.cells import cell_of_repeats, rows_where
+from gpca.reporting.tables.builder import TableBuilder, interval_over, over_clusters
+from gpca.reporting.tables.cells import cell_of_repeats, clustered_cell, rows_where
 from gpca.reporting.tables.table import Cell, Column, Table
 
 if TYPE_CHECKING:
@@ -32,32 +36,38 @@ _MEASURES = {  # Each measure of the grid has a column, and a factor to the colu
 }
 
 
-def table4_kernels(grid: pd.DataFrame, sources: Mapping[str, Mapping], test: int) -> Table:
+def table4_kernels(intervals: pd.DataFrame, sources: Mapping[str, Mapping]) -> Table:
     """Return the accuracy of those of the paper's five kernels and schedules that were fitted, by sources."""
-    shown = {name: entry for name, entry in sources.items() if (grid["source"] == name).any()}
+    shown = _shown(intervals, sources)
     table = TableBuilder("table4_kernels", _HEADS)
     for setting in PRINTED:
-        table.add_row(_labels(setting), {name: _cell(grid, name, setting, "accuracy", test) for name in shown})
+        table.add_row(_labels(setting), {name: _cell(intervals, name, setting, "accuracy") for name in shown})
     table.compare_down(shown)
     return table.build(
         caption="Accuracy of the GPC by kernel and schedule (%)" + stand_in_clause(shown.values(), partly=False),
         column_head="source",
         columns={name: Column(title_of(entry)) for name, entry in shown.items()},
         footnotes=(
-            f"{mean_over(table.most_seeds(), test)}.",
+            f"{_repeats(table)}.",
             "The rows that the paper prints; table4_grid has all, with their confidence.",
         ),
     )
 
 
-def table4_grid(grid: pd.DataFrame, sources: Mapping[str, Mapping], test: int) -> Table:
-    """Return every kernel, learning rate and number of iterations on every source, with its calibration."""
-    shown = {name: entry for name, entry in sources.items() if (grid["source"] == name).any()}
+def table4_grid(grid: pd.DataFrame, intervals: pd.DataFrame, sources: Mapping[str, Mapping]) -> Table:
+    """Return every kernel, learning rate and number of iterations on every source, with its calibration.
+
+    Args:
+        grid: What :func:`gpca.experiments.kernel_grid.grid.read_grids` returned.
+    """
+    shown = _shown(intervals, sources)
     settings = list(grid[list(_HEADS)].drop_duplicates().itertuples(index=False, name=None))
     table = TableBuilder("table4_grid", {"source": "Dataset", **_HEADS})
     for name, entry in shown.items():
         for setting in settings:
-            cells = {measure: _cell(grid, name, setting, measure, test) for measure in _MEASURES}
+            cells = {measure: _cell(intervals, name, setting, measure) for measure in _MEASURES}
+            elbo_R = rows_where(grid, source=name, **dict(zip(_HEADS, setting, strict=True)))["elbo"].to_numpy()
+            cells["elbo"] = cell_of_repeats(elbo_R, 0)
             table.add_row([(name, title_of(entry)), *_labels(setting)], cells)
     table.compare_down(["accuracy", "nll"], same=1)
     return table.build(
@@ -65,12 +75,24 @@ def table4_grid(grid: pd.DataFrame, sources: Mapping[str, Mapping], test: int) -
         column_head="measure",
         columns={measure: column for measure, (column, _) in _MEASURES.items()},
         footnotes=(
-            f"{mean_over(table.most_seeds(), test)}. Bold: best accuracy and NLL of a dataset.",
-            "Confidence: mean of the largest score. ECE: its gap to the accuracy over 15 equally wide bins. ELBO: per "
-            "training sample. If the ELBO still rises from row to row and the confidence lies far below the "
-            "accuracy, the fit was stopped before it had converged.",
+            f"{_repeats(table)}. Bold: best accuracy and NLL of a dataset.",
+            "Confidence: mean of the largest score. ECE: its gap to the accuracy over 15 equally wide bins, mean of "
+            "each seed's own. ELBO: per training sample, mean over the seeds; "
+            f"{interval_over(table.most_seeds())}. If it still rises from row to row and the confidence lies far below "
+            "the accuracy, the fit was stopped before it had converged.",
         ),
     )
+
+
+def _shown(intervals: pd.DataFrame, sources: Mapping[str, Mapping]) -> dict[str, Mapping]:
+    return {name: entry for name, entry in sources.items() if (intervals["source"] == name).any()}
+
+
+def _repeats(table: TableBuilder) -> str:
+    """Return the start of the footnote on seeds, samples and intervals, without a full stop."""
+    table.require_rows()
+    cell = next(cell for cell in table.cells.values() if cell.test_samples)
+    return over_clusters(cell.seeds, cell.test_samples // cell.seeds)
 
 
 def _labels(setting: tuple) -> tuple[tuple[str, str], ...]:
@@ -78,7 +100,7 @@ def _labels(setting: tuple) -> tuple[tuple[str, str], ...]:
     return (kernel, TITLES[kernel]), (f"{rate:g}", f"{rate:g}"), (str(iterations), str(iterations))
 
 
-def _cell(grid: pd.DataFrame, source: str, setting: tuple, measure: str, test: int) -> Cell | None:
-    of_setting = rows_where(grid, source=source, **dict(zip(_HEADS, setting, strict=True)))
+def _cell(intervals: pd.DataFrame, source: str, setting: tuple, measure: str) -> Cell | None:
     _, factor = _MEASURES[measure]
-    return cell_of_repeats(of_setting[measure].to_numpy() * factor, test * len(of_setting))
+    method = setting_name(*setting)
+    return clustered_cell(intervals, factor, table=TABLE, source=source, method=method, metric=measure)

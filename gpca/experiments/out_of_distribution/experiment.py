@@ -57,6 +57,14 @@ EXPERIMENT = Experiment(
                 "set_files": "shifted/{source}/seed{seed}.npz",
             },
         ),
+        Tidy(
+            "learner_intervals.csv",
+            "gpca.experiments.out_of_distribution.intervals:collect_intervals",
+            {
+                "prediction_files": "learners/{source}/{learner}/seed{seed}.csv",
+                "set_files": "shifted/{source}/seed{seed}.npz",
+            },
+        ),
     ),
     names=names,
     shown=shown,

@@ -161,7 +161,7 @@ def _pretrained_on(frames: Mapping) -> str:
 EXPERIMENT = Experiment(
     name="real_world",
     sections={"real_world": RealWorldSettings},
-    tidy=(Tidy("real_world.csv"),),
+    tidy=(Tidy("real_world.csv"), Tidy("real_world_intervals.csv")),
     names=names,
     shown=shown,
     check=check,

@@ -47,7 +47,7 @@ def collect(
         if (of_source := poses.get((source, f"seed{seed}"))) is None:
             raise InputError(path, "has no pose file beside it", "regenerate both from the same config")
         rows = read_predictions(path)
-        for name, test in _parts(path, rows[rows["split"] == "test"], of_source):
+        for name, test in parts_of_frames(path, rows[rows["split"] == "test"], of_source):
             metrics = attribution_metrics(test, concepts_of(rows))
             scores = _scores(test, concepts_of(rows))
             metrics |= {"ece": {ALL: calibration_error(*scores)}, "objects": {ALL: test["object"].nunique()}}
@@ -72,7 +72,12 @@ def read_together(path: str | Path) -> pd.DataFrame:
     return metrics[(metrics["table"] == TOGETHER) & (metrics["source"] == REAL_WORLD)]
 
 
-def _parts(path, test: pd.DataFrame, pose_file: str | Path) -> Iterator[tuple[str, pd.DataFrame]]:
+def parts_of_frames(path, test: pd.DataFrame, pose_file: str | Path) -> Iterator[tuple[str, pd.DataFrame]]:
+    """Yield the test rows of a file of predictions: all together, and by what the column `table` of the metrics names.
+
+    Raises:
+        InputError: no test rows, or other samples than in the file of poses.
+    """
     if test.empty:
         raise InputError(path, "has no test rows", "regenerate it")
     samples = read_samples_of_frames(pose_file)

@@ -1,4 +1,8 @@
-"""Makes Table VI of the paper: GP-CA on depth frames by backbone and reduction, and by seen and unseen objects."""
+"""Makes Table VI of the paper: GP-CA on depth frames by backbone and reduction, and by seen and unseen objects.
+
+The metrics are what :func:`gpca.experiments.real_world.metrics.collect` returned, and the intervals what
+:func:`gpca.experiments.real_world.intervals.collect_intervals` did.
+"""
 
 from __future__ import annotations
 
@@ -14,8 +18,8 @@ from gpca.encoders.registry import make_encoder, parameter_count
 from gpca.experiments.real_world.metrics import DATASET, SEEN, TOGETHER, UNSEEN
 from gpca.frames.source import ONE_ENCODER, REAL_WORLD, RENDERED
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.reporting.tables.builder import TableBuilder, crossed, interval_over
-from gpca.reporting.tables.cells import cell_of_all_samples, cell_of_repeats, plain_cell, rows_where
+from gpca.reporting.tables.builder import TableBuilder, crossed, over_clusters
+from gpca.reporting.tables.cells import cell_of_repeats, clustered_cell, plain_cell, rows_where
 from gpca.reporting.tables.table import Cell, Column, Table
 from gpca.reporting.words import dataset_in_words, plural
 
@@ -34,6 +38,7 @@ RENDERED_NOTE = (
     "Tested objects rendered: pretrained on frames rendered of the tested objects' own models, which is no row of the "
     "paper's and is not compared with it."
 )
+SCENES = ("scenes", "scene")
 EVERYTHING_SEEN = {TOGETHER: "All (%)", SEEN: "Seen objects (%)", UNSEEN: "Unseen objects (%)"}
 
 
@@ -45,6 +50,7 @@ def encoder_title(encoder: str, reduction: str) -> str:
 
 
 def table6_of_encoders(
+    intervals: pd.DataFrame,
     metrics: pd.DataFrame,
     title: str,
     encoders: Mapping[str, Mapping],
@@ -58,10 +64,11 @@ def table6_of_encoders(
         name: parameter_count(make_encoder(settings["backbone"], settings.get("options", {})))
         for name, settings in encoders.items()
     }
-    return table6_backbones(metrics, title, backbones, reductions, pretrained_on, rendered, explainers)
+    return table6_backbones(intervals, metrics, title, backbones, reductions, pretrained_on, rendered, explainers)
 
 
 def table6_backbones(
+    intervals: pd.DataFrame,
     metrics: pd.DataFrame,
     title: str,
     backbones: Mapping[str, int],
@@ -73,8 +80,6 @@ def table6_backbones(
     """Return the accuracy on depth frames by backbones × reductions, and of the classic features.
 
     Args:
-        metrics: The tidy metrics of the methods ``{backbone}-{reduction}``, made by
-            :func:`gpca.experiments.real_world.metrics.collect`.
         backbones: The number of parameters of each name, in order. The table shows differences to the first backbone
             with the first reduction.
         reductions: The names of the reductions, in order.
@@ -84,24 +89,23 @@ def table6_backbones(
     """
     together = rows_where(metrics, table=TOGETHER)
     metrics, one_encoder = (rows_where(together, source=source) for source in (REAL_WORLD, ONE_ENCODER))
+    intervals = rows_where(intervals, table=TOGETHER, source=REAL_WORLD)
     first = next(iter(backbones))
-    reference_R = _values(metrics, f"{first}-{reductions[0]}")
     table = TableBuilder("table6_backbones", {"backbone": "Backbone", "reduction": "Reduction"})
     for backbone, parameters in backbones.items():
         for reduction in reductions:
             labels = [(backbone, BACKBONES.get(backbone, backbone)), (reduction, REDUCTIONS[reduction])]
             method = f"{backbone}-{reduction}"
-            cells = _cells(metrics, method, reference_R, not table.rows, parameters)
+            cells = _cells(intervals, metrics, method, parameters)
             table.add_row(labels, cells | {"classifiers": _deviation(one_encoder, method)} if cells else {})
     for backbone in rendered:
         name = f"{backbone}{RENDERED}"
         labels = [(name, encoder_title(name, "none")), ("none", REDUCTIONS["none"])]
-        cells = _cells(metrics, f"{name}-none", reference_R, not table.rows, backbones[backbone])
-        table.add_row(labels, cells, rival=False)
+        table.add_row(labels, _cells(intervals, metrics, f"{name}-none", backbones[backbone]), rival=False)
     untrained = {name: title for name, title in (explainers or {}).items() if name in UNTRAINED}
     for method, name in {**CLASSIC, **untrained}.items():
         labels = [(method, name), ("none", REDUCTIONS["none"])]
-        table.add_row(labels, _cells(metrics, method, reference_R, not table.rows))
+        table.add_row(labels, _cells(intervals, metrics, method))
     table.compare_down(["accuracy"])
     shown = table.first_cell("accuracy")
     rival = f"To {BACKBONES.get(first, first)}"
@@ -119,11 +123,10 @@ def table6_backbones(
             "parameters": Column("Parameters (k)", decimals=0, interval=False, limits=(0, inf)),
         },
         footnotes=(
-            f"Mean over {plural(shown.seeds, 'seed')}, {shown.test_samples // shown.seeds} test samples each, in "
-            f"scenes that training does not see; {interval_over(shown.seeds)}. Each seed has its own split of the "
-            f"scenes, perturbations, {encoder}, and GPC.",
+            f"{over_clusters(shown.seeds, shown.test_samples // shown.seeds, SCENES)}. Training sees none of these "
+            f"scenes. Each seed has its own split of the scenes, perturbations, {encoder}, and GPC.",
             "Std. dev.: as the paper says, of classifiers on one encoder's embeddings, the first seed's. Of all: of "
-            "the seeds of the mean.",
+            "the seeds of the accuracy.",
             f"{rival}: paired difference to it{other}. By concept: the share of its samples that is attributed to it. "
             "Parameters: of the encoder.",
             *([RENDERED_NOTE] if rendered else ()),
@@ -132,25 +135,21 @@ def table6_backbones(
 
 
 def _cells(
-    metrics: pd.DataFrame, method: str, reference_R: np.ndarray, is_first: bool, parameters: int | None = None
+    intervals: pd.DataFrame, metrics: pd.DataFrame, method: str, parameters: int | None = None
 ) -> dict[str, Cell | None]:
-    """Return the cells of a method; the first row of the table is not compared with itself."""
-    accuracy_R = _values(metrics, method)
-    seeds = len(accuracy_R)
-    if not seeds:
+    """Return the cells of a method."""
+    rows = rows_where(intervals, method=method)
+    accuracy = clustered_cell(rows, metric="accuracy", concept=ALL)
+    if accuracy is None:
         return {}
-    samples = int(_values(metrics, method, "test_samples", scale=1).sum())
-    clusters = {concept: int(_values(metrics, method, "clusters", concept, 1).sum()) for concept in (ALL, *CONCEPTS)}
-    cells: dict[str, Cell | None] = {"accuracy": cell_of_repeats(accuracy_R, samples, clusters=clusters[ALL])}
-    if seeds > 1:
-        cells["deviation"] = plain_cell(float(accuracy_R.std(ddof=1)), seeds, samples)
-    if not is_first and seeds == len(reference_R):
-        cells["difference"] = cell_of_repeats(accuracy_R - reference_R, samples)
-    for concept in CONCEPTS:
-        of_concept_R = _values(metrics, method, concept=concept)
-        cells[concept] = cell_of_repeats(of_concept_R, samples, clusters=clusters[concept])
+    cells: dict[str, Cell | None] = {"accuracy": accuracy}
+    accuracy_R = _values(metrics, method)
+    if len(accuracy_R) > 1:
+        cells["deviation"] = plain_cell(float(accuracy_R.std(ddof=1)), accuracy.seeds, accuracy.test_samples)
+    cells["difference"] = clustered_cell(rows, metric="difference")
+    cells |= {concept: clustered_cell(rows, metric="accuracy", concept=concept) for concept in CONCEPTS}
     if parameters is not None:
-        cells["parameters"] = plain_cell(parameters / 1000, seeds, samples)
+        cells["parameters"] = plain_cell(parameters / 1000, accuracy.seeds, accuracy.test_samples)
     return cells
 
 
@@ -159,15 +158,13 @@ def _deviation(one_encoder: pd.DataFrame, method: str) -> Cell | None:
     return plain_cell(float(accuracy_R.std(ddof=1)), len(accuracy_R), 0) if len(accuracy_R) > 1 else None
 
 
-def _values(
-    metrics: pd.DataFrame, method: str, metric: str = "accuracy", concept: str = ALL, scale: float = 100
-) -> np.ndarray:
-    """Return the values over the seeds, in the order of the seeds."""
-    chosen = rows_where(metrics, method=method, metric=metric, concept=concept)
-    return chosen.sort_values("seed")["value"].to_numpy() * scale
+def _values(metrics: pd.DataFrame, method: str) -> np.ndarray:
+    """Return the accuracies over the seeds in %."""
+    return rows_where(metrics, method=method, metric="accuracy", concept=ALL)["value"].to_numpy() * 100
 
 
 def table6_seen_unseen(
+    intervals: pd.DataFrame,
     metrics: pd.DataFrame,
     title: str,
     conditions: Mapping[str, str],
@@ -179,18 +176,18 @@ def table6_seen_unseen(
     """Return the accuracy on depth frames, for seen and unseen objects and by dataset, under every condition.
 
     Args:
-        metrics: The tidy metrics (:func:`gpca.experiments.real_world.metrics.collect`).
         conditions: Source of each condition -> its title, in order.
         backbones: The names of the methods ``{backbone}-{reduction}``, in order.
         sees: What each method sees, in words.
         rendered: Whether the encoders learned from frames rendered of the models first.
     """
     titles = {name: encoder_title(*name.split("-")) for name in backbones} | CLASSIC | dict(explainers)
-    datasets = sorted({name for name in metrics["table"] if name.startswith(DATASET)})
+    datasets = sorted({name for name in intervals["table"] if name.startswith(DATASET)})
     heads = {"condition": "Initial poses", "method": "Method", "reads": "Reads"}
     table = TableBuilder("table6_seen_unseen", heads)
     for (source, method), labels in crossed(conditions, titles):
-        cells = _cells_by_objects(rows_where(metrics, source=source, method=method), datasets)
+        accuracies, scores = (rows_where(rows, source=source, method=method) for rows in (intervals, metrics))
+        cells = _cells_by_objects(accuracies, scores, datasets)
         table.add_row([*labels, (sees[method], sees[method])], cells)
     table.compare_down(EVERYTHING_SEEN, same=1)
     columns = {name: Column(head) for name, head in EVERYTHING_SEEN.items()}
@@ -201,15 +198,15 @@ def table6_seen_unseen(
     columns |= {"icp_calls": Column("ICP calls", decimals=0, interval=False, limits=(0.0, inf))}
     seeds = table.most_seeds()
     pretrained = "The pretraining renders the models of both. " if rendered else ""
-    first = rows_where(metrics, source=next(iter(conditions)), metric="test_samples", concept=ALL)
+    first = rows_where(intervals, source=next(iter(conditions)), metric="accuracy", concept=ALL)
     shares = [_share(first, name) for name in (SEEN, UNSEEN)]
     return table.build(
         caption=f"Accuracy (%) on {title}: objects that training saw and did not see",
         column_head="samples",
         columns=columns,
         footnotes=(
-            f"Mean over the test samples of {plural(seeds, 'seed')} together, as some seeds have more of a column than "
-            f"others; {interval_over(seeds)}. Bold: best for one kind of initial poses.",
+            f"{over_clusters(seeds, clusters=SCENES)}. Shares of the test samples of all seeds together, as some seeds "
+            "have more of a column than others. Bold: best for one kind of initial poses.",
             *_counts(table, columns, conditions),
             f"No scene is in both training and test. Seen objects ({shares[0]} of the test samples) are shown in a "
             f"scene of the training too, unseen ones ({shares[1]}) are not. {pretrained}Instances take turns, so that "
@@ -220,20 +217,17 @@ def table6_seen_unseen(
     )
 
 
-def _cells_by_objects(of_method: pd.DataFrame, datasets: Sequence[str]) -> dict[str, Cell | None]:
-    cells = {name: _cell(rows_where(of_method, table=name), "accuracy") for name in (*EVERYTHING_SEEN, *datasets)}
-    together = rows_where(of_method, table=TOGETHER)
-    return cells | {metric: _cell(together, metric, scale=1) for metric in NOT_SHARES}
-
-
-def _cell(rows: pd.DataFrame, metric: str, scale: float = 100) -> Cell | None:
-    value_R, samples_R = (
-        rows_where(rows, metric=name, concept=ALL).sort_values("seed")["value"].to_numpy(float)
-        for name in (metric, "test_samples")
-    )
-    if metric == "accuracy":
-        return cell_of_all_samples(scale * value_R, samples_R)
-    return cell_of_repeats(scale * value_R, int(samples_R.sum()))  # no mean over samples
+def _cells_by_objects(
+    accuracies: pd.DataFrame, scores: pd.DataFrame, datasets: Sequence[str]
+) -> dict[str, Cell | None]:
+    rows = rows_where(accuracies, metric="accuracy", concept=ALL)
+    cells = {name: clustered_cell(rows, table=name) for name in (*EVERYTHING_SEEN, *datasets)}
+    together = rows_where(scores, table=TOGETHER, concept=ALL)
+    samples = int(rows_where(together, metric="test_samples")["value"].sum())
+    return cells | {
+        metric: cell_of_repeats(rows_where(together, metric=metric)["value"].to_numpy(), samples)
+        for metric in NOT_SHARES  # no means over samples
+    }
 
 
 def _counts(table: TableBuilder, columns: Mapping[str, Column], conditions: Mapping[str, str]) -> list[str]:
@@ -254,5 +248,5 @@ def _counts(table: TableBuilder, columns: Mapping[str, Column], conditions: Mapp
 
 
 def _share(samples: pd.DataFrame, name: str) -> str:
-    of_part, of_all = (rows_where(samples, table=table)["value"].to_numpy(float) for table in (name, TOGETHER))
+    of_part, of_all = (rows_where(samples, table=table)["samples"].to_numpy(float) for table in (name, TOGETHER))
     return f"{100 * np.sum(of_part) / np.sum(of_all):.0f} %" if len(of_all) else "0 %"

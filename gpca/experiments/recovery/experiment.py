@@ -101,6 +101,12 @@ EXPERIMENT = Experiment(
             },
         ),
         Tidy(
+            "recovery_intervals.csv",
+            "gpca.experiments.recovery.intervals:collect_intervals",
+            {"files": "recovery/seed{seed}.csv"},
+            {"budget": "recovery.loop.budget"},
+        ),
+        Tidy(
             "recovery_differences.csv",
             "gpca.experiments.recovery.differences:collect_differences",
             {"files": "recovery/seed{seed}.csv"},

@@ -6,11 +6,12 @@ from collections.abc import Mapping
 from math import inf
 from typing import TYPE_CHECKING
 
+from gpca.attribution.metrics import ALL
 from gpca.experiments.recovery.differences import ERROR, SEQUENCE
 from gpca.experiments.recovery.metrics import pool_share
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.reporting.tables.builder import TableBuilder
-from gpca.reporting.tables.cells import WILSON, interval_cell, plain_cell, rows_where, share_cell
+from gpca.reporting.tables.builder import TableBuilder, over_clusters
+from gpca.reporting.tables.cells import clustered_cell, interval_cell, plain_cell, rows_where
 from gpca.reporting.tables.table import Column, Table
 from gpca.reporting.words import plural
 
@@ -23,6 +24,7 @@ AGAINST = {SEQUENCE: "best sequence", ERROR: "error only"}
 
 def table8_recovery(
     metrics: pd.DataFrame,
+    intervals: pd.DataFrame,
     differences: pd.DataFrame,
     seconds: Mapping[str, float],
     title: str,
@@ -34,6 +36,7 @@ def table8_recovery(
 
     Args:
         metrics: The tidy metrics that :func:`gpca.experiments.recovery.metrics.collect_recovery` makes.
+        intervals: What :func:`gpca.experiments.recovery.intervals.collect_intervals` makes.
         differences: What :func:`gpca.experiments.recovery.differences.collect_differences` makes.
         seconds: The mean seconds of a failure, by policy.
         budget: The number of actions that a policy may take.
@@ -45,15 +48,15 @@ def table8_recovery(
     leads = {f"{metric}_{against}": (metric, against) for against in AGAINST for metric in (within[0], within[-1])}
     table = TableBuilder("table8_recovery", {"policy": "Policy"})
     for policy, words in policies.items():
-        if pool_share(metrics, policy, within[0]) is None:
+        shares = rows_where(intervals, method=policy)
+        if shares.empty:
             continue
-        shares = {key: pool_share(metrics, policy, key) for key in (*within, *AT_FIRST)}
-        shares |= {key: pool_share(metrics, policy, within[-1], cause) for key, cause in by_cause.items()}
-        cells = {key: share_cell(*share, seeds) for key, share in shares.items() if share is not None}
+        cells = {key: clustered_cell(shares, metric=key, concept=ALL) for key in (*within, *AT_FIRST)}
+        cells |= {key: clustered_cell(shares, metric=within[-1], concept=cause) for key, cause in by_cause.items()}
         for key, (metric, against) in leads.items():
             for _, row in rows_where(differences, policy=policy, metric=metric, against=against).iterrows():
                 cells[key] = interval_cell(row, "difference")
-        failures = cells[within[0]].test_samples
+        failures = int(rows_where(shares, metric=within[0], concept=ALL)["samples"].iloc[0])
         if mean := pool_share(metrics, policy, "cost"):
             cells["cost"] = plain_cell(mean[0], seeds, failures)
         if policy in seconds:
@@ -81,8 +84,7 @@ def table8_recovery(
         footnotes=(
             f"{failures} failures over {plural(seeds, 'seed')}: {failure_counts(metrics)}. A failure is a pose off by "
             f"{100 * success:g} % of the diameter or more (ADD; ADD-S for symmetric objects) that is not off without "
-            f"its cause. {WILSON}, as if all cases were independent; those on one rendered table are alike, so that it "
-            "is somewhat too narrow. Bold: best of a column.",
+            f"its cause. {over_clusters(seeds, clusters=('rendered tables', 'table'))}. Bold: best of a column.",
             f"Acts on good: of {good} registrations on the same tables whose pose is right, those that the policy "
             "would change. Policies that are told that a pose is wrong change all; the oracle is told of these too.",
             f"To best sequence, to error only: paired differences of the shares within 1 and within {budget} actions, "

@@ -55,6 +55,12 @@ EXPERIMENT = Experiment(
             {"files": "methods/{source}/{method}/seed{seed}.csv"},
             {"severities": "registrations.severities", "success": "success"},
         ),
+        Tidy(
+            "registration_intervals.csv",
+            "gpca.experiments.registration_methods.intervals:collect_intervals",
+            {"files": "methods/{source}/{method}/seed{seed}.csv", "objects": "objects/{source}.npz"},
+            {"severities": "registrations.severities", "success": "success"},
+        ),
     ),
     names=names,
     shown=shown,

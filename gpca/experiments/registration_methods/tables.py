@@ -15,8 +15,8 @@ from gpca.attribution.metrics import ALL
 from gpca.experiments.registration_methods.metrics import BINS, INITIAL, NO_START, bin_name, row_name
 from gpca.objects.title import stand_in_clause
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.reporting.tables.builder import TableBuilder, mean_over, missing_packages
-from gpca.reporting.tables.cells import cell_over_sources
+from gpca.reporting.tables.builder import TableBuilder, missing_packages, over_clusters
+from gpca.reporting.tables.cells import cell_over_sources, clustered_cell, rows_where
 from gpca.reporting.tables.table import Column, Table
 
 if TYPE_CHECKING:
@@ -32,6 +32,7 @@ _MILLISECONDS = Column("ms", interval=False, limits=(0, inf), least_is_best=True
 
 
 def table11_registration(
+    intervals: pd.DataFrame,
     metrics: pd.DataFrame,
     seconds: pd.DataFrame,
     sources: Mapping[str, Mapping],
@@ -39,18 +40,19 @@ def table11_registration(
     global_start: str,
     left_out: Mapping[str, str],
 ) -> Table:
-    """Return successes in all and by cause, errors and milliseconds: starts × methods."""
+    """Return successes in all and by cause, errors and milliseconds: starts × methods.
+
+    Args:
+        intervals: What :func:`gpca.experiments.registration_methods.intervals.collect_intervals` returned.
+        metrics: What :func:`gpca.experiments.registration_methods.metrics.collect_trials` returned.
+        seconds: What :func:`gpca.experiments.registration_methods.metrics.collect_seconds` returned.
+    """
     table = _table("table11_registration")
     causes = (ALL, *CONCEPTS)
     for labels, name in _rows(methods, global_start):
-        cells = {
-            f"success_{cause}": cell_over_sources(metrics, metrics, sources, name, "success", cause, 100)
-            for cause in causes
-        }
-        cells |= {
-            key: cell_over_sources(metrics, metrics, sources, name, key, ALL, factor)
-            for key, (_, factor) in _ERRORS.items()
-        }
+        rows = rows_where(intervals, method=name)
+        cells = {f"success_{cause}": clustered_cell(rows, metric="success", concept=cause) for cause in causes}
+        cells |= {key: clustered_cell(rows, factor, metric=key, concept=ALL) for key, (_, factor) in _ERRORS.items()}
         cells["milliseconds"] = cell_over_sources(metrics, seconds, sources, name, "seconds", ALL, 1e3)
         table.add_row(labels, cells)
     columns = {f"success_{cause}": Column(f"{cause.capitalize()} (%)") for cause in causes}
@@ -61,7 +63,7 @@ def table11_registration(
         column_head="metric",
         columns=columns | {"milliseconds": _MILLISECONDS},
         footnotes=(
-            *_notes(table, metrics, sources, left_out),
+            *_notes(table, intervals, left_out),
             "Errors are means over all registrations, at the last pose of those that failed; rotations up to the "
             "object's symmetries. Failed: given up by the method itself, or not at rest. ms: of one registration, with "
             "its global start if it has one, without the normals; the only column that differs from run to run.",
@@ -70,7 +72,7 @@ def table11_registration(
 
 
 def table11_limits(
-    metrics: pd.DataFrame,
+    intervals: pd.DataFrame,
     sources: Mapping[str, Mapping],
     methods: Mapping[str, Mapping],
     global_start: str,
@@ -81,20 +83,19 @@ def table11_limits(
     table = _table("table11_limits")
     columns = {success_within(limit): Column(f"{100 * limit:g} % d (%)") for limit in curve}
     for labels, name in _rows(methods, global_start):
-        table.add_row(
-            labels, {key: cell_over_sources(metrics, metrics, sources, name, key, ALL, 100) for key in columns}
-        )
+        rows = rows_where(intervals, method=name, concept=ALL)
+        table.add_row(labels, {key: clustered_cell(rows, metric=key) for key in columns})
     table.compare_down(columns, same=1)
     return table.build(
         caption="Registrations that succeed, by the error that is allowed" + stand_in_clause(sources.values()),
         column_head="error below",
         columns=columns,
-        footnotes=_notes(table, metrics, sources, left_out),
+        footnotes=_notes(table, intervals, left_out),
     )
 
 
 def table11_severity(
-    metrics: pd.DataFrame,
+    intervals: pd.DataFrame,
     sources: Mapping[str, Mapping],
     methods: Mapping[str, Mapping],
     global_start: str,
@@ -108,9 +109,8 @@ def table11_severity(
         for severity in BINS
     }
     for labels, name in _rows(methods, global_start):
-        table.add_row(
-            labels, {key: cell_over_sources(metrics, metrics, sources, name, "success", key, 100) for key in columns}
-        )
+        rows = rows_where(intervals, method=name, metric="success")
+        table.add_row(labels, {key: clustered_cell(rows, concept=key) for key in columns})
     table.compare_down(columns, same=1)
     pairs = {key: cell.test_samples for (_, key), cell in table.cells.items()}
     return table.build(
@@ -118,7 +118,7 @@ def table11_severity(
         column_head="cause",
         columns=columns,
         footnotes=(
-            *_notes(table, metrics, sources, left_out),
+            *_notes(table, intervals, left_out),
             "Low, middle, high: thirds of what is drawn; a pose error counts by the mean of its places in the two "
             f"ranges. Pairs of all seeds, by column: {', '.join(str(pairs.get(key, 0)) for key in columns)}.",
         ),
@@ -140,16 +140,12 @@ def _rows(methods: Mapping[str, Mapping], global_start: str) -> Iterable[tuple[l
                 yield [(start, title), (name, entry["title"])], row_name(name, start)
 
 
-def _notes(
-    table: TableBuilder, metrics: pd.DataFrame, sources: Mapping[str, Mapping], left_out: Mapping[str, str]
-) -> list[str]:
+def _notes(table: TableBuilder, intervals: pd.DataFrame, left_out: Mapping[str, str]) -> list[str]:
     table.require_rows()
-    (start, _), (method, _) = table.rows[0]
-    pairs = cell_over_sources(metrics, metrics, sources, row_name(method, start), "success", ALL, 1)
-    per_seed = pairs.test_samples // pairs.seeds if pairs else 0
+    pairs = int(rows_where(intervals, concept=ALL)["samples"].max())
     notes = [
-        f"{mean_over(table.most_seeds(), per_seed)}. A success is off by less than the config's `success.error` "
-        "of the diameter d, ADD or, for symmetric objects, ADD-S. A registration that failed by the method's own "
-        "account is no success. Bold: best of a start."
+        f"{over_clusters(table.most_seeds(), pairs // table.most_seeds())}. A success is off by less than the config's "
+        "`success.error` of the diameter d, ADD or, for symmetric objects, ADD-S. A registration that failed by the "
+        "method's own account is no success. Bold: best of a start."
     ]
     return [*notes, *missing_packages(left_out)]

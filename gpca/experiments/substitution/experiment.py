@@ -70,6 +70,11 @@ EXPERIMENT = Experiment(
             {"prediction_files": "exchange/{exchange_source}/seed{exchange_seed}.csv"},
             rule="exchange_metrics",
         ),
+        Tidy(
+            "exchange_intervals.csv",
+            "gpca.experiments.substitution.metrics:collect_intervals",
+            {"prediction_files": "exchange/{exchange_source}/seed{exchange_seed}.csv"},
+        ),
     ),
     names=names,
     shown=shown,

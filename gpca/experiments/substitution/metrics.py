@@ -1,14 +1,16 @@
-"""Turns predictions with something else beneath the explainers into one tidy table of metrics."""
+"""Turns predictions with something else beneath the explainers into tidy metrics, and into intervals of these."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
+from gpca.attribution.clustered import Clustered, intervals
 from gpca.attribution.metrics import ALL, source_method_seed, tidy
 from gpca.attribution.predictions import read_predictions
 from gpca.errors import InputError
+from gpca.experiments.diagnosis.judged import POOLED
 from gpca.experiments.substitution.settings import ESTIMATOR, FAILURE, LABELS, METHOD
 
 if TYPE_CHECKING:
@@ -16,6 +18,22 @@ if TYPE_CHECKING:
 
 MONTE_CARLO = "monte_carlo"  # whose explanations the others are compared with
 ANOTHER = "another"  # all methods but the one that was learned from
+
+
+class Answers(NamedTuple):
+    """The answers of an explainer with one method or estimator beneath it.
+
+    Attributes:
+        explainer, beneath, concept: as `table`, `method` and `concept` of the metrics.
+        rows: of the samples.
+        are: metric -> whether it counts each of them.
+    """
+
+    explainer: str
+    beneath: str
+    concept: str
+    rows: pd.DataFrame
+    are: dict[str, pd.Series]
 
 
 def collect(prediction_files: Iterable[str | Path]) -> pd.DataFrame:
@@ -39,43 +57,74 @@ def collect(prediction_files: Iterable[str | Path]) -> pd.DataFrame:
         InputError: no files, one that cannot be read, or that exchanges something else.
     """
     records = []
+    for (source, seed), rows in _read(prediction_files).groupby(["source", "seed"], sort=False):
+        for explainer, beneath, concept, chosen, are in _answers(rows):
+            values = {metric: share_S.mean() for metric, share_S in are.items()} | {"test_samples": len(chosen)}
+            records += [
+                (explainer, source, beneath, metric, concept, seed, float(value)) for metric, value in values.items()
+            ]
+    return tidy(records, "exchange")
+
+
+def collect_intervals(prediction_files: Iterable[str | Path]) -> pd.DataFrame:
+    """Return the same shares over all sources and seeds, with 95 % intervals (:mod:`gpca.attribution.clustered`).
+
+    A cluster is a family of objects of one source, and has the same draws in all rows.
+    """
+    rows = _read(prediction_files)
+    samples = Clustered.drawn(rows["seed"], rows["source"] + "/" + rows["cluster"], "exchange intervals")
+    records = []
+    for explainer, beneath, concept, chosen, are in _answers(rows):
+        own = samples.subset(chosen.index.to_numpy())
+        for metric, is_S in are.items():
+            records.append(own.record((explainer, POOLED, beneath, metric, concept), own.share(is_S.to_numpy())))
+    return intervals(records, "exchange")
+
+
+def _read(prediction_files: Iterable[str | Path]) -> pd.DataFrame:
+    """Return the rows of all files, with their source and seed and whether they are right."""
+    import pandas as pd
+
+    frames = []
     for path in prediction_files:
         _, source, seed = source_method_seed(path)
         rows = read_predictions(path, (*LABELS, FAILURE))
         if unknown := sorted(set(rows["exchanged"]) - {METHOD, ESTIMATOR}):
             raise InputError(path, f"exchanges '{unknown[0]}'", f"expected {METHOD} or {ESTIMATOR}")
-        rows["right"] = (rows["concept_true"] == rows["concept_predicted"]) & ~rows["abstained"]
-        for (exchanged, explainer), of_explainer in rows.groupby(["exchanged", "explainer"], sort=False):
-            measure = _of_estimators if exchanged == ESTIMATOR else _of_methods
-            records += [
-                (explainer, source, beneath, metric, concept, seed, float(value))
-                for beneath, concept, metrics in measure(of_explainer)
-                for metric, value in metrics.items()
-            ]
-    return tidy(records, "exchange")
+        right_S = (rows["concept_true"] == rows["concept_predicted"]) & ~rows["abstained"]
+        frames.append(rows.assign(source=source, seed=seed, right=right_S))
+    if not frames:
+        raise InputError("exchange", "no files were given", "name a source in exchange.sources")
+    return pd.concat(frames, ignore_index=True)
 
 
-def _of_estimators(rows: pd.DataFrame) -> Iterator[tuple[str, str, dict[str, float]]]:
-    named_by = rows.set_index(["asked_of", "split", "sample"])["concept_predicted"]
-    usual = named_by.loc[MONTE_CARLO] if MONTE_CARLO in set(rows["asked_of"]) else None
+def _answers(rows: pd.DataFrame) -> Iterator[Answers]:
+    for (exchanged, explainer), of_explainer in rows.groupby(["exchanged", "explainer"], sort=False):
+        judge = _of_estimators if exchanged == ESTIMATOR else _of_methods
+        for beneath, concept, chosen, are in judge(of_explainer):
+            yield Answers(str(explainer), beneath, concept, chosen, are)
+
+
+def _of_estimators(rows: pd.DataFrame) -> Iterator[tuple[str, str, pd.DataFrame, dict[str, pd.Series]]]:
+    sample = ["source", "seed", "split", "sample"]
+    usual = rows[rows["asked_of"] == MONTE_CARLO].set_index(sample)["concept_predicted"]
     for estimator, of_estimator in rows.groupby("asked_of", sort=False):
         for concept in (ALL, *of_estimator["concept_true"].unique()):
             chosen = of_estimator if concept == ALL else of_estimator[of_estimator["concept_true"] == concept]
-            metrics = {"accuracy": chosen["right"].mean(), "test_samples": len(chosen)}
+            are = {"accuracy": chosen["right"]}
             if concept == ALL:
                 untold = chosen[FAILURE] != ""
-                metrics |= {"no_estimate": untold.mean(), "abstained": (chosen["abstained"] & ~untold).mean()}
-                if usual is not None:
-                    own = named_by.loc[estimator]
-                    metrics["agreement"] = (own == usual.reindex(own.index)).mean()
-            yield estimator, concept, metrics
+                are |= {"no_estimate": untold, "abstained": chosen["abstained"] & ~untold}
+                if len(usual):
+                    own = chosen.set_index(sample)["concept_predicted"]
+                    are["agreement"] = own == usual.reindex(own.index)
+            yield estimator, concept, chosen, are
 
 
-def _of_methods(rows: pd.DataFrame) -> Iterator[tuple[str, str, dict[str, float]]]:
+def _of_methods(rows: pd.DataFrame) -> Iterator[tuple[str, str, pd.DataFrame, dict[str, pd.Series]]]:
     for learnt_from, of_lesson in rows.groupby("learnt_from", sort=False):
         parts = dict(iter(of_lesson.groupby("asked_of", sort=False)))
         if len(parts) > 1:
             parts[ANOTHER] = of_lesson[of_lesson["asked_of"] != learnt_from]
         for asked_of, part in parts.items():
-            failed = (part[FAILURE] != "").mean()
-            yield asked_of, learnt_from, {"accuracy": part["right"].mean(), "failed": failed, "test_samples": len(part)}
+            yield asked_of, learnt_from, part, {"accuracy": part["right"], "failed": part[FAILURE] != ""}

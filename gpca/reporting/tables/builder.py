@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import product
 
+from gpca.attribution.confidence import REPEATS
 from gpca.errors import InputError
 from gpca.objects.title import stand_in_clause, title_of
 from gpca.reporting.tables.cells import share_within_limits
@@ -16,6 +17,7 @@ NEAR_LIMITS = (
     "In brackets, where that is 0 or reaches beyond 0 or 100 %: the farther bounds of it and of Wilson's interval, for "
     "which a cluster of objects or scenes counts once in each seed (docs/comparison.md)."
 )
+FAMILIES = ("families of objects", "family")  # what clusters are in most tables, and one of them
 Label = tuple[str, str]  # key for the CSV, title for the reader
 
 
@@ -137,6 +139,33 @@ def interval_over(seeds: int | str) -> str:
     if most < LEAST_SEEDS:
         return f"with fewer than {LEAST_SEEDS} there is no interval and no bold"
     return INTERVAL if fewest >= LEAST_SEEDS else f"{INTERVAL} (none for fewer than {LEAST_SEEDS})"
+
+
+def over_clusters(seeds: int | str, samples: int | str = "", clusters: tuple[str, str] = FAMILIES) -> str:
+    """Return the same of values with intervals over clusters (:mod:`gpca.attribution.clustered`), without a full stop.
+
+    Args:
+        seeds, samples: how many, the latter of each seed; empty where the note says it elsewhere.
+        clusters: what they are, and one of them.
+    """
+    several, one = clusters
+    of_each = f", {samples} test samples each" if samples else ""
+    return (
+        f"Over {plural(seeds, 'seed')}{of_each}; in brackets: the 95 % interval of a bootstrap over {several} and "
+        f"seeds ({REPEATS} draws), of a share at least Wilson's of independent samples, and where all draws agree that "
+        f"for which a {one} counts once in each seed (docs/comparison.md)"
+    )
+
+
+def cautious_over(seeds: int | str, samples: int | str) -> str:
+    """Return the same of means of which no single answers are kept (:func:`cautious_cell`), without a full stop."""
+    over = f"Mean over {plural(seeds, 'seed')}, {samples} test samples each"
+    of_accuracies = "In brackets, of accuracies, of which no single answers are kept:"
+    wilson = "Wilson's interval, for which a family of objects counts once in each seed (docs/comparison.md)"
+    if int(str(seeds).split()[-1]) < LEAST_SEEDS:
+        without = f"with fewer than {LEAST_SEEDS} all else has no interval and no bold"
+        return f"{over}; {without}. {of_accuracies} {wilson}"
+    return f"{over}; {interval_over(seeds)}. {of_accuracies} the farther bounds of that and of {wilson}"
 
 
 def missing_packages(left_out: Mapping[str, str]) -> list[str]:

@@ -7,16 +7,12 @@ from dataclasses import replace
 from math import isfinite, isnan, nan
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from gpca.attribution.confidence import wilson_interval
 from gpca.attribution.metrics import mean_interval
 from gpca.reporting.tables.table import LEAST_SEEDS, SHARE, Cell, Column
 
 if TYPE_CHECKING:
     import pandas as pd
-
-WILSON = "In brackets: the Wilson interval (95 %)"
 
 
 def rows_where(frame: pd.DataFrame, **wanted: object) -> pd.DataFrame:
@@ -62,25 +58,31 @@ def share_within_limits(cell: Cell, column: Column) -> Cell:
         return cell
     if not (trials := cell.clusters or cell.test_samples // cell.seeds) or not least <= cell.mean <= most:
         return replace(cell, half_width=nan)
-    of_wilson = wilson_interval(cell.mean / most * trials, trials)
-    return replace(cell, bounds=(max(least, min(low, most * of_wilson[0])), min(most, max(high, most * of_wilson[1]))))
+    return replace(cell, bounds=_farther_bounds(cell, trials))
 
 
-def cell_of_all_samples(values_R: Sequence[float], samples_R: Sequence[float]) -> Cell | None:
-    """Return the mean over the samples of R seeds, which have unequally many, or None without any seed.
+def cautious_cell(values_R: Collection[float], test_samples: int, clusters: int) -> Cell | None:
+    """Return the mean of a share in % over R seeds of which no single answers are kept, or None without any seed.
 
-    The interval is that of a ratio of two means over the seeds (by its linearization), which for equally many samples
-    is the t-interval of the seeds' means.
+    Its bounds are the farther ones of the t-interval over the seeds, where there are enough of them, and of Wilson's,
+    in which a cluster counts once in each seed.
 
     Args:
-        values_R: The mean over the samples of each seed, in the column's unit.
-        samples_R: How many these are.
+        values_R, test_samples: as for :func:`cell_of_repeats`.
+        clusters: in how many clusters the samples are, those of each seed counted.
     """
-    value_R, sample_R = np.asarray(values_R, float), np.asarray(samples_R, float)
-    if not len(value_R):
-        return None
-    mean = np.average(value_R, weights=sample_R)
-    return cell_of_repeats(mean + sample_R / sample_R.mean() * (value_R - mean), int(sample_R.sum()))
+    cell = cell_of_repeats(values_R, test_samples, clusters=clusters)
+    if cell is None or not clusters:
+        return cell
+    low, high = _farther_bounds(cell, clusters)
+    return replace(cell, bounds=(low, high), half_width=(high - low) / 2)
+
+
+def _farther_bounds(cell: Cell, trials: int) -> tuple[float, float]:
+    """Return the farther bounds of the t-interval of a share in %, if it has one, and of Wilson's interval."""
+    (least, most), half_width = SHARE, 0.0 if isnan(cell.half_width) else cell.half_width
+    low, high = (most * bound for bound in wilson_interval(cell.mean / most * trials, trials))
+    return max(least, min(cell.mean - half_width, low)), min(most, max(cell.mean + half_width, high))
 
 
 def cell_over_sources(
@@ -102,6 +104,12 @@ def cell_over_sources(
     return cell_of_repeats((factor * sums / counts_R).to_numpy(), int(counts_R.sum()))
 
 
+def clustered_cell(intervals: pd.DataFrame, factor: float = 100, **wanted: object) -> Cell | None:
+    """Return the cell of the one row of intervals (:mod:`gpca.attribution.clustered`) with these entries, if any."""
+    rows = rows_where(intervals, **wanted)
+    return interval_cell(rows.iloc[0], factor=factor) if len(rows) else None
+
+
 def interval_cell(row: pd.Series, value: str = "value", bounds: Sequence[str] = ("low", "high"), factor: float = 100):
     """Return the cell of a row that has its interval in two columns of it, and ``seeds`` and ``samples``."""
     low, high = (factor * row[name] for name in bounds)
@@ -112,28 +120,3 @@ def interval_cell(row: pd.Series, value: str = "value", bounds: Sequence[str] = 
 def plain_cell(value: float, seeds: int, test_samples: int) -> Cell:
     """Return a number that has no interval."""
     return Cell(value, nan, seeds, test_samples)
-
-
-def share_cell(share: float, trials: int, seeds: int) -> Cell:
-    """Return a share of pooled trials as a cell in %, with its Wilson interval."""
-    low, high = (100 * bound for bound in wilson_interval(share * trials, trials))
-    return Cell(100 * share, (high - low) / 2, seeds, trials, bounds=(low, high))
-
-
-def share_over_sources(
-    metrics: pd.DataFrame, sources: Iterable[str], method: str, metric: str, concept: str
-) -> Cell | None:
-    """Return a share of the test samples of all sources and seeds together, or None where there is none.
-
-    Args:
-        metrics: Tidy metrics, with ``test_samples``.
-        sources, method, metric, concept: Which share.
-    """
-    counts = rows_where(metrics, method=method, metric="test_samples", concept=concept)
-    shares = rows_where(metrics, method=method, metric=metric, concept=concept)
-    both = shares.merge(counts, on=["source", "seed"], suffixes=("", "_n"))
-    both = both[both["source"].isin(list(sources))]
-    if both.empty:
-        return None
-    share = float(np.average(both["value"], weights=both["value_n"]))
-    return share_cell(share, int(both["value_n"].sum()), both["seed"].nunique())

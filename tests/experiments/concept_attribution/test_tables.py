@@ -6,7 +6,7 @@ from dataclasses import replace
 import pandas as pd
 import pytest
 
-from gpca.attribution.confidence import wilson_interval
+from gpca.attribution.clustered import COLUMNS
 from gpca.attribution.metrics import TIDY_COLUMNS
 from gpca.errors import InputError
 from gpca.experiments.concept_attribution.tables import table1_extended, table1_single_baselines, table2_per_concept
@@ -18,27 +18,30 @@ TITLES = {"gpca_paper": "GP-CA (paper)", "gpca": "GP-CA", "shap_additive": "SHAP
 EXPLAINERS = {name: {"title": title, "oracle": name == "shap_oracle", "sees": "pair"} for name, title in TITLES.items()}
 
 
-def tidy(accuracies, test_samples=200):
-    """Metrics from {(source, explainer, concept): accuracies over seeds}, by default 200 test samples, 50 of each."""
+def tidy(accuracies, test_samples=200, seeds=3):
+    """Intervals of 5 points about accuracies, by default over 200 test samples of a seed, 50 of each concept."""
     records = []
-    for (source, explainer, concept), values in accuracies.items():
-        samples = test_samples if concept == "all" else 50
-        for seed, value in enumerate(values):
-            records.append(("attribution", source, explainer, "accuracy", concept, seed, value))
-            records.append(("attribution", source, explainer, "test_samples", concept, seed, float(samples)))
-    return pd.DataFrame(records, columns=list(TIDY_COLUMNS))
+    for (source, explainer, concept), value in accuracies.items():
+        samples = seeds * (test_samples if concept == "all" else 50)
+        own = ("attribution", source, explainer, "accuracy", concept, seeds, 11, samples)
+        records.append((*own, value, value - 0.03, min(1, value + 0.02)))
+    return pd.DataFrame(records, columns=list(COLUMNS))
+
+
+def extended(intervals, sources, explainers):
+    return table1_extended(intervals, pd.DataFrame(columns=list(TIDY_COLUMNS)), sources, explainers)
 
 
 @pytest.fixture
 def metrics():
     return tidy(
         {
-            ("linemod", "gpca", "noise"): [0.99, 1.0, 1.0],
-            ("linemod", "gpca", "pose"): [0.90, 0.92, 0.94],
-            ("linemod", "gpca", "all"): [0.96, 0.97, 0.98],
-            ("linemod", "shap_additive", "noise"): [0.4, 0.5, 0.3],
-            ("linemod", "shap_additive", "all"): [0.29, 0.3, 0.31],
-            ("ycb", "gpca", "all"): [0.94, 0.95, 0.96],
+            ("linemod", "gpca", "noise"): 0.997,
+            ("linemod", "gpca", "pose"): 0.92,
+            ("linemod", "gpca", "all"): 0.97,
+            ("linemod", "shap_additive", "noise"): 0.4,
+            ("linemod", "shap_additive", "all"): 0.3,
+            ("ycb", "gpca", "all"): 0.95,
         }
     )
 
@@ -46,18 +49,19 @@ def metrics():
 def test_table1_has_the_papers_explainers_with_predictions_in_its_order(metrics):
     markdown = table1_single_baselines(metrics, REAL, EXPLAINERS).markdown()
     assert "| Dataset | SHAP | GP-CA |" in markdown
-    # s = 0.01, t_2 = 4.3027: ± 2.48 points; the dash stands where SHAP has no predictions.
-    assert "| LINEMOD | 30.0 ± 2.5 | **97.0 ± 2.5** |" in markdown
-    assert "| YCB | – | 95.0 ± 2.5 |" in markdown
-    assert "Mean over 3 seeds, 200 test samples each" in markdown
-    assert "95 % t-interval" in markdown
+    # The dash stands where SHAP has no predictions.
+    assert "| LINEMOD | 30.0 (27.0 to 32.0) | **97.0 (94.0 to 99.0)** |" in markdown
+    assert "| YCB | – | 95.0 (92.0 to 97.0) |" in markdown
+    assert (
+        "Over 3 seeds, 200 test samples each; in brackets: the 95 % interval of a bootstrap over families" in markdown
+    )
     assert "stand-in" not in markdown
-    oracle = tidy({("ycb", "shap_oracle", "all"): [0.6, 0.7]})
+    oracle = tidy({("ycb", "shap_oracle", "all"): 0.65}, seeds=2)
     assert table1_single_baselines(pd.concat([metrics, oracle]), REAL, EXPLAINERS).markdown() == markdown
 
 
 def test_table1_says_who_explains_fewer_samples(metrics):
-    both = pd.concat([metrics, tidy({("ycb", "shap_additive", "all"): [0.3, 0.3, 0.4]}, test_samples=60)])
+    both = pd.concat([metrics, tidy({("ycb", "shap_additive", "all"): 0.33}, test_samples=60)])
     both = both[(both["source"] == "ycb") | (both["method"] == "gpca")]
     footnotes = table1_single_baselines(both, REAL, EXPLAINERS).footnotes
     assert "60 to 200 test samples each" in footnotes[0]
@@ -67,12 +71,12 @@ def test_table1_says_who_explains_fewer_samples(metrics):
 def test_table2_has_concepts_as_columns_and_only_gpca_as_rows(metrics):
     markdown = table2_per_concept(metrics, REAL, EXPLAINERS).markdown()
     assert "| Dataset | Explainer | Noise | Pose | All |" in markdown
-    assert "| LINEMOD | GP-CA | **99.7 (92.3 to 100.0)** | 92.0 ± 5.0 | 97.0 ± 2.5 |" in markdown
+    assert "| LINEMOD | GP-CA | **99.7 (96.7 to 100.0)** | 92.0 (89.0 to 94.0) | 97.0 (94.0 to 99.0) |" in markdown
     assert "SHAP" not in markdown
 
 
 def test_stand_ins_are_said_in_title_and_row(metrics):
-    for make in (table1_single_baselines, table1_extended, table2_per_concept):
+    for make in (table1_single_baselines, extended, table2_per_concept):
         table = make(metrics, STAND_INS, EXPLAINERS)
         assert "on procedural stand-ins" in table.caption
         assert "LINEMOD (procedural stand-in)" in table.latex()
@@ -81,27 +85,16 @@ def test_stand_ins_are_said_in_title_and_row(metrics):
         assert "| YCB |" in mixed.markdown()
 
 
-def test_one_seed_has_no_interval():
-    table = table1_single_baselines(tidy({("ycb", "gpca", "all"): [0.5]}), REAL, EXPLAINERS)
-    assert "| YCB | 50.0 |" in table.markdown()
-    assert "Mean over 1 seed, 200 test samples each" in table.markdown()
-    assert table.records()[1] == ("ycb", "gpca", 50.0, "", "", 1, 200, False)
-
-
-def test_a_share_near_its_limits_never_has_an_interval_of_no_width():
-    metrics = tidy({("ycb", "gpca", "all"): [1.0, 1.0, 1.0], ("linemod", "gpca", "all"): [1.0, 1.0, 0.97]})
-    clusters = [("attribution", "ycb", "gpca", "clusters", "all", seed, 4.0) for seed in range(3)]
-    metrics = pd.concat([metrics, pd.DataFrame(clusters, columns=list(TIDY_COLUMNS))])
-    table = table1_single_baselines(metrics, REAL, EXPLAINERS)
-    low, _ = wilson_interval(12, 12)  # four clusters in three seeds
-    assert f"| YCB | 100.0 ({100 * low:.1f} to 100.0) |" in table.markdown()
-    assert "| LINEMOD | 99.0 (94.7 to 100.0) |" in table.markdown()  # that of the seeds is wider, and is cut
-    assert table.footnotes[-1].startswith("In brackets")
+def test_one_seed_has_an_interval_over_families():
+    table = table1_single_baselines(tidy({("ycb", "gpca", "all"): 0.5}, seeds=1), REAL, EXPLAINERS)
+    assert "| YCB | 50.0 (47.0 to 52.0) |" in table.markdown()
+    assert "Over 1 seed, 200 test samples each" in table.markdown()
+    assert table.records()[1] == ("ycb", "gpca", 50.0, 47.0, 52.0, 1, 200, False)
 
 
 def test_different_numbers_of_seeds_are_told():
-    metrics = tidy({("ycb", "gpca", "all"): [0.5, 0.6], ("linemod", "gpca", "all"): [0.5, 0.6, 0.7]})
-    assert "Mean over 2 to 3 seeds" in table1_single_baselines(metrics, REAL, EXPLAINERS).markdown()
+    both = [tidy({(source, "gpca", "all"): 0.5}, seeds=seeds) for source, seeds in (("ycb", 2), ("linemod", 3))]
+    assert "Over 2 to 3 seeds, 200 test" in table1_single_baselines(pd.concat(both), REAL, EXPLAINERS).markdown()
 
 
 def test_csv_is_machine_readable_and_bounds_stay_possible(metrics, tmp_path):
@@ -110,8 +103,7 @@ def test_csv_is_machine_readable_and_bounds_stay_possible(metrics, tmp_path):
         rows = list(csv.DictReader(file))
     gpca = next(row for row in rows if (row["source"], row["explainer"]) == ("linemod", "gpca"))
     assert float(gpca["mean"]) == 97.0
-    assert float(gpca["ci_low"]) == pytest.approx(97 - 2.484138, abs=1e-6)
-    assert float(gpca["ci_high"]) == pytest.approx(97 + 2.484138, abs=1e-6)
+    assert (float(gpca["ci_low"]), float(gpca["ci_high"])) == (94, 99)
     assert (gpca["n_seeds"], gpca["n_test"]) == ("3", "600")
     assert len(rows) == 3
     assert (tmp_path / "t.md").read_text(encoding="utf-8").startswith("**Mean accuracy")
@@ -165,11 +157,9 @@ def test_latex_needs_no_letters_that_it_lacks_and_has_minus_signs():
 def test_latex_is_balanced_and_escaped(metrics):
     sources = {"linemod": {"title": r"A_1 & 50 % ~ \x {b}", "stand_in": False}}
     latex = table1_single_baselines(metrics, sources, EXPLAINERS).latex()
-    assert (
-        r"A\_1 \& 50 \% \textasciitilde{} \textbackslash{}x \{b\} & 30.0 $\pm$ 2.5 & \textbf{97.0 $\pm$ 2.5} \\"
-        in latex
-    )
-    for environment in ("table", "tabular"):
+    title = r"A\_1 \& 50 \% \textasciitilde{} \textbackslash{}x \{b\}"
+    assert rf"{title} & 30.0 (27.0 to 32.0) & \textbf{{97.0 (94.0 to 99.0)}} \\" in latex
+    for environment in ("table*", "tabular"):
         assert latex.count(rf"\begin{{{environment}}}") == latex.count(rf"\end{{{environment}}}") == 1
     assert latex.count(r"\toprule") == latex.count(r"\midrule") == latex.count(r"\bottomrule") == 1
     assert latex.replace(r"\{", "").replace(r"\}", "").count("{") == latex.replace(r"\{", "").replace(r"\}", "").count(
@@ -181,14 +171,15 @@ def test_latex_is_balanced_and_escaped(metrics):
 
 
 def test_latex_spans_both_columns_only_where_it_must(metrics):
-    assert r"\begin{table}[t]" in table1_single_baselines(metrics, REAL, EXPLAINERS).latex()
+    alone = {"gpca": EXPLAINERS["gpca"]}
+    assert r"\begin{table}[t]" in table1_single_baselines(metrics, REAL, alone).latex()
     assert r"\begin{table*}[t]" in table1_single_baselines(metrics, STAND_INS, EXPLAINERS).latex()
 
 
 def test_metrics_without_these_explainers_are_refused(metrics):
     unknown = {"sa_local_additive": {"title": "SA", "oracle": False, "sees": "runs"}}
-    for make in (table1_single_baselines, table1_extended, table2_per_concept):
-        with pytest.raises(InputError, match=make.__name__):
+    for make in (table1_single_baselines, extended, table2_per_concept):
+        with pytest.raises(InputError, match="table '"):
             make(metrics, REAL, unknown)
 
 
@@ -198,76 +189,89 @@ def test_column_text_rounds_and_shows_missing_intervals():
     assert Column("A", decimals=0, interval=False).text(Cell(400.0, 0.1, 5, 1000)) == "400"
 
 
-def full(source, explainer, accuracies, **metrics):
-    """Metrics of one explainer as the collectors make them, others than the accuracy the same over seeds."""
+def full(source, explainer, accuracy, **metrics):
+    """Intervals and metrics of one explainer as the collectors make them, the metrics the same over seeds."""
     given = {"permuted_accuracy": 0.9, "abstention_rate": 0.125, "icp_calls": 400.0, "seconds_per_sample": 0.25}
     given |= {"test_samples": 200.0, "causal_samples": 80.0, "causal_accuracy": 0.5} | metrics
+    counts = {"accuracy": "test_samples", "permuted_accuracy": "test_samples", "causal_accuracy": "causal_samples"}
+    intervals = []
+    for metric, counted in counts.items():
+        value = accuracy if metric == "accuracy" else given[metric]
+        own = ("attribution", source, explainer, metric, "all", 3, 11, int(3 * given[counted]))
+        intervals.append((*own, value, value - 0.03, value + 0.02))
     records = [
         ("attribution", source, explainer, metric, "all", seed, value)
-        for seed, accuracy in enumerate(accuracies)
-        for metric, value in (given | {"accuracy": accuracy}).items()
+        for seed in range(3)
+        for metric, value in given.items()
+        if metric not in counts
     ]
-    return pd.DataFrame(records, columns=list(TIDY_COLUMNS))
+    return pd.DataFrame(intervals, columns=list(COLUMNS)), pd.DataFrame(records, columns=list(TIDY_COLUMNS))
 
 
 @pytest.fixture
 def everything():
-    return pd.concat(
-        [
-            full("ycb", "gpca", [0.89, 0.9, 0.91], icp_calls=0.0, seconds_per_sample=0.0204),
-            full("ycb", "shap_additive", [0.3, 0.4, 0.35], test_samples=60.0, causal_samples=21.0),
-            full("ycb", "shap_oracle", [0.97, 0.97, 0.97]),
-            full("linemod", "gpca", [0.79, 0.8, 0.81]),
-        ]
-    )
+    parts = [
+        full("ycb", "gpca", 0.9, icp_calls=0.0, seconds_per_sample=0.0204),
+        full("ycb", "shap_additive", 0.35, test_samples=60.0, causal_samples=21.0),
+        full("ycb", "shap_oracle", 0.97),
+        full("linemod", "gpca", 0.8),
+    ]
+    return tuple(pd.concat(part) for part in zip(*parts, strict=True))
 
 
 def test_extended_has_a_row_per_explainer_and_a_unit_per_column(everything):
-    table = table1_extended(everything, REAL, EXPLAINERS)
+    table = table1_extended(*everything, REAL, EXPLAINERS)
     lines = table.markdown().splitlines()
     assert lines[2] == (
         "| Dataset | Explainer | Reads | Accuracy (%) | Relabeled (%) | Causal (%) | n causal "
         "| Abstained (%) | ICP calls | Seconds | n |"
     )
-    constant = "90.0 (85.1 to 93.4) | 50.0 (39.3 to 60.7) | 80 | 12.5"
-    assert lines[4] == f"| LINEMOD | GP-CA | pair | 80.0 ± 2.5 | {constant} | 400 | 0.250 | 200 |"
-    assert lines[5] == f"| YCB | GP-CA | pair | **90.0 ± 2.5** | {constant} | 0 | 0.020 | 200 |"
-    assert lines[6].startswith("| YCB | SHAP | pair | 35.0 ± 12.4 |")
+    constant = "90.0 (87.0 to 92.0) | 50.0 (47.0 to 52.0) | 80 | 12.5"
+    assert lines[4] == f"| LINEMOD | GP-CA | pair | 80.0 (77.0 to 82.0) | {constant} | 400 | 0.250 | 200 |"
+    assert lines[5] == f"| YCB | GP-CA | pair | **90.0 (87.0 to 92.0)** | {constant} | 0 | 0.020 | 200 |"
+    assert lines[6].startswith("| YCB | SHAP | pair | 35.0 (32.0 to 37.0) |")
     assert lines[6].endswith("| 21 | 12.5 | 400 | 0.250 | 60 |")
     assert "60 to 200 test samples each" in table.footnotes[0]
     assert "the one column that differs from run to run" in table.markdown()
 
 
+def test_extended_says_nothing_of_few_causal_samples(everything):
+    intervals, metrics = everything
+    few = intervals.assign(samples=29)
+    assert (1, "causal_accuracy") in table1_extended(intervals, metrics, REAL, EXPLAINERS).cells
+    assert (1, "causal_accuracy") not in table1_extended(few, metrics, REAL, EXPLAINERS).cells
+
+
 def test_extended_sets_the_best_rival_in_bold_and_never_an_oracle(everything):
-    table = table1_extended(everything, REAL, EXPLAINERS)
+    table = table1_extended(*everything, REAL, EXPLAINERS)
     assert table.best() == {(1, "accuracy")}
     assert [labels[1][1] for labels in table.rows if labels[0][0] == "ycb"] == ["GP-CA", "SHAP", "SHAP (oracle)"]
     assert "oracles apart" in table.markdown()
     rivals = {name: entry for name, entry in EXPLAINERS.items() if not entry["oracle"]}
-    assert "oracle" not in table1_extended(everything, REAL, rivals).markdown()
+    assert "oracle" not in table1_extended(*everything, REAL, rivals).markdown()
 
 
 def test_extended_csv_is_one_line_per_number(everything):
-    records = table1_extended(everything, REAL, EXPLAINERS).records()
+    records = table1_extended(*everything, REAL, EXPLAINERS).records()
     heads = ("metric", "mean", "ci_low", "ci_high", "n_seeds", "n_test", "at_least")
     assert records[0] == ("source", "explainer", "reads", *heads)
     assert len(records) == 1 + 4 * 8
     assert ("ycb", "gpca", "pair", "seconds_per_sample", 0.0204, 0.0204, 0.0204, 3, 600, False) in records
-    assert ("ycb", "shap_additive", "pair", "causal_accuracy", 50.0, 30.337916, 69.662084, 3, 63, False) in records
-    assert ("ycb", "shap_additive", "pair", "accuracy", 35.0, 22.579311, 47.420689, 3, 180, False) in records
+    assert ("ycb", "shap_additive", "pair", "causal_accuracy", 50.0, 47.0, 52.0, 3, 63, False) in records
+    assert ("ycb", "shap_additive", "pair", "accuracy", 35.0, 32.0, 37.0, 3, 180, False) in records
     assert ("ycb", "gpca", "pair", "icp_calls", 0.0, 0.0, 0.0, 3, 600, False) in records
 
 
 def test_extended_leaves_out_what_was_not_measured(everything):
-    accuracies = everything[~everything["metric"].str.startswith(("causal", "seconds"))]
-    markdown = table1_extended(accuracies, REAL, EXPLAINERS).markdown()
+    parts = (part[~part["metric"].str.startswith(("causal", "seconds"))] for part in everything)
+    markdown = table1_extended(*parts, REAL, EXPLAINERS).markdown()
     assert "Causal" not in markdown
     assert "Seconds" not in markdown
 
 
 def test_a_table_that_may_be_wider_than_the_text_is_scaled_down_in_latex(everything):
-    wide = table1_extended(everything, STAND_INS, EXPLAINERS).latex()
+    wide = table1_extended(*everything, STAND_INS, EXPLAINERS).latex()
     assert r"\usepackage{booktabs, graphicx}" in wide.splitlines()[0]
     assert wide.count(r"\resizebox") == wide.count(r"\end{tabular}}") == 1
     assert wide.count("{") == wide.count("}")
-    assert "resizebox" not in table1_single_baselines(everything, REAL, EXPLAINERS).latex()
+    assert "resizebox" not in table1_single_baselines(everything[0], REAL, EXPLAINERS).latex()

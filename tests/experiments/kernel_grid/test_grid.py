@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from gpca.attribution.clustered import read_clustered
 from gpca.attribution.diagnostics import calibration_error, negative_log_likelihood
 from gpca.attribution.metrics import TIDY_COLUMNS as TIDY
 from gpca.attribution.metrics import read_metrics, write_metrics
@@ -12,6 +13,7 @@ from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
 from gpca.experiments.kernel_grid.grid import (
     GRID_COLUMNS,
+    SETTING,
     KernelGrid,
     collect_grids,
     evaluate_grid,
@@ -19,6 +21,8 @@ from gpca.experiments.kernel_grid.grid import (
     setting_name,
     write_grid,
 )
+from gpca.experiments.kernel_grid.intervals import collect_intervals
+from gpca.io.csv_file import write_csv
 from gpca.pairs.perturbation import CONCEPTS
 
 GRID = KernelGrid(("rbf", "polynomial"), (0.1, 0.01), (2, 6), inducing=6, draws=40)
@@ -33,8 +37,13 @@ def embedded(registrations):
 
 
 @pytest.fixture(scope="module")
-def grid(embedded):
+def evaluated(embedded):
     return evaluate_grid(embedded, GRID, "tiny", 0)
+
+
+@pytest.fixture(scope="module")
+def grid(evaluated):
+    return evaluated[0]
 
 
 def test_there_is_a_row_for_every_kernel_rate_and_count(grid):
@@ -59,6 +68,32 @@ def test_every_row_is_that_of_a_fit_of_its_own(embedded, grid, row):
         calibration_error(scores, target),
         negative_log_likelihood(scores, target),
     ]
+
+
+def test_predictions_are_those_that_the_rows_are_judged_by(embedded, evaluated, grid):
+    predictions = evaluated[1]
+    assert tuple(predictions.columns[:3]) == SETTING and len(predictions) == 8 * len(embedded.rows("test"))
+    right = predictions["concept_predicted"] == predictions["concept_true"]
+    shares = right.groupby([predictions[name] for name in SETTING], sort=False).mean()
+    assert shares.to_numpy().tolist() == grid["accuracy"].tolist()
+    assert set(predictions["cluster"]) == set(embedded.cluster[embedded.rows("test")])
+
+
+def test_intervals_are_of_the_same_measures_over_families(evaluated, grid, tmp_path):
+    paths = [tmp_path / "kernel_predictions/tiny" / f"seed{seed}.csv" for seed in (0, 1)]
+    for path in paths:
+        write_csv(path, evaluated[1])
+    write_csv(tmp_path / "intervals.csv", collect_intervals(paths), form=None)
+    found = read_clustered(tmp_path / "intervals.csv").set_index(["method", "metric"])
+    for row in grid.itertuples():
+        name = setting_name(row.kernel, row.learning_rate, row.iterations)
+        for measure in ("accuracy", "confidence", "ece", "nll"):
+            assert found.loc[(name, measure), "value"] == pytest.approx(getattr(row, measure), abs=1e-5)
+    assert len(found) == 8 * 4
+    assert (found["seeds"] == 2).all() and (found["clusters"] == 3).all()
+    assert (found["low"] < found["high"]).all()
+    with pytest.raises(InputError, match="no files were given"):
+        collect_intervals([])
 
 
 def test_a_larger_rate_raises_the_bound_further(grid):

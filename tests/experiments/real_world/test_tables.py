@@ -1,6 +1,7 @@
 import pandas as pd
 import pytest
 
+from gpca.attribution.clustered import COLUMNS
 from gpca.attribution.metrics import ALL, TIDY_COLUMNS
 from gpca.errors import InputError
 from gpca.experiments.real_world.tables import table6_backbones, table6_seen_unseen
@@ -10,14 +11,27 @@ CONDITIONS = {"real_rgbd": "True pose", "real_rgbd_estimated": "Pose estimators"
 
 
 def metrics(values, seeds=3):
-    """Metrics of method -> accuracies by seed; a concept's are half a point above."""
+    """Metrics of method -> accuracies by seed."""
     rows = []
     for method, accuracies in values.items():
         for seed, accuracy in enumerate(accuracies[:seeds]):
             rows.append(("attribution", "real_rgbd", method, "accuracy", ALL, seed, accuracy))
-            rows.append(("attribution", "real_rgbd", method, "accuracy", "pose", seed, accuracy + 0.005))
             rows.append(("attribution", "real_rgbd", method, "test_samples", ALL, seed, 300))
     return pd.DataFrame(rows, columns=list(TIDY_COLUMNS))
+
+
+def intervals(values, seeds=3):
+    """Of the same methods; a concept's accuracies are half a point above, and the first is compared with none."""
+    rows = []
+    for method, accuracies in values.items():
+        mean = sum(accuracies[:seeds]) / len(accuracies[:seeds])
+        told = {("accuracy", ALL): mean, ("accuracy", "pose"): mean + 0.005}
+        if method != "dgcnn-none":
+            told["difference", ALL] = mean - sum(values.get("dgcnn-none", (0.8,))[:seeds]) / seeds
+        for (metric, concept), value in told.items():
+            own = ("attribution", "real_rgbd", method, metric, concept, len(accuracies[:seeds]), 12, 300 * seeds)
+            rows.append((*own, value, value - 0.04, value + 0.02))
+    return pd.DataFrame(rows, columns=list(COLUMNS))
 
 
 VALUES = {
@@ -29,7 +43,8 @@ VALUES = {
 
 
 def make(values=VALUES, **changes):
-    return table6_backbones(metrics(values, **changes), "frames", BACKBONES, ("none", "pca"))
+    of = intervals(values, **changes), metrics(values, **changes)
+    return table6_backbones(*of, "frames", BACKBONES, ("none", "pca"))
 
 
 def test_rows_are_backbones_by_reductions_and_the_classic_features_last():
@@ -37,32 +52,29 @@ def test_rows_are_backbones_by_reductions_and_the_classic_features_last():
     assert labels == [("dgcnn", "none"), ("dgcnn", "pca"), ("pointnet", "none"), ("analytical_gpc", "none")]
 
 
-def test_mean_deviation_and_paired_difference_are_those_of_the_seeds():
-    cells = make().cells
-    assert cells[0, "accuracy"].mean == pytest.approx(82)
+def test_accuracies_and_differences_have_their_interval_over_scenes_and_the_deviation_is_of_the_seeds():
+    table = make()
+    cells = table.cells
+    assert cells[0, "accuracy"].mean == pytest.approx(82) and cells[0, "accuracy"].bounds == pytest.approx((78, 84))
     assert cells[0, "deviation"].mean == pytest.approx(2)
     assert (0, "difference") not in cells
     assert cells[1, "difference"].mean == pytest.approx(1.0)
-    assert cells[1, "difference"].half_width == pytest.approx(0.0, abs=1e-9)  # the same in all seeds
-    assert cells[2, "difference"].mean == pytest.approx(-17.0)
-    assert cells[2, "difference"].half_width == pytest.approx(4.3027 * 3 / 3**0.5, abs=1e-3)
+    assert cells[2, "difference"].bounds == pytest.approx((-21, -15))
     assert cells[2, "pose"].mean == pytest.approx(65.5)
     assert cells[2, "parameters"].mean == 150
     assert (3, "parameters") not in cells
-    assert make().best() == {(1, "accuracy")}
+    assert table.best() == {(1, "accuracy")}
+    assert (
+        "Over 3 seeds, 300 test samples each; in brackets: the 95 % interval of a bootstrap over scenes"
+        in (table.footnotes[0])
+    )
 
 
-def test_a_difference_below_zero_is_not_clipped_in_the_csv():
-    row = next(r for r in make().records() if r[:3] == ("pointnet", "none", "difference"))
-    assert float(row[4]) < -17
-
-
-def test_one_seed_has_no_deviation_and_no_interval():
+def test_one_seed_has_no_deviation():
     table = make(seeds=1)
     assert (0, "deviation") not in table.cells
-    assert "| 82.0 |" in make({"dgcnn-none": (0.82,)}, seeds=1).markdown()
-    assert "Mean over 1 seed, 300 test samples each" in table.markdown()
-    assert table.best() == set()
+    assert "| 82.0 (78.0 to 84.0) |" in make({"dgcnn-none": (0.82,)}, seeds=1).markdown()
+    assert "Over 1 seed, 300 test samples each" in table.markdown()
 
 
 def test_what_was_not_run_has_no_row_and_nothing_at_all_is_refused():
@@ -72,14 +84,14 @@ def test_what_was_not_run_has_no_row_and_nothing_at_all_is_refused():
 
 
 def test_the_note_says_what_encoders_were_pretrained_on():
-    of = metrics(VALUES), "frames", BACKBONES, ("none", "pca")
+    of = intervals(VALUES), metrics(VALUES), "frames", BACKBONES, ("none", "pca")
     assert "pretrained on whole objects, and GPC" in " ".join(table6_backbones(*of, "whole objects").footnotes)
     assert "perturbations, encoder, and GPC" in " ".join(table6_backbones(*of).footnotes)
 
 
 def test_what_saw_the_tested_objects_stands_below_and_is_never_the_best():
     values = VALUES | {"dgcnn_rendered-none": (0.9, 0.9, 0.9), "chance": (0.3, 0.3, 0.4), "gpca_pair": (0.9, 0.9, 0.9)}
-    of = metrics(values), "frames", BACKBONES, ("none", "pca")
+    of = intervals(values), metrics(values), "frames", BACKBONES, ("none", "pca")
     table = table6_backbones(*of, rendered=["dgcnn"], explainers={"chance": "Chance", "gpca_pair": "Pair"})
     assert [row[0][1] for row in table.rows][-3:] == ["DGCNN, tested objects rendered", "Classic features", "Chance"]
     assert table.best() == make().best()
@@ -89,42 +101,47 @@ def test_what_saw_the_tested_objects_stands_below_and_is_never_the_best():
 
 def test_a_backbone_without_a_title_has_its_name():
     values = {"mine-none": (0.8, 0.8, 0.8), "pointnet-none": (0.6, 0.7, 0.65)}
-    table = table6_backbones(metrics(values), "frames", {"mine": 1000, "pointnet": 150_000}, ("none",))
+    of = intervals(values), metrics(values)
+    table = table6_backbones(*of, "frames", {"mine": 1000, "pointnet": 150_000}, ("none",))
     assert "| To mine (points) |" in table.markdown()
 
 
-def seen_metrics(values):
-    rows = []
-    for (source, table, method), of_seeds in values.items():
-        for seed, (accuracy, samples) in enumerate(of_seeds):
-            rows += [(table, source, method, "accuracy", ALL, seed, accuracy)]
-            rows += [(table, source, method, "test_samples", ALL, seed, samples)]
-            rows += [(table, source, method, "ece", ALL, seed, 0.1), (table, source, method, "nll", ALL, seed, 1.5)]
-    return pd.DataFrame(rows, columns=list(TIDY_COLUMNS))
+def seen(values):
+    """Intervals and metrics of (source, table, method) -> accuracy, samples and seeds."""
+    rows, scores = [], []
+    for (source, table, method), (accuracy, samples, seeds) in values.items():
+        own = (table, source, method, "accuracy", ALL, seeds, 9, samples)
+        rows.append((*own, accuracy, accuracy - 0.04, accuracy + 0.02))
+        scores += [
+            (table, source, method, metric, ALL, seed, value)
+            for seed in range(seeds)
+            for metric, value in {"ece": 0.1, "nll": 1.5, "test_samples": samples / seeds}.items()
+        ]
+    return pd.DataFrame(rows, columns=list(COLUMNS)), pd.DataFrame(scores, columns=list(TIDY_COLUMNS))
 
 
 def make_seen(values, **options):
     explainers = {"gpca_pair": "GP-CA on the pair"}
     sees = dict.fromkeys(("dgcnn-none", "analytical_gpc", "analytical_gpc_no_counts"), "aligned source")
     sees["gpca_pair"] = "pair + motion"
-    return table6_seen_unseen(seen_metrics(values), "frames", CONDITIONS, ["dgcnn-none"], explainers, sees, **options)
+    return table6_seen_unseen(*seen(values), "frames", CONDITIONS, ["dgcnn-none"], explainers, sees, **options)
 
 
 def test_rows_are_conditions_by_methods_and_columns_what_was_seen():
     table = make_seen(
         {
-            ("real_rgbd", "attribution", "dgcnn-none"): [(0.7, 100), (0.8, 100)],
-            ("real_rgbd", "seen", "dgcnn-none"): [(0.9, 60), (0.8, 20)],
-            ("real_rgbd", "unseen", "dgcnn-none"): [(0.4, 40), (0.8, 80)],
-            ("real_rgbd", "dataset/lmo", "dgcnn-none"): [(0.6, 30)],
-            ("real_rgbd_estimated", "attribution", "gpca_pair"): [(0.5, 100), (0.7, 100)],
+            ("real_rgbd", "attribution", "dgcnn-none"): (0.75, 200, 2),
+            ("real_rgbd", "seen", "dgcnn-none"): (0.875, 80, 2),
+            ("real_rgbd", "unseen", "dgcnn-none"): (0.6, 120, 2),
+            ("real_rgbd", "dataset/lmo", "dgcnn-none"): (0.6, 30, 1),
+            ("real_rgbd_estimated", "attribution", "gpca_pair"): (0.6, 200, 2),
         }
     )
     assert [tuple(key for key, _ in row) for row in table.rows] == [
         ("real_rgbd", "dgcnn-none", "aligned source"), ("real_rgbd_estimated", "gpca_pair", "pair + motion"),
     ]  # fmt: skip
-    assert table.cells[0, "seen"].mean == pytest.approx(87.5)  # of 60 and 20 samples
-    assert table.cells[0, "unseen"].mean == pytest.approx(80 * 8 / 12 + 40 * 4 / 12)
+    assert table.cells[0, "seen"].mean == pytest.approx(87.5)
+    assert table.cells[0, "unseen"].bounds == pytest.approx((56, 62))
     assert table.cells[0, "dataset/lmo"].mean == pytest.approx(60)
     assert table.cells[1, "attribution"].mean == pytest.approx(60)
     assert (1, "seen") not in table.cells
@@ -138,11 +155,11 @@ def test_rows_are_conditions_by_methods_and_columns_what_was_seen():
 
 
 def test_the_note_says_that_the_pretraining_knows_the_models():
-    values = {("real_rgbd", "attribution", "dgcnn-none"): [(0.7, 100)]}
+    values = {("real_rgbd", "attribution", "dgcnn-none"): (0.7, 100, 1)}
     assert "renders the models" not in " ".join(make_seen(values).footnotes)
     assert "The pretraining renders the models of both." in " ".join(make_seen(values, rendered=True).footnotes)
 
 
 def test_nothing_to_show_is_refused():
     with pytest.raises(InputError, match="has nothing to show"):
-        make_seen({("real_rgbd", "attribution", "other"): [(0.7, 100)]})
+        make_seen({("real_rgbd", "attribution", "other"): (0.7, 100, 1)})

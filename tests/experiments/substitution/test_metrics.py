@@ -2,7 +2,7 @@ import pandas as pd
 import pytest
 
 from gpca.errors import InputError
-from gpca.experiments.substitution.metrics import collect
+from gpca.experiments.substitution.metrics import collect, collect_intervals
 
 CONCEPTS = ("noise", "pose", "overlap")
 
@@ -59,6 +59,32 @@ def test_methods_are_judged_by_what_was_learned_from_and_over_all_others(path):
     assert found["icp", "icp", "accuracy"] == 1 and found["gicp", "icp", "accuracy"] == 0.5
     assert found["another", "gicp", "accuracy"] == 0.5
     assert values(path, table="gpca", metric="failed")["gicp", "icp", "failed"] == 0.5
+
+
+def test_intervals_are_of_the_same_shares_over_families_of_all_sources(path, tmp_path):
+    other = tmp_path / "exchange/cups/seed3.csv"
+    other.parent.mkdir()
+    other.write_text(path.read_text())
+    found = collect_intervals([path, other])
+    single = collect([path])
+    shares = single[single["metric"] != "test_samples"].set_index(["table", "method", "metric", "concept"])["value"]
+    found = found.set_index(["table", "method", "metric", "concept"])
+    assert set(found.index) == set(shares.index)
+    assert (found["value"] == shares[found.index]).all()
+    row = found.loc["gpca", "another", "accuracy", "gicp"]
+    assert (row["source"], row["seeds"], row["clusters"], row["samples"]) == ("pooled", 1, 2, 4)
+    assert (found["low"] < found["high"]).all()
+
+
+def test_agreement_is_with_the_same_sample_of_the_same_source_and_seed(path, tmp_path):
+    other = tmp_path / "exchange/cups/seed4.csv"
+    other.parent.mkdir()
+    rows = pd.read_csv(path, keep_default_na=False)
+    rows.loc[rows["asked_of"] == "censi", "concept_predicted"] = "pose"  # as Monte-Carlo says
+    rows.loc[rows["asked_of"] == "censi", "abstained"] = False
+    rows.to_csv(other, index=False)
+    found = collect_intervals([path, other]).set_index(["method", "metric"])["value"]
+    assert found["censi", "agreement"] == 0.5
 
 
 def test_what_is_neither_is_refused(path):

@@ -5,7 +5,7 @@ import pytest
 
 from gpca.errors import InputError
 from gpca.reporting.tables.builder import INTERVAL, TableBuilder, mean_over
-from gpca.reporting.tables.cells import cell_of_all_samples, cell_of_repeats, plain_cell, rows_where
+from gpca.reporting.tables.cells import cell_of_repeats, plain_cell, rows_where
 from gpca.reporting.tables.table import Cell, Column
 from gpca.reporting.words import span
 
@@ -112,22 +112,6 @@ def test_fewer_than_three_repeats_have_no_interval_and_none_makes_no_cell():
     assert cell_of_repeats([5.0, 6.0], 400).mean == 5.5
     assert cell_of_repeats([], 200) is None
     assert math.isnan(plain_cell(0.25, 3, 600).half_width)
-
-
-def test_a_mean_over_all_samples_lies_between_those_of_its_parts():
-    seen, unseen = cell_of_all_samples([80, 90, 70], [10, 30, 20]), cell_of_all_samples([60, 50, 65], [20, 10, 30])
-    every = cell_of_all_samples([200 / 3, 80, 67], [30, 40, 50])
-    assert (seen.mean, seen.seeds, seen.test_samples) == (pytest.approx(4900 / 60), 3, 60)
-    assert unseen.mean < every.mean < seen.mean
-    assert every.mean == pytest.approx((seen.mean + unseen.mean) / 2)
-    assert cell_of_all_samples([], []) is None
-
-
-def test_with_equally_many_samples_it_is_the_mean_of_the_seeds_with_its_interval():
-    alike, usual = cell_of_all_samples([97.0, 98.0, 99.5], [200] * 3), cell_of_repeats([97.0, 98.0, 99.5], 600)
-    assert (alike.mean, alike.half_width) == (pytest.approx(usual.mean), pytest.approx(usual.half_width))
-    few = cell_of_all_samples([0.0, 98.0, 99.0], [1, 300, 300])  # a seed with hardly a sample says hardly anything
-    assert few.half_width < 3
 
 
 def test_an_interval_has_its_bounds_where_it_is_not_that_over_the_seeds():

@@ -1,28 +1,49 @@
-"""Shares of counted samples with Wilson's interval."""
+"""Cells with intervals over clusters, and of shares of which no single answers are kept."""
 
+import math
+
+import pandas as pd
 import pytest
 
+from gpca.attribution.clustered import COLUMNS
 from gpca.attribution.confidence import wilson_interval
-from gpca.attribution.metrics import tidy
-from gpca.reporting.tables.cells import share_cell, share_over_sources
+from gpca.attribution.metrics import mean_interval
+from gpca.reporting.tables.cells import cautious_cell, cell_of_repeats, clustered_cell, share_within_limits
 from gpca.reporting.tables.table import Column
 
+INTERVALS = pd.DataFrame(
+    [
+        ("t", "ycb", "gpca", "accuracy", "all", 3, 11, 180, 0.95, 0.9, 0.98),
+        ("t", "ycb", "gpca", "ece", "all", 3, 11, 180, 0.05, math.nan, math.nan),
+    ],
+    columns=[*COLUMNS],
+)
 
-def test_a_share_has_an_interval_within_its_limits():
-    assert Column("A").text(share_cell(0.0, 18, 3)) == "0.0 (0.0 to 17.6)"
-    assert Column("A").text(share_cell(1.0, 18, 3)) == "100.0 (82.4 to 100.0)"
-    cell = share_cell(8 / 18, 18, 3)
-    assert cell.bounds == tuple(100 * bound for bound in wilson_interval(8, 18))
-    assert (cell.mean, cell.seeds, cell.test_samples) == (pytest.approx(44.444, abs=1e-3), 3, 18)
+
+def test_a_cell_has_the_interval_of_its_row():
+    cell = clustered_cell(INTERVALS, method="gpca", metric="accuracy")
+    assert (cell.mean, cell.seeds, cell.test_samples) == (95, 3, 180)
+    assert Column("A").text(cell) == "95.0 (90.0 to 98.0)"
+    assert clustered_cell(INTERVALS, method="gpca", metric="nll") is None
+    without = clustered_cell(INTERVALS, 1, metric="ece")
+    assert Column("ECE", decimals=3).text(without) == "0.050"
 
 
-def test_a_share_is_over_the_samples_of_all_sources_and_seeds():
-    rows = []
-    for source, seed, samples, value in (("ycb", 0, 30, 0.5), ("ycb", 1, 10, 0.9), ("cups", 0, 60, 0.0)):
-        of = {"accuracy": value, "test_samples": samples}
-        rows += [("t", source, "m", metric, "all", seed, number) for metric, number in of.items()]
-    metrics = tidy(rows, "metrics")
-    cell = share_over_sources(metrics, ["ycb", "cups"], "m", "accuracy", "all")
-    assert (cell.mean, cell.seeds, cell.test_samples) == (pytest.approx(24), 2, 100)
-    assert share_over_sources(metrics, ["ycb"], "m", "accuracy", "all").mean == pytest.approx(60)
-    assert share_over_sources(metrics, ["ycb"], "other", "accuracy", "all") is None
+def test_without_single_answers_the_farther_bounds_of_two_intervals_count():
+    low, high = (100 * bound for bound in wilson_interval(0.9 * 33, 33))
+    agreed = cautious_cell([90, 90, 90], 180, 33)
+    assert agreed.bounds == pytest.approx((low, high)) and Column("A").text(agreed) == f"90.0 ({low:.1f} to {high:.1f})"
+    spread = cautious_cell([80, 90, 100], 180, 33)
+    assert spread.bounds == (mean_interval([80, 90, 100])[1], 100)  # cut at the limit
+    assert cautious_cell([90, 90], 120, 33).bounds == pytest.approx((low, high))  # two seeds have no t-interval
+    assert cautious_cell([90, 90, 90], 180, 0).bounds is None
+    assert cautious_cell([], 0, 33) is None
+
+
+def test_a_share_near_its_limits_never_has_an_interval_of_no_width():
+    agreed = share_within_limits(cell_of_repeats([100, 100, 100], 600, clusters=12), Column("A"))
+    assert agreed.bounds == (pytest.approx(100 * wilson_interval(12, 12)[0]), 100)
+    cut = share_within_limits(cell_of_repeats([100, 100, 97], 600), Column("A"))  # that of the seeds is wider
+    assert Column("A").text(cut) == "99.0 (94.7 to 100.0)"
+    inside = cell_of_repeats([60, 70, 65], 600, clusters=12)
+    assert share_within_limits(inside, Column("A")) == inside
