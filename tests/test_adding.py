@@ -126,7 +126,7 @@ def test_an_acquisition_strategy(config, registrations, monkeypatch, tmp_path):
     titles = {name: acquisition.STRATEGIES[name].title for name in config["active_learning"]["strategies"]}
     sources = {"tiny": {"title": "Tiny", "stand_in": False}}
     conditions = config["active_learning"] | config["registrations"]
-    table = table3_extended(collect_curves(paths, 0.9), sources, titles, conditions)
+    table = table3_extended(collect_curves(paths, 0.9), {("tiny", 0): 3}, sources, titles, conditions)
     table.write(tmp_path / "table")
     assert (tmp_path / "table.md").read_text().count("| BALD, density-weighted |") == 1
 

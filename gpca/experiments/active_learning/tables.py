@@ -1,4 +1,8 @@
-"""Makes the tables of active learning; ``conditions`` are its section of the config, with train and test samples."""
+"""Makes the tables of active learning.
+
+The ``conditions`` are its section of the config, with train and test samples, and ``clusters`` of how many families the
+test samples of each source and seed are.
+"""
 
 from __future__ import annotations
 
@@ -9,8 +13,9 @@ from typing import TYPE_CHECKING, Any
 
 from gpca.active_learning.acquisition import STRATEGIES, STREAMS
 from gpca.active_learning.metrics import CENSORED_BY, TABLE
-from gpca.reporting.tables.builder import TableBuilder, crossed, mean_over, titles_of
-from gpca.reporting.tables.cells import cell_of_repeats, rows_where
+from gpca.experiments.active_learning.clusters import Clusters
+from gpca.reporting.tables.builder import TableBuilder, cautious_over, crossed, titles_of
+from gpca.reporting.tables.cells import cautious_cell, cell_of_repeats, rows_where
 from gpca.reporting.tables.table import Cell, Column, Table
 
 if TYPE_CHECKING:
@@ -24,6 +29,7 @@ SETTINGS = {
 }
 COUNT: dict[str, Any] = {"decimals": 0, "limits": (0, inf), "least_is_best": True}
 _SHARES = ("reached", "area_under_curve", "area_gain")  # These and every accuracy lie in [0, 1] and are printed in %.
+_OF_TEST_SAMPLES = ("final_accuracy", "final_accuracy_new", "area_under_curve")
 
 
 @dataclass(frozen=True)
@@ -37,7 +43,11 @@ class Quantity:
 
 
 def table3_active_learning(
-    metrics: pd.DataFrame, sources: Mapping[str, Mapping], strategies: Mapping[str, str], conditions: Mapping
+    metrics: pd.DataFrame,
+    clusters: Clusters,
+    sources: Mapping[str, Mapping],
+    strategies: Mapping[str, str],
+    conditions: Mapping,
 ) -> Table:
     """Return the labels to the target accuracy by BALD with k-means and at random (Table III), sources × settings."""
     of_table = metrics[metrics["concept"] == PAPERS_HELD_OUT]
@@ -53,7 +63,7 @@ def table3_active_learning(
     table = TableBuilder("table3_active_learning", {"source": "Dataset", "setting": "Encoder saw"})
     for (source, setting), labels in crossed(titles_of(sources), SETTINGS):
         of_row = rows_where(of_table, source=source, table=TABLE + setting)
-        table.add_row(labels, _cells(of_row, quantities, conditions))
+        table.add_row(labels, _cells(of_row, quantities, conditions, clusters))
     table.compare_across(["labels_bald_kmeans", "labels_random"])
     return table.build(
         caption=f"Labels until a GPC that knew noise and pose reaches {conditions['target']:.0%} on all concepts"
@@ -61,7 +71,7 @@ def table3_active_learning(
         column_head="quantity",
         columns=_columns(quantities),
         footnotes=(
-            f"{mean_over(table.most_seeds(), conditions['test'])}.",
+            f"{cautious_over(table.most_seeds(), conditions['test'])}.",
             _protocol(conditions),
             *_rare(conditions),
             f"Retraining is a warm start of at most {conditions['iterations']} passes over the labels. Epochs: passes "
@@ -78,7 +88,11 @@ def _rare(conditions: Mapping) -> list[str]:
 
 
 def table3_extended(
-    metrics: pd.DataFrame, sources: Mapping[str, Mapping], strategies: Mapping[str, str], conditions: Mapping
+    metrics: pd.DataFrame,
+    clusters: Clusters,
+    sources: Mapping[str, Mapping],
+    strategies: Mapping[str, str],
+    conditions: Mapping,
 ) -> Table:
     """Return every strategy, encoder and concept held out, with means over the three where one column is for all."""
     quantities = {
@@ -96,7 +110,7 @@ def table3_extended(
     of_pool = {name: title for name, title in strategies.items() if name in STRATEGIES}
     for (source, setting, strategy), labels in crossed(titles_of(sources), settings, of_pool):
         of_row = rows_where(metrics, source=source, table=TABLE + setting, method=strategy)
-        table.add_row(labels, _cells(of_row, quantities, conditions), rival=not STRATEGIES[strategy].oracle)
+        table.add_row(labels, _cells(of_row, quantities, conditions, clusters), rival=not STRATEGIES[strategy].oracle)
     table.compare_down([key for key in quantities if key != "reached"], same=2)
     return table.build(
         caption=f"Active learning of a held-out concept by every strategy, to {conditions['target']:.0%}"
@@ -104,7 +118,7 @@ def table3_extended(
         column_head="quantity",
         columns=_columns(quantities),
         footnotes=(
-            f"{mean_over(table.most_seeds(), conditions['test'])}.",
+            f"{cautious_over(table.most_seeds(), conditions['test'])}.",
             _protocol(conditions),
             "Labels: until the target, by the concept held out. Reached: share of the runs that reached it. Accuracy: "
             "after all labels; New: that on the concept held out. Area: mean accuracy over the budget. Gain: area "
@@ -115,7 +129,11 @@ def table3_extended(
 
 
 def table3_stream(
-    metrics: pd.DataFrame, sources: Mapping[str, Mapping], strategies: Mapping[str, str], conditions: Mapping
+    metrics: pd.DataFrame,
+    clusters: Clusters,
+    sources: Mapping[str, Mapping],
+    strategies: Mapping[str, str],
+    conditions: Mapping,
 ) -> Table:
     """Return the stream form: labels asked for, arrivals until a new concept is recognized, accuracy."""
     stream = conditions["stream"]
@@ -132,14 +150,14 @@ def table3_stream(
     of_stream = {name: title for name, title in strategies.items() if name in STREAMS}
     for (source, strategy), labels in crossed(titles_of(sources), of_stream):
         of_row = rows_where(metrics, source=source, table=TABLE + "pretrained", method=strategy)
-        table.add_row(labels, _cells(of_row, quantities, conditions))
+        table.add_row(labels, _cells(of_row, quantities, conditions, clusters))
     table.compare_down([key for key in quantities if "labels" not in key], same=1)
     return table.build(
         caption="A new concept in a stream of registrations" + table.stand_in_clause(sources, partly=False),
         column_head="quantity",
         columns=_columns(quantities),
         footnotes=(
-            f"{mean_over(table.most_seeds(), conditions['test'])}.",
+            f"{cautious_over(table.most_seeds(), conditions['test'])}.",
             f"{stream['arrivals']} samples arrive one by one; the first {stream['quiet']} are of the two known "
             f"concepts ({conditions['initial']} labeled samples at the start); a third of the others is new. A label "
             f"may be requested for {stream['budget']:.0%} of the arrivals; the GPC learns it at once, or the learner "
@@ -160,21 +178,34 @@ def _columns(quantities: Mapping[str, Quantity]) -> dict[str, Column]:
     return {key: quantity.column for key, quantity in quantities.items()}
 
 
-def _cells(metrics: pd.DataFrame, quantities: Mapping[str, Quantity], conditions: Mapping) -> dict[str, Cell | None]:
+def _cells(
+    metrics: pd.DataFrame, quantities: Mapping[str, Quantity], conditions: Mapping, clusters: Clusters
+) -> dict[str, Cell | None]:
     """Return the cells of a row, given its metrics."""
-    return {key: cell_of(metrics, quantity, conditions["test"]) for key, quantity in quantities.items()}
+    return {key: cell_of(metrics, quantity, conditions["test"], clusters) for key, quantity in quantities.items()}
 
 
-def cell_of(metrics: pd.DataFrame, quantity: Quantity, test: int) -> Cell | None:
-    """Return the mean of a quantity over the concepts held out that the rows hold, then over the seeds."""
+def cell_of(metrics: pd.DataFrame, quantity: Quantity, test: int, clusters: Clusters | None = None) -> Cell | None:
+    """Return the mean of a quantity over the concepts held out that the rows hold, then over the seeds.
+
+    Args:
+        metrics: those of one source.
+        test: its test samples of a seed.
+        clusters: of how many clusters these are, which widen the interval of an accuracy.
+    """
     if quantity.strategy is not None:
         metrics = rows_where(metrics, method=quantity.strategy)
     if quantity.concept is not None:
         metrics = rows_where(metrics, concept=quantity.concept)
-    values_R = rows_where(metrics, metric=quantity.metric).groupby("seed")["value"].mean()
+    rows = rows_where(metrics, metric=quantity.metric)
+    values_R = rows.groupby("seed")["value"].mean()
     scale = 100 if quantity.metric in _SHARES or "accuracy" in quantity.metric else 1
+    samples = test * len(values_R)
+    if clusters is not None and quantity.metric in _OF_TEST_SAMPLES:
+        counted = sum(clusters[source, int(seed)] for source in rows["source"].unique() for seed in values_R.index)
+        return cautious_cell(values_R * scale, samples, counted)
     done = rows_where(metrics, metric=CENSORED_BY.get(quantity.metric))["value"]
-    return cell_of_repeats(values_R * scale, test * len(values_R), at_least=bool((done < 1).any()))
+    return cell_of_repeats(values_R * scale, samples, at_least=bool((done < 1).any()))
 
 
 def _protocol(conditions: Mapping) -> str:

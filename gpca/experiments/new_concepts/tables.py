@@ -2,7 +2,8 @@
 
 The metrics are those of ``active_learning.csv``, with which the others are compared, and of ``new_concepts.csv``. The
 ``conditions`` are the sections ``active_learning`` and ``new_concepts`` of the config, with the ``seeds`` that the
-latter was run for, ``test`` of its ``registrations``, and its section ``causes`` as ``of_causes``.
+latter was run for, ``test`` of its ``registrations``, and its section ``causes`` as ``of_causes``. The ``clusters`` say
+of how many families the test samples of each source and seed are.
 """
 
 from __future__ import annotations
@@ -15,10 +16,11 @@ from gpca.active_learning.settings import ALL_LABELS
 from gpca.attribution.metrics import ALL
 from gpca.causes.quotas import apportion
 from gpca.causes.truth import BORDERLINE, GEOMETRY, NOMINAL
+from gpca.experiments.active_learning.clusters import Clusters
 from gpca.experiments.active_learning.tables import COUNT, Quantity, cell_of
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.reporting.tables.builder import TableBuilder, crossed, mean_over, titles_of
-from gpca.reporting.tables.cells import cell_of_repeats, plain_cell, rows_where
+from gpca.reporting.tables.builder import TableBuilder, cautious_over, crossed, titles_of
+from gpca.reporting.tables.cells import cell_of_repeats, clustered_cell, plain_cell, rows_where
 from gpca.reporting.tables.table import Cell, Column, Table
 from gpca.reporting.words import plural
 
@@ -39,14 +41,21 @@ PAPERS, WITHIN = "bald_kmeans", 20  # labels that a new concept may cost
 
 
 def table15_new_concepts(
-    metrics: pd.DataFrame, without_labels: pd.DataFrame, sources: Mapping[str, Mapping], conditions: Mapping
+    metrics: pd.DataFrame,
+    without_labels: pd.DataFrame,
+    clusters: Clusters,
+    clusters_of_causes: Clusters,
+    sources: Mapping[str, Mapping],
+    conditions: Mapping,
 ) -> Table:
     """Return the labels that each new concept costs in each embedding, and the accuracy that labels can reach.
 
     Args:
-        without_labels: Metrics of the explainers of `NO_LABELS`, under the paper's protocol.
+        without_labels: What :func:`gpca.experiments.concept_attribution.intervals.collect_intervals` returned of the
+            explainers of `NO_LABELS`, for the same seeds.
+        clusters_of_causes: The same of the registrations with measured causes.
     """
-    metrics, without_labels = (rows[rows["seed"].isin(conditions["seeds"])] for rows in (metrics, without_labels))
+    metrics = metrics[metrics["seed"].isin(conditions["seeds"])]
     labels = {f"labels_{c}": Quantity("labels_to_target", Column(f"Labels, {c}", **COUNT), PAPERS, c) for c in CONCEPTS}
     labels["labels_random"] = Quantity("labels_to_target", Column("Labels, random choice", **COUNT), "random")
     accuracies = {"all_labels": Quantity("final_accuracy", Column("Acc., pool labeled (%)"), ALL_LABELS)}
@@ -63,13 +72,16 @@ def table15_new_concepts(
         of_row = rows_where(metrics, source=source, table=TABLE + setting)
         of_concepts = of_row[of_row["concept"].isin(CONCEPTS)]
         test = conditions["test"]
-        cells = {key: cell_of(of_concepts, quantity, test) for key, quantity in (labels | accuracies).items()}
+        cells = {key: cell_of(of_concepts, quantity, test, clusters) for key, quantity in (labels | accuracies).items()}
         cells["within"] = _within(of_concepts, test)
-        cells |= {key: cell_of(of_row, quantity, tests[str(quantity.concept)]) for key, quantity in of_causes.items()}
+        cells |= {
+            key: cell_of(of_row, quantity, tests[str(quantity.concept)], clusters_of_causes)
+            for key, quantity in of_causes.items()
+        }
         table.add_row(row_labels, cells, rival=setting != "pretrained")
     for (source, explainer), row_labels in crossed(titles_of(sources), NO_LABELS):
-        of_row = rows_where(without_labels, source=source, method=explainer, concept=ALL)
-        cells = _without_labels(of_row, labels, conditions)
+        accuracy = clustered_cell(without_labels, source=source, method=explainer, metric="accuracy", concept=ALL)
+        cells = _without_labels(accuracy, labels, conditions["target"])
         table.add_row(row_labels, cells, rival=False)
     table.compare_down([*labels, "within", *NEW_CAUSES], same=1)
     columns = {key: quantity.column for key, quantity in labels.items()} | {"within": within}
@@ -80,13 +92,14 @@ def table15_new_concepts(
         column_head="quantity",
         columns={key: column for key, column in columns.items() if any(shown == key for _, shown in table.cells)},
         footnotes=(
-            f"{mean_over(table.span_of_seeds(), conditions['test'])}; a dash stands for what was not run. Bold: best "
-            "of a dataset, the first row apart.",
+            f"{cautious_over(table.span_of_seeds(), conditions['test'])}. A dash stands for what was not run. Bold: "
+            "best of a dataset, the first row apart.",
             _protocol(conditions),
             "Labels: by BALD with k-means, for each concept as the new one, and by random choice, mean over the three. "
             f"Within {WITHIN} labels: share of the runs that reached the target with so few. Pool labeled: accuracy "
             "when the whole pool is labeled, mean over the three.",
-            "No labels: the accuracy that needs none, and 0 labels where it reaches the target.",
+            "No labels: the accuracy that needs none, with the interval of a bootstrap over families and seeds, and 0 "
+            "labels where it reaches the target.",
             "Nominal, Geometry: the new concept in registrations with measured causes, of objects that no method saw; "
             "accuracy over all causes after all queries by BALD, and with the whole pool labeled. No encoder saw "
             f"Geometry. Test samples of a seed: {tests[NOMINAL]}, with Geometry up to {tests[GEOMETRY]}, if any of its "
@@ -95,7 +108,9 @@ def table15_new_concepts(
     )
 
 
-def table15_oracle(metrics: pd.DataFrame, sources: Mapping[str, Mapping], conditions: Mapping) -> Table:
+def table15_oracle(
+    metrics: pd.DataFrame, clusters: Clusters, sources: Mapping[str, Mapping], conditions: Mapping
+) -> Table:
     """Return the results of learning from an oracle that errs: labels to the target, final accuracy, by its errors."""
     metrics = metrics[metrics["seed"].isin(conditions["seeds"])]
     shares = [0, *(round(100 * share) for share in conditions["errors"])]
@@ -113,7 +128,8 @@ def table15_oracle(metrics: pd.DataFrame, sources: Mapping[str, Mapping], condit
             of_cell = rows_where(metrics, source=source, table=name, method=strategy)
             of_cell = of_cell[of_cell["concept"].isin(CONCEPTS)]
             for key, metric in (("labels", "labels_to_target"), ("accuracy", "final_accuracy")):
-                cells[f"{key}_{share}"] = cell_of(of_cell, Quantity(metric, Column("")), conditions["test"])
+                quantity = Quantity(metric, Column(""))
+                cells[f"{key}_{share}"] = cell_of(of_cell, quantity, conditions["test"], clusters)
         table.add_row(row_labels, cells)
     table.compare_down([*labels, *accuracies], same=2)
     return table.build(
@@ -122,7 +138,7 @@ def table15_oracle(metrics: pd.DataFrame, sources: Mapping[str, Mapping], condit
         column_head="quantity",
         columns=labels | accuracies,
         footnotes=(
-            f"{mean_over(table.most_seeds(), conditions['test'])}.",
+            f"{cautious_over(table.most_seeds(), conditions['test'])}.",
             _protocol(conditions),
             "Means over noise, pose and overlap as the new concept, then over the seeds. A wrong answer names one of "
             "the other two concepts; an oracle that errs more repeats the errors of one that errs less. The labels at "
@@ -159,20 +175,17 @@ def _within(metrics: pd.DataFrame, test: int) -> Cell | None:
     return cell_of_repeats(shares, test * len(shares))
 
 
-def _without_labels(metrics: pd.DataFrame, labels: Iterable[str], conditions: Mapping) -> dict[str, Cell | None]:
+def _without_labels(accuracy: Cell | None, labels: Iterable[str], target: float) -> dict[str, Cell | None]:
     """Return the accuracy of what needs no labels as that of the whole pool, and where it is enough, that it has none.
 
     Args:
-        metrics: those of one source and explainer.
+        accuracy: in %, if it is known.
         labels: the columns of numbers of labels.
     """
-    accuracy_R = rows_where(metrics, metric="accuracy")["value"].to_numpy()
-    cells: dict[str, Cell | None] = {
-        "all_labels": cell_of_repeats(100 * accuracy_R, conditions["test"] * len(accuracy_R))
+    enough = labels if accuracy and accuracy.mean >= 100 * target else ()
+    return {"all_labels": accuracy} | {
+        key: plain_cell(0, accuracy.seeds, accuracy.test_samples) for key in enough if accuracy
     }
-    if len(accuracy_R) and accuracy_R.mean() >= conditions["target"]:
-        cells |= {key: plain_cell(0, len(accuracy_R), conditions["test"] * len(accuracy_R)) for key in labels}
-    return cells
 
 
 def _protocol(conditions: Mapping) -> str:

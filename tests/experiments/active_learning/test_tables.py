@@ -1,6 +1,7 @@
 import pandas as pd
 import pytest
 
+from gpca.attribution.confidence import wilson_interval
 from gpca.attribution.metrics import TIDY_COLUMNS
 from gpca.errors import InputError
 from gpca.experiments.active_learning.tables import table3_active_learning, table3_extended, table3_stream
@@ -14,6 +15,16 @@ CONDITIONS = {
     "initial": 120, "train": 800, "test": 200, "labels": 60, "batch": 4, "target": 0.9, "iterations": 100,
     "rare_share": 0.05, "rare_labels": 400, "stream": {"arrivals": 400, "quiet": 100, "budget": 0.1},
 }  # fmt: skip
+CLUSTERS = {("ycb", seed): 11 for seed in range(3)}
+
+
+def wilson(percent):
+    """The bounds of a share of all families of three seeds."""
+    low, high = (100 * bound for bound in wilson_interval(percent / 100 * 33, 33))
+    return f"{low:.1f} to {high:.1f}"
+
+
+AT_96 = f"96.0 ({wilson(96)})"
 
 
 def tidy(values):
@@ -54,46 +65,57 @@ def metrics():
 
 
 def test_table3_shows_the_papers_experiment_alone(metrics):
-    markdown = table3_active_learning(metrics, REAL, STRATEGIES, CONDITIONS).markdown()
+    markdown = table3_active_learning(metrics, CLUSTERS, REAL, STRATEGIES, CONDITIONS).markdown()
     assert "| Dataset | Encoder saw | Labels, BALD + k-means | Labels, random |" in markdown
     # Two of three random runs reached the target: their mean is a lower bound, without an interval, and never bold.
-    assert "| YCB | all concepts | **16 ± 10** | > 48 | 96.0 ± 2.5 |" in markdown
+    assert f"| YCB | all concepts | **16 ± 10** | > 48 | {AT_96} |" in markdown
     assert "| YCB | the known concepts only | – | > 60 |" in markdown
     assert "LINEMOD" not in markdown
 
 
+def test_accuracies_have_the_farther_bounds_of_those_over_seeds_and_families(metrics):
+    table = table3_active_learning(metrics, CLUSTERS, REAL, STRATEGIES, CONDITIONS)
+    note = table.footnotes[0]
+    assert "± is the half-width of the 95 % t-interval over the seeds" in note
+    assert "the farther bounds of that and of Wilson's interval, for which a family of objects counts once" in note
+    few = dict.fromkeys(CLUSTERS, 2)
+    wider = table3_active_learning(metrics, few, REAL, STRATEGIES, CONDITIONS)
+    assert wider.cells[0, "accuracy_bald_kmeans"].bounds[0] < table.cells[0, "accuracy_bald_kmeans"].bounds[0]
+    assert wider.cells[0, "labels_bald_kmeans"] == table.cells[0, "labels_bald_kmeans"]  # no share of samples
+
+
 def test_table3_states_its_conditions(metrics):
-    markdown = table3_active_learning(metrics, REAL, STRATEGIES, CONDITIONS).markdown()
+    markdown = table3_active_learning(metrics, CLUSTERS, REAL, STRATEGIES, CONDITIONS).markdown()
     for words in ("120 labeled samples", "680 training samples", "4 labels a round, 60 in all", "warm start", "5% of"):
         assert words in markdown
     assert "Mean over 3 seeds, 200 test samples each" in markdown
 
 
 def test_without_a_rare_share_nothing_is_said_of_it(metrics):
-    table = table3_active_learning(metrics, REAL, STRATEGIES, CONDITIONS | {"rare_share": None})
+    table = table3_active_learning(metrics, CLUSTERS, REAL, STRATEGIES, CONDITIONS | {"rare_share": None})
     assert not [note for note in table.footnotes if note.startswith("Rare")]
 
 
 def test_the_csv_marks_lower_bounds(metrics):
-    records = table3_active_learning(metrics, REAL, STRATEGIES, CONDITIONS).records()
+    records = table3_active_learning(metrics, CLUSTERS, REAL, STRATEGIES, CONDITIONS).records()
     assert ("ycb", "pretrained", "labels_random", 48.0, "", "", 3, 600, True) in records
     assert ("ycb", "pretrained", "labels_bald_kmeans", 16.0, 6.063449, 25.936551, 3, 600, False) in records
 
 
 def test_extended_averages_over_the_concepts_held_out_and_leaves_the_oracle_out_of_the_comparison(metrics):
-    markdown = table3_extended(metrics, REAL, STRATEGIES, CONDITIONS).markdown()
+    markdown = table3_extended(metrics, CLUSTERS, REAL, STRATEGIES, CONDITIONS).markdown()
     assert "Labels, overlap" in markdown
     [bald] = [line for line in markdown.splitlines() if "BALD + k-means" in line and "YCB" in line]
-    assert "70.0 (63.3 to 75.9)" in bald
+    assert f"70.0 ({wilson(70)})" in bald  # all seeds agree
     assert "**0.0 ± 24.8**" not in bald
     [told] = [line for line in markdown.splitlines() if "Told" in line]
     assert "**" not in told
-    assert "**75.0 (68.6 to 80.5)**" in markdown
+    assert f"**75.0 ({wilson(75)})**" in markdown
     assert "Stream" not in markdown
 
 
 def test_stream_shows_streams_alone(metrics):
-    markdown = table3_stream(metrics, REAL, STRATEGIES, CONDITIONS).markdown()
+    markdown = table3_stream(metrics, CLUSTERS, REAL, STRATEGIES, CONDITIONS).markdown()
     assert "| YCB | Stream |" in markdown
     assert "60 ± 25" in markdown
     assert "Random" not in markdown
@@ -102,9 +124,9 @@ def test_stream_shows_streams_alone(metrics):
 
 @pytest.mark.parametrize("make", [table3_active_learning, table3_extended, table3_stream])
 def test_stand_ins_are_said_and_nothing_to_show_is_a_fault(metrics, make):
-    table = make(metrics, STAND_INS, STRATEGIES, CONDITIONS)
+    table = make(metrics, CLUSTERS, STAND_INS, STRATEGIES, CONDITIONS)
     assert "on procedural stand-ins" in table.caption
     assert "YCB (procedural stand-in)" in table.markdown()
     assert table.latex().count("{") == table.latex().count("}")
     with pytest.raises(InputError, match="has nothing to show"):
-        make(metrics[:0], REAL, STRATEGIES, CONDITIONS)
+        make(metrics[:0], CLUSTERS, REAL, STRATEGIES, CONDITIONS)

@@ -1,6 +1,8 @@
 import pandas as pd
 import pytest
 
+from gpca.attribution.clustered import COLUMNS as INTERVALS
+from gpca.attribution.confidence import wilson_interval
 from gpca.attribution.metrics import TIDY_COLUMNS
 from gpca.errors import InputError
 from gpca.experiments.new_concepts.tables import table15_new_concepts, table15_oracle
@@ -11,7 +13,8 @@ CONDITIONS = {
     "initial": 120, "labels": 60, "batch": 4, "target": 0.9, "test": 200, "seeds": [0, 1], "errors": [0.1],
     "erring": ["pair"], "of_causes": {"test": 300, "shares": SHARES}, "geometry_test": 30,
 }  # fmt: skip
-NOTHING = pd.DataFrame(columns=list(TIDY_COLUMNS))
+CLUSTERS, OF_CAUSES = ({("ycb", seed): count for seed in range(3)} for count in (11, 3))
+NOTHING = pd.DataFrame(columns=list(INTERVALS))
 
 
 def rows(setting, strategy, concept, metric, *of_seeds):
@@ -37,9 +40,10 @@ def metrics():
 
 
 def test_labels_are_counted_by_concept_and_all_within_a_limit(metrics):
-    markdown = table15_new_concepts(metrics, NOTHING, SOURCES, CONDITIONS).markdown()
+    markdown = table15_new_concepts(metrics, NOTHING, CLUSTERS, OF_CAUSES, SOURCES, CONDITIONS).markdown()
     assert "| nothing: measurements of the pair |" in markdown
-    cells = {cell.strip("* ") for cell in markdown.split("measurements of the pair |")[1].split("\n")[0].split("|")}
+    row = markdown.split("measurements of the pair |")[1].split("\n")[0]
+    cells = {cell.strip("* ").partition(" (")[0] for cell in row.split("|")}
     # Noise in 8 and 12 labels; of six runs, pose of the second seed alone did not get there.
     assert {"> 36", "20", "83", "70.0"} <= cells
     assert "(procedural stand-in)" in markdown
@@ -47,32 +51,31 @@ def test_labels_are_counted_by_concept_and_all_within_a_limit(metrics):
 
 def test_what_needs_no_labels_stands_below_the_encoders(metrics):
     known = [
-        ("attribution", "ycb", name, metric, "all", seed, value)
+        ("attribution", "ycb", name, "accuracy", "all", 2, 11, 400, accuracy, accuracy - 0.1, accuracy)
         for name, accuracy in (("rule", 1.0), ("chance", 0.34))
-        for seed in (0, 1, 2)
-        for metric, value in (("accuracy", accuracy), ("test_samples", 200))
     ]
-    table = table15_new_concepts(metrics, pd.DataFrame(known, columns=list(TIDY_COLUMNS)), SOURCES, CONDITIONS)
+    of_known = pd.DataFrame(known, columns=list(INTERVALS))
+    table = table15_new_concepts(metrics, of_known, CLUSTERS, OF_CAUSES, SOURCES, CONDITIONS)
     found = {record[1:3]: record[3] for record in table.records()}
     assert (found["rule", "labels_noise"], found["rule", "labels_random"], found["rule", "all_labels"]) == (0, 0, 100)
     assert found["chance", "all_labels"] == 34 and ("chance", "labels_noise") not in found
     assert [labels[1][0] for labels in table.rows][-2:] == ["chance", "rule"]
-    assert table15_new_concepts(metrics, NOTHING, SOURCES, CONDITIONS).best() == table.best()
+    assert table15_new_concepts(metrics, NOTHING, CLUSTERS, OF_CAUSES, SOURCES, CONDITIONS).best() == table.best()
 
 
 def test_rows_are_of_the_seeds_of_the_new_concepts(metrics):
-    records = table15_new_concepts(metrics, NOTHING, SOURCES, CONDITIONS).records()
+    records = table15_new_concepts(metrics, NOTHING, CLUSTERS, OF_CAUSES, SOURCES, CONDITIONS).records()
     assert [record[3] for record in records if record[1:3] == ("pretrained", "labels_pose")] == [4]
 
 
 def test_nominal_is_no_concept_of_the_papers(metrics):
-    records = table15_new_concepts(metrics, NOTHING, SOURCES, CONDITIONS).records()
+    records = table15_new_concepts(metrics, NOTHING, CLUSTERS, OF_CAUSES, SOURCES, CONDITIONS).records()
     [found] = [record for record in records if record[1:3] == ("pair", "all_labels")]
     assert found[3] == pytest.approx(99)
 
 
 def test_causes_have_test_samples_of_their_own(metrics):
-    table = table15_new_concepts(metrics, NOTHING, SOURCES, CONDITIONS)
+    table = table15_new_concepts(metrics, NOTHING, CLUSTERS, OF_CAUSES, SOURCES, CONDITIONS)
     counts = {record[2]: record[7] for record in table.records() if record[1] == "pair"}
     assert (counts["nominal"], counts["geometry"], counts["labels_pose"]) == (504, 282, 400)
     told = "Test samples of a seed: 252, with Geometry up to 282, if any of its registrations fails by that"
@@ -82,14 +85,26 @@ def test_causes_have_test_samples_of_their_own(metrics):
 
 
 def test_errors_of_the_oracle_stand_side_by_side(metrics):
-    markdown = table15_oracle(metrics, SOURCES, CONDITIONS).markdown()
+    markdown = table15_oracle(metrics, CLUSTERS, SOURCES, CONDITIONS).markdown()
     [row] = [line for line in markdown.splitlines() if "measurements of the pair" in line]
     assert "BALD + k-means" in row
     assert "| 24 |" in row
-    assert "| 85.0 |" in row
+    low, high = (100 * bound for bound in wilson_interval(0.85 * 22, 22))
+    assert f"| 85.0 ({low:.1f} to {high:.1f}) |" in row
 
 
-@pytest.mark.parametrize(("table", "others"), [(table15_new_concepts, [NOTHING]), (table15_oracle, [])])
+def test_accuracies_have_the_interval_of_families_even_of_few_seeds(metrics):
+    table = table15_new_concepts(metrics, NOTHING, CLUSTERS, OF_CAUSES, SOURCES, CONDITIONS)
+    [row] = [number for number, labels in enumerate(table.rows) if labels[1][0] == "pair"]
+    of_causes = wilson_interval(0.7 * 6, 6)  # three families in each of two seeds
+    assert table.cells[row, "nominal"].bounds == pytest.approx([100 * bound for bound in of_causes])
+    assert table.cells[row, "labels_overlap"].bounds is None
+    assert "with fewer than 3 all else has no interval and no bold. In brackets, of accuracies" in table.footnotes[0]
+
+
+@pytest.mark.parametrize(
+    ("table", "others"), [(table15_new_concepts, [NOTHING, CLUSTERS, OF_CAUSES]), (table15_oracle, [CLUSTERS])]
+)
 def test_without_these_sources_there_is_no_table(metrics, table, others):
     with pytest.raises(InputError, match="has nothing to show"):
         table(metrics, *others, {"cups": SOURCES["ycb"]}, CONDITIONS)
