@@ -49,9 +49,9 @@ def draw_causes_example(
     """Draw the counterfactuals on the left, and on the right the measured shares and the scores of every explainer.
 
     Left is the observed cloud over the model after ICP with every subset of the causes, and the error v of each.
-    Of the failed test samples of several causes whose largest φ is at least 0.6 of the sum of all, the sample is the one
-    whose margin, by which its largest φ exceeds the next one, is the median: a usual case with a clear cause, whoever
-    is right about it. Where none is so clear, all that have several causes count, or else all that failed.
+    The sample is a usual case with a clear cause, whoever is right about it. Of the failed test samples of several
+    causes whose largest φ is at least 0.6 of the sum of all, it is the one whose margin, by which its largest φ exceeds
+    the next one, is the median. Where none is so clear, all that have several causes count, or else all that failed.
 
     Args:
         objects_npz, causes_npz: Of the shown source and seed, which their paths name.
