@@ -14,6 +14,7 @@ import numpy as np
 
 from gpca.causes.dataset import LABELS
 from gpca.classifier.settings import LearningRate
+from gpca.explainers.boosted_trees import boosted_trees
 from gpca.explainers.concept_classifier import ClassifierExplainer, standardized_regression
 from gpca.explainers.interface import ConceptExplainer, ExplainerEntry, attached
 from gpca.explainers.sight import Sees
@@ -85,21 +86,6 @@ def randomized_trees(source: str, seed: int, trees: int = 300, smallest_leaf: in
     )
 
 
-def boosted_trees(source: str, seed: int, iterations: int = 150, learning_rate: float = 0.06):
-    """Return unfitted gradient boosting on histograms (Ke et al. 2017)."""
-    from sklearn.ensemble import HistGradientBoostingClassifier
-
-    return HistGradientBoostingClassifier(
-        learning_rate=learning_rate,
-        max_iter=iterations,
-        min_samples_leaf=8,
-        l2_regularization=1.0,
-        max_features=0.3,
-        early_stopping=False,
-        random_state=seed_of(source, seed, "boosted trees") % 2**32,
-    )
-
-
 def pair_forest(
     sees: Sees, source: str, seed: int, trees: Count = 300, smallest_leaf: Count = 2
 ) -> DescriptorClassifier:
@@ -112,7 +98,8 @@ def pair_boosting(
     sees: Sees, source: str, seed: int, iterations: Count = 150, learning_rate: LearningRate = 0.06
 ) -> DescriptorClassifier:
     """Make the boosted trees."""
-    return DescriptorClassifier(boosted_trees(source, seed, iterations, learning_rate), sees)
+    classifier = boosted_trees(source, seed, iterations=iterations, learning_rate=learning_rate)
+    return DescriptorClassifier(classifier, sees)
 
 
 def entry(title: str, make: Callable[..., ConceptExplainer], sees: Sees) -> ExplainerEntry:

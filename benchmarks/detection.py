@@ -78,8 +78,8 @@ def on_frames(explainer, options: argparse.Namespace) -> dict[str, float]:
         alarms["diagnosis"].append(said.diagnosis.failure)
         alarms["inlier_rmse"].append(registrations.inlier_rmse[row])
         alarms["fitness"].append(-registrations.fitness[row])
-        motion = explainer.model.diagnoser.features(source, target, T_icp)
-        alarms["spread"].append(motion[motion_end() + spread])
+        described, _ = (explainer.model.fast or explainer.model.diagnoser).measured(source, target, T_icp)
+        alarms["spread"].append(described[motion_end() + spread])
     kept = ~np.isin(rows, skipped)
     failed_K, instance_K = failed_K[kept], poses["instance"].to_numpy()[rows][kept]
     print(f"{len(failed_K)} registrations of {len(set(instance_K))} instances, {failed_K.sum()} failed")

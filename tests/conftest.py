@@ -59,32 +59,39 @@ def registrations(objects):
 
 
 @pytest.fixture(scope="session")
-def diagnoser():
-    """A diagnoser of twelve pairs whose descriptors were drawn; two thirds failed, each for all causes."""
+def diagnosers():
+    """Diagnosers, with and without re-enactment, of twelve pairs whose features were drawn; two thirds failed."""
     import numpy as np
 
     from gpca.causes.settings import CauseSettings
     from gpca.classifier.settings import GPCSettings
-    from gpca.features.dataset import WIDTHS
-    from gpca.features.settings import DescriptorSettings
+    from gpca.model.diagnoser import PLAIN_WIDTH
     from gpca.model.learning import Lessons, learn
+    from gpca.reenactment.features import FEATURES
+    from gpca.reenactment.settings import ReenactmentSettings
 
     random, label_N = np.random.default_rng(0), np.array(["nominal", "noise", "pose"] * 4)
     failed_N = label_N != "nominal"
     lessons = Lessons(
-        features_N_F=random.normal(size=(12, sum(WIDTHS.values()))) + 3 * failed_N[:, None],
+        features_N_F=random.normal(size=(12, len(FEATURES) + PLAIN_WIDTH)) + 3 * failed_N[:, None],
         label_N=label_N,
+        state_N=np.where(failed_N, "several", "nominal"),
         causes_N_3=np.repeat(failed_N[:, None], 3, axis=1),
         error_N=np.where(failed_N, 0.2, 0.01),
-        unseen_N=np.arange(12) < 6,
+        family_N=np.repeat(["box", "can"], 6),
     )
     gpc = GPCSettings(learning_rate=0.1, iterations=20, inducing=4, draws=50)
-    descriptors = DescriptorSettings(starts=1, restarts=2, icp_points=64)
-    return learn(lessons, gpc, CauseSettings(points=(64, 128)), descriptors, 0.05, "tiny", 0)[0]
+    reenactment = ReenactmentSettings(hypotheses=2)
+    return learn(lessons, gpc, CauseSettings(points=(64, 128), moved="observed"), reenactment, 0.05, "tiny", 0)[:2]
 
 
 @pytest.fixture(scope="session")
-def model(registrations, diagnoser):
+def diagnoser(diagnosers):
+    return diagnosers[0]
+
+
+@pytest.fixture(scope="session")
+def model(registrations, diagnosers):
     """A model of an encoder that was not trained: its embeddings tell concepts apart well enough to be scored."""
     import torch
 
@@ -107,7 +114,9 @@ def model(registrations, diagnoser):
     gpc.fit(h_S_d, train.concept)
     policy = RecoveryPolicy(Thresholds(uncertain=1.0, dominant=0.4))
     familiar = Familiarity.of((train.cloud(row), train.target(row)) for row in range(len(train)))
-    return Model(diagnoser, network.encoder, settings, gpc, ICPSettings(), 256, policy, "Tiny", True, familiar)
+    diagnoser, fast = diagnosers
+    parts = (network.encoder, settings, gpc, ICPSettings(), 256, policy, "Tiny", True, familiar, fast)
+    return Model(diagnoser, *parts)
 
 
 @pytest.fixture(scope="session")

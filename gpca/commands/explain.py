@@ -30,6 +30,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         "--uncertainty", nargs="?", const=MONTE_CARLO, metavar="ESTIMATOR",
         help="measure the uncertainty of the pose with an estimator such as brossard (default: Monte-Carlo)",
     )  # fmt: skip
+    parser.add_argument("--fast", action="store_true", help="re-enact nothing: quicker, and wrong more often")
     form = parser.add_mutually_exclusive_group()
     form.add_argument("--json", action="store_true", help="print one JSON object")
     form.add_argument("--json-lines", action="store_true", help="print one line of JSON per source")
@@ -66,7 +67,7 @@ def run(options: Namespace) -> int:
     torch.set_num_threads(options.threads)
     say_when_compiling()
     model = Model.load(path)
-    requested = {"uncertainty": uncertainty, "method": options.method, "estimator": estimator}
+    requested = {"uncertainty": uncertainty, "method": options.method, "estimator": estimator, "fast": options.fast}
     explainer = Explainer(model)
     trained_on = f"{model.title} (procedural stand-in)" if model.stand_in else model.title
     status = 0

@@ -1,4 +1,8 @@
-"""GP-CA's classifiers on the descriptors of a pair: whether anything is wrong, and which causes it has."""
+"""GP-CA's classifiers on the descriptors of a pair: whether anything is wrong, and which causes it has.
+
+Beside the Gaussian processes may stand boosted trees. The two err in different ways, so that the mean of their
+probabilities is better than either; variances and BALD are those of the processes.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +16,7 @@ from scipy.special import ndtri
 from gpca.causes.truth import FAILED, NOMINAL
 from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
+from gpca.explainers.boosted_trees import BoostedQuestion
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import seed_of
 
@@ -84,9 +89,13 @@ class PairClassifier:
     Args:
         settings: of each.
         axes: names of the seed.
+        trees: whether boosted trees answer the same four questions beside them.
     """
 
-    def __init__(self, settings: GPCSettings, *axes: object) -> None:
+    def __init__(self, settings: GPCSettings, *axes: object, trees: bool = False) -> None:
+        self._axes = axes
+        self._with_trees = trees
+        self._trees: list[BoostedQuestion] = []
         self.normalized = NormalizedFeatures(*axes)
         self._failure = GPC((NOMINAL, FAILED), settings, *axes, FAILED)
         self._causes = [GPC((ABSENT, PRESENT), settings, *axes, concept) for concept in CONCEPTS]
@@ -103,16 +112,22 @@ class PairClassifier:
         self._failure.fit(inputs_N_F, np.where(failed_N, FAILED, NOMINAL))
         for gpc, present_N in zip(self._causes, causes_N_3.T, strict=True):
             gpc.fit(inputs_N_F, np.where(present_N, PRESENT, ABSENT))
+        if self._with_trees:
+            questions = zip((FAILED, *CONCEPTS), (failed_N, *causes_N_3.T), strict=True)
+            self._trees = [BoostedQuestion.fit(inputs_N_F, yes_N, *self._axes, name) for name, yes_N in questions]
         return self
 
     def judge(self, inputs_N_F: np.ndarray) -> Judgment:
         """Return the verdict of the classifiers on descriptors that `normalized` has mapped."""
-        (failed, _, bald), *causes = (gpc.attribute(inputs_N_F) for gpc in (self._failure, *self._causes))
+        judged = [gpc.attribute(inputs_N_F) for gpc in (self._failure, *self._causes)]
+        yes_N_4 = np.column_stack([scores_N_2[:, 1] for scores_N_2, _, _ in judged])
+        if self._trees:
+            yes_N_4 = (yes_N_4 + np.column_stack([trees.probability(inputs_N_F) for trees in self._trees])) / 2
         return Judgment(
-            failure_N=failed[:, 1],
-            causes_N_3=np.column_stack([scores[:, 1] for scores, _, _ in causes]),
-            causes_variances_N_3=np.column_stack([variances[:, 1] for _, variances, _ in causes]),
-            bald_N=np.max([bald, *(of_cause for _, _, of_cause in causes)], axis=0),
+            failure_N=yes_N_4[:, 0],
+            causes_N_3=yes_N_4[:, 1:],
+            causes_variances_N_3=np.column_stack([variances_N_2[:, 1] for _, variances_N_2, _ in judged[1:]]),
+            bald_N=np.max([bald_N for _, _, bald_N in judged], axis=0),
         )
 
     def unlikeness(self, inputs_N_F: np.ndarray) -> np.ndarray:
@@ -143,7 +158,8 @@ class PairClassifier:
         for gpc, state in zip(self._causes, causes, strict=True):
             if np.array_equal(gpc.learned_N_d, self._failure.learned_N_d):
                 state["labelled"] = failure["labelled"]
-        return {"quantiles": self.normalized.state(), "failure": failure, "causes": causes}
+        trees = {"trees": [trees.state() for trees in self._trees]} if self._trees else {}
+        return {"quantiles": self.normalized.state(), "failure": failure, "causes": causes, **trees}
 
     @classmethod
     def from_state(cls, state: dict) -> PairClassifier:
@@ -152,6 +168,7 @@ class PairClassifier:
         made.normalized = NormalizedFeatures.from_state(state["quantiles"])
         made._failure = GPC.from_state(state["failure"])
         made._causes = [GPC.from_state(part) for part in state["causes"]]
+        made._trees = [BoostedQuestion.from_state(part) for part in state.get("trees", ())]
         return made
 
 

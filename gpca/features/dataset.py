@@ -68,16 +68,20 @@ class Descriptors:
         return cls(arrays["sample"], arrays["split"], {name: arrays[name] for name in GROUPS}, registrations.axes)
 
 
-def describe(pair: ObservedPair, settings: DescriptorSettings, icp: ICPSettings) -> tuple[dict[str, np.ndarray], float]:
-    """Return every group of a pair, and the seconds that its registrations with remedies took."""
+def describe_plainly(pair: ObservedPair, icp: ICPSettings) -> dict[str, np.ndarray]:
+    """Return the groups of a pair that are quick to measure: distances, planes, motion and starts."""
     distances, planes = describe_distances(pair)
-    described = {
+    return {
         "distances": distances,
         "planes": planes,
         "motion": describe_motion(pair),
         "starts": describe_starts(pair, icp),
-        "entropy": describe_entropy(pair),
     }
+
+
+def describe(pair: ObservedPair, settings: DescriptorSettings, icp: ICPSettings) -> tuple[dict[str, np.ndarray], float]:
+    """Return every group of a pair, and the seconds that its registrations with remedies took."""
+    described = describe_plainly(pair, icp) | {"entropy": describe_entropy(pair)}
     started = perf_counter()
     described["remedied"] = describe_remedied(pair, settings, icp)
     return described, perf_counter() - started

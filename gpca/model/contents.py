@@ -6,23 +6,32 @@ A model may come from anywhere. Its faults have to be found when it is loaded, n
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from typing import get_args
 
 import torch
 
 from gpca.alignment.icp import ICPSettings
+from gpca.causes.settings import Moved
 from gpca.causes.truth import FAILED, NOMINAL
 from gpca.classifier.covariances import make_covariance
 from gpca.classifier.settings import GPCSettings
 from gpca.encoders.registry import make_encoder
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.tensor_file import require_like
+from gpca.explainers.boosted_trees import require_trees
 from gpca.explainers.pair_classifier import ABSENT, PRESENT
 from gpca.features.dataset import WIDTHS
 from gpca.features.settings import DescriptorSettings
+from gpca.guarantee.guarantee import Guarantee
+from gpca.guarantee.sets import Nonconformity
+from gpca.guarantee.states import STATES
+from gpca.model.diagnoser import PLAIN, PLAIN_WIDTH, REENACTED, REMEDIED
 from gpca.model.familiarity import MEASURES
 from gpca.objects.canonical import FEWEST_CLOUD_POINTS
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.recovery.policy import TREATMENTS
+from gpca.reenactment.features import FEATURES
+from gpca.reenactment.settings import ReenactmentSettings
 from gpca.settings import read_settings
 from gpca.uncertainty.settings import FEWEST_STARTS, UncertaintySettings
 
@@ -34,6 +43,7 @@ MOST_CLOUD_POINTS = 10**6
 MOST_ITERATIONS = 10**5  # of ICP
 MOST_RUNS = 10**4  # of ICP, to describe a pair
 MOST_NEIGHBORS = 10**4  # or whatever else a backbone's options count
+WIDTH_READ = {PLAIN: PLAIN_WIDTH, REENACTED: len(FEATURES) + PLAIN_WIDTH, REMEDIED: sum(WIDTHS.values())}
 ASYMMETRY = 1e-9  # of a covariance, whose prior is the identity
 
 
@@ -44,8 +54,9 @@ def require_possible(content: Mapping, settings: EncoderSettings) -> None:
     read_settings(ICPSettings, content["icp"])
     if "familiar" in content:
         _require_ranges(content["familiar"])
-    if content["diagnoser"] is not None:
-        _require_diagnoser(content["diagnoser"])
+    for diagnoser in (content["diagnoser"], content.get("fast")):
+        if diagnoser is not None:
+            _require_diagnoser(diagnoser)
     counts = {
         "draws of the classifier": (content["gpc"]["settings"]["draws"], 2, MOST_DRAWS),
         "points": (content["points"], FEWEST_CLOUD_POINTS, MOST_CLOUD_POINTS),
@@ -102,22 +113,18 @@ def _require_ranges(ranges: Mapping) -> None:
 
 
 def _require_diagnoser(state: Mapping) -> None:
-    read_settings(DescriptorSettings, state["descriptors"])
     read_settings(UncertaintySettings, state["runs"])
     read_settings(ICPSettings, state["icp"])
-    causes = state["classifier"]["causes"]
-    _require_counts(
-        {
-            "points of a description": (state["points"], FEWEST_CLOUD_POINTS, MOST_CLOUD_POINTS),
-            "starts": (state["runs"]["starts"], FEWEST_STARTS, MOST_RUNS),
-            "starts with remedies": (state["descriptors"]["starts"], 1, MOST_RUNS),
-            "restarts": (state["descriptors"]["restarts"], 1, MOST_RUNS),
-            "iterations of ICP": (state["icp"]["max_iterations"], 1, MOST_ITERATIONS),
-            "classifiers of causes": (len(causes), len(CONCEPTS), len(CONCEPTS)),
-        }
-    )
-    quantiles, weights, threshold = state["classifier"]["quantiles"], state["error_weights"], state["threshold"]
-    features = sum(WIDTHS.values())
+    classifier = state["classifier"]
+    counts = {
+        "points of a description": (state["points"], FEWEST_CLOUD_POINTS, MOST_CLOUD_POINTS),
+        "starts": (state["runs"]["starts"], FEWEST_STARTS, MOST_RUNS),
+        "iterations of ICP": (state["icp"]["max_iterations"], 1, MOST_ITERATIONS),
+        "classifiers of causes": (len(classifier["causes"]), len(CONCEPTS), len(CONCEPTS)),
+    }
+    _require_counts(counts | _counts_of_runs(state))
+    features = WIDTH_READ[state.get("reads", REMEDIED)]
+    quantiles, weights, threshold = classifier["quantiles"], state["error_weights"], state["threshold"]
     if quantiles.ndim != 2 or len(quantiles) < 2 or quantiles.shape[1] != features:
         raise ValueError(f"'quantiles' has shape {tuple(quantiles.shape)}, not {features} descriptors")
     if (quantiles.diff(dim=0) < 0).any():
@@ -127,12 +134,43 @@ def _require_diagnoser(state: Mapping) -> None:
     if type(threshold) is not float or not 0 <= threshold <= 2:
         raise ValueError(f"threshold: {threshold!r} is not a probability")
     for gpc, classes in [
-        (state["classifier"]["failure"], (NOMINAL, FAILED)),
-        *((cause, (ABSENT, PRESENT)) for cause in causes),
+        (classifier["failure"], (NOMINAL, FAILED)),
+        *((cause, (ABSENT, PRESENT)) for cause in classifier["causes"]),
     ]:
         _require_counts({"draws of a classifier": (gpc["settings"]["draws"], 2, MOST_DRAWS)})
         read_settings(GPCSettings, gpc["settings"])
         _require_classifier(gpc, classes, features)
+    if trees := classifier.get("trees"):
+        _require_counts({"questions of trees": (len(trees), 1 + len(CONCEPTS), 1 + len(CONCEPTS))})
+        for question in trees:
+            require_trees(question, features)
+    _require_promises(state)
+
+
+def _counts_of_runs(state: Mapping) -> dict[str, tuple[object, int, int]]:
+    """Return the numbers of registrations that a diagnosis makes again, and check their settings."""
+    if state.get("reads", REMEDIED) == REENACTED:
+        settings = read_settings(ReenactmentSettings, state["reenactment"])
+        if state["moved"] not in get_args(Moved):
+            raise ValueError(f"moved: {str(state['moved'])[:40]!r} is not one of {', '.join(get_args(Moved))}")
+        return {"re-enactments": (settings.calls(state["runs"]["starts"]), 1, MOST_RUNS)}
+    if state.get("reads", REMEDIED) == REMEDIED:
+        remedies = read_settings(DescriptorSettings, state["descriptors"])
+        return {
+            "starts with remedies": (remedies.starts, 1, MOST_RUNS),
+            "restarts": (remedies.restarts, 1, MOST_RUNS),
+        }
+    return {}
+
+
+def _require_promises(state: Mapping) -> None:
+    if state.get("guarantee") is not None:
+        sets = Guarantee.from_dict(state["guarantee"]).state_sets
+        if sets.states != STATES or not 0 < sets.level < 1 or sets.nonconformity not in get_args(Nonconformity):
+            raise ValueError("its guarantee is of different states, or of none")
+    for name, value in state.get("held_out", {}).items():
+        if type(name) is not str or not name.isidentifier() or type(value) is not float or not 0 <= value < MOST_DRAWS:
+            raise ValueError(f"held_out: {str(name)[:40]!r} is not the name of a measure with a value")
 
 
 def _require_classifier(state: Mapping, classes: tuple[str, ...], d: int) -> None:

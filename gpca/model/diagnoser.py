@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from sys import intern
 
 import numpy as np
 import torch
@@ -11,75 +13,47 @@ from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.icp import ICPSettings
 from gpca.alignment.rigid import inverse, transform
 from gpca.alignment.twist import exp
-from gpca.causes.truth import FAILED, LARGEST_ERROR, NOMINAL
+from gpca.causes.settings import OBSERVED, CauseSettings, Moved
+from gpca.causes.truth import LARGEST_ERROR
 from gpca.explainers.pair_classifier import PairClassifier
-from gpca.features.dataset import describe
+from gpca.features.dataset import WIDTHS, describe, describe_plainly
 from gpca.features.pair import ObservedPair
 from gpca.features.settings import GROUPS, DescriptorSettings
+from gpca.guarantee.guarantee import Guarantee
+from gpca.model.diagnosis import Diagnosis
+from gpca.model.guaranteed import Guaranteed, scores_of_states
+from gpca.model.reenacted import Reenacted
 from gpca.pairs.perturbation import CONCEPTS
+from gpca.reenactment.dataset import DESCRIBED, Reenactments, row_of
+from gpca.reenactment.enactment import reenact
+from gpca.reenactment.features import reenactment_features
+from gpca.reenactment.settings import ReenactmentSettings
+from gpca.reenactment.surface import ModelSurface
 from gpca.seeds import generator
 from gpca.uncertainty.settings import UncertaintySettings
 
 SMALLEST_ERROR = 1e-3  # diameters; below it lies the spacing of the points
-UNKNOWN = "unknown"  # the state of a diagnosis without meaning
-LIKELY = 0.5  # probability from which a concept is called one of the causes
-
-
-@dataclass(frozen=True)
-class Diagnosis:
-    """The diagnosis of one registration.
-
-    Attributes:
-        failure: probability that it failed.
-        threshold: of that probability, from which something is called wrong.
-        causes: probability of each concept that it is one of the causes, if there are any.
-        variances: of these over the posterior draws (Eq. 5).
-        bald: of the least certain of these probabilities, nats (Eq. 7).
-        expected_error: of the pose: ADD, or ADD-S of a symmetric object.
-        unlikeness: how unlike the training samples the pair is: 1 % of these are above 1.
-        void: whether the pair is such that none of these numbers means anything (:mod:`gpca.model.familiarity`).
-    """
-
-    failure: float
-    threshold: float
-    causes: dict[str, float]
-    variances: dict[str, float]
-    bald: float
-    expected_error: float
-    unlikeness: float = 0.0
-    void: bool = False
-
-    @property
-    def state(self) -> str:
-        """``nominal``, ``failed`` or ``unknown``."""
-        if self.void:
-            return UNKNOWN
-        return NOMINAL if self.failure < self.threshold else FAILED
-
-    @property
-    def named(self) -> tuple[str, ...]:
-        """The causes that are more likely than not, the likeliest first, and at least that one; none unless failed."""
-        if self.state != FAILED:
-            return ()
-        first, *rest = sorted(self.causes, key=lambda cause: -self.causes[cause])
-        return first, *(cause for cause in rest if self.causes[cause] >= LIKELY)
-
-    def as_dict(self) -> dict[str, object]:
-        """Return it as numbers, lists and names, for JSON."""
-        return vars(self) | {"state": self.state, "named": list(self.named)}
+PLAIN, REENACTED, REMEDIED = ("plain", "reenacted", "remedied")  # what a diagnoser reads of a pair
+PLAIN_WIDTH = sum(WIDTHS[group] for group in DESCRIBED)  # features that need no re-enactment
 
 
 @dataclass(frozen=True)
 class Diagnoser:
-    """Classifiers on the descriptors of a pair, and the settings by which a pair is described as in the training.
+    """Classifiers on the features of a pair, and the settings by which a pair is measured as in the training.
 
     Attributes:
         classifier: of failure and of the causes.
-        error_weights: (F + 1,) regression of ln error (diameters) on the normalized descriptors, the constant last.
+        error_weights: (F + 1,) regression of ln error (diameters) on the normalized features, the constant last.
         threshold: probability of failure from which something is called wrong.
         points: of each cloud, at most.
         runs: how ICP runs from other starts.
-        descriptors: what is measured.
+        reads: ``plain`` descriptors; ``reenacted``, the numbers of a re-enactment and these; or ``remedied``, all
+            groups of descriptors, as models before version 4 do.
+        moved: the cloud that ICP moves in a re-enactment.
+        reenactment: how the true pose is sought.
+        descriptors: how pairs are registered with remedies.
+        guarantee: of what is said; None of older models.
+        held_out: how well classifiers that learned from other families of shapes did, by measure; empty of older ones.
     """
 
     classifier: PairClassifier
@@ -87,7 +61,12 @@ class Diagnoser:
     threshold: float
     points: int
     runs: UncertaintySettings
-    descriptors: DescriptorSettings
+    reads: str = REENACTED
+    moved: Moved = OBSERVED
+    reenactment: ReenactmentSettings = field(default_factory=ReenactmentSettings)
+    descriptors: DescriptorSettings = field(default_factory=DescriptorSettings)
+    guarantee: Guarantee | None = None
+    held_out: Mapping[str, float] = field(default_factory=dict)
 
     def diagnose(self, observed: np.ndarray, model: np.ndarray, T_icp: np.ndarray) -> Diagnosis:
         """Diagnose a registration; the same clouds give the same numbers.
@@ -97,7 +76,8 @@ class Diagnoser:
             model: (M, 3).
             T_icp: 4×4, what ICP found: takes the observed cloud to the model.
         """
-        inputs_1_F = self.classifier.normalized(self.features(observed, model, T_icp)[None])
+        features_F, reenacted = self.measured(observed, model, T_icp)
+        inputs_1_F = self.classifier.normalized(features_F[None])
         judged = self.classifier.judge(inputs_1_F)
         log_error = float(inputs_1_F[0] @ self.error_weights[:-1] + self.error_weights[-1])
         return Diagnosis(
@@ -108,16 +88,34 @@ class Diagnoser:
             bald=float(judged.bald_N[0]),
             expected_error=float(np.clip(np.exp(log_error), SMALLEST_ERROR, LARGEST_ERROR)),
             unlikeness=float(self.classifier.unlikeness(inputs_1_F)[0]),
+            guarantee=Guaranteed.of(self.guarantee, scores_of_states(judged)) if self.guarantee else None,
+            reenacted=reenacted,
         )
 
-    def features(self, observed: np.ndarray, model: np.ndarray, T_icp: np.ndarray) -> np.ndarray:
-        """Return the descriptors (F,) of the pair."""
+    def measured(
+        self, observed: np.ndarray, model: np.ndarray, T_icp: np.ndarray
+    ) -> tuple[np.ndarray, Reenacted | None]:
+        """Return the features (F,) of the pair, and what its re-enactment says, if it has one."""
+        pair = self._pair(observed, model, T_icp)
+        if self.reads == PLAIN:
+            return np.concatenate([*describe_plainly(pair, self.runs.icp).values()]), None
+        if self.reads == REMEDIED:
+            described, _ = describe(pair, self.descriptors, self.runs.icp)
+            return np.concatenate([described[group] for group in GROUPS]), None
+        truth, surface = CauseSettings(**vars(self.runs), moved=self.moved), ModelSurface(pair.model)
+        enactments = reenact(pair, self.reenactment, truth, surface)
+        row = row_of(enactments, pair, self.reenactment, truth)
+        said = Reenacted.of(enactments, row["weight"][: len(enactments)], T_icp, surface)
+        return reenactment_features(Reenactments.of_rows([row], truth))[0], said
+
+    def _pair(self, observed: np.ndarray, model: np.ndarray, T_icp: np.ndarray) -> ObservedPair:
+        """Return the pair with runs of ICP from other starts, as the training has them."""
         observed, model = _drawn(observed, self.points, "observed"), _drawn(model, self.points, "model")
         starts_n = exp(generator("diagnosis", "starts").normal(size=(self.runs.starts, 6)) * self.runs.deviation_6())
         starts_n[0] = T_icp
         T_n, fitness_n, rmse_n = BatchedICP(model, self.runs.icp).register(observed, starts_n)
         T_back = inverse(T_n[0])
-        pair = ObservedPair(
+        return ObservedPair(
             observed=transform(T_n[0], observed),
             model=model,
             T_init=T_back,
@@ -126,31 +124,40 @@ class Diagnoser:
             inlier_rmse_n=rmse_n,
             axes=("diagnosis",),
         )
-        described, _ = describe(pair, self.descriptors, self.runs.icp)
-        return np.concatenate([described[group] for group in GROUPS])
 
     def state(self) -> dict[str, object]:
         """Return tensors, numbers and names for :meth:`from_state`."""
+        own = {REENACTED: "reenactment", REMEDIED: "descriptors"}.get(self.reads)
         return {
+            "reads": self.reads,
             "classifier": self.classifier.state(),
             "error_weights": torch.from_numpy(self.error_weights),
             "threshold": self.threshold,
             "points": self.points,
             "runs": {name: value for name, value in asdict(self.runs).items() if name != "icp"},
             "icp": asdict(self.runs.icp),
-            "descriptors": asdict(self.descriptors),
+            "moved": self.moved,
+            **({own: asdict(getattr(self, own))} if own else {}),
+            "guarantee": self.guarantee and self.guarantee.to_dict(),
+            "held_out": dict(self.held_out),
         }
 
     @classmethod
-    def from_state(cls, state: dict) -> Diagnoser:
-        """Return the diagnoser of a :meth:`state`."""
+    def from_state(cls, state: Mapping) -> Diagnoser:
+        """Return the diagnoser of a :meth:`state`, or of one from before version 4, which read all descriptors."""
         return cls(
             classifier=PairClassifier.from_state(state["classifier"]),
             error_weights=state["error_weights"].numpy(),
             threshold=state["threshold"],
             points=state["points"],
             runs=UncertaintySettings(**state["runs"], icp=ICPSettings(**state["icp"])),
-            descriptors=DescriptorSettings(**state["descriptors"]),
+            reads=state.get("reads", REMEDIED),
+            moved=state.get("moved", OBSERVED),
+            reenactment=ReenactmentSettings(**state.get("reenactment", {})),
+            descriptors=DescriptorSettings(**state.get("descriptors", {})),
+            guarantee=Guarantee.from_dict(state["guarantee"]) if state.get("guarantee") else None,
+            # As in the code, so that one text is one object: of these a file holds one.
+            held_out={intern(name): value for name, value in state.get("held_out", {}).items()},
         )
 
 

@@ -25,7 +25,7 @@ from gpca.causes.truth import NOMINAL
 from gpca.encoders.training import best_device
 from gpca.errors import InputError
 from gpca.model.clouds import Clouds
-from gpca.model.diagnoser import Diagnosis
+from gpca.model.diagnosis import Diagnosis
 from gpca.model.explanation import CHECK, Explanation, PoseSpread
 from gpca.model.familiarity import Void, voids_of
 from gpca.model.file import Model
@@ -35,6 +35,8 @@ from gpca.recovery.policy import NOTHING, Decision, RecoveryPolicy
 from gpca.seeds import generator, seed_of
 from gpca.uncertainty.settings import MONTE_CARLO, UncertaintySettings
 
+NOTHING_REENACTED = "the model is from an older version and re-enacts nothing; make another, or take the package's"
+FAST = "fast: nothing was re-enacted"
 GOOD_FITNESS = 0.9  # from which on an initial pose is not doubted
 INVERSE_COST = 0.5  # of that from the initial pose; where the inverse of this ends with less, it was probably meant
 
@@ -72,6 +74,7 @@ class Explainer:
         diagnose: bool = True,
         method: str | None = None,
         estimator: str = MONTE_CARLO,
+        fast: bool = False,
     ) -> Explanation:
         """Register the source to the target, and say why that is uncertain. The same clouds give the same numbers.
 
@@ -87,6 +90,7 @@ class Explainer:
                 default the model's own ICP, on whose results the classifier was trained.
             estimator: of the uncertainty, where it is measured (docs/estimators.md): one that needs no training
                 registrations. Where it cannot tell, a note says why.
+            fast: whether the diagnosis re-enacts nothing: half the time, and it errs more often.
 
         Raises:
             InputError: too few points, NaN, a unit that cannot be right, source and target of unlike sizes, an initial
@@ -105,12 +109,14 @@ class Explainer:
             at_pose = self._aligned(clouds, register, method, notes)
         voids = voids_of(clouds.source, clouds.target, at_pose.fitness, self.model.familiar)
         diagnosis = None
-        if diagnose and self.model.diagnoser is not None:
+        diagnoser = self.model.fast if fast and self.model.fast else self.model.diagnoser
+        if diagnose and diagnoser is not None:
             with _timed(seconds, "diagnosis"):
-                diagnosis = self.model.diagnoser.diagnose(clouds.source, clouds.target, at_pose.T_target_source)
-            diagnosis = replace(
-                diagnosis, expected_error=diagnosis.expected_error * clouds.frame.diameter, void=bool(voids)
-            )
+                diagnosis = diagnoser.diagnose(clouds.source, clouds.target, at_pose.T_target_source)
+            outside = diagnosis.outside(clouds.frame, clouds.T_target_source_init)
+            diagnosis = replace(outside, void=bool(voids))
+            if diagnosis.reenacted is None:
+                notes.append(FAST if fast else NOTHING_REENACTED)
         with _timed(seconds, "embedding"):
             h_1_d = self.embed(transform(at_pose.T_target_source, clouds.source))
         with _timed(seconds, "attribution"):
@@ -155,6 +161,7 @@ class Explainer:
         diagnose: bool = True,
         method: str | None = None,
         estimator: str = MONTE_CARLO,
+        fast: bool = False,
     ) -> Iterator[Explanation]:
         """Yield the explanation of each pair in turn, as :meth:`explain` gives it.
 
@@ -162,12 +169,12 @@ class Explainer:
 
         Args:
             pairs: source, target, and the pose where ICP starts if it is not the identity.
-            unit, uncertainty, diagnose, method, estimator: as for :meth:`explain`.
+            unit, uncertainty, diagnose, method, estimator, fast: as for :meth:`explain`.
 
         Raises:
             InputError: as :meth:`explain`, when the pair's turn comes; the line names the number of the pair, from 0.
         """
-        options = uncertainty, diagnose, method, estimator
+        options = uncertainty, diagnose, method, estimator, fast
         known, frame = None, None
         for number, (source_points, target_points, *init) in enumerate(pairs):
             try:

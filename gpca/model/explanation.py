@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gpca.model.diagnoser import UNKNOWN, Diagnosis
+from gpca.model.diagnosis import UNKNOWN, Diagnosis
 from gpca.recovery.policy import NOTHING, QUEUE
 
 CHECK = "check"  # the branch of an explanation without meaning: the user checks the input
@@ -118,7 +118,8 @@ class Explanation:
             f"registration   {self.method}, fitness {self.fitness:.3f}, inlier RMSE {self.inlier_rmse:.4g} {self.unit}"
         )
         doubts = [f"warning   {line}" for line in self.warnings]
-        body = [*self._diagnosed(), action, "", *self._attributed()]
+        diagnosed = self.diagnosis.lines(self.unit) if self.diagnosis else []
+        body = [*diagnosed, action, "", *self._attributed()]
         lines = [*doubts, *([f"state     {UNKNOWN}", action] if self.unknown else body), "", registered]
         if self.spread is not None:
             scatter = f"{self.spread.rotation_deg:.2f}°, {self.spread.translation:.4g} {self.unit}"
@@ -128,18 +129,6 @@ class Explanation:
         lines += [" ".join(f"{number:12.6g}" for number in row) for row in self.T_target_source]
         stages = ", ".join(f"{stage} {1e3 * seconds:.1f}" for stage, seconds in self.seconds.items())
         return "\n".join([*lines, "", f"milliseconds   {stages}", ""])
-
-    def _diagnosed(self) -> list[str]:
-        if self.diagnosis is None:
-            return []
-        diagnosis = self.diagnosis
-        named = " and ".join(diagnosis.named) or "nothing is wrong"
-        return [
-            f"state     {diagnosis.state}: {named}",
-            f"failure   probability {diagnosis.failure:.3f}, called a failure from {diagnosis.threshold:.3f}",
-            f"causes    {', '.join(f'{cause} {share:.3f}' for cause, share in diagnosis.causes.items())}, if it failed",
-            f"error     about {diagnosis.expected_error:.2g} {self.unit}",
-        ]
 
     def _attributed(self) -> list[str]:
         return [

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
@@ -13,9 +14,7 @@ from gpca.causes.dataset import LABELS, Causes
 from gpca.causes.settings import CauseSettings
 from gpca.causes.shapley import SUBSETS
 from gpca.errors import InputError
-from gpca.features.dataset import WIDTHS
-from gpca.features.distances import describe_distances
-from gpca.features.motion import describe_motion, describe_starts
+from gpca.features.dataset import WIDTHS, describe_plainly
 from gpca.features.pair import ObservedPair, displacements, observed_pair
 from gpca.io.arrays import REAL, REGENERATE, TEXT, WHOLE, load_arrays, save_arrays
 from gpca.io.names import Axes
@@ -68,6 +67,20 @@ class Reenactments:
     verdict: np.ndarray
     axes: Axes | None
 
+    @classmethod
+    def of_rows(
+        cls, rows: Sequence[Mapping[str, np.ndarray]], truth: CauseSettings, registrations: Registrations | None = None
+    ) -> Reenactments:
+        """Return those of the rows of pairs (:func:`row_of`), which may be of no registrations of a file."""
+        arrays = {name: np.array([row[name] for row in rows]) for name in SHAPES}
+        return cls(
+            sample=np.arange(len(rows)) if registrations is None else registrations.sample,
+            split=np.full(len(rows), "") if registrations is None else registrations.split,
+            **arrays,
+            verdict=verdict(arrays["error"], arrays["weight"], truth.limits),
+            axes=None if registrations is None else registrations.axes,
+        )
+
     def save(self, path: str | Path) -> None:
         """Write the npz described in results/README.md."""
         names = ("sample", "split", *SHAPES, "verdict")
@@ -102,20 +115,18 @@ def reenact_all(
         started = perf_counter()
         pair = observed_pair(causes, row, source, seed, "reenactment")
         enactments = reenact(pair, settings, truth)
-        described = np.concatenate([*describe_distances(pair), describe_motion(pair), describe_starts(pair, truth.icp)])
-        rows.append(as_arrays(enactments, pair, settings.hypotheses) | {"described": described})
+        rows.append(row_of(enactments, pair, settings, truth))
         seconds.append(perf_counter() - started)
         icp_seconds.append(sum(enactment.icp_seconds for enactment in enactments))
-    arrays = {name: np.array([of_row[name] for of_row in rows]) for name in SHAPES}
-    registrations = causes.registrations
-    found = Reenactments(
-        sample=registrations.sample,
-        split=registrations.split,
-        **arrays,
-        verdict=verdict(arrays["error"], arrays["weight"], truth.limits),
-        axes=registrations.axes,
-    )
-    return found, np.array(seconds), np.array(icp_seconds)
+    return Reenactments.of_rows(rows, truth, causes.registrations), np.array(seconds), np.array(icp_seconds)
+
+
+def row_of(
+    enactments: list[Enactment], pair: ObservedPair, settings: ReenactmentSettings, truth: CauseSettings
+) -> dict[str, np.ndarray]:
+    """Return the arrays of one pair, see :class:`Reenactments`."""
+    described = np.concatenate([*describe_plainly(pair, truth.icp).values()])
+    return as_arrays(enactments, pair, settings.hypotheses) | {"described": described}
 
 
 def as_arrays(enactments: list[Enactment], pair: ObservedPair, most: int) -> dict[str, np.ndarray]:

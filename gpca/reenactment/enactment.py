@@ -45,13 +45,16 @@ class Enactment:
         return shapley_values(self.error_8[None])[0]
 
 
-def reenact(pair: ObservedPair, settings: ReenactmentSettings, truth: CauseSettings) -> list[Enactment]:
+def reenact(
+    pair: ObservedPair, settings: ReenactmentSettings, truth: CauseSettings, surface: ModelSurface | None = None
+) -> list[Enactment]:
     """Find hypotheses of the true pose and enact each, the most probable first.
 
     Args:
         truth: how the truth's counterfactuals are registered; what it says of candidates is not read.
+        surface: that of the model, where it is known already.
     """
-    surface = ModelSurface(pair.model)
+    surface = surface or ModelSurface(pair.model)
     before = transform(pair.T_init, pair.observed)
     T_found_n = pair.T_runs @ inverse(pair.T_init)
     random = generator(*pair.axes, "hypotheses")

@@ -20,6 +20,7 @@ from gpca.reenactment.surface_kernels import nearest_rows
 JUDGED = 256  # points over which an error is the mean
 COMPARED = 64  # points that tell whether two poses are the same
 TRIMMED = 0.94  # share of the residuals that count, the smallest: outliers are at most a twentieth
+LEAST_SPACING = 1e-4  # diameters; a user's cloud may hold every point twice
 CORNER = 1.5  # of the spacing: so far from a point, along its plane, its surface reaches
 
 
@@ -41,7 +42,7 @@ class ModelSurface:
         self.tree = cKDTree(self.points)
         neighbors = min(_neighbors(len(points)), len(points) - 1)
         distances, rows = self.tree.query(self.points, neighbors + 1)
-        self.spacing = float(np.median(distances[:, 1]))
+        self.spacing = max(float(np.median(distances[:, 1])), LEAST_SPACING)
         self.spacing_M = distances[:, 1:4].mean(axis=1)
         around = self.points[rows]  # each point first
         self.centers, axes = _planes(around)
@@ -52,9 +53,14 @@ class ModelSurface:
         self.roughness = max(trimmed_square(left_out) - trimmed_square(own), 0.0)
 
     @cached_property
+    def symmetries(self) -> dict[str, list]:
+        """The turns that leave the shape as it is (:func:`gpca.objects.symmetry.find_symmetries`)."""
+        return find_symmetries(self.points, 1.0)
+
+    @property
     def symmetric(self) -> bool:
         """Whether some turn leaves the shape as it is; errors then are those of the nearest points."""
-        return bool(find_symmetries(self.points, 1.0))
+        return bool(self.symmetries)
 
     def residuals(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the signed distances (N,) of points (N, 3) from the plane of the nearest model point, and its row."""

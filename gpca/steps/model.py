@@ -11,8 +11,6 @@ from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.weights import load_model
-from gpca.features.dataset import Descriptors
-from gpca.features.settings import DescriptorSettings
 from gpca.model.familiarity import Familiarity
 from gpca.model.file import Model
 from gpca.model.learning import Lessons, joined, learn
@@ -21,18 +19,20 @@ from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
 from gpca.recovery.policy import RecoveryPolicy
+from gpca.reenactment.dataset import Reenactments
+from gpca.reenactment.settings import ReenactmentSettings
 
 
 def run(job: Job) -> None:
-    """Fit both classifiers and write them with the encoder and the policy."""
-    inputs = [job.registrations, job.encoder, job.embeddings, *job.causes, *job.descriptors]
+    """Fit all classifiers and write them with the encoder and the policy."""
+    inputs = [job.registrations, job.encoder, job.embeddings, *job.causes, *job.reenactments]
     with record_provenance([job.out], inputs, job.settings, seed=job.seed):
         icp, own = job.section("registrations").get("icp", {}), job.section("model")
-        diagnoser, bald_N = learn(
-            joined([_lessons(*files) for files in zip(job.causes, job.descriptors, strict=True)]),
+        diagnoser, fast, bald_N = learn(
+            joined([_lessons(*files) for files in zip(job.causes, job.reenactments, strict=True)]),
             GPCSettings(**own.get("classifier", {})),
             CauseSettings.from_dict(job.section("causes") | own.get("causes", {}), icp),
-            DescriptorSettings(**job.section("descriptors")),
+            ReenactmentSettings(**job.section("reenactment")),
             own.get("false_alarms", 0.05),
             *("model", job.seed),
         )
@@ -41,6 +41,7 @@ def run(job: Job) -> None:
         registrations = Registrations.load(job.registrations, axes)
         Model(
             diagnoser=diagnoser,
+            fast=fast,
             encoder=load_model(job.encoder, settings, axes=axes).encoder,
             encoder_settings=settings,
             gpc=_gpc(job, registrations, GPCSettings(**job.section("gpc"))),
@@ -60,9 +61,9 @@ def run(job: Job) -> None:
         ).save(job.out)
 
 
-def _lessons(causes_file: Path, descriptors_file: Path) -> Lessons:
+def _lessons(causes_file: Path, reenactments_file: Path) -> Lessons:
     causes = Causes.load(causes_file)
-    return Lessons.of(causes, Descriptors.load(descriptors_file, causes.registrations))
+    return Lessons.of(causes, Reenactments.load(reenactments_file, causes.registrations))
 
 
 def _gpc(job: Job, registrations: Registrations, settings: GPCSettings) -> GPC:

@@ -1,5 +1,6 @@
 """What is said of a pair of clouds: by its descriptors, the same whatever is around it."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +9,9 @@ import pytest
 from gpca.alignment.rigid import transform
 from gpca.alignment.twist import exp
 from gpca.features.dataset import WIDTHS
-from gpca.model.diagnoser import Diagnoser, Diagnosis
+from gpca.model.diagnoser import PLAIN_WIDTH, Diagnoser
+from gpca.model.diagnosis import Diagnosis
+from gpca.reenactment.features import FEATURES
 
 SMALL_MOTION = exp(np.array([[0.05, -0.02, 0.03, 0.01, 0.02, -0.01]]))[0]
 
@@ -19,23 +22,50 @@ def cloud():
     return points * np.array([0.5, 0.3, 0.2]) / np.sqrt(np.square(points).sum(axis=1, keepdims=True))
 
 
-def test_descriptors_do_not_depend_on_where_icp_was_started_but_for_the_motion(diagnoser, cloud):
-    diagnoser = replace(diagnoser, points=1024)
-    here = diagnoser.features(cloud, cloud[::2], np.eye(4))
-    assert here.shape == (sum(WIDTHS.values()),)
-    moved = diagnoser.features(transform(np.linalg.inv(SMALL_MOTION), cloud), cloud[::2], SMALL_MOTION)
+def test_descriptors_do_not_depend_on_where_icp_was_started_but_for_the_motion(diagnosers, cloud):
+    fast = replace(diagnosers[1], points=1024)
+    here, _ = fast.measured(cloud, cloud[::2], np.eye(4))
+    assert here.shape == (PLAIN_WIDTH,)
+    moved, _ = fast.measured(transform(np.linalg.inv(SMALL_MOTION), cloud), cloud[::2], SMALL_MOTION)
     distances = WIDTHS["distances"]
     np.testing.assert_allclose(moved[:distances], here[:distances], atol=5e-3)
     rotation = distances + WIDTHS["planes"]
     assert moved[rotation] - here[rotation] == pytest.approx(np.sqrt(0.05**2 + 0.02**2 + 0.03**2), abs=0.01)
 
 
-def test_the_same_clouds_give_the_same_diagnosis_also_after_the_way_to_a_file(diagnoser, cloud):
+def test_one_that_reenacts_also_reads_what_the_other_reads(diagnosers, cloud):
+    full, fast = diagnosers
+    features, said = full.measured(cloud, cloud[::2], np.eye(4))
+    plain, nothing = fast.measured(cloud, cloud[::2], np.eye(4))
+    np.testing.assert_array_equal(features[-PLAIN_WIDTH:], plain)
+    assert features.shape == (len(FEATURES) + PLAIN_WIDTH,)
+    assert nothing is None
+    assert said.error == pytest.approx(np.exp(features[FEATURES.index("mean_error_7")]))
+    assert said.noise == features[FEATURES.index("first_noise")]
+
+
+@pytest.mark.parametrize("kind", [0, 1])
+def test_the_same_clouds_give_the_same_diagnosis_also_after_the_way_to_a_file(diagnosers, kind, cloud):
+    diagnoser = diagnosers[kind]
     first = diagnoser.diagnose(cloud, cloud[::2], np.eye(4))
-    assert first == Diagnoser.from_state(diagnoser.state()).diagnose(cloud, cloud[::2], np.eye(4))
+    again = Diagnoser.from_state(diagnoser.state()).diagnose(cloud, cloud[::2], np.eye(4))
+    assert json.dumps(first.as_dict()) == json.dumps(again.as_dict())
     assert 0 <= first.failure <= 1
     assert set(first.causes) == set(first.variances) == {"noise", "pose", "overlap"}
     assert 1e-3 <= first.expected_error <= 0.5
+    assert first.guarantee.states
+    assert (first.reenacted is None) == (kind == 1)
+
+
+def test_one_of_a_model_from_before_version_4_reads_what_it_learned(diagnosers, cloud):
+    state = {**diagnosers[1].state(), "descriptors": {"starts": 1, "restarts": 2, "icp_points": 64}}
+    for name in ("reads", "moved", "guarantee", "held_out"):
+        del state[name]
+    older = Diagnoser.from_state(state)
+    features, said = older.measured(cloud, cloud[::2], np.eye(4))
+    assert features.shape == (sum(WIDTHS.values()),)
+    assert said is None
+    assert older.guarantee is None
 
 
 CAUSES = {"noise": 0.2, "pose": 0.9, "overlap": 0.6}

@@ -81,6 +81,67 @@ def test_what_failed_is_treated_by_its_causes(model, pair):
     assert in_mm.diagnosis.expected_error == pytest.approx(1e3 * found.expected_error, rel=0.1)
 
 
+def test_a_reenactment_finds_the_pose_that_a_registration_missed(explainer):
+    source, target = ell(400, 0), ell(500, 1)
+    T_start = exp(np.array([[0, 0, np.pi / 2, 0, 0, 0]]))[0]  # from here ICP does not come back
+    said = explainer.explain(transform(T_start, source), target)
+    best = said.diagnosis.reenacted.poses[0]
+    assert not best.registered
+    error = transform(best.T_target_source, transform(T_start, source)) - source
+    assert np.sqrt(np.square(error).sum(axis=1)).mean() < 0.005
+    assert f"pose 1    the object fits {best.words('m', 'fits')[5:]}: probability " in said.text()
+    in_mm = explainer.explain(1e3 * transform(T_start, source), 1e3 * target, unit="mm").diagnosis.reenacted
+    assert in_mm.error == pytest.approx(1e3 * said.diagnosis.reenacted.error, rel=1e-6)
+    assert in_mm.poses[0].shift == pytest.approx(1e3 * best.shift, rel=1e-6)
+
+
+def test_a_turn_about_the_axis_of_a_symmetric_object_is_no_other_pose(explainer):
+    random = np.random.default_rng(2)
+    turn, height = random.uniform(0, 2 * np.pi, (2, 600)), random.uniform(-0.06, 0.06, (2, 600))
+    source, target = np.stack([0.03 * np.cos(turn), 0.03 * np.sin(turn), height], axis=2)
+    T_start = exp(np.array([[0, 0, 1.0, 0, 0, 0]]))[0]
+    poses = explainer.explain(transform(T_start, source), target).diagnosis.reenacted.poses
+    assert poses[0].registered
+    assert poses[0].turn_deg < 10
+    assert sum(pose.registered for pose in poses) == 1
+
+
+def test_clouds_of_which_no_surface_can_be_made_are_explained_all_the_same(explainer):
+    cloud = ell(64, 3)
+    for target in (np.repeat(cloud, 2, axis=0), cloud * np.array([1, 1, 0.0]), np.repeat(cloud[:5], 20, axis=0)):
+        said = explainer.explain(cloud, target).diagnosis
+        assert np.isfinite([said.failure, said.reenacted.error, *said.reenacted.effects.values()]).all()
+
+
+def test_a_fast_explanation_reenacts_nothing_and_says_so(explainer, model, pair):
+    said = explainer.explain(*pair, fast=True)
+    assert said.diagnosis.reenacted is None
+    assert said.diagnosis.threshold == model.fast.threshold
+    assert "fast: nothing was re-enacted" in said.notes
+    assert "(nothing was re-enacted)" in said.text()
+    [again] = explainer.explain_many([pair], fast=True)
+    assert again.diagnosis == said.diagnosis
+
+
+def test_a_model_without_reenactment_says_so(model, pair):
+    older = replace(model, diagnoser=replace(model.fast, guarantee=None), fast=None)
+    said = Explainer(older, device="cpu").explain(*pair)
+    assert any("re-enacts nothing; make another" in note for note in said.notes)
+    assert said.as_dict()["diagnosis"]["guarantee"] is None
+    assert Explainer(older, device="cpu").explain(*pair, fast=True).diagnosis == said.diagnosis
+
+
+def ell(n, seed):
+    """Points on two bars of unlike lengths that form an L of 10 cm."""
+    random = np.random.default_rng(seed)
+    long = random.random(n) < 0.6
+    sizes = np.where(long[:, None], (0.1, 0.03, 0.02), (0.03, 0.06, 0.02))
+    points = random.random((n, 3)) * sizes
+    side = random.integers(3, size=n)
+    points[np.arange(n), side] = np.where(random.random(n) < 0.5, 0, sizes[np.arange(n), side])
+    return points + np.where(long[:, None], 0.0, (0.0, 0.03, 0.0))
+
+
 def test_gpca_alone_decides_where_nothing_is_diagnosed(explainer, model, pair):
     said = explainer.explain(*pair, diagnose=False)
     assert said.diagnosis is None

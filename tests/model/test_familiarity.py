@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gpca import Explainer
-from gpca.model.diagnoser import UNKNOWN
+from gpca.model.diagnosis import UNKNOWN
 from gpca.model.explanation import CHECK, WORDS
 from gpca.model.familiarity import MEASURES, Familiarity, hidden_share, measure, voids_of
 from gpca.objects.canonical import canonical_cloud

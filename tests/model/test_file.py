@@ -48,14 +48,18 @@ def test_the_same_model_is_written_in_the_same_bytes(model, path, tmp_path):
 
 
 def test_what_all_classifiers_of_the_diagnosis_learnt_stands_in_the_file_once(path):
-    state = torch.load(path, weights_only=True)["diagnoser"]["classifier"]
-    assert len({gpc["labelled"].data_ptr() for gpc in (state["failure"], *state["causes"])}) == 1
+    content = torch.load(path, weights_only=True)
+    states = [content[part]["classifier"] for part in ("diagnoser", "fast")]
+    learned = [gpc["labelled"] for state in states for gpc in (state["failure"], *state["causes"])]
+    assert len({inputs.untyped_storage().data_ptr() for inputs in learned}) == 1
+    assert len({inputs.shape for inputs in learned}) == 2
 
 
 def test_a_file_that_holds_it_four_times_says_the_same_and_is_written_smaller(model, path, tmp_path):
     content = torch.load(path, weights_only=True)
-    for gpc in content["diagnoser"]["classifier"]["causes"]:
-        gpc["labelled"] = gpc["labelled"].clone()
+    for part in ("diagnoser", "fast"):
+        for gpc in content[part]["classifier"]["causes"]:
+            gpc["labelled"] = gpc["labelled"].clone()
     torch.save(content, tmp_path / "large.pt")
     assert (tmp_path / "large.pt").stat().st_size > path.stat().st_size
     Model.load(tmp_path / "large.pt").save(tmp_path / "small.pt")
@@ -89,7 +93,7 @@ def changed(**changes):
         (lambda path: os.truncate(path, 1000), "is damaged or not a model"),
         (lambda path: path.write_bytes(pickle.dumps(print, protocol=2)), "is damaged or not a model"),
         (lambda path: torch.save({"weights": torch.zeros(3)}, path), "is not a model"),
-        (changed(version=7), "is a model of version 7, not 3; make one with"),
+        (changed(version=7), "is a model of version 7, not 4; make one with"),
         (changed(gpc=None), "missing or damaged parts .*'gpc'"),
         (changed(encoder={}), "missing or damaged parts"),
     ],

@@ -28,6 +28,15 @@ def every_weight(change):
     return lambda content: content.update(encoder={name: change(w) for name, w in content["encoder"].items()})
 
 
+def trees_of(roots=(0,), feature=(0, -1, -1), number=(0, 1, 2), right=(2, 1, 2)):
+    """One question's only tree: a node and two leaves."""
+    parts = {
+        "roots": torch.tensor(roots, dtype=torch.int32), "right": torch.tensor(right, dtype=torch.int32),
+        "feature": torch.tensor(feature, dtype=torch.int16), "number": torch.tensor(number, dtype=torch.float64),
+    }  # fmt: skip
+    return {"baseline": 0.0, **parts}
+
+
 CONTENTS = {
     "weights of NaN": lambda content: weight(content).fill_(NAN),
     "one weight of infinity": lambda content: weight(content).view(-1)[3:4].fill_(float("inf")),
@@ -83,14 +92,30 @@ CONTENTS = {
     "no settings": drop("encoder_settings"),
     "no thresholds": drop("thresholds"),
     "no title": drop("title"),
-    "another version": put("version", 4),
+    "another version": put("version", 5),
     "another format": put("format", "a model"),
     "a threshold of failure of NaN": put("diagnoser/threshold", NAN),
     "errors of other descriptors": put("diagnoser/error_weights", lambda w: w[:-1]),
     "quantiles of other descriptors": put("diagnoser/classifier/quantiles", lambda q: q[:, :-1]),
     "quantiles that fall": put("diagnoser/classifier/quantiles", lambda q: q.flip(0)),
     "1e9 starts": put("diagnoser/runs/starts", HUGE),
-    "an angle of NaN": put("diagnoser/descriptors/restart_rotation_deg", NAN),
+    "an angle of NaN": put("diagnoser/reenactment/bad_rotation_deg", NAN),
+    "1e9 hypotheses": put("diagnoser/reenactment/hypotheses", HUGE),
+    "no way to move": put("diagnoser/moved", "both"),
+    "features that nobody measures": put("diagnoser/reads", "tea leaves"),
+    "features of the other diagnoser": put("fast/reads", "reenacted"),
+    "trees for three questions": put("diagnoser/classifier/trees", lambda trees: trees[:3]),
+    "trees without end": put("fast/classifier/trees", lambda trees: [trees_of(right=[1, 1, 1])] * 4),
+    "trees that lead elsewhere": put("fast/classifier/trees", lambda trees: [trees_of(right=[9, 1, 2])] * 4),
+    "trees that start elsewhere": put("fast/classifier/trees", lambda trees: [trees_of(roots=[3])] * 4),
+    "trees of other features": put("fast/classifier/trees", lambda trees: [trees_of(feature=[999, -1, -1])] * 4),
+    "trees of NaN": put("fast/classifier/trees", lambda trees: [trees_of(number=[NAN, 0, 0])] * 4),
+    "trees of text": put("fast/classifier/trees", [{"roots": "0"}] * 4),
+    "a guarantee of other states": put("diagnoser/guarantee/sets/states", list("abcde")),
+    "a guarantee of NaN": put("diagnoser/guarantee/sets/level", NAN),
+    "a guarantee of nothing": put("diagnoser/guarantee", {"sets": 1}),
+    "measures of text": put("diagnoser/held_out/samples", "many"),
+    "a fast diagnoser of nothing": put("fast", {"reads": "plain"}),
     "1e9 points of a description": put("diagnoser/points", HUGE),
     "a cause without a classifier": put("diagnoser/classifier/causes", lambda causes: causes[:2]),
     "states in another order": put("diagnoser/classifier/failure/classes", ["failed", "nominal"]),

@@ -57,7 +57,7 @@ LISTS = {  # which names of a step are lists, and not of one seed, file or name
     "readings": "registrations sets poses predictions embeddings",
     "exchange": "seeds registrations encoders out",
     "attribute": "seeds registrations embeddings uncertainty uncertainty_timings input_timings predictions timings",
-    "model": "causes descriptors",
+    "model": "causes reenactments",
     "reduce": "seeds embeddings out",
     "train": "registrations registrations_of",
     "uncertainty": "seeds registrations outcomes tables timings",

@@ -214,11 +214,11 @@ STEP_OPTIONS = {
     "model": COMMON | {
         "--settings": {"encoder": ENCODER, "gpc": {"iterations": 5, "inducing": 6, "draws": 20},
                        "registrations": {"cloud_points": 128}, "recovery": POLICY, "causes": CAUSES,
-                       "descriptors": {"starts": 1, "restarts": 2, "icp_points": 64},
+                       "reenactment": {"hypotheses": 2},
                        "model": {"classifier": {"iterations": 5, "inducing": 6, "draws": 20}}},
         "--title": "Tiny", "--stand-in": [], "--seed": 0, "--registrations": "registrations.npz",
         "--encoder": "weights.pt", "--embeddings": "embeddings.npz", "--causes": "causes.npz",
-        "--descriptors": "descriptors.npz", "--out": "model.pt",
+        "--reenactments": "reenactments.npz", "--out": "model.pt",
     },
     "runtime": COMMON | {
         "--settings": {"runtime": {"repeats": 2}, "active_learning": LEARNING}, "--seed": 0, "--model": "model.pt",

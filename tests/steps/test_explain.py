@@ -54,6 +54,33 @@ def test_an_explanation_is_on_stdout_and_what_led_to_it_on_stderr(folder, capsys
         assert word in text
 
 
+def test_a_diagnosis_says_what_it_rests_on_and_fast_that_it_rests_on_less(folder, capsys):
+    assert main(arguments("explain", {})) == 0
+    diagnosis = json.loads(capsys.readouterr().out)["diagnosis"]
+    assert set(diagnosis["reenacted"]["effects"]) == {"noise", "pose", "overlap"}
+    assert sum(pose["probability"] for pose in diagnosis["reenacted"]["poses"]) == pytest.approx(1)
+    assert set(diagnosis["guarantee"]["states"]) <= {"nominal", "noise", "pose", "overlap", "several"}
+    assert diagnosis["guarantee"]["level"] == 0.9
+    assert diagnosis["guarantee"]["call"] in ("good", "not sure", "failed")
+    assert main(arguments("explain", {"--fast": []})) == 0
+    out, err = capsys.readouterr()
+    assert json.loads(out)["diagnosis"]["reenacted"] is None
+    assert json.loads(out)["diagnosis"]["guarantee"]["level"] == 0.9
+    assert "fast: nothing was re-enacted\n" in err
+    assert main(arguments("explain", {"--json": None})) == 0
+    text = capsys.readouterr().out
+    for words in (
+        "\nset       ",
+        "\nalarm     ",
+        "\nre-enacted error ",
+        "\nobserved  noise of ",
+        "\npose 1    the object fits ",
+    ):
+        assert words in text
+    assert main(arguments("explain", {"--json": None, "--fast": []})) == 0
+    assert "(nothing was re-enacted)" in capsys.readouterr().out
+
+
 # What loads for tenths of a second or more, and what of that an explanation by the model's own ICP needs.
 HEAVY = {"torch", "numba", "scipy", "trimesh", "gpytorch", "sklearn", "pandas", "sympy", "open3d", "torch._dynamo"}
 NEEDED = {"torch", "numba", "scipy", "trimesh", "gpytorch"}

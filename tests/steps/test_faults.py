@@ -200,6 +200,9 @@ FAULTS = {
         (removed("weights.pt"), {}, "weights.pt: no such weights"),
         (removed("embeddings.npz"), {}, "embeddings.npz: no such file"),
         (removed("causes.npz"), {}, "causes.npz: no such file"),
+        (removed("reenactments.npz"), {}, "reenactments.npz: no such file"),
+        (arrays_changed("reenactments.npz", sample=later), {}, "reenactments.npz: its samples differ"),
+        (arrays_changed("reenactments.npz", error=nan), {}, "array 'error' contains NaN"),
     ],
     "runtime": [(removed("model.pt"), {}, "model.pt: no such model; make one with 'make results'")],
 }

@@ -11,7 +11,7 @@ MODEL_SETTINGS = {
         name: config["registrations"][name] for name in ("cloud_points", "icp")
     },
     "causes": config["causes"],
-    "descriptors": DIAGNOSIS["descriptors"],
+    "reenactment": DIAGNOSIS["reenactment"],
     "model": {
         name: config["model"][name] for name in ("causes", "classifier", "false_alarms")
     },
@@ -36,18 +36,26 @@ use rule sample_causes as sample_model_causes with:
         settings=as_json(config["causes"] | config["model"]["causes"] | ICP),
 
 
-use rule describe as describe_model_causes with:
+use rule reenact as reenact_model_causes with:
     input:
         causes="<results>/model_causes/{source}/seed{seed}.npz",
         causes_timings="<results>/timings/{source}/model_causes/seed{seed}.csv",
-        code=code_files("gpca.steps.describe"),
+        code=code_files("gpca.steps.reenact"),
     output:
-        descriptors="<results>/model_descriptors/{source}/seed{seed}.npz",
-        timings="<results>/timings/{source}/model_descriptors/seed{seed}.csv",
+        reenactments="<results>/model_reenactments/{source}/seed{seed}.npz",
+        timings="<results>/timings/{source}/model_reenactments/seed{seed}.csv",
     log:
-        "<logs>/model_descriptors/{source}/seed{seed}.log",
+        "<logs>/model_reenactments/{source}/seed{seed}.log",
     benchmark:
-        "<benchmarks>/model_descriptors/{source}/seed{seed}.tsv"
+        "<benchmarks>/model_reenactments/{source}/seed{seed}.tsv"
+    params:
+        settings=as_json(
+            {
+                "reenactment": DIAGNOSIS["reenactment"],
+                "causes": config["causes"] | config["model"]["causes"],
+            }
+            | ICP
+        ),
 
 
 rule model:
@@ -59,8 +67,8 @@ rule model:
             source=SOURCES,
             seed=SEEDS[0],
         ),
-        descriptors=collect(
-            "<results>/model_descriptors/{source}/seed{seed}.npz",
+        reenactments=collect(
+            "<results>/model_reenactments/{source}/seed{seed}.npz",
             source=SOURCES,
             seed=SEEDS[0],
         ),

@@ -1,0 +1,117 @@
+"""What a re-enactment says to a user: other poses in plain words, and what each cause does."""
+
+import json
+
+import numpy as np
+import pytest
+
+from gpca.alignment.canonical_frame import CanonicalFrame
+from gpca.alignment.rigid import transform
+from gpca.alignment.twist import exp
+from gpca.causes.shapley import ALL, shapley_values
+from gpca.model.reenacted import Reenacted, axis_in_words
+from gpca.reenactment.enactment import Enactment
+from gpca.reenactment.hypotheses import Hypothesis
+from gpca.reenactment.observation import Observation
+from gpca.reenactment.surface import ModelSurface
+
+ERRORS = np.arange(8) / 100
+T_RESULT = exp(np.array([[0.2, -0.1, 0.3, 0.05, 0.02, -0.04]]))[0]
+
+
+def moved(turn_deg=(0, 0, 0), shift=(0, 0, 0)):
+    """The result, turned and shifted in the target's frame."""
+    return exp(np.array([[*np.deg2rad(turn_deg), 0, 0, 0]]))[0] @ exp(np.array([[0, 0, 0, *shift]]))[0] @ T_RESULT
+
+
+def enacted(T):
+    """An enactment of this hypothesis, with noise of 2 %, a quarter outliers and half of the surface missing."""
+    hypothesis = Hypothesis(T, np.ones(4), 0.0, 0.01, 1.0, 0.0)
+    outlier = np.array([True, False, False, False])
+    seen = Observation(np.zeros((4, 3)), outlier, 0.02, np.zeros(4), np.arange(4), np.arange(10) < 5)
+    return Enactment(hypothesis, seen, None, ERRORS, np.zeros(8), 0.0)
+
+
+def said(points, *poses):
+    weights = np.arange(len(poses), 0, -1) / (len(poses) * (len(poses) + 1) / 2)
+    return Reenacted.of([enacted(T) for T in poses], weights, T_RESULT, ModelSurface(points))
+
+
+@pytest.fixture(scope="module")
+def drill(four):
+    index = four.names.index("035_power_drill")
+    return four.points(index)[:600].astype(float) / four.diameters_m[index]
+
+
+@pytest.fixture(scope="module")
+def cylinder():
+    """Points of a cylinder around the z axis, of diameter 1, and of its two ends."""
+    random = np.random.default_rng(0)
+    turn, height, out = random.uniform(0, 2 * np.pi, 2000), random.uniform(-0.4, 0.4, 2000), np.full(2000, 0.3)
+    out[:600], height[:600] = 0.3 * np.sqrt(random.random(600)), np.where(np.arange(600) % 2, 0.4, -0.4)
+    return np.column_stack([out * np.cos(turn), out * np.sin(turn), height])
+
+
+def test_poses_are_named_by_where_they_lie_from_the_result(drill):
+    found = said(drill, T_RESULT, moved((0, 0, 90)), moved(shift=(0.1, 0, 0)), moved((30, 30, 30), (0, 0.05, 0)))
+    assert [pose.registered for pose in found.poses] == [True, False, False, False]
+    assert [round(pose.turn_deg) for pose in found.poses] == [0, 90, 0, 52]
+    assert found.poses[3].shift == pytest.approx(0.05)
+    assert sum(pose.probability for pose in found.poses) == pytest.approx(1)
+    lines = found.outside(CanonicalFrame(np.zeros(3), 200.0), np.eye(4)).lines("mm")[2:]
+    assert lines[0].startswith("pose 1    the object fits as registered, within ")
+    assert lines[0].endswith(" mm: probability 0.40")
+    assert lines[1].startswith("pose 2    the object also fits turned by 90° about the target's z axis, ")
+    assert lines[2] == "pose 3    the object also fits moved by 20 mm: probability 0.20"
+    assert "turned by 52° about the axis (0.58, 0.58, 0.58) of the target's frame, 10 mm away" in lines[3]
+
+
+def test_where_the_likeliest_pose_is_another_the_text_says_so(drill):
+    [line] = said(drill, moved((180, 0, 0))).lines("m")[2:]
+    assert line.startswith("pose 1    the object fits turned by 180° about the target's x axis, ")
+    assert line.endswith("probability 1.00")
+
+
+def test_a_turn_that_leaves_a_symmetric_object_as_it_is_is_none(cylinder):
+    same, along, over = said(cylinder, moved((0, 0, 37)), moved((0, 0, 73), (0, 0, 0.1)), moved((40, 0, 0))).poses
+    assert same.registered
+    assert same.turn_deg == pytest.approx(0, abs=1e-3)
+    assert not along.registered
+    assert along.turn_deg == pytest.approx(0, abs=1e-3)
+    assert along.words("m", "fits") == "fits moved by 0.1 m"
+    assert over.turn_deg == pytest.approx(40)
+    upside_down = said(cylinder, moved((180, 0, 0))).poses[0]
+    assert upside_down.registered
+
+
+def test_effects_add_up_and_lengths_are_in_the_users_unit(drill):
+    found = said(drill, T_RESULT, moved((0, 90, 0)))
+    assert found.error == pytest.approx(ERRORS[ALL])
+    np.testing.assert_allclose(list(found.effects.values()), shapley_values(ERRORS[None])[0])
+    assert sum(found.effects.values()) == pytest.approx(ERRORS[ALL] - ERRORS[0])
+    assert (found.noise, found.outliers, found.missing) == (0.02, 0.25, 0.5)
+    outside = found.outside(CanonicalFrame(np.array([1.0, 2.0, 3.0]), 10.0), np.eye(4))
+    assert outside.error == pytest.approx(0.7)
+    assert outside.noise == pytest.approx(0.2)
+    assert outside.effects["pose"] == pytest.approx(10 * found.effects["pose"])
+    first, second = outside.lines("mm")[:2]
+    assert first == "re-enacted error 0.7 mm, to which the causes add: noise 0.1, pose 0.2, overlap 0.4"
+    assert second == "observed  noise of 0.2 mm, 25% outliers, 50% of the surface missing"
+
+
+def test_a_pose_takes_the_users_source_to_the_users_target(drill):
+    frame = CanonicalFrame(np.array([1.0, 2.0, 3.0]), 10.0)
+    T_init = exp(np.array([[0.1, 0.2, 0.3, 5.0, 6.0, 7.0]]))[0]
+    T = moved((0, 90, 0))
+    outside = said(drill, T).outside(frame, T_init)
+    source = np.random.default_rng(1).normal(size=(5, 3))
+    expected = transform(T, frame.coordinates(transform(T_init, source)))
+    np.testing.assert_allclose(frame.coordinates(transform(outside.poses[0].T_target_source, source)), expected)
+    plain = json.loads(json.dumps(outside.as_dict()))
+    assert np.array(plain["poses"][0]["T_target_source"]).shape == (4, 4)
+    assert set(plain) == {"error", "effects", "noise", "outliers", "missing", "poses"}
+
+
+def test_an_axis_has_a_name_where_it_is_nearly_one_of_the_targets():
+    assert axis_in_words((0.1, -0.99, 0.05)) == "the target's y axis"
+    assert axis_in_words((0.6, 0.8, 0.0)) == "the axis (0.60, 0.80, 0.00) of the target's frame"
