@@ -28,6 +28,7 @@ from gpca.reenactment.dataset import Reenactments
 from gpca.reenactment.features import reenactment_features
 from gpca.reenactment.settings import ReenactmentSettings
 
+MOST_REENACTED = 512  # points of a user's cloud: with twice as many, a re-enactment takes more than half a second
 RIDGE = 10.0  # of the regression of the error, in samples
 FOLDS = 3  # of the families
 LEVEL = 0.9  # probability that a set of states holds the true one
@@ -93,12 +94,15 @@ def learn(
     The threshold of failure is the one that at most the share `false_alarms` of the nominal registrations of new
     families reaches.
     """
-    settings: dict[str, Any] = {
-        "points": causes.points[1], "runs": causes.runs(), "moved": causes.moved, "reenactment": reenactment,
-    }  # fmt: skip
+    settings: dict[str, Any] = {"runs": causes.runs(), "moved": causes.moved, "reenactment": reenactment}
     full, bald_N = _learned(lessons, gpc, false_alarms, *axes)
     fast, _ = _learned(lessons.plain(), gpc, false_alarms, *axes)
-    return Diagnoser(**full, **settings, reads=REENACTED), Diagnoser(**fast, **settings, reads=PLAIN), bald_N
+    points = causes.points[1]
+    return (
+        Diagnoser(**full, **settings, reads=REENACTED, points=min(points, MOST_REENACTED)),
+        Diagnoser(**fast, **settings, reads=PLAIN, points=points),
+        bald_N,
+    )
 
 
 def _learned(
