@@ -83,6 +83,21 @@ def test_counterparts_name_what_the_config_makes():
     assert {method for file, method in named if file == "kernels.csv"} == known["kernels.csv"]
 
 
+def test_table_vs_gpc_is_the_matern_row_whose_values_it_prints():
+    of_key = {number.key: number for number in NUMBERS}
+    learner, grid = CONFIG["learners"]["gpca_matern"], CONFIG["kernel_grid"]
+    row = setting_name(learner["kernel"], learner["learning_rate"], learner["iterations"])
+    for column, source in (("LM", "LINEMOD"), ("YCB", "YCB")):
+        number = of_key["V", "GPC", column]
+        first = of_key[number.same_as]
+        assert (first.table, first.column, first.value) == ("IV", source, number.value)
+        assert first.counterpart.methods == (row,)
+    assert {number.counterpart.methods for key, number in of_key.items() if key[:2] == ("V", "GPC")} == {
+        ("gpca_matern",)
+    }
+    assert [learner[name] for name in ("inducing", "draws")] == [grid[name] for name in ("inducing", "draws")]
+
+
 def test_every_unit_has_a_tolerance():
     assert set(CONFIG["comparison"]["tolerances"]) == set(UNITS)
 

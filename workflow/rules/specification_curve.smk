@@ -14,6 +14,7 @@ READING_SECTIONS = {
     "encoder": config["encoders"][config["embedding"]["encoder"]],
     "active_learning": config["active_learning"],
     **{name: config["explainers"].get(name) or {} for name in ("gpca_paper", "gpca")},
+    "gpca_matern": LEARNER_SETTINGS.get("gpca_matern", {}),
 }
 
 

@@ -147,7 +147,7 @@ GROUPS = {
         "diagnostics:run",
         ("sets", "predictions"),
         ("ycb",),
-        ("gpca_paper", "learner_forest", "learner_linear_svm"),
+        ("gpca_matern", "learner_forest", "learner_linear_svm"),
     ),
     "pool": Group(
         "Pool, batch and start of active learning",

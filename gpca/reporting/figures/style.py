@@ -35,6 +35,7 @@ SMALL_PT = 7  # No letters are smaller.
 METHOD_LOOKS: dict[str, tuple[str, Any, float]] = {
     "gpca_paper": (BLUE, (0, (4, 2)), 1.8),
     "gpca": (BLUE, "-", 1.8),
+    "gpca_matern": (SKY_BLUE, "-", 1.4),
     "learner_forest": (VERMILION, "-", 1.4),
     "learner_linear_svm": (ORANGE, "-", 1.4),
     "gpca_pair": (GREEN, "-", 1.8),

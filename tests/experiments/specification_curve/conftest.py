@@ -20,6 +20,7 @@ SECTIONS = {
     "active_learning": {"initial": 8, "labels": 6, "batch": 2, "target": 0.9, "gpc": GPC},
     "gpca_paper": GPC,
     "gpca": GPC,
+    "gpca_matern": GPC | {"kernel": "matern32"},
 }
 
 

@@ -50,17 +50,19 @@ def test_the_protocols_start_is_the_classifiers_own_and_others_are_not(halves):
 def test_starts_touch_the_small_rate_and_table_v(run_files):
     settings = SECTIONS | {"gpca_paper": SECTIONS["gpca_paper"] | {"inducing": 4}}
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(gpc_start, "FITTED", (("polynomial", 0.001, 2), ("rbf", 0.01, 2)))
+        patch.setattr(gpc_start, "FITTED", (("polynomial", 0.001, 2), ("rbf", 0.01, 2), ("matern32", 0.01, 2)))
+        patch.setattr(gpc_start, "SHOWN_AS", {("rbf", 0.01, 2): "gpca_paper", ("matern32", 0.01, 2): "gpca_matern"})
         found = rows_of(gpc_start.run, replace(run_files, settings=settings), {k: [v] for k, v in PROTOCOL.items()})
     methods = {(method, metric) for _, method, metric, concept in found if concept == "all"}
-    assert {("polynomial-0.001-2", "accuracy"), ("gpca_paper", "ece")} <= methods
+    assert {("polynomial-0.001-2", "accuracy"), ("gpca_paper", "accuracy"), ("gpca_matern", "ece")} <= methods
 
 
 def test_kernel_and_schedule_of_table_v(run_files):
     found = rows_of(learners.kernel, run_files, {"kernel": ["rbf", "matern32"], "iterations": [1, 20]})
-    accuracy = {reading: v for (reading, _, metric, concept), v in found.items() if (metric, concept) == ("ece", "all")}
-    assert set(accuracy) == {("rbf", 1), ("rbf", 20), ("matern32", 1), ("matern32", 20)}
-    assert accuracy["rbf", 1] != accuracy["rbf", 20] != accuracy["matern32", 20]
+    ece = {reading: v for (reading, _, metric, concept), v in found.items() if (metric, concept) == ("ece", "all")}
+    assert set(ece) == {("rbf", 1), ("rbf", 20), ("matern32", 1), ("matern32", 20)}
+    assert ece["rbf", 1] != ece["rbf", 20] != ece["matern32", 20]
+    assert {method for _, method, _, _ in found} == {"gpca_matern"}
 
 
 def test_the_protocols_svm_is_the_learners_own_and_probabilities_add_up(halves):
@@ -78,7 +80,8 @@ def test_another_head_trains_another_encoder_and_only_where_it_is_wanted(run_fil
     choices = {"head": ["linear", "two_layer"], "inputs": ["standardised"]}
     found = rows_of(learners.encoder_head, run_files, choices)
     methods = {(reading[0], method) for reading, method, _, _ in found}
-    assert methods == {(h, m) for h in choices["head"] for m in ("gpca_paper", "learner_forest", "learner_linear_svm")}
+    learned = ("gpca_paper", "gpca_matern", "learner_forest", "learner_linear_svm")
+    assert methods == {(h, m) for h in choices["head"] for m in learned}
     none = rows_of(learners.encoder_head, run_files, choices, ReadingSizes(encoders=0))
     assert {reading[0] for reading, *_ in none} == {"linear"}
 
