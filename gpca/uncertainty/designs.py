@@ -186,6 +186,24 @@ def design_rows(registrations: Registrations, design: str, samples: int | None) 
     return np.flatnonzero(chosen)
 
 
+def knob_runs(
+    registrations: Registrations, row: int, source: str, seed: int, settings: UncertaintySettings
+) -> KnobRuns:
+    """Return the function of the knobs that design ``additive`` evaluates for a registration, by the same numbers."""
+    xi_n_6, random = _random_numbers(registrations, row, source, seed, settings)
+    pair = RegisteredRow(registrations.without_labels(), row)
+    return KnobRuns(*pair.observed(settings.icp_points, random), xi_n_6, settings, random)
+
+
+def _random_numbers(
+    registrations: Registrations, row: int, source: str, seed: int, settings: UncertaintySettings
+) -> tuple[np.ndarray, np.random.Generator]:
+    """Return the twists (n, 6) of a registration's starts, and the generator of all else."""
+    axes = (source, seed, "uncertainty", registrations.split[row], registrations.sample[row])
+    xi_n_6 = generator(*axes, "starts").normal(size=(settings.starts, 6)) * settings.deviation_6()
+    return xi_n_6, generator(*axes, "clouds")
+
+
 def evaluate_design(
     design: str, registrations: Registrations, source: str, seed: int, settings: UncertaintySettings
 ) -> tuple[Outcomes, np.ndarray, np.ndarray]:
@@ -201,9 +219,8 @@ def evaluate_design(
     observed = registrations if entry.oracle else registrations.without_labels()
     rows = []
     for i in progress(range(len(observed)), f"uncertainty ({design}) of {source}, seed {seed}"):
-        axes = (source, seed, "uncertainty", observed.split[i], observed.sample[i])
-        xi_n_6 = generator(*axes, "starts").normal(size=(settings.starts, 6)) * settings.deviation_6()
-        rows.append(entry.evaluate(RegisteredRow(observed, i), xi_n_6, settings, generator(*axes, "clouds")))
+        xi_n_6, random = _random_numbers(observed, i, source, seed, settings)
+        rows.append(entry.evaluate(RegisteredRow(observed, i), xi_n_6, settings, random))
     columns = {
         name: np.array([[getattr(outcome, name) for outcome in row] for row in rows])
         for name in ("covariance", "residual", "degenerate", "icp_calls", "seconds", "icp_seconds")

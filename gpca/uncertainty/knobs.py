@@ -93,7 +93,7 @@ class KnobRuns:
         self._source = KnobbedSource(source, random)
         self._target = target
         self._T_init = T_target_source_init
-        self._T_ref = T_ref
+        self.T_ref = T_ref
         self._settings = settings
         self._icp = BatchedICP(target, settings.icp)
         self._seen: dict[Knobs, Spread] = {}
@@ -112,7 +112,7 @@ class KnobRuns:
     def _evaluate(self, knobs: Knobs) -> Spread:
         started = perf_counter()
         runs, source = self.runs(knobs)
-        return summarize_runs(runs, cKDTree(source), self._target, self._T_ref, self._settings, started)
+        return summarize_runs(runs, cKDTree(source), self._target, self.T_ref, self._settings, started)
 
     def runs(self, knobs: Knobs) -> tuple[Runs, np.ndarray]:
         """Run ICP from all starts under one setting, seen before or not; return the runs and the source (N, 3).
