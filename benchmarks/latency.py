@@ -5,13 +5,14 @@
 
 Both register the same clouds and hold the same weights and posterior, in one process and in turn (A B A B …), so that
 whatever else the machine does meets both. Ours is the explainer of `python -m gpca explain` with its model loaded. The
-plain composition calls Open3D's ICP, a DGCNN with one linear layer per edge (tests/encoders/per_edge.py) and gpytorch
-(tests/classifier/gpytorch_form.py), from which it draws, and works scores, variances and BALD out of the draws as Eqs.
-4, 5 and 7 read. Of a cloud of exactly as many points as the encoder sees, all draws of the protocol are the same cloud:
-ours embeds it once, and `speedup` is over a plain composition that does so too. `speedup_all_draws` is over one that
-embeds every draw, as the protocol reads. The clouds are perturbed ellipsoids, the encoder is not trained. Both sides
-draw their own numbers, so their scores differ by the error of sampling, which is printed beside the difference. The
-last line is a JSON object: median_ms, speedup, speedup_all_draws (medians over the repeats), max_score_difference.
+plain composition calls Open3D's ICP, a DGCNN with one linear layer per edge (tests/encoders/per_edge.py) and gpytorch's
+own classes (gpca/classifier/gpytorch_classes.py), from which it draws, and works scores, variances and BALD out of the
+draws as Eqs. 4, 5 and 7 read. Of a cloud of exactly as many points as the encoder sees, all draws of the protocol are
+the same cloud: ours embeds it once, and `speedup` is over a plain composition that does so too. `speedup_all_draws` is
+over one that embeds every draw, as the protocol reads. The clouds are perturbed ellipsoids, the encoder is not trained.
+Both sides draw their own numbers, so their scores differ by the error of sampling, which is printed beside the
+difference. The last line is a JSON object: median_ms, speedup, speedup_all_draws (medians over the repeats),
+max_score_difference.
 
 With a model of your own, whole explanations by it are timed in turn: with the diagnosis, with the fast one, with none.
 The last line is then a JSON object of their medians: median_ms, median_ms_fast, median_ms_gpca_alone.
@@ -168,7 +169,7 @@ class PlainComposition:
         import torch
 
         from benchmarks.edge_conv import per_edge_form
-        from tests.classifier.gpytorch_form import LatentGPs
+        from gpca.classifier.gpytorch_classes import LatentGPs
 
         self._model = model
         self._encoder = per_edge_form(model.encoder).eval()

@@ -79,7 +79,10 @@ def variance(covariance: gpytorch.kernels.ScaleKernel, a_A_d: Tensor) -> Tensor:
     scale_C_1 = covariance.outputscale[:, None]
     if isinstance(base, ScaledPolynomial):
         return scale_C_1 * (a_A_d.square().mean(dim=1) + base.offset).square()
-    return scale_C_1.expand(-1, len(a_A_d)) if base.is_stationary else covariance(a_A_d, diag=True)
+    if base.is_stationary:
+        return scale_C_1.expand(-1, len(a_A_d))
+    # Not with diag=True: of as many inputs as latents, gpytorch takes the variances (C, A) for a covariance (A, A).
+    return covariance(a_A_d).diagonal(dim1=-1, dim2=-2)
 
 
 def squared_distances(a_A_d: Tensor, b_B_d: Tensor) -> Tensor:

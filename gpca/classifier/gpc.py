@@ -9,7 +9,7 @@ inducing inputs and posterior (:mod:`gpca.classifier.sparse_gp`); further labels
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 
 import numpy as np
 import torch
@@ -21,33 +21,10 @@ from gpca.classifier.latents import Latents, Projection, Sites, elbo, refine
 from gpca.classifier.prior import Prior
 from gpca.classifier.settings import GPCSettings
 from gpca.classifier.sparse_gp import SparseGPs
+from gpca.classifier.start import Standardization, Start
 from gpca.errors import InputError
 from gpca.process.progress import progress
-from gpca.seeds import generator, seed_of
-
-
-@dataclass(frozen=True)
-class Standardization:
-    """Means and deviations (d,) of the inputs that it was fitted to; a constant input has the deviation 1.
-
-    scikit-learn fits it. To apply it takes none of that, which loads for a second.
-    """
-
-    mean_d: np.ndarray
-    scale_d: np.ndarray
-
-    @classmethod
-    def of(cls, h_N_d: np.ndarray) -> Standardization:
-        """Fit it to inputs."""
-        from sklearn.preprocessing import StandardScaler
-
-        fitted = StandardScaler().fit(h_N_d)
-        return cls(fitted.mean_, fitted.scale_)
-
-    def __call__(self, h_N_d: np.ndarray) -> np.ndarray:
-        """Return the standardized inputs, in their own precision."""
-        precision = np.result_type(h_N_d, np.float32)
-        return (h_N_d - self.mean_d.astype(precision)) / self.scale_d.astype(precision)
+from gpca.seeds import generator
 
 
 class GPC:
@@ -89,9 +66,9 @@ class GPC:
         starts_R_d = self._scaled(around_R_d)
         inputs_N_d = self._scaled(h_N_d)
         targets_N = self._targets(labels_N)
-        random = torch.Generator().manual_seed(seed_of(*self._axes, "gpc"))
-        covariance = make_covariance(self.settings.kernel, len(self.classes), _median_distance(starts_R_d, self._axes))
-        model = SparseGPs(covariance, _inducing_inputs(starts_R_d, self.settings, self._axes), random)
+        start = Start.of(starts_R_d, len(self.classes), self.settings, self._axes)
+        random = torch.Generator().manual_seed(start.seed)
+        model = SparseGPs(start.covariance, start.inducing_M_d, random)
         optimizer = Adam(model.parameters(), self.settings.learning_rate)
         stops = sorted(set(iterations))
         for done in progress(range(1, stops[-1] + 1), " ".join(map(str, ("GPC", *self._axes)))):
@@ -225,19 +202,4 @@ class GPC:
         return np.array([self.classes.index(label) for label in labels_N], dtype=np.int64)
 
     def _scaled(self, h_N_d: np.ndarray) -> torch.Tensor:
-        return torch.from_numpy(self._scaler(h_N_d).astype(np.float32))
-
-
-def _inducing_inputs(inputs_N_d: torch.Tensor, settings: GPCSettings, axes: tuple) -> torch.Tensor:
-    from sklearn.cluster import KMeans
-
-    clusters = min(settings.inducing, len(torch.unique(inputs_N_d, dim=0)))
-    kmeans = KMeans(clusters, n_init=1, random_state=seed_of(*axes, "inducing") % 2**32)
-    return torch.from_numpy(kmeans.fit(inputs_N_d.numpy()).cluster_centers_.astype(np.float32))
-
-
-def _median_distance(inputs_N_d: torch.Tensor, axes: tuple, most: int = 1000) -> float:
-    """Return the median distance between distinct points (the median heuristic), of at most `most` drawn ones."""
-    order = generator(*axes, "median").permutation(len(inputs_N_d))[:most]
-    median = float(torch.pdist(inputs_N_d[order]).median()) if len(order) > 1 else 0.0
-    return median if median > 0 else 1.0
+        return self._scaler.tensor(h_N_d)

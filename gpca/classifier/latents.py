@@ -124,12 +124,16 @@ def refine(
 
 def elbo(projection: Projection, targets_N: np.ndarray, latents: Latents) -> float:
     """Return the evidence lower bound in nats: Σ E_q[log softmax(f)_y] - KL(q ‖ prior)."""
-    mean_N_C, deviation_N_C = latents.marginals(projection)
+    return expected_log_likelihood(*latents.marginals(projection), targets_N) - latents.divergence()
+
+
+def expected_log_likelihood(mean_N_C: np.ndarray, deviation_N_C: np.ndarray, targets_N: np.ndarray) -> float:
+    """Return Σ E_q[log softmax(f)_y] in nats, of independent latents with these marginals."""
     logits_Q_N_C = mean_N_C + deviation_N_C * _normal_points(mean_N_C.shape[1])[:, None]
     largest_Q_N_1 = logits_Q_N_C.max(axis=2, keepdims=True)
     log_p_Q_N_C = logits_Q_N_C - largest_Q_N_1
     log_p_Q_N_C = log_p_Q_N_C - np.log(np.exp(log_p_Q_N_C).sum(axis=2, keepdims=True))
-    return float(log_p_Q_N_C[:, np.arange(len(targets_N)), targets_N].mean(axis=0).sum()) - latents.divergence()
+    return float(log_p_Q_N_C[:, np.arange(len(targets_N)), targets_N].mean(axis=0).sum())
 
 
 def _expected_softmax(mean_N_C: np.ndarray, deviation_N_C: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

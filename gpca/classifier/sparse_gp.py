@@ -2,7 +2,7 @@
 
 gpytorch's objective (``VariationalStrategy``, ``CholeskyVariationalDistribution``, ``SoftmaxLikelihood`` and
 ``VariationalELBO`` with their defaults), from the same random numbers, in several times less time: distances are
-shared by the latents, and nothing is built for sizes that are known. ``tests/classifier/gpytorch_form.py`` is that
+shared by the latents, and nothing is built for sizes that are known. :mod:`gpca.classifier.gpytorch_classes` is that
 form, and ``tests/classifier/test_sparse_gp.py`` compares the two.
 """
 

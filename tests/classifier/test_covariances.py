@@ -42,14 +42,16 @@ def test_the_variance_is_the_covariances_diagonal(name, n):
     assert torch.allclose(variance(kernel, A[:n]), diagonal, atol=1e-5)
 
 
+@pytest.mark.parametrize("n", [3, 7])  # as many inputs as latents, and more
 @pytest.mark.parametrize("form", [gpytorch.kernels.RQKernel, gpytorch.kernels.LinearKernel])
-def test_a_kernel_without_a_form_here_is_that_of_gpytorch(form, monkeypatch):
+def test_a_kernel_without_a_form_here_is_that_of_gpytorch(form, n, monkeypatch):
     monkeypatch.setitem(COVARIANCES, "new", form)
     kernel = make_covariance("new", 3, lengthscale=3.0)
     kernel.outputscale = torch.tensor([0.5, 1.0, 2.0])
     assert torch.allclose(cross_covariance(kernel, A, B), kernel(A, B).to_dense())
-    diagonal = cross_covariance(kernel, A, A).diagonal(dim1=1, dim2=2)
-    assert torch.allclose(variance(kernel, A), diagonal, atol=1e-5)
+    diagonal = cross_covariance(kernel, A[:n], A[:n]).diagonal(dim1=1, dim2=2)
+    assert variance(kernel, A[:n]).shape == (3, n)
+    assert torch.allclose(variance(kernel, A[:n]), diagonal, atol=1e-5)
 
 
 @pytest.mark.parametrize("name", COVARIANCES)

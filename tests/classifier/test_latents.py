@@ -8,11 +8,10 @@ from scipy.stats import norm, qmc
 from torch.distributions import MultivariateNormal, kl_divergence
 
 from gpca.classifier.gpc import GPC
+from gpca.classifier.gpytorch_classes import LatentGPs
 from gpca.classifier.latents import Latents, Projection, Sites, elbo, refine
 from gpca.classifier.prior import Prior
 from gpca.classifier.settings import GPCSettings
-
-from .gpytorch_form import LatentGPs
 
 CLASSES = ("noise", "pose", "overlap")
 QUICK = GPCSettings(learning_rate=0.05, iterations=40, inducing=12, draws=200)

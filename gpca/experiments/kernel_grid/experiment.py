@@ -8,8 +8,7 @@ from typing import Any
 
 from gpca.errors import require_names
 from gpca.experiments.experiment import Experiment, LeftOut, Tidy
-from gpca.experiments.kernel_grid.grid import KernelGrid
-from gpca.experiments.kernel_grid.tables import PRINTED
+from gpca.experiments.kernel_grid.grid import PRINTED, KernelGrid
 from gpca.objects.title import title_of
 from gpca.settings import Distinct
 

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from gpca.comparison.published import Number
 from gpca.errors import InputError
-from gpca.experiments.kernel_grid.tables import PRINTED, TITLES
+from gpca.experiments.kernel_grid.grid import PRINTED
+from gpca.experiments.kernel_grid.tables import TITLES
 from gpca.reporting.figures.panels import in_lines, legend_below, panels
 from gpca.reporting.figures.style import BLACK, BLUE, COLUMN_WIDTH_IN, GRAY, ORANGE
 
@@ -30,6 +31,7 @@ def draw_kernel_curves(grid: pd.DataFrame, sources: Mapping[str, str], numbers: 
     Args:
         grid: The frame that :func:`gpca.experiments.kernel_grid.grid.read_grids` returns.
     """
+    grid = grid[grid["kernel"].isin(COLORS)]  # gpytorch's own classes would draw the same curves
     shown = [name for name in sources if (grid["source"] == name).any()]
     if not shown:
         raise InputError("kernels", "have no results for these sources", "run them first")

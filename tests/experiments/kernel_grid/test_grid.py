@@ -11,6 +11,7 @@ from gpca.attribution.metrics import read_metrics, write_metrics
 from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
+from gpca.experiments.kernel_grid import grid as kernel_grid
 from gpca.experiments.kernel_grid.grid import (
     GRID_COLUMNS,
     SETTING,
@@ -94,6 +95,16 @@ def test_intervals_are_of_the_same_measures_over_families(evaluated, grid, tmp_p
     assert (found["low"] < found["high"]).all()
     with pytest.raises(InputError, match="no files were given"):
         collect_intervals([])
+
+
+def test_gpytorchs_classes_give_the_printed_row_once_more(embedded, monkeypatch):
+    monkeypatch.setattr(kernel_grid, "PRINTED", (("rbf", 0.1, 6), ("polynomial", 0.01, 6), ("rbf", 0.1, 7)))
+    rows, predictions = evaluate_grid(embedded, replace(GRID, gpytorch=("rbf", "polynomial")), "tiny", 0)
+    *own, added = rows.itertuples(index=False, name=None)
+    assert added[:3] == ("rbf_gpytorch", 0.1, 6)  # not at the smaller rate, nor off the grid
+    [ours] = [row for row in own if row[:3] == ("rbf", 0.1, 6)]
+    assert added[3:] == pytest.approx(ours[3:], abs=1e-4)
+    assert predictions["kernel"].iloc[-1] == "rbf_gpytorch"
 
 
 def test_a_larger_rate_raises_the_bound_further(grid):

@@ -5,8 +5,8 @@ from gpca.attribution.clustered import COLUMNS
 from gpca.comparison.published import read_published
 from gpca.errors import InputError
 from gpca.experiments.kernel_grid.figure import COLORS, PRINTED_MARKERS, draw_kernel_curves, printed_accuracies
-from gpca.experiments.kernel_grid.grid import GRID_COLUMNS, setting_name
-from gpca.experiments.kernel_grid.tables import PRINTED, table4_grid, table4_kernels
+from gpca.experiments.kernel_grid.grid import GRID_COLUMNS, PRINTED, setting_name
+from gpca.experiments.kernel_grid.tables import table4_grid, table4_kernels
 
 REAL = {"linemod": {"title": "LINEMOD", "stand_in": False}, "ycb": {"title": "YCB", "stand_in": False}}
 STAND_INS = {name: entry | {"stand_in": True} for name, entry in REAL.items()}
@@ -45,6 +45,28 @@ def test_table4_has_the_papers_rows_and_a_column_per_source():
     assert list(table.columns) == ["linemod", "ycb"]
     assert "| RBF | 0.01 | 100 | 76.0 (71.0 to 78.0) | 86.0 (81.0 to 88.0) |" in table.markdown()
     assert "| Matérn 3/2 | 0.01 | 200 | **81.0 (76.0 to 83.0)** | **91.0 (86.0 to 93.0)** |" in table.markdown()
+
+
+def with_gpytorch():
+    """The grid and its intervals, with one row in gpytorch's classes besides."""
+    own, of_own = grid(), intervals()
+    again = own[(own["kernel"] == "rbf") & (own["learning_rate"] == 0.01) & (own["iterations"] == 100)]
+    of_again = of_own[of_own["method"] == "rbf-0.01-100"].assign(method="rbf_gpytorch-0.01-100")
+    return pd.concat([own, again.assign(kernel="rbf_gpytorch")]), pd.concat([of_own, of_again])
+
+
+def test_rows_in_gpytorchs_classes_stand_below_the_printed_ones():
+    both, of_both = with_gpytorch()
+    table = table4_kernels(of_both, REAL)
+    assert [key for key, _ in table.rows[-1]] == ["rbf_gpytorch", "0.01", "100"]
+    assert len(table.rows) == len(PRINTED) + 1
+    assert "| RBF, by gpytorch | 0.01 | 100 | 76.0 (71.0 to 78.0) | 86.0 (81.0 to 88.0) |" in table.markdown()
+    for made in (table, table4_grid(both, of_both, REAL)):
+        assert "By gpytorch: " in made.markdown()
+    for made in (table4_kernels(intervals(), REAL), table4_grid(grid(), intervals(), REAL)):
+        assert "gpytorch" not in made.markdown()
+    curves = [len(draw_kernel_curves(of, {"ycb": "YCB"}, []).axes[0].get_lines()) for of in (grid(), both)]
+    assert curves[0] == curves[1]
 
 
 def test_rows_and_sources_that_were_not_fitted_are_left_out():

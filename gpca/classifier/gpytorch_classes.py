@@ -1,0 +1,174 @@
+"""The classifier in gpytorch's own classes, as its tutorials write one: what the suite's form is compared with.
+
+An ``ApproximateGP`` with ``VariationalStrategy`` under ``IndependentMultitaskVariationalStrategy`` and a
+``CholeskyVariationalDistribution`` is trained by ``VariationalELBO`` with a ``SoftmaxLikelihood``. It starts where
+:class:`gpca.classifier.gpc.GPC` does and draws the same random numbers in the same order, so both give the same numbers
+but for rounding: how much that is, stands in docs/baselines.md, and ``tests/classifier/test_gpytorch_classes.py`` holds
+it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+import gpytorch
+import numpy as np
+import torch
+from torch import Tensor
+from torch.overrides import TorchFunctionMode
+
+from gpca.adam import Adam
+from gpca.attribution.scores import summarize_marginals
+from gpca.classifier.latents import expected_log_likelihood
+from gpca.classifier.settings import GPCSettings
+from gpca.classifier.start import Standardization, Start
+from gpca.elementary import square_root
+from gpca.errors import InputError
+from gpca.process.progress import progress
+from gpca.seeds import generator
+
+
+class LatentGPs(gpytorch.models.ApproximateGP):
+    """C independent latent GPs on shared inducing inputs, which are learned.
+
+    Args:
+        covariance: of batch shape (C,).
+        inducing_M_d: where the inducing inputs start.
+    """
+
+    def __init__(self, covariance: gpytorch.kernels.ScaleKernel, inducing_M_d: Tensor) -> None:
+        batch = covariance.batch_shape
+        posterior = gpytorch.variational.CholeskyVariationalDistribution(len(inducing_M_d), batch_shape=batch)
+        strategy = gpytorch.variational.VariationalStrategy(
+            self, inducing_M_d, posterior, learn_inducing_locations=True
+        )
+        super().__init__(gpytorch.variational.IndependentMultitaskVariationalStrategy(strategy, num_tasks=batch[0]))
+        self.mean_module = gpytorch.means.ZeroMean(batch_shape=batch)
+        self.covar_module = covariance
+
+    def forward(self, inputs: Tensor) -> gpytorch.distributions.MultivariateNormal:
+        """Return the prior at inputs."""
+        return gpytorch.distributions.MultivariateNormal(self.mean_module(inputs), self.covar_module(inputs))
+
+    @property
+    def strategy(self) -> gpytorch.variational.VariationalStrategy:
+        """The strategy below that of the classes."""
+        return self.variational_strategy.base_variational_strategy
+
+
+def ascend(model: LatentGPs, inputs_N_d: Tensor, targets_N: Tensor, learning_rate: float) -> Iterator[float]:
+    """Take a step of Adam up the ELBO at each turn, without end, and yield the loss before it, in nats per sample.
+
+    All samples are one batch. The random numbers come from torch's global generator, as gpytorch offers no other way.
+
+    Raises:
+        InputError: as many samples as classes, which ``SoftmaxLikelihood`` takes for an old, transposed layout.
+    """
+    n_classes = model.variational_strategy.num_tasks
+    if len(targets_N) == n_classes:
+        fault = f"{n_classes} samples for {n_classes} classes, which gpytorch's SoftmaxLikelihood would read transposed"
+        raise InputError("training samples", fault, "give more samples")
+    likelihood = gpytorch.likelihoods.SoftmaxLikelihood(num_classes=n_classes, mixing_weights=False)
+    elbo = gpytorch.mlls.VariationalELBO(likelihood, model, num_data=len(targets_N))
+    optimizer = Adam(model.parameters(), learning_rate)
+    while True:
+        model.train()
+        optimizer.zero_grad()
+        loss = -elbo(model(inputs_N_d), targets_N)
+        loss.backward()
+        optimizer.step()
+        model.eval()
+        yield loss.item()
+
+
+class GpytorchGPC:
+    """:class:`gpca.classifier.gpc.GPC` by gpytorch: the same arguments, seeds and results, without later labels."""
+
+    def __init__(self, classes: tuple[str, ...], settings: GPCSettings, *axes: object) -> None:
+        self.classes = classes
+        self.settings = settings
+        self._axes = axes
+
+    def fit(self, h_N_d: np.ndarray, labels_N: np.ndarray) -> GpytorchGPC:
+        """Maximize the ELBO on labeled embeddings."""
+        for _ in self.fit_up_to([self.settings.iterations], h_N_d, labels_N):
+            pass
+        return self
+
+    def fit_up_to(self, iterations: Iterable[int], h_N_d: np.ndarray, labels_N: np.ndarray) -> Iterator[int]:
+        """Yield each of these counts in rising order, the classifier then as :meth:`fit` leaves it after so many.
+
+        Raises:
+            InputError: as many samples as classes.
+        """
+        self._scaler = Standardization.of(h_N_d)
+        self._inputs_N_d = self._scaler.tensor(h_N_d)
+        self._targets_N = np.array([self.classes.index(label) for label in labels_N], dtype=np.int64)
+        start = Start.of(self._inputs_N_d, len(self.classes), self.settings, self._axes)
+        self._model = LatentGPs(start.covariance, start.inducing_M_d)
+        steps = ascend(self._model, self._inputs_N_d, torch.from_numpy(self._targets_N), self.settings.learning_rate)
+        state = torch.Generator().manual_seed(start.seed).get_state()
+        stops = sorted(set(iterations))
+        for done in progress(range(1, stops[-1] + 1), " ".join(map(str, ("gpytorch's GPC", *self._axes)))):
+            with torch.random.fork_rng(devices=[]), SameRoots():
+                torch.set_rng_state(state)
+                next(steps)
+                state = torch.get_rng_state()
+            if done in stops:
+                yield done
+
+    def posterior(self, h_N_d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return mean and standard deviation (N, C) of the latent logits q(f(h))."""
+        return self._marginals(self._scaler.tensor(h_N_d))
+
+    def attribute(self, h_N_d: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return scores_N_C, variances_N_C and bald_N from M posterior draws (Eqs. 4, 5, 7)."""
+        normal_M_C = generator(*self._axes, "draws").normal(size=(self.settings.draws, len(self.classes)))
+        return summarize_marginals(*self.posterior(h_N_d), normal_M_C)
+
+    def elbo(self) -> float:
+        """Return the evidence lower bound per labeled sample in nats."""
+        expected = expected_log_likelihood(*self._marginals(self._inputs_N_d), self._targets_N)
+        with torch.no_grad(), SameRoots():
+            divergence = float(self._model.variational_strategy.kl_divergence())
+        return (expected - divergence) / len(self._targets_N)
+
+    def _marginals(self, inputs_N_d: Tensor) -> tuple[np.ndarray, np.ndarray]:
+        with torch.no_grad(), SameRoots():
+            latents = self._model(inputs_N_d)
+            return latents.mean.double().numpy(), np.sqrt(latents.variance.double().numpy())
+
+
+class SameRoots(TorchFunctionMode):
+    """Within it torch's roots and distances, and so gpytorch's, have the same bits on every vendor's processors."""
+
+    def __torch_function__(self, function, types, arguments=(), keywords=None):
+        """Call the function; a root or a distance in its own way."""
+        if function is torch.cdist:
+            return _Root.apply(_squared_distances(*arguments[:2]))
+        if function in (torch.sqrt, Tensor.sqrt):
+            return _Root.apply(arguments[0])
+        if function is Tensor.sqrt_:
+            return arguments[0].copy_(_Root.apply(arguments[0]))
+        return function(*arguments, **(keywords or {}))
+
+
+def _squared_distances(a_A_d: Tensor, b_B_d: Tensor) -> Tensor:
+    """Return |a - b|², (…, A, B), of coinciding points a little more than 0, where the root has no derivative."""
+    squares_A_B = a_A_d.square().sum(dim=-1)[..., :, None] + b_B_d.square().sum(dim=-1)[..., None, :]
+    return (squares_A_B - 2 * a_A_d @ b_B_d.mT).clamp_min(1e-30)
+
+
+class _Root(torch.autograd.Function):
+    """The elementary root with torch's derivative, which is finite wherever the root is positive."""
+
+    @staticmethod
+    def forward(context, positive: Tensor) -> Tensor:
+        root = square_root(positive)
+        context.save_for_backward(root)
+        return root
+
+    @staticmethod
+    def backward(context, *gradients: Tensor) -> Tensor:
+        (root,) = context.saved_tensors
+        return gradients[0] / (2 * root)
