@@ -4,8 +4,8 @@ SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 .ONESHELL:
 .DELETE_ON_ERROR:
-.PHONY: results report test test-library test-processes test-workflow coverage smoke lint check-reference environment lock \
-        clean-environment help
+.PHONY: results report check test test-library test-processes test-workflow coverage smoke lint check-reference \
+        environment lock clean-environment help
 
 CORES ?= 2
 SNAKEMAKE_ARGS ?=
@@ -16,6 +16,7 @@ PYTEST_ARGS ?=
 INSTALL := -m pip install --quiet --disable-pip-version-check --only-binary=:all: --no-binary=connection_pool
 RUN := PATH="$(CURDIR)/.venv/bin:$$PATH"
 PROCESSES := tests/process/test_processor.py tests/test_emulation.py tests/test_benchmarks.py tests/encoders/test_reduction.py
+PARTS := test-workflow test-library test-processes
 PYTEST := $(RUN) OMP_NUM_THREADS=1 python -m pytest
 
 results: environment ## every table and figure of config/config.yaml, into results/ (SNAKEMAKE_ARGS passes through)
@@ -25,11 +26,16 @@ report: environment ## Snakemake's report of the same run in one HTML file, REPO
 	mkdir -p $(dir $(REPORT))
 	$(RUN) snakemake -j$(CORES) all --report $(REPORT) --report-after-run $(SNAKEMAKE_ARGS)
 
-# Side by side, as a test waits for one core most of the time; the last part starts on the core that is free first. Each
+# Side by side, as each keeps one core busy most of the time; the later ones start on the core that is free first. Each
 # prints its report when it is done.
+SIDE_BY_SIDE := $(MAKE) --no-print-directory -j$(CORES) --keep-going --output-sync=target
+
+check: environment ## lint and test, as before every commit
+	@$(SIDE_BY_SIDE) $(PARTS) lint
+
 test: environment ## the tests, or only those of PYTEST_ARGS
 ifeq ($(strip $(PYTEST_ARGS)),)
-	@$(MAKE) --no-print-directory -j$(CORES) --keep-going --output-sync=target test-workflow test-library test-processes
+	@$(SIDE_BY_SIDE) $(PARTS)
 else
 	$(PYTEST) $(PYTEST_ARGS)
 endif

@@ -45,17 +45,17 @@ class DryRun:
     plan: tuple[tuple[str, set[str], set[str]], ...]
     messages: str
 
-    def remade(self, path):
-        """The files that are made again once the file has changed."""
-        changed = {path}
+    def remade(self, *paths):
+        """The files that are made again once these have changed."""
+        changed = {*paths}
         for _, inputs, outputs in self.plan:
             if inputs & changed:
                 changed |= outputs
-        return changed - {path}
+        return changed - {*paths}
 
-    def behind(self, path):
-        """How many jobs of each rule read the file, or what comes of it."""
-        remade = self.remade(path)
+    def behind(self, *paths):
+        """How many jobs of each rule read one of the files, or what comes of it."""
+        remade = self.remade(*paths)
         return Counter(rule for rule, _, outputs in self.plan if outputs & remade)
 
     def needed(self, path):
@@ -251,5 +251,5 @@ def _killed_and_continued(smoke, folder):
     assert not list(project.folder.glob("results/smoke/predictions/**/*.csv"))
     temporary = {path for path in temporary_folders(project.folder) if Path(path).exists()}
     locks = len(list(project.folder.glob(".snakemake/locks/*")))
-    project.snakemake_as_processes(*run)
+    project.snakemake(*run)
     return Continued(project, locks, temporary, second)

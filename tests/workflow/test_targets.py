@@ -146,10 +146,11 @@ def test_the_comparison_comes_after_every_number(planned):
         assert "comparison" in planned.behind(f"results/smoke/{name}.csv")
 
 
-@pytest.mark.parametrize("module", ["gpca/classifier/gpc.py", "gpca/encoders/dgcnn.py", "gpca/objects/uw_rgbd.py"])
-def test_an_edit_reruns_what_depends_on_the_module(finished, planned, module):
-    finished.append(module, "\n# edited\n")
-    assert without_ends(finished.dry_run(*SMOKE).jobs) == without_ends(planned.behind(module))
+def test_edits_rerun_what_depends_on_the_modules(finished, planned):
+    modules = ("gpca/classifier/gpc.py", "gpca/encoders/dgcnn.py", "gpca/objects/uw_rgbd.py")
+    for module in modules:
+        finished.append(module, "\n# edited\n")
+    assert without_ends(finished.dry_run(*SMOKE).jobs) == without_ends(planned.behind(*modules))
 
 
 @pytest.mark.parametrize("name", ["gpca", "gpca_paper"])
