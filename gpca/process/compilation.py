@@ -2,7 +2,8 @@
 
 Numba itself looks at a function's own file alone, and would go on with what it once took from other modules. The
 folders lie beside this module, else in the user's cache, else among the temporary files: in a read-only checkout, say,
-of a user without a home.
+of a user without a home. In them a loop is found by its package, not by its path as numba would, so that a checkout
+that was copied or moved takes along what was compiled.
 """
 
 from __future__ import annotations
@@ -56,6 +57,7 @@ def _writable(folder: Path) -> bool:
 os.environ[VARIABLE] = str(_cache_folder())  # numba reads the variable when it is imported
 
 from numba import config, njit, prange  # noqa: E402
+from numba.core.caching import UserProvidedCacheLocator  # noqa: E402
 from numba.core.event import Listener, register  # noqa: E402
 
 setattr(config, "CACHE_DIR", os.environ[VARIABLE])  # noqa: B010 - numba declares it at run time; where it was imported before
@@ -78,6 +80,23 @@ OVER_CLOUDS: dict[str, Any] = {
     "error_model": "numpy",
     "fastmath": {"contract", "nsz", "nnan"},
 }
+
+
+class PackageLocator(UserProvidedCacheLocator):
+    """Keeps the loops of a package of ours in a folder of its name."""
+
+    @classmethod
+    def from_function(cls, py_func: Any, py_file: str) -> PackageLocator | None:
+        """Return the locator of a function of ours; None for others, which numba keeps as it always does."""
+        return super().from_function(py_func, py_file) if Path(py_file).is_relative_to(ROOT) else None
+
+    @classmethod
+    def get_suitable_cache_subpath(cls, py_file: str) -> str:
+        """Return the name of the package that the file lies in."""
+        return ".".join(Path(py_file).relative_to(ROOT).parent.parts)
+
+
+setattr(config, "CACHE_LOCATOR_CLASSES", f"{__name__}.{PackageLocator.__name__},{UserProvidedCacheLocator.__name__}")  # noqa: B010
 
 
 @cache

@@ -72,6 +72,21 @@ def test_a_first_call_says_that_it_compiles_and_later_ones_do_not(package):
     assert [imported(package, code).stderr for _ in range(2)] == [f"{NOTICE}\n", ""]
 
 
+def test_a_copy_elsewhere_takes_along_what_was_compiled(package, tmp_path_factory):
+    code = "from gpca.upper import upper; print(upper(1), *upper.stats.cache_hits.values())"
+    assert imported(package, code).stdout.strip() == "20"
+    copy = shutil.copytree(package, tmp_path_factory.mktemp("elsewhere") / "copy")
+    assert imported(copy, code).stdout.strip() == "20 1"
+
+
+def test_loops_of_others_are_kept_too(package, tmp_path_factory):
+    elsewhere = tmp_path_factory.mktemp("elsewhere")
+    (elsewhere / "theirs.py").write_text("from numba import njit\n@njit(cache=True)\ndef f(x):\n    return x\n")
+    code = f"import sys; import gpca.process.compilation; sys.path.insert(0, {str(elsewhere)!r})\n"
+    code += "from theirs import f; print(f(1), *f.stats.cache_hits.values())"
+    assert [imported(package, code).stdout.strip() for _ in range(2)] == ["1", "1 1"]
+
+
 def test_a_loop_is_compiled_anew_when_a_module_beneath_its_own_has_changed(package):
     code = "from gpca.upper import upper; print(upper(1), *upper.stats.cache_hits.values())"
     printed = []
