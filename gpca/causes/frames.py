@@ -30,7 +30,7 @@ from gpca.causes.shapley import ALL, NONE
 from gpca.causes.subjects import Subject, measure_clean_pairs
 from gpca.errors import InputError
 from gpca.frames.camera import MeshScene
-from gpca.frames.clean_view import clean_view, rendered_side
+from gpca.frames.clean_view import CleanView, clean_view, rendered_side
 from gpca.frames.instances import Instances
 from gpca.frames.starts import KINDS, Starts
 from gpca.objects.canonical import ObjectClouds
@@ -89,7 +89,7 @@ def measure_frames(
     Raises:
         InputError: no registration can be measured.
     """
-    subjects, limit = measure_clean_pairs(_subjects(instances, starts.instance, objects), source, seed, settings)
+    subjects, limit = measure_clean_pairs(subjects_of(instances, starts.instance, objects), source, seed, settings)
     measuring, of_object = Measuring(settings, limit), {subject.index: subject for subject in subjects}
     records: list[dict[str, Any]] = []
     for k in progress(range(len(starts)), f"causes of {source}, seed {seed}"):
@@ -128,24 +128,51 @@ def frame_candidate(
     Raises:
         Unmeasurable: no ray of its pixels meets the mesh, or the model cannot be seen at the initial pose.
     """
-    diameter_m, camera_3_3 = subject.diameter_m, instances.camera_3_3[i]
+    diameter_m, sighting = subject.diameter_m, instances.sighting(i)
     T_true = instances.T_camera_object_true[i]
-    outline_m = subject.surface[:OUTLINE_POINTS] * diameter_m
-    if (view := clean_view(instances, i, mesh, outline_m)) is None:
+    outline_m = outline(subject)
+    if (view := clean_view(sighting, T_true, mesh, outline_m)) is None:
         raise Unmeasurable("its pixels show none of the mesh at the true pose")
-    sides = [rendered_side(mesh, camera_3_3, T, outline_m) for T in (T_true, T_init)]
+    sides_m = [rendered_side(mesh, sighting.camera_3_3, T, outline_m).points_m for T in (T_init, T_true)]
     # The same numbers draw the points of both, so that another draw alone is no effect of the pose.
-    order = random.random(max(map(len, sides)))
-    models = [side[np.argsort(order[: len(side)])[:points]] for side in sides]
-    if min(map(len, models)) < FEWEST_POINTS:
+    order = random.random(max(map(len, sides_m)))
+    at_init_m, at_truth_m = (side_m[np.argsort(order[: len(side_m)])[:points]] for side_m in sides_m)
+    if min(len(at_init_m), len(at_truth_m)) < FEWEST_POINTS:
         raise Unmeasurable("its mesh is not visible at the pose that ICP starts from")
     kept = random.permutation(len(view.clean))[:points]
+    T_model_observed = scale_translation(inverse(T_init) @ T_true, 1 / diameter_m)
+    models = at_init_m / diameter_m, at_truth_m / diameter_m
+    return candidate_of_view(view, kept, *models, T_model_observed, diameter_m, random)
+
+
+def outline(subject: Subject) -> np.ndarray:
+    """Return points (Q, 3) of an object, meters, that tell where in an image it lies."""
+    return subject.surface[:OUTLINE_POINTS] * subject.diameter_m
+
+
+def candidate_of_view(
+    view: CleanView,
+    kept: np.ndarray,
+    model: np.ndarray,
+    model_at_truth: np.ndarray,
+    T_model_observed: np.ndarray,
+    diameter_m: float,
+    random: np.random.Generator,
+) -> Candidate:
+    """Return what was seen of an object at a pose that is taken for the true one, with all that may be taken away.
+
+    Args:
+        view: at that pose.
+        kept: rows of what was measured that are registered.
+        model, model_at_truth: (P, 3) diameters, what the camera would see where the registration starts, and at that
+            pose.
+        T_model_observed: 4×4, takes what was observed to where it lies in the model at the start, diameters.
+    """
     hidden = _drawn(view.unmeasured, round(len(kept) * (1 - view.share) / max(view.share, 1e-9)), random)
     residuals = view.measured[kept] - view.clean[kept]
-    T_model_observed = scale_translation(inverse(T_init) @ T_true, 1 / diameter_m)
     return Candidate(
         applied=np.ones(len(CONCEPTS), bool),
-        model=models[1] / diameter_m,
+        model=model,
         clean=np.concatenate([view.clean[kept], hidden]) / diameter_m,
         noisy=np.concatenate([view.measured[kept], hidden + residuals[random.integers(len(kept), size=len(hidden))]])
         / diameter_m,
@@ -160,7 +187,7 @@ def frame_candidate(
             "translation": float(np.linalg.norm(T_model_observed[:3, 3])),
             "crop": 1 - view.share,
         },
-        model_at_truth=models[0] / diameter_m,
+        model_at_truth=model_at_truth,
     )
 
 
@@ -178,7 +205,7 @@ def _measured(candidate: Candidate, measuring: Measuring, subject: Subject, axes
     return {**observed, "truth": truths[0], "again": truths[1], "candidate": axes[3]}
 
 
-def _subjects(instances: Instances, rows: np.ndarray, objects: ObjectClouds) -> list[Subject]:
+def subjects_of(instances: Instances, rows: np.ndarray, objects: ObjectClouds) -> list[Subject]:
     """Return the objects that the instances show; symmetric is what the dataset says is."""
     return [
         Subject.of(objects, index, bool(instances.symmetric[instances.object_index == index].any()))

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpca.errors import InputError
+from gpca.frames.sighting import Sighting
 from gpca.io.arrays import REGENERATE, TEXT, WHOLE, load_arrays, save_arrays
 from gpca.io.csv_file import numbers, read_csv
 from gpca.objects.splits import DRAWN, unseen
@@ -72,6 +73,10 @@ class Instances:
     def pixels_of(self, i: int) -> np.ndarray:
         """Return the pixels (P, 2) of instance i."""
         return self.pixels[self.offsets[i] : self.offsets[i + 1]]
+
+    def sighting(self, i: int) -> Sighting:
+        """Return what was measured of instance i."""
+        return Sighting(self.cloud_m(i).astype(np.float64), self.pixels_of(i), self.camera_3_3[i])
 
     @property
     def is_colored(self) -> np.ndarray:

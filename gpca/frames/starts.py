@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
+from pathlib import Path
 
 import numpy as np
 
@@ -21,6 +22,8 @@ from gpca.frames.dataset import Dataset
 from gpca.frames.estimates import EstimatorErrors, error_of, estimates_of, read_pose_errors
 from gpca.frames.instances import Instances
 from gpca.frames.reading import CenteredModel
+from gpca.io.arrays import REAL, TEXT, WHOLE, load_arrays, save_arrays
+from gpca.io.names import Axes
 from gpca.objects import splits
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.perturbation import misplacement
@@ -52,6 +55,19 @@ class Starts:
     def subset(self, rows: np.ndarray) -> Starts:
         """Return the given rows."""
         return Starts(*(getattr(self, field.name)[rows] for field in fields(self)))
+
+    def save(self, path: str | Path, axes: Axes) -> None:
+        """Write the npz described in results/README.md, of this source and seed."""
+        save_arrays(path, {field.name: getattr(self, field.name) for field in fields(self)}, axes)
+
+    @classmethod
+    def load(cls, path: str | Path, axes: Axes) -> Starts:
+        """Read the npz; InputError where it is missing, damaged, or of another source or seed."""
+        shapes: dict[str, tuple[int | str, ...]] = {field.name: ("K",) for field in fields(cls)}
+        shapes |= {"T_camera_object_init": ("K", 4, 4)}
+        kinds = {"instance": WHOLE, "kind": TEXT, "init_from": TEXT, "T_camera_object_init": REAL}
+        arrays = load_arrays(path, shapes, kinds, axes)
+        return cls(**{name: arrays[name] for name in shapes})
 
 
 def all_starts(

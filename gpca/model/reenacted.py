@@ -94,7 +94,7 @@ class Reenacted:
         """
         error_k_8 = np.array([enactment.error_8 for enactment in enactments])
         mean_8 = (weight_k[:, None] * error_k_8).sum(axis=0)
-        seen = enactments[0].observation
+        severity = enactments[0].candidate.severity
         poses = [
             _fitting(enactment, float(weight), T_result, surface)
             for enactment, weight in zip(enactments, weight_k, strict=True)
@@ -102,9 +102,9 @@ class Reenacted:
         return cls(
             error=float(mean_8[ALL]),
             effects=dict(zip(CONCEPTS, shapley_values(mean_8[None])[0].tolist(), strict=True)),
-            noise=float(seen.noise),
-            outliers=seen.outliers,
-            missing=seen.missing,
+            noise=severity["noise"],
+            outliers=severity["outliers"],
+            missing=severity["crop"],
             poses=tuple(poses),
         )
 

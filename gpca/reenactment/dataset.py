@@ -48,8 +48,8 @@ class Reenactments:
         T_model_observed: (S, K, 4, 4) takes what was observed from where the registration began to where a hypothesis
             has it in the model, in diameters.
         error, uncertainty: (S, K, 8) v̂ and û of every subset of the causes.
-        measured: (S, K, 8) the numbers of `MEASURED`: those of :class:`gpca.reenactment.hypotheses.Hypothesis` and of
-            :class:`gpca.reenactment.observation.Observation`; and how far (root mean square, diameters) the observed
+        measured: (S, K, 8) the numbers of `MEASURED`: those of :class:`gpca.reenactment.hypotheses.Hypothesis`; the
+            severities of noise, outliers and crop under it; and how far (root mean square, diameters) the observed
             points then lie from where the registration began, and from where it ended.
         described: (S, F) the groups `DESCRIBED` of descriptors (:mod:`gpca.features`), side by side.
         verdict: (S, 4) of :func:`gpca.reenactment.verdict.verdict`.
@@ -145,11 +145,11 @@ def as_arrays(enactments: list[Enactment], pair: ObservedPair, most: int) -> dic
 
 
 def _measured(enactment: Enactment, pair: ObservedPair) -> list[float]:
-    hypothesis, observation = enactment.hypothesis, enactment.observation
+    hypothesis, severity = enactment.hypothesis, enactment.candidate.severity
     before = transform(pair.T_init, pair.observed)
     return [
         *(hypothesis.log_likelihood, hypothesis.width, hypothesis.covered),
-        *(observation.noise, observation.outliers, observation.missing),
+        *(severity["noise"], severity["outliers"], severity["crop"]),
         displacements(hypothesis.T[None], before)[0],
         displacements((hypothesis.T @ pair.T_init)[None], pair.observed)[0],
     ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from time import perf_counter
@@ -16,7 +17,7 @@ from gpca.causes.shapley import SUBSETS, shapley_values
 from gpca.causes.truth import LARGEST_ERROR
 from gpca.features.pair import ObservedPair
 from gpca.reenactment.hypotheses import Hypothesis, find_hypotheses
-from gpca.reenactment.observation import NoiseScale, Observation, observe
+from gpca.reenactment.observation import NoiseScale, observe
 from gpca.reenactment.rebuilding import rebuild
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface
@@ -28,12 +29,12 @@ class Enactment:
     """One hypothesis and what the registration would have done, were it true.
 
     Attributes:
+        candidate: what is registered; its severities are what the hypothesis says of noise, outliers and crop.
         error_8, uncertainty_8: v̂ and û of every subset of the causes, as in :class:`gpca.causes.truth.Truth`.
         icp_seconds: that the registrations took.
     """
 
     hypothesis: Hypothesis
-    observation: Observation
     candidate: Candidate
     error_8: np.ndarray
     uncertainty_8: np.ndarray
@@ -76,10 +77,26 @@ def enact(
     """Register every subset of the causes from the same starts, as if a hypothesis were true."""
     observation = observe(before, hypothesis, surface, scale, random)
     candidate = rebuild(hypothesis.T, observation, surface, random)
+    return register(hypothesis, candidate, surface.errors, xi_n_6, truth)
+
+
+def register(
+    hypothesis: Hypothesis,
+    candidate: Candidate,
+    errors: Callable[[np.ndarray], np.ndarray],
+    xi_n_6: np.ndarray,
+    truth: CauseSettings,
+    misses: bool = False,
+) -> Enactment:
+    """Register every subset of a candidate's causes; what cannot be registered is as wrong as can be.
+
+    Args:
+        errors, misses: as for :class:`gpca.causes.counterfactuals.Counterfactuals` and its registrar.
+    """
     started = perf_counter()
-    measured = Counterfactuals(Registrar(candidate, truth), surface.errors, xi_n_6, truth)
+    measured = Counterfactuals(Registrar(candidate, truth, misses), errors, xi_n_6, truth)
     error_8, uncertainty_8 = np.array([_measured(measured, subset) for subset in range(len(SUBSETS))]).T
-    return Enactment(hypothesis, observation, candidate, error_8, uncertainty_8, perf_counter() - started)
+    return Enactment(hypothesis, candidate, error_8, uncertainty_8, perf_counter() - started)
 
 
 def _measured(measured: Counterfactuals, subset: int) -> tuple[float, float]:

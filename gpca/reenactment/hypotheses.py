@@ -69,14 +69,32 @@ def find_hypotheses(
         T_found_n: (n, 4, 4) poses that registrations ended at.
     """
     search = _Search(observed, surface, settings, random)
-    fits = search.fit(_ends(observed, surface, T_found_n, random), few=True)
-    ranked = sorted(fits, key=lambda hypothesis: -hypothesis.log_posterior)
-    rows = distinct_rows(surface, np.stack([hypothesis.T for hypothesis in ranked]), settings.hypotheses, SAME)
-    found = search.fit(np.stack([ranked[row].T for row in rows]), few=False)
-    found.sort(key=lambda hypothesis: -hypothesis.log_posterior)
-    rows = distinct_rows(surface, np.stack([hypothesis.T for hypothesis in found]), settings.hypotheses, SAME / 2)
-    least = found[0].log_posterior - NEGLIGIBLE
-    return [found[row] for row in rows if found[row].log_posterior > least]
+    fits = search.fit(search_ends(observed, surface, T_found_n, random), few=True)
+    first = most_probable(fits, surface, settings.hypotheses, SAME)
+    found = search.fit(np.stack([hypothesis.T for hypothesis in first]), few=False)
+    return not_negligible(most_probable(found, surface, settings.hypotheses, SAME / 2))
+
+
+def most_probable(hypotheses: list[Hypothesis], surface: ModelSurface, most: int, limit: float) -> list[Hypothesis]:
+    """Return the most probable distinct hypotheses, the best first."""
+    ranked = sorted(hypotheses, key=lambda hypothesis: -hypothesis.log_posterior)
+    rows = distinct_rows(surface, np.stack([hypothesis.T for hypothesis in ranked]), most, limit)
+    return [ranked[row] for row in rows]
+
+
+def not_negligible(ranked: list[Hypothesis], nats: float = NEGLIGIBLE) -> list[Hypothesis]:
+    """Return the hypotheses, the best first, without those that are so many nats below it."""
+    least = ranked[0].log_posterior - nats
+    return [hypothesis for hypothesis in ranked if hypothesis.log_posterior > least]
+
+
+def anchor_of(points: int, settings: ReenactmentSettings) -> Anchor:
+    """Return what holds a pose to the initial one, as firmly as is believed of good starts, against so many points."""
+    return Anchor(
+        np.deg2rad(settings.good_rotation_deg) / np.sqrt(3),
+        settings.good_translation / np.sqrt(3),
+        max(points / INDEPENDENT, 1.0),
+    )
 
 
 class _Search:
@@ -94,11 +112,7 @@ class _Search:
 
     def fit(self, T_n: np.ndarray, few: bool) -> list[Hypothesis]:
         observed, mixture, iterations = self._few if few else self._all
-        anchor = Anchor(
-            np.deg2rad(self._settings.good_rotation_deg) / np.sqrt(3),
-            self._settings.good_translation / np.sqrt(3),
-            max(len(observed) / INDEPENDENT, 1.0),
-        )
+        anchor = anchor_of(len(observed), self._settings)
         free = mixture.fit(observed, T_n, iterations)
         held = mixture.fit(observed, np.eye(4)[None], iterations, anchor=anchor)
         return [
@@ -108,7 +122,9 @@ class _Search:
         ]
 
 
-def _ends(observed: np.ndarray, surface: ModelSurface, T_found_n: np.ndarray, random: np.random.Generator):
+def search_ends(
+    observed: np.ndarray, surface: ModelSurface, T_found_n: np.ndarray, random: np.random.Generator
+) -> np.ndarray:
     """Return distinct poses (n, 4, 4) that ICP finds from all starts."""
     few = observed[np.sort(random.permutation(len(observed))[:SEARCHED])]
     few_model = surface.points[:SEARCHED_MODEL]
@@ -145,8 +161,8 @@ def _hypothesis(
 def log_prior(T: np.ndarray, settings: ReenactmentSettings) -> float:
     """Return the logarithm of how probable a pose error is beforehand, up to a constant.
 
-    A good start's error is small, any other's large; both are normal in angle and length. Their weights are those of
-    the two kinds of start, not densities: a hypothesis stands for all poses around it.
+    A good start's error is small, another's large, both normal in angle and length; a lost start's is any. The weights
+    are those of the kinds of start, not densities: a hypothesis stands for all poses around it.
     """
     angle, length = rotation_angle_rad(T), float(np.sqrt(np.square(T[:3, 3]).sum()))
 
@@ -156,7 +172,8 @@ def log_prior(T: np.ndarray, settings: ReenactmentSettings) -> float:
 
     good = np.log(settings.good_starts) + log_normal(settings.good_rotation_deg, settings.good_translation)
     bad = np.log(1 - settings.good_starts) + log_normal(settings.bad_rotation_deg, settings.bad_translation)
-    return float(np.logaddexp(good, bad))
+    lost = np.log(settings.lost_starts) if settings.lost_starts else -np.inf
+    return float(np.logaddexp(np.logaddexp(good, bad), lost))
 
 
 def distinct_rows(surface: ModelSurface, T_n: np.ndarray, most: int, limit: float) -> list[int]:

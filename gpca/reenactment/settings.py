@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.settings import Bounds, OpenShare, Positive
+from gpca.settings import Bounds, OpenShare, Positive, Share
 
 Angle = Annotated[float, Bounds(exclusiveMinimum=0, maximum=180)]  # degrees
 
@@ -20,6 +20,7 @@ class ReenactmentSettings:
         good_starts: how probable it is that the initial pose is good.
         good_rotation_deg, good_translation: root mean square angle and length (diameters) of a good start's error.
         bad_rotation_deg, bad_translation: the same of any other's.
+        lost_starts: how probable it is that the initial pose says nothing, and any other is as likely.
     """
 
     hypotheses: Annotated[int, Bounds(minimum=2, maximum=20)] = 4
@@ -28,6 +29,7 @@ class ReenactmentSettings:
     good_translation: Positive = 0.017
     bad_rotation_deg: Angle = 70.0
     bad_translation: Positive = 0.35
+    lost_starts: Share = 0.0
 
     def calls(self, starts: int) -> int:
         """Return how many runs of ICP take whole clouds, at most: of all subsets of the causes from so many starts."""

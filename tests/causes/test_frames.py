@@ -4,28 +4,25 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
-from gpca.causes.frames import chosen_starts, frame_candidate, measure_frames
+from gpca.causes.frames import chosen_starts, frame_candidate, measure_frames, subjects_of
 from gpca.causes.settings import CauseSettings, FrameCauseSettings
 from gpca.causes.shapley import ALL
 from gpca.causes.truth import LARGEST_ERROR
 from gpca.errors import InputError
 from gpca.frames.clean_view import clean_view
 from gpca.frames.meshes import meshes_of
-from gpca.frames.reading import Dataset, read_models
 from gpca.frames.starts import Starts
 from gpca.objects.splits import TRAINING
+from tests.frames.bracket import BRACKET, hidden, misplaced, models_in, most_seen, noisy, own_starts
 
 SETTINGS = CauseSettings(clean_pairs=20, points=(96, 128))
 POINTS = 256
-UNKNOWN = "bracket"  # no rotation leaves it as it is, so that ADD sees every error
 
 
 @pytest.fixture(scope="module")
 def models(scenes):
-    dataset = Dataset("tiny", (scenes,))
-    return {"tiny": read_models(dataset, dataset.frames())}
+    return models_in(scenes)
 
 
 @pytest.fixture(scope="module")
@@ -35,49 +32,12 @@ def meshes(models, tiny):
 
 @pytest.fixture(scope="module")
 def seen(tiny):
-    """The instance of the bracket with most pixels, alone, started from the truth."""
-    instances, objects = tiny
-    sizes = np.diff(instances.offsets) * (instances.object_index == objects.names.index(f"tiny {UNKNOWN}"))
-    return only(instances, int(sizes.argmax()))
-
-
-def only(instances, i, points_m=None, pixels=None):
-    """One instance from its true pose, with other points where they are given."""
-    columns = {
-        name: getattr(instances, name)[[i]]
-        for name in ("dataset", "scene", "image", "object_index", "symmetric", "init_from", "camera_3_3", "colour")
-    }
-    points_m = instances.cloud_m(i) if points_m is None else points_m.astype(np.float32)
-    pixels = instances.pixels_of(i) if pixels is None else pixels
-    poses = dict.fromkeys(("T_camera_object_true", "T_camera_object_init"), instances.T_camera_object_true[[i]])
-    return replace(instances, **columns, **poses, points_m=points_m, pixels=pixels, offsets=np.array([0, len(pixels)]))
+    return most_seen(*tiny)
 
 
 def measured(instances, objects, meshes):
     starts = own_starts(instances)
     return measure_frames(instances, starts, objects, meshes, "tiny", 100, SETTINGS, POINTS)
-
-
-def own_starts(instances, kind="native"):
-    numbers = np.arange(len(instances))
-    return Starts(numbers, np.full(len(numbers), kind), instances.init_from, instances.T_camera_object_init)
-
-
-def hidden(seen):
-    """The same behind something that leaves the leftmost pixels alone."""
-    kept = np.argsort(seen.pixels[:, 0], kind="stable")[: len(seen.pixels) // 4]
-    return only(seen, 0, seen.points_m[kept], seen.pixels[kept])
-
-
-def misplaced(seen):
-    T_wrong = np.eye(4)
-    T_wrong[:3, :3] = Rotation.from_rotvec([0, np.deg2rad(100), 0]).as_matrix()
-    return replace(seen, T_camera_object_init=seen.T_camera_object_true @ T_wrong)
-
-
-def noisy(seen):
-    along = 1 + np.random.default_rng(100).normal(scale=0.02, size=(len(seen.points_m), 1))
-    return only(seen, 0, seen.points_m * along)
 
 
 @pytest.mark.parametrize(("change", "cause"), [(hidden, "overlap"), (misplaced, "pose"), (noisy, "noise")])
@@ -102,18 +62,16 @@ def test_nothing_is_wrong_with_what_is_whole_and_where_it_should_be(seen, tiny, 
 def test_a_perfect_sensor_measures_what_is_rendered(seen, tiny, meshes):
     index = int(seen.object_index[0])
     surface_m = tiny[1].points(index).astype(float)
-    view = clean_view(seen, 0, meshes[index], surface_m)
+    view = clean_view(seen.sighting(0), seen.T_camera_object_true[0], meshes[index], surface_m)
     assert np.median(np.linalg.norm(view.measured - view.clean, axis=1)) < 1e-3
-    whole = clean_view(hidden(seen), 0, meshes[index], surface_m)
+    whole = clean_view(hidden(seen).sighting(0), seen.T_camera_object_true[0], meshes[index], surface_m)
     assert whole.share == pytest.approx(view.share / 4, abs=0.05)
     assert len(whole.unmeasured) > len(view.unmeasured)
     assert np.isfinite(whole.clean).all()
 
 
 def test_the_model_is_what_the_camera_would_see_where_icp_starts(seen, tiny, meshes):
-    from gpca.causes.frames import _subjects
-
-    [subject] = _subjects(seen, np.arange(1), tiny[1])
+    [subject] = subjects_of(seen, np.arange(1), tiny[1])
     T_init, random = misplaced(seen).T_camera_object_init[0], np.random.default_rng(100)
     candidate = frame_candidate(seen, 0, T_init, subject, meshes[subject.index], POINTS, random)
     assert candidate.reference((1,)) is candidate.model
@@ -122,8 +80,8 @@ def test_the_model_is_what_the_camera_would_see_where_icp_starts(seen, tiny, mes
 
 
 def test_what_has_no_mesh_or_lies_beside_it_is_refused_or_left_out(seen, tiny, models, meshes, capsys):
-    without = {"tiny": {number: model for number, model in models["tiny"].items() if UNKNOWN not in model.surface.name}}
-    with pytest.raises(InputError, match=f"object 'tiny {UNKNOWN}': has no mesh among the models"):
+    without = {"tiny": {number: model for number, model in models["tiny"].items() if BRACKET not in model.surface.name}}
+    with pytest.raises(InputError, match=f"object 'tiny {BRACKET}': has no mesh among the models"):
         meshes_of(without, tiny[1], seen.object_index.tolist())
     beside = replace(seen, points_m=seen.points_m + np.float32([5, 0, 0]))
     with pytest.raises(InputError, match="no instance in the frames can be measured"):

@@ -1,6 +1,7 @@
 """What a re-enactment says to a user: other poses in plain words, and what each cause does."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,7 +13,6 @@ from gpca.causes.shapley import ALL, shapley_values
 from gpca.model.reenacted import Reenacted, axis_in_words
 from gpca.reenactment.enactment import Enactment
 from gpca.reenactment.hypotheses import Hypothesis
-from gpca.reenactment.observation import Observation
 from gpca.reenactment.surface import ModelSurface
 
 ERRORS = np.arange(8) / 100
@@ -27,9 +27,8 @@ def moved(turn_deg=(0, 0, 0), shift=(0, 0, 0)):
 def enacted(T):
     """An enactment of this hypothesis, with noise of 2 %, a quarter outliers and half of the surface missing."""
     hypothesis = Hypothesis(T, np.ones(4), 0.0, 0.01, 1.0, 0.0)
-    outlier = np.array([True, False, False, False])
-    seen = Observation(np.zeros((4, 3)), outlier, 0.02, np.zeros(4), np.arange(4), np.arange(10) < 5)
-    return Enactment(hypothesis, seen, None, ERRORS, np.zeros(8), 0.0)
+    candidate = SimpleNamespace(severity={"noise": 0.02, "outliers": 0.25, "crop": 0.5})
+    return Enactment(hypothesis, candidate, ERRORS, np.zeros(8), 0.0)
 
 
 def said(points, *poses):

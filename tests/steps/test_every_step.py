@@ -13,7 +13,8 @@ from .command_lines import STEP_OPTIONS, arguments
 # tests/frames/test_steps.py, tests/steps/test_frame_causes.py, test_live_shap.py, test_recover.py, test_readings.py and
 # test_ship.py, tests/comparison/test_reference.py
 ELSEWHERE = {
-    *("scenes", "instances", "frame_registrations", "frame_causes", "live_shap", "recover", "readings", "ship"),
+    *("scenes", "instances", "frame_registrations", "frame_causes", "reenact_frames", "diagnose_frames"),
+    *("live_shap", "recover", "readings", "ship"),
     *("check-config", "check-reference"),
 }
 BY_HAND = {"labels.csv", "answers.txt"}  # given by a person, not made

@@ -1,4 +1,4 @@
-"""The step ``frame_causes`` by hand, what is collected of it, and what it says of faulty files and settings."""
+"""The steps of frames' causes by hand, what is collected of them, and what they say of faulty files and settings."""
 
 import json
 
@@ -21,34 +21,41 @@ SETTINGS = {
     "causes": CAUSES,
     "icp": {"max_iterations": 30},
     "descriptors": {"starts": 1, "restarts": 2, "icp_points": 64},
+    "reenactment": {"hypotheses": 2},
     "encoder": ENCODER,
-    "explainers": {"gpca": FEW, "gpca_pair": FEW, "gate_rmse": {}},
+    "explainers": {"gpca": FEW, "gpca_pair": FEW, "gate_rmse": {}, "reenact": {}},
 }
 
 
 @pytest.fixture(scope="module")
-def call(made, tiny, scenes, tmp_path_factory):
-    """A folder with what the step reads, and its command line there."""
+def calls(made, tiny, scenes, tmp_path_factory):
+    """A folder with what the steps read, and their command lines there, by name."""
     folder = tmp_path_factory.mktemp("frames")
     tiny[0].save(folder / "instances.npz", "tiny")
     tiny[1].save(folder / "objects.npz", "tiny")
-    lessons = {"causes": "causes", "descriptors": "descriptors", "cause_embeddings": "embeddings"}
     datasets = {"tiny": {"location": str(scenes)}}
-    words = ["--source", "tiny", "--seed", "100", "--settings", json.dumps(SETTINGS | {"datasets": datasets})]
-    words += ["--instances", "instances.npz", "--objects", "objects.npz", "--encoders", made / "cause_weights.pt"]
-    for name, option in lessons.items():
-        words += [f"--{option}", made / f"{name}.npz"]
-    outputs = {"--frame-causes": "seed100.npz", "--samples": "seed100.csv", "--predictions": "said.csv"}
-    words += [word for pair in outputs.items() for word in pair]
-    return folder, ["frame_causes", *map(str, words)]
+    common = ["--source", "tiny", "--seed", "100", "--settings", json.dumps(SETTINGS | {"datasets": datasets})]
+    frames = [*common, "--instances", "instances.npz", "--objects", "objects.npz"]
+    measured = ["--frame-causes", "seed100.npz"]
+    starts = ["--starts", "starts.npz"]
+    lessons = {"causes": "causes", "descriptors": "descriptors", "cause_embeddings": "embeddings"}
+    lessons |= {"reenactments": "reenactments"}
+    learned = [word for name, option in lessons.items() for word in (f"--{option}", made / f"{name}.npz")]
+    learned += ["--encoders", made / "cause_weights.pt", "--frame-reenactments", "reenactments.npz"]
+    words_of = {
+        "frame_causes": [*frames, *measured, *starts, "--samples", "seed100.csv"],
+        "reenact_frames": [*frames, *measured, *starts, "--reenactments", "reenactments.npz"],
+        "diagnose_frames": [*common, *measured, *learned, "--predictions", "said.csv"],
+    }
+    return folder, {step: [step, *map(str, words)] for step, words in words_of.items()}
 
 
 @pytest.fixture(scope="module")
-def asked(call):
-    folder, words = call
+def asked(calls):
+    folder, words_of = calls
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
-        assert main(words) == 0
+        assert [main(words) for words in words_of.values()] == [0, 0, 0]
     return tuple([folder / name] for name in ("seed100.npz", "seed100.csv", "said.csv"))
 
 
@@ -106,18 +113,22 @@ def test_files_of_other_samples_are_refused(asked, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("option", "value", "words"),
+    ("step", "option", "value", "words"),
     [
-        ("--instances", ["objects.npz"], "objects.npz: array"),
+        ("frame_causes", "--instances", ["objects.npz"], "objects.npz: array"),
         (
+            "frame_causes",
             "--settings",
             [json.dumps(SETTINGS | {"datasets": {"tiny": {"location": "/not/there"}}})],
             "/not/there does not exist",
         ),
-        ("--frame-causes", ["objects.npz"], "objects.npz"),
+        ("frame_causes", "--frame-causes", ["objects.npz"], "objects.npz"),
+        ("reenact_frames", "--starts", ["objects.npz"], "objects.npz: array 'instance' is missing"),
+        ("reenact_frames", "--frame-causes", ["lost.npz"], "lost.npz: no such file"),
+        ("diagnose_frames", "--frame-reenactments", ["instances.npz"], "instances.npz: array"),
     ],
 )
-def test_a_fault_is_one_line_and_harms_nothing(call, asked, option, value, words):
-    folder, line = call
+def test_a_fault_is_one_line_and_harms_nothing(calls, asked, step, option, value, words):
+    folder, line = calls[0], calls[1][step]
     at = line.index(option)
     refusal([*line[: at + 1], *value, *line[at + 2 :]], folder, words)

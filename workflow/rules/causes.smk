@@ -64,6 +64,8 @@ rule reenact:
         "<logs>/reenactments/{source}/seed{seed}.log",
     benchmark:
         "<benchmarks>/reenactments/{source}/seed{seed}.tsv"
+    wildcard_constraints:
+        source="|".join(SOURCES),
     conda:
         "../envs/gpca.yaml"
     params:

@@ -1,13 +1,83 @@
 # Instances of depth frames -> registrations with measured causes -> what explainers of simulated causes say of them.
+FRAME_CAUSES = {
+    "datasets": REAL_WORLD["datasets"],
+    "role": config["splits"]["role"],
+    "causes": config["causes"],
+    **ICP,
+}
+
+
 rule measure_frame_causes:
     input:
         **FRAMES_FROM,
         splits=split_file("scenes") if REAL_WORLD["datasets"] else [],
         instances=f"<results>/instances/{FRAMES}.npz",
         objects=f"<results>/objects/{FRAMES}.npz",
+        code=code_files("gpca.experiments.frame_causes.step"),
+    output:
+        frame_causes="<results>/frame_causes/seed{seed}.npz",
+        samples="<results>/frame_causes/seed{seed}.csv",
+        starts="<results>/frame_starts/seed{seed}.npz",
+    log:
+        "<logs>/frame_causes/seed{seed}.log",
+    benchmark:
+        "<benchmarks>/frame_causes/seed{seed}.tsv"
+    priority: 10
+    conda:
+        "../envs/gpca.yaml"
+    params:
+        step="gpca.experiments.frame_causes.step",
+        settings=as_json({"frames": REAL_WORLD["causes"], **FRAME_CAUSES}),
+        source=FRAMES,
+        folders=DATA_FOLDERS,
+    script:
+        "../scripts/step.py"
+
+
+rule reenact_frames:
+    input:
+        **FRAMES_FROM,
+        splits=split_file("scenes") if REAL_WORLD["datasets"] else [],
+        instances=f"<results>/instances/{FRAMES}.npz",
+        objects=f"<results>/objects/{FRAMES}.npz",
+        frame_causes="<results>/frame_causes/seed{seed}.npz",
+        starts="<results>/frame_starts/seed{seed}.npz",
+        code=code_files("gpca.steps.reenact_frames"),
+    output:
+        reenactments=f"<results>/reenactments/{FRAMES}/seed{{seed}}.npz",
+    log:
+        f"<logs>/reenactments/{FRAMES}/seed{{seed}}.log",
+    benchmark:
+        f"<benchmarks>/reenactments/{FRAMES}/seed{{seed}}.tsv"
+    priority: 10
+    conda:
+        "../envs/gpca.yaml"
+    params:
+        step="gpca.steps.reenact_frames",
+        settings=as_json(
+            {
+                "reenactment": DIAGNOSIS["reenactment"] | REAL_WORLD["reenactment"],
+                **FRAME_CAUSES,
+            }
+        ),
+        source=FRAMES,
+        folders=DATA_FOLDERS,
+    script:
+        "../scripts/step.py"
+
+
+rule diagnose_frames:
+    input:
+        frame_causes="<results>/frame_causes/seed{seed}.npz",
+        frame_reenactments=if_enacted(
+            f"<results>/reenactments/{FRAMES}/seed{{seed}}.npz"
+        ),
         causes=collect("<results>/causes/{source}/seed{{seed}}.npz", source=SOURCES),
         descriptors=collect(
             "<results>/descriptors/{source}/seed{{seed}}.npz", source=SOURCES
+        ),
+        reenactments=if_enacted(
+            collect("<results>/reenactments/{source}/seed{{seed}}.npz", source=SOURCES)
         ),
         encoders=collect(
             "<results>/cause_encoders/{source}/seed{{seed}}.pt", source=SOURCES
@@ -16,34 +86,21 @@ rule measure_frame_causes:
             "<results>/cause_embeddings/{source}/seed{{seed}}.npz", source=SOURCES
         ),
         code=code_files(
-            "gpca.experiments.frame_causes.step",
+            "gpca.experiments.frame_causes.diagnosis_step",
             backbone_module(DIAGNOSIS["encoder"]),
-            *(explainer_module(name, CAUSES) for name in explained_on_frames()),
+            *(explainer_module(name, CAUSES) for name in DIAGNOSIS["explainers"]),
         ),
     output:
-        frame_causes="<results>/frame_causes/seed{seed}.npz",
-        samples="<results>/frame_causes/seed{seed}.csv",
         predictions="<results>/frame_diagnoses/seed{seed}.csv",
     log:
-        "<logs>/frame_causes/seed{seed}.log",
+        "<logs>/frame_diagnoses/seed{seed}.log",
     benchmark:
-        "<benchmarks>/frame_causes/seed{seed}.tsv"
+        "<benchmarks>/frame_diagnoses/seed{seed}.tsv"
     conda:
         "../envs/gpca.yaml"
     params:
-        step="gpca.experiments.frame_causes.step",
-        settings=as_json(
-            {
-                "frames": REAL_WORLD["causes"],
-                "datasets": REAL_WORLD["datasets"],
-                "role": config["splits"]["role"],
-                "causes": config["causes"],
-                **ICP,
-                **DIAGNOSIS,
-                "explainers": explained_on_frames(),
-            }
-        ),
+        step="gpca.experiments.frame_causes.diagnosis_step",
+        settings=as_json(DIAGNOSIS | ICP),
         source=FRAMES,
-        folders=DATA_FOLDERS,
     script:
         "../scripts/step.py"

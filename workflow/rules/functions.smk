@@ -82,13 +82,13 @@ def read_by(cause_explainer):
     return folders.get(explainer_entry(cause_explainer, CAUSES).reads, "descriptors")
 
 
-def explained_on_frames():
-    """Return the explainers of causes that depth frames are explained by: all but those that read re-enactments."""
-    return {
-        name: own
-        for name, own in config["diagnosis"]["explainers"].items()
-        if explainer_entry(name, CAUSES).reads != REENACTED
-    }
+def if_enacted(files):
+    """Return files of re-enactments where an explainer of causes reads any."""
+    read = [
+        explainer_entry(name, CAUSES).reads
+        for name in config["diagnosis"]["explainers"]
+    ]
+    return files if REENACTED in read else []
 
 
 def encoders_of_others(wildcards):

@@ -82,7 +82,8 @@ def table9_frames(
             "State: mean share of the nominal and of the failed that is called so. Over untrained, lead: State minus "
             "that of the best untrained row and of the best other row, on the same draws. n: starts that are nominal "
             "or failed. The others as in Table IX. The rule counts points against the part of the model that the "
-            "camera would see, which is not what it was made for: here it is a control.",
+            "camera would see, which is not what it was made for: here it is a control. A re-enactment also reads "
+            "the mesh, the camera and the pixels of the object.",
             COST_NOTE,
         ),
     )

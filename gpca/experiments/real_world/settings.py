@@ -13,6 +13,7 @@ from gpca.frames.initial_pose import InitialPoseSettings
 from gpca.frames.rgbd_scene import SceneSettings
 from gpca.objects.entry import Checksums, Name, Place, Text, Unit, Urls
 from gpca.pairs.synthesis import TestSamples, TrainSamples
+from gpca.reenactment.settings import ReenactmentSettings
 from gpca.settings import Bounds, Count, Distinct, OpenShare, Share, changes_of
 
 Pretraining = Annotated[dict, changes_of(EncoderSettings, without=("backbone", "options", "reading", "draws"))]
@@ -20,6 +21,9 @@ Pretraining = Annotated[dict, changes_of(EncoderSettings, without=("backbone", "
 Training = Annotated[
     dict, changes_of(EncoderSettings, without=("backbone", "options", "reading", "draw_points", "draws"))
 ]
+
+# The same hypotheses cost the same everywhere.
+Reenactment = Annotated[dict, changes_of(ReenactmentSettings, without=("hypotheses",))]
 
 
 @dataclass(frozen=True)
@@ -75,3 +79,4 @@ class RealWorldSettings:
     explainers: dict[str, dict | None] | None
     one_encoder: bool
     causes: FrameCauseSettings
+    reenactment: Reenactment
