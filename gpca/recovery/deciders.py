@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,6 +17,9 @@ from gpca.recovery.chances import ExpectedUtility
 from gpca.recovery.gate import FailureGate
 from gpca.recovery.policy import NOTHING, Decision, RecoveryPolicy, Thresholds, Treated
 from gpca.recovery.sequences import Order, next_of
+
+if TYPE_CHECKING:
+    from gpca.recovery.reenactment import Reenacted
 
 
 @dataclass(frozen=True)
@@ -30,6 +34,7 @@ class Case:
             policies that learn.
         cause: of a failure, for the oracle alone; empty for all others.
         random: the case's own numbers for policies, from their start: the same at every decision.
+        reenacted: the registration as it is now, for policies that re-enact it.
     """
 
     actions: tuple[str, ...]
@@ -39,6 +44,7 @@ class Case:
     known_F: np.ndarray | None
     cause: str
     random: np.random.Generator
+    reenacted: Reenacted | None = None
 
 
 Decide = Callable[[Case], Decision]
@@ -53,6 +59,7 @@ class Means:
         actions: those it can take.
         utility, order: what the rehearsals taught: chances, and the best fixed order of actions.
         gate: it tells failures from good registrations.
+        alarm: the probability of a failure, by the re-enactment, above which a registration is taken for one.
     """
 
     policy: RecoveryPolicy
@@ -60,6 +67,7 @@ class Means:
     utility: ExpectedUtility | None = None
     order: Order = ()
     gate: FailureGate | None = None
+    alarm: float | None = None
 
 
 def follow_scores(means: Means) -> Decide:
@@ -135,22 +143,65 @@ def follow_rehearsed(means: Means) -> Decide:
     return follow_sequence(means.order)(means)
 
 
+def follow_reenactment(means: Means) -> Decide:
+    """Treat the cause without which the registration would gain most, by its re-enactment as it is now.
+
+    An action that was taken without success comes again only after all others.
+    """
+    treatments = means.policy.treatments
+
+    def decide(case: Case) -> Decision:
+        assert case.reenacted is not None  # policies that re-enact are given it
+        gains = dict(zip(CONCEPTS, case.reenacted.phi_3.tolist(), strict=True))
+        fewest = min(case.actions.count(action) for action in treatments.values())
+        untried = [concept for concept in gains if case.actions.count(treatments[concept]) == fewest]
+        best = max(untried, key=gains.__getitem__)
+        return Decision(treatments[best], best, f"{best} adds {gains[best]:.3f} of the diameter to the error")
+
+    return decide
+
+
 def gated(make: Callable[[Means], Decide]) -> Callable[[Means], Decide]:
     """Return a maker of the policy that leaves alone what the gate takes for good."""
 
     def make_gated(means: Means) -> Decide:
-        gate, decide = means.gate, make(means)
+        gate = means.gate
         assert gate is not None  # policies that ask a gate are given one
 
-        def decide_gated(case: Case) -> Decision:
+        def alarms(case: Case) -> bool:
             assert case.observed_F is not None
-            if case.actions or gate.alarms(case.observed_F):
-                return decide(case)
-            return Decision(NOTHING, "", "the gate takes it for good")
+            return gate.alarms(case.observed_F)
 
-        return decide_gated
+        return _unless_good(make(means), alarms)
 
     return make_gated
+
+
+def gated_by_reenactment(make: Callable[[Means], Decide]) -> Callable[[Means], Decide]:
+    """Return a maker of the policy that leaves alone what the re-enactment takes for good."""
+
+    def make_gated(means: Means) -> Decide:
+        threshold = means.alarm
+        assert threshold is not None  # policies that ask for the alarm are given its threshold
+
+        def alarms(case: Case) -> bool:
+            assert case.reenacted is not None
+            return case.reenacted.belief.failure > threshold
+
+        return _unless_good(make(means), alarms)
+
+    return make_gated
+
+
+def _unless_good(decide: Decide, alarms: Callable[[Case], bool]) -> Decide:
+    """Decide where there is an alarm at the start; who has acted is told that the pose is wrong yet."""
+
+    def decide_gated(case: Case) -> Decision:
+        if case.actions or alarms(case):
+            return decide(case)
+        return Decision(NOTHING, "", "it is taken for good")
+
+    return decide_gated
 
 
 def follow_truth(means: Means) -> Decide:

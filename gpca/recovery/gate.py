@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import ceil
 from typing import Any
 
 import numpy as np
 
 from gpca.errors import InputError
+from gpca.guarantee.quantile import upper_bound
 
 INVERSE_REGULARIZATION = 0.3  # C of scikit-learn; chosen on development seeds
 FOLDS = 8  # of the tables
@@ -71,11 +71,10 @@ def learn_gate(
 def alarm_threshold(failure_M: np.ndarray, false_alarms: float) -> float:
     """Return the threshold that a further good registration exceeds with at most this probability.
 
-    That holds over the draws of the M good ones, if they are exchangeable with it: it is their value of rank
-    ⌈(M + 1)(1 - `false_alarms`)⌉, as in conformal prediction. Where M is too small for it, it is the largest of them.
+    That holds over the draws of the M good ones, if they are exchangeable with it
+    (:func:`gpca.guarantee.quantile.upper_bound`). Where M is too small for it, it is the largest of them.
     """
-    rank = min(len(failure_M), ceil((len(failure_M) + 1) * (1 - false_alarms)))
-    return float(np.sort(failure_M)[rank - 1])
+    return min(upper_bound(failure_M, 1 - false_alarms), float(failure_M.max()))
 
 
 def _fitted(observed_N_F: np.ndarray, failed_N: np.ndarray) -> FailureGate:

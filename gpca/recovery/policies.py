@@ -16,11 +16,13 @@ from gpca.recovery.deciders import (
     act_at_random,
     act_in_turn,
     always_act,
+    follow_reenactment,
     follow_rehearsed,
     follow_scores,
     follow_sequence,
     follow_truth,
     gated,
+    gated_by_reenactment,
     never_queue,
     weigh_alarmed,
     weigh_chances,
@@ -40,6 +42,8 @@ class PolicyEntry:
         learns: whether it weighs chances that the rehearsals taught.
         rehearsed: whether it takes the best order of the rehearsals.
         gated: whether it asks the gate first.
+        reenacts: whether it reads the re-enactment of the registration.
+        alarmed: whether it asks the re-enactment for an alarm first.
         told: whether it is told that the pose is wrong, so that it would act on every good registration too.
         oracle: whether it is told the cause.
     """
@@ -51,6 +55,8 @@ class PolicyEntry:
     learns: bool = False
     rehearsed: bool = False
     gated: bool = False
+    reenacts: bool = False
+    alarmed: bool = False
     told: bool = True
     oracle: bool = False
 
@@ -68,6 +74,18 @@ POLICIES = {
     ),
     "error_only": PolicyEntry("Error only, gated", gated(follow_rehearsed), rehearsed=True, gated=True, told=False),
     "error_only_acting": PolicyEntry("Error only, alarmed", follow_rehearsed, rehearsed=True),
+    "reenact": PolicyEntry("Re-enactment", follow_reenactment, reenacts=True),
+    "reenact_gated": PolicyEntry(
+        "Re-enactment, gated", gated_by_reenactment(follow_reenactment), reenacts=True, alarmed=True, told=False
+    ),
+    "error_only_reenact": PolicyEntry(
+        "Error only, re-enactment's gate",
+        gated_by_reenactment(follow_rehearsed),
+        rehearsed=True,
+        reenacts=True,
+        alarmed=True,
+        told=False,
+    ),
     "shap_removal": PolicyEntry("SHAP, remedies, residual", never_queue, explainer="shap_removal_residual"),
     "softmax_head": PolicyEntry("Softmax head", never_queue, explainer="softmax_head"),
     "random": PolicyEntry("Random action", act_at_random),

@@ -8,11 +8,13 @@ from typing import Annotated
 
 from gpca.alignment.icp import ICPSettings
 from gpca.alignment.success import SuccessSettings
+from gpca.causes.settings import OBSERVED, CauseSettings, Limits
 from gpca.encoders.settings import EncoderSettings
 from gpca.frames.camera import Camera
 from gpca.frames.rgbd_scene import SceneSettings
 from gpca.frames.situations import SituationSettings
 from gpca.pairs.synthesis import RegistrationSettings
+from gpca.reenactment.settings import ReenactmentSettings
 from gpca.settings import Bounds, Count
 from gpca.uncertainty.settings import UncertaintySettings
 
@@ -50,6 +52,8 @@ class RecoverySettings:
         situation: what disturbs the registrations, and on which scenes.
         encoder, uncertainty: what the explainers share.
         explainers: the settings of each explainer by its name.
+        reenactment: what the robot believes of its starts, and how many hypotheses it has.
+        counterfactuals: how it registers under each.
     """
 
     section: Mapping
@@ -59,11 +63,13 @@ class RecoverySettings:
     encoder: EncoderSettings
     uncertainty: UncertaintySettings
     explainers: Mapping[str, Mapping]
+    reenactment: ReenactmentSettings
+    counterfactuals: CauseSettings
 
     @classmethod
     def from_sections(cls, sections: Mapping[str, dict]) -> RecoverySettings:
-        """Build from the sections of the config by name, and from ``explainers``."""
-        recovery = sections["recovery"]
+        """Build from the sections of the config by name, and from ``explainers`` and ``reenactment``."""
+        recovery, success = sections["recovery"], sections["success"]["error"]
         registration = RegistrationSettings.from_dict(sections["registrations"])
         scenes = SceneSettings.from_dict(sections["scenes"])
         return cls(
@@ -71,7 +77,7 @@ class RecoverySettings:
             objects=sections["objects"],
             loop=LoopSettings(
                 **recovery["loop"],
-                success=sections["success"]["error"],
+                success=success,
                 cloud_points=registration.cloud_points,
                 icp=registration.icp,
             ),
@@ -84,4 +90,8 @@ class RecoverySettings:
             encoder=EncoderSettings(**sections["encoder"]),
             uncertainty=UncertaintySettings(**sections["uncertainty"], icp=registration.icp),
             explainers=sections.get("explainers", {}),
+            reenactment=ReenactmentSettings(**sections.get("reenactment", {})),
+            counterfactuals=CauseSettings(
+                icp=registration.icp, moved=OBSERVED, limits=Limits(min(Limits.nominal, success), success)
+            ),
         )

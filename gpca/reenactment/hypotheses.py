@@ -7,6 +7,7 @@ Poses take what was observed, where it lay before the registration, to the model
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,6 +33,8 @@ INDEPENDENT = 30  # points that the likelihood counts as: the mixture is no exac
 NEGLIGIBLE = 4.5  # nats below the best hypothesis
 LEAST_COVERED = 0.2  # share of the model
 FEWEST_INLIERS = 8
+
+Evidence = Callable[[np.ndarray, float], float]  # pose (4×4), width of the normals -> nats of the posterior
 
 
 @dataclass(frozen=True)
@@ -61,14 +64,16 @@ def find_hypotheses(
     T_found_n: np.ndarray,
     settings: ReenactmentSettings,
     random: np.random.Generator,
+    evidence: Evidence | None = None,
 ) -> list[Hypothesis]:
     """Return the probable hypotheses, the best first.
 
     Args:
         observed: (N, 3) before the registration, in the model's frame.
         T_found_n: (n, 4, 4) poses that registrations ended at.
+        evidence: what else speaks for a pose, such as what a camera saw around the points.
     """
-    search = _Search(observed, surface, settings, random)
+    search = _Search(observed, surface, settings, random, evidence)
     fits = search.fit(search_ends(observed, surface, T_found_n, random), few=True)
     first = most_probable(fits, surface, settings.hypotheses, SAME)
     found = search.fit(np.stack([hypothesis.T for hypothesis in first]), few=False)
@@ -101,9 +106,14 @@ class _Search:
     """Fits poses to some of the points, or to all; the initial pose is always among them, held by what is believed."""
 
     def __init__(
-        self, observed: np.ndarray, surface: ModelSurface, settings: ReenactmentSettings, random: np.random.Generator
+        self,
+        observed: np.ndarray,
+        surface: ModelSurface,
+        settings: ReenactmentSettings,
+        random: np.random.Generator,
+        evidence: Evidence | None,
     ) -> None:
-        self._surface, self._settings, self._random = surface, settings, random
+        self._surface, self._settings, self._random, self._evidence = surface, settings, random, evidence
         few = observed[np.sort(random.permutation(len(observed))[:FITTED])]
         few_model = surface.points[:FITTED_MODEL]
         spacing = surface.spacing * np.sqrt(len(surface.points) / len(few_model))
@@ -116,7 +126,7 @@ class _Search:
         free = mixture.fit(observed, T_n, iterations)
         held = mixture.fit(observed, np.eye(4)[None], iterations, anchor=anchor)
         return [
-            _hypothesis(fits, i, observed, self._surface, self._settings, self._random)
+            _hypothesis(fits, i, observed, self._surface, self._settings, self._random, self._evidence)
             for fits in (free, held)
             for i in range(len(fits.T_n))
         ]
@@ -144,6 +154,7 @@ def _hypothesis(
     surface: ModelSurface,
     settings: ReenactmentSettings,
     random: np.random.Generator,
+    evidence: Evidence | None,
 ) -> Hypothesis:
     T, inlier_N, width = fits.T_n[i], fits.inlier_n_N[i], float(fits.width_n[i])
     seen = transform(T, observed)
@@ -155,6 +166,8 @@ def _hypothesis(
     density = (1 - fits.outliers_n[i]) * np.log(max(covered, LEAST_COVERED))
     likelihood = float(fits.log_likelihood_n[i])
     log_posterior = min(len(observed), INDEPENDENT) * (likelihood - density) + log_prior(T, settings)
+    if evidence is not None:
+        log_posterior += evidence(T, width)
     return Hypothesis(T, inlier_N, likelihood, width, covered, float(log_posterior))
 
 

@@ -1,3 +1,5 @@
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -12,10 +14,10 @@ ACTIONS = ("reinitialize", "new_view", "denoise")
 POLICY = RecoveryPolicy(Thresholds(uncertain=0.2, dominant=0.4))
 
 
-def case(actions=(), scores=None, bald=None, observed=None, known=None, cause="", episode=0):
+def case(actions=(), scores=None, bald=None, observed=None, known=None, cause="", episode=0, reenacted=None):
     scores = None if scores is None else np.array(scores, float)
     bald = None if bald is None else np.array(bald, float)
-    return Case(actions, scores, bald, observed, known, cause, generator("test", episode))
+    return Case(actions, scores, bald, observed, known, cause, generator("test", episode), reenacted)
 
 
 def made(name, **means):
@@ -92,6 +94,30 @@ def test_gated_policies_leave_alone_what_the_gate_takes_for_good_and_act_on_the_
     assert decide(case(("new_view",), observed=np.array([-1.0]), **again)).action != NOTHING  # it is known to be wrong
 
 
+def reenacted(phi, failure=1.0):
+    return SimpleNamespace(phi_3=np.array(phi), belief=SimpleNamespace(failure=failure))
+
+
+def test_the_re_enactment_is_followed_to_the_cause_that_adds_most_and_repeats_no_action_before_all_were_taken():
+    phi = [0.3, 0.1, 0.2]
+    taken = ()
+    for _ in range(4):
+        taken += (made("reenact")(case(taken, reenacted=reenacted(phi))).action,)
+    assert taken == ("denoise", "new_view", "reinitialize", "denoise")
+    now = case(("denoise",), reenacted=reenacted([0.3, 0.2, 0.1]))  # what it is after the action counts
+    assert made("reenact")(now).action == "reinitialize"
+    assert made("reenact")(now).concept == "pose"
+
+
+@pytest.mark.parametrize(("name", "action"), [("reenact_gated", "denoise"), ("error_only_reenact", "new_view")])
+def test_the_alarm_of_the_re_enactment_has_a_threshold(name, action):
+    decide = made(name, alarm=0.4, order=("new_view", "denoise", "reinitialize"))
+    quiet, loud = (reenacted([0.3, 0.1, 0.2], failure) for failure in (0.4, 0.5))
+    assert decide(case(reenacted=quiet)).action == NOTHING
+    assert decide(case(reenacted=loud)).action == action
+    assert decide(case((action,), reenacted=quiet)).action not in (NOTHING, action)  # it is known to be wrong
+
+
 def test_the_error_alone_is_followed_by_the_rehearsed_order():
     decide = made("error_only_acting", order=("new_view", "denoise", "reinitialize"))
     assert [decide(case(taken)).action for taken in ((), ("new_view",))] == ["new_view", "denoise"]
@@ -114,7 +140,8 @@ def test_a_sequence_takes_its_actions_in_turn_and_begins_anew():
 
 def test_who_is_told_that_the_pose_is_wrong():
     alone = {name for name, entry in policies(ACTIONS).items() if not entry.told}
-    assert alone == {"gpca", "gpca_gated", "utility", "utility_gated", "error_only"}
+    gated = {"gpca_gated", "utility_gated", "error_only", "reenact_gated", "error_only_reenact"}
+    assert alone == {"gpca", "utility", *gated}
 
 
 def test_fixed_actions_and_the_oracle():

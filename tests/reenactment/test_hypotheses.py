@@ -59,3 +59,20 @@ def test_good_starts_are_probable_and_errors_beyond_all_bounds_are_not():
     assert near >= small > large
     assert log_prior(exp(np.array([[0, 0, 0, 2.0, 0, 0]]))[0], SETTINGS) < large - 10
     assert rotation_angle_rad(poses[2]) == pytest.approx(0.7)
+
+
+def test_evidence_from_elsewhere_counts(drill):
+    candidate = candidate_of(drill, "pose", seed=101)
+    pair, T_true = pair_of(candidate)
+    surface = ModelSurface(candidate.model)
+
+    def against_the_truth(T, width):
+        return -100.0 if surface.apart((T @ inverse(T_true))[None])[0] < 0.05 else 0.0
+
+    before, T_found_n = transform(pair.T_init, pair.observed), pair.T_runs @ inverse(pair.T_init)
+    arguments = before, surface, T_found_n, SETTINGS
+    near, far = (
+        find_hypotheses(*arguments, np.random.default_rng(0), evidence)[0].T for evidence in (None, against_the_truth)
+    )
+    assert surface.apart((near @ inverse(T_true))[None])[0] < 0.02
+    assert surface.apart((far @ inverse(T_true))[None])[0] > 0.05

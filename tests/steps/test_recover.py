@@ -11,6 +11,7 @@ from tests.steps.by_words import main
 from ..config.test_check import load
 from ..frames.tiny import surfaces
 
+POLICIES = ["gpca_gated", "utility", "error_only", "reenact_gated", "softmax_head", "always_new_view"]
 OTHERS = {"--policy": "policy.json", "--example": "example.npz"}
 
 
@@ -23,7 +24,7 @@ def tiny_objects(monkeypatch):
 def settings(**changed):
     config = load("smoke")
     recovery = config["recovery"] | {
-        "policies": ["gpca_gated", "utility", "error_only", "softmax_head", "always_new_view"],
+        "policies": POLICIES,
         "loop": {"failures": 1, "good": 2, "tries": 8, "budget": 1},
         "rehearsals": 1,
         "train": 9,
@@ -54,7 +55,7 @@ def call(folder, given):
 def test_the_step_writes_rows_seconds_thresholds_and_an_example(tmp_path):
     assert call(tmp_path, settings()) == 0
     rows, seconds = (pd.read_csv(tmp_path / name) for name in ("seed7.csv", "t/seed7.csv"))
-    assert set(rows["policy"]) == {"gpca_gated", "utility", "error_only", "softmax_head", "always_new_view"}
+    assert set(rows["policy"]) == set(POLICIES)
     assert set(rows.loc[rows["failed"], "cause"]) <= set(CONCEPTS)
     assert set(rows["table"]) <= {0, 1}
     assert len(seconds) == len(rows)
@@ -66,6 +67,7 @@ def test_the_step_writes_rows_seconds_thresholds_and_an_example(tmp_path):
     assert set(policy["calibration_accuracy"]) == {"gpca", "softmax_head"}
     assert 0 <= policy["thresholds"]["uncertain"] < 1.1
     assert 0 <= policy["thresholds"]["gate"] <= 1
+    assert 0 <= policy["thresholds"]["alarm"] <= 1
     assert sorted(policy["order"]) == ["denoise", "new_view", "reinitialize"]
     assert call(tmp_path / "again", settings()) == 0
     for name in ("seed7.csv", "q/seed7.csv", "policy.json", "example.npz"):

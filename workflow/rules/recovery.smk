@@ -19,6 +19,7 @@ RECOVERY_SETTINGS = {
     "registrations": config["registrations"],
     "encoder": config["encoders"][config["embedding"]["encoder"]] | RECOVERY["encoder"],
     "uncertainty": config["uncertainty"].get("removal", {}),
+    "reenactment": config["diagnosis"]["reenactment"],
     "explainers": {
         name: config["explainers"].get(name) or {} for name in RECOVERY_EXPLAINERS
     },

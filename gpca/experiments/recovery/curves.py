@@ -10,7 +10,17 @@ import numpy as np
 from gpca.errors import InputError
 from gpca.experiments.recovery.metrics import at, pool_share
 from gpca.reporting.figures.panels import legend_below, panels
-from gpca.reporting.figures.style import BLACK, BLUE, GRAY, GREEN, LIGHT_GRAY, ORANGE, VERMILION, write_title
+from gpca.reporting.figures.style import (
+    BLACK,
+    BLUE,
+    GRAY,
+    GREEN,
+    LIGHT_GRAY,
+    ORANGE,
+    PURPLE,
+    VERMILION,
+    write_title,
+)
 from gpca.reporting.words import plural
 
 if TYPE_CHECKING:
@@ -22,6 +32,7 @@ TOLD: dict[str, Look] = {  # policies that are told that the pose is wrong
     "gpca_acting": (BLUE, "-"),
     "utility_acting": (GREEN, "-"),
     "error_only_acting": (VERMILION, "-"),
+    "reenact": (PURPLE, "-"),
     "random": (GRAY, ":"),
     "oracle": (BLACK, (0, (4, 2))),
 }
@@ -31,6 +42,8 @@ ALONE: dict[str, Look] = {  # policies that have to recognize failures themselve
     "utility": (GREEN, ":"),
     "utility_gated": (GREEN, "-"),
     "error_only": (VERMILION, "-"),
+    "error_only_reenact": (VERMILION, ":"),
+    "reenact_gated": (PURPLE, "-"),
 }
 ALWAYS: Look = (ORANGE, (0, (4, 2)))  # the best of the sequences
 FACTORS = np.geomspace(0.3, 3, 21)  # on the costs of all actions

@@ -13,6 +13,7 @@ import numpy as np
 
 from gpca.experiments.recovery.answers import Answer, Answers, CaseKey, Explain
 from gpca.experiments.recovery.episodes import Episode
+from gpca.experiments.recovery.reenactor import Reenactor
 from gpca.experiments.recovery.rehearsal import known
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.recovery.actions import Action
@@ -36,6 +37,7 @@ class Loop:
         actions: each by its name.
         explain: for each explainer that the policies read, the function that attributes registrations.
         means: what the policies are made from.
+        reenactor: for policies that re-enact registrations.
     """
 
     def __init__(
@@ -46,12 +48,14 @@ class Loop:
         means: Means,
         settings: LoopSettings,
         axes: tuple,
+        reenactor: Reenactor,
     ) -> None:
         self.episodes = episodes
         self._actions = actions
         self._means = means
         self._settings = settings
         self._axes = axes
+        self._reenactor = reenactor
         self._answers = Answers(episodes, explain, tuple(actions), settings.budget)
 
     def run(self, policies: Sequence[str]) -> tuple[pd.DataFrame, pd.DataFrame]:
@@ -87,6 +91,7 @@ class Loop:
     ) -> tuple[dict, dict]:
         """Let one policy decide and act; return its row and its seconds."""
         history = self._answers.history(entry.explainer, episode.number, before) if entry.explainer else []
+        reenacted = self._reenactor.reenact(episode, before) if entry.reenacts else None
         started = perf_counter()
         decision = decide(
             Case(
@@ -97,9 +102,10 @@ class Loop:
                 known_F=known(episode.observe(before), history[-1]) if entry.learns else None,
                 cause=episode.situation.cause if entry.oracle and episode.failed else "",
                 random=generator(*self._axes, "policy", episode.number),
+                reenacted=reenacted,
             )
         )
-        spent = perf_counter() - started
+        spent = perf_counter() - started + (reenacted.seconds if reenacted else 0.0)
         last = history[-1] if history else UNEXPLAINED
         old, new, action_seconds, recovered = episode.outcomes[before], None, 0.0, False
         if episode.failed and decision.action in self._actions:

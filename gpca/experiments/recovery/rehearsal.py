@@ -115,6 +115,7 @@ def summary(means: Means, explainers: LoopExplainers) -> dict:
     """Return thresholds, treatments, order and the explainers' accuracy on the calibration samples, for JSON."""
     policy, gate = means.policy, means.gate
     thresholds = asdict(policy.thresholds) | ({"gate": gate.threshold} if gate else {})
+    thresholds |= {"alarm": means.alarm} if means.alarm is not None else {}
     return {
         "thresholds": {name: round(value, 6) for name, value in thresholds.items()},
         "treatments": dict(policy.treatments),

@@ -13,6 +13,7 @@ from gpca.experiments.recovery.example import ACTION, save_example
 from gpca.experiments.recovery.loop import Loop
 from gpca.experiments.recovery.loop_explainers import LoopExplainers, learn_explainers
 from gpca.experiments.recovery.queueing import error_by_labels, learners_of
+from gpca.experiments.recovery.reenactor import Reenactor, calibrated_alarm
 from gpca.experiments.recovery.rehearsal import (
     Rehearsal,
     rehearse,
@@ -60,14 +61,20 @@ def run(job: Job) -> None:
             recovery["remedied"],
             *axes,
         )
-        learning = any(entry.learns or entry.queues or entry.rehearsed or entry.gated for entry in entries)
+        learning = any(e.learns or e.queues or e.rehearsed or e.gated or e.alarmed for e in entries)
         rehearsals = replace(loop, failures=recovery["rehearsals"])
         rehearsed = find_episodes(tables["rehearsals"], rehearsals) if learning else []
         rehearsal = _rehearse(rehearsed, entries, actions, explainers, loop)
         means = _means(recovery, entries, actions, registered, rehearsed, rehearsal, loop)
+        reenactor = Reenactor(settings.reenactment, settings.counterfactuals)
+        if any(entry.alarmed for entry in entries):
+            fresh = [*registered["test"], *rehearsed]  # of which the re-enactment has learned nothing
+            means = replace(means, alarm=calibrated_alarm(fresh, reenactor, recovery["gate"]["false_alarms"]))
         _write_summary(job.policy, summary(means, explainers))
         episodes = find_episodes(tables["failures"], loop)
-        rows, seconds = Loop(episodes, actions, explainers.explain, means, loop, axes).run(recovery["policies"])
+        rows, seconds = Loop(episodes, actions, explainers.explain, means, loop, axes, reenactor).run(
+            recovery["policies"]
+        )
         judged = [episode for episode in episodes if episode.failed]
         solved = [{name: episode.solved_by((name,), actions, loop) for name in actions} for episode in judged]
         learners = learners_of(recovery["policies"], means, rehearsal, judged, explainers, loop.budget)

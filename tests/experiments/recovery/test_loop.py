@@ -1,6 +1,7 @@
 """The loop on a tiny table, with a stub in place of a classifier."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -31,6 +32,14 @@ def stub(concept):
     return explain
 
 
+class Reenacting:
+    """Re-enacts nothing: a failure by its start it is, whatever was registered."""
+
+    def reenact(self, episode, actions):
+        believed = SimpleNamespace(failure=0.9)
+        return SimpleNamespace(phi_3=np.array([0.1, 0.3, 0.2]), belief=believed, seconds=0.5)
+
+
 @pytest.fixture
 def loop(start):
     episode = Episode(0, *start, LOOP.success, tries=5)
@@ -40,9 +49,8 @@ def loop(start):
         explain = stub(concept)
         given = {"gpca": explain, "softmax_head": stub(concept)}
         policy = RecoveryPolicy(Thresholds(**{"uncertain": 0.2, "dominant": 0.4} | thresholds))
-        rows, seconds = Loop([episode, *others], actions, given, Means(policy, tuple(actions)), LOOP, ("tiny", 0)).run(
-            policies
-        )
+        means = Means(policy, tuple(actions), alarm=0.5)
+        rows, seconds = Loop([episode, *others], actions, given, means, LOOP, ("tiny", 0), Reenacting()).run(policies)
         return rows, seconds, explain
 
     return run
@@ -86,6 +94,14 @@ def test_about_what_did_not_fail_a_policy_only_decides(loop, start):
     }
     assert not rows.loc[rows["episode"] == 1, ["failed", "recovered"]].any(axis=None)
     assert list(fine.outcomes) == [()]
+
+
+def test_policies_that_re_enact_are_given_it_and_its_seconds_count_for_each(loop):
+    rows, seconds, _ = loop(["reenact", "reenact_gated"])
+    firsts = rows[rows["step"] == 1]
+    assert (firsts["action"] == "reinitialize").all()
+    assert (firsts["concept"] == "pose").all()
+    assert (seconds["explanation_seconds"] >= 0.5).all()
 
 
 def test_a_policy_does_not_insist_on_what_did_not_help(loop):

@@ -1,0 +1,98 @@
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from gpca.alignment.rigid import inverse, scale_translation
+from gpca.causes.settings import OBSERVED, CauseSettings
+from gpca.causes.shapley import ALL, NONE
+from gpca.experiments.recovery.cases import RobotIn, register_after
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.recovery.actions import ACTIONS
+from gpca.recovery.reenactment import KnownModel, believe, reenact, seen_surface
+from gpca.reenactment.settings import ReenactmentSettings
+from tests.failures import LOOP
+
+SETTINGS, COUNTERFACTUALS = ReenactmentSettings(), CauseSettings(moved=OBSERVED)
+AXES = ("tiny", 1)
+
+
+@pytest.fixture(scope="module")
+def known(start):
+    return KnownModel.of(RobotIn(start[0]), np.random.default_rng(0))
+
+
+def belief_of(holding, known, axes=AXES):
+    return believe(holding, known, SETTINGS, COUNTERFACTUALS, axes)
+
+
+def right(start):
+    situation, outcome = start
+    pose = situation.T_world_object
+    return replace(outcome.holding, T_world_object_init=pose, T_world_object=pose)
+
+
+def test_a_wrong_pose_is_probably_a_failure_and_a_right_one_is_not(start, known):
+    wrong = belief_of(start[1].holding, known)
+    assert wrong.failure > 0.9
+    assert belief_of(right(start), known).failure < 0.1
+    assert wrong.weight_K.sum() == pytest.approx(1)
+    assert (wrong.error_K > 0.1).all()
+
+
+def test_a_bad_start_is_what_adds_most(start, known):
+    holding = start[1].holding
+    reenacted = reenact(belief_of(holding, known), holding, known, COUNTERFACTUALS, AXES)
+    assert CONCEPTS[reenacted.phi_3.argmax()] == "pose"
+    error_8 = reenacted.error_K_8[0]
+    assert error_8[ALL] > 0.1 > error_8[NONE]
+    assert reenacted.seconds > reenacted.belief.seconds > 0
+
+
+def test_hypotheses_under_which_the_pose_is_right_say_nothing_of_a_failure(start, known):
+    holding = start[1].holding
+    reenacted = reenact(belief_of(holding, known), holding, known, COUNTERFACTUALS, AXES)
+    doubled = replace(
+        reenacted,
+        belief=replace(reenacted.belief, weight_K=np.array([0.1, 0.9]), failure_K=np.array([1.0, 1e-6])),
+        error_K_8=np.array([np.where(np.arange(8) & 1, 0.2, 0.0), np.where(np.arange(8) & 2, 0.2, 0.0)]),
+    )
+    assert doubled.phi_3 == pytest.approx([0.2, 0, 0], abs=1e-4)
+
+
+def test_it_reads_what_the_robot_holds_and_the_model_alone(start):
+    """A robot without a situation, so without a truth, comes to the same numbers."""
+    situation, outcome = start
+    robot = RobotIn(situation)
+    shape = ("points_m", "normals", "vertices_m", "faces", "diameter_m")
+    bare = SimpleNamespace(**{name: getattr(robot, name) for name in shape})
+    numbers = []
+    for who in (robot, bare):
+        known = KnownModel.of(who, np.random.default_rng(0))
+        belief = belief_of(outcome.holding, known)
+        numbers.append((belief.failure, reenact(belief, outcome.holding, known, COUNTERFACTUALS, AXES).error_K_8))
+    assert numbers[0][0] == numbers[1][0]
+    assert np.array_equal(numbers[0][1], numbers[1][1])
+
+
+def test_seen_surface_faces_a_camera_and_grows_with_another_view(start, known):
+    situation, outcome = start
+    action = ACTIONS["new_view"]
+    twice = register_after(situation, outcome, action, ("new_view",), LOOP.cloud_points, LOOP.icp).holding
+    shares = []
+    for holding in (outcome.holding, twice):
+        T_true = scale_translation(
+            inverse(situation.T_world_object) @ holding.T_world_object_init, 1 / situation.diameter_m
+        )
+        seen_M = seen_surface(holding, known, SimpleNamespace(T=T_true), 0.0)
+        shares.append(seen_M.mean())
+    assert 0.1 < shares[0] < 0.6
+    assert shares[1] > shares[0]
+
+
+def test_random_numbers_are_named(start, known):
+    holding = start[1].holding
+    first, again, other = (belief_of(holding, known, axes) for axes in (AXES, AXES, ("other", 1)))
+    assert np.array_equal(first.observed, again.observed) and first.failure == again.failure
+    assert not np.array_equal(first.observed, other.observed)
