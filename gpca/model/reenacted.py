@@ -144,7 +144,7 @@ class Reenacted:
             for number, pose in enumerate(self.poses)
         ]
         return [
-            f"re-enacted error {self.error:.2g} {unit}, to which the causes add: {effects}",
+            f"effects   on the re-enacted error of {self.error:.2g} {unit}: {effects}",
             f"observed  noise of {self.noise:.2g} {unit}, {parts}",
             *(f"pose {number}    the object {words}" for number, words in enumerate(poses, 1)),
         ]

@@ -94,7 +94,7 @@ def test_effects_add_up_and_lengths_are_in_the_users_unit(drill):
     assert outside.noise == pytest.approx(0.2)
     assert outside.effects["pose"] == pytest.approx(10 * found.effects["pose"])
     first, second = outside.lines("mm")[:2]
-    assert first == "re-enacted error 0.7 mm, to which the causes add: noise 0.1, pose 0.2, overlap 0.4"
+    assert first == "effects   on the re-enacted error of 0.7 mm: noise 0.1, pose 0.2, overlap 0.4"
     assert second == "observed  noise of 0.2 mm, 25% outliers, 50% of the surface missing"
 
 
