@@ -68,7 +68,7 @@ def run(job: Job) -> None:
         means = _means(recovery, entries, actions, registered, rehearsed, rehearsal, loop)
         reenactor = Reenactor(settings.reenactment, settings.counterfactuals)
         if any(entry.alarmed for entry in entries):
-            fresh = [*registered["test"], *rehearsed]  # of which the re-enactment has learned nothing
+            fresh = [*registered["train"], *registered["test"], *rehearsed]  # of which it has learned nothing
             means = replace(means, alarm=calibrated_alarm(fresh, reenactor, recovery["gate"]["false_alarms"]))
         _write_summary(job.policy, summary(means, explainers))
         episodes = find_episodes(tables["failures"], loop)
