@@ -6,15 +6,20 @@ import runpy
 import numpy as np
 import pytest
 
+from gpca.guarantee.alarm import OUTCOMES
+from gpca.guarantee.states import STATES
+
 from .documents import ROOT
 
 
-def run_example(page, registrations):
-    """Run the one Python example of a page with the clouds that it takes for granted."""
+def run_example(page, registrations, **given):
+    """Run the one Python example of a page with the clouds, and what else it takes for granted."""
     text = (ROOT / f"docs/{page}.md").read_text()
     [example] = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
     clouds = {"source_points": registrations.cloud(0), "target_points": registrations.target(0)}
-    exec(example, clouds | {"T_target_source_init": np.eye(4)})
+    names = clouds | {"T_target_source_init": np.eye(4)} | given
+    exec(example, names)
+    return names
 
 
 @pytest.mark.parametrize("page", ["quick_start", "explain"])
@@ -29,6 +34,19 @@ def test_the_python_of_a_page_runs(page, model, registrations, tmp_path, monkeyp
 def test_the_python_of_the_page_of_registration_methods_runs(registrations, capsys):
     run_example("registration", registrations)
     assert capsys.readouterr().out.startswith("True ")
+
+
+def test_the_python_of_the_page_of_guarantees_runs(registrations):
+    scores = np.random.default_rng(0).dirichlet(np.ones(4), size=200)
+    given = {
+        "scores_N_4": scores,
+        "state_N": np.resize(STATES, 200),
+        "family_N": np.arange(200) % 20,
+        "new_M_4": scores,
+    }
+    names = run_example("guarantee", registrations, **given)
+    assert names["same"] == names["guarantee"] and names["inside_M_5"].shape == (200, 5)
+    assert set(names["called_M"]) <= set(OUTCOMES)
 
 
 def test_the_tutorial_runs_to_its_end_and_warns_of_the_foreign_scale(model, tmp_path, monkeypatch, capsys):

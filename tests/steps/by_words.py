@@ -27,6 +27,7 @@ MODULES = {  # of steps whose module is not gpca.steps.<name>
     "diagnose_frames": IN + "frame_causes.diagnosis_step",
     "frame_labels": IN + "frame_labels.step",
     "gradients": IN + "gradients.step",
+    "guarantee": IN + "guarantee.step",
     "kernel_grid": IN + "kernel_grid.step",
     "learning_curve": IN + "learning_curve.step",
     "learning_samples": IN + "learning_curve.samples_step",

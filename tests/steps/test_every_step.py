@@ -11,10 +11,10 @@ from tests.steps.by_words import main, module_of, run_apart
 from .command_lines import STEP_OPTIONS, arguments
 
 # tests/frames/test_steps.py, tests/steps/test_frame_causes.py, test_live_shap.py, test_recover.py, test_readings.py and
-# test_ship.py, tests/comparison/test_reference.py
+# test_ship.py, tests/comparison/test_reference.py, tests/experiments/guarantee/test_step.py
 ELSEWHERE = {
     *("scenes", "instances", "frame_registrations", "frame_causes", "reenact_frames", "diagnose_frames"),
-    *("live_shap", "recover", "readings", "ship"),
+    *("guarantee", "live_shap", "recover", "readings", "ship"),
     *("check-config", "check-reference"),
 }
 BY_HAND = {"labels.csv", "answers.txt"}  # given by a person, not made

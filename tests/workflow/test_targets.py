@@ -46,6 +46,10 @@ NEEDS = {  # a table: what is made for it, and what is not
     "table11_registration": ("registrations/ycb methods/ycb", "encoders embeddings uncertainty/ predictions causes/"),
     "table12_uncertainty": ("causes/ycb estimates/ycb", "registrations encoders embeddings uncertainty/ predictions"),
     "table14_method_matrix": ("encoders/ycb exchange/", "coffee_cup predictions uncertainty/ causes/ embeddings"),
+    "table19_guarantee": (
+        "reenactments/ycb diagnoses/ycb/gpca frame_diagnoses/ guarantee/reenact",
+        "predictions estimates learning_curve controls/ uncertainty/ model.pt",
+    ),
     "table15_new_concepts": (
         "causes/ycb cause_encoders/ycb embeddings/ycb active_learning/ycb new_concepts/ycb predictions/ycb/rule",
         "predictions/ycb/gpca diagnoses controls/ uncertainty/",

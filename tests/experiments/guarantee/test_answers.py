@@ -1,0 +1,92 @@
+"""What is calibrated on what, and how often promises are kept."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gpca.causes.truth import NOMINAL
+from gpca.experiments.guarantee.answers import (
+    BY_FAMILY,
+    BY_SAMPLE,
+    BY_STATE,
+    CONFIDENT,
+    FAMILIES,
+    PLAIN,
+    answers_of,
+    conditions,
+    plain_sets,
+    plain_threshold,
+)
+from gpca.experiments.guarantee.settings import GuaranteeSettings
+from gpca.guarantee.alarm import ALARM, GOOD, NOT_SURE
+from gpca.guarantee.states import STATES
+
+SETTINGS = GuaranteeSettings(level=0.8)
+
+
+@pytest.fixture(scope="module")
+def promised(scored):
+    [condition] = [each for each in conditions(scored) if each.name == FAMILIES]
+    return condition
+
+
+@pytest.fixture(scope="module")
+def answers(scored, promised):
+    return answers_of(scored, promised, SETTINGS)
+
+
+def test_every_sample_of_a_family_that_a_model_did_not_learn_from_is_answered_once(scored, promised, answers):
+    assert sorted(answers.row) == np.flatnonzero(promised.tested).tolist()
+    assert not scored.taught[answers.row].any()
+    assert answers.families == 7  # two thirds of twelve, without the tested one
+    assert set(answers.sets) == {PLAIN, BY_SAMPLE, BY_STATE, BY_FAMILY}
+    assert set(answers.calls) == {PLAIN, BY_SAMPLE, CONFIDENT, BY_FAMILY}
+
+
+def test_neither_the_tested_family_nor_what_was_learned_from_sets_a_threshold(scored, promised, answers):
+    own = scored.family == "family04"
+    turned = own & (np.arange(len(scored)) % 2 == 0)
+    asked = own[answers.row] & ~turned[answers.row]
+    for changed, same in ((turned | scored.taught, True), (~own & ~scored.taught, False)):
+        scores = np.where(changed[:, None], scored.scores[:, ::-1], scored.scores)
+        again = answers_of(replace(scored, scores=scores), promised, SETTINGS)
+        for name in (BY_SAMPLE, BY_STATE, BY_FAMILY):
+            assert np.array_equal(again.sets[name][asked], answers.sets[name][asked]) == same
+
+
+def test_promises_by_sample_are_kept_about_as_well_as_families_are_alike(scored, answers):
+    state = scored.state[answers.row]
+    truth = state[:, None] == np.array(STATES)
+    for name in (BY_SAMPLE, BY_STATE, BY_FAMILY):
+        assert (answers.sets[name] & truth).any(axis=1).mean() > 0.76
+    calls = answers.calls[BY_SAMPLE]
+    assert (calls[state != NOMINAL] == GOOD).mean() < 0.07
+    assert (calls[state == NOMINAL] == ALARM).mean() < 0.07
+    assert set(answers.calls[BY_FAMILY]) == {NOT_SURE}  # seven families promise at most 1 in 8
+    assert NOT_SURE not in answers.calls[PLAIN]
+
+
+def test_conditions_of_shift_calibrate_on_one_kind_and_test_the_other(scored):
+    found = {condition.name: condition for condition in conditions(scored)}
+    assert list(found) == [FAMILIES, "from_cups", "from_tools", "milder", "harder", "frames"]
+    for name, condition in found.items():
+        assert not (condition.known & condition.tested).any() or name == FAMILIES
+        assert not (scored.taught & condition.known).any() or name == "frames"
+    assert set(scored.source[found["from_cups"].known]) == {"cups"}
+    assert set(scored.source[found["frames"].tested]) == {"real_rgbd"}
+    severity = scored.severity
+    nominal = scored.state == NOMINAL
+    for of_state in (nominal, ~nominal):
+        mild, hard = (severity[found["milder"].known & of_state], severity[found["milder"].tested & of_state])
+        assert mild.max() <= hard.min() and abs(len(mild) - len(hard)) <= 1
+    one = scored.subset((scored.source == "cups") & np.char.startswith(scored.model, "part"))
+    assert [condition.name for condition in conditions(one)] == [FAMILIES, "milder", "harder"]
+
+
+def test_plain_sets_and_the_plain_threshold_by_hand():
+    probabilities = np.array([[0.5, 0.3, 0.1, 0.1, 0.0], [0.95, 0.05, 0, 0, 0], [0.2, 0.2, 0.2, 0.2, 0.2]])
+    assert plain_sets(probabilities, 0.8).sum(axis=1).tolist() == [2, 1, 4]
+    assert plain_sets(probabilities, 0.9).sum(axis=1).tolist() == [3, 1, 5]
+    failure = np.arange(100.0)
+    assert plain_threshold(failure, 0.05) == 5 and plain_threshold(failure[:1], 0.99) == 0
