@@ -163,7 +163,8 @@ def larger_config(sources: int, seeds: int, explainers: int) -> dict:
     default = yaml.safe_load((ROOT / "config/config.yaml").read_text(encoding="utf-8"))
     own = yaml.safe_load((ROOT / "config/sources.yaml").read_text(encoding="utf-8"))["sources"]
     others = [name for name in known() if name not in default["explainers"] and not name.startswith("learner_")]
-    most = len(default["explainers"]) + len(others)
+    rows = [name for name, entry in default["explainers"].items() if entry is not False]
+    most = len(rows) + len(others)
     for name, count, low, high in (
         ("sources", sources, len(own), 10_000),
         ("seeds", seeds, 1, 1000),
@@ -171,12 +172,12 @@ def larger_config(sources: int, seeds: int, explainers: int) -> dict:
     ):
         if not low <= count <= high:
             raise InputError(f"--{name} {count}", "cannot be planned", f"give {low} to {high}")
-    further = {name: {} for name in others[: max(0, explainers - len(default["explainers"]))]}
+    further = {name: {} for name in others[: max(0, explainers - len(rows))]}
     copies = islice(cycle(own.values()), sources - len(own))
     return {
         "seeds": list(range(seeds)),
         "sources": {f"copy{n}": entry | {"title": f"Copy {n}"} for n, entry in enumerate(copies)},
-        "explainers": further | dict.fromkeys(list(default["explainers"])[explainers:], False),
+        "explainers": further | dict.fromkeys(rows[explainers:], False),
         "controls": {"controls": [name for name in default["controls"]["controls"] if name != "transfer"]},
     }
 
