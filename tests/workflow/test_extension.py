@@ -18,7 +18,7 @@ OLD_ROW = "coffee_cup"  # a source that no setting of the smoke run names
 
 
 def files_of(source, planned):
-    """The files of a source among the planned, under the name of the old row; live_shap is of the first source alone."""
+    """The planned files of a source, under the name of the old row; live_shap is of the first source alone."""
     parts = [path.split("/") for path in planned.outputs if "/live_shap/" not in path]
     return {"/".join(OLD_ROW if part == source else part for part in path) for path in parts if source in path}
 
