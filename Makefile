@@ -17,7 +17,8 @@ INSTALL := -m pip install --quiet --disable-pip-version-check --only-binary=:all
 RUN := PATH="$(CURDIR)/.venv/bin:$$PATH"
 PROCESSES := tests/process/test_processor.py tests/test_emulation.py tests/test_benchmarks.py tests/encoders/test_reduction.py
 PARTS := test-workflow test-library test-processes
-PYTEST := $(RUN) OMP_NUM_THREADS=1 python -m pytest
+# What is imported is kept compiled, whatever the user's environment says: thousands of processes import it.
+PYTEST := $(RUN) OMP_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE= python -m pytest
 
 results: environment ## every table and figure of config/config.yaml, into results/ (SNAKEMAKE_ARGS passes through)
 	$(RUN) snakemake -j$(CORES) all $(SNAKEMAKE_ARGS)
