@@ -11,6 +11,7 @@ from gpca.pairs.perturbation import CONCEPTS
 
 SUBSETS = tuple(tuple(i for i in range(len(CONCEPTS)) if subset >> i & 1) for subset in range(2 ** len(CONCEPTS)))
 NONE, ALL = 0, len(SUBSETS) - 1
+BY_SIZE = tuple(sorted(range(len(SUBSETS)), key=lambda subset: (len(SUBSETS[subset]), subset)))  # as figures show them
 # Of a value, by how many of the other concepts are present: |S|! (2 − |S|)! / 3!
 WEIGHTS = (1 / 3, 1 / 6, 1 / 3)
 

@@ -20,7 +20,7 @@ from gpca.io.arrays import REAL, REGENERATE, TEXT, WHOLE, load_arrays, save_arra
 from gpca.io.names import Axes
 from gpca.pairs.dataset import Registrations
 from gpca.process.progress import progress
-from gpca.reenactment.enactment import Enactment, reenact
+from gpca.reenactment.enactment import Enactment, reenact, weights_of
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.reenactment.verdict import verdict
 
@@ -131,12 +131,10 @@ def row_of(
 
 def as_arrays(enactments: list[Enactment], pair: ObservedPair, most: int) -> dict[str, np.ndarray]:
     """Return the arrays of one pair (K, …), see :class:`Reenactments`, for K = `most` hypotheses."""
-    posterior_k = np.array([enactment.hypothesis.log_posterior for enactment in enactments])
-    weight_k = np.exp(posterior_k - posterior_k.max())
     rows_K = np.where(np.arange(most) < len(enactments), np.arange(most), 0)
     measured_k = [_measured(enactment, pair) for enactment in enactments]
     return {
-        "weight": np.pad(weight_k / weight_k.sum(), (0, most - len(enactments))),
+        "weight": np.pad(weights_of(enactments), (0, most - len(enactments))),
         "T_model_observed": np.array([enactment.hypothesis.T for enactment in enactments])[rows_K],
         "error": np.array([enactment.error_8 for enactment in enactments])[rows_K],
         "uncertainty": np.array([enactment.uncertainty_8 for enactment in enactments])[rows_K],

@@ -102,6 +102,24 @@ def anchor_of(points: int, settings: ReenactmentSettings) -> Anchor:
     )
 
 
+def hypothesis_at(
+    T: np.ndarray,
+    observed: np.ndarray,
+    surface: ModelSurface,
+    settings: ReenactmentSettings,
+    random: np.random.Generator,
+) -> Hypothesis:
+    """Return a pose, 4×4, as a hypothesis: with the width and the outliers that are most likely there.
+
+    Args:
+        T: takes what was observed, before the registration, to the model.
+        observed: (N, 3) as in :func:`find_hypotheses`.
+    """
+    mixture = Mixture(surface.points, surface.spacing / 2)
+    fits = mixture.fit(observed, T[None], LAST_ITERATIONS, moving=False)
+    return _hypothesis(fits, 0, observed, surface, settings, random, None)
+
+
 class _Search:
     """Fits poses to some of the points, or to all; the initial pose is always among them, held by what is believed."""
 

@@ -2,6 +2,8 @@
 
 import json
 
+from gpca.experiments.reenactment.knowledge import KNOWN
+
 ENCODER = {"draw_points": 64, "draws": 2, "epochs": 2, "batch_size": 12, "options": {"k": 8, "point_features": 16}}
 POLICY = {
     "thresholds": {"uncertain": None, "queued_share": 0.1, "dominant": 0.4, "improvement": 0.1},
@@ -55,6 +57,13 @@ STEP_OPTIONS = {
         },
         "--seed": 0, "--causes": "causes.npz", "--causes-timings": "causes_timings.csv",
         "--reenactments": "reenactments.npz", "--timings": "reenactments_seconds.csv",
+    },
+    "oracles": COMMON | {
+        "--settings": {
+            "reenactment": {"hypotheses": 2}, "causes": CAUSES, "icp": {"max_iterations": 30},
+        },
+        "--seed": 0, "--objects": "objects.npz", "--causes": "causes.npz",
+        "--predictions": [f"oracles/{name}/seed0.csv" for name in KNOWN],
     },
     "estimate": COMMON | {
         "--settings": {

@@ -24,6 +24,10 @@ def later(sample):
     return sample + 50
 
 
+def upside_down(points):
+    return -points
+
+
 def reversed_order(array):
     return array[::-1]
 
@@ -66,6 +70,11 @@ FAULTS = {
         (truncated("causes.npz"), {}, f"causes.npz: {NO_ARCHIVE}"),
         (lines_kept("causes_timings.csv", 3), {}, OTHER_TIMES),
         (untouched, {"--descriptors": "causes.npz"}, "causes.npz"),
+    ],
+    "oracles": [
+        (removed("objects.npz"), {}, "objects.npz: no such file"),
+        (arrays_changed("objects.npz", points_m=upside_down), {}, "sample 0 of tiny: is not reproduced by these"),
+        (arrays_changed("causes.npz", candidate=later), {}, "sample 0 of tiny: is not reproduced by these settings"),
     ],
     "estimate": [
         (removed("causes.npz"), {}, "causes.npz: no such file"),

@@ -13,7 +13,7 @@ from gpca.attribution.predictions import read_predictions
 from gpca.causes.counterfactuals import replay
 from gpca.causes.dataset import LABELS, Causes
 from gpca.causes.settings import CauseSettings
-from gpca.causes.shapley import ALL, SUBSETS
+from gpca.causes.shapley import ALL, BY_SIZE, SUBSETS
 from gpca.causes.truth import FAILED
 from gpca.errors import InputError
 from gpca.objects.canonical import ObjectClouds
@@ -72,8 +72,7 @@ def draw_causes_example(
     view = widest_views(shown.model)[0]
     everything = np.concatenate([shown.model @ view.T, *(cloud @ view.T for cloud in shown.observed)])
     corners = np.quantile(everything, (0.001, 0.999), axis=0)
-    subsets = sorted(range(len(SUBSETS)), key=lambda subset: (len(SUBSETS[subset]), subset))
-    for panel, subset in zip(left.subplots(4, 2).flat, subsets, strict=True):
+    for panel, subset in zip(left.subplots(4, 2).flat, BY_SIZE, strict=True):
         draw_clouds(panel, shown.model @ view.T, shown.observed[subset] @ view.T, size=0.9, corners=corners)
         words = " + ".join(CONCEPTS[i] for i in SUBSETS[subset]) or "none"
         words = "all three" if subset == ALL else words
