@@ -87,7 +87,13 @@ def plain_log_likelihood(model, observed, least_width: float) -> float:
     """Return the mean log-likelihood of the mixture after as many iterations, of every partner of every point."""
     import numpy as np
 
-    from gpca.reenactment.mixture import FEWEST_OUTLIERS, FIRST_OUTLIERS, FIRST_WIDTH, LARGEST_WIDTH, MOST_OUTLIERS
+    from gpca.reenactment.mixture_kernels import (
+        FEWEST_OUTLIERS,
+        FIRST_OUTLIERS,
+        FIRST_WIDTH,
+        LARGEST_WIDTH,
+        MOST_OUTLIERS,
+    )
 
     square_N_M = np.square(observed[:, None] - model).sum(axis=2)
     variance, outliers = max(least_width, FIRST_WIDTH) ** 2, FIRST_OUTLIERS

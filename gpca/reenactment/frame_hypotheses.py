@@ -24,7 +24,8 @@ from gpca.reenactment.hypotheses import (
     not_negligible,
     search_ends,
 )
-from gpca.reenactment.mixture import LARGEST_WIDTH, Anchor, Mixture
+from gpca.reenactment.mixture import Anchor, Mixture
+from gpca.reenactment.mixture_kernels import LARGEST_WIDTH
 from gpca.reenactment.settings import ReenactmentSettings
 
 COARSE, FINE = 1200, 3000  # pixels at which a side is looked at, about

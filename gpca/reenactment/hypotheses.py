@@ -159,6 +159,7 @@ def search_ends(
     known_n = np.concatenate([np.eye(4)[None], T_found_n])
     starts_n = np.concatenate([search_starts(few, few_model), T_found_n])
     near_n, _, _ = BatchedICP(few_model, WIDE).register(few, starts_n)
+    near_n = near_n[first_of_alike(near_n)]
     ends_n, fitness_n, rmse_n = BatchedICP(few_model, NARROW).register(few, np.concatenate([near_n, known_n]))
     cost_n = clipped_cost(fitness_n, rmse_n, NARROW.correspondence_distance)
     best_n = np.argsort(cost_n, kind="stable")[:MOST_COMPARED]
@@ -207,6 +208,12 @@ def log_prior(T: np.ndarray, settings: ReenactmentSettings) -> float:
     return float(np.logaddexp(np.logaddexp(good, bad), lost))
 
 
+def first_of_alike(T_n: np.ndarray) -> np.ndarray:
+    """Return which poses (n,) of (n, 4, 4) have none before them whose matrix is the same up to `CLOSE`."""
+    apart_n_n = np.abs(T_n[:, None] - T_n).max(axis=(2, 3))
+    return ~np.tril(apart_n_n <= CLOSE, -1).any(axis=1)
+
+
 def distinct_rows(surface: ModelSurface, T_n: np.ndarray, most: int, limit: float) -> list[int]:
     """Return the rows of the first poses (n, 4, 4) that put the surface elsewhere than all before them."""
     chosen: list[int] = []
@@ -215,7 +222,7 @@ def distinct_rows(surface: ModelSurface, T_n: np.ndarray, most: int, limit: floa
         if chosen:
             if (np.abs(T - T_n[chosen]).max(axis=(1, 2)) <= CLOSE).any():
                 continue
-            if (surface.apart(np.stack([T @ back_n[k] for k in chosen])) <= limit).any():
+            if (surface.apart(T @ back_n[chosen]) <= limit).any():
                 continue
         chosen.append(i)
         if len(chosen) == most:

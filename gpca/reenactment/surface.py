@@ -11,11 +11,10 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from gpca.alignment.icp_target import make_target
-from gpca.alignment.rigid import transform
 from gpca.causes.truth import LARGEST_ERROR
 from gpca.features.distances import second_moments
 from gpca.objects.symmetry import find_symmetries
-from gpca.reenactment.surface_kernels import nearest_rows
+from gpca.reenactment.surface_kernels import nearest_rows, surface_distances
 
 JUDGED = 256  # points over which an error is the mean
 COMPARED = 64  # points that tell whether two poses are the same
@@ -64,27 +63,28 @@ class ModelSurface:
 
     def residuals(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the signed distances (N,) of points (N, 3) from the plane of the nearest model point, and its row."""
-        rows = self.tree.query(points)[1]
+        target, rows_M, _, _ = self._target
+        rows = np.empty(len(points), np.int64)
+        nearest_rows(np.ascontiguousarray(points), target, rows)
+        far = rows < 0
+        rows = rows_M[rows]
+        if far.any():
+            rows[far] = self.tree.query(points[far])[1]
         return _dots(points - self.centers[rows], self.normals[rows]), rows
 
     def distances(self, points: np.ndarray) -> np.ndarray:
         """Return the distances (N,) of points (N, 3) from the surface: from the plane of the nearest model point, and
         along it as far as the points' spacing does not reach."""
-        target, rows_M = self._target
-        rows, distance = np.empty(len(points), np.int64), np.empty(len(points))
-        nearest_rows(np.ascontiguousarray(points), target, rows, distance)
-        near = rows >= 0
-        rows = rows_M[rows]
-        off = np.abs(_dots(points - self.points[rows], self.normals[rows]))
-        along = np.sqrt(np.maximum(distance**2 - off**2, 0))
-        reached = np.hypot(off, np.maximum(along - CORNER * self.spacing_M[rows], 0))
-        return np.where(near, np.minimum(reached, distance), LARGEST_ERROR)
+        target, _, normals, reach = self._target
+        distance_N = np.empty(len(points))
+        surface_distances(np.ascontiguousarray(points), target, normals, reach, distance_N)
+        return distance_N
 
     def errors(self, T_n: np.ndarray) -> np.ndarray:
         """Return the errors (n,) of poses (n, 4, 4) where the identity is right: ADD, or for symmetric models the mean
         distance from the surface, which does not grow with the points' spacing as ADD-S does."""
         points = self.points[:JUDGED]
-        moved = np.stack([transform(T, points) for T in T_n])
+        moved = _moved(T_n, points)
         if self.symmetric:
             return self.distances(moved.reshape(-1, 3)).reshape(moved.shape[:2]).mean(axis=1)
         return np.sqrt(np.square(moved - points).sum(axis=2)).mean(axis=1)
@@ -92,14 +92,14 @@ class ModelSurface:
     def apart(self, T_between_n: np.ndarray) -> np.ndarray:
         """Return how far (n,) the surface lies from itself after each motion (n, 4, 4)."""
         points = self.points[:COMPARED]
-        moved = np.concatenate([transform(T, points) for T in T_between_n])
-        return self.distances(moved).reshape(len(T_between_n), -1).mean(axis=1)
+        return self.distances(_moved(T_between_n, points).reshape(-1, 3)).reshape(len(T_between_n), -1).mean(axis=1)
 
     @cached_property
     def _target(self):
-        """The points for compiled searches, and the row of each in `points`."""
+        """The points for compiled searches, and their rows in `points`, normals, and how far their surface reaches."""
         target = make_target(self.points, LARGEST_ERROR)
-        return target, self.tree.query(target.points)[1]
+        rows_M = self.tree.query(target.points)[1]
+        return target, rows_M, self.normals[rows_M], CORNER * self.spacing_M[rows_M]
 
 
 def trimmed_square(values: np.ndarray) -> float:
@@ -117,6 +117,13 @@ def _planes(around_M_k_3: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     centers = around_M_k_3.mean(axis=1)
     moments = second_moments(around_M_k_3 - centers[:, None])
     return centers, np.linalg.eigh(moments)[1]
+
+
+def _moved(T_n: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Return points (N, 3) after each motion (n, 4, 4) as (n, N, 3), summed from x to z."""
+    x, y, z = points.T
+    rows = T_n[:, :3, :, None]
+    return np.moveaxis(x * rows[:, :, 0] + y * rows[:, :, 1] + z * rows[:, :, 2] + rows[:, :, 3], 1, 2)
 
 
 def _dots(a_N_3: np.ndarray, b_N_3: np.ndarray) -> np.ndarray:

@@ -5,7 +5,7 @@ import pytest
 
 from gpca.alignment.rigid import inverse, rotation_angle_rad, transform
 from gpca.alignment.twist import exp
-from gpca.reenactment.hypotheses import distinct_rows, find_hypotheses, log_prior
+from gpca.reenactment.hypotheses import distinct_rows, find_hypotheses, first_of_alike, hypothesis_at, log_prior
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface
 from tests.reenactment.conftest import candidate_of, pair_of
@@ -76,3 +76,19 @@ def test_evidence_from_elsewhere_counts(drill):
     )
     assert surface.apart((near @ inverse(T_true))[None])[0] < 0.02
     assert surface.apart((far @ inverse(T_true))[None])[0] > 0.05
+
+
+def test_of_poses_that_are_alike_the_first_counts():
+    offsets = np.array([0, 1e-4, 0.1, 0.1001, 2e-4])
+    poses = exp(offsets[:, None] * np.array([[1.0, 0, 0, 0, 0, 0]]))
+    assert first_of_alike(poses).tolist() == [True, False, True, False, False]
+
+
+def test_a_pose_that_is_given_stays_and_is_likelier_where_it_is_true(drill):
+    candidate = candidate_of(drill, "noise", "pose", "overlap", seed=102)
+    pair, T_true = pair_of(candidate)
+    surface, before = ModelSurface(candidate.model), transform(pair.T_init, pair.observed)
+    true, wrong = (hypothesis_at(T, before, surface, SETTINGS, np.random.default_rng(0)) for T in (T_true, np.eye(4)))
+    assert np.array_equal(true.T, T_true)
+    assert true.log_posterior > wrong.log_posterior + 4.5
+    assert true.width == pytest.approx(0.06, rel=0.3)

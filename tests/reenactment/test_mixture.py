@@ -5,6 +5,7 @@ from scipy.stats import multivariate_normal
 from gpca.alignment.rigid import inverse, transform
 from gpca.alignment.twist import exp
 from gpca.reenactment.mixture import Anchor, Mixture
+from gpca.reenactment.mixture_kernels import FIRST_OUTLIERS, REACH
 
 RANDOM = np.random.default_rng(100)
 
@@ -20,6 +21,23 @@ def test_the_likelihood_is_that_of_normals_and_uniform_outliers(drill, model):
     expected = plain_log_likelihood(points, model.points, fits.width_n[0], fits.outliers_n[0])
     assert fits.log_likelihood_n[0] == pytest.approx(expected, abs=5e-3)  # partners that are far off count as none
     assert np.array_equal(fits.T_n[0], np.eye(4))
+
+
+def test_the_likelihood_counts_all_partners_within_reach_and_no_others(drill, model):
+    points, variance = drill[400:500] + RANDOM.normal(scale=0.05, size=(100, 3)), 0.05**2
+    squares = ((points[:, None] - model.points) ** 2).sum(axis=2)
+    weights = np.where(squares < REACH * variance, np.exp(-0.5 * squares / variance), 0)
+    density = (1 - FIRST_OUTLIERS) * weights.mean(axis=1) * (2 * np.pi * variance) ** -1.5 + FIRST_OUTLIERS
+    fits = Mixture(model.points, 0.05).fit(points, np.eye(4)[None], iterations=0)
+    assert fits.log_likelihood_n[0] == pytest.approx(np.log(density).mean(), abs=1e-8)
+    assert fits.inlier_n_N[0] == pytest.approx(1 - FIRST_OUTLIERS / density, abs=1e-8)
+
+
+def test_a_fit_that_has_converged_stops(drill, model):
+    mixture, points = Mixture(model.points, model.spacing / 2), drill[400:800]
+    many, more = (mixture.fit(points, np.eye(4)[None], iterations) for iterations in (1000, 2000))
+    assert np.array_equal(many.T_n, more.T_n)
+    assert mixture.fit(points, np.eye(4)[None], 5).log_likelihood_n[0] < many.log_likelihood_n[0]
 
 
 def test_a_known_pose_is_recovered_from_noise_and_outliers(drill, model):

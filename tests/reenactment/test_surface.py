@@ -3,7 +3,7 @@ import pytest
 
 from gpca.alignment.pose_error import PoseErrors
 from gpca.alignment.twist import exp
-from gpca.reenactment.surface import ModelSurface
+from gpca.reenactment.surface import CORNER, ModelSurface
 
 
 def test_planes_lie_in_the_surface(drill, model):
@@ -42,6 +42,21 @@ def test_poses_are_apart_as_far_as_their_surfaces_are(can, drill):
     turned = exp(np.array([[0, 0, 1.0, 0, 0, 0]]))
     assert ModelSurface(can[:400]).apart(turned)[0] < 0.01
     assert ModelSurface(drill[:400]).apart(turned)[0] > 0.05
+
+
+def test_distances_are_those_from_planes_as_far_as_the_spacing_reaches(drill, model):
+    points = drill[400:500] + np.random.default_rng(1).normal(scale=0.03, size=(100, 3))
+    rows = np.linalg.norm(model.points[:, None] - points, axis=2).argmin(axis=0)
+    offsets = points - model.points[rows]
+    square, off = (offsets**2).sum(axis=1), (offsets * model.normals[rows]).sum(axis=1)
+    along = np.maximum(np.sqrt(np.maximum(square - off**2, 0)) - CORNER * model.spacing_M[rows], 0)
+    assert model.distances(points) == pytest.approx(np.minimum(np.hypot(off, along), np.sqrt(square)), abs=1e-9)
+
+
+def test_the_plane_of_a_point_beyond_reach_is_still_that_of_the_nearest(model):
+    far = np.array([[5.0, 0, 0], [0.1, 0, 0]])
+    nearest = np.linalg.norm(model.points[:, None] - far, axis=2).argmin(axis=0)
+    assert np.array_equal(model.residuals(far)[1], nearest)
 
 
 def test_what_is_beyond_reach_counts_as_far_as_errors_do(model):
