@@ -54,6 +54,7 @@ def on_frames(explainer, options: argparse.Namespace) -> dict[str, float]:
 
     from gpca.alignment.canonical_frame import CanonicalFrame
     from gpca.alignment.rigid import inverse, transform
+    from gpca.features.motion import describe_motion
     from gpca.features.settings import MOTION
     from gpca.pairs.dataset import Registrations
     from gpca.process.progress import progress
@@ -66,7 +67,6 @@ def on_frames(explainer, options: argparse.Namespace) -> dict[str, float]:
     failed_K, frame = error_N[rows] > FAILED, CanonicalFrame(np.zeros(3), 1.0)
     alarms: dict[str, list[float]] = {"diagnosis": [], "inlier_rmse": [], "fitness": [], "spread": []}
     skipped = []
-    spread = MOTION.index("log_determinant") - len(MOTION)
     for row in progress(rows, "registrations"):
         cloud, target = (getattr(registrations, name)(row).astype(float) for name in ("cloud", "target"))
         T_icp = registrations.T_target_source("icp", row) @ inverse(registrations.T_target_source("init", row))
@@ -78,8 +78,8 @@ def on_frames(explainer, options: argparse.Namespace) -> dict[str, float]:
         alarms["diagnosis"].append(said.diagnosis.failure)
         alarms["inlier_rmse"].append(registrations.inlier_rmse[row])
         alarms["fitness"].append(-registrations.fitness[row])
-        described, _ = (explainer.model.fast or explainer.model.diagnoser).measured(source, target, T_icp)
-        alarms["spread"].append(described[motion_end() + spread])
+        pair = explainer.model.diagnoser.pair(source, target, T_icp)
+        alarms["spread"].append(describe_motion(pair)[MOTION.index("log_determinant")])
     kept = ~np.isin(rows, skipped)
     failed_K, instance_K = failed_K[kept], poses["instance"].to_numpy()[rows][kept]
     print(f"{len(failed_K)} registrations of {len(set(instance_K))} instances, {failed_K.sum()} failed")
@@ -103,12 +103,6 @@ def on_frames(explainer, options: argparse.Namespace) -> dict[str, float]:
     found = np.array(alarms["diagnosis"]) >= explainer.model.diagnoser.threshold
     print(f"called failed: {found[failed_K].mean():.3f} of the failed, {found[~failed_K].mean():.3f} of the nominal")
     return result | {"found": found[failed_K].mean(), "false_alarms": found[~failed_K].mean()}
-
-
-def motion_end() -> int:
-    from gpca.features.dataset import WIDTHS
-
-    return WIDTHS["distances"] + WIDTHS["planes"] + WIDTHS["motion"]
 
 
 def resampled(instance_K, random):

@@ -59,21 +59,21 @@ def registrations(objects):
 
 
 @pytest.fixture(scope="session")
-def diagnosers():
-    """Diagnosers, with and without re-enactment, of twelve pairs whose features were drawn; two thirds failed."""
+def diagnoser():
+    """A diagnoser of twelve pairs whose features were drawn; two thirds failed."""
     import numpy as np
 
     from gpca.causes.settings import CauseSettings
     from gpca.classifier.settings import GPCSettings
-    from gpca.model.diagnoser import PLAIN_WIDTH
+    from gpca.model.contents import WIDTH_READ
+    from gpca.model.diagnoser import REENACTED
     from gpca.model.learning import Lessons, learn
-    from gpca.reenactment.features import FEATURES
     from gpca.reenactment.settings import ReenactmentSettings
 
     random, label_N = np.random.default_rng(0), np.array(["nominal", "noise", "pose"] * 4)
     failed_N = label_N != "nominal"
     lessons = Lessons(
-        features_N_F=random.normal(size=(12, len(FEATURES) + PLAIN_WIDTH)) + 3 * failed_N[:, None],
+        features_N_F=random.normal(size=(12, WIDTH_READ[REENACTED])) + 3 * failed_N[:, None],
         label_N=label_N,
         state_N=np.where(failed_N, "several", "nominal"),
         causes_N_3=np.repeat(failed_N[:, None], 3, axis=1),
@@ -82,16 +82,11 @@ def diagnosers():
     )
     gpc = GPCSettings(learning_rate=0.1, iterations=20, inducing=4, draws=50)
     reenactment = ReenactmentSettings(hypotheses=2)
-    return learn(lessons, gpc, CauseSettings(points=(64, 128), moved="observed"), reenactment, 0.05, "tiny", 0)[:2]
+    return learn(lessons, gpc, CauseSettings(points=(64, 128), moved="observed"), reenactment, 0.05, "tiny", 0)[0]
 
 
 @pytest.fixture(scope="session")
-def diagnoser(diagnosers):
-    return diagnosers[0]
-
-
-@pytest.fixture(scope="session")
-def model(registrations, diagnosers):
+def model(registrations, diagnoser):
     """A model of an encoder that was not trained: its embeddings tell concepts apart well enough to be scored."""
     import torch
 
@@ -114,9 +109,7 @@ def model(registrations, diagnosers):
     gpc.fit(h_S_d, train.concept)
     policy = RecoveryPolicy(Thresholds(uncertain=1.0, dominant=0.4))
     familiar = Familiarity.of((train.cloud(row), train.target(row)) for row in range(len(train)))
-    diagnoser, fast = diagnosers
-    parts = (network.encoder, settings, gpc, ICPSettings(), 256, policy, "Tiny", True, familiar, fast)
-    return Model(diagnoser, *parts)
+    return Model(diagnoser, network.encoder, settings, gpc, ICPSettings(), 256, policy, "Tiny", True, familiar)
 
 
 @pytest.fixture(scope="session")

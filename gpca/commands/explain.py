@@ -30,7 +30,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         "--uncertainty", nargs="?", const=MONTE_CARLO, metavar="ESTIMATOR",
         help="measure the uncertainty of the pose with an estimator such as brossard (default: Monte-Carlo)",
     )  # fmt: skip
-    parser.add_argument("--fast", action="store_true", help="re-enact nothing: quicker, and wrong more often")
+    parser.add_argument("--fast", action="store_true", help="re-enact with fewer points and poses, without a promise")
     form = parser.add_mutually_exclusive_group()
     form.add_argument("--json", action="store_true", help="print one JSON object")
     form.add_argument("--json-lines", action="store_true", help="print one line of JSON per source")

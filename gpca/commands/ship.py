@@ -19,7 +19,7 @@ from gpca.experiments.diagnosis.judged import CEILING, POOLED
 from gpca.experiments.diagnosis.measures import RECALL
 from gpca.experiments.diagnosis.metrics import read_intervals
 from gpca.io.files import require_outputs, whole_file
-from gpca.model.diagnoser import Diagnoser
+from gpca.model.diagnoser import REENACTED, Diagnoser
 from gpca.model.file import VERSION, Model
 from gpca.model.origin import License, Origin
 from gpca.objects.canonical import LARGEST_DIAMETER_M, SMALLEST_DIAMETER_M
@@ -79,7 +79,7 @@ def card(name: str, content: bytes, model: Model, diagnoser: Diagnoser, origin: 
         _file(name, content, origin),
         *("## Training data", *_training(model, diagnoser, origin)),
         *("## Data and licenses", *_licenses(origin)),
-        *("## Scores", *_held_out(model, diagnoser), *_scores(origin, scores)),
+        *("## Scores", *_held_out(diagnoser), *_scores(origin, scores)),
         *("## Limits", "\n".join(_wrapped(f"- {line}", "  ") for line in limits)),
     ]
     return "\n\n".join(text if text[0] in "|-#" else _wrapped(text) for text in paragraphs) + "\n"
@@ -123,16 +123,12 @@ def _licenses(origin: Origin) -> list[str]:
     ]
 
 
-def _held_out(model: Model, diagnoser: Diagnoser) -> list[str]:
-    kinds = {"with re-enactment": diagnoser.held_out, "`--fast`": model.fast.held_out if model.fast else {}}
-    rows = [
-        (name, *(f"{of[measure]:.0f}" if of[measure] >= 2 else f"{of[measure]:.3f}" for measure in HELD_OUT))
-        for name, of in kinds.items()
-    ]
+def _held_out(diagnoser: Diagnoser) -> list[str]:
+    held_out = [diagnoser.held_out[measure] for measure in HELD_OUT]
     return [
         "The training registrations were judged by classifiers like those in the file that had learned other families "
         "of shapes. The classifiers in the file learned them all, so nothing is left to test these on.",
-        _table(["diagnosis", *HELD_OUT.values()], rows),
+        _table([*HELD_OUT.values()], [[f"{value:.0f}" if value >= 2 else f"{value:.3f}" for value in held_out]]),
     ]
 
 
@@ -235,7 +231,7 @@ def run(options: Namespace) -> None:
     scores = options.model.with_name("cause_intervals.csv")
     require_outputs([options.out, options.card], [options.model, scores])
     model = Model.load(options.model)
-    if model.diagnoser is None or model.fast is None:
+    if model.diagnoser is None or model.diagnoser.reads != REENACTED:
         fault = "cannot say what is wrong with a registration" if model.diagnoser is None else "re-enacts nothing"
         raise InputError(options.model, fault, "ship one that this version made")
     if model.stand_in:

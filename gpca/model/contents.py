@@ -25,11 +25,12 @@ from gpca.features.settings import DescriptorSettings
 from gpca.guarantee.guarantee import Guarantee
 from gpca.guarantee.sets import Nonconformity
 from gpca.guarantee.states import STATES
-from gpca.model.diagnoser import PLAIN, PLAIN_WIDTH, REENACTED, REMEDIED
+from gpca.model.diagnoser import REENACTED, REMEDIED
 from gpca.model.familiarity import MEASURES
 from gpca.objects.canonical import FEWEST_CLOUD_POINTS
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.recovery.policy import TREATMENTS
+from gpca.reenactment.dataset import DESCRIBED
 from gpca.reenactment.features import FEATURES
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.settings import read_settings
@@ -43,7 +44,10 @@ MOST_CLOUD_POINTS = 10**6
 MOST_ITERATIONS = 10**5  # of ICP
 MOST_RUNS = 10**4  # of ICP, to describe a pair
 MOST_NEIGHBORS = 10**4  # or whatever else a backbone's options count
-WIDTH_READ = {PLAIN: PLAIN_WIDTH, REENACTED: len(FEATURES) + PLAIN_WIDTH, REMEDIED: sum(WIDTHS.values())}
+WIDTH_READ = {
+    REENACTED: len(FEATURES) + sum(WIDTHS[group] for group in DESCRIBED),
+    REMEDIED: sum(WIDTHS.values()),
+}
 ASYMMETRY = 1e-9  # of a covariance, whose prior is the identity
 
 
@@ -54,9 +58,8 @@ def require_possible(content: Mapping, settings: EncoderSettings) -> None:
     read_settings(ICPSettings, content["icp"])
     if "familiar" in content:
         _require_ranges(content["familiar"])
-    for diagnoser in (content["diagnoser"], content.get("fast")):
-        if diagnoser is not None:
-            _require_diagnoser(diagnoser)
+    if content["diagnoser"] is not None:
+        _require_diagnoser(content["diagnoser"])
     counts = {
         "draws of the classifier": (content["gpc"]["settings"]["draws"], 2, MOST_DRAWS),
         "points": (content["points"], FEWEST_CLOUD_POINTS, MOST_CLOUD_POINTS),
@@ -154,13 +157,8 @@ def _counts_of_runs(state: Mapping) -> dict[str, tuple[object, int, int]]:
         if state["moved"] not in get_args(Moved):
             raise ValueError(f"moved: {str(state['moved'])[:40]!r} is not one of {', '.join(get_args(Moved))}")
         return {"re-enactments": (settings.calls(state["runs"]["starts"]), 1, MOST_RUNS)}
-    if state.get("reads", REMEDIED) == REMEDIED:
-        remedies = read_settings(DescriptorSettings, state["descriptors"])
-        return {
-            "starts with remedies": (remedies.starts, 1, MOST_RUNS),
-            "restarts": (remedies.restarts, 1, MOST_RUNS),
-        }
-    return {}
+    remedies = read_settings(DescriptorSettings, state["descriptors"])
+    return {"starts with remedies": (remedies.starts, 1, MOST_RUNS), "restarts": (remedies.restarts, 1, MOST_RUNS)}
 
 
 def _require_promises(state: Mapping) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from sys import intern
 
 import numpy as np
@@ -16,7 +16,7 @@ from gpca.alignment.twist import exp
 from gpca.causes.settings import OBSERVED, CauseSettings, Moved
 from gpca.causes.truth import LARGEST_ERROR
 from gpca.explainers.pair_classifier import PairClassifier
-from gpca.features.dataset import WIDTHS, describe, describe_plainly
+from gpca.features.dataset import describe
 from gpca.features.pair import ObservedPair
 from gpca.features.settings import GROUPS, DescriptorSettings
 from gpca.guarantee.guarantee import Guarantee
@@ -24,7 +24,7 @@ from gpca.model.diagnosis import Diagnosis
 from gpca.model.guaranteed import Guaranteed, scores_of_states
 from gpca.model.reenacted import Reenacted
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.reenactment.dataset import DESCRIBED, Reenactments, row_of
+from gpca.reenactment.dataset import Reenactments, row_of
 from gpca.reenactment.enactment import reenact
 from gpca.reenactment.features import reenactment_features
 from gpca.reenactment.settings import ReenactmentSettings
@@ -33,8 +33,8 @@ from gpca.seeds import generator
 from gpca.uncertainty.settings import UncertaintySettings
 
 SMALLEST_ERROR = 1e-3  # diameters; below it lies the spacing of the points
-PLAIN, REENACTED, REMEDIED = ("plain", "reenacted", "remedied")  # what a diagnoser reads of a pair
-PLAIN_WIDTH = sum(WIDTHS[group] for group in DESCRIBED)  # features that need no re-enactment
+REENACTED, REMEDIED = ("reenacted", "remedied")  # what a diagnoser reads of a pair
+QUICK_POINTS, QUICK_HYPOTHESES = 256, 2  # of a quick diagnosis, at most
 
 
 @dataclass(frozen=True)
@@ -47,12 +47,12 @@ class Diagnoser:
         threshold: probability of failure from which something is called wrong.
         points: of each cloud, at most.
         runs: how ICP runs from other starts.
-        reads: ``plain`` descriptors; ``reenacted``, the numbers of a re-enactment and these; or ``remedied``, all
-            groups of descriptors, as models before version 4 do.
+        reads: ``reenacted``, the numbers of a re-enactment; or ``remedied``, all groups of descriptors, as models
+            before version 4 do.
         moved: the cloud that ICP moves in a re-enactment.
         reenactment: how the true pose is sought.
         descriptors: how pairs are registered with remedies.
-        guarantee: of what is said; None of older models.
+        guarantee: of what is said; None of older models and of a quick diagnosis.
         held_out: how well classifiers that learned from other families of shapes did, by measure; empty of older ones.
     """
 
@@ -67,6 +67,11 @@ class Diagnoser:
     descriptors: DescriptorSettings = field(default_factory=DescriptorSettings)
     guarantee: Guarantee | None = None
     held_out: Mapping[str, float] = field(default_factory=dict)
+
+    def quick(self) -> Diagnoser:
+        """Return it for a quick diagnosis: with fewer points and hypotheses, and no promise, which needs them all."""
+        reenactment = replace(self.reenactment, hypotheses=min(self.reenactment.hypotheses, QUICK_HYPOTHESES))
+        return replace(self, points=min(self.points, QUICK_POINTS), reenactment=reenactment, guarantee=None)
 
     def diagnose(self, observed: np.ndarray, model: np.ndarray, T_icp: np.ndarray) -> Diagnosis:
         """Diagnose a registration; the same clouds give the same numbers.
@@ -96,9 +101,7 @@ class Diagnoser:
         self, observed: np.ndarray, model: np.ndarray, T_icp: np.ndarray
     ) -> tuple[np.ndarray, Reenacted | None]:
         """Return the features (F,) of the pair, and what its re-enactment says, if it has one."""
-        pair = self._pair(observed, model, T_icp)
-        if self.reads == PLAIN:
-            return np.concatenate([*describe_plainly(pair, self.runs.icp).values()]), None
+        pair = self.pair(observed, model, T_icp)
         if self.reads == REMEDIED:
             described, _ = describe(pair, self.descriptors, self.runs.icp)
             return np.concatenate([described[group] for group in GROUPS]), None
@@ -108,7 +111,7 @@ class Diagnoser:
         said = Reenacted.of(enactments, row["weight"][: len(enactments)], T_icp, surface)
         return reenactment_features(Reenactments.of_rows([row], truth))[0], said
 
-    def _pair(self, observed: np.ndarray, model: np.ndarray, T_icp: np.ndarray) -> ObservedPair:
+    def pair(self, observed: np.ndarray, model: np.ndarray, T_icp: np.ndarray) -> ObservedPair:
         """Return the pair with runs of ICP from other starts, as the training has them."""
         observed, model = _drawn(observed, self.points, "observed"), _drawn(model, self.points, "model")
         starts_n = exp(generator("diagnosis", "starts").normal(size=(self.runs.starts, 6)) * self.runs.deviation_6())
@@ -127,7 +130,7 @@ class Diagnoser:
 
     def state(self) -> dict[str, object]:
         """Return tensors, numbers and names for :meth:`from_state`."""
-        own = {REENACTED: "reenactment", REMEDIED: "descriptors"}.get(self.reads)
+        own = {REENACTED: "reenactment", REMEDIED: "descriptors"}[self.reads]
         return {
             "reads": self.reads,
             "classifier": self.classifier.state(),
@@ -137,7 +140,7 @@ class Diagnoser:
             "runs": {name: value for name, value in asdict(self.runs).items() if name != "icp"},
             "icp": asdict(self.runs.icp),
             "moved": self.moved,
-            **({own: asdict(getattr(self, own))} if own else {}),
+            own: asdict(getattr(self, own)),
             "guarantee": self.guarantee and self.guarantee.to_dict(),
             "held_out": dict(self.held_out),
         }

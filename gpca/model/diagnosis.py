@@ -78,7 +78,7 @@ class Diagnosis:
         return [
             f"state     {self.state}: {named}",
             f"failure   probability {self.failure:.3f}, called a failure from {self.threshold:.3f}",
-            *(self.guarantee.lines() if self.guarantee else ()),
+            *(self.guarantee.lines() if self.guarantee else ["set       none, since nothing is promised"]),
             f"causes    {', '.join(f'{cause} {share:.3f}' for cause, share in self.causes.items())}, if it failed",
             f"error     about {self.expected_error:.2g} {unit}",
             *(self.reenacted.lines(unit) if self.reenacted else ["          (nothing was re-enacted)"]),

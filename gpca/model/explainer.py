@@ -25,6 +25,7 @@ from gpca.causes.truth import NOMINAL
 from gpca.encoders.training import best_device
 from gpca.errors import InputError
 from gpca.model.clouds import Clouds
+from gpca.model.diagnoser import QUICK_HYPOTHESES, QUICK_POINTS
 from gpca.model.diagnosis import Diagnosis
 from gpca.model.explanation import CHECK, Explanation, PoseSpread
 from gpca.model.familiarity import Void, voids_of
@@ -36,7 +37,7 @@ from gpca.seeds import generator, seed_of
 from gpca.uncertainty.settings import MONTE_CARLO, UncertaintySettings
 
 NOTHING_REENACTED = "the model is from an older version and re-enacts nothing; make another, or take the package's"
-FAST = "fast: nothing was re-enacted"
+FAST = f"fast: at most {QUICK_POINTS} points and {QUICK_HYPOTHESES} poses were re-enacted, and nothing is promised"
 GOOD_FITNESS = 0.9  # from which on an initial pose is not doubted
 INVERSE_COST = 0.5  # of that from the initial pose; where the inverse of this ends with less, it was probably meant
 
@@ -90,7 +91,7 @@ class Explainer:
                 default the model's own ICP, on whose results the classifier was trained.
             estimator: of the uncertainty, where it is measured (docs/estimators.md): one that needs no training
                 registrations. Where it cannot tell, a note says why.
-            fast: whether the diagnosis re-enacts nothing: half the time, and it errs more often.
+            fast: whether a quick re-enactment is enough: half the time; it errs more often and promises nothing.
 
         Raises:
             InputError: too few points, NaN, a unit that cannot be right, source and target of unlike sizes, an initial
@@ -109,14 +110,16 @@ class Explainer:
             at_pose = self._aligned(clouds, register, method, notes)
         voids = voids_of(clouds.source, clouds.target, at_pose.fitness, self.model.familiar)
         diagnosis = None
-        diagnoser = self.model.fast if fast and self.model.fast else self.model.diagnoser
-        if diagnose and diagnoser is not None:
+        if diagnose and (diagnoser := self.model.diagnoser) is not None:
+            diagnoser = diagnoser.quick() if fast else diagnoser
             with _timed(seconds, "diagnosis"):
                 diagnosis = diagnoser.diagnose(clouds.source, clouds.target, at_pose.T_target_source)
             outside = diagnosis.outside(clouds.frame, clouds.T_target_source_init)
             diagnosis = replace(outside, void=bool(voids))
             if diagnosis.reenacted is None:
-                notes.append(FAST if fast else NOTHING_REENACTED)
+                notes.append(NOTHING_REENACTED)
+            elif fast:
+                notes.append(FAST)
         with _timed(seconds, "embedding"):
             h_1_d = self.embed(transform(at_pose.T_target_source, clouds.source))
         with _timed(seconds, "attribution"):

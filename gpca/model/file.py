@@ -9,7 +9,6 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-import torch
 from torch import nn
 
 from gpca.alignment.icp import ICPSettings
@@ -42,7 +41,6 @@ class Model:
         policy: the actions for the causes.
         title, stand_in: of the objects that GP-CA learned, and whether they were drawn by the package.
         familiar: ranges of simple measures of the clouds that GP-CA learned; None in older files.
-        fast: a diagnoser that re-enacts nothing; None in older files, whose only one does not either.
     """
 
     diagnoser: Diagnoser | None
@@ -55,7 +53,6 @@ class Model:
     title: str
     stand_in: bool
     familiar: Familiarity | None = None
-    fast: Diagnoser | None = None
 
     @property
     def concepts(self) -> tuple[str, ...]:
@@ -68,7 +65,6 @@ class Model:
             "format": FORMAT,
             "version": VERSION,
             "diagnoser": self.diagnoser and self.diagnoser.state(),
-            "fast": self.fast and self.fast.state(),
             "encoder": self.encoder.state_dict(),
             "encoder_settings": _renamed(
                 {k: v for k, v in asdict(self.encoder_settings).items() if v is not None}, "draw_points", "points"
@@ -83,7 +79,6 @@ class Model:
         }
         if self.familiar is not None:
             content["familiar"] = {name: list(ends) for name, ends in self.familiar.ranges.items()}
-        _share_inputs(content)
         write_tensors(path, content)
 
     @classmethod
@@ -112,7 +107,6 @@ class Model:
             encoder.load_state_dict(content["encoder"])
             return cls(
                 diagnoser=content["diagnoser"] and Diagnoser.from_state(content["diagnoser"]),
-                fast=Diagnoser.from_state(content["fast"]) if content.get("fast") else None,
                 encoder=encoder.eval(),
                 encoder_settings=settings,
                 gpc=GPC.from_state(content["gpc"]),
@@ -124,18 +118,6 @@ class Model:
             )
         except (LookupError, TypeError, ValueError, RuntimeError, AttributeError) as fault:
             raise InputError(path, f"is a model with missing or damaged parts ({fault})", REMEDY) from fault
-
-
-def _share_inputs(content: Mapping) -> None:
-    """Let the fast diagnoser's inputs be the last ones of the other's, so that a file holds them once."""
-    if content["diagnoser"] is None or content["fast"] is None:
-        return
-    all_N_F = content["diagnoser"]["classifier"]["failure"]["labelled"]
-    classifier = content["fast"]["classifier"]
-    for gpc in (classifier["failure"], *classifier["causes"]):
-        last = all_N_F[:, -gpc["labelled"].shape[1] :]
-        if torch.equal(gpc["labelled"], last):
-            gpc["labelled"] = last
 
 
 def _renamed(settings: Mapping, old: str, new: str) -> dict:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -22,7 +21,7 @@ from gpca.explainers.pair_classifier import Judgment, PairClassifier
 from gpca.guarantee.guarantee import Guarantee, calibrate
 from gpca.guarantee.quantile import highest_level
 from gpca.guarantee.states import states_of
-from gpca.model.diagnoser import PLAIN, PLAIN_WIDTH, REENACTED, SMALLEST_ERROR, Diagnoser
+from gpca.model.diagnoser import SMALLEST_ERROR, Diagnoser
 from gpca.model.guaranteed import scores_of_states
 from gpca.reenactment.dataset import Reenactments
 from gpca.reenactment.features import reenactment_features
@@ -40,7 +39,7 @@ class Lessons:
     """N registrations whose causes were measured.
 
     Attributes:
-        features_N_F: their features, those of the re-enactment and then, `PLAIN_WIDTH`, those that need none.
+        features_N_F: their features (:func:`gpca.reenactment.features.reenactment_features`).
         label_N: nominal, a dominant cause, or borderline.
         state_N: the same, but ``several`` where a failure has several causes.
         causes_N_3: whether each concept is one of the causes.
@@ -71,10 +70,6 @@ class Lessons:
         """Return the given rows."""
         return Lessons(**{name: array[rows_N] for name, array in vars(self).items()})
 
-    def plain(self) -> Lessons:
-        """Return them with the features that need no re-enactment alone."""
-        return Lessons(**vars(self) | {"features_N_F": self.features_N_F[:, -PLAIN_WIDTH:]})
-
 
 def joined(parts: Sequence[Lessons]) -> Lessons:
     """Return the lessons of several sources."""
@@ -88,39 +83,29 @@ def learn(
     reenactment: ReenactmentSettings,
     false_alarms: float,
     *axes: object,
-) -> tuple[Diagnoser, Diagnoser, np.ndarray]:
-    """Return what learned all lessons, the same without re-enactment, and the BALD (nats) of failures of new families.
+) -> tuple[Diagnoser, np.ndarray]:
+    """Return what learned all lessons, and the BALD (nats) of failures of new families.
 
     The threshold of failure is the one that at most the share `false_alarms` of the nominal registrations of new
     families reaches.
     """
-    settings: dict[str, Any] = {"runs": causes.runs(), "moved": causes.moved, "reenactment": reenactment}
-    full, bald_N = _learned(lessons, gpc, false_alarms, *axes)
-    fast, _ = _learned(lessons.plain(), gpc, false_alarms, *axes)
-    points = causes.points[1]
-    return (
-        Diagnoser(**full, **settings, reads=REENACTED, points=min(points, MOST_REENACTED)),
-        Diagnoser(**fast, **settings, reads=PLAIN, points=points),
-        bald_N,
-    )
-
-
-def _learned(
-    lessons: Lessons, gpc: GPCSettings, false_alarms: float, *axes: object
-) -> tuple[dict[str, Any], np.ndarray]:
     clear = lessons.subset(lessons.label_N != BORDERLINE)
     judged = judged_unseen(clear, gpc, *axes)
     nominal_N = clear.label_N == NOMINAL
     threshold = threshold_of(judged.failure_N[nominal_N], false_alarms)
     classifier = _classifier(clear, gpc, *axes)
-    learned = {
-        "classifier": classifier,
-        "error_weights": fit_error(classifier.normalized(lessons.features_N_F), lessons.error_N),
-        "threshold": threshold,
-        "guarantee": promised(clear, judged, false_alarms),
-        "held_out": measured(clear, judged, threshold),
-    }
-    return learned, judged.bald_N[~nominal_N]
+    diagnoser = Diagnoser(
+        classifier=classifier,
+        error_weights=fit_error(classifier.normalized(lessons.features_N_F), lessons.error_N),
+        threshold=threshold,
+        points=min(causes.points[1], MOST_REENACTED),
+        runs=causes.runs(),
+        moved=causes.moved,
+        reenactment=reenactment,
+        guarantee=promised(clear, judged, false_alarms),
+        held_out=measured(clear, judged, threshold),
+    )
+    return diagnoser, judged.bald_N[~nominal_N]
 
 
 def judged_unseen(lessons: Lessons, gpc: GPCSettings, *axes: object) -> Judgment:

@@ -28,7 +28,7 @@ def run(job: Job) -> None:
     inputs = [job.registrations, job.encoder, job.embeddings, *job.causes, *job.reenactments]
     with record_provenance([job.out], inputs, job.settings, seed=job.seed):
         icp, own = job.section("registrations").get("icp", {}), job.section("model")
-        diagnoser, fast, bald_N = learn(
+        diagnoser, bald_N = learn(
             joined([_lessons(*files) for files in zip(job.causes, job.reenactments, strict=True)]),
             GPCSettings(**own.get("classifier", {})),
             CauseSettings.from_dict(job.section("causes") | own.get("causes", {}), icp),
@@ -41,7 +41,6 @@ def run(job: Job) -> None:
         registrations = Registrations.load(job.registrations, axes)
         Model(
             diagnoser=diagnoser,
-            fast=fast,
             encoder=load_model(job.encoder, settings, axes=axes).encoder,
             encoder_settings=settings,
             gpc=_gpc(job, registrations, GPCSettings(**job.section("gpc"))),
