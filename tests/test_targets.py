@@ -84,7 +84,8 @@ def test_memory_that_was_not_sampled_is_left_out(run_folder, smoke_plan):
 def test_the_command_prints_the_table_and_writes_it_into_its_page(
     smoke_plan, run_folder, tmp_path, monkeypatch, capsys
 ):
-    half = smoke_plan[: smoke_plan.rindex("\n\n", 0, len(smoke_plan) // 2)]  # of whole jobs
+    jobs = [found.start() for found in re.finditer(r"^(?:local)?rule ", smoke_plan, re.MULTILINE)]
+    half = smoke_plan[: jobs[len(jobs) // 2]]
     plans = {"all": smoke_plan, "paper": half}
     monkeypatch.setattr(targets, "plan", lambda run, configfile, config, target: plans[target])
     page = tmp_path / "page.md"
