@@ -27,7 +27,7 @@ from gpca.reenactment.dataset import Reenactments
 from gpca.reenactment.features import reenactment_features
 from gpca.reenactment.settings import ReenactmentSettings
 
-MOST_REENACTED = 512  # points of a user's cloud: with twice as many, a re-enactment takes more than half a second
+MOST_REENACTED = 512  # points of a user's cloud: twice as many take twice the time and gain nothing
 RIDGE = 10.0  # of the regression of the error, in samples
 FOLDS = 3  # of the families
 LEVEL = 0.9  # probability that a set of states holds the true one

@@ -56,8 +56,8 @@ def test_the_same_clouds_give_the_same_diagnosis_also_after_the_way_to_a_file(di
 def test_a_quick_diagnosis_reenacts_less_and_promises_nothing(diagnoser, cloud):
     large = replace(diagnoser, points=512, reenactment=ReenactmentSettings(hypotheses=4))
     quick = large.quick()
-    assert (quick.points, quick.reenactment.hypotheses) == (256, 2)
-    assert diagnoser.quick().points == diagnoser.points < 256
+    assert (quick.points, quick.reenactment.hypotheses) == (384, 2)
+    assert diagnoser.quick().points == diagnoser.points < 384
     said = quick.diagnose(cloud, cloud[::2], np.eye(4))
     assert said.guarantee is None
     assert 1 <= len(said.reenacted.poses) <= 2

@@ -118,7 +118,7 @@ def test_clouds_of_which_no_surface_can_be_made_are_explained_all_the_same(expla
 def test_a_fast_explanation_promises_nothing_and_says_so(explainer, pair):
     said = explainer.explain(*pair, fast=True)
     assert said.as_dict()["diagnosis"]["guarantee"] is None
-    assert "fast: at most 256 points and 2 poses were re-enacted, and nothing is promised" in said.notes
+    assert "fast: at most 384 points and 2 poses were re-enacted, and nothing is promised" in said.notes
     assert "set       none, since nothing is promised" in said.text()
     [again] = explainer.explain_many([pair], fast=True)
     assert json.dumps(again.as_dict()["diagnosis"]) == json.dumps(said.as_dict()["diagnosis"])

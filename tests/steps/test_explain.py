@@ -66,7 +66,7 @@ def test_a_diagnosis_says_what_it_rests_on_and_fast_that_it_rests_on_less(folder
     out, err = capsys.readouterr()
     assert json.loads(out)["diagnosis"]["guarantee"] is None
     assert json.loads(out)["diagnosis"]["reenacted"]["poses"]
-    assert "fast: at most 256 points and 2 poses were re-enacted, and nothing is promised\n" in err
+    assert "fast: at most 384 points and 2 poses were re-enacted, and nothing is promised\n" in err
     assert main(arguments("explain", {"--json": None})) == 0
     text = capsys.readouterr().out
     starts = [line.split()[0] for line in text.splitlines() if line]
