@@ -171,7 +171,10 @@ def _possible(arrays: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 
 def joined(parts: Sequence[Registrations]) -> Registrations:
-    """Return the registrations of several sources as one, their samples numbered anew within each split."""
+    """Return the registrations of several sources as one, with what is attached to all of them.
+
+    Their samples are numbered anew within each split.
+    """
     columns = {name: np.concatenate([getattr(part, name) for part in parts]) for name in REGISTRATION_COLUMNS}
     for split in SPLITS:
         rows = np.flatnonzero(columns["split"] == split)
@@ -179,7 +182,8 @@ def joined(parts: Sequence[Registrations]) -> Registrations:
     clouds = [part.cloud(row) for part in parts for row in range(len(part))]
     targets = [part.target(row) for part in parts for row in range(len(part))]
     whole: dict[str, Any] = columns | ragged(clouds, targets)
-    return Registrations(**whole)
+    attached = {name: np.concatenate([part.attached[name] for part in parts]) for name in parts[0].attached}
+    return Registrations(**whole, attached=attached)
 
 
 def load_embeddings(

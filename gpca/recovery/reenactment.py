@@ -24,7 +24,8 @@ from gpca.frames.camera import MeshScene
 from gpca.frames.shots import NEAR, Shot, fuse
 from gpca.recovery.actions import Holding, Robot
 from gpca.recovery.appearance import Appearance
-from gpca.reenactment.hypotheses import Hypothesis, find_hypotheses
+from gpca.reenactment.enactment import start_twists
+from gpca.reenactment.hypotheses import Hypothesis, find_hypotheses, weights_of
 from gpca.reenactment.observation import NoiseScale, observe
 from gpca.reenactment.rebuilding import rebuild
 from gpca.reenactment.settings import ReenactmentSettings
@@ -133,12 +134,10 @@ def believe(
     T_result = scale_translation(inverse(holding.T_world_object) @ T_init, 1 / d)
     evidence = partial(_evidence, holding, known, Appearance(holding.shots, known.mesh))
     hypotheses = find_hypotheses(observed, known.surface, T_result[None], settings, random, evidence)
-    posterior_K = np.array([hypothesis.log_posterior for hypothesis in hypotheses])
-    weight_K = np.exp(posterior_K - posterior_K.max())
     T_off_K = np.stack([T_result @ inverse(hypothesis.T) for hypothesis in hypotheses])
     error_K = capped(known.surface.errors(T_off_K))
     failure_K = expit(STEEPNESS * np.log(np.maximum(error_K, SMALLEST_ERROR) / truth.limits.failed))
-    return Belief(hypotheses, observed, weight_K / weight_K.sum(), error_K, failure_K, perf_counter() - started)
+    return Belief(hypotheses, observed, weights_of(hypotheses), error_K, failure_K, perf_counter() - started)
 
 
 def reenact(belief: Belief, holding: Holding, known: KnownModel, truth: CauseSettings, axes: tuple) -> Reenacted:
@@ -153,7 +152,7 @@ def reenact(belief: Belief, holding: Holding, known: KnownModel, truth: CauseSet
     """
     started = perf_counter()
     random = generator(*axes, "clouds")
-    xi_n_6 = generator(*axes, "starts").normal(size=(truth.starts, 6)) * truth.deviation_6()
+    xi_n_6 = start_twists(axes, truth)
     error_K_8 = []
     for hypothesis in belief.hypotheses:
         observation = observe(belief.observed, hypothesis, known.surface, known.scale, random)

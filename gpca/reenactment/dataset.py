@@ -20,7 +20,8 @@ from gpca.io.arrays import REAL, REGENERATE, TEXT, WHOLE, load_arrays, save_arra
 from gpca.io.names import Axes
 from gpca.pairs.dataset import Registrations
 from gpca.process.progress import progress
-from gpca.reenactment.enactment import Enactment, reenact, weights_of
+from gpca.reenactment.enactment import Enactment, reenact
+from gpca.reenactment.hypotheses import weights_of
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.reenactment.verdict import verdict
 
@@ -134,7 +135,7 @@ def as_arrays(enactments: list[Enactment], pair: ObservedPair, most: int) -> dic
     rows_K = np.where(np.arange(most) < len(enactments), np.arange(most), 0)
     measured_k = [_measured(enactment, pair) for enactment in enactments]
     return {
-        "weight": np.pad(weights_of(enactments), (0, most - len(enactments))),
+        "weight": np.pad(weights_of(enactment.hypothesis for enactment in enactments), (0, most - len(enactments))),
         "T_model_observed": np.array([enactment.hypothesis.T for enactment in enactments])[rows_K],
         "error": np.array([enactment.error_8 for enactment in enactments])[rows_K],
         "uncertainty": np.array([enactment.uncertainty_8 for enactment in enactments])[rows_K],

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from time import perf_counter
@@ -60,7 +60,7 @@ def reenact(
     T_found_n = pair.T_runs @ inverse(pair.T_init)
     random = generator(*pair.axes, "hypotheses")
     hypotheses = find_hypotheses(before, surface, T_found_n, settings, random)
-    xi_n_6 = start_twists(pair, truth)
+    xi_n_6 = start_twists(pair.axes, truth)
     scale = NoiseScale(surface, random)
     return [enact(before, hypothesis, surface, scale, xi_n_6, truth, random) for hypothesis in hypotheses]
 
@@ -99,16 +99,13 @@ def register(
     return Enactment(hypothesis, candidate, error_8, uncertainty_8, perf_counter() - started)
 
 
-def start_twists(pair: ObservedPair, truth: CauseSettings) -> np.ndarray:
-    """Return the twists (n, 6) of the starts around the initial pose, the same for every subset and hypothesis."""
-    return generator(*pair.axes, "starts").normal(size=(truth.starts, 6)) * truth.deviation_6()
+def start_twists(axes: tuple, truth: CauseSettings) -> np.ndarray:
+    """Return the twists (n, 6) of the starts around the initial pose, the same for every subset and hypothesis.
 
-
-def weights_of(enactments: Sequence[Enactment]) -> np.ndarray:
-    """Return the probabilities (K,) of the hypotheses that were enacted."""
-    posterior_K = np.array([enactment.hypothesis.log_posterior for enactment in enactments])
-    weight_K = np.exp(posterior_K - posterior_K.max())
-    return weight_K / weight_K.sum()
+    Args:
+        axes: name the random numbers of the registration.
+    """
+    return generator(*axes, "starts").normal(size=(truth.starts, 6)) * truth.deviation_6()
 
 
 def _measured(measured: Counterfactuals, subset: int) -> tuple[float, float]:

@@ -18,7 +18,7 @@ from gpca.frames.starts import Starts
 from gpca.objects.canonical import ObjectClouds
 from gpca.process.progress import progress
 from gpca.reenactment.dataset import Reenactments, row_of
-from gpca.reenactment.enactment import Enactment, register
+from gpca.reenactment.enactment import Enactment, register, start_twists
 from gpca.reenactment.frame_hypotheses import find_frame_hypotheses
 from gpca.reenactment.frame_view import FrameView, KnownObject
 from gpca.reenactment.settings import ReenactmentSettings
@@ -75,7 +75,7 @@ def reenact_frame(view: FrameView, settings: ReenactmentSettings, truth: CauseSe
     """
     random = generator(*view.pair.axes, "hypotheses")
     hypotheses = find_frame_hypotheses(view, settings, random)
-    xi_n_6 = generator(*view.pair.axes, "starts").normal(size=(truth.starts, 6)) * truth.deviation_6()
+    xi_n_6 = start_twists(view.pair.axes, truth)
     enactments = []
     for hypothesis in hypotheses:
         candidate = view.candidate(hypothesis.T, random)

@@ -7,7 +7,7 @@ Poses take what was observed, where it lay before the registration, to the model
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -91,6 +91,13 @@ def not_negligible(ranked: list[Hypothesis], nats: float = NEGLIGIBLE) -> list[H
     """Return the hypotheses, the best first, without those that are so many nats below it."""
     least = ranked[0].log_posterior - nats
     return [hypothesis for hypothesis in ranked if hypothesis.log_posterior > least]
+
+
+def weights_of(hypotheses: Iterable[Hypothesis]) -> np.ndarray:
+    """Return the probabilities (K,) of the hypotheses, which add up to 1."""
+    posterior_K = np.array([hypothesis.log_posterior for hypothesis in hypotheses])
+    weight_K = np.exp(posterior_K - posterior_K.max())
+    return weight_K / weight_K.sum()
 
 
 def anchor_of(points: int, settings: ReenactmentSettings) -> Anchor:

@@ -63,13 +63,21 @@ def with_pooled(judged: dict[tuple[str, str, int], Judged]) -> dict[tuple[str, s
     }
 
 
-def over_seeds(judged: dict[tuple[str, str, int], Judged], source: str) -> dict[str, Judged]:
-    """Return the samples of all seeds of a source together, by explainer."""
-    parts: dict[str, list[Judged]] = {}
-    for (own, explainer, _), samples in judged.items():
-        if own == source:
-            parts.setdefault(explainer, []).append(samples)
-    return {explainer: joined(of_explainer) for explainer, of_explainer in parts.items()}
+def by_source(
+    prediction_files: Iterable[str | Path], causes_files: Iterable[str | Path]
+) -> dict[str, dict[str, Judged]]:
+    """Return the samples of all seeds together, for every source and all of them, by explainer.
+
+    Raises:
+        InputError: see :func:`gpca.experiments.diagnosis.judged.read_judged`.
+    """
+    parts: dict[str, dict[str, list[Judged]]] = {}
+    for (source, explainer, _), samples in with_pooled(read_judged(prediction_files, causes_files)).items():
+        parts.setdefault(source, {}).setdefault(explainer, []).append(samples)
+    return {
+        source: {explainer: joined(of_seeds) for explainer, of_seeds in of_source.items()}
+        for source, of_source in parts.items()
+    }
 
 
 def _confusion(samples: Judged) -> list[tuple[str, str, float]]:
@@ -95,10 +103,9 @@ def collect_intervals(prediction_files: Iterable[str | Path], causes_files: Iter
     """
     import pandas as pd
 
-    judged = with_pooled(read_judged(prediction_files, causes_files))
     rows: list[tuple] = []
-    for source in dict.fromkeys(source for source, _, _ in judged):
-        rows += _of_source(source, over_seeds(judged, source))
+    for source, samples_of in by_source(prediction_files, causes_files).items():
+        rows += _of_source(source, samples_of)
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 

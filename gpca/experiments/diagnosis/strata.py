@@ -11,9 +11,9 @@ import numpy as np
 from gpca.attribution.confidence import pigeonhole_weights
 from gpca.causes.shapley import ALL
 from gpca.causes.truth import BORDERLINE, FAILED, NOMINAL
-from gpca.experiments.diagnosis.judged import POOLED, Judged, read_judged
+from gpca.experiments.diagnosis.judged import POOLED, Judged
 from gpca.experiments.diagnosis.measures import of_decisions
-from gpca.experiments.diagnosis.metrics import COLUMNS, NUMBERS, over_seeds, rows_of, with_pooled
+from gpca.experiments.diagnosis.metrics import COLUMNS, NUMBERS, by_source, rows_of
 from gpca.io.csv_file import read_numbers
 from gpca.seeds import generator
 
@@ -60,9 +60,9 @@ def collect_strata(prediction_files: Iterable[str | Path], causes_files: Iterabl
     """
     import pandas as pd
 
-    judged = with_pooled(read_judged(prediction_files, causes_files))
-    pooled = POOLED if any(source == POOLED for source, _, _ in judged) else next(iter(judged))[0]
-    return pd.DataFrame(_rows(pooled, over_seeds(judged, pooled)), columns=list(STRATUM_COLUMNS))
+    samples_of = by_source(prediction_files, causes_files)
+    pooled = POOLED if POOLED in samples_of else next(iter(samples_of))
+    return pd.DataFrame(_rows(pooled, samples_of[pooled]), columns=list(STRATUM_COLUMNS))
 
 
 def read_strata(path: str | Path) -> pd.DataFrame:

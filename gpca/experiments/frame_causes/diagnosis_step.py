@@ -5,7 +5,6 @@ The explainers have learned from registrations whose causes were drawn, those of
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -99,7 +98,7 @@ class _FramesToExplain:
             else:
                 entry = entry if reads == REENACTED else explainer_entry("gpca_pair", CAUSES)
                 explained = self._enacted_frames(entry) if reads == REENACTED else self._described_frames()
-                self._pairs[reads] = [(_joined(self._learned(entry, reads)), explained)]
+                self._pairs[reads] = [(joined(self._learned(entry, reads)), explained)]
         return self._pairs[reads]
 
     def _learned(self, entry: ExplainerEntry, reads: str) -> list[Registrations]:
@@ -130,8 +129,3 @@ class _FramesToExplain:
             attached = {**observed.attached, "embedding": h_S_d, "head_logits": logits_S_C}
             pairs.append((learned, replace(observed, attached=attached)))
         return pairs
-
-
-def _joined(parts: Sequence[Registrations]) -> Registrations:
-    attached = {name: np.concatenate([part.attached[name] for part in parts]) for name in parts[0].attached}
-    return replace(joined(parts), attached=attached)

@@ -10,9 +10,9 @@ import numpy as np
 
 from gpca.attribution.confidence import bounds, pigeonhole_weights
 from gpca.attribution.paired import Difference, difference
-from gpca.experiments.diagnosis.judged import Judged, read_judged
+from gpca.experiments.diagnosis.judged import Judged
 from gpca.experiments.diagnosis.measures import SHARES, counted, measure
-from gpca.experiments.diagnosis.metrics import over_seeds, with_pooled
+from gpca.experiments.diagnosis.metrics import by_source
 from gpca.experiments.reenactment.knowledge import NOTHING
 from gpca.io.csv_file import read_numbers
 from gpca.seeds import generator
@@ -37,10 +37,9 @@ def collect_oracles(prediction_files: Iterable[str | Path], causes_files: Iterab
     """
     import pandas as pd
 
-    judged = with_pooled(read_judged(prediction_files, causes_files))
     rows: list[tuple] = []
-    for source in dict.fromkeys(source for source, _, _ in judged):
-        rows += _of_source(source, over_seeds(judged, source))
+    for source, samples_of in by_source(prediction_files, causes_files).items():
+        rows += _of_source(source, samples_of)
     return pd.DataFrame(rows, columns=list(ORACLE_COLUMNS))
 
 

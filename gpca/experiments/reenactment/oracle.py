@@ -19,8 +19,8 @@ from gpca.features.pair import ObservedPair, observed_pair
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.perturbation import NOISE, OVERLAP, POSE
 from gpca.process.progress import progress
-from gpca.reenactment.enactment import Enactment, enact, reenact, register, start_twists, weights_of
-from gpca.reenactment.hypotheses import hypothesis_at
+from gpca.reenactment.enactment import Enactment, enact, reenact, register, start_twists
+from gpca.reenactment.hypotheses import hypothesis_at, weights_of
 from gpca.reenactment.observation import NoiseScale
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface
@@ -63,13 +63,14 @@ def verdicts(
     Args:
         true: the candidate that the pair is.
     """
-    enacting = _Enacting(pair, true, truth, ModelSurface(pair.model), start_twists(pair, truth))
+    enacting = _Enacting(pair, true, truth, ModelSurface(pair.model), start_twists(pair.axes, truth))
     estimated, at_truth = reenact(pair, settings, truth, enacting.surface), [enacting.at_the_true_pose(settings)]
     found = {}
     for name, known in KNOWN.items():
         enactments = at_truth if POSE in known else estimated
         error_K_8 = np.array([enacting.errors(enactment, known) for enactment in enactments])
-        found[name] = verdict(error_K_8[None], weights_of(enactments)[None], truth.limits)[0]
+        weight_K = weights_of(enactment.hypothesis for enactment in enactments)
+        found[name] = verdict(error_K_8[None], weight_K[None], truth.limits)[0]
     return found
 
 
