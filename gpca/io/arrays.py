@@ -43,6 +43,7 @@ def load_arrays(
     kinds: Mapping[str, str] | None = None,
     axes: Axes | None = None,
     optional: Collection[str] = (),
+    remedy: str = REGENERATE,
 ) -> dict[str, np.ndarray]:
     """Load the arrays of an npz that a stage needs, and no others.
 
@@ -55,6 +56,7 @@ def load_arrays(
         kinds: for some of them what they may hold: `TEXT`, `WHOLE` or `REAL`. Any other may hold each of these.
         axes: the source and seed that the file has to be of; it may be of any where this is None.
         optional: arrays that may be missing, as ``source`` in a file that a user's own program wrote.
+        remedy: what to do about a damaged file.
 
     Raises:
         InputError: missing or unreadable file, pickled objects, missing array, wrong shape or type, more than the
@@ -66,15 +68,15 @@ def load_arrays(
     shapes, kinds = _with_axes(shapes, kinds or {}, axes)
     try:
         with zipfile.ZipFile(path) as archive:
-            members = _checked_members(archive, path, shapes, kinds, optional)
+            members = _checked_members(archive, path, shapes, kinds, optional, remedy)
             arrays = {name: _read_array(archive, info) for name, info in members.items()}
     except InputError:
         raise
     except Exception as fault:  # numpy and zipfile raise errors of many kinds for a damaged archive
-        raise InputError(path, "is not a readable npz archive", REGENERATE) from fault
+        raise InputError(path, "is not a readable npz archive", remedy) from fault
     for name, array in arrays.items():
         if (value_fault := _fault_of(name, array)) is not None:
-            raise InputError(path, f"array '{name}' contains {value_fault}", REGENERATE)
+            raise InputError(path, f"array '{name}' contains {value_fault}", remedy)
     if axes is not None and "source" in arrays:
         require_axes(path, axes_in(arrays), axes)
     return arrays
@@ -106,7 +108,7 @@ def _fault_of(name: str, array: np.ndarray) -> str | None:
     return None
 
 
-def _checked_members(archive, path, shapes, kinds, optional) -> dict[str, zipfile.ZipInfo]:
+def _checked_members(archive, path, shapes, kinds, optional, remedy) -> dict[str, zipfile.ZipInfo]:
     """Return the member of each array, once its header is found to be right."""
     listed = archive.namelist()
     sizes: dict[str, int] = {}
@@ -115,23 +117,23 @@ def _checked_members(archive, path, shapes, kinds, optional) -> dict[str, zipfil
         if (count := listed.count(f"{name}.npy")) == 0 and name in optional:
             continue
         if count != 1:
-            raise InputError(path, f"array '{name}' is {'duplicated' if count else 'missing'}", REGENERATE)
+            raise InputError(path, f"array '{name}' is {'duplicated' if count else 'missing'}", remedy)
         members[name] = info = archive.getinfo(f"{name}.npy")
         if not is_bounded(info):
-            raise InputError(path, f"array '{name}' uses a compression that npz does not support", REGENERATE)
+            raise InputError(path, f"array '{name}' uses a compression that npz does not support", remedy)
         with archive.open(info) as stream:
             actual, dtype, start = _npy_header(stream)
         if dtype.hasobject:
-            raise InputError(path, "contains pickled objects, which are never loaded", REGENERATE)
-        _check_shape(path, name, actual, shape, sizes)
+            raise InputError(path, "contains pickled objects, which are never loaded", remedy)
+        _check_shape(path, name, actual, shape, sizes, remedy)
         if math.prod(actual) and dtype.kind not in kinds.get(name, _KNOWN):
-            raise InputError(path, f"array '{name}' has type {dtype}", REGENERATE)
+            raise InputError(path, f"array '{name}' has type {dtype}", remedy)
         if (dtype.kind == "f" and dtype.itemsize not in _FLOAT_BYTES) or not dtype.isnative:
             # Half precision has lost digits, and neither torch nor LAPACK calculates with more than double.
-            raise InputError(path, f"array '{name}' has type {dtype}, not float32 or float64", REGENERATE)
+            raise InputError(path, f"array '{name}' has type {dtype}, not float32 or float64", remedy)
         if start + math.prod(actual) * dtype.itemsize != info.file_size:
             raise ValueError(f"array '{name}' is not as long as its header says")
-    require_memory(sum(info.file_size for info in members.values()), path.stat().st_size, path, REGENERATE)
+    require_memory(sum(info.file_size for info in members.values()), path.stat().st_size, path, remedy)
     return members
 
 
@@ -149,13 +151,11 @@ def _read_array(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> np.ndarray:
         return np.lib.format.read_array(stream, allow_pickle=False)
 
 
-def _check_shape(path, name, actual, shape, sizes) -> None:
+def _check_shape(path, name, actual, shape, sizes, remedy) -> None:
     matches = len(actual) == len(shape) and all(
         sizes.setdefault(size, length) == length if isinstance(size, str) else size == length
         for size, length in zip(shape, actual, strict=True)
     )
     if not matches:
         expected = "×".join(str(sizes.get(size, size)) for size in shape) or "scalar"
-        raise InputError(
-            path, f"array '{name}' is {'×'.join(map(str, actual)) or 'scalar'}, not {expected}", REGENERATE
-        )
+        raise InputError(path, f"array '{name}' is {'×'.join(map(str, actual)) or 'scalar'}, not {expected}", remedy)

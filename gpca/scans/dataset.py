@@ -26,6 +26,7 @@ SHAPES: dict[str, tuple[int | str, ...]] = {
     "scene": ("K",),
     "kind": ("K",),
     "size_m": ("K",),
+    "cluster": ("K",),
 }
 KINDS = {
     "points": REAL,
@@ -40,6 +41,7 @@ KINDS = {
     "scene": TEXT,
     "kind": TEXT,
     "size_m": REAL,
+    "cluster": TEXT,
 }
 
 
@@ -54,9 +56,9 @@ class ScanPairs:
     arrays: dict[str, np.ndarray]
 
     @property
-    def scene(self) -> np.ndarray:
-        """The scene of each pair (K,)."""
-        return self.arrays["scene"]
+    def cluster(self) -> np.ndarray:
+        """What each pair (K,) is clustered and split by: its scene, or the family of that."""
+        return self.arrays["cluster"]
 
     def __len__(self) -> int:
         return len(self.arrays["overlap"])
@@ -78,6 +80,7 @@ class ScanPairs:
             float(of["size_m"][k]),
             *(str(of["scan"][row]) for row in rows),
             *viewpoints,
+            family=str(of["cluster"][k]),
         )
 
     @classmethod
@@ -109,6 +112,7 @@ class ScanPairs:
                 "scene": np.array([pair.scene for pair in pairs]),
                 "kind": np.array([pair.kind for pair in pairs]),
                 "size_m": np.array([pair.size_m for pair in pairs]),
+                "cluster": np.array([pair.cluster for pair in pairs]),
             }
         )
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
@@ -26,12 +26,13 @@ class ScanPair:
         T_target_source: the true pose (4×4).
         overlap: share of the source's points that the target has as well, in (0, 1]: printed by the data set, or else
             :func:`gpca.scans.overlap.overlap`.
-        scene: name of the scene, by which pairs are clustered and split.
+        scene: its name.
         kind: whether the scene is a room or an object.
         size_m: diagonal of the box around all scans of the scene; of a room it has no use.
         source_name, target_name: of the scans in the scene.
         source_viewpoint_3, target_viewpoint_3: where the sensor stood, each in the frame of its scan; None where it is
             not known. Normals point there.
+        family: scenes of one family are alike, as two data sets of one object; the scene itself if empty.
 
     Raises:
         InputError: fewer than three points, NaN, a pose that is not rigid, or a size that is not positive.
@@ -47,7 +48,8 @@ class ScanPair:
     source_name: str = "source"
     target_name: str = "target"
     source_viewpoint_3: np.ndarray | None = None
-    target_viewpoint_3: np.ndarray | None = field(default=None)
+    target_viewpoint_3: np.ndarray | None = None
+    family: str = ""
 
     def __post_init__(self) -> None:
         for name, points in ((self.source_name, self.source_N_3), (self.target_name, self.target_M_3)):
@@ -62,6 +64,11 @@ class ScanPair:
     def name(self) -> str:
         """Scene, target and source, by which random numbers are named: ``kitchen/0/3``."""
         return f"{self.scene}/{self.target_name}/{self.source_name}"
+
+    @property
+    def cluster(self) -> str:
+        """What pairs are clustered and split by: the family, or else the scene."""
+        return self.family or self.scene
 
     @property
     def scale(self) -> float:
