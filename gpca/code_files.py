@@ -12,6 +12,7 @@ BESIDE = {  # what a module reads from its own folder
     "gpca.comparison.claims": "claims.yaml",
     "gpca.comparison.published": "*.csv",
     "gpca.reporting.figures.style": "matplotlibrc",
+    "gpca.experiments.scans.published": "published.csv",
     "gpca.page.page": "templates/*",
 }
 

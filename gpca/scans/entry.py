@@ -29,6 +29,7 @@ class ScanEntry:
         sensor_at_origin: the sensor stood at the origin of each scan's frame, so that normals point there.
         development: scenes on which settings were chosen; other runs than those of development leave them out.
         families: family of a scene, by name, where several scenes are alike.
+        benchmark: it is 3DMatch's, whose recalls others have published.
         address, license: where the data is found, and on which terms.
         rooms, objects, views: of virtual scenes, how many, and scans of each.
     """
@@ -42,6 +43,7 @@ class ScanEntry:
     sensor_at_origin: bool = False
     development: tuple[Text, ...] = ()
     families: Mapping[str, Text] = field(default_factory=dict)
+    benchmark: bool = False
     address: Text = ""
     license: Text = ""
     rooms: Number = 0

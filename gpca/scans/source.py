@@ -20,6 +20,7 @@ from gpca.scans.scene import Scan, Scene
 from gpca.seeds import generator
 from gpca.settings import read_settings
 
+SUFFIXES = (".npz", ".csv", ".ply", ".txt", ".log")
 DEVELOPMENT = "development"  # of the roles of a run
 Reader = Callable[[ScanEntry, Path], Iterator[Scene]]
 READERS: dict[str, Reader] = {
@@ -51,6 +52,14 @@ def place_of(entry: ScanEntry, data_dir: str | None) -> Path | None:
         return None
     remedy = f"get it from {entry.address}" if entry.address else "correct location, or set data_dir"
     raise InputError(places[0], "no such file or folder", remedy)
+
+
+def data_files(entry: ScanEntry, data_dir: str | None) -> list[Path]:
+    """Return the files that a data set is read from, sorted; none of a virtual one."""
+    if entry.kind == "virtual" or (place := place_of(entry, data_dir)) is None:
+        return []
+    files = [place] if place.is_file() else [path for path in place.rglob("*") if path.suffix.lower() in SUFFIXES]
+    return sorted(files)
 
 
 def scenes_of(entry: ScanEntry, place: Path | None, role: str, most_points: int) -> Iterator[Scene]:

@@ -74,9 +74,9 @@ def try_methods(
             **{name: getattr(registrations, name)[row] for name in SEVERITY_COLUMNS},
             "symmetric": judge.symmetric,
         }
-        coarse = _timed(made[start], pair)
+        coarse = timed(made[start], pair)
         for name, method in made.items():
-            for started_at, outcome, seconds in _attempts(name, method, pair, start, coarse):
+            for started_at, outcome, seconds in attempts(name, method, pair, start, coarse):
                 errors = judge(outcome.T_target_source, T_true)
                 of_outcome = {key: getattr(outcome, key) for key in ("fitness", "inlier_rmse", "failure")}
                 row_of_trial = known | {"start": started_at} | errors | of_outcome
@@ -97,7 +97,7 @@ def pair_to_register(registrations: Registrations, row: int, source: str, seed: 
     ).with_normals()
 
 
-def _attempts(
+def attempts(
     name: str, method: Method, pair: Pair, start: str, coarse_and_seconds: tuple[Outcome, float]
 ) -> Iterator[tuple[str, Outcome, float]]:
     """Yield start, outcome and seconds of each run of a method; those of the global method `start` are known."""
@@ -105,17 +105,18 @@ def _attempts(
     if name == start:
         yield NO_START, coarse, coarse_seconds
     elif method_entry(name).is_global:
-        yield NO_START, *_timed(method, pair)
+        yield NO_START, *timed(method, pair)
     else:
-        yield INITIAL, *_timed(method, pair)
+        yield INITIAL, *timed(method, pair)
         if coarse.converged:
-            outcome, seconds = _timed(method, pair.started_at(coarse.T_target_source))
+            outcome, seconds = timed(method, pair.started_at(coarse.T_target_source))
             yield start, outcome, coarse_seconds + seconds
         else:
             yield start, replace(coarse, failure=f"{start}: {coarse.failure}"), coarse_seconds
 
 
-def _timed(method: Method, pair: Pair) -> tuple[Outcome, float]:
+def timed(method: Method, pair: Pair) -> tuple[Outcome, float]:
+    """Return what a method makes of a pair, and the seconds that it took."""
     started = perf_counter()
     outcome = method(pair)
     return outcome, perf_counter() - started

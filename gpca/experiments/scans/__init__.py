@@ -1,0 +1,1 @@
+"""Registration methods on scans of rooms and objects (Table XVII)."""

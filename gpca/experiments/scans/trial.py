@@ -1,0 +1,119 @@
+"""Registers pairs of scans by every method: local ones from a rung of the ladder, and from a global method's pose."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gpca.alignment.methods.interface import Pair
+from gpca.alignment.methods.registry import make_method, require_global
+from gpca.alignment.rigid import inverse, rotation_angle_rad, scale_translation
+from gpca.errors import InputError
+from gpca.experiments.registration_methods.trial import attempts, timed
+from gpca.experiments.scans.settings import TrialSettings
+from gpca.process.environment import open3d_cloud, require_open3d
+from gpca.process.progress import progress
+from gpca.scans.dataset import ScanPairs
+from gpca.scans.ladder import Rung, disturbed
+from gpca.scans.overlap import voxels
+from gpca.scans.pair import ScanPair
+from gpca.scans.success import overlap_rmse
+from gpca.seeds import generator, seed_of
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+NORMAL_VOXELS, NORMAL_NEIGHBORS = 2, 30  # radius and most neighbors, as Open3D's tutorial has them for such scans
+
+
+def try_methods(
+    pairs: ScanPairs, name: str, seed: int, methods: Mapping[str, Mapping], settings: TrialSettings
+) -> dict[str, pd.DataFrame]:
+    """Return for each method a row per pair and start, with the seconds that it took.
+
+    Normals are estimated beforehand; what a method loads or compiles at its first call is loaded before the first pair.
+
+    Args:
+        name: of the data set.
+        methods: name -> settings, the global start among them.
+
+    Raises:
+        InputError: an unknown method or setting, a missing package, or a global start that is none or not among them.
+    """
+    import pandas as pd
+
+    made = {method: make_method(method, entry) for method, entry in methods.items()}
+    require_global(start := settings.global_start)
+    if start not in made:
+        raise InputError("scans.global_start", f"'{start}' is not among the methods", "add it or name another")
+    records: dict[str, list[dict]] = {method: [] for method in made}
+    warm = False
+    for k, pair in enumerate(progress(pairs, f"registration of scans of {name}, seed {seed}")):
+        rung = settings.ladder[k % len(settings.ladder)]
+        given = pair_to_register(pair, rung, settings, name, seed)
+        if not warm:
+            for method in made.values():
+                method(given)
+            warm = True
+        known = {
+            "sample": k,
+            "pair": pair.name,
+            "cluster": pair.cluster,
+            "kind": pair.kind,
+            "size_m": pair.size_m,
+            "overlap": pair.overlap,
+            "rung": rung.name,
+        }
+        coarse = timed(made[start], given)
+        for method, align in made.items():
+            for started_at, outcome, seconds in attempts(method, align, given, start, coarse):
+                T_target_source = scale_translation(outcome.T_target_source, pair.scale)
+                row = known | {"start": started_at} | errors_of(pair, T_target_source)
+                row |= {key: getattr(outcome, key) for key in ("fitness", "inlier_rmse", "failure")}
+                records[method].append(row | {"seconds": seconds})
+    return {method: pd.DataFrame(rows) for method, rows in records.items()}
+
+
+def pair_to_register(pair: ScanPair, rung: Rung, settings: TrialSettings, *axes: object) -> Pair:
+    """Return the input of a method: thinned scans in the meters of a room, with normals, started on a rung."""
+    clouds, normals = {}, {}
+    for role, points, viewpoint in (
+        ("source", pair.source_N_3, pair.source_viewpoint_3),
+        ("target", pair.target_M_3, pair.target_viewpoint_3),
+    ):
+        points_n_3 = voxels(points / pair.scale, settings.voxel_m)
+        if len(points_n_3) > settings.points:
+            kept = generator(*axes, pair.name, role, "clouds").permutation(len(points_n_3))[: settings.points]
+            points_n_3 = points_n_3[np.sort(kept)]
+        clouds[role] = points_n_3
+        seen_from = None if viewpoint is None else viewpoint / pair.scale
+        normals[role] = scan_normals(points_n_3, NORMAL_VOXELS * settings.voxel_m, seen_from)
+    T_init = scale_translation(disturbed(pair, rung, *axes), 1 / pair.scale)
+    draws = seed_of(*axes, pair.name, "draws")
+    return Pair(clouds["source"], clouds["target"], T_init, normals["source"], normals["target"], draws)
+
+
+def scan_normals(points_N_3: np.ndarray, radius: float, viewpoint_3: np.ndarray | None) -> np.ndarray:
+    """Return unit normals (N, 3) that point to where the sensor stood, or away from the middle where it is not known.
+
+    Args:
+        radius: of the neighbors, in the unit of the points.
+        viewpoint_3: the sensor's place in the frame of the points.
+    """
+    cloud = open3d_cloud(points_N_3)
+    cloud.estimate_normals(require_open3d().geometry.KDTreeSearchParamHybrid(radius, NORMAL_NEIGHBORS))
+    normals_N_3 = np.array(cloud.normals)
+    ahead_N_3 = points_N_3 - points_N_3.mean(axis=0) if viewpoint_3 is None else viewpoint_3 - points_N_3
+    behind_N = np.einsum("ni,ni->n", normals_N_3, ahead_N_3) < 0
+    return np.where(behind_N[:, None], -normals_N_3, normals_N_3)
+
+
+def errors_of(pair: ScanPair, T_target_source: np.ndarray) -> dict[str, float]:
+    """Return the RMSE over the true overlap (m), and the error of rotation (rad) and of translation (m)."""
+    return {
+        "rmse_m": overlap_rmse(pair, T_target_source),
+        "rotation_error_rad": rotation_angle_rad(inverse(pair.T_target_source) @ T_target_source),
+        "translation_error_m": float(np.linalg.norm(T_target_source[:3, 3] - pair.T_target_source[:3, 3])),
+    }

@@ -1,0 +1,155 @@
+"""Virtual scenes: furnished rooms and compound objects, scanned by the virtual depth camera from several places.
+
+They need no data. A scene is named by its number, from which all of it is drawn; those of development have numbers from
+100 on. A scan of a room is what a camera sees that turns on its way through the room; a scan of an object is what one
+sees on a circle around it. The camera has the noise of a structured-light sensor
+(:class:`gpca.frames.camera.DepthNoise`), in rooms half of it, as fragments of rooms are fused from many frames.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from gpca.frames.camera import Camera, DepthNoise, MeshScene, look_at
+from gpca.objects.shapes.solids import box, cylinder, ellipsoid
+from gpca.scans.entry import ScanEntry
+from gpca.scans.pair import Kind
+from gpca.scans.scene import Scan, Scene
+from gpca.seeds import generator
+
+FIRST_OF_DEVELOPMENT = 100
+ROOM_CAMERA = Camera(160, 120, 142.5)  # every fourth pixel of a Kinect
+OBJECT_CAMERA = Camera(140, 140, 285.0)  # every second pixel around the object
+ROOM_NOISE, OBJECT_NOISE = DepthNoise(scale=0.5), DepthNoise()
+TURN_DEG = 16.0  # of the camera between two scans of a room
+DISTANCE_M = 0.6  # of the camera from an object
+WALL_M = 0.1
+
+Mesh = tuple[np.ndarray, np.ndarray]
+
+
+def scenes(entry: ScanEntry, development: bool) -> Iterator[Scene]:
+    """Yield the rooms, then the objects."""
+    first = FIRST_OF_DEVELOPMENT if development else 0
+    for number in range(first, first + entry.rooms):
+        yield room(f"room_{number}", entry.views)
+    for number in range(first, first + entry.objects):
+        yield compound(f"object_{number}", entry.views)
+
+
+def room(name: str, views: int) -> Scene:
+    """Return a room of this name and its scans."""
+    random = generator("virtual scans", name)
+    extent_3 = random.uniform((3.5, 3.5, 2.4), (6.0, 5.0, 3.0))
+    meshes = MeshScene(_furnished(extent_3, random))
+    heading_rad, places = random.uniform(0, 2 * np.pi), []
+    for i in range(views):
+        yaw, pitch = heading_rad + np.deg2rad(TURN_DEG) * i + random.normal(0, 0.05), random.normal(-0.2, 0.08)
+        eye_m = np.array([*random.uniform(-0.35, 0.35, 2), random.uniform(1.1, 1.6)])
+        ahead_3 = [np.cos(yaw) * np.cos(pitch), np.sin(yaw) * np.cos(pitch), np.sin(pitch)]
+        places.append(look_at(eye_m, eye_m + ahead_3))
+    return _scanned(name, "room", meshes, places, ROOM_CAMERA, ROOM_NOISE)
+
+
+def compound(name: str, views: int) -> Scene:
+    """Return an object of this name, a few solids in one another, and its scans."""
+    random = generator("virtual scans", name)
+    size_m = random.uniform(0.12, 0.22)
+    meshes = []
+    for _ in range(random.integers(4, 7)):
+        at_3, extent_3 = random.uniform(-0.25, 0.25, 3), random.uniform(0.15, 0.6, 3)
+        kind = random.integers(3)
+        if kind == 0:
+            solid = box(extent_3, at_3)
+        elif kind == 1:
+            solid = cylinder(extent_3[0] / 2, extent_3[1] + 0.2, at_3, "xyz"[random.integers(3)])
+        else:
+            solid = ellipsoid(extent_3 / 2, at_3)
+        meshes.append((np.asarray(solid.vertices) * size_m, np.asarray(solid.faces)))
+    places = []
+    for i in range(views):
+        azimuth = 2 * np.pi * i / views + random.normal(0, 0.05)
+        height = random.uniform(0.2, 0.7)
+        to_camera_3 = np.array([np.cos(azimuth), np.sin(azimuth), height])
+        places.append(look_at(DISTANCE_M * to_camera_3 / np.linalg.norm(to_camera_3), np.zeros(3)))
+    return _scanned(name, "object", MeshScene(meshes), places, OBJECT_CAMERA, OBJECT_NOISE)
+
+
+def _scanned(
+    name: str, kind: Kind, meshes: MeshScene, places: list[np.ndarray], camera: Camera, noise: DepthNoise
+) -> Scene:
+    """Return what a camera measures from each ``T_scene_camera``."""
+    scans = {}
+    for i, T_scene_camera in enumerate(places):
+        depth_m = noise.measure(meshes.look(camera, T_scene_camera), generator("virtual scans", name, i))
+        points_N_3 = (camera.rays() * depth_m[..., None])[depth_m > 0]
+        scans[str(i)] = Scan(points_N_3, T_scene_camera, np.zeros(3))
+    return Scene(name, kind, scans)
+
+
+def _furnished(extent_3: np.ndarray, random: np.random.Generator) -> list[Mesh]:
+    """Return a room around the origin, its floor at z = 0, and furniture along its walls, none in the middle."""
+    x, y, z = extent_3
+    solids = [
+        box((x, y, WALL_M), (0, 0, -WALL_M / 2)),
+        box((x, y, WALL_M), (0, 0, z + WALL_M / 2)),
+        *(box((WALL_M, y, z), (side * (x + WALL_M) / 2, 0, z / 2)) for side in (-1, 1)),
+        *(box((x, WALL_M, z), (0, side * (y + WALL_M) / 2, z / 2)) for side in (-1, 1)),
+    ]
+    meshes = [(np.asarray(solid.vertices), np.asarray(solid.faces)) for solid in solids]
+    for wall in range(4):
+        along, across = (y, x) if wall % 2 else (x, y)
+        position = -along / 2 + random.uniform(0.1, 0.4)
+        while position < along / 2 - 0.5:
+            width, depth = min(random.uniform(0.4, 1.2), along / 2 - position), random.uniform(0.3, 0.7)
+            height = random.uniform(*((0.4, 0.9), (1.2, 2.1))[random.integers(2)])
+            at_2 = np.array([position + width / 2, (across - depth) / 2])
+            for solid in _furniture(at_2, np.array([width, depth, height]), random):
+                meshes.append((_turned(np.asarray(solid.vertices), wall), np.asarray(solid.faces)))
+            position += width + random.uniform(0.1, 0.8)
+    return meshes
+
+
+def _furniture(at_2: np.ndarray, extent_3: np.ndarray, random: np.random.Generator) -> list:
+    """Return a cupboard, a table, a bin or a chair at a place along a wall, and things that stand on it."""
+    (u, v), (width, depth, height) = at_2, extent_3
+    kind = random.integers(4)
+    if kind == 0:
+        solids = [box(extent_3, (u, v, height / 2))]
+    elif kind == 1:
+        height = min(height, 0.9)
+        legs = [(u + a * 0.45 * width, v + b * 0.45 * depth) for a in (-1, 1) for b in (-1, 1)]
+        solids = [
+            box((width, depth, 0.05), (u, v, height)),
+            *(box((0.06, 0.06, height), (*leg, height / 2)) for leg in legs),
+        ]
+    elif kind == 2:
+        height = min(height, 1.4)
+        solids = [cylinder(min(width, depth) / 2, height, (u, v, height / 2))]
+    else:
+        height = 0.45
+        solids = [
+            box((0.5, 0.5, height), (u, v, height / 2)),
+            box((0.5, 0.1, 0.6), (u, v + 0.2, height + 0.3)),
+        ]
+    for _ in range(random.integers(0, 4) if height < 1.3 else 0):
+        w, d, h = random.uniform(0.08, 0.3, 3)
+        spot = (u + random.uniform(-0.3, 0.3) * width, v + random.uniform(-0.3, 0.3) * depth)
+        if random.integers(2):
+            solids.append(box((w, d, h), (*spot, height + h / 2)))
+        else:
+            solids.append(cylinder(w / 2, h, (*spot, height + h / 2)))
+    return solids
+
+
+def _turned(vertices_V_3: np.ndarray, wall: int) -> np.ndarray:
+    """Return vertices turned about z by as many right angles, so that what stood at the wall of largest y stands there.
+
+    Its coordinates are exchanged, not multiplied: a quarter turn takes (x, y) to (-y, x).
+    """
+    x, y, z = vertices_V_3.T
+    for _ in range(wall):
+        x, y = -y, x
+    return np.stack([x, y, z], axis=1)
