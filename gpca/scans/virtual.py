@@ -59,7 +59,7 @@ def compound(name: str, views: int) -> Scene:
     size_m = random.uniform(0.12, 0.22)
     meshes = []
     for _ in range(random.integers(4, 7)):
-        at_3, extent_3 = random.uniform(-0.25, 0.25, 3), random.uniform(0.15, 0.6, 3)
+        at_3, extent_3 = random.uniform(-0.2, 0.2, 3), random.uniform(0.2, 0.6, 3)
         kind = random.integers(3)
         if kind == 0:
             solid = box(extent_3, at_3)

@@ -16,10 +16,10 @@ def run(job: Job) -> None:
     """Read or make the scenes, and draw their pairs."""
     entry, choice = entry_of(job.section("entry")), job.section("choice")
     place = Path(job.place) if job.get("place") else None
-    with record_provenance([job.out], job.files("data"), job.settings, seed=job.seed):
+    with record_provenance([job.out], job.get("data", []), job.settings, seed=job.seed):
         scenes = scenes_of(entry, place, job.settings["role"], choice["scan_points"])
-        pairs = choose_pairs(scenes, choice["strata"], choice["pairs"], job.scan_set, job.seed)
+        pairs = choose_pairs(scenes, choice["strata"], choice["pairs"], job.source, job.seed)
         if not pairs:
             fault = f"has no two scans that overlap by {choice['strata'][0]:g} or more"
             raise InputError(place or entry.title, fault, "check its poses and its unit")
-        ScanPairs.of(pairs).save(job.out, (job.scan_set, job.seed))
+        ScanPairs.of(pairs).save(job.out, (job.source, job.seed))

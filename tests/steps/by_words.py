@@ -39,6 +39,8 @@ MODULES = {  # of steps whose module is not gpca.steps.<name>
     "recover": IN + "recovery.step",
     "register_methods": IN + "registration_methods.step",
     "runtime": IN + "runtime.step",
+    "draw_scans": "gpca.steps.scans",
+    "register_scans": IN + "scans.step",
     "readings": IN + "specification_curve.step",
     "exchange": IN + "substitution.step",
 }
@@ -60,6 +62,8 @@ LISTS = {  # which names of a step are lists, and not of one seed, file or name
     "shift": "seeds registrations other_registrations embeddings encoders out",
     "learners": "seeds learners sets out",
     "register_methods": "seeds methods registrations rows timings",
+    "draw_scans": "data",
+    "register_scans": "methods rows timings",
     "readings": "registrations sets poses predictions embeddings",
     "exchange": "seeds registrations encoders out",
     "attribute": "seeds registrations embeddings uncertainty uncertainty_timings input_timings predictions timings",
@@ -73,6 +77,7 @@ TEXTS = {
     *("source", "explainer", "control", "design", "reduction", "group", "title", "name", "files_of", "encoder_of"),
     *("registrations_of", "retrained", "others", "strategies", "concepts", "estimators", "backbones", "learners"),
     *("remedies", "reenactment", "other", "methods", "encoders_of", "data_dir", "chunk"),
+    "place",
 }
 SWITCHES = {"stand_in"}
 CODE = "import sys; from tests.steps.by_words import main; sys.exit(main(sys.argv[1:]))"

@@ -114,6 +114,25 @@ STEP_OPTIONS = {
         "--registrations": "registrations.npz", "--rows": ["point_trials.csv", "fgr_trials.csv"],
         "--timings": ["point_seconds.csv", "fgr_seconds.csv"],
     },
+    "draw_scans": COMMON | {
+        "--settings": {
+            "entry": {"title": "Tiny", "kind": "virtual", "objects": 1, "views": 6}, "role": "evaluation",
+            "choice": {"strata": [0.1, 1.0], "pairs": 2, "scan_points": 500},
+        },
+        "--seed": 0, "--out": "scans.npz",
+    },
+    "register_scans": COMMON | {
+        "--settings": {
+            "scans": {
+                "voxel_m": 0.1, "points": 100, "global_start": "fgr",
+                "ladder": [{"rotation_deg": 0, "translation_m": 0}, {"rotation_deg": 20, "translation_m": 0.2}],
+            },
+            "methods": {"point_to_point": {"correspondence_distance": 0.3}, "fgr": {"feature_radius": 0.5}},
+        },
+        "--seed": 0, "--methods": ["point_to_point", "fgr"], "--scans": "scans.npz",
+        "--rows": ["point_scan_trials.csv", "fgr_scan_trials.csv"],
+        "--timings": ["point_scan_seconds.csv", "fgr_scan_seconds.csv"],
+    },
     "train": COMMON | {
         "--settings": ENCODER, "--seed": 0, "--registrations": "registrations.npz", "--weights": "weights.pt",
         "--curve": "curve.csv",

@@ -41,6 +41,7 @@ NO_ARCHIVE = "is not a readable npz archive"
 NOT_THE_WEIGHTS = "weights.pt: not the weights of backbone 'dgcnn'"
 OTHER_SAMPLES = "its samples differ from those of the"
 OTHER_TIMES = "causes_timings.csv: does not contain the times of these samples"
+FOLDER = {"title": "T", "kind": "ply_folder", "location": "x", "scenes": "room"}
 SHAP = {
     "--explainer": "shap_removal", "--settings": {}, "--embeddings": None, "--uncertainty": "uncertainty.npz",
     "--uncertainty-timings": "uncertainty_timings.csv", "--input-timings": "icp.csv",
@@ -70,6 +71,14 @@ FAULTS = {
         (truncated("causes.npz"), {}, f"causes.npz: {NO_ARCHIVE}"),
         (lines_kept("causes_timings.csv", 3), {}, OTHER_TIMES),
         (untouched, {"--descriptors": "causes.npz"}, "causes.npz"),
+    ],
+    "draw_scans": [
+        (untouched, settings("draw_scans", entry={"title": "T", "kind": "npz", "location": "x"}), "T: its data is not"),
+        (untouched, {"--place": "nowhere", **settings("draw_scans", entry=FOLDER)}, "nowhere/poses.txt: no such file"),
+    ],
+    "register_scans": [
+        (truncated("scans.npz"), {}, f"scans.npz: {NO_ARCHIVE}"),
+        (arrays_changed("scans.npz", offsets=later), {}, "scans.npz: its pairs and scans do not belong together"),
     ],
     "oracles": [
         (removed("objects.npz"), {}, "objects.npz: no such file"),

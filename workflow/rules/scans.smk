@@ -43,6 +43,7 @@ rule draw_scans:
         "../envs/gpca.yaml"
     params:
         step="gpca.steps.scans",
+        source=lambda wildcards: wildcards.scan_set,
         settings=lambda wildcards: as_json(
             {
                 "entry": SCANS["datasets"][wildcards.scan_set],
@@ -82,6 +83,7 @@ rule register_scans:
         "../envs/gpca.yaml"
     params:
         step="gpca.experiments.scans.step",
+        source=lambda wildcards: wildcards.scan_set,
         settings=as_json(
             {
                 "scans": {name: SCANS[name] for name in SCAN_TRIALS},

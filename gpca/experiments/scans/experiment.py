@@ -8,7 +8,7 @@ from typing import Any
 from gpca.alignment.methods.registry import installed, require_global, require_settings
 from gpca.errors import InputError, require_names, with_key
 from gpca.experiments.experiment import Experiment, LeftOut, Names, Tidy
-from gpca.experiments.scans.settings import ScanSettings
+from gpca.experiments.scans.settings import ChoiceSettings, ScanSettings, part
 from gpca.objects.title import title_of
 from gpca.scans.entry import ScanEntry
 from gpca.scans.source import entry_of, place_of
@@ -17,6 +17,7 @@ from gpca.scans.source import entry_of, place_of
 def check(config: dict, left_out: LeftOut) -> None:
     """Check the settings of methods on scans, and that the data sets that are not optional are there."""
     section = config["scans"]
+    with_key("scans", part, ChoiceSettings, section)
     for name, settings in section["methods"].items():
         with_key(f"scans.methods.{name}", require_settings, name, settings or {})
     key = "scans.global_start"

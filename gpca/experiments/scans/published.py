@@ -33,7 +33,7 @@ def table17_published(
         for name, entry in methods.items():
             if entry["is_global"]:
                 rows = rows_where(intervals, source=dataset, method=name, metric=CLOSE)
-                labels = [("run", f"This run, {titles[dataset]}"), (name, entry["title"]), ("own", "as in Table XVII")]
+                labels = [("run", f"This run, {titles[dataset]}"), (name, entry["title"]), ("FPFH", "FPFH")]
                 table.add_row(labels, {key: clustered_cell(rows, concept=key) for key in LISTS})
     seeds = table.most_seeds()
     with PUBLISHED.open(encoding="utf-8", newline="") as file:

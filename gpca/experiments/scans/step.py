@@ -16,8 +16,8 @@ def run(job: Job) -> None:
     methods = job.by_name("methods", job.methods)
     outputs = [*job.rows, *job.timings]
     with record_provenance(outputs, [job.scans], job.settings, seed=job.seed):
-        pairs = ScanPairs.load(job.scans, (job.scan_set, job.seed))
-        trials = try_methods(pairs, job.scan_set, job.seed, methods, settings)
+        pairs = ScanPairs.load(job.scans, (job.source, job.seed))
+        trials = try_methods(pairs, job.source, job.seed, methods, settings)
         for rows, out, timings in zip(trials.values(), job.rows, job.timings, strict=True):
-            write_csv(out, rows.drop(columns="seconds"), form="%.9g")
+            write_csv(out, rows.drop(columns="seconds"))
             write_csv(timings, rows[["sample", "start", "seconds"]])

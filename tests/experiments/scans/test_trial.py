@@ -1,0 +1,102 @@
+"""Pairs of scans by registration methods: starts, errors, and what the methods are given."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gpca.alignment.methods import registry
+from gpca.alignment.methods.interface import FailedRegistration, MethodEntry, Outcome
+from gpca.alignment.rigid import rotation_angle_rad
+from gpca.errors import InputError
+from gpca.experiments.scans.settings import TrialSettings
+from gpca.experiments.scans.trial import errors_of, pair_to_register, scan_normals, try_methods
+from gpca.scans.dataset import ScanPairs
+from gpca.scans.ladder import Rung
+from tests.scans.tiny import pair
+
+LADDER = (Rung(0, 0), Rung(20, 0.3))
+SETTINGS = TrialSettings(voxel_m=0.04, points=300, ladder=LADDER, global_start="oracle")
+
+
+def no_match(_pair):
+    raise FailedRegistration("no match")
+
+
+STILL = MethodEntry("Still", lambda given: Outcome.at(given, given.T_target_source_init, 1.0))
+BLIND = MethodEntry("Blind", no_match, is_global=True)
+
+
+@pytest.fixture
+def rows(monkeypatch):
+    pairs = ScanPairs.of([pair(), pair("object"), pair(source="2")])
+    truths = iter([pair().T_target_source, *(each.T_target_source for each in pairs)])  # the first call is not timed
+
+    def oracle(given):
+        T = next(truths).copy()
+        T[:3, 3] /= 1 if len(asked) != 2 else pairs[1].scale
+        asked.append(given)
+        return Outcome.at(given, T, 1.0)
+
+    asked = []
+    methods = {"oracle": MethodEntry("Oracle", oracle, is_global=True), "still": STILL, "blind": BLIND}
+    monkeypatch.setattr(registry.REGISTRY, "by_module", lambda: {"m": methods})
+    return try_methods(pairs, "tiny", 0, {name: {} for name in methods}, SETTINGS)
+
+
+def test_local_methods_start_on_the_ladder_and_at_the_pose_of_a_global_one(rows):
+    still = rows["still"]
+    assert still["start"].tolist() == ["initial", "oracle"] * 3
+    assert still["rung"].tolist() == ["0deg_0m"] * 2 + ["20deg_0.3m"] * 2 + ["0deg_0m"] * 2
+    assert still["kind"].tolist() == ["room"] * 2 + ["object"] * 2 + ["room"] * 2
+    first = still[still["start"] == "initial"]
+    assert first["rmse_m"].to_numpy()[[0, 2]] == pytest.approx([0, 0], abs=1e-9)
+    assert first["rotation_error_rad"].iloc[1] == pytest.approx(np.deg2rad(20))
+    # At the pose of the global method they are right, whatever the unit that they were given.
+    assert still[still["start"] == "oracle"]["rmse_m"].tolist() == pytest.approx([0, 0, 0], abs=1e-9)
+    assert rows["oracle"]["start"].tolist() == ["none"] * 3 and (rows["oracle"]["seconds"] >= 0).all()
+
+
+def test_a_method_without_a_pose_has_its_reason(rows):
+    assert set(rows["blind"]["failure"]) == {"no match"} and (rows["blind"]["fitness"] == 0).all()
+
+
+@pytest.mark.parametrize("kind", ["room", "object"])
+def test_scans_are_given_in_meters_of_a_room(kind):
+    scans = pair(kind)
+    given = pair_to_register(scans, LADDER[1], SETTINGS, "tiny", 0)
+    assert len(given.source) <= 300 and len(given.source) == len(given.source_normals)
+    assert np.ptp(given.source, axis=0).max() == pytest.approx(
+        np.ptp(scans.source_N_3, axis=0).max() / scans.scale, abs=0.1
+    )
+    start = given.T_target_source_init.copy()
+    start[:3, 3] *= scans.scale
+    errors = errors_of(scans, start)
+    assert errors["rotation_error_rad"] == pytest.approx(np.deg2rad(20))
+    assert 0.2 * scans.scale < errors["rmse_m"] < 1.0 * scans.scale
+    again = pair_to_register(scans, LADDER[1], SETTINGS, "tiny", 0)
+    assert (again.source == given.source).all() and again.seed == given.seed
+    assert len(pair_to_register(scans, LADDER[0], replace(SETTINGS, points=64), "tiny", 0).target) == 64
+
+
+def test_errors_are_zero_at_the_truth():
+    scans = pair()
+    errors = errors_of(scans, scans.T_target_source)
+    assert max(errors.values()) < 1e-7
+    assert rotation_angle_rad(scans.T_target_source) > 1
+
+
+def test_normals_point_to_the_sensor():
+    x, y = np.meshgrid(np.linspace(0, 1, 20), np.linspace(0, 1, 20))
+    plane = np.stack([x.ravel(), y.ravel(), 0 * x.ravel()], axis=1)
+    for height in (1.0, -1.0):
+        normals = scan_normals(plane, 0.2, np.array([0.5, 0.5, height]))
+        np.testing.assert_allclose(normals, np.tile([0, 0, height], (400, 1)), atol=1e-9)
+    two = np.concatenate([plane, plane + np.array([0, 0, 1.0])])
+    outward = scan_normals(two, 0.2, None)
+    assert (outward[:400, 2] < -0.99).all() and (outward[400:, 2] > 0.99).all()
+
+
+def test_a_start_that_is_not_among_the_methods_is_refused():
+    with pytest.raises(InputError, match=r"scans.global_start: 'fgr' is not among the methods"):
+        try_methods(ScanPairs.of([pair()]), "tiny", 0, {"gicp": {}}, replace(SETTINGS, global_start="fgr"))
