@@ -16,7 +16,7 @@ import numpy as np
 from gpca.alignment.rigid import require_rigid, scale_translation
 from gpca.errors import InputError
 from gpca.io.arrays import REAL, load_arrays
-from gpca.io.csv_file import numbers, read_csv
+from gpca.io.csv_file import ANY, numbers, read_csv
 from gpca.io.limits import require_file
 from gpca.objects.canonical import require_points
 from gpca.objects.mesh_folder import meters_per
@@ -90,7 +90,7 @@ def _read_pairs(path: Path) -> dict[str, tuple[Known, ...]]:
     """Return the pairs that a file lists, by scene; none where there is no file. A pair may stand in several lists."""
     if not path.is_file():
         return {}
-    rows = read_csv(path, ("scene", "target", "source", "overlap"), ("list",), "correct it as docs/scans.md says")
+    rows = read_csv(path, ("scene", "target", "source", "overlap"), ANY, "correct it as docs/scans.md says")
     rows["overlap"] = numbers(path, rows, "overlap", least=0)
     if (rows["overlap"] > 1).any():
         raise InputError(path, "column 'overlap' contains numbers above 1", "give shares from 0 to 1")
