@@ -82,9 +82,8 @@ def _groups(trials: pd.DataFrame, strata: Sequence[float]) -> dict[str, np.ndarr
     stratum_N = np.array([stratum_of(share, strata) or "" for share in overlap_N])
     groups = {ALL: np.ones(len(trials), bool)}
     groups |= {name: stratum_N == name for name in sorted(set(stratum_N) - {""})}
-    groups |= {
-        name: (overlap_N >= low) & ((overlap_N < high) | (overlap_N == 1)) for name, (low, high) in LISTS.items()
-    }
+    for name, (low, high) in LISTS.items():
+        groups[name] = (overlap_N >= low) & ((overlap_N < high) | ((high == 1) & (overlap_N == 1)))
     return groups | {name: (trials["rung"] == name).to_numpy() for name in trials["rung"].unique()}
 
 
