@@ -1,7 +1,8 @@
 """How much of a scan another one has seen too, where the data set does not print it.
 
-The share of the source's points that have a point of the target within :data:`gpca.scans.pair.OVERLAP_M`, at the true
-pose and after both were thinned to voxels, so that the density of points near a sensor does not count.
+The share of the target's points that have a point of the source within :data:`gpca.scans.pair.OVERLAP_M`, at the true
+pose and after both were thinned to voxels, so that the density of points near a sensor does not count. It is the
+target's share because that is what is printed for 3DMatch and 3DLoMatch (Huang et al. 2021).
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ MOST_CELLS = 2.0**62
 
 
 def overlap(source_N_3: np.ndarray, target_M_3: np.ndarray, T_target_source: np.ndarray, scale: float = 1.0) -> float:
-    """Return the share of the source's surface in [0, 1] that the target has as well.
+    """Return the share of the target's surface in [0, 1] that the source has as well.
 
     Args:
         source_N_3, target_M_3: points, each in its own frame (m).
@@ -32,7 +33,7 @@ def overlap_of_voxels(
     source_n_3: np.ndarray, target_m_3: np.ndarray, T_target_source: np.ndarray, scale: float = 1.0
 ) -> float:
     """Return the same of clouds that were thinned to voxels before."""
-    return float(near(transform(T_target_source, source_n_3), target_m_3, OVERLAP_M * scale).mean())
+    return float(near(target_m_3, transform(T_target_source, source_n_3), OVERLAP_M * scale).mean())
 
 
 def voxels(points_N_3: np.ndarray, edge: float) -> np.ndarray:

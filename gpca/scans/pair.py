@@ -24,7 +24,7 @@ class ScanPair:
     Attributes:
         source_N_3, target_M_3: points as they were measured; their numbers differ.
         T_target_source: the true pose (4×4).
-        overlap: share of the source's points that the target has as well, in (0, 1]: printed by the data set, or else
+        overlap: share of the target's points that the source has as well, in (0, 1]: printed by the data set, or else
             :func:`gpca.scans.overlap.overlap`.
         scene: its name.
         kind: whether the scene is a room or an object.

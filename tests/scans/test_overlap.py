@@ -13,12 +13,14 @@ from .tiny import scene
 EDGES = (0.1, 0.3, 0.5, 0.7, 1.0)
 
 
-def test_overlap_is_the_share_of_the_source_that_the_target_has():
+def test_overlap_is_the_share_of_the_target_that_the_source_has():
     shares = {(known.target, known.source): known.overlap for known in scene().known()}
     assert shares == pytest.approx({("0", "1"): 0.5, ("0", "2"): 0.2, ("1", "2"): 0.7}, abs=0.06)
     assert {(known.target, known.source): known.overlap for known in scene("object").known()} == pytest.approx(
         shares, abs=0.06
     )
+    [inside] = scene(windows=((0.0, 2.0), (0.5, 1.5))).known()
+    assert inside.overlap == pytest.approx(0.5, abs=0.06)
 
 
 def test_what_a_data_set_prints_comes_first():
@@ -38,7 +40,7 @@ def test_a_voxel_has_the_mean_of_its_points():
     points = np.array([[0.0, 0, 0], [0.4, 0, 0], [1.1, 0, 0], [0.1, 0.9, 0]])
     np.testing.assert_allclose(voxels(points, 1.0), [[0.5 / 3, 0.3, 0], [1.1, 0, 0]])
     assert len(voxels(points, 0.05)) == 4
-    with pytest.raises(InputError, match=r"scan: spans 1e.13 m, too much for voxels of 0.001 m; correct its unit"):
+    with pytest.raises(InputError, match=r"scan: spans 1.1e.13 m, too much for voxels of 0.001 m; correct its unit"):
         voxels(points * 1e13, 0.001)
 
 
