@@ -68,26 +68,36 @@ class ScanPairs:
 
     def __getitem__(self, k: int) -> ScanPair:
         """Return pair number k; its points are float64."""
-        of, rows = self.arrays, [self.arrays[name][k] for name in ("source_scan", "target")]
-        clouds = [of["points"][of["offsets"][row] : of["offsets"][row + 1]].astype(np.float64) for row in rows]
-        viewpoints = [of["viewpoint"][row].astype(np.float64) if of["viewpoint_known"][row] else None for row in rows]
+        of, (source, target) = self.arrays, (int(self.arrays[name][k]) for name in ("source_scan", "target"))
         return ScanPair(
-            *clouds,
+            self._points(source),
+            self._points(target),
             of["T_target_source"][k],
-            float(of["overlap"][k]),
-            str(of["scene"][k]),
-            str(of["kind"][k]),  # type: ignore[arg-type]
-            float(of["size_m"][k]),
-            *(str(of["scan"][row]) for row in rows),
-            *viewpoints,
+            overlap=float(of["overlap"][k]),
+            scene=str(of["scene"][k]),
+            kind="object" if of["kind"][k] == "object" else "room",
+            size_m=float(of["size_m"][k]),
+            source_name=str(of["scan"][source]),
+            target_name=str(of["scan"][target]),
+            source_viewpoint_3=self._viewpoint(source),
+            target_viewpoint_3=self._viewpoint(target),
             family=str(of["cluster"][k]),
         )
+
+    def _points(self, scan: int) -> np.ndarray:
+        first, last = self.arrays["offsets"][scan : scan + 2]
+        return self.arrays["points"][first:last].astype(np.float64)
+
+    def _viewpoint(self, scan: int) -> np.ndarray | None:
+        known = self.arrays["viewpoint_known"][scan]
+        return self.arrays["viewpoint"][scan].astype(np.float64) if known else None
 
     @classmethod
     def of(cls, pairs: Iterable[ScanPair]) -> ScanPairs:
         """Collect pairs; a scan that several of a scene share is kept once."""
-        pairs, number, scans = list(pairs), {}, []
-        rows = []
+        pairs, rows = list(pairs), []
+        number: dict[tuple[str, str], int] = {}
+        scans: list[tuple[str, np.ndarray, np.ndarray | None]] = []
         for pair in pairs:
             for name, points, viewpoint in (
                 (pair.source_name, pair.source_N_3, pair.source_viewpoint_3),

@@ -67,12 +67,12 @@ def try_methods(
             "rung": rung.name,
         }
         coarse = timed(made[start], given)
-        for method, align in made.items():
-            for started_at, outcome, seconds in attempts(method, align, given, start, coarse):
+        for method_name, align in made.items():
+            for started_at, outcome, seconds in attempts(method_name, align, given, start, coarse):
                 T_target_source = scale_translation(outcome.T_target_source, pair.scale)
                 row = known | {"start": started_at} | errors_of(pair, T_target_source)
                 row |= {key: getattr(outcome, key) for key in ("fitness", "inlier_rmse", "failure")}
-                records[method].append(row | {"seconds": seconds})
+                records[method_name].append(row | {"seconds": seconds})
     return {method: pd.DataFrame(rows) for method, rows in records.items()}
 
 
