@@ -62,18 +62,18 @@ class GPC:
     ) -> Iterator[int]:
         """Yield each of these counts in rising order, the classifier then as :meth:`fit` leaves it after so many."""
         around_R_d = h_N_d if around_R_d is None else around_R_d
-        self._scaler = Standardization.of(around_R_d)
+        self._scaler = self.scaling(around_R_d)
         starts_R_d = self._scaled(around_R_d)
         inputs_N_d = self._scaled(h_N_d)
         targets_N = self._targets(labels_N)
-        start = Start.of(starts_R_d, len(self.classes), self.settings, self._axes)
+        start = self.start(starts_R_d)
         random = torch.Generator().manual_seed(start.seed)
         model = SparseGPs(start.covariance, start.inducing_M_d, random)
         optimizer = Adam(model.parameters(), self.settings.learning_rate)
         stops = sorted(set(iterations))
         for done in progress(range(1, stops[-1] + 1), " ".join(map(str, ("GPC", *self._axes)))):
             optimizer.zero_grad()
-            (-model.elbo(inputs_N_d, torch.from_numpy(targets_N))).backward()
+            (-self.objective(model, inputs_N_d, torch.from_numpy(targets_N), random)).backward()
             optimizer.step()
             if done in stops:
                 self._prior = Prior.of(model)
@@ -82,6 +82,20 @@ class GPC:
                 self._targets_N = targets_N
                 self._sites = None
                 yield done
+
+    def scaling(self, around_R_d: np.ndarray) -> Standardization:
+        """Return how inputs are scaled, given those around which a fit starts; a reading of the paper has another."""
+        return Standardization.of(around_R_d)
+
+    def start(self, inputs_R_d: torch.Tensor) -> Start:
+        """Return where a fit starts, given scaled inputs around it; a reading of the paper has another."""
+        return Start.of(inputs_R_d, len(self.classes), self.settings, self._axes)
+
+    def objective(
+        self, model: SparseGPs, inputs_N_d: torch.Tensor, targets_N: torch.Tensor, _random: torch.Generator
+    ) -> torch.Tensor:
+        """Return what an iteration climbs: the ELBO of all samples; a reading of the paper has another."""
+        return model.elbo(inputs_N_d, targets_N)
 
     def elbo(self) -> float:
         """Return the evidence lower bound per labeled sample in nats."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from gpca.comparison.closeness import exactly
 from gpca.comparison.published import Counterpart, Number
 from gpca.comparison.values import Reproduced, value_of_run
 from gpca.comparison.verdicts import (
@@ -15,7 +16,6 @@ from gpca.comparison.verdicts import (
     NOT_COMPARABLE,
     NOT_REPRODUCED,
     REPRODUCED,
-    Printed,
     Tolerance,
     distance,
     verdict_of,
@@ -67,7 +67,7 @@ def judge_readings(
             if reproduced is None:
                 continue
             group, _, reading = name.partition("/")
-            tolerance, printed = tolerances[number.unit], _exactly(number)
+            tolerance, printed = tolerances[number.unit], exactly(number)
             records.append(
                 (
                     *number.key,
@@ -227,11 +227,6 @@ def read_judged(path: str | Path) -> pd.DataFrame:
 def _value(number: Number, counterpart: Counterpart, name: str, rows: pd.DataFrame) -> Reproduced | None:
     there = replace(counterpart, file=READINGS, table=name)
     return value_of_run(replace(number, counterpart=there), {READINGS: rows})
-
-
-def _exactly(number: Number) -> Printed:
-    """Return the number as if its sampling left nothing open."""
-    return Printed(number.value, number.upper, number.rounding, number.value, number.upper)
 
 
 def _exact(reproduced: Reproduced) -> Reproduced:

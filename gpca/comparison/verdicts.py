@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gpca.comparison.citations import filled
 from gpca.comparison.clusters import Drawn
 from gpca.comparison.published import TIMES, Counterpart, Number, Reason, reason_of
 from gpca.comparison.values import RUNTIME, Reproduced, deviation_interval, value_of_run
@@ -76,7 +77,8 @@ def compare(
 
     Args:
         numbers: the printed numbers.
-        results: file name -> its rows, as :func:`gpca.comparison.values.read_results` reads them.
+        results: file name -> its rows, as :func:`gpca.comparison.values.read_results` reads them; those that reasons
+            cite too.
         objects: source -> ``{"title": str, "stand_in": bool}``; "model" is what the explained model was trained on.
         tolerances: one for each unit.
         reasons: why printed numbers were not reached.
@@ -99,6 +101,7 @@ def compare(
         reproduced = values[number.key] = value_of_run(number, results, clusters)
         tolerance = tolerances[number.unit]
         verdict, reason = _judge(number, printed, reproduced, objects, tolerance, reasons)
+        reason = filled(reason, number, results)
         first = values.get(number.same_as)
         repeats = (
             first is not None and reproduced is not None and (first.value, first.n) == (reproduced.value, reproduced.n)

@@ -1,12 +1,9 @@
 """The reference run on real objects: its comparison and the reasons."""
 
-import re
-
 import pandas as pd
 import pytest
 import yaml
 
-from gpca.attribution.metrics import read_metrics
 from gpca.code_files import ROOT
 from gpca.comparison.claim_verdicts import CLAIM_COLUMNS, read_verdicts
 from gpca.comparison.claims import read_claims
@@ -28,12 +25,9 @@ def reference():
     objects |= {name: {"title": name, "stand_in": False} for name in ("real_rgbd", "model")}
     numbers = read_published()
     named = {number.counterpart.file for number in numbers if number.counterpart}
-    results = read_results(path for path in sorted(folder.glob("*.csv")) if path.name in named)
+    results = read_results(path for path in sorted(folder.glob("*.csv")) if path.name in named | {READINGS})
     comparison = compare(numbers, results, objects, TOLERANCES, read_reasons())
-    if not (folder / READINGS).is_file():
-        return comparison
-    readings = read_metrics(folder / READINGS)
-    return with_readings(comparison, judge_readings(numbers, comparison, readings, TOLERANCES))
+    return with_readings(comparison, judge_readings(numbers, comparison, results[READINGS], TOLERANCES))
 
 
 def is_of_this_version():
@@ -92,11 +86,3 @@ def test_the_page_of_the_reference_counts_its_verdicts(shown):
     page = (ROOT / "results/reference/full/comparison.md").read_text()
     assert counts_table(shown, TOLERANCES) in page
     assert summary(shown) in page
-
-
-def test_the_reason_of_labels_at_random_has_the_numbers_of_the_reference(shown):
-    rows = read_metrics(ROOT / "results/reference/full/active_learning.csv")
-    rare = rows[(rows["table"] == "active_learning/rare") & (rows["metric"] == "labels_to_target")]
-    labels = rare.groupby(["method", "source"])["value"].mean().round().astype(int)
-    reason = shown[(shown["table"] == "III") & (shown["column"] == "#Labels Random")]["reason"].iloc[0]
-    assert {*labels["random"], *labels["bald_kmeans"]} <= set(map(int, re.findall(r"\d+", reason)))

@@ -42,6 +42,11 @@ MODULES = {  # of steps whose module is not gpca.steps.<name>
     "draw_scans": "gpca.steps.scans",
     "register_scans": IN + "scans.step",
     "readings": IN + "specification_curve.step",
+    "retrain": IN + "specification_curve.retrain_step",
+    "measure_joint": IN + "joint_reading.measure_step",
+    "choose_joint": IN + "joint_reading.choose_step",
+    "apply_joint": IN + "joint_reading.apply_step",
+    "judge_joint": IN + "joint_reading.verdict_step",
     "exchange": IN + "substitution.step",
 }
 LISTS = {  # which names of a step are lists, and not of one seed, file or name
@@ -64,7 +69,10 @@ LISTS = {  # which names of a step are lists, and not of one seed, file or name
     "register_methods": "seeds methods registrations rows timings",
     "draw_scans": "data",
     "register_scans": "methods rows timings",
-    "readings": "registrations sets poses predictions embeddings",
+    "readings": "registrations sets predictions embeddings retrained",
+    "choose_joint": "measured",
+    "apply_joint": "sets other_sets",
+    "judge_joint": "values",
     "exchange": "seeds registrations encoders out",
     "attribute": "seeds registrations embeddings uncertainty uncertainty_timings input_timings predictions timings",
     "model": "causes reenactments",
@@ -76,7 +84,7 @@ NUMBERS = {"seed", "seeds", "files_seed", "surface_points", "threads"}
 TEXTS = {
     *("source", "explainer", "control", "design", "reduction", "group", "title", "name", "files_of", "encoder_of"),
     *("registrations_of", "retrained", "others", "strategies", "concepts", "estimators", "backbones", "learners"),
-    *("remedies", "reenactment", "other", "methods", "encoders_of", "data_dir", "chunk"),
+    *("remedies", "reenactment", "other", "methods", "encoders_of", "data_dir", "chunk", "severities"),
     "place",
 }
 SWITCHES = {"stand_in"}

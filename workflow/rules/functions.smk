@@ -123,6 +123,9 @@ def read_by_readings(wildcards):
         return read_by_frame_input()
     sources = [name for name in group.sources if name in SOURCES]
     seeds = SEEDS[: 1 if group.costly else READINGS["seeds"]]
+    ranges = []
+    if wildcards.reading_group == RETRAINED:
+        seeds, ranges = RETRAINED_SEEDS, READINGS["groups"][RETRAINED]["range"]
     made = "predictions"
     methods = [name for name in group.methods if name in config["explainers"]]
     if wildcards.reading_group == "diagnostics":
@@ -135,6 +138,7 @@ def read_by_readings(wildcards):
         "sets": "<results>/shifted/{source}/seed{seed}.npz",
         "predictions": f"<results>/{made}/{{source}}/{{method}}/seed{{seed}}.csv",
         "embeddings": "<results>/embeddings/{source}/{method}/seed{seed}.npz",
+        "retrained": "<results>/retrained/{range}/{source}/seed{seed}.npz",
     }
     embedded = [method.replace("-", "/") for method in methods]
     return {
@@ -142,6 +146,7 @@ def read_by_readings(wildcards):
             patterns[kind],
             source=sources,
             method=embedded if kind == "embeddings" else methods,
+            range=ranges,
             seed=SEEDS[:1] if kind == "embeddings" else seeds,
         )
         for kind in group.reads
@@ -149,27 +154,24 @@ def read_by_readings(wildcards):
 
 
 def read_by_frame_input():
-    """Return the frames of its seeds with what the protocol's encoder makes of them, and what others start from."""
+    """Return the frames of its seeds, what the protocol's encoder makes of them, and their embeddings by others."""
     of = {"source": FRAMES, "seed": SEEDS[: READINGS["frame_seeds"]]}
     return {
-        "registrations": [
-            *collect("<results>/registrations/{source}/seed{seed}.npz", **of),
-            *(pretrained_on(BACKBONE)[1] if REAL_WORLD["pretraining"] else []),
-        ],
-        "poses": collect("<results>/poses/{source}/seed{seed}.csv", **of),
+        "registrations": collect(
+            "<results>/registrations/{source}/seed{seed}.npz", **of
+        ),
         "predictions": collect(
             f"<results>/predictions/{{source}}/{BACKBONE}-none/seed{{seed}}.csv", **of
+        ),
+        "embeddings": collect(
+            f"<results>/other_clouds/{{source}}/{BACKBONE}/{{cloud}}/seed{{seed}}.npz",
+            cloud=OTHER_CLOUDS,
+            **of,
         ),
     }
 
 
-def reading_sections(group):
-    """Return the sections of the config that a group reads beside its choices."""
-    if group != FRAME_INPUT:
-        return READING_SECTIONS
-    training = (REAL_WORLD["training"] or {}).get(BACKBONE) or {}
-    of_frames = {"pretraining": REAL_WORLD["pretraining"] or {}, "training": training}
-    encoder = {"encoder": config["encoders"][BACKBONE]}
-    return (
-        {name: READING_SECTIONS[name] for name in ("icp", "gpca")} | of_frames | encoder
-    )
+def retrained_on(severities):
+    """Return the section `registrations` with the severities of that name; the protocol's own where there are none."""
+    other = READINGS["severities"].get(severities)
+    return config["registrations"] | ({"severities": other} if other else {})

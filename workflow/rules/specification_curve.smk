@@ -1,13 +1,17 @@
 # Files of a run -> the printed numbers under every reading of what the paper leaves unstated.
-from gpca.experiments.specification_curve.registry import FRAME_INPUT, GROUPS
+from gpca.experiments.specification_curve.frame_input import ALIGNED
+from gpca.experiments.specification_curve.registry import FRAME_INPUT, GROUPS, RETRAINED
 
 READINGS = config["readings"]
 READING_SIZES = {name: READINGS[name] for name in ("seeds", "encoders", "samples")}
+RETRAINED_SEEDS = SEEDS[: READINGS["encoders"]]
 BACKBONE = REAL_WORLD["backbones"][0]  # whose encoder of frames sees other clouds
-ENCODERS_OF_READINGS = {
-    "encoder_head": config["embedding"]["encoder"],
-    FRAME_INPUT: BACKBONE,
-}
+OTHER_CLOUDS = [
+    cloud
+    for cloud in READINGS["groups"].get(FRAME_INPUT, {}).get("input", [])
+    if cloud != ALIGNED
+]
+ENCODERS_OF_READINGS = {"encoder_head": config["embedding"]["encoder"]}
 READING_SECTIONS = {
     "uncertainty": config["uncertainty"].get("additive", {}),
     "icp": config["registrations"]["icp"],
@@ -39,7 +43,7 @@ rule reading:
         "<benchmarks>/readings/{reading_group}.tsv"
     wildcard_constraints:
         reading_group="|".join(GROUPS),
-    priority: 12  # that of the frames' clouds trains encoders: the longest job, with many cores to be started early
+    priority: 9
     conda:
         "../envs/gpca.yaml"
     resources:
@@ -52,8 +56,141 @@ rule reading:
             {
                 "choices": READINGS["groups"][wildcards.reading_group],
                 "sizes": READING_SIZES,
-                **reading_sections(wildcards.reading_group),
+                **READING_SECTIONS,
             }
         ),
+    script:
+        "../scripts/step.py"
+
+
+# Other severities, in training too.
+rule retrain:
+    input:
+        objects="<results>/objects/{source}.npz",
+        code=code_files(
+            "gpca.experiments.specification_curve.retrain_step",
+            encoder_module(config["embedding"]["encoder"]),
+        ),
+    output:
+        out="<results>/retrained/{severities}/{source}/seed{seed}.npz",
+    log:
+        "<logs>/retrained/{severities}/{source}/seed{seed}.log",
+    benchmark:
+        "<benchmarks>/retrained/{severities}/{source}/seed{seed}.tsv"
+    wildcard_constraints:
+        source="|".join([*SOURCES, *NAMES["development_source"]]),
+        severities=r"\w+",
+    priority: 10
+    conda:
+        "../envs/gpca.yaml"
+    params:
+        step="gpca.experiments.specification_curve.retrain_step",
+        settings=lambda wildcards: as_json(
+            {
+                "shift": config["shift"],
+                "registrations": retrained_on(wildcards.severities),
+                "encoder": config["encoders"][config["embedding"]["encoder"]],
+            }
+        ),
+    script:
+        "../scripts/step.py"
+
+
+# Encoders of depth frames that see other clouds, one job each: trained as that of the protocol is.
+def other_cloud_settings(wildcards, changes):
+    icp = {"icp": config["registrations"]["icp"]}
+    encoder = config["encoders"][BACKBONE] | (changes or {}) | icp
+    return as_json(encoder | {"reading": wildcards.cloud})
+
+
+rule pretrain_on_other_cloud:
+    input:
+        registrations=pretrained_on(BACKBONE)[1],
+        code=code_files("gpca.steps.train", encoder_module(BACKBONE)),
+    output:
+        weights=f"<results>/other_clouds/pretrained/{BACKBONE}/{{cloud}}.pt",
+        curve=f"<results>/other_clouds/pretrained/{BACKBONE}/{{cloud}}.csv",
+    log:
+        f"<logs>/other_clouds/pretrained/{BACKBONE}/{{cloud}}.log",
+    benchmark:
+        f"<benchmarks>/other_clouds/pretrained/{BACKBONE}/{{cloud}}.tsv"
+    wildcard_constraints:
+        cloud=r"\w+",
+    priority: 12  # the longest jobs, with many cores to be started early
+    conda:
+        "../envs/gpca.yaml"
+    resources:
+        mem_mb=3000,
+        runtime=180,
+    params:
+        step="gpca.steps.train",
+        source="pretraining",
+        settings=lambda wildcards: other_cloud_settings(
+            wildcards, REAL_WORLD["pretraining"]
+        ),
+        seed=SEEDS[0],
+        registrations_of=pretrained_on(BACKBONE)[0],
+    script:
+        "../scripts/step.py"
+
+
+rule train_on_other_cloud:
+    input:
+        unpack(
+            lambda wildcards: (
+                {"start": f"<results>/other_clouds/pretrained/{BACKBONE}/{{cloud}}.pt"}
+                if REAL_WORLD["pretraining"]
+                else {}
+            )
+        ),
+        registrations=f"<results>/registrations/{FRAMES}/seed{{seed}}.npz",
+        poses=f"<results>/poses/{FRAMES}/seed{{seed}}.csv",
+        code=code_files("gpca.steps.train", encoder_module(BACKBONE)),
+    output:
+        weights=f"<results>/other_clouds/{FRAMES}/{BACKBONE}/{{cloud}}/seed{{seed}}.pt",
+        curve=f"<results>/other_clouds/{FRAMES}/{BACKBONE}/{{cloud}}/seed{{seed}}.csv",
+    log:
+        f"<logs>/other_clouds/{FRAMES}/{BACKBONE}/{{cloud}}/seed{{seed}}.log",
+    benchmark:
+        f"<benchmarks>/other_clouds/{FRAMES}/{BACKBONE}/{{cloud}}/seed{{seed}}.tsv"
+    wildcard_constraints:
+        cloud=r"\w+",
+    priority: 11
+    conda:
+        "../envs/gpca.yaml"
+    params:
+        step="gpca.steps.train",
+        settings=lambda wildcards: other_cloud_settings(
+            wildcards, (REAL_WORLD["training"] or {}).get(BACKBONE)
+        ),
+        source=FRAMES,
+    script:
+        "../scripts/step.py"
+
+
+rule embed_other_cloud:
+    input:
+        registrations=f"<results>/registrations/{FRAMES}/seed{{seed}}.npz",
+        registration_timings=f"<results>/timings/{FRAMES}/icp/seed{{seed}}.csv",
+        encoder=f"<results>/other_clouds/{FRAMES}/{BACKBONE}/{{cloud}}/seed{{seed}}.pt",
+        code=code_files("gpca.steps.embed", encoder_module(BACKBONE)),
+    output:
+        embeddings=f"<results>/other_clouds/{FRAMES}/{BACKBONE}/{{cloud}}/seed{{seed}}.npz",
+        timings=f"<results>/timings/{FRAMES}/{BACKBONE}_{{cloud}}/seed{{seed}}.csv",
+    log:
+        f"<logs>/other_clouds/{FRAMES}/{BACKBONE}/{{cloud}}/embed_seed{{seed}}.log",
+    benchmark:
+        f"<benchmarks>/other_clouds/{FRAMES}/{BACKBONE}/{{cloud}}/embed_seed{{seed}}.tsv"
+    wildcard_constraints:
+        cloud=r"\w+",
+    priority: 11
+    conda:
+        "../envs/gpca.yaml"
+    params:
+        step="gpca.steps.embed",
+        settings=lambda wildcards: other_cloud_settings(
+            wildcards, (REAL_WORLD["training"] or {}).get(BACKBONE)
+        ),
+        source=FRAMES,
     script:
         "../scripts/step.py"

@@ -1,11 +1,10 @@
 """A run's collected numbers beside the printed ones and the paper's sentences -> verdicts on both, and on readings."""
 
-from gpca.attribution.metrics import read_metrics
 from gpca.comparison.claim_verdicts import judge
 from gpca.comparison.claims import counterparts_of, read_claims
 from gpca.comparison.clusters import cluster_draws
 from gpca.comparison.published import read_published, read_reasons
-from gpca.comparison.readings import judge_readings, with_readings
+from gpca.comparison.readings import READINGS, judge_readings, with_readings
 from gpca.comparison.values import measured_on, read_results
 from gpca.comparison.verdicts import Tolerance, compare
 from gpca.io.csv_file import write_csv
@@ -17,7 +16,7 @@ with workflow_script(snakemake):
     given, params = snakemake.input, snakemake.params
     numbers, sentences = read_published(), read_claims()
     tolerances = {unit: Tolerance(**tolerance) for unit, tolerance in params.tolerances.items()}
-    results = read_results(given.collected)
+    results = read_results([*given.collected, given.readings])
     counterparts = [*(number.counterpart for number in numbers), *counterparts_of(sentences)]
     clusters = cluster_draws(counterparts, given.predictions)
     comparison = compare(
@@ -29,7 +28,7 @@ with workflow_script(snakemake):
         measured_on(given.collected),
         clusters,
     )
-    judged = judge_readings(numbers, comparison, read_metrics(given.readings), tolerances)
+    judged = judge_readings(numbers, comparison, results[READINGS], tolerances)
     comparison = with_readings(comparison, judged)
     claims = judge(sentences, results, params.objects, given.predictions, clusters, params.floors)
     out = snakemake.output

@@ -42,6 +42,25 @@ def make_sets(
             as the sets of unseen objects are where the source has a single one.
         encoder, encoder_settings: the source's encoder.
     """
+    measured = [sets_of_encoder(objects, registrations, other, encoder, encoder_settings, source, seed, settings)]
+    held_out_S = held_out(registrations, settings.held_out_share, source, seed)
+    if held_out_S.any():
+        parts = _of_unseen_objects(registrations, held_out_S, source, seed, settings)
+        measured.append(_measured(parts, source, seed, settings))
+    return ShiftedSets.join(measured)
+
+
+def sets_of_encoder(
+    objects: ObjectClouds,
+    registrations: Registrations,
+    other: Registrations | None,
+    encoder: Classifier,
+    encoder_settings: EncoderSettings,
+    source: str,
+    seed: int,
+    settings: ShiftSettings,
+) -> ShiftedSets:
+    """Make, embed and measure the sets of the source's encoder; arguments as of :func:`make_sets`."""
     beyond, _ = make_registrations(objects, f"{source} severity", seed, settings.beyond)
     parts = {"in_distribution": registrations, "severity": beyond}
     if other is not None:
@@ -49,12 +68,7 @@ def make_sets(
     for name in [name for name in parts if name != "in_distribution"]:
         h_S_d, _ = embed(encoder, parts[name], f"{source} {name}", seed, encoder_settings)
         parts[name] = replace(parts[name], attached={"embedding": h_S_d})
-    measured = [_measured(parts, source, seed, settings)]
-    held_out_S = held_out(registrations, settings.held_out_share, source, seed)
-    if held_out_S.any():
-        parts = _of_unseen_objects(registrations, held_out_S, source, seed, settings)
-        measured.append(_measured(parts, source, seed, settings))
-    return ShiftedSets.join(measured)
+    return _measured(parts, source, seed, settings)
 
 
 def held_out(registrations: Registrations, share: float, source: str, seed: int) -> np.ndarray:

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, get_args
 
 from gpca.experiments.experiment import Experiment, Names, Tidy
-from gpca.experiments.specification_curve.registry import FRAME_INPUT, GROUPS
+from gpca.experiments.specification_curve.registry import FRAME_INPUT, GROUPS, RETRAINED, OtherSeverities
 from gpca.experiments.specification_curve.settings import ReadingSizes
+from gpca.pairs.perturbation import Severities
 from gpca.settings import Bounds, Keys
+
+RANGES = get_args(OtherSeverities)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -19,17 +22,22 @@ class Section(ReadingSizes):
     Attributes:
         frame_seeds: how many of the run's seeds, from the first, are used to train encoders that see other clouds of
             depth frames.
+        severities: ranges that encoders learn from in the place of the protocol's, for as many seeds as `encoders`.
     """
 
     frame_seeds: Annotated[int, Bounds(minimum=0)]
+    severities: Annotated[dict, Keys(dict.fromkeys(RANGES, Severities), required=RANGES)]
     groups: Annotated[dict, Keys({name: group.values for name, group in GROUPS.items()})]
 
 
 def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
-    """Return the groups of readings; the one that trains encoders of depth frames is run where there are seeds."""
+    """Return the groups of readings; those that train encoders for each reading are run where there are seeds."""
     readings = config["readings"]
-    trains = readings["frame_seeds"] and "none" in config["real_world"]["reductions"]
-    groups = [name for name in readings["groups"] if name != FRAME_INPUT or trains]
+    trained = {
+        FRAME_INPUT: readings["frame_seeds"] and "none" in config["real_world"]["reductions"],
+        RETRAINED: readings["encoders"],
+    }
+    groups = [name for name in readings["groups"] if trained.get(name, True)]
     return {"reading_group": groups, "frame_input": [name for name in groups if name == FRAME_INPUT]}
 
 

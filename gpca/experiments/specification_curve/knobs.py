@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -21,6 +21,8 @@ from gpca.uncertainty.designs import KNOB_RANGE, STEP, RegisteredRow, design_row
 from gpca.uncertainty.knobs import MIDDLE, UNTOUCHED, KnobRuns, Knobs
 from gpca.uncertainty.settings import UncertaintySettings
 from gpca.uncertainty.spread import divergence, log_determinant, log_residual
+
+Pair = tuple[str, dict[str, tuple[tuple, KnobRuns]]]  # its concept, and by name the clouds that are run and their runs
 
 # Step from the untouched pair, of each knob.
 STEPS = {"small": STEP * KNOB_RANGE, "middle": np.subtract(MIDDLE, UNTOUCHED)}
@@ -66,19 +68,33 @@ def magnitudes(run_files: RunFiles, readings: Sequence[Reading], sizes: ReadingS
     settings = run_files.uncertainty()
     turned_R_3 = np.array([[reading[name] for name in Knobs._fields] for reading in readings])
     for source, seed, pairs in _pairs(run_files, sizes, settings, settings.starts, "knobs"):
-        concept_S, worths = [], []
-        for concept, runs in pairs:
-            concept_S.append(concept)
-            spread_R_8 = np.array([_turned(runs["observed"], turned_3) for turned_3 in turned_R_3])
-            worths.append(_worth(spread_R_8, "divergence", settings.floor))
-        for number, reading in enumerate(readings):
-            worth_S_8 = np.array([worth_R_8[number] for worth_R_8 in worths])
-            change_S_3 = worth_S_8[:, [1 << knob for knob in range(3)]] - worth_S_8[:, :1]
-            derivative_S_3 = change_S_3 / ((turned_R_3[number] - UNTOUCHED) / KNOB_RANGE)
-            named = {"shap_additive": shapley_values(worth_S_8), "sa_local_additive": derivative_S_3}
-            for method, value_S_3 in named.items():
-                value = _accuracy(np.array(concept_S), value_S_3, "signed")
-                yield reading, source, method, "accuracy", ALL, seed, value
+        for method, value_R in accuracies_of_magnitudes(pairs, turned_R_3, settings.floor).items():
+            for reading, value in zip(readings, value_R, strict=True):
+                yield reading, source, method, "accuracy", ALL, seed, float(value)
+
+
+def accuracies_of_magnitudes(pairs: Iterable[Pair], turned_R_3: np.ndarray, floor: float) -> dict[str, np.ndarray]:
+    """Return the accuracies (R,) of SHAP and of local sensitivity analysis, by how far the knobs are turned.
+
+    Args:
+        pairs: as :func:`runs_of` yields them.
+        turned_R_3: settings of the knobs.
+        floor: variance below which a spread is no uncertainty.
+    """
+    concept_S, worths = [], []
+    for concept, runs in pairs:
+        concept_S.append(concept)
+        spread_R_8 = np.array([_turned(runs["observed"], turned_3) for turned_3 in turned_R_3])
+        worths.append(_worth(spread_R_8, "divergence", floor))
+    true_S = np.array(concept_S)
+    values: dict[str, list[float]] = {"shap_additive": [], "sa_local_additive": []}
+    for number, turned_3 in enumerate(turned_R_3):
+        worth_S_8 = np.array([worth_R_8[number] for worth_R_8 in worths])
+        change_S_3 = worth_S_8[:, [1 << knob for knob in range(3)]] - worth_S_8[:, :1]
+        derivative_S_3 = change_S_3 / ((turned_3 - UNTOUCHED) / KNOB_RANGE)
+        values["shap_additive"].append(_accuracy(true_S, shapley_values(worth_S_8), "signed"))
+        values["sa_local_additive"].append(_accuracy(true_S, derivative_S_3, "signed"))
+    return {method: np.array(value_R) for method, value_R in values.items()}
 
 
 def _turned(pair: tuple, turned_3: np.ndarray) -> np.ndarray:
@@ -90,7 +106,7 @@ def _turned(pair: tuple, turned_3: np.ndarray) -> np.ndarray:
 
 def _pairs(
     run_files: RunFiles, sizes: ReadingSizes, settings: UncertaintySettings, starts: int, title: str
-) -> Iterator[tuple[str, int, Iterator[tuple[str, dict[str, tuple[RegisteredRow, KnobRuns]]]]]]:
+) -> Iterator[tuple[str, int, Iterator[Pair]]]:
     """Yield source, seed, and of each sample its concept and its runs: of the observed pair, and of a clean one.
 
     What is random in a sample is named as in :func:`gpca.uncertainty.designs.evaluate_design`.
@@ -98,12 +114,13 @@ def _pairs(
     for (source, seed), path in run_files.registrations.items():
         registrations = Registrations.load(path, (source, seed))
         chosen = registrations.subset(design_rows(registrations, "additive", sizes.samples))
-        yield source, seed, _runs(chosen, source, seed, settings, starts, f"{title} of {source}, seed {seed}")
+        yield source, seed, runs_of(chosen, source, seed, settings, starts, f"{title} of {source}, seed {seed}")
 
 
-def _runs(
+def runs_of(
     registrations: Registrations, source: str, seed: int, settings: UncertaintySettings, starts: int, title: str
-) -> Iterator[tuple[str, dict]]:
+) -> Iterator[Pair]:
+    """Yield the concept of each registration, and its Monte-Carlo ICP by pair: the observed one, and a clean one."""
     observed = registrations.without_labels()
     for row in progress(range(len(registrations)), title):
         axes = (source, seed, "uncertainty", observed.split[row], observed.sample[row])

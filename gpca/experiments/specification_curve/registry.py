@@ -14,7 +14,8 @@ from gpca.pairs.reading import Reading as ReadAs
 from gpca.registry import load
 from gpca.settings import Bounds, Count, Distinct, Keys, OpenShare, Positive
 
-FRAME_INPUT = "frame_input"  # the group that trains an encoder of frames for each of its readings
+FRAME_INPUT = "frame_input"  # the group whose encoders of frames see other clouds
+RETRAINED = "severities_retrained"  # the group whose encoders learn from other severities
 ALL_SOURCES = ("coffee_cup", "linemod", "ycb")
 AboveOne = Annotated[float, Bounds(exclusiveMinimum=1)]
 AtLeastTwo = Annotated[int, Bounds(minimum=2)]
@@ -24,6 +25,7 @@ ShiftedSet = Literal["in_distribution", "severity", "source", "objects"]
 JoinedSets = Literal["in_distribution+severity", "in_distribution+source", "seen_objects+objects"]
 Distance = Literal["knn_analytical", "mahalanobis_analytical", "knn_embedding", "mahalanobis_embedding"]
 ShownObjects = Literal["all", "seen", "unseen"]
+OtherSeverities = Literal["weaker", "stronger"]
 
 
 @dataclass(frozen=True)
@@ -104,6 +106,12 @@ GROUPS = {
         ("registrations", "predictions"),
         methods=("gpca_paper", "gpca"),
     ),
+    RETRAINED: Group(
+        "How strong the perturbations are, in training too",
+        {"range": OtherSeverities, "classifier": Literal["paper", "converged"]},
+        "severities:retrained",
+        ("retrained",),
+    ),
     "gpc_start": Group(
         "How the GPC starts",
         {
@@ -183,7 +191,7 @@ GROUPS = {
         "What the encoder sees on depth frames",
         {"input": ReadAs, "objects": ShownObjects},
         "frame_input:run",
-        ("registrations", "poses", "predictions"),
+        ("registrations", "predictions", "embeddings"),
         (),
     ),
     "features": Group(

@@ -24,16 +24,16 @@ class RunFiles:
 
     Attributes:
         registrations, sets: (source, seed) -> file of the step ``registrations`` or ``shift``.
-        poses: (source, seed) -> CSV beside the registrations of depth frames.
         predictions, embeddings: (source, method, seed) -> file.
+        retrained: (severities, source, seed) -> file of the step ``retrain``, for other severities.
         settings: sections of the config by name, for what a reading leaves as it is.
     """
 
     registrations: Mapping[tuple[str, int], Path] = field(default_factory=dict)
     sets: Mapping[tuple[str, int], Path] = field(default_factory=dict)
-    poses: Mapping[tuple[str, int], Path] = field(default_factory=dict)
     predictions: Mapping[tuple[str, str, int], Path] = field(default_factory=dict)
     embeddings: Mapping[tuple[str, str, int], Path] = field(default_factory=dict)
+    retrained: Mapping[tuple[str, str, int], Path] = field(default_factory=dict)
     settings: Mapping[str, dict] = field(default_factory=dict)
 
     def section(self, name: str) -> dict:
@@ -49,7 +49,7 @@ class RunFiles:
         """Yield source, seed, sets, and the samples like the training's with their embeddings attached."""
         for (source, seed), path in self.sets.items():
             sets = ShiftedSets.load(path, (source, seed))
-            yield source, seed, sets, sets.registrations((sets.set == "in_distribution").nonzero()[0])
+            yield source, seed, sets, like_the_training(sets)
 
     def embedded(self, source: str, method: str, seed: int) -> Registrations:
         """Return registrations with the embeddings of a ``{backbone}-{reduction}`` attached."""
@@ -58,13 +58,18 @@ class RunFiles:
         return replace(registrations, attached=embedding)
 
 
+def like_the_training(sets: ShiftedSets) -> Registrations:
+    """Return the training samples of the source's encoder and the test samples like them, with their embeddings."""
+    return sets.registrations((sets.set == "in_distribution").nonzero()[0])
+
+
 def by_source_and_seed(paths: Iterable[Path]) -> dict[tuple[str, int], Path]:
     """Return files named ``…/{source}/seed{seed}.npz`` by source and seed."""
     return {source_method_seed(path)[1:]: path for path in paths}
 
 
 def by_method(paths: Iterable[Path]) -> dict[tuple[str, str, int], Path]:
-    """Return prediction files named ``…/{source}/{method}/seed{seed}.csv`` by these three."""
+    """Return files named ``…/{source}/{method}/seed{seed}.csv``, or by two other names, by these three."""
     return {source_method_seed(path): path for path in paths}
 
 

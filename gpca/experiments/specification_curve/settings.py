@@ -16,7 +16,7 @@ class ReadingSizes:
 
     Attributes:
         seeds: how many of the run's seeds are used, from the first.
-        encoders: of these, seeds for which another encoder is trained.
+        encoders: of these, seeds for which other encoders are trained.
         samples: test samples of each source and seed on which Monte-Carlo ICP is run, balanced, at most.
     """
 

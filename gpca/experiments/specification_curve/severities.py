@@ -1,4 +1,4 @@
-"""GP-CA on test samples that were perturbed weakly or strongly: the effect of severity on its accuracy."""
+"""GP-CA by severity: on test samples that were perturbed weakly or strongly, and retrained on such ranges."""
 
 from __future__ import annotations
 
@@ -8,10 +8,14 @@ import numpy as np
 from scipy.stats import rankdata
 
 from gpca.attribution.predictions import read_predictions
-from gpca.experiments.specification_curve.diagnostics import accuracies_of_named
-from gpca.experiments.specification_curve.run_files import Row, RunFiles
+from gpca.classifier.gpc import GPC
+from gpca.classifier.settings import GPCSettings
+from gpca.experiments.out_of_distribution.sets import ShiftedSets
+from gpca.experiments.specification_curve.diagnostics import accuracies, accuracies_of_named
+from gpca.experiments.specification_curve.run_files import Row, RunFiles, like_the_training
 from gpca.experiments.specification_curve.settings import Reading, ReadingSizes
 from gpca.pairs.dataset import Registrations
+from gpca.pairs.perturbation import CONCEPTS
 
 PARTS = ("weakest", "middle", "strongest")
 CLASSIFIERS = {"paper": "gpca_paper", "converged": "gpca"}
@@ -33,6 +37,18 @@ def run(run_files: RunFiles, readings: Sequence[Reading], _sizes: ReadingSizes) 
                 rows = rows[rows["sample"].map(part_S) == reading["part"]]
             values = accuracies_of_named(rows["concept_true"].to_numpy(), rows["concept_predicted"].to_numpy())
             for (metric, concept), value in values.items():
+                yield reading, source, "gpca_paper", metric, concept, seed, value
+
+
+def retrained(run_files: RunFiles, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iterator[Row]:
+    """Yield the accuracies of encoder and classifier that learned from other severities, on test samples of these."""
+    for (severities, source, seed), path in run_files.retrained.items():
+        samples = like_the_training(ShiftedSets.load(path, (source, seed)))
+        train, test = (samples.subset(samples.rows(split)) for split in ("train", "test"))
+        for reading in (reading for reading in readings if reading["range"] == severities):
+            settings = GPCSettings(**run_files.section(CLASSIFIERS[reading["classifier"]]))
+            gpc = GPC(CONCEPTS, settings, source, seed).fit(train.embedding, train.concept)
+            for (metric, concept), value in accuracies(test.concept, gpc.attribute(test.embedding)[0]).items():
                 yield reading, source, "gpca_paper", metric, concept, seed, value
 
 

@@ -19,9 +19,9 @@ from gpca.process.provenance import record_provenance
 KINDS: dict[str, Callable[[list[Path]], dict]] = {
     "registrations": by_source_and_seed,
     "sets": by_source_and_seed,
-    "poses": by_source_and_seed,
     "predictions": by_method,
     "embeddings": by_backbone,
+    "retrained": by_method,
 }
 
 

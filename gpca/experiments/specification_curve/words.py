@@ -38,6 +38,7 @@ WORDS = {  # field of a group's choices -> what its values are called
         "middle": "middle third",
         "strongest": "strongest third",
     },
+    "range": {"weaker": "weaker perturbations", "stronger": "stronger perturbations"},
     "classifier": {"paper": "the paper's setting", "converged": "trained longer"},
     "inputs": _INPUTS,
     "inducing": {"kmeans": "inducing inputs by k-means", "random": "random inducing inputs"},
@@ -100,10 +101,11 @@ def reading_in_words(group: str, reading: str) -> str:
     names = list(GROUPS[group].choices) if group in GROUPS else []
     if len(names) != len(values):
         return ", ".join(values)
-    return ", ".join(_words(name, value) for name, value in zip(names, values, strict=True))
+    return ", ".join(words_of(name, value) for name, value in zip(names, values, strict=True))
 
 
-def _words(name: str, value: str) -> str:
+def words_of(name: str, value: str) -> str:
+    """Return a value of a choice as words."""
     of_name = WORDS.get(name, {})
     if value not in of_name and name in NUMBERS:
         return NUMBERS[name].format(value)

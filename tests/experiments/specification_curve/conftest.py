@@ -44,15 +44,18 @@ def run_files(embedded, tmp_path_factory):
         "sets": folder / "shifted/tiny/seed0.npz",
         "predictions": folder / "predictions/tiny/gpca_paper/seed0.csv",
         "embeddings": folder / "embeddings/tiny/dgcnn/none/seed0.npz",
+        "retrained": folder / "retrained/weaker/tiny/seed0.npz",
     }
     for path in paths.values():
         path.parent.mkdir(parents=True, exist_ok=True)
     embedded.save(paths["registrations"])
     columns = {name: getattr(embedded, name) for name in ("split", "sample", "concept", "object_name", "cluster")}
     distance = np.linspace(0, 1, len(embedded))[:, None] * np.ones(len(DISTANCES))
-    ShiftedSets(set=np.full(len(embedded), "in_distribution"), h=embedded.embedding, distance=distance, **columns).save(
-        paths["sets"], embedded.axes
+    sets = ShiftedSets(
+        set=np.full(len(embedded), "in_distribution"), h=embedded.embedding, distance=distance, **columns
     )
+    for kind in ("sets", "retrained"):
+        sets.save(paths[kind], embedded.axes)
     # Right but for the first test sample of each concept.
     scores_S_3 = 0.8 * (embedded.concept[:, None] == np.array(CONCEPTS)) + 0.1
     scores_S_3[embedded.rows("test")[:3]] = np.roll(scores_S_3[embedded.rows("test")[:3]], 1, axis=1)
@@ -64,6 +67,7 @@ def run_files(embedded, tmp_path_factory):
         sets={("tiny", 0): paths["sets"]},
         predictions={("tiny", "gpca_paper", 0): paths["predictions"]},
         embeddings={("tiny", "dgcnn-none", 0): paths["embeddings"]},
+        retrained={("weaker", "tiny", 0): paths["retrained"]},
         settings=SECTIONS,
     )
 

@@ -4,13 +4,11 @@ import json
 from dataclasses import replace
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from baselines.learners import linear_svm
 from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
-from gpca.encoders.training import train_encoder
 from gpca.errors import InputError
 from gpca.experiments.out_of_distribution.metrics import read_learner_predictions
 from gpca.experiments.specification_curve import (
@@ -41,10 +39,19 @@ def test_the_protocols_start_is_the_classifiers_own_and_others_are_not(halves):
     train, test = halves
     settings = GPCSettings(**SECTIONS["gpca_paper"])
     expected = GPC(CONCEPTS, settings, "tiny", 0).fit(train.embedding, train.concept).attribute(test.embedding)[0]
-    arguments = (train.embedding, train.concept, test.embedding, settings)
-    np.testing.assert_allclose(gpc_start.scores(*arguments, PROTOCOL, "tiny", 0), expected, atol=1e-4)
-    for choice in ({"inputs": "raw"}, {"inducing": "random"}, {"lengthscale": "default"}, {"batch": "minibatch"}):
-        assert np.abs(gpc_start.scores(*arguments, PROTOCOL | choice, "tiny", 0) - expected).max() > 1e-3
+
+    def scores(**choice):
+        gpc = gpc_start.StartedGPC(settings, PROTOCOL | choice, "tiny", 0)
+        return gpc.fit(train.embedding, train.concept).attribute(test.embedding)[0]
+
+    np.testing.assert_array_equal(scores(), expected)
+    for choice in (
+        *({"inputs": inputs} for inputs in ("raw", "unit_norm")),
+        *({"inducing": "random"}, {"lengthscale": "default"}, {"batch": "minibatch"}),
+    ):
+        assert np.abs(scores(**choice) - expected).max() > 1e-3
+    np.testing.assert_allclose(np.linalg.norm(gpc_start.of_unit_norm(test.embedding), axis=1), 1, rtol=1e-5)
+    assert not gpc_start.of_unit_norm(np.zeros((1, 3))).any()
 
 
 def test_starts_touch_the_small_rate_and_table_v(run_files):
@@ -120,6 +127,14 @@ def test_severities_come_in_thirds_of_each_concept(run_files, halves):
     assert {reading[1] for reading, *_ in found} == {"paper"}  # there are no predictions of the other
 
 
+def test_other_severities_are_learned_by_their_own_classifier(run_files):
+    found = rows_of(
+        severities.retrained, run_files, {"range": ["weaker", "stronger"], "classifier": ["paper", "converged"]}
+    )
+    assert {reading for reading, *_ in found} == {("weaker", "paper"), ("weaker", "converged")}
+    assert found[("weaker", "paper"), "gpca_paper", "accuracy", "all"] > 0.9
+
+
 def test_pool_holds_the_share_and_labels_are_counted_to_the_target(run_files):
     found = rows_of(labels.pool, run_files, {"new_share": [0.1, 0.4], "batch": [1, 2], "initial": [8, 400]})
     kinds = {(reading, method, metric) for reading, method, metric, _ in found}
@@ -172,34 +187,21 @@ def test_features_are_chosen_by_name(run_files):
     assert counts["residual"] < 1
 
 
-def test_an_encoder_is_trained_for_every_cloud_but_that_of_the_protocol(run_files, embedded, tmp_path, monkeypatch):
-    poses = tmp_path / "poses.csv"
-    rows = {"sample": embedded.sample, "split": embedded.split, "instance": embedded.sample // 3, "dataset": "tiny"}
-    pd.DataFrame(rows | {"in_training": True}).to_csv(poses, index=False)
-    trained = []
-
-    def train(registrations, source, seed, settings, *, start=None, group_S=None):
-        trained.append((settings.reading, source, start is not None, group_S is not None, settings.validation_share))
-        return train_encoder(registrations, source, seed, settings, start=start, group_S=group_S)
-
-    monkeypatch.setattr(frame_input, "train_encoder", train)
+def test_frames_are_named_from_the_embeddings_of_each_cloud(run_files):
+    [embeddings] = run_files.embeddings.values()
+    [predictions] = run_files.predictions.values()
     shown = replace(
         run_files,
-        registrations=run_files.registrations | {("other", 0): saved_as(embedded, ("other", 0), tmp_path)},
-        poses={("tiny", 0): poses},
-        settings=SECTIONS | {"pretraining": {"epochs": 1}, "training": {"validation_share": 0.2}},
+        predictions={("tiny", "dgcnn-none", 0): predictions},
+        embeddings={("tiny", "dgcnn-observed", 0): embeddings},
     )
-    choices = {"input": ["aligned", "observed", "reversed"], "objects": ["all", "unseen"]}
+    choices = {"input": ["aligned", "observed"], "objects": ["all", "unseen"]}
     found = rows_of(frame_input.run, shown, choices)
-    assert found[("aligned", "all"), "gpca_paper", "accuracy", "all"] == pytest.approx(15 / 18)
+    assert found[("aligned", "all"), "dgcnn-none", "accuracy", "all"] == pytest.approx(15 / 18)
+    assert found[("observed", "all"), "dgcnn-none", "accuracy", "all"] > 0.9
     assert {reading for reading, *_ in found} == {(cloud, "all") for cloud in choices["input"]}
-    assert trained == [
-        (cloud, source, *of)
-        for cloud in ("observed", "reversed")
-        for source, *of in (("pretraining", False, False, 0.0), ("tiny", True, True, 0.2))
-    ]
-    with pytest.raises(InputError, match="lack registrations or poses of tiny, seed 0, beside its predictions"):
-        rows_of(frame_input.run, replace(shown, poses={}), choices)
+    with pytest.raises(InputError, match="lack embeddings dgcnn-reversed of tiny, seed 0"):
+        rows_of(frame_input.run, shown, {"input": ["reversed"], "objects": ["all"]})
 
 
 def test_a_group_that_needs_more_samples_than_there_are_says_how_to_get_on(run_files, tmp_path, capsys):
