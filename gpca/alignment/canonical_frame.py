@@ -9,6 +9,7 @@ import numpy as np
 from gpca.errors import InputError
 from gpca.objects.canonical import FEWEST_CLOUD_POINTS, diameter, require_points, require_size
 from gpca.objects.mesh_folder import meters_per
+from gpca.objects.units import IN_CONFIG
 from gpca.seeds import generator
 
 MEASURED_POINTS = 10_000  # so many measure the frame of a larger cloud, since all of them may lie on its hull
@@ -22,8 +23,13 @@ class CanonicalFrame:
     diameter: float
 
     @classmethod
-    def of(cls, points: np.ndarray, unit: str = "m", subject: object = "target") -> CanonicalFrame:
+    def of(
+        cls, points: np.ndarray, unit: str = "m", subject: object = "target", say: str = IN_CONFIG
+    ) -> CanonicalFrame:
         """Measure the points (N, 3) of a target.
+
+        Args:
+            subject, say: what the target is, and how its unit is given, for messages.
 
         Raises:
             InputError: too few points, NaN, points on one line, or a diameter that the unit does not give.
@@ -31,7 +37,7 @@ class CanonicalFrame:
         require_cloud_points(points, subject)
         points = thin(points, MEASURED_POINTS, "frame")
         size = diameter(points, subject)
-        require_size(size * meters_per(unit), subject)
+        require_size(size * meters_per(unit), subject, say)
         return cls((points.min(axis=0) + points.max(axis=0)) / 2, size)
 
     def coordinates(self, points: np.ndarray) -> np.ndarray:

@@ -12,6 +12,8 @@ from gpca.alignment.icp import ICPSettings
 from gpca.alignment.rigid import require_rigid, transform
 from gpca.errors import InputError
 from gpca.objects.canonical import normals_towards_camera
+from gpca.objects.cloud_objects import as_points
+from gpca.objects.units import AS_ARGUMENT
 
 LARGEST_RATIO = 8.0  # the extents of source and target may differ so much; in the wrong unit they differ by 10 or more
 # Diameters of the target between its center and the source: farther off, nothing can meet, and the unit may be wrong.
@@ -61,11 +63,11 @@ class Clouds:
         Raises:
             InputError: see :meth:`gpca.model.explainer.Explainer.explain`.
         """
-        source, target = (np.asarray(points, np.float64) for points in (source_points, target_points))
+        source, target = as_points(source_points, "source"), as_points(target_points, "target")
         T_init = np.eye(4) if T_target_source_init is None else np.array(T_target_source_init, np.float64)
         require_rigid(T_init, "initial pose")
         require_cloud_points(source, "source")
-        frame = frame or CanonicalFrame.of(target, unit)
+        frame = frame or CanonicalFrame.of(target, unit, say=AS_ARGUMENT)
         target = frame.coordinates(_thinned(target, cloud_points, "target", notes))
         seen = _thinned(source, cloud_points, "source", notes)
         source = frame.coordinates(transform(T_init, seen))

@@ -1,4 +1,4 @@
-"""A file of points or of a mesh as a user has it, read for one explanation: PLY, PCD, OBJ, STL, OFF."""
+"""A file of points or of a mesh as a user has it, read for one explanation; `SUFFIXES` says which formats."""
 
 from __future__ import annotations
 
@@ -11,12 +11,13 @@ from gpca.alignment.rigid import require_rigid
 from gpca.errors import InputError
 from gpca.io.limits import require_file
 from gpca.numerals import decimal
-from gpca.objects import mesh_folder, pcd
+from gpca.objects import mesh_folder, pcd, point_tables, scanner_files
 from gpca.objects.canonical import bounding_center, canonical_cloud
+from gpca.objects.units import AS_OPTION
 
 SAMPLED_POINTS = 16384  # so many are drawn on a mesh, as on the objects of the training
 LARGEST_POSE_BYTES = 10**5  # 16 numbers, however they are written
-SUFFIXES = (*mesh_folder.SUFFIXES, ".pcd")
+SUFFIXES = (*mesh_folder.SUFFIXES, ".pcd", *point_tables.READERS, *scanner_files.PACKAGES)
 
 
 def require_format(path: Path) -> None:
@@ -33,21 +34,28 @@ def read_points(path: Path, unit: str) -> tuple[np.ndarray, CanonicalFrame]:
         unit: the file's: ``m``, ``cm`` or ``mm``.
 
     Raises:
-        InputError: no such file, another format, unreadable, too few points, NaN, a mesh without area, or a diameter
-            that this unit does not give.
+        InputError: no such file, another format, a package that is missing, unreadable, too few points, NaN, a mesh
+            without area, or a diameter that this unit does not give.
     """
     scale = mesh_folder.meters_per(unit)
     require_format(path)
-    if path.suffix.lower() == ".pcd":
-        points = pcd.parse(path.read_bytes(), path)
-    else:
+    if path.suffix.lower() in mesh_folder.SUFFIXES:
         surface = mesh_folder.read_surface(path, scale)
         if surface.faces is not None:
-            points_m, _, diameter_m = canonical_cloud(surface, "mesh", SAMPLED_POINTS)
+            points_m, _, diameter_m = canonical_cloud(surface, "mesh", SAMPLED_POINTS, AS_OPTION)
             frame = CanonicalFrame(bounding_center(surface) / scale, diameter_m / scale)
             return points_m.astype(np.float64) / scale + frame.center_3, frame
         points = surface.vertices_m / scale
-    return points, CanonicalFrame.of(points, unit, path)
+    else:
+        points = _cloud(path)
+    return points, CanonicalFrame.of(points, unit, path, AS_OPTION)
+
+
+def _cloud(path: Path) -> np.ndarray:
+    suffix = path.suffix.lower()
+    if suffix == ".pcd":
+        return pcd.parse(path.read_bytes(), path)
+    return point_tables.read_table(path) if suffix in point_tables.READERS else scanner_files.read_scanner_file(path)
 
 
 def read_pose(path: Path) -> np.ndarray:

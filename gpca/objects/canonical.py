@@ -15,6 +15,7 @@ from gpca.io.arrays import REAL, REGENERATE, TEXT, WHOLE, load_arrays, save_arra
 from gpca.io.names import is_name
 from gpca.objects.splits import DRAWN, families_and_folds, read_object_splits, without_unused
 from gpca.objects.surface import Surface, instance_of
+from gpca.objects.units import IN_CONFIG
 from gpca.process.environment import open3d_cloud, require_open3d
 
 FEWEST_CLOUD_POINTS = 64
@@ -80,7 +81,9 @@ def diameter(points: np.ndarray, subject: object) -> float:
     return float(max(cdist(block, hull).max() for block in blocks))
 
 
-def canonical_cloud(surface: Surface, source: str, n_points: int = 16384) -> tuple[np.ndarray, np.ndarray, float]:
+def canonical_cloud(
+    surface: Surface, source: str, n_points: int = 16384, say: str = IN_CONFIG
+) -> tuple[np.ndarray, np.ndarray, float]:
     """Sample a surface uniformly and center it on its bounding box.
 
     A mesh gives `n_points` area-uniform samples with the normals of their triangles. A point cloud keeps all its
@@ -90,6 +93,7 @@ def canonical_cloud(surface: Surface, source: str, n_points: int = 16384) -> tup
         surface: vertices in meters.
         source: the source's name; with the surface's name it seeds the draw.
         n_points: points drawn from a mesh.
+        say: how the unit is given, for messages.
 
     Returns:
         points_m (P, 3) float32, normals (P, 3) float32 unit, diameter in meters of the vertices.
@@ -115,7 +119,7 @@ def canonical_cloud(surface: Surface, source: str, n_points: int = 16384) -> tup
             raise InputError(subject, "the mesh has no area", "export it again with its faces")
         hull_m, draw = _used_vertices(surface), _sampled
     diameter_m = diameter(hull_m, subject)
-    require_size(diameter_m, subject)
+    require_size(diameter_m, subject, say)
     points_m, normals = draw(surface, n_points, seeds.generator(source, surface.name, "surface"))
     return (points_m - bounding_center(surface)).astype(np.float32), normals.astype(np.float32), diameter_m
 
@@ -132,14 +136,13 @@ def _used_vertices(surface: Surface) -> np.ndarray:
     return vertices_m if surface.faces is None else vertices_m[np.unique(surface.faces)]
 
 
-def require_size(diameter_m: float, subject: object) -> None:
-    """Raise an InputError unless a diameter lies between 1 mm and 10 m, as one in the right unit does."""
+def require_size(diameter_m: float, subject: object, say: str = IN_CONFIG) -> None:
+    """Raise an InputError unless a diameter is 1 mm to 10 m, as in the right unit; `say` tells how that is given."""
     if SMALLEST_DIAMETER_M <= diameter_m <= LARGEST_DIAMETER_M:
         return
-    likely = "in millimeters? set unit: mm" if diameter_m > LARGEST_DIAMETER_M else "in meters? set unit: m"
-    raise InputError(
-        subject, f"its diameter is {diameter_m:.4g} m, so the declared unit looks wrong", f"is it {likely}"
-    )
+    unit, short = ("millimeters", "mm") if diameter_m > LARGEST_DIAMETER_M else ("meters", "m")
+    fault = f"its diameter is {diameter_m:.4g} m, so the declared unit looks wrong"
+    raise InputError(subject, fault, f"is it in {unit}? {say.format(short)}")
 
 
 def _area_vectors(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:

@@ -54,7 +54,14 @@ CLOUDS = {
     "nan.pcd": pcd([*POINTS[1:], ("nan", 0, 0)]),
     "two.pcd": pcd(POINTS[:, :2]),
     "points.txt": lambda path: np.savetxt(path, POINTS),
-    "points.npy": lambda path: np.save(path, POINTS),
+    "two.npy": lambda path: np.save(path, POINTS[:, :2]),
+    "objects.npy": lambda path: np.save(path, np.array([{}] * 99), allow_pickle=True),
+    "pickle.npz": lambda path: np.savez(path, points=np.array([{}] * 99)),
+    "wide.npz": lambda path: np.savez(path, first=POINTS, second=POINTS),
+    "nan.xyz": lambda path: np.savetxt(path, np.where(POINTS > 60, np.nan, POINTS)),
+    "words.csv": lambda path: path.write_text("a,b,c\n1,2,3\n"),
+    "odd.bin": lambda path: path.write_bytes(bytes(1001)),
+    "scan.las": lambda path: path.write_bytes(b"LASF"),
     "scene.glb": lambda path: path.write_bytes(BALL.export(file_type="glb")[:500]),
 }
 

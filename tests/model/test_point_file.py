@@ -47,9 +47,13 @@ def test_a_mesh_is_sampled_in_its_own_frame_and_measured_by_its_vertices(tmp_pat
         (lambda f: written(f, "few.ply", POINTS[:10]), "m", "few.ply: has 10 points; give 64 or more"),
         (lambda f: written(f, "few.pcd", POINTS[:10]), "m", "few.pcd: has 10 points"),
         (lambda f: written(f, "nan.ply", np.where(POINTS > 0.29, np.nan, POINTS)), "m", "nan.ply: .* contain NaN"),
-        (lambda f: written(f, "mm.ply", 1e3 * POINTS), "m", "mm.ply: its diameter is .* m, so the declared unit"),
+        (
+            lambda f: written(f, "mm.ply", 1e3 * POINTS),
+            "m",
+            "mm.ply: its diameter is .* in millimeters. give --unit mm",
+        ),
         (lambda f: written(f, "m.ply"), "mm", "m.ply: its diameter is .* m, so the declared unit"),
-        (lambda f: written(f, "cloud.ply").rename(f / "cloud.xyz"), "m", "cloud.xyz: has an unsupported format"),
+        (lambda f: written(f, "cloud.ply").rename(f / "cloud.abc"), "m", "cloud.abc: has an unsupported format"),
     ],
 )
 def test_a_file_that_cannot_be_right_is_one_line(tmp_path, make, unit, message):
