@@ -101,7 +101,8 @@ def library():
     """The files of the steps and of `gpca explain`."""
     steps = [*(ROOT / "gpca/steps").glob("[!_]*.py"), *(ROOT / "gpca/experiments").rglob("*step.py")]
     modules = (".".join(path.relative_to(ROOT).with_suffix("").parts) for path in steps)
-    return [*map(Path, code_files(*modules, "gpca.commands.explain")), *files_of("baselines")]
+    used = map(Path, code_files(*modules, "gpca.commands.explain"))
+    return [*(path for path in used if path.suffix == ".py"), *files_of("baselines")]
 
 
 def imported(files):

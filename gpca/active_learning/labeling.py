@@ -97,6 +97,7 @@ class Session:
         labels: the file of answers; those that it holds are learned at once.
         settings: how the classifier is fitted.
         strategy: which one of :mod:`gpca.active_learning.acquisition` asks.
+        gpc: a classifier that has learned already, and learns on; then `start` may be empty.
 
     Raises:
         InputError: fewer than two concepts are labeled.
@@ -111,6 +112,7 @@ class Session:
         settings: GPCSettings,
         strategy: str = "bald_kmeans",
         seed: int = 0,
+        gpc: GPC | None = None,
     ) -> None:
         self.keys = keys
         self.labels = labels
@@ -118,13 +120,8 @@ class Session:
         self._rows = {key: row for row, key in enumerate(keys)}
         self._random = generator("label", seed)
         self._start = dict(start)
-        concepts = tuple(dict.fromkeys(start.values()))
-        if len(concepts) < 2:
-            raise InputError("labeling", "starts with fewer than two labeled concepts", "name two with --known")
-        self.gpc = GPC(concepts, settings, "label", seed)
-        rows = [self._rows[key] for key in start]
-        self.gpc.fit(h_S_d[rows], np.array(list(start.values())), h_S_d)
-        self.gpc.refine()
+        self.gpc = _fitted(h_S_d, [self._rows[key] for key in start], start, settings, seed) if gpc is None else gpc
+        self._known = [] if gpc is None else [gpc.learned_N_d]  # standardized, what it learned before
         self.h_S_d = h_S_d
         self._learned: set[Key] = set()
         self.retrain()
@@ -154,7 +151,17 @@ class Session:
         projection = self.gpc.project(self.h_S_d[left])
         scores_N_C, variances_N_C, bald_N = self.gpc.attribute(projection)
         labeled = self.h_S_d[[self._rows[key] for key in (*self._start, *self.answered)]]
-        inputs_L_d = self.gpc.project(labeled).inputs_N_d
-        pool = Pool(projection.inputs_N_d, scores_N_C, bald_N, inputs_L_d, np.full(len(left), ""))
+        inputs_L_d = [*self._known, *([self.gpc.project(labeled).inputs_N_d] if len(labeled) else [])]
+        pool = Pool(projection.inputs_N_d, scores_N_C, bald_N, np.concatenate(inputs_L_d), np.full(len(left), ""))
         chosen = select(self._strategy, pool, batch, self._random)
         return [Question(left[i], scores_N_C[i], variances_N_C[i], float(bald_N[i])) for i in chosen]
+
+
+def _fitted(h_S_d: np.ndarray, rows: list[int], start: Mapping[Key, str], settings: GPCSettings, seed: int) -> GPC:
+    concepts = tuple(dict.fromkeys(start.values()))
+    if len(concepts) < 2:
+        raise InputError("labeling", "starts with fewer than two labeled concepts", "name two with --known")
+    gpc = GPC(concepts, settings, "label", seed)
+    gpc.fit(h_S_d[rows], np.array(list(start.values())), h_S_d)
+    gpc.refine()
+    return gpc

@@ -5,32 +5,41 @@ from __future__ import annotations
 import json
 import sys
 from argparse import ArgumentParser, Namespace
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from gpca.errors import InputError
+from gpca.io.files import require_outputs
 from gpca.model.location import model_path, require_model
 from gpca.model.point_file import read_points, read_pose, require_format
 from gpca.objects.mesh_folder import METERS_PER_UNIT
 from gpca.uncertainty.settings import MONTE_CARLO, UncertaintySettings
 
+if TYPE_CHECKING:
+    from gpca.model.explainer import Explainer
+    from gpca.model.explanation import Explanation
+
 UNKNOWN_STATUS = 3  # of the process; 1 is a failed check of another step, 2 a fault of the user's
+FORMATS = "PLY, PCD, OBJ, STL, OFF, npy, npz, xyz, csv, KITTI's bin, LAS, E57"
+FIGURE = "gpca.reporting.figures.explanation"  # by its name, since it needs matplotlib, which nothing else here does
 
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare files and options."""
-    parser.add_argument(
-        "source", type=Path, nargs="+", help="what was observed: points or a mesh (PLY, PCD, OBJ, STL, OFF)"
-    )
+    parser.add_argument("source", type=Path, nargs="+", help=f"what was observed: points or a mesh ({FORMATS})")
     parser.add_argument("target", type=Path, help="the reference that each source is aligned to")
     parser.add_argument("--init", type=Path, help="text file with the 4×4 numbers of T_target_source")
     parser.add_argument("--unit", choices=METERS_PER_UNIT, default="m", help="unit of files and pose (default m)")
     parser.add_argument("--model", type=Path, help="model file (default: GPCA_MODEL, one in ./results/, the package's)")
     parser.add_argument("--method", help="registration method, such as gicp (default: the model's ICP)")
-    parser.add_argument(
-        "--uncertainty", nargs="?", const=MONTE_CARLO, metavar="ESTIMATOR",
-        help="measure the uncertainty of the pose with an estimator such as brossard (default: Monte-Carlo)",
-    )  # fmt: skip
+    parser.add_argument("--uncertainty", action="store_true", help="measure the uncertainty of the pose")
+    parser.add_argument("--estimator", help="measure it with an estimator such as brossard (default: Monte-Carlo)")
     parser.add_argument("--fast", action="store_true", help="re-enact with fewer points and poses, without a promise")
+    parser.add_argument("--html", type=Path, metavar="FILE", help="write one page that shows all of it in 3-D")
+    parser.add_argument("--png", type=Path, metavar="FILE", help="write one figure that shows it")
+    parser.add_argument("--queue", type=Path, metavar="FILE", help="add what is queued to a file for 'gpca label'")
     form = parser.add_mutually_exclusive_group()
     form.add_argument("--json", action="store_true", help="print one JSON object")
     form.add_argument("--json-lines", action="store_true", help="print one line of JSON per source")
@@ -44,12 +53,7 @@ def run(options: Namespace) -> int:
     Returns:
         `UNKNOWN_STATUS` where one of the explanations means nothing, otherwise 0.
     """
-    if options.settings:
-        raise InputError("--settings", "is not used by explain", "make another model to change its settings")
-    if len(options.source) > 1 and not options.json_lines:
-        raise InputError("explain", f"{len(options.source)} sources need one line each", "add --json-lines")
-    uncertainty = UncertaintySettings() if options.uncertainty is not None else None
-    estimator = MONTE_CARLO if options.uncertainty is None else options.uncertainty
+    _require_fitting(options)
     path = model_path(options.model)
     require_model(path)
     for cloud in (*options.source, options.target):
@@ -57,7 +61,7 @@ def run(options: Namespace) -> int:
     T_init = read_pose(options.init) if options.init else None
     sources = [read_points(source, options.unit)[0] for source in options.source]
     target, frame = read_points(options.target, options.unit)
-    _require_known(options.method, options.uncertainty)
+    _require_known(options.method, options.estimator)
     import torch
 
     from gpca.model.explainer import Explainer
@@ -67,7 +71,12 @@ def run(options: Namespace) -> int:
     torch.set_num_threads(options.threads)
     say_when_compiling()
     model = Model.load(path)
-    requested = {"uncertainty": uncertainty, "method": options.method, "estimator": estimator, "fast": options.fast}
+    requested = {
+        "uncertainty": UncertaintySettings() if options.uncertainty or options.estimator else None,
+        "estimator": options.estimator or MONTE_CARLO,
+        "method": options.method,
+        "fast": options.fast,
+    }
     explainer = Explainer(model)
     trained_on = f"{model.title} (procedural stand-in)" if model.stand_in else model.title
     status = 0
@@ -82,13 +91,32 @@ def run(options: Namespace) -> int:
         warnings = [f"warning: {line}" for line in explanation.warnings] if as_json else []
         for line in (*explanation.notes, *warnings):
             print(line if len(sources) == 1 else f"{name}: {line}", file=sys.stderr)
+        names = {"source": str(name), "target": str(options.target), "model": str(path)}
         if as_json:
-            names = {"source": str(name), "target": str(options.target), "model": str(path), "trained_on": trained_on}
-            print(json.dumps(explanation.as_dict() | names), flush=options.json_lines)
+            told = explanation.as_dict() | names | {"trained_on": trained_on}
+            print(json.dumps(told), flush=options.json_lines)
         else:
             print(explanation.text(), end="")
-    print(f"model {path}, trained on {trained_on}", file=sys.stderr)
+        _write(options, explanation, names)
+        _queue(options.queue, explainer, explanation, f"{name} to {options.target}")
+    print(f"model {path}: {model.learning}", file=sys.stderr)
     return status
+
+
+def _require_fitting(options: Namespace) -> None:
+    """Refuse options that do not go together, and files that cannot be written."""
+    if options.settings:
+        raise InputError("--settings", "is not used by explain", "make another model to change its settings")
+    if len(options.source) > 1 and not options.json_lines:
+        raise InputError("explain", f"{len(options.source)} sources need one line each", "add --json-lines")
+    for name in ("html", "png"):
+        if getattr(options, name) and len(options.source) > 1:
+            raise InputError(f"--{name}", "shows one source", "explain one source after the other")
+    if options.png and find_spec("matplotlib") is None:
+        raise InputError("--png", "needs the package matplotlib, which is not installed", "pip install matplotlib")
+    read = [*options.source, options.target, options.init, options.model]
+    outputs = [path for path in (options.html, options.png, options.queue) if path]
+    require_outputs(outputs, [path for path in read if path])
 
 
 def _require_known(method: str | None, estimator: str | None) -> None:
@@ -101,3 +129,28 @@ def _require_known(method: str | None, estimator: str | None) -> None:
         from gpca.model.pose_spread import spread_estimator
 
         spread_estimator(estimator, UncertaintySettings())
+
+
+def _write(options: Namespace, explanation: Explanation, names: dict[str, str]) -> None:
+    """Write the page and the figure that were asked for."""
+    if options.html:
+        explanation.save_html(options.html, names)
+        print(f"page {options.html}", file=sys.stderr)
+    if options.png:
+        import_module(FIGURE).draw_explanation(explanation, options.png, f"{names['source']} to {names['target']}")
+        print(f"figure {options.png}", file=sys.stderr)
+
+
+def _queue(path: Path | None, explainer: Explainer, explanation: Explanation, name: str) -> None:
+    """Add a registration to the queue where that is the action; where no file is named, say how."""
+    from gpca.recovery.policy import QUEUE
+
+    if explanation.action != QUEUE or explanation.scene is None:
+        return
+    if path is None:
+        print("to label it: explain it with --queue queued.npz, then 'gpca label queued.npz'", file=sys.stderr)
+        return
+    from gpca.model.queue import add_to_queue
+
+    count = add_to_queue(path, explanation.scene, explainer.embed(explanation.scene.aligned), name)
+    print(f"queued in {path}, which holds {count}", file=sys.stderr)

@@ -1,8 +1,9 @@
 """Step ``label``: a person names the cause of the registrations that the classifier is least sure of.
 
-Each question shows a picture and the scores; the answer is a concept, known or new, or one of the commands below. It is
-in the labels file before the next question comes; the same command continues where labeling was stopped. Answers can
-come from a file or a pipe.
+They are those of a run, or those that ``gpca explain --queue`` has queued: then the model's own classifier asks, and
+learns the answers. Each question shows a picture and the scores; the answer is a concept, known or new, or one of the
+commands below. It is in the labels file before the next question comes; the same command continues where labeling was
+stopped. Answers can come from a file or a pipe.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import sys
 from argparse import ArgumentParser, Namespace
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
@@ -22,6 +24,7 @@ from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
 from gpca.io.files import require_outputs
 from gpca.io.limits import require_file
+from gpca.model.queue import Queue, is_queue
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.arguments import COUNT
@@ -29,13 +32,16 @@ from gpca.process.provenance import record_provenance
 from gpca.reporting.figures.cloud_views import draw_query
 from gpca.settings import read_settings
 
+if TYPE_CHECKING:
+    from gpca.model.file import Model
+
 COMMANDS = {"/retrain": "learn the answers so far", "/skip": "do not judge this one", "/quit": "stop here"}
 
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare files and names; ``--settings`` are those of the classifier, as of the explainer ``gpca``."""
-    parser.add_argument("registrations", type=Path)
-    parser.add_argument("--embeddings", required=True, type=Path, help="its embeddings")
+    parser.add_argument("registrations", type=Path, help="registrations of a run, or the queue of 'gpca explain'")
+    parser.add_argument("--embeddings", type=Path, help="embeddings of the registrations; a queue has its own")
     parser.add_argument("--labels", required=True, type=Path, help="CSV to which the answers are appended")
     parser.add_argument(
         "--known", nargs="+", choices=CONCEPTS, default=CONCEPTS[:2], help="concepts labeled at the start"
@@ -51,19 +57,29 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--predictions", type=Path, help="CSV of what the classifier says about every sample at the end"
     )
+    parser.add_argument("--model", type=Path, help="model that explained a queue (default: as of 'gpca explain')")
+    parser.add_argument("--out", type=Path, help="model file to write with what was learned from a queue")
 
 
 def run(options: Namespace) -> None:
     """Ask, write, retrain, until the questions, the answers or the samples are used up."""
     torch.set_num_threads(options.threads)
     settings = read_settings(GPCSettings, {"learning_rate": 0.2, "iterations": 150} | options.settings)
-    read = [options.registrations, options.embeddings, *([options.answers] if options.answers else [])]
-    require_outputs([path for path in (options.labels, options.picture, options.predictions) if path], read)
-    registrations, h_S_d = _load(options)
-    keys = list(zip(registrations.split.tolist(), registrations.sample.tolist(), strict=True))
-    start = _start(registrations, keys, options)
+    read = [options.registrations, options.embeddings, options.answers, options.model]
+    outputs = [options.labels, options.picture, options.predictions, options.out]
+    require_outputs([path for path in outputs if path], [path for path in read if path])
+    require_file(options.registrations, "no such file", "make it with Snakemake, or by 'gpca explain --queue'")
+    queued = is_queue(options.registrations)
+    _require_fitting(options, queued)
+    registrations, h_S_d, model = _queued(options) if queued else (*_load(options), None)
+    if isinstance(registrations, Queue):
+        keys = [("train", row) for row in range(len(registrations))]
+        start = {}
+    else:
+        keys = list(zip(registrations.split.tolist(), registrations.sample.tolist(), strict=True))
+        start = _start(registrations, keys, options)
     labels = LabelFile(options.labels, dict.fromkeys(keys))
-    session = Session(h_S_d, keys, start, labels, settings, options.strategy)
+    session = Session(h_S_d, keys, start, labels, settings, options.strategy, gpc=None if model is None else model.gpc)
     answers = _answers(options.answers)
     questions_asked = 0
     print(f"{len(start)} labeled at the start, {len(session.answered)} answered before, {len(keys)} samples")
@@ -75,10 +91,40 @@ def run(options: Namespace) -> None:
             questions_asked += 1
             answer = _ask(session, registrations, question, options.picture, answers)
             if answer in (None, "/quit"):
-                return _finish(session, registrations, options)
+                return _finish(session, registrations, model, options)
             labels.add(keys[question.row], SKIPPED if answer == "/skip" else answer)
         _retrain(session)
-    return _finish(session, registrations, options)
+    return _finish(session, registrations, model, options)
+
+
+def _require_fitting(options: Namespace, queued: bool) -> None:
+    """Refuse options that do not go with what is labeled."""
+    if queued:
+        for name in ("embeddings", "predictions"):
+            if getattr(options, name):
+                raise InputError(f"--{name}", "is not for the queue of an explanation", "leave it out")
+        if options.settings:
+            raise InputError("--settings", "are those of the model where a queue is labeled", "leave them out")
+    else:
+        if options.embeddings is None:
+            raise InputError("--embeddings", "is missing", "name the embeddings of the registrations")
+        for name in ("model", "out"):
+            if getattr(options, name):
+                raise InputError(f"--{name}", "is for the queue of an explanation alone", "leave it out")
+
+
+def _queued(options: Namespace) -> tuple[Queue, np.ndarray, Model]:
+    """Return a queue, its embeddings, and the model whose classifier asks."""
+    from gpca.model.file import Model
+    from gpca.model.location import model_path
+
+    path = model_path(options.model)
+    model, queue = Model.load(path), Queue.load(options.registrations)
+    width = model.gpc.learned_N_d.shape[1]
+    if queue.h.shape[1] != width:
+        fault = f"holds embeddings of {queue.h.shape[1]} numbers, but those of {path} have {width}"
+        raise InputError(options.registrations, fault, "name the model that explained them with --model")
+    return queue, queue.h, model
 
 
 def _load(options: Namespace) -> tuple[Registrations, np.ndarray]:
@@ -101,7 +147,9 @@ def _answers(path: Path | None):
     return path.open(encoding="utf-8")
 
 
-def _ask(session: Session, registrations: Registrations, question: Question, picture: Path, answers) -> str | None:
+def _ask(
+    session: Session, registrations: Registrations | Queue, question: Question, picture: Path, answers
+) -> str | None:
     """Show one question until it is answered; None at the end of the answers."""
     row = question.row
     split, sample = session.keys[row]
@@ -140,15 +188,26 @@ def _retrain(session: Session) -> None:
     print(f"  learned {answers}; concepts: {', '.join(session.gpc.classes)}")
 
 
-def _finish(session: Session, registrations: Registrations, options: Namespace) -> None:
+def _finish(session: Session, registrations: Registrations | Queue, model: Model | None, options: Namespace) -> None:
     session.retrain()
     answered = session.answered
     counts = ", ".join(f"{c} {list(answered.values()).count(c)}" for c in dict.fromkeys(answered.values())) or "none"
     print(f"\n{options.labels}: {counts}")
-    if options.predictions:
+    if model is not None and options.out:
+        _write_model(model, session, options.out)
+    if options.predictions and isinstance(registrations, Registrations):
         scores_N_C, variances_N_C, bald_N = session.gpc.attribute(session.h_S_d)
         attribution = Attribution.of_scores(session.gpc.classes, scores_N_C, seconds=0.0)
         attribution = replace(attribution, variances_N_C=variances_N_C, bald_N=bald_N)
         inputs = [options.registrations, options.embeddings, *([options.labels] if options.labels.is_file() else [])]
         with record_provenance([options.predictions], inputs, options.settings):
             write_predictions(options.predictions, registrations, attribution)
+
+
+def _write_model(model: Model, session: Session, path: Path) -> None:
+    """Write the model with the classifier that has learned the answers; its diagnosis is as before."""
+    if new := [concept for concept in session.gpc.classes if concept not in CONCEPTS]:
+        fault = f"is not written: a model file cannot hold the new concept {', '.join(new)}"
+        raise InputError(path, fault, "the labels are kept; name one of " + ", ".join(CONCEPTS) + " instead")
+    replace(model, gpc=session.gpc).save(path)
+    print(f"{path}: the model whose GP-CA has learned them; the diagnosis is as before")

@@ -19,6 +19,7 @@ from gpca.experiments.diagnosis.judged import CEILING, POOLED
 from gpca.experiments.diagnosis.measures import RECALL
 from gpca.experiments.diagnosis.metrics import read_intervals
 from gpca.io.files import require_outputs, whole_file
+from gpca.model.card import DIAGNOSED
 from gpca.model.diagnoser import REENACTED, Diagnoser
 from gpca.model.file import VERSION, Model
 from gpca.model.origin import License, Origin
@@ -99,7 +100,7 @@ def _file(name: str, content: bytes, origin: Origin) -> str:
 
 
 def _training(model: Model, diagnoser: Diagnoser, origin: Origin) -> list[str]:
-    rows = [(source.title, source.objects, "diagnosis" if source.diagnosed else "GP-CA") for source in origin.sources]
+    rows = [(source.title, source.objects, DIAGNOSED if source.diagnosed else "GP-CA") for source in origin.sources]
     return [
         f"The diagnosis was trained on {diagnoser.classifier.samples} registrations whose causes were measured by "
         "counterfactuals (docs/causes.md). Their source clouds were sampled from the objects' surfaces and perturbed. "

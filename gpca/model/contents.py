@@ -73,6 +73,9 @@ def require_possible(content: Mapping, settings: EncoderSettings) -> None:
             raise ValueError(f"option {name}: {value!r} is not from 0 to {MOST_NEIGHBORS}")
     if not isinstance(content["title"], str) or not content["title"].isprintable():
         raise ValueError("its title is not a line of text")
+    titles = content.get("learned_from", [])
+    if not isinstance(titles, list) or not all(isinstance(title, str) and title.isprintable() for title in titles):
+        raise ValueError("learned_from is not a list of lines of text")
     _require_treatments(content["treatments"])
     if type(content["stand_in"]) is not bool:
         raise ValueError("stand_in is neither true nor false")

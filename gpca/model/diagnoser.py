@@ -25,7 +25,7 @@ from gpca.model.guaranteed import Guaranteed, scores_of_states
 from gpca.model.reenacted import Reenacted
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reenactment.dataset import Reenactments, row_of
-from gpca.reenactment.enactment import reenact
+from gpca.reenactment.enactment import Enactment, reenact
 from gpca.reenactment.features import reenactment_features
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface
@@ -105,11 +105,23 @@ class Diagnoser:
         if self.reads == REMEDIED:
             described, _ = describe(pair, self.descriptors, self.runs.icp)
             return np.concatenate([described[group] for group in GROUPS]), None
-        truth, surface = CauseSettings(**vars(self.runs), moved=self.moved), ModelSurface(pair.model)
-        enactments = reenact(pair, self.reenactment, truth, surface)
+        surface = ModelSurface(pair.model)
+        enactments, truth = self.enacted(pair, surface)
         row = row_of(enactments, pair, self.reenactment, truth)
         said = Reenacted.of(enactments, row["weight"][: len(enactments)], T_icp, surface)
         return reenactment_features(Reenactments.of_rows([row], truth))[0], said
+
+    def enacted(self, pair: ObservedPair, surface: ModelSurface) -> tuple[list[Enactment], CauseSettings]:
+        """Return the re-enactments of a :meth:`pair`, the most probable first, and how they were registered."""
+        truth = CauseSettings(**vars(self.runs), moved=self.moved)
+        return reenact(pair, self.reenactment, truth, surface), truth
+
+    def enacted_again(
+        self, observed: np.ndarray, model: np.ndarray, T_icp: np.ndarray
+    ) -> tuple[list[Enactment], CauseSettings]:
+        """Return what :meth:`diagnose` re-enacts of the same clouds."""
+        pair = self.pair(observed, model, T_icp)
+        return self.enacted(pair, ModelSurface(pair.model))
 
     def pair(self, observed: np.ndarray, model: np.ndarray, T_icp: np.ndarray) -> ObservedPair:
         """Return the pair with runs of ICP from other starts, as the training has them."""

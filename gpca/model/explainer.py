@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 
@@ -21,17 +22,22 @@ from gpca.alignment.methods.interface import Outcome, Pair
 from gpca.alignment.methods.registry import make_method
 from gpca.alignment.rigid import inverse, transform
 from gpca.attribution.scores import entropy
+from gpca.causes.settings import Limits
 from gpca.causes.truth import NOMINAL
 from gpca.encoders.training import best_device
 from gpca.errors import InputError
+from gpca.model.advice import CHECK
 from gpca.model.clouds import Clouds
 from gpca.model.diagnoser import QUICK_HYPOTHESES, QUICK_POINTS
 from gpca.model.diagnosis import Diagnosis
-from gpca.model.explanation import CHECK, Explanation, PoseSpread
+from gpca.model.explanation import Explanation, PoseSpread
 from gpca.model.familiarity import Void, voids_of
 from gpca.model.file import Model
 from gpca.model.location import model_path
 from gpca.model.pose_spread import NAMES, estimated_spread, spread_estimator, spread_of_icp
+from gpca.model.scene import Scene
+from gpca.objects.cloud_objects import as_points
+from gpca.objects.units import AS_ARGUMENT
 from gpca.recovery.policy import NOTHING, Decision, RecoveryPolicy
 from gpca.seeds import generator, seed_of
 from gpca.uncertainty.settings import MONTE_CARLO, UncertaintySettings
@@ -80,7 +86,8 @@ class Explainer:
         """Register the source to the target, and say why that is uncertain. The same clouds give the same numbers.
 
         Args:
-            source_points, target_points: (N, 3) what was observed, and the reference that it is aligned to.
+            source_points, target_points: (N, 3) what was observed, and the reference that it is aligned to: arrays, or
+                clouds of Open3D.
             T_target_source_init: (4, 4) where ICP starts; the identity by default.
             unit: that of points and pose: ``m``, ``cm`` or ``mm``.
             frame: the target's, where it is known already; by default it is measured on its points.
@@ -109,7 +116,7 @@ class Explainer:
         with _timed(seconds, "icp"):
             at_pose = self._aligned(clouds, register, method, notes)
         voids = voids_of(clouds.source, clouds.target, at_pose.fitness, self.model.familiar)
-        diagnosis = None
+        diagnosis, enact = None, None
         if diagnose and (diagnoser := self.model.diagnoser) is not None:
             diagnoser = diagnoser.quick() if fast else diagnoser
             with _timed(seconds, "diagnosis"):
@@ -118,7 +125,9 @@ class Explainer:
             diagnosis = replace(outside, void=bool(voids))
             if diagnosis.reenacted is None:
                 notes.append(NOTHING_REENACTED)
-            elif fast:
+            else:
+                enact = partial(diagnoser.enacted_again, clouds.source, clouds.target, at_pose.T_target_source)
+            if fast and enact is not None:
                 notes.append(FAST)
         with _timed(seconds, "embedding"):
             h_1_d = self.embed(transform(at_pose.T_target_source, clouds.source))
@@ -154,6 +163,11 @@ class Explainer:
             seconds=seconds | {"total": perf_counter() - started},
             notes=tuple(notes),
             warnings=tuple(warnings),
+            learned_from=self.model.learning,
+            scene=Scene(
+                *(clouds.source, clouds.target, at_pose.T_target_source, clouds.frame),
+                *(self.model.icp.correspondence_distance, Limits().failed, enact),
+            ),
         )
 
     def explain_many(
@@ -168,7 +182,8 @@ class Explainer:
     ) -> Iterator[Explanation]:
         """Yield the explanation of each pair in turn, as :meth:`explain` gives it.
 
-        The frame of a target that is the same array as that of the pair before is measured once.
+        The frame of a target that is the same array as that of the pair before is measured once. Many explanations are
+        kept without the clouds that a page needs.
 
         Args:
             pairs: source, target, and the pose where ICP starts if it is not the identity.
@@ -182,9 +197,11 @@ class Explainer:
         for number, (source_points, target_points, *init) in enumerate(pairs):
             try:
                 if frame is None or target_points is not known:
-                    known, frame = target_points, CanonicalFrame.of(np.asarray(target_points, np.float64), unit)
+                    points = as_points(target_points, "target")
+                    known, frame = target_points, CanonicalFrame.of(points, unit, say=AS_ARGUMENT)
                 T_init = init[0] if init else None
-                yield self.explain(source_points, target_points, T_init, unit, frame, *options)
+                explanation = self.explain(source_points, target_points, T_init, unit, frame, *options)
+                yield replace(explanation, scene=None)
             except InputError as fault:
                 raise InputError(f"pair {number}", str(fault)) from fault
 

@@ -3,22 +3,17 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 import numpy as np
 
+from gpca.io.files import whole_file
+from gpca.model.advice import CHECK, WORDS
 from gpca.model.diagnosis import UNKNOWN, Diagnosis
-from gpca.recovery.policy import NOTHING, QUEUE
-
-CHECK = "check"  # the branch of an explanation without meaning: the user checks the input
-WORDS = {  # the advice to a reader for each branch
-    NOTHING: "none",
-    "reinitialize": "reinitialize ICP with a broader search",
-    "new_view": "change the viewpoint",
-    "denoise": "filter and check the sensor",
-    CHECK: "check what was given",
-    QUEUE: "queue for labeling, so that the cause can be learned",
-}
+from gpca.model.scene import Scene
+from gpca.model.shown.page import framed, page
 
 
 @dataclass(frozen=True)
@@ -69,6 +64,8 @@ class Explanation:
         seconds: those of each stage, and ``total``.
         notes: what was done to the clouds, such as points that were left out.
         warnings: why this explanation is not to be relied on: what is unlike all that the model learned.
+        learned_from: what the diagnosis learned from, in words.
+        scene: what it is drawn from (:meth:`html`); None where it came as one of many.
     """
 
     T_target_source: np.ndarray
@@ -88,11 +85,18 @@ class Explanation:
     seconds: dict[str, float]
     notes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
+    learned_from: str = ""
+    scene: Scene | None = field(default=None, repr=False, compare=False)
 
     @property
     def unknown(self) -> bool:
         """Whether the pair is such that neither diagnosis nor scores mean anything."""
         return self.action == CHECK
+
+    @property
+    def advice(self) -> str:
+        """What to do next, in words."""
+        return WORDS.get(self.action, self.action)
 
     def as_dict(self) -> dict[str, object]:
         """Return it as numbers, lists and names, for JSON."""
@@ -103,7 +107,8 @@ class Explanation:
             "estimator": self.spread.estimator,
             "starts": self.spread.starts,
         }
-        return vars(self) | {
+        told = {name: value for name, value in vars(self).items() if name != "scene"}
+        return told | {
             "T_target_source": self.T_target_source.tolist(),
             "diagnosis": self.diagnosis and self.diagnosis.as_dict(),
             "spread": spread,
@@ -111,9 +116,30 @@ class Explanation:
             "warnings": list(self.warnings),
         }
 
+    def html(self, names: Mapping[str, str] | None = None) -> str:
+        """Return it as a page of its own, without any other file: both clouds in 3-D, causes, poses, counterfactuals.
+
+        Args:
+            names: of the files and the model, which the page lists.
+        """
+        reenacted = self.diagnosis.reenacted if self.diagnosis else None
+        # Poses of a pair without meaning would mean nothing either.
+        scene = replace(self.scene, enact=None) if self.scene is not None and self.unknown else self.scene
+        named = {"training": self.learned_from} | dict(names or {})
+        return page(self.as_dict(), self.advice, reenacted, scene, named)
+
+    def save_html(self, path: str | Path, names: Mapping[str, str] | None = None) -> None:
+        """Write :meth:`html` to a file."""
+        with whole_file(path) as partial:
+            partial.write_text(self.html(names), encoding="utf-8")
+
+    def _repr_html_(self) -> str:
+        """Return the page as a notebook shows it."""
+        return framed(self.html())
+
     def text(self) -> str:
         """Return it for a reader."""
-        action = f"action    {WORDS.get(self.action, self.action)} ({self.reason})"
+        action = f"action    {self.advice} ({self.reason})"
         registered = (
             f"registration   {self.method}, fitness {self.fitness:.3f}, inlier RMSE {self.inlier_rmse:.4g} {self.unit}"
         )

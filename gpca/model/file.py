@@ -17,6 +17,7 @@ from gpca.encoders.registry import make_encoder
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.tensor_file import read_tensors, write_tensors
 from gpca.errors import InputError
+from gpca.model.card import titles_of_diagnosis
 from gpca.model.contents import require_possible
 from gpca.model.diagnoser import Diagnoser
 from gpca.model.familiarity import Familiarity
@@ -41,6 +42,7 @@ class Model:
         policy: the actions for the causes.
         title, stand_in: of the objects that GP-CA learned, and whether they were drawn by the package.
         familiar: ranges of simple measures of the clouds that GP-CA learned; None in older files.
+        learned_from: titles of the objects that the diagnosis learned from; empty where nothing says so.
     """
 
     diagnoser: Diagnoser | None
@@ -53,11 +55,21 @@ class Model:
     title: str
     stand_in: bool
     familiar: Familiarity | None = None
+    learned_from: tuple[str, ...] = ()
 
     @property
     def concepts(self) -> tuple[str, ...]:
         """Names of the causes that it tells apart, in the order of the scores."""
         return self.gpc.classes
+
+    @property
+    def learning(self) -> str:
+        """What all of it was learned from, in words."""
+        paper = f"{self.title} (procedural stand-in)" if self.stand_in else self.title
+        if self.diagnoser is None:
+            return f"GP-CA as in the paper learned from {paper}; there is no diagnosis"
+        objects = ", ".join(self.learned_from) or "objects that the model file does not name"
+        return f"the diagnosis learned from {objects}; GP-CA as in the paper from {paper}"
 
     def save(self, path: str | Path) -> None:
         """Write the file; the same model gives the same bytes."""
@@ -79,6 +91,8 @@ class Model:
         }
         if self.familiar is not None:
             content["familiar"] = {name: list(ends) for name, ends in self.familiar.ranges.items()}
+        if self.learned_from:
+            content["learned_from"] = list(self.learned_from)
         write_tensors(path, content)
 
     @classmethod
@@ -114,6 +128,7 @@ class Model:
                 policy=RecoveryPolicy(Thresholds(**content["thresholds"]), dict(content["treatments"])),
                 cloud_points=content["points"],
                 familiar=familiar and Familiarity({name: (low, high) for name, (low, high) in familiar.items()}),
+                learned_from=tuple(content.get("learned_from", ())) or titles_of_diagnosis(Path(path)),
                 **{name: content[name] for name in ("title", "stand_in")},
             )
         except (LookupError, TypeError, ValueError, RuntimeError, AttributeError) as fault:

@@ -135,13 +135,17 @@ class Reenacted:
         ]
         return asdict(self) | {"poses": poses}
 
+    def words(self, unit: str) -> list[str]:
+        """Return where each of the poses lies from the result, behind the word that it fits."""
+        return [pose.words(unit, "also fits" if number else "fits") for number, pose in enumerate(self.poses)]
+
     def lines(self, unit: str) -> list[str]:
         """Return it for a reader."""
         effects = ", ".join(f"{cause} {effect:.2g}" for cause, effect in self.effects.items())
         parts = f"{self.outliers:.0%} outliers, {self.missing:.0%} of the surface missing"
         poses = [
-            f"{pose.words(unit, 'also fits' if number else 'fits')}: probability {pose.probability:.2f}"
-            for number, pose in enumerate(self.poses)
+            f"{words}: probability {pose.probability:.2f}"
+            for words, pose in zip(self.words(unit), self.poses, strict=True)
         ]
         return [
             f"effects   on the re-enacted error of {self.error:.2g} {unit}: {effects}",

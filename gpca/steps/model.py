@@ -53,6 +53,7 @@ def run(job: Job) -> None:
             else RecoveryPolicy(),
             title=job.title,
             stand_in=job.get("stand_in"),
+            learned_from=tuple(job.get("learned_from", ())),
             familiar=Familiarity.of(
                 (registrations.cloud(row).astype(float), registrations.target(row).astype(float))
                 for row in registrations.rows("train")

@@ -20,15 +20,21 @@ FAULTS = [
     (truncated("model.pt"), {}, r"model.pt: is damaged or not a model"),
     (truncated("meshes/cone.ply"), {}, r"cone.ply: is truncated or not a readable .ply file"),
     (removed("meshes/brick.stl"), {}, r"brick.stl: no such file; give one of .ply"),
-    (untouched, {"--unit": "m"}, r"mesh: object 'brick': its diameter is 128.5 m, so the declared unit"),
+    (
+        untouched,
+        {"--unit": "m"},
+        r"brick': its diameter is 128.5 m, so .* looks wrong; is it in millimeters. give --unit mm",
+    ),
     (written("pose.txt", "1 0 0"), {"--init": "pose.txt"}, r"pose.txt: contains 3 numbers; give 4×4"),
     (untouched, {"--init": "pose.txt"}, r"pose.txt: no such file"),
     (untouched, {"--method": "icp"}, r"explain: registration method 'icp': unknown; choose one of fgr, "),
-    (untouched, {"--uncertainty": "gauss"}, r"explain: estimator 'gauss': unknown; choose one of .*brossard"),
-    (untouched, {"--uncertainty": "cello"}, r"explain: estimator 'cello': learns from registrations"),
-    (untouched, {"--uncertainty": ""}, r"--uncertainty: '' is empty or does not fit on one line"),
+    (untouched, {"--estimator": "gauss"}, r"explain: estimator 'gauss': unknown; choose one of .*brossard"),
+    (untouched, {"--estimator": "cello"}, r"explain: estimator 'cello': learns from registrations"),
+    (untouched, {"--estimator": ""}, r"--estimator: '' is empty or does not fit on one line"),
     (untouched, {"meshes/cone.ply": ["meshes/cone.ply"]}, r"explain: 2 sources need one line each; add --json-lines"),
     (untouched, {"--settings": {"draws": 3}}, r"--settings: is not used by explain"),
+    (untouched, {"--html": "meshes/cone.ply"}, r"cone.ply: is also an input or another output"),
+    (untouched, {"--png": "lost/../model.pt", "--model": "model.pt"}, r"model.pt: is also an input"),
 ]
 
 
@@ -47,7 +53,10 @@ def test_an_explanation_is_on_stdout_and_what_led_to_it_on_stderr(folder, capsys
     assert explanation["spread"]["starts"] == 50
     assert explanation["trained_on"] == "Tiny (procedural stand-in)"
     assert "source: 128 of 16384 points, drawn at random\n" in err
-    assert "model model.pt, trained on Tiny (procedural stand-in)\n" in err
+    assert err.endswith(
+        "model model.pt: the diagnosis learned from objects that the model file does not name; "
+        "GP-CA as in the paper from Tiny (procedural stand-in)\n"
+    )
     assert main(arguments("explain", {"--json": None})) == 0
     text = capsys.readouterr().out
     for word in ("concept", "action", "variance", "fitness", "T_target_source, in mm"):
@@ -95,7 +104,7 @@ def loaded_by(folder, *words):
 def test_a_file_that_cannot_be_used_is_refused_before_heavy_libraries_are_loaded(tmp_path, fault):
     source, options = tmp_path / "cloud.ply", ["--model", SHIPPED]
     if fault == "suffix":
-        source = tmp_path / "cloud.xyz"
+        source = tmp_path / "cloud.abc"
     if fault == "folder":
         source.mkdir()
     elif fault != "missing":
@@ -114,7 +123,7 @@ def test_an_explanation_loads_no_library_that_it_does_not_need(folder):
 
 
 def test_an_estimator_says_how_uncertain_another_methods_pose_is(folder, capsys):
-    assert main(arguments("explain", {"--method": "gicp", "--uncertainty": "brossard"})) == 0
+    assert main(arguments("explain", {"--method": "gicp", "--estimator": "brossard"})) == 0
     spread = json.loads(capsys.readouterr().out)["spread"]
     assert spread["estimator"] == "brossard"
     assert spread["starts"] is None
@@ -167,3 +176,20 @@ def test_several_sources_are_a_line_each(folder, capsys):
     assert {line["target"] for line in lines} == {"meshes/cone.ply"}
     assert all(set(line["diagnosis"]["causes"]) == {"noise", "pose", "overlap"} for line in lines)
     assert "meshes/brick.stl: source: 128 of 16384 points, drawn at random\n" in err
+
+
+def test_an_option_without_a_value_swallows_no_file(folder, capsys):
+    words = ["explain", "--uncertainty", "meshes/brick.stl", "meshes/cone.ply", "--unit", "mm", "--model", "model.pt"]
+    assert main([*words, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["spread"]["estimator"] == "monte_carlo"
+
+
+def test_page_and_figure_are_written_beside_the_text(folder, capsys):
+    assert main(arguments("explain", {"--json": None, "--html": "out/page.html", "--png": "figure.png"})) == 0
+    out, err = capsys.readouterr()
+    assert "state     " in out
+    assert "page out/page.html\nfigure figure.png\n" in err
+    page = (folder / "out/page.html").read_text()
+    assert "<dt>Source</dt><dd>meshes/brick.stl</dd>" in page
+    assert "T_target_source" in page
+    assert (folder / "figure.png").read_bytes().startswith(b"\x89PNG")

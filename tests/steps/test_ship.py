@@ -73,6 +73,11 @@ def test_what_is_shipped_explains_as_the_runs_model_does(folder, registrations):
     said = [Explainer(Model.load(path)).explain(source, target).as_dict() for path in ("real/model.pt", "shipped.pt")]
     for explanation in said:
         del explanation["seconds"]
+    # Where a model file does not say what its diagnosis learned from, its card does.
+    assert (
+        said[0].pop("learned_from").startswith("the diagnosis learned from objects that the model file does not name")
+    )
+    assert said[1].pop("learned_from") == "the diagnosis learned from Tiny things; GP-CA as in the paper from Frames"
     assert said[0] == said[1]
 
 

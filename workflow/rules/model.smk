@@ -87,6 +87,10 @@ rule model:
         seed=SEEDS[0],
         title=SHOWN["model"]["title"],
         stand_in=SHOWN["model"]["stand_in"],
+        learned_from=[
+            of["title"] + " (procedural stand-in)" * of["stand_in"]
+            for of in (SHOWN["sources"][source] for source in SOURCES)
+        ],
         settings=as_json(MODEL_SETTINGS),
     script:
         "../scripts/step.py"

@@ -1,0 +1,134 @@
+"""The page of an explanation: alone, small, and with all that the explanation says."""
+
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gpca.alignment.rigid import transform
+from gpca.causes.shapley import ALL, BY_SIZE
+from gpca.model.shown.packing import MOST_POINTS, packed, unpacked
+from gpca.model.shown.parts import taken_out
+
+from ..page.test_in_a_browser import chromium, in_a_browser
+
+LARGEST_BYTES = 2 * 10**6
+
+
+@pytest.fixture(scope="module")
+def explained(explainer, pair):
+    return explainer.explain(*pair)
+
+
+@pytest.fixture(scope="module")
+def html(explained):
+    return explained.html({"source": "scan <1>.ply"})
+
+
+def scene_of(html):
+    [text] = re.findall(r'<script type="application/json" id="scene">(.*?)</script>', html)
+    return json.loads(text)
+
+
+def test_a_page_is_one_small_file_that_asks_for_no_other(html):
+    assert len(html.encode()) < LARGEST_BYTES
+    assert not re.search(r"https?:|src=|@import|url\(", html)
+    assert re.findall(r'href="([^"]*)"', html) == ["data:,"]
+    assert "default-src 'none'" in html
+    assert "scan &lt;1&gt;.ply" in html
+
+
+def test_a_page_says_what_the_text_says(html, explained):
+    found = explained.diagnosis
+    for words in (explained.reason, *explained.diagnosis.causes, found.guarantee.call, "What to do", "What if?"):
+        assert words in html
+    for state in found.guarantee.states:
+        assert f'<li class="in">{state.replace("several", "several causes")}</li>' in html
+    assert html.count('class="what-if"') == 8 * len(found.reenacted.poses)
+    for pose in found.reenacted.poses:
+        assert f"<span>{pose.probability:.2f}</span>" in html
+
+
+def test_a_page_holds_both_clouds_and_every_registration_that_was_reenacted(html, explained):
+    scene, drawn = explained.scene, scene_of(html)
+    np.testing.assert_allclose(unpacked(drawn["target"]), scene.target, atol=1e-4)
+    np.testing.assert_allclose(unpacked(drawn["source"]), scene.source, atol=1e-4)
+    np.testing.assert_allclose(np.reshape(drawn["found"], (4, 4)), scene.T_found, atol=1e-6)
+    assert drawn["diameter"] == scene.frame.diameter
+    found = explained.diagnosis.reenacted
+    assert len(drawn["poses"]) == len(scene.possibilities) == len(found.poses)
+    for pose, possibility, of_page in zip(found.poses, scene.possibilities, drawn["poses"], strict=True):
+        assert pose.error == scene.frame.diameter * possibility.what_ifs[ALL].error
+        assert pose.probability == possibility.probability
+        for place, subset in enumerate(BY_SIZE):
+            points = possibility.what_ifs[subset].points
+            np.testing.assert_allclose(unpacked(of_page["what_ifs"][place]), points, atol=1e-3)
+
+
+def test_with_a_right_start_on_clean_and_whole_surface_the_cloud_ends_on_the_target(explained):
+    """The best case of the most probable pose, up to twice the spacing of the points."""
+    from scipy.spatial import cKDTree
+
+    points = explained.scene.possibilities[0].what_ifs[0].points
+    assert np.median(cKDTree(explained.scene.target).query(points)[0]) < 0.06
+
+
+def test_the_counterfactuals_are_named_by_what_is_taken_out():
+    assert taken_out(ALL) == "As it was"
+    assert taken_out(0) == "Clean points, right start, whole surface"
+    assert len({taken_out(subset) for subset in range(8)}) == 8
+
+
+def test_large_clouds_are_thinned():
+    points = np.random.default_rng(0).normal(size=(2 * MOST_POINTS, 3))
+    assert len(unpacked(packed(points))) == MOST_POINTS
+
+
+def test_a_notebook_shows_the_page_in_a_frame(explained):
+    shown = explained._repr_html_()
+    assert shown.startswith('<iframe srcdoc="&lt;!doctype html&gt;')
+    assert "<script" not in shown
+
+
+def test_one_of_many_has_no_view_and_an_unknown_one_no_poses(explainer, pair):
+    [many] = explainer.explain_many([pair])
+    assert many.scene is None
+    assert "<canvas" not in many.html()
+    assert "<h1" in many.html()
+    source, target = pair
+    unknown = explainer.explain(source + 100 * np.ptp(target), target)
+    assert unknown.unknown
+    page = unknown.html()
+    assert "Nothing can be said of this registration" in page
+    assert 'data-view="pose:0"' not in page
+    assert "<canvas" in page
+
+
+def test_a_fast_or_undiagnosed_one_has_its_page(explainer, pair):
+    assert "Nothing: a fast explanation" in explainer.explain(*pair, fast=True).html()
+    alone = explainer.explain(*pair, diagnose=False)
+    assert f"The leading concept is {alone.concept}" in alone.html()
+
+
+def test_an_explanation_and_its_scene_are_in_one_frame(explained, pair):
+    source, _ = pair
+    aligned = transform(explained.T_target_source, source)
+    frame = explained.scene.frame
+    np.testing.assert_allclose(frame.coordinates(aligned), explained.scene.aligned, atol=1e-6)
+    assert replace(explained, scene=None).as_dict() == explained.as_dict()
+
+
+@in_a_browser
+def test_a_browser_draws_every_view_and_has_nothing_to_complain_about(html, tmp_path):
+    choose = """<script>addEventListener("load", () => {
+      for (const button of document.querySelectorAll("[data-view]")) button.click();
+      document.querySelector('[data-view="what:0:3"]').click();
+    });</script></body>"""
+    # The page's policy allows scripts that stand in it.
+    (tmp_path / "page.html").write_text(html.replace("</body>", choose))
+    shown = chromium(tmp_path / "page.html", tmp_path / "profile", "--dump-dom", "--window-size=400,900")
+    assert 'data-shown="what:0:3"' in shown
+    assert "Re-enacted as if pose 1 were true, " in shown
+    assert "or more</span>" in shown

@@ -1,0 +1,36 @@
+"""The file of queued registrations, which grows."""
+
+import numpy as np
+import pytest
+
+from gpca.errors import InputError
+from gpca.model.queue import Queue, add_to_queue, is_queue
+
+
+@pytest.fixture(scope="module")
+def explained(explainer, pair):
+    return explainer.explain(*pair, diagnose=False)
+
+
+def test_a_queue_grows_by_one_and_keeps_what_it_had(explainer, explained, tmp_path):
+    path, scene = tmp_path / "queued.npz", explained.scene
+    h_1_d = explainer.embed(scene.aligned)
+    assert [add_to_queue(path, scene, n * h_1_d, f"scan{n}.ply to box.stl") for n in (1, 2, 3)] == [1, 2, 3]
+    queue = Queue.load(path)
+    assert is_queue(path)
+    assert queue.object_name.tolist() == [f"scan{n}.ply to box.stl" for n in (1, 2, 3)]
+    np.testing.assert_allclose(queue.h, np.arange(1, 4)[:, None] * h_1_d, rtol=1e-5)
+    for row in range(3):
+        np.testing.assert_allclose(queue.cloud(row), scene.aligned, atol=1e-6)
+        np.testing.assert_allclose(queue.target(row), scene.target, atol=1e-6)
+
+
+def test_what_is_no_queue_or_of_another_model_is_refused(explained, registrations, tmp_path):
+    registrations.save(tmp_path / "registrations.npz")
+    assert not is_queue(tmp_path / "registrations.npz")
+    assert not is_queue(tmp_path / "lost.npz")
+    with pytest.raises(InputError, match=r"registrations.npz: is not a queue; name another file with --queue"):
+        add_to_queue(tmp_path / "registrations.npz", explained.scene, np.zeros((1, 4)), "a to b")
+    add_to_queue(tmp_path / "queued.npz", explained.scene, np.zeros((1, 4)), "a to b")
+    with pytest.raises(InputError, match=r"queued.npz: is a queue of another model"):
+        add_to_queue(tmp_path / "queued.npz", explained.scene, np.zeros((1, 5)), "a to b")
