@@ -3,6 +3,7 @@
 A kind of source is a module beside this one with ``from_entry(entry, folder) -> Iterator[Surface]``; a new kind is
 such a file and nothing else; with a ``require_entry(entry, folder)`` it can refuse an entry whose data is at hand, as
 far as names of files tell, when a workflow loads. ``procedural`` needs no data and has ``surfaces(family)`` instead.
+Kinds that read or render depth frames stand among those (`OF_FRAMES`).
 """
 
 from __future__ import annotations
@@ -22,6 +23,8 @@ from gpca.objects import archive, download, procedural
 from gpca.objects.repository import folders_of_data, require_whole_if_ours
 from gpca.objects.surface import Surface
 
+# Kinds whose modules read depth frames, or render them, and stand there.
+OF_FRAMES = {"bop_views": "gpca.frames.bop_views", "mesh_views": "gpca.frames.mesh_views"}
 SYSTEM = ("/dev", "/proc", "/sys")
 # Keys of an entry that a procedural source has no use for: a config may lay one over a source of files.
 OF_FILES = ("location", "files", "objects", "unit", "url", "urls", "sha256", "views_per_instance")
@@ -128,7 +131,7 @@ def source_modules(entry: dict) -> list[str]:
     """Return the modules that read an entry: they are found by name at run time, so no import tells of them."""
     if entry["kind"] == "procedural":
         return ["gpca.objects.procedural", f"gpca.objects.shapes.{procedural.FAMILIES[entry['family']]}"]
-    return [f"gpca.objects.{entry['kind']}"]
+    return [_kinds()[entry["kind"]]]
 
 
 def _unpacked(file: Path) -> Path:
@@ -204,11 +207,16 @@ def _require_pattern(pattern: str) -> None:
 
 
 def _module_of(kind: object) -> ModuleType:
-    names = [module.name for module in pkgutil.iter_modules(objects.__path__)]
-    if kind in names and hasattr(module := import_module(f"gpca.objects.{kind}"), "from_entry"):
+    kinds = _kinds()
+    if kind in kinds and hasattr(module := import_module(kinds[str(kind)]), "from_entry"):
         return module
-    known = ["procedural"] + [name for name in names if hasattr(import_module(f"gpca.objects.{name}"), "from_entry")]
-    raise InputError(f"kind '{kind}'", "is not a kind of source", f"choose one of {', '.join(known)}")
+    known = [name for name, module in kinds.items() if hasattr(import_module(module), "from_entry")]
+    raise InputError(f"kind '{kind}'", "is not a kind of source", f"choose one of procedural, {', '.join(known)}")
+
+
+def _kinds() -> dict[str, str]:
+    """Return the module of every kind by name; not each module beside this one is of a kind."""
+    return {module.name: f"gpca.objects.{module.name}" for module in pkgutil.iter_modules(objects.__path__)} | OF_FRAMES
 
 
 def _as_list(value: str | list | None) -> list:

@@ -6,9 +6,13 @@ RGB-D datasets have views: clouds of one instance from several sides.
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -33,6 +37,14 @@ class Surface:
         if self.faces is None:
             raise ValueError(f"{self.name} is a point cloud")
         return self.faces
+
+
+def evenly(items: Sequence[T], most: int) -> list[T]:
+    """Return at most so many of the items, spread evenly over them.
+
+    The end is left out: the last frame of a turntable is the neighbor of its first.
+    """
+    return [items[i] for i in np.linspace(0, len(items), min(most, len(items)), endpoint=False).astype(int)]
 
 
 def instance_of(name: str) -> str:

@@ -10,13 +10,11 @@ from collections.abc import Callable, Iterable, Iterator
 from itertools import groupby
 from pathlib import Path, PurePosixPath
 
-import numpy as np
-
 from gpca.errors import InputError
 from gpca.io.limits import require_file
 from gpca.objects import archive, pcd
 from gpca.objects.mesh_folder import files_in, meters_per
-from gpca.objects.surface import Surface, instance_of, view_order
+from gpca.objects.surface import Surface, evenly, instance_of, view_order
 
 SUFFIXES = (".pcd", ".tar", ".tar.gz", ".tgz")
 READS_ARCHIVES = True  # only a few of the 600 views in a tar are wanted, so nothing is unpacked
@@ -62,9 +60,5 @@ def surfaces(paths: Iterable[Path], unit: str = "m", views_per_instance: int = 6
 def _chosen(views: list[_View], scale: float, views_per_instance: int) -> Iterator[Surface]:
     views = sorted(views, key=lambda view: view_order(view[0]))
     for _, group in groupby(views, key=lambda view: instance_of(view[0])):
-        of_instance = list(group)
-        # The end is left out: the turntable's last frame is the neighbor of its first.
-        steps = np.linspace(0, len(of_instance), min(views_per_instance, len(of_instance)), endpoint=False)
-        for step in steps.astype(int):
-            name, read, subject = of_instance[step]
+        for name, read, subject in evenly(list(group), views_per_instance):
             yield Surface(name, pcd.parse(read(), subject) * scale, None)
