@@ -8,6 +8,7 @@ from gpca.registry import load
 ENCODERS = {
     "dgcnn": "gpca.encoders.dgcnn:DGCNN",
     "pointnet": "gpca.encoders.pointnet:PointNet",
+    "pointnet_tnet": "gpca.encoders.pointnet_tnet:PointNetTNet",
     "pointnet2": "gpca.encoders.pointnet2:PointNet2",
     "pointnext": "gpca.encoders.pointnext:PointNeXt",
 }

@@ -79,7 +79,7 @@ class DGCNNOptions:
 
 @dataclass(frozen=True)
 class PointNetOptions:
-    """Options of the backbone ``pointnet``."""
+    """Options of the backbones ``pointnet`` and ``pointnet_tnet``."""
 
     width: Count = 64
 
@@ -96,6 +96,7 @@ class PointNet2Options(PointNetOptions):
     centroids: Annotated[int, Bounds(minimum=4)] = 256
     radius: PositiveShare = 0.1
     neighbours: Count = 32
+    as_published: bool = False
 
 
 @dataclass(frozen=True)
@@ -126,6 +127,7 @@ def require_draws(key: str, encoder: Mapping[str, Any], points: int, points_key:
 OPTIONS = {
     "dgcnn": DGCNNOptions,
     "pointnet": PointNetOptions,
+    "pointnet_tnet": PointNetOptions,
     "pointnet2": PointNet2Options,
     "pointnext": PointNeXtOptions,
 }

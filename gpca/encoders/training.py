@@ -170,6 +170,8 @@ class _Training:
         for batch_rows in np.array_split(order, self._batches):
             outputs_B_C, targets_B = self._predict(batch_rows, "epoch", epoch)
             loss = _loss(outputs_B_C, targets_B)
+            if (penalty := getattr(self._model.encoder, "penalty", None)) is not None:
+                loss = loss + penalty
             self._optimizer.zero_grad()
             loss.backward()
             self._optimizer.step()

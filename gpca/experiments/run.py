@@ -72,7 +72,12 @@ def settings_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, An
 
 def explainer_of(method: str, names: Mapping[str, Any]) -> str:
     """Return the explainer behind a row of predictions: itself, or GP-CA for a ``{backbone}-{reduction}``."""
-    return "gpca" if method in (*names["backbone"], *names["rendered"]) else method
+    return "gpca" if method in _embedded(names) else method
+
+
+def _embedded(names: Mapping[str, Any]) -> list[str]:
+    """Return the rows of depth frames that read embeddings."""
+    return [*names["backbone"], *names["published"], *names["rendered"]]
 
 
 def files_behind(method: str, names: Mapping[str, Any]) -> dict[str, str]:
@@ -81,8 +86,7 @@ def files_behind(method: str, names: Mapping[str, Any]) -> dict[str, str]:
     ``input_timings`` are the seconds that were spent before it starts.
     """
     entry = explainer_entry(explainer_of(method, names))
-    of_frames = method in (*names["backbone"], *names["rendered"])
-    encoder, reduction = method.split("-") if of_frames else names["embedding"].split("/")
+    encoder, reduction = method.split("-") if method in _embedded(names) else names["embedding"].split("/")
     if entry.reads == "embeddings":
         return {
             "input_timings": f"timings/{{source}}/{encoder}/seed{{seed}}.csv",

@@ -39,6 +39,7 @@ wildcard_constraints:
             *config["explainers"],
             *NAMES["frame_explainer"],
             *NAMES["backbone"],
+            *NAMES["published"],
             *NAMES["rendered"],
         ]
     ),

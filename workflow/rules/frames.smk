@@ -19,6 +19,7 @@ DATA_FOLDERS = (
 ASKED = {
     FRAMES: [
         *NAMES["backbone"],
+        *NAMES["published"],
         *NAMES["rendered"],
         *NAMES["classic"],
         *NAMES["frame_explainer"],

@@ -121,6 +121,8 @@ def read_by_readings(wildcards):
     group = GROUPS[wildcards.reading_group]
     if wildcards.reading_group == FRAME_INPUT:
         return read_by_frame_input()
+    if wildcards.reading_group in (FRAME_ENCODER, FRAME_START):
+        return read_by_frame_rows(wildcards.reading_group)
     sources = [name for name in group.sources if name in SOURCES]
     seeds = SEEDS[: 1 if group.costly else READINGS["seeds"]]
     ranges = []
@@ -168,6 +170,31 @@ def read_by_frame_input():
             cloud=OTHER_CLOUDS,
             **of,
         ),
+    }
+
+
+def read_by_frame_rows(group):
+    """Return the predictions of the judged rows on frames and of those in their place, and what they are of."""
+    asked = {FRAMES: [*NAMES["backbone"], *NAMES["published"]]}
+    if group == FRAME_START:
+        asked = {
+            FRAMES: NAMES["backbone"],
+            NAMES["estimated"]: NAMES["condition_backbone"],
+        }
+    return {
+        "registrations": collect(
+            "<results>/registrations/{source}/seed{seed}.npz", source=asked, seed=SEEDS
+        ),
+        "predictions": [
+            path
+            for source, methods in asked.items()
+            for path in collect(
+                "<results>/predictions/{source}/{method}/seed{seed}.csv",
+                source=source,
+                method=methods,
+                seed=SEEDS,
+            )
+        ],
     }
 
 

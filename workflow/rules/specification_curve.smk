@@ -1,6 +1,12 @@
 # Files of a run -> the printed numbers under every reading of what the paper leaves unstated.
 from gpca.experiments.specification_curve.frame_input import ALIGNED
-from gpca.experiments.specification_curve.registry import FRAME_INPUT, GROUPS, RETRAINED
+from gpca.experiments.specification_curve.registry import (
+    FRAME_ENCODER,
+    FRAME_INPUT,
+    FRAME_START,
+    GROUPS,
+    RETRAINED,
+)
 
 READINGS = config["readings"]
 READING_SIZES = {name: READINGS[name] for name in ("seeds", "encoders", "samples")}
@@ -19,6 +25,14 @@ READING_SECTIONS = {
     "active_learning": config["active_learning"],
     **{name: config["explainers"].get(name) or {} for name in ("gpca_paper", "gpca")},
     "gpca_matern": LEARNER_SETTINGS.get("gpca_matern", {}),
+}
+FRAME_ROWS = {
+    "frames": {
+        "source": FRAMES,
+        "methods": NAMES["backbone"],
+        "estimated": NAMES["estimated"],
+    },
+    "published": REAL_WORLD["published"],
 }
 
 
@@ -56,7 +70,11 @@ rule reading:
             {
                 "choices": READINGS["groups"][wildcards.reading_group],
                 "sizes": READING_SIZES,
-                **READING_SECTIONS,
+                **(
+                    FRAME_ROWS
+                    if wildcards.reading_group in (FRAME_ENCODER, FRAME_START)
+                    else READING_SECTIONS
+                ),
             }
         ),
     script:

@@ -42,9 +42,22 @@ def check(config: dict, left_out: LeftOut) -> None:
         raise InputError("config key real_world.rendered", fault, "set that, or rendered to []")
     key, backbones = "real_world.condition_backbones", section["backbones"]
     require_names(key, section["condition_backbones"], backbones, "backbone", encoders_left_out)
+    key, reductions = "real_world.condition_reductions", section["reductions"]
+    require_names(key, section["condition_reductions"], reductions, "reduction", left_out("reductions"))
+    _check_published(config, encoders_left_out)
     for name, settings in (section["explainers"] or {}).items():
         with_key(f"real_world.explainers.{name}", require_settings, name, settings or {})
     _check_reductions(config)
+
+
+def _check_published(config: dict, encoders_left_out: set[str]) -> None:
+    """Check that encoders as published stand beside judged ones, each under a name of its own."""
+    section, key = config["real_world"], "real_world.published"
+    require_names(key, list(section["published"]), section["backbones"], "backbone", encoders_left_out)
+    names = list(section["published"].values())
+    require_names(key, names, config["encoders"], "encoder", encoders_left_out)
+    if twice := [name for i, name in enumerate(names) if name in (*section["backbones"], *names[:i])]:
+        raise InputError(f"config key {key}", f"'{twice[0]}' has rows already", "name another encoder")
 
 
 def _check_training(config: dict) -> None:
@@ -56,7 +69,7 @@ def _check_training(config: dict) -> None:
                 fault = f"needs real_world.{needed}: {why}"
                 raise InputError("config key real_world.virtual", fault, f"set {needed}, or virtual to null")
     require_names("real_world.training", list(section["training"] or {}), encoders, "encoder", set())
-    for name in section["backbones"]:
+    for name in (*section["backbones"], *section["published"].values()):
         changes = {"pretraining": section["pretraining"] or {}, "training": (section["training"] or {}).get(name, {})}
         for part, settings in changes.items():
             with_key(f"real_world.{part}", lambda whole: EncoderSettings(**whole), encoders[name] | settings)
@@ -67,7 +80,7 @@ def _check_reductions(config: dict) -> None:
     section = config["real_world"]
     for name in section["reductions"]:
         reduction = make_reduction(name, config["reductions"].get(name) or {})
-        for backbone in section["backbones"] if reduction else ():
+        for backbone in (*section["backbones"], *section["published"].values()) if reduction else ():
             encoder = EncoderSettings(**config["encoders"][backbone])
             options = OPTIONS.get(encoder.backbone)
             size = options(**encoder.options).embedding_size if options else None
@@ -82,13 +95,18 @@ def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
         "frames": REAL_WORLD,
         "backbone": backbones,
         "first_backbone": backbones[0],
+        "published": published_backbones(frames),
         "rendered": rendered_backbones(frames),
         "classic": [name for name in CLASSIC if name in config["explainers"]],
         "frame_explainer": list(frames["explainers"]),
         "compared_backbone": list(frames["backbones"])[1:],
         "unreduced": list(unreduced_methods(frames)),
         "condition": [f"{REAL_WORLD}_{name}" for name in conditions_of(config)],
-        "condition_backbone": [f"{name}-none" for name in frames["condition_backbones"]],
+        "condition_backbone": [
+            f"{name}-{reduction}"
+            for name in frames["condition_backbones"]
+            for reduction in frames["condition_reductions"]
+        ],
         "one_encoder": ONE_ENCODER if frames["one_encoder"] else "",
     }
 
@@ -106,7 +124,8 @@ def shown(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
         "frames_pretrained_on": _pretrained_on(frames),
         "frames_rendered": (frames["virtual"] or {}).get("objects") == "all",
         "frame_conditions": {name: POSES.get(entry.get("form", ""), GLOBAL_POSE) for name, entry in poses.items()},
-        "frame_methods": [*reduced_backbones(frames), *rendered_backbones(frames)],
+        "frame_methods": [*reduced_backbones(frames), *published_backbones(frames), *rendered_backbones(frames)],
+        "published_encoders": {name: config["encoders"][name] for name in frames["published"].values()},
         "rendered": list(frames["rendered"]),
         "frame_explainers": titles(frames["explainers"]),
         "frame_sees": {name: explainer_entry(explainer).sight for name, explainer in _behind(frames).items()},
@@ -121,7 +140,8 @@ def shown(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
 def _behind(frames: Mapping) -> dict[str, str]:
     """Return the explainer behind each method: itself, or GP-CA for a ``{backbone}-{reduction}``."""
     own = {name: name for name in (*CLASSIC, *frames["explainers"])}
-    return dict.fromkeys([*reduced_backbones(frames), *rendered_backbones(frames)], "gpca") | own
+    embedded = [*reduced_backbones(frames), *published_backbones(frames), *rendered_backbones(frames)]
+    return dict.fromkeys(embedded, "gpca") | own
 
 
 def _title(config: Mapping[str, Any]) -> str:
@@ -134,6 +154,11 @@ def _title(config: Mapping[str, Any]) -> str:
 def reduced_backbones(frames: Mapping) -> list[str]:
     """Return the rows of Table VI that read embeddings: every encoder with every reduction."""
     return [f"{backbone}-{reduction}" for backbone in frames["backbones"] for reduction in frames["reductions"]]
+
+
+def published_backbones(frames: Mapping) -> list[str]:
+    """Return the rows beside them whose encoders are as published, with every reduction."""
+    return [f"{encoder}-{name}" for encoder in frames["published"].values() for name in frames["reductions"]]
 
 
 def rendered_backbones(frames: Mapping) -> list[str]:
@@ -169,8 +194,10 @@ EXPERIMENT = Experiment(
     lists={
         "real_world.backbones": "encoders",
         "real_world.condition_backbones": "encoders",
+        "real_world.published": "encoders",
         "real_world.rendered": "encoders",
         "real_world.training": "encoders",
         "real_world.reductions": "reductions",
+        "real_world.condition_reductions": "reductions",
     },
 )

@@ -22,6 +22,8 @@ Training = Annotated[
     dict, changes_of(EncoderSettings, without=("backbone", "options", "reading", "draw_points", "draws"))
 ]
 
+Reduction = Literal["none", "pca", "umap", "autoencoder"]
+
 # The same hypotheses cost the same everywhere.
 Reenactment = Annotated[dict, changes_of(ReenactmentSettings, without=("hypotheses",))]
 
@@ -58,7 +60,11 @@ class VirtualFrames:
 
 @dataclass(frozen=True)
 class RealWorldSettings:
-    """Registrations of depth frames, every backbone with every reduction."""
+    """Registrations of depth frames, every backbone with every reduction.
+
+    Attributes:
+        published: judged backbone -> encoder of its published architecture, whose rows stand beside the judged ones.
+    """
 
     title: Text | None
     scenes: SceneSettings
@@ -66,14 +72,16 @@ class RealWorldSettings:
     initial_pose: InitialPoseSettings
     conditions: dict[Name, InitialPoseSettings] | None
     condition_backbones: list[str]
+    condition_reductions: Distinct[Reduction]
     train: TrainSamples
     test: TestSamples
     test_share: OpenShare
     occluders: Share
     backbones: Distinct[str]
-    reductions: Distinct[Literal["none", "pca", "umap", "autoencoder"]]
+    reductions: Distinct[Reduction]
     pretraining: Pretraining | None
     virtual: VirtualFrames | None
+    published: dict[str, str]
     rendered: list[str]
     training: dict[str, Training] | None
     explainers: dict[str, dict | None] | None

@@ -27,6 +27,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
 BACKBONES = {"dgcnn": "DGCNN", "pointnet": "PointNet", "pointnet2": "PointNet++", "pointnext": "PointNeXt-S"}
+BACKBONES |= {"dgcnn_1024": "DGCNN of 1024 features", "pointnet_tnet": "PointNet with T-Nets"}
+BACKBONES |= {"pointnet2_ssg": "PointNet++ as published"}
+PUBLISHED_NOTE = "readings of which architecture the paper used; they are not compared with what it prints."
 REDUCTIONS = {"none": "No reduction", "pca": "PCA", "umap": "UMAP", "autoencoder": "Autoencoder"}
 CLASSIC = {
     "analytical_gpc": "Classic features",
@@ -58,13 +61,17 @@ def table6_of_encoders(
     pretrained_on: str = "",
     rendered: Sequence[str] = (),
     explainers: Mapping[str, str] | None = None,
+    published: Mapping[str, Mapping] | None = None,
 ) -> Table:
     """Return :func:`table6_backbones` with the parameters counted of encoders that are made from their settings."""
-    backbones = {
-        name: parameter_count(make_encoder(settings["backbone"], settings.get("options", {})))
-        for name, settings in encoders.items()
-    }
-    return table6_backbones(intervals, metrics, title, backbones, reductions, pretrained_on, rendered, explainers)
+    counted, beside = (
+        {
+            name: parameter_count(make_encoder(settings["backbone"], settings.get("options", {})))
+            for name, settings in of.items()
+        }
+        for of in (encoders, published or {})
+    )
+    return table6_backbones(intervals, metrics, title, counted, reductions, pretrained_on, rendered, explainers, beside)
 
 
 def table6_backbones(
@@ -76,6 +83,7 @@ def table6_backbones(
     pretrained_on: str = "",
     rendered: Sequence[str] = (),
     explainers: Mapping[str, str] | None = None,
+    published: Mapping[str, int] | None = None,
 ) -> Table:
     """Return the accuracy on depth frames by backbones × reductions, and of the classic features.
 
@@ -86,6 +94,7 @@ def table6_backbones(
         pretrained_on: What the encoders learned from before the frames, if anything.
         rendered: Those that stand here once more, pretrained on frames rendered of the tested objects' models.
         explainers: The titles of the other explainers on frames, of which those without training stand last.
+        published: The number of parameters of each encoder whose published architecture stands beside the judged one.
     """
     together = rows_where(metrics, table=TOGETHER)
     metrics, one_encoder = (rows_where(together, source=source) for source in (REAL_WORLD, ONE_ENCODER))
@@ -98,6 +107,10 @@ def table6_backbones(
             method = f"{backbone}-{reduction}"
             cells = _cells(intervals, metrics, method, parameters)
             table.add_row(labels, cells | {"classifiers": _deviation(one_encoder, method)} if cells else {})
+    beside = {name: BACKBONES.get(name, name) for name in published or {}}
+    for (name, reduction), labels in crossed(beside, {name: REDUCTIONS[name] for name in reductions}):
+        cells = _cells(intervals, metrics, f"{name}-{reduction}", (published or {})[name])
+        table.add_row(labels, cells, rival=False)
     for backbone in rendered:
         name = f"{backbone}{RENDERED}"
         labels = [(name, encoder_title(name, "none")), ("none", REDUCTIONS["none"])]
@@ -129,6 +142,7 @@ def table6_backbones(
             "the seeds of the accuracy.",
             f"{rival}: paired difference to it{other}. By concept: the share of its samples that is attributed to it. "
             "Parameters: of the encoder.",
+            *([f"{', '.join(beside.values())}: {PUBLISHED_NOTE}"] if beside else ()),
             *([RENDERED_NOTE] if rendered else ()),
         ),
     )

@@ -7,8 +7,16 @@ from dataclasses import dataclass
 from typing import Annotated, Any, get_args
 
 from gpca.experiments.experiment import Experiment, Names, Tidy
-from gpca.experiments.specification_curve.registry import FRAME_INPUT, GROUPS, RETRAINED, OtherSeverities
+from gpca.experiments.specification_curve.registry import (
+    FRAME_ENCODER,
+    FRAME_INPUT,
+    FRAME_START,
+    GROUPS,
+    RETRAINED,
+    OtherSeverities,
+)
 from gpca.experiments.specification_curve.settings import ReadingSizes
+from gpca.frames.source import REAL_WORLD, conditions_of
 from gpca.pairs.perturbation import Severities
 from gpca.settings import Bounds, Keys
 
@@ -31,14 +39,25 @@ class Section(ReadingSizes):
 
 
 def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
-    """Return the groups of readings; those that train encoders for each reading are run where there are seeds."""
-    readings = config["readings"]
-    trained = {
-        FRAME_INPUT: readings["frame_seeds"] and "none" in config["real_world"]["reductions"],
+    """Return the groups of readings; some are run only where there is what they read.
+
+    Those that train encoders for each reading need seeds, and others rows of encoders as published, or from poses of
+    estimators.
+    """
+    readings, frames = config["readings"], config["real_world"]
+    estimated = [name for name, entry in conditions_of(config).items() if entry.get("form") == "results"]
+    readable = {
+        FRAME_INPUT: readings["frame_seeds"] and "none" in frames["reductions"],
+        FRAME_ENCODER: frames["published"],
+        FRAME_START: estimated and frames["condition_backbones"],
         RETRAINED: readings["encoders"],
     }
-    groups = [name for name in readings["groups"] if trained.get(name, True)]
-    return {"reading_group": groups, "frame_input": [name for name in groups if name == FRAME_INPUT]}
+    groups = [name for name in readings["groups"] if readable.get(name, True)]
+    return {
+        "reading_group": groups,
+        "frame_input": [name for name in groups if name == FRAME_INPUT],
+        "estimated": f"{REAL_WORLD}_{estimated[0]}" if estimated else "",
+    }
 
 
 def shown(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str, Any]:

@@ -15,6 +15,7 @@ from gpca.registry import load
 from gpca.settings import Bounds, Count, Distinct, Keys, OpenShare, Positive
 
 FRAME_INPUT = "frame_input"  # the group whose encoders of frames see other clouds
+FRAME_ENCODER, FRAME_START = "frame_encoder", "frame_start"  # those that read other rows on frames than the judged
 RETRAINED = "severities_retrained"  # the group whose encoders learn from other severities
 ALL_SOURCES = ("coffee_cup", "linemod", "ycb")
 AboveOne = Annotated[float, Bounds(exclusiveMinimum=1)]
@@ -192,6 +193,20 @@ GROUPS = {
         {"input": ReadAs, "objects": ShownObjects},
         "frame_input:run",
         ("registrations", "predictions", "embeddings"),
+        (),
+    ),
+    FRAME_ENCODER: Group(
+        "Which architecture encodes depth frames",
+        {"architecture": Literal["judged", "published"], "objects": ShownObjects},
+        "frame_rows:encoders",
+        ("registrations", "predictions"),
+        (),
+    ),
+    FRAME_START: Group(
+        "Where ICP starts on depth frames",
+        {"initial_pose": Literal["true_pose", "estimated"], "objects": ShownObjects},
+        "frame_rows:starts",
+        ("registrations", "predictions"),
         (),
     ),
     "features": Group(

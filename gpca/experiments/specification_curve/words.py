@@ -70,6 +70,8 @@ WORDS = {  # field of a group's choices -> what its values are called
         "observed": "cloud before ICP",
         "reversed": "ICP from the model to the cloud",
     },
+    "architecture": {"judged": "judged encoder", "published": "encoder as published"},
+    "initial_pose": {"true_pose": "ICP from near the true pose", "estimated": "ICP from estimators' poses"},
     "features": {
         "all": "all features",
         "no_counts": "without point counts",

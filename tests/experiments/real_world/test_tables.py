@@ -99,6 +99,18 @@ def test_what_saw_the_tested_objects_stands_below_and_is_never_the_best():
     assert "rendered" not in " ".join(make(values).footnotes)
 
 
+def test_encoders_as_published_stand_below_the_judged_ones_and_are_never_the_best():
+    values = VALUES | {"dgcnn_1024-none": (0.9, 0.9, 0.9), "dgcnn_1024-pca": (0.9, 0.9, 0.8)}
+    of = intervals(values), metrics(values), "frames", BACKBONES, ("none", "pca")
+    table = table6_backbones(*of, published={"dgcnn_1024": 750_000})
+    assert [tuple(key for key, _ in row) for row in table.rows][2:] == [
+        ("pointnet", "none"), ("dgcnn_1024", "none"), ("dgcnn_1024", "pca"), ("analytical_gpc", "none"),
+    ]  # fmt: skip
+    assert table.cells[3, "parameters"].mean == 750 and table.best() == make().best()
+    assert "DGCNN of 1024 features: readings of which architecture" in " ".join(table.footnotes)
+    assert "readings of" not in " ".join(make(values).footnotes)
+
+
 def test_a_backbone_without_a_title_has_its_name():
     values = {"mine-none": (0.8, 0.8, 0.8), "pointnet-none": (0.6, 0.7, 0.65)}
     of = intervals(values), metrics(values)
