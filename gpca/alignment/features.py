@@ -30,16 +30,21 @@ def estimate_normals(points_N_3: np.ndarray, neighbors: int = NEIGHBORS) -> np.n
     return np.where(inward_N[:, None], -normals_N_3, normals_N_3)
 
 
-def fpfh_of_pair(pair: Any, radius: float = RADIUS) -> tuple[list[Any], list[Any]]:
+def fpfh_of_pair(
+    pair: Any, radius: float = RADIUS, most_neighbors: int = MOST_NEIGHBORS
+) -> tuple[list[Any], list[Any]]:
     """Return Open3D's clouds of a pair's source and target, and the features of each."""
     clouds = [open3d_cloud(getattr(pair, name), pair.normals(name)) for name in ("source", "target")]
-    return clouds, [fpfh(cloud, radius) for cloud in clouds]
+    return clouds, [fpfh(cloud, radius, most_neighbors) for cloud in clouds]
 
 
-def fpfh(cloud: Any, radius: float = RADIUS) -> Any:
-    """Return Open3D's features of a cloud with normals; `.data` is (33, N)."""
+def fpfh(cloud: Any, radius: float = RADIUS, most_neighbors: int = MOST_NEIGHBORS) -> Any:
+    """Return Open3D's features of a cloud with normals, of the nearest so many points within a radius at most.
+
+    Their `.data` is (33, N).
+    """
     o3d = require_open3d()
-    neighbors = o3d.geometry.KDTreeSearchParamHybrid(radius, MOST_NEIGHBORS)
+    neighbors = o3d.geometry.KDTreeSearchParamHybrid(radius, most_neighbors)
     return o3d.pipelines.registration.compute_fpfh_feature(cloud, neighbors)
 
 

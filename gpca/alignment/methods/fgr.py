@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gpca.alignment.features import RADIUS, fpfh_of_pair
+from gpca.alignment.features import MOST_NEIGHBORS, RADIUS, fpfh_of_pair
 from gpca.alignment.methods.interface import (
     CORRESPONDENCE_DISTANCE,
     FailedRegistration,
@@ -25,18 +25,19 @@ def align(
     tuples: int = 1000,
     iterations: int = 64,
     correspondence_distance: float = CORRESPONDENCE_DISTANCE,
+    feature_neighbors: int = MOST_NEIGHBORS,
 ) -> Outcome:
     """Minimize a robust cost over all matches that agree in triples.
 
     Args:
-        feature_radius: of the features, in diameters.
+        feature_radius, feature_neighbors: of the features, in diameters; of the points within it, the nearest so many.
         inlier_distance: down to which the robust cost is sharpened, in diameters.
         tuple_similarity: least ratio of the edges of the two triangles of a triple.
         tuples: most triples that are used.
     """
     o3d = require_open3d()
     registration = o3d.pipelines.registration
-    clouds, features = fpfh_of_pair(pair, feature_radius)
+    clouds, features = fpfh_of_pair(pair, feature_radius, feature_neighbors)
     o3d.utility.random.seed(pair.seed % 2**31)
     option = registration.FastGlobalRegistrationOption(
         use_absolute_scale=True,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gpca.alignment.features import RADIUS, fpfh_of_pair
+from gpca.alignment.features import MOST_NEIGHBORS, RADIUS, fpfh_of_pair
 from gpca.alignment.methods.interface import (
     CORRESPONDENCE_DISTANCE,
     FEWEST,
@@ -24,18 +24,19 @@ def align(
     iterations: int = 20_000,
     confidence: Share = 0.999,
     correspondence_distance: float = CORRESPONDENCE_DISTANCE,
+    feature_neighbors: int = MOST_NEIGHBORS,
 ) -> Outcome:
     """Take the pose of three matches that agrees with most others.
 
     Args:
-        feature_radius: of the features, in diameters.
+        feature_radius, feature_neighbors: of the features, in diameters; of the points within it, the nearest so many.
         inlier_distance: within which a match agrees, in diameters.
         edge_similarity: least ratio of the edges of the two triangles.
         iterations, confidence: when to stop.
     """
     o3d = require_open3d()
     registration = o3d.pipelines.registration
-    clouds, features = fpfh_of_pair(pair, feature_radius)
+    clouds, features = fpfh_of_pair(pair, feature_radius, feature_neighbors)
     o3d.utility.random.seed(pair.seed % 2**31)
     result = registration.registration_ransac_based_on_feature_matching(
         *clouds,

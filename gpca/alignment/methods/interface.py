@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from gpca.alignment.features import estimate_normals
+from gpca.alignment.features import NEIGHBORS, estimate_normals
 from gpca.alignment.icp import ICP, ICPSettings, Method, require_cloud
 from gpca.alignment.rigid import require_rigid, transform
 from gpca.errors import InputError
@@ -68,12 +68,13 @@ class Pair:
         """Return the pair with another initial pose, that of a global method for one."""
         return replace(self, T_target_source_init=T_target_source)
 
-    def with_normals(self) -> Pair:
-        """Return the pair with normals of both clouds, estimated where it has none."""
+    def with_normals(self, neighbors: int = NEIGHBORS) -> Pair:
+        """Return the pair with normals of both clouds, estimated from so many neighbors where it has none."""
+        source_normals, target_normals = self.source_normals, self.target_normals
         return replace(
             self,
-            source_normals=estimate_normals(self.source) if self.source_normals is None else self.source_normals,
-            target_normals=estimate_normals(self.target) if self.target_normals is None else self.target_normals,
+            source_normals=estimate_normals(self.source, neighbors) if source_normals is None else source_normals,
+            target_normals=estimate_normals(self.target, neighbors) if target_normals is None else target_normals,
         )
 
     def normals(self, name: str) -> np.ndarray:

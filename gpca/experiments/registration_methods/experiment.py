@@ -22,6 +22,8 @@ def check(config: dict, names_left_out: LeftOut) -> None:
     """Check that every method takes its settings, and that the global start is one that runs here."""
     for name, settings in config["methods"].items():
         with_key(f"methods.{name}", require_settings, name, settings or {})
+    key, own = "method_pairs.points_of", config["method_pairs"].get("points_of") or {}
+    require_names(key, list(own), config["methods"], "registration method", names_left_out("methods"))
     key, start = "method_pairs.global_start", config["method_pairs"]["global_start"]
     require_names(key, [start], config["methods"], "registration method", names_left_out("methods"))
     with_key(key, require_global, start)
@@ -66,4 +68,5 @@ EXPERIMENT = Experiment(
     shown=shown,
     check=check,
     leavable={"methods": Names("registration method", methods)},
+    lists={"method_pairs.points_of": "methods"},
 )

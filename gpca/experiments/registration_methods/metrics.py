@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 INITIAL, NO_START = "initial", "none"  # where a registration starts, or the name of a global method
 SEVERITY_COLUMNS = tuple(f"severity_{name}" for name in SEVERITIES)
 MEASURED = ("add_relative", "rotation_error_rad", "translation_error")
-COLUMNS = ("sample", "concept", "start", "failure", *SEVERITY_COLUMNS, *MEASURED)
+POINTS = "points"  # of a cloud: the mean of source and target
+COLUMNS = ("sample", "concept", "start", "failure", *SEVERITY_COLUMNS, *MEASURED, POINTS)
 TABLE = "registration_methods"  # `table` of the tidy rows reads this
 TIMED = "method_"  # with a method behind it, the folder of its seconds
 BINS = ("low", "middle", "high")  # thirds of what is drawn
@@ -39,7 +40,7 @@ def row_name(method: str, start: str) -> str:
 def read_trials(path: str | Path) -> pd.DataFrame:
     """Read a file of the step ``register_methods``: numbers as numbers, the rest as text."""
     rows = read_csv(path, COLUMNS, others=("object", "symmetric", "fitness", "inlier_rmse"))
-    for name in (*SEVERITY_COLUMNS, *MEASURED):
+    for name in (*SEVERITY_COLUMNS, *MEASURED, POINTS):
         rows[name] = numbers(path, rows, name)
     return rows
 
@@ -72,6 +73,7 @@ def collect_trials(
                 values = _metrics(of_concept, limits.error)
                 if concept == ALL:
                     values |= {success_within(limit): _success(of_concept, limit) for limit in limits.curve}
+                    values[POINTS] = of_concept[POINTS].mean()
                 row = (TABLE, source, row_name(method, start))
                 records += [(*row, metric, concept, seed, float(value)) for metric, value in values.items()]
     return tidy(records, "registration methods")

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated
 
 from gpca.settings import Bounds
+
+Points = Annotated[int, Bounds(minimum=64, maximum=65536)]
 
 
 @dataclass(frozen=True)
@@ -16,8 +18,14 @@ class PairSettings:
         samples: test samples of each source and seed, balanced, at most.
         points: of source and of target (fewer where a cloud has fewer).
         global_start: the global method at whose pose local methods start a second time.
+        points_of: method -> its own number of points, where its authors use more than others do.
     """
 
     samples: Annotated[int, Bounds(minimum=3, multipleOf=3)]
-    points: Annotated[int, Bounds(minimum=64, maximum=65536)]
+    points: Points
     global_start: str
+    points_of: dict[str, Points] = field(default_factory=dict)
+
+    def points_for(self, method: str) -> int:
+        """Return how many points of either cloud a method gets."""
+        return self.points_of.get(method, self.points)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from gpca.alignment.success import success_within
 from gpca.attribution.metrics import ALL
-from gpca.experiments.registration_methods.metrics import BINS, INITIAL, NO_START, bin_name, row_name
+from gpca.experiments.registration_methods.metrics import BINS, INITIAL, NO_START, POINTS, bin_name, row_name
 from gpca.objects.title import stand_in_clause
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.tables.builder import TableBuilder, missing_packages, over_clusters
@@ -28,6 +28,7 @@ _ERRORS = {  # Each of these metrics has a column, and a factor to the column's 
     "rotation_deg": (Column("Rotation (°)", limits=(0, 180), least_is_best=True), 1),
     "translation": (Column("Translation (% d)", limits=(0, inf), least_is_best=True), 100),
 }
+_POINTS = Column("Points", decimals=0, interval=False, limits=(0, inf))
 _MILLISECONDS = Column("ms", interval=False, limits=(0, inf), least_is_best=True)
 
 
@@ -40,7 +41,7 @@ def table11_registration(
     global_start: str,
     left_out: Mapping[str, str],
 ) -> Table:
-    """Return successes in all and by cause, errors and milliseconds: starts × methods.
+    """Return successes in all and by cause, errors, points and milliseconds: starts × methods.
 
     Args:
         intervals: What :func:`gpca.experiments.registration_methods.intervals.collect_intervals` returned.
@@ -53,6 +54,7 @@ def table11_registration(
         rows = rows_where(intervals, method=name)
         cells = {f"success_{cause}": clustered_cell(rows, metric="success", concept=cause) for cause in causes}
         cells |= {key: clustered_cell(rows, factor, metric=key, concept=ALL) for key, (_, factor) in _ERRORS.items()}
+        cells[POINTS] = cell_over_sources(metrics, metrics, sources, name, POINTS, ALL, 1.0)
         cells["milliseconds"] = cell_over_sources(metrics, seconds, sources, name, "seconds", ALL, 1e3)
         table.add_row(labels, cells)
     columns = {f"success_{cause}": Column(f"{cause.capitalize()} (%)") for cause in causes}
@@ -61,12 +63,13 @@ def table11_registration(
     return table.build(
         caption="Registrations that succeed, and how far all are off" + stand_in_clause(sources.values()),
         column_head="metric",
-        columns=columns | {"milliseconds": _MILLISECONDS},
+        columns=columns | {POINTS: _POINTS, "milliseconds": _MILLISECONDS},
         footnotes=(
             *_notes(table, intervals, left_out),
             "Errors are means over all registrations, at the last pose of those that failed; rotations up to the "
-            "object's symmetries. Failed: given up by the method itself, or not at rest. ms: of one registration, with "
-            "its global start if it has one, without the normals; the only column that differs from run to run.",
+            "object's symmetries. Failed: given up by the method itself, or not at rest. Points: of a cloud, on "
+            "average over sources and targets; behind a global start, the local method's. ms: of one registration, "
+            "with its global start if it has one, without the normals; the only column that differs from run to run.",
         ),
     )
 

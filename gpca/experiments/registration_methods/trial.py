@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from functools import cache
 from time import perf_counter
 from typing import TYPE_CHECKING
 
@@ -36,10 +37,11 @@ def try_methods(
     methods: Mapping[str, Mapping],
     settings: PairSettings,
 ) -> dict[str, pd.DataFrame]:
-    """Return for each method a row per pair and start, with the seconds that it took.
+    """Return for each method a row per pair and start, with the points that it had and the seconds that it took.
 
-    A method that fails has its reason in the row. Normals are estimated beforehand, as the same ones
-    serve all methods; what a method loads or compiles at its first call is loaded before the first pair.
+    A method that fails has its reason in the row. Normals are estimated beforehand, as the same ones serve all methods
+    of one number of points; what a method loads or compiles at its first call is loaded before the first pair. Fewer
+    points of a cloud are among more of it.
 
     Args:
         registrations: with test samples; their targets are in the objects' canonical frames.
@@ -59,12 +61,11 @@ def try_methods(
     rows = _chosen(registrations, source, settings.samples)
     of_objects = Judges(objects, f"objects of {source}")
     judges = [of_objects.of(registrations, row) for row in rows]
-    first = pair_to_register(registrations, rows[0], source, seed, settings.points)
-    for method in made.values():
-        method(first)
+    for name, method in made.items():
+        method(pair_to_register(registrations, rows[0], source, seed, settings.points_for(name)))
     records: dict[str, list[dict]] = {name: [] for name in made}
     for i, row in enumerate(progress(rows, f"registration methods on {source}, seed {seed}")):
-        pair = pair_to_register(registrations, row, source, seed, settings.points)
+        pair_of = cache(lambda points, row=row: pair_to_register(registrations, row, source, seed, points))
         T_true = registrations.T_target_source("true", row)
         judge = judges[i]
         known = {
@@ -74,12 +75,14 @@ def try_methods(
             **{name: getattr(registrations, name)[row] for name in SEVERITY_COLUMNS},
             "symmetric": judge.symmetric,
         }
-        coarse = timed(made[start], pair)
+        coarse = timed(made[start], pair_of(settings.points_for(start)))
         for name, method in made.items():
+            pair = pair_of(settings.points_for(name))
+            known_of_pair = known | {"points": (len(pair.source) + len(pair.target)) / 2}
             for started_at, outcome, seconds in attempts(name, method, pair, start, coarse):
                 errors = judge(outcome.T_target_source, T_true)
                 of_outcome = {key: getattr(outcome, key) for key in ("fitness", "inlier_rmse", "failure")}
-                row_of_trial = known | {"start": started_at} | errors | of_outcome
+                row_of_trial = known_of_pair | {"start": started_at} | errors | of_outcome
                 records[name].append(row_of_trial | {"seconds": seconds})
     return {name: pd.DataFrame(of_method) for name, of_method in records.items()}
 

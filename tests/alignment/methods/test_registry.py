@@ -2,6 +2,7 @@ import hashlib
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from importlib import import_module
 
 import numpy as np
@@ -18,7 +19,7 @@ from gpca.alignment.methods.registry import (
     require_settings,
 )
 from gpca.alignment.pose_error import add_error
-from gpca.alignment.rigid import require_rigid
+from gpca.alignment.rigid import require_rigid, transform
 from gpca.errors import InputError
 from tests.documents import ROOT
 
@@ -142,8 +143,6 @@ def test_poor_clouds_give_a_rigid_pose_and_no_exception(objects, name, poor):
 
 
 def test_a_pose_that_is_not_finite_is_a_failure(objects, monkeypatch):
-    from dataclasses import replace
-
     from gpca.alignment.methods.interface import Outcome
 
     pair, T_true = small_motion(objects)
@@ -197,6 +196,17 @@ def test_an_optional_package_aligns_what_lies_close(objects, name, largest):
     assert error(pair, make_method(name)(pair), T_true) < largest
 
 
+def test_where_the_origin_is_does_not_matter_to_kiss_matcher(objects):
+    pytest.importorskip("kiss_matcher")
+    pair, T_true = small_motion(objects, 1)
+    aside = np.eye(4)
+    aside[:3, 3] = 2, -1, 0.5
+    moved = replace(pair, target=transform(aside, pair.target))
+    near, far = (make_method("kiss_matcher")(each) for each in (pair, moved))
+    assert error(moved, far, aside @ T_true) < 0.1
+    np.testing.assert_allclose(far.T_target_source, aside @ near.T_target_source, atol=1e-3)
+
+
 REFUSED = 0.1
 
 
@@ -209,7 +219,8 @@ def small_shift():
 class StandIn:
     """What the two packages offer, as far as it is called, for where they are not installed."""
 
-    PointCloud = KISSMatcherConfig = staticmethod(lambda given: given)
+    PointCloud = staticmethod(lambda given: given)
+    KISSMatcherConfig = staticmethod(lambda voxel, **gains: voxel)
 
     def __init__(self, T, good):
         self.T_target_source, self.rotation, self.translation = T, T[:3, :3], T[:3, 3:]
@@ -247,7 +258,7 @@ def test_what_an_optional_package_finds_becomes_an_outcome(objects, monkeypatch,
     pair, T_true = small_motion(objects)
     monkeypatch.setitem(sys.modules, OPTIONAL[name], StandIn(T_true, good))
     monkeypatch.setattr(registry, "find_spec", lambda name: True)
-    outcome = make_method(name)(pair)
+    outcome = make_method(name, {"centered": False} if name == "kiss_matcher" else {})(pair)
     assert outcome.converged == good
     assert np.array_equal(outcome.T_target_source, T_true if good or name == "gicp_small" else np.eye(4))
 

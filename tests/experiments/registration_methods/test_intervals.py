@@ -27,6 +27,7 @@ def trials(names, seed):
         errors = dict(zip(MEASURED, (0.01, 0.1, 0.02) if good else (0.3 + 0.1 * seed, 1.1, 0.2), strict=True))
         severe = dict.fromkeys(SEVERITY_COLUMNS, 0.02) | {"severity_rotation_rad": 1.0, "severity_crop": 0.55}
         known = {"sample": sample, "object": name, "concept": concept, "start": "initial", "failure": ""}
+        known |= {"points": 100}
         records.append(known | severe | errors)
     return pd.DataFrame(records)
 
@@ -53,7 +54,8 @@ def found(files, tmp_path):
 
 def test_values_are_those_of_the_metrics_over_all_pairs(files, found):
     metrics = collect_trials(files[0], RANGES, SUCCESS).set_index(["method", "metric", "concept"])["value"]
-    every = {key for key in metrics.index if key[1] != "test_samples" and (key[1] == "success" or key[2] == "all")}
+    counts = ("test_samples", "points")
+    every = {key for key in metrics.index if key[1] not in counts and (key[1] == "success" or key[2] == "all")}
     assert every == set(found.index)  # the tables show no errors by cause
     for key in found.index:
         assert found.loc[key, "value"] == pytest.approx(metrics[key].mean())

@@ -33,7 +33,7 @@ def trials(starts=("initial", "fgr"), **changes):
             good = sample < 3 and start == starts[0]
             errors = dict(zip(MEASURED, (0.01, 0.1, 0.02) if good else (0.3, 1.1, 0.2), strict=True))
             known = {"sample": sample, "concept": CONCEPTS[sample % 3], "start": start}
-            told = known | (mild if sample < 3 else severe) | errors
+            told = known | (mild if sample < 3 else severe) | errors | {"points": 300 + 100 * (sample % 2)}
             records.append(told | {"failure": "" if good else "lost, alas"})
     return pd.DataFrame(records).assign(**changes)
 
@@ -70,6 +70,7 @@ def test_every_start_cause_and_bin_has_its_metrics(written):
     assert value(first, metric="rotation_deg", **told) == pytest.approx(np.rad2deg(0.6))
     assert value(first, metric="translation", **told) == pytest.approx(0.11)
     assert value(first, metric="test_samples", **told) == 6
+    assert value(first, metric="points", **told) == 350
     for concept in CONCEPTS:
         assert value(first, method="gicp", metric="test_samples", concept=concept) == 2
         assert value(first, method="gicp", metric="success", concept=f"{concept}_low") == 1

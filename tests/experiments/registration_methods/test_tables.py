@@ -40,7 +40,7 @@ def seconds():
         ("registration_methods", source, method, metric, "all", seed, value)
         for source, values in {"ycb": (30, 0.02), "cups": (10, 0.06)}.items()
         for method in SUCCESS
-        for metric, value in zip(("test_samples", "seconds"), values, strict=True)
+        for metric, value in zip(("test_samples", "seconds", "points"), (*values, 100 * values[1] * 1e2), strict=True)
         for seed in range(3)
     ]
     return tidy(rows, "seconds")
@@ -64,6 +64,7 @@ def test_cells_have_the_intervals_over_families_and_times_have_none(intervals, s
     assert (cell.mean, cell.seeds, cell.test_samples) == (pytest.approx(50), 3, 120)
     assert cell.bounds == pytest.approx((40, 55))
     assert table.cells[3, "milliseconds"].mean == pytest.approx(30)
+    assert table.cells[3, "points"].mean == pytest.approx(300)  # of the pairs of both sources
     assert table.cells[3, "rotation_deg"].mean == pytest.approx(12)
     assert table.cells[3, "translation"].bounds == pytest.approx((2.4, 3.3))
     assert {row for row, key in table.best() if key == "success_all"} == {1, 3}
