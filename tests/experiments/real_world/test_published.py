@@ -1,0 +1,62 @@
+"""Encoders as published beside the judged rows of Table VI, and the same rows from other initial poses: their names."""
+
+from copy import deepcopy
+
+import pytest
+
+from gpca.config.check import check
+from gpca.config.leave_out import without_false
+from gpca.encoders.registry import make_encoder
+from gpca.errors import InputError
+from gpca.experiments.run import explainer_of, files_behind, names_of, settings_of
+
+from ...config.configs import changed, load
+
+
+def test_the_full_protocol_has_them_with_every_reduction_and_the_default_has_none():
+    config = without_false(load("full"))
+    sources = check(deepcopy(config))
+    names, settings = names_of(config, sources), settings_of(config, sources)
+    assert names["published"][0] == "dgcnn_1024-none" and len(names["published"]) == 12
+    assert explainer_of("pointnet_tnet-umap", names) == "gpca"
+    behind = files_behind("pointnet2_ssg-pca", names)["embeddings"]
+    assert behind == "embeddings/{source}/pointnet2_ssg/pca/seed{seed}.npz"
+    assert names["condition_backbone"] == names["backbone"] and len(names["backbone"]) == 16
+    assert {"frame_encoder", "frame_start"} <= set(names["reading_group"])
+    assert names["estimated"] == "real_rgbd_estimated"
+    assert list(settings["published_encoders"]) == ["dgcnn_1024", "pointnet_tnet", "pointnet2_ssg"]
+    usual = names_of(without_false(load()), sources)
+    assert usual["published"] == [] and usual["condition_backbone"] == ["dgcnn-none"]
+    assert not {"frame_encoder", "frame_start"} & set(usual["reading_group"])
+
+
+def test_they_have_the_published_sizes():
+    encoders = load("full")["encoders"]
+    sizes = {
+        name: make_encoder(encoders[name]["backbone"], encoders[name]["options"]).embedding_size
+        for name in ("dgcnn_1024", "pointnet_tnet", "pointnet2_ssg")
+    }
+    assert sizes == {"dgcnn_1024": 2048, "pointnet_tnet": 1024, "pointnet2_ssg": 1024}
+    assert encoders["pointnet2_ssg"]["draw_points"] == 2 * encoders["pointnet2_ssg"]["options"]["centroids"] == 1024
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "message"),
+    [
+        ("real_world.published", {"dgcnn": "dgcnn2"}, "real_world.published: no encoder 'dgcnn2'; choose one of dgcnn"),
+        ("real_world.published", {"pointnet3": "dgcnn_1024"}, "real_world.published: no backbone 'pointnet3'"),
+        ("real_world.published", {"dgcnn": "pointnet"}, "real_world.published: 'pointnet' has rows already"),
+        (
+            "real_world.published",
+            {"dgcnn": "dgcnn_1024", "pointnet": "dgcnn_1024"},
+            "real_world.published: 'dgcnn_1024' has rows already",
+        ),
+        ("real_world.reductions", ["pca"], "real_world.condition_reductions: no reduction 'none'; choose one of pca"),
+        ("real_world.condition_reductions", ["tsne"], "real_world.condition_reductions.0: 'tsne' should be"),
+        ("method_pairs.points_of", {"icp": 512}, "method_pairs.points_of: no registration method 'icp'"),
+        ("method_pairs.points_of", {"fgr": 10}, "method_pairs.points_of.fgr: 10 should be greater than or equal to 64"),
+    ],
+)
+def test_names_that_nothing_has_are_refused(key, value, message):
+    with pytest.raises(InputError, match=message):
+        check(without_false(changed(key, value)))
