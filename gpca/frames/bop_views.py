@@ -1,6 +1,6 @@
 """Single views of objects in the depth frames of a BOP dataset, cut out by their masks: a kind of source.
 
-A view is a cloud in the camera's frame. It is named ``obj_000014_48_1000`` by its object, the scene, and the image with
+A view is a cloud in the camera's frame. It is named ``obj_000014_48_1002`` by its object, the scene, and the image with
 the place of the object among the image's annotations; so all views of an object are one instance.
 """
 

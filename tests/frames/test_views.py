@@ -8,13 +8,16 @@ import pytest
 from scipy.spatial import cKDTree
 
 from gpca.alignment.rigid import inverse, transform
+from gpca.config.check import check
+from gpca.config.leave_out import without_false
 from gpca.errors import InputError
 from gpca.frames import bop_views, mesh_views
 from gpca.objects.canonical import ObjectClouds, write_objects
-from gpca.objects.source import resolve, source_modules
+from gpca.objects.source import data_files, resolve, source_modules
 from gpca.objects.source import surfaces as surfaces_of
 from gpca.objects.surface import Surface, evenly, instance_of
 
+from ..config.configs import load
 from .tiny import surfaces as meshes
 
 
@@ -76,6 +79,17 @@ def test_rendered_views_show_the_side_of_a_mesh_that_faces_the_camera():
     assert np.array_equal(again[1].vertices_m, found[1].vertices_m)
     with pytest.raises(InputError, match="object 'cloud': is a cloud"):
         list(mesh_views.views(Surface("cloud", brick.vertices_m, None), 1))
+
+
+def test_the_config_of_cups_has_the_real_views_that_there_are():
+    sources = check(without_false(load("cup_views")))
+    assert list(sources) == ["coffee_cup", "coffee_cup_views", "coffee_cup_rendered_views"]
+    views = list(surfaces_of(sources["coffee_cup_views"], "nowhere"))
+    assert [view.name for view in views] == [
+        *(f"obj_000014_0_{1000 * image + 1}" for image in (1, 4, 7, 10, 20)), "obj_000014_48_1002",
+    ]  # fmt: skip
+    assert min(len(view.vertices_m) for view in views) > 2 * 2048  # as many as source and target take
+    assert len(data_files(sources["coffee_cup_rendered_views"])) == 11
 
 
 def test_views_are_kinds_of_source(scenes, tmp_path):
