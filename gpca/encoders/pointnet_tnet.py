@@ -7,6 +7,8 @@ from itertools import pairwise
 import torch
 from torch import nn
 
+from gpca.encoders.group_mlp import GroupMLP
+from gpca.encoders.grouping import Groups
 from gpca.encoders.layers import PointLinear, stacked_product
 
 PENALTY = 1e-3  # weight of the distance of the second transform from an orthogonal one, as published
@@ -32,7 +34,7 @@ class PointNetTNet(nn.Module):
         self.turn_points = TNet(3, width)
         self.first = PointLayers((3, width, width))
         self.turn_features = TNet(width, width)
-        self.last = PointLayers((width, width, 2 * width, self.embedding_size))
+        self.last = Pooled(width, (width, 2 * width, self.embedding_size))
         self.penalty: torch.Tensor | None = None
 
     def forward(self, points_B_N_3: torch.Tensor) -> torch.Tensor:
@@ -40,7 +42,7 @@ class PointNetTNet(nn.Module):
         x_B_N_F = self.first(stacked_product(points_B_N_3, self.turn_points(points_B_N_3)))
         A_B_F_F = self.turn_features(x_B_N_F)
         self.penalty = PENALTY * _from_orthogonal(A_B_F_F) if self.training else None
-        return self.last(stacked_product(x_B_N_F, A_B_F_F)).amax(dim=1)
+        return self.last(stacked_product(x_B_N_F, A_B_F_F))
 
 
 class TNet(nn.Module):
@@ -49,7 +51,7 @@ class TNet(nn.Module):
     def __init__(self, features: int, width: int) -> None:
         super().__init__()
         self.features = features
-        self.points = PointLayers((features, width, 2 * width, 16 * width))
+        self.points = Pooled(features, (width, 2 * width, 16 * width))
         self.whole = PointLayers((16 * width, 8 * width, 4 * width))
         self.matrix = PointLinear(4 * width, features**2)
         nn.init.zeros_(self.matrix.weight)
@@ -58,7 +60,22 @@ class TNet(nn.Module):
 
     def forward(self, x_B_N_F: torch.Tensor) -> torch.Tensor:
         """Return the matrix (B, F, F) of each cloud."""
-        return self.matrix(self.whole(self.points(x_B_N_F).amax(dim=1))).view(-1, self.features, self.features)
+        return self.matrix(self.whole(self.points(x_B_N_F))).view(-1, self.features, self.features)
+
+
+class Pooled(nn.Module):
+    """Layers of linear map, batch norm and ReLU on points of so many numbers, and the maximum over the points."""
+
+    def __init__(self, inputs: int, widths: tuple[int, ...]) -> None:
+        super().__init__()
+        self.layers = GroupMLP(inputs - 3, widths)
+
+    def forward(self, x_B_N_F: torch.Tensor) -> torch.Tensor:
+        """Map features (B, N, F) to the whole cloud's (B, F_out)."""
+        # To the layers, three of the numbers are coordinates, which a whole cloud does not treat in another way.
+        three_B_N_3, others_B_N_F = x_B_N_F[..., :3].contiguous(), x_B_N_F[..., 3:].contiguous()
+        others = others_B_N_F if others_B_N_F.shape[-1] else None
+        return self.layers(three_B_N_3, others, Groups.whole(three_B_N_3))[:, 0]
 
 
 class PointLayers(nn.Module):

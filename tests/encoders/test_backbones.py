@@ -114,6 +114,17 @@ def test_a_tnet_starts_at_the_identity_and_its_second_transform_is_held_near_a_r
     assert encoder.penalty is None
 
 
+def test_pointnet_with_tnets_has_the_published_widths():
+    encoder = make_encoder("pointnet_tnet", {})
+    for turn, inputs in ((encoder.turn_points, 3), (encoder.turn_features, 64)):
+        shapes = [linear.weight.shape for linear in (*turn.points.layers.linears, *turn.whole.linears, turn.matrix)]
+        assert shapes == [
+            (64, inputs), (128, 64), (1024, 128), (512, 1024), (256, 512), (inputs**2, 256),
+        ]  # fmt: skip
+    shapes = [linear.weight.shape for linear in (*encoder.first.linears, *encoder.last.layers.linears)]
+    assert shapes == [(64, 3), (64, 64), (64, 64), (128, 64), (1024, 128)]
+
+
 def test_the_training_minimizes_the_penalty_of_a_tnet(easy, monkeypatch):
     from gpca.encoders import pointnet_tnet
 
