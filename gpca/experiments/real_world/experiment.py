@@ -35,6 +35,7 @@ def check(config: dict, left_out: LeftOut) -> None:
     if section["initial_pose"].get("form") == "results" and not has_estimates(datasets):
         fault = "form 'results' needs a dataset with results or errors"
         raise InputError("config key real_world.initial_pose", fault, "name the files or choose another form")
+    _check_published(config, encoders_left_out)
     _check_training(config)
     require_names("real_world.rendered", section["rendered"], section["backbones"], "backbone", encoders_left_out)
     if section["rendered"] and (section["virtual"] or {}).get("objects") != "training":
@@ -44,7 +45,6 @@ def check(config: dict, left_out: LeftOut) -> None:
     require_names(key, section["condition_backbones"], backbones, "backbone", encoders_left_out)
     key, reductions = "real_world.condition_reductions", section["reductions"]
     require_names(key, section["condition_reductions"], reductions, "reduction", left_out("reductions"))
-    _check_published(config, encoders_left_out)
     for name, settings in (section["explainers"] or {}).items():
         with_key(f"real_world.explainers.{name}", require_settings, name, settings or {})
     _check_reductions(config)
