@@ -28,7 +28,7 @@ def align(
     pair: Pair,
     voxel: float = VOXEL,
     correspondence_distance: float = CORRESPONDENCE_DISTANCE,
-    centered: bool = True,
+    centered: bool = False,
     normal_gain: float = 3.0,
     feature_gain: float = 5.0,
     noise_gain: float = 1.0,

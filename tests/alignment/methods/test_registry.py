@@ -202,7 +202,7 @@ def test_where_the_origin_is_does_not_matter_to_kiss_matcher(objects):
     aside = np.eye(4)
     aside[:3, 3] = 2, -1, 0.5
     moved = replace(pair, target=transform(aside, pair.target))
-    near, far = (make_method("kiss_matcher")(each) for each in (pair, moved))
+    near, far = (make_method("kiss_matcher", {"centered": True})(each) for each in (pair, moved))
     assert error(moved, far, aside @ T_true) < 0.1
     np.testing.assert_allclose(far.T_target_source, aside @ near.T_target_source, atol=1e-3)
 
@@ -258,7 +258,7 @@ def test_what_an_optional_package_finds_becomes_an_outcome(objects, monkeypatch,
     pair, T_true = small_motion(objects)
     monkeypatch.setitem(sys.modules, OPTIONAL[name], StandIn(T_true, good))
     monkeypatch.setattr(registry, "find_spec", lambda name: True)
-    outcome = make_method(name, {"centered": False} if name == "kiss_matcher" else {})(pair)
+    outcome = make_method(name)(pair)
     assert outcome.converged == good
     assert np.array_equal(outcome.T_target_source, T_true if good or name == "gicp_small" else np.eye(4))
 
