@@ -21,13 +21,14 @@ def test_what_is_false_is_left_out_as_if_it_were_not_there(key):
     config, never_there = changed(key, False), changed(key, MISSING)
     # The rows that need it.
     never_there["kernel_grid"]["sources"] = [n for n in ("ycb", "linemod") if n in never_there["sources"]]
-    never_there["real_world"]["backbones"] = list(never_there["encoders"])
+    for part in ("backbones", "training"):
+        named = never_there["real_world"][part]
+        there = [name for name in named if name in never_there["encoders"]]
+        never_there["real_world"][part] = there if part == "backbones" else {name: named[name] for name in there}
     never_there["real_world"]["reductions"] = ["none", *never_there["reductions"]]
     never_there["exchange"]["estimators"] = [
         name for name in never_there["exchange"]["estimators"] if name in never_there["estimators"]
     ]
-    training = never_there["real_world"]["training"]
-    never_there["real_world"]["training"] = {name: training[name] for name in never_there["encoders"]}
     of_scans = never_there["scans"]["methods"]
     never_there["scans"]["methods"] = {name: of_scans[name] for name in of_scans if name in never_there["methods"]}
     if key == "uncertainty.oracle":

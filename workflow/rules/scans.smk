@@ -1,6 +1,6 @@
 # Data sets of scans -> pairs by overlap -> each registered by every method -> scans.csv.
 from gpca.experiments.scans.experiment import missing, present
-from gpca.scans.source import data_files, place_of
+from gpca.scans.source import data_files as files_of_scans, place_of
 
 SCANS, SCAN_ENTRIES = config["scans"], present(config)
 SCAN_CHOICE = ("strata", "pairs", "scan_points")
@@ -28,7 +28,7 @@ rule scan_pairs:
 
 rule draw_scans:
     input:
-        data=lambda wildcards: data_files(
+        data=lambda wildcards: files_of_scans(
             SCAN_ENTRIES[wildcards.scan_set], config["data_dir"]
         ),
         code=code_files("gpca.steps.scans"),

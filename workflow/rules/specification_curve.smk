@@ -133,7 +133,7 @@ rule pretrain_on_other_cloud:
     benchmark:
         f"<benchmarks>/other_clouds/pretrained/{BACKBONE}/{{cloud}}.tsv"
     wildcard_constraints:
-        cloud=r"\w+",
+        cloud="|".join(OTHER_CLOUDS) or "none",
     priority: 12  # the longest jobs, with many cores to be started early
     conda:
         "../envs/gpca.yaml"
@@ -172,7 +172,7 @@ rule train_on_other_cloud:
     benchmark:
         f"<benchmarks>/other_clouds/{FRAMES}/{BACKBONE}/{{cloud}}/seed{{seed}}.tsv"
     wildcard_constraints:
-        cloud=r"\w+",
+        cloud="|".join(OTHER_CLOUDS) or "none",
     priority: 11
     conda:
         "../envs/gpca.yaml"
@@ -200,7 +200,7 @@ rule embed_other_cloud:
     benchmark:
         f"<benchmarks>/other_clouds/{FRAMES}/{BACKBONE}/{{cloud}}/embed_seed{{seed}}.tsv"
     wildcard_constraints:
-        cloud=r"\w+",
+        cloud="|".join(OTHER_CLOUDS) or "none",
     priority: 11
     conda:
         "../envs/gpca.yaml"
