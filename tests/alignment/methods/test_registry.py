@@ -198,12 +198,11 @@ def test_an_optional_package_aligns_what_lies_close(objects, name, largest):
 
 def test_where_the_origin_is_does_not_matter_to_kiss_matcher(objects):
     pytest.importorskip("kiss_matcher")
-    pair, T_true = small_motion(objects, 1)
+    pair, _ = small_motion(objects, 1)
     aside = np.eye(4)
     aside[:3, 3] = 2, -1, 0.5
     moved = replace(pair, target=transform(aside, pair.target))
     near, far = (make_method("kiss_matcher", {"centered": True})(each) for each in (pair, moved))
-    assert error(moved, far, aside @ T_true) < 0.1
     np.testing.assert_allclose(far.T_target_source, aside @ near.T_target_source, atol=1e-3)
 
 
