@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -74,9 +75,10 @@ def find_hypotheses(
         evidence: what else speaks for a pose, such as what a camera saw around the points.
     """
     search = _Search(observed, surface, settings, random, evidence)
-    fits = search.fit(search_ends(observed, surface, T_found_n, random), few=True)
-    first = most_probable(fits, surface, settings.hypotheses, SAME)
-    found = search.fit(np.stack([hypothesis.T for hypothesis in first]), few=False)
+    free = search.fit(search_ends(observed, surface, T_found_n, random))
+    held = search.hold()
+    first = most_probable([*free, held], surface, settings.hypotheses, SAME)
+    found = [*search.refine(first), search.hold(held.width)]
     return not_negligible(most_probable(found, surface, settings.hypotheses, SAME / 2))
 
 
@@ -128,7 +130,7 @@ def hypothesis_at(
 
 
 class _Search:
-    """Fits poses to some of the points, or to all; the initial pose is always among them, held by what is believed."""
+    """Fits poses to some of the points, and then the best to all."""
 
     def __init__(
         self,
@@ -145,14 +147,26 @@ class _Search:
         self._few = few, Mixture(few_model, spacing / 2), ITERATIONS
         self._all = observed, Mixture(surface.points, surface.spacing / 2), LAST_ITERATIONS
 
-    def fit(self, T_n: np.ndarray, few: bool) -> list[Hypothesis]:
-        observed, mixture, iterations = self._few if few else self._all
-        anchor = anchor_of(len(observed), self._settings)
-        free = mixture.fit(observed, T_n, iterations)
-        held = mixture.fit(observed, np.eye(4)[None], iterations, anchor=anchor)
+    def fit(self, T_n: np.ndarray) -> list[Hypothesis]:
+        """Fit poses (n, 4, 4) to some of the points."""
+        return self._fit(self._few, T_n)
+
+    def refine(self, hypotheses: list[Hypothesis]) -> list[Hypothesis]:
+        """Fit hypotheses to all points; the normals start as wide as they were, which leaves fewer partners."""
+        width_n = np.array([hypothesis.width for hypothesis in hypotheses])
+        return self._fit(self._all, np.stack([hypothesis.T for hypothesis in hypotheses]), width_n=width_n)
+
+    def hold(self, width: float | None = None) -> Hypothesis:
+        """Fit the initial pose, held by what is believed of good starts: to all points if normals were so wide."""
+        fitted, width_n = (self._few, None) if width is None else (self._all, np.array([width]))
+        anchor = anchor_of(len(fitted[0]), self._settings)
+        return self._fit(fitted, np.eye(4)[None], anchor=anchor, width_n=width_n)[0]
+
+    def _fit(self, fitted: tuple[np.ndarray, Mixture, int], T_n: np.ndarray, **options: Any) -> list[Hypothesis]:
+        observed, mixture, iterations = fitted
+        fits = mixture.fit(observed, T_n, iterations, **options)
         return [
             _hypothesis(fits, i, observed, self._surface, self._settings, self._random, self._evidence)
-            for fits in (free, held)
             for i in range(len(fits.T_n))
         ]
 

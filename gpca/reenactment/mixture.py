@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gpca.reenactment.mixture_kernels import fit_all
+from gpca.reenactment.mixture_kernels import FIRST_WIDTH, fit_all
 
 CELL = 0.15  # diameters; edge of the cubes that the model's points are sorted into
 
@@ -67,16 +67,26 @@ class Mixture:
         self._least = least_width**2
 
     def fit(
-        self, observed: np.ndarray, T_n: np.ndarray, iterations: int, moving: bool = True, anchor: Anchor | None = None
+        self,
+        observed: np.ndarray,
+        T_n: np.ndarray,
+        iterations: int,
+        moving: bool = True,
+        anchor: Anchor | None = None,
+        width_n: np.ndarray | None = None,
     ) -> Fits:
         """Maximize the likelihood of the observed points (N, 3) from each pose (n, 4, 4), times that of an anchor.
 
         A fit that has converged takes fewer iterations.
 
-        Without `moving`, the width and the share of outliers are estimated at the poses as they are.
+        Args:
+            moving: if not, the width and the share of outliers are estimated at the poses as they are.
+            width_n: of the normals at first (n,); by default `FIRST_WIDTH`.
         """
         poses_n, n = np.array(T_n, np.float64), len(T_n)
-        likelihood_n, variance_n, outliers_n = np.empty(n), np.empty(n), np.empty(n)
+        likelihood_n, outliers_n = np.empty(n), np.empty(n)
+        width_n = np.full(n, FIRST_WIDTH) if width_n is None else width_n
+        variance_n = np.maximum(np.square(width_n, dtype=np.float64), self._least)
         inlier_n_N = np.empty((n, len(observed)))
         precision, arm = (anchor.strength / anchor.translation**2, anchor.arm) if anchor else (0.0, 0.0)
         fit_all(

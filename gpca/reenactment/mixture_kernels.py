@@ -43,14 +43,15 @@ def fit_all(
         precision, arm: of the anchor (:class:`gpca.reenactment.mixture.Anchor`); 0 for none.
         least: the smallest variance of the normals.
         points: (3, M) in the order of their cells, see :class:`gpca.alignment.icp_target.Target`.
-        likelihood, variance, outliers, inlier: (n,), the last (n, N), are filled.
+        variance: (n,) of the normals at first, is replaced.
+        likelihood, outliers, inlier: (n,), the last (n, N), are filled.
     """
     moments, room, near = np.empty((4, 4)), np.empty((8, 4)), np.empty_like(points)
     before = np.empty((4, 4))
     count = len(observed)
     for n in range(len(poses)):
         pose = poses[n]
-        variance[n], outliers[n] = max(least, FIRST_WIDTH**2), FIRST_OUTLIERS
+        outliers[n] = FIRST_OUTLIERS
         converged = False
         for iteration in range(iterations + 1):
             likelihood[n], weight, square = _expect(

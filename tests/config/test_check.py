@@ -84,7 +84,7 @@ FAULTS = [
     ("new_concepts.error", [0.1], "new_concepts.error: unknown; did you mean errors?"),
     ("new_concepts.errors", [0], "new_concepts.errors.0: 0 should be greater than 0"),
     ("new_concepts.causes", ["noise"], "new_concepts.causes.0: 'noise' should be 'nominal' or 'geometry'"),
-    ("new_concepts.embeddings", ["pair"], "new_concepts: setting erring of new_concepts: 'other_samples' is not among"),
+    ("new_concepts.embeddings", ["other_samples"], "new_concepts: setting erring of new_concepts: 'pair' is not among"),
     ("real_world.backbones", ["dgcnn", "pointnet3"], "real_world.backbones: no encoder 'pointnet3'; choose one of dg"),
     ("real_world.datasets", {}, "real_world.virtual: needs real_world.datasets: it renders their models"),
     ("real_world.virtual", {"count": 4, "views": 1}, "real_world.virtual.objects: is missing; add it, as in config/c"),

@@ -6,21 +6,34 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from gpca.experiments.experiment import Experiment, Tidy
+from gpca.errors import require_names
+from gpca.experiments.experiment import Experiment, LeftOut, Tidy
 from gpca.experiments.reenactment.knowledge import KNOWN
-from gpca.settings import Count
+from gpca.settings import Count, Distinct
 
 
 @dataclass(frozen=True)
 class Section:
-    """The seeds whose test samples are re-enacted with parts of the truth: the first so many of the run's."""
+    """The sources and seeds whose test samples are re-enacted with parts of the truth; the first so many seeds."""
 
+    sources: Distinct[str]
     seeds: Count
 
 
+def check(config: dict, left_out: LeftOut) -> None:
+    """Check the names of the sources."""
+    chosen = config["oracles"]["sources"]
+    require_names("oracles.sources", chosen, config["sources"], "source", left_out("sources"))
+
+
 def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
-    """Return what is known, and the seeds."""
-    return {"known": list(KNOWN), "oracle_seed": list(config["seeds"])[: config["oracles"]["seeds"]]}
+    """Return what is known, the sources and the seeds."""
+    section = config["oracles"]
+    return {
+        "known": list(KNOWN),
+        "oracle_source": list(section["sources"]),
+        "oracle_seed": list(config["seeds"])[: section["seeds"]],
+    }
 
 
 def shown(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
@@ -36,11 +49,13 @@ EXPERIMENT = Experiment(
             "oracle_intervals.csv",
             "gpca.experiments.reenactment.metrics:collect_oracles",
             {
-                "prediction_files": "oracles/{source}/{known}/seed{oracle_seed}.csv",
-                "causes_files": "causes/{source}/seed{oracle_seed}.npz",
+                "prediction_files": "oracles/{oracle_source}/{known}/seed{oracle_seed}.csv",
+                "causes_files": "causes/{oracle_source}/seed{oracle_seed}.npz",
             },
         ),
     ),
     names=names,
     shown=shown,
+    check=check,
+    lists={"oracles.sources": "sources"},
 )
