@@ -13,7 +13,7 @@ import numpy as np
 
 from gpca.errors import require_known
 
-EXPANSION = 4  # K: BALD with k-means clusters the K·B most uncertain samples
+EXPANSION = 4  # K: BALD with k-means forms clusters of K of the B·K most uncertain samples
 
 
 @dataclass(frozen=True)
@@ -112,23 +112,41 @@ def bald(pool: Pool, batch: int, _random: np.random.Generator) -> np.ndarray:
 
 
 def bald_kmeans(pool: Pool, batch: int, random: np.random.Generator) -> np.ndarray:
-    """Cluster the B·K largest BALD into B clusters and take the sample nearest to each centroid (the paper).
+    """Cluster the B·K largest BALD into B clusters of K each and take the sample nearest to each centroid (Sec. III-C).
 
-    Distances to all centroids are settled from the smallest on, so that no sample stands for two clusters.
+    The most uncertain of these comes first.
     """
-    from sklearn.cluster import KMeans  # here, because the workflow imports this file only for the names
-
     candidates = top(pool.bald_N, batch * EXPANSION)
     h_n_d = pool.h_N_d[candidates]
-    clusters = min(batch, len(np.unique(h_n_d, axis=0)))
-    kmeans = KMeans(clusters, n_init=1, random_state=int(random.integers(2**31))).fit(h_n_d)
-    distances_n_B = kmeans.transform(h_n_d)
-    chosen: dict[int, int] = {}
-    for flat in np.argsort(distances_n_B, axis=None, kind="stable"):
-        row, cluster = divmod(int(flat), clusters)
-        if cluster not in chosen and row not in chosen.values():
-            chosen[cluster] = row
-    return candidates[sorted(chosen.values())]
+    cluster_n, centers_B_d = balanced_kmeans(h_n_d, batch, random)
+    distance_n = np.square(h_n_d - centers_B_d[cluster_n]).sum(axis=1)
+    nearest = [min(np.flatnonzero(cluster_n == cluster), key=distance_n.__getitem__) for cluster in range(batch)]
+    return candidates[sorted(nearest)]
+
+
+def balanced_kmeans(
+    h_n_d: np.ndarray, clusters: int, random: np.random.Generator, most: int = 100
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the cluster (n,) of each sample and the centroids (B, d); sizes of clusters differ by one at most.
+
+    K-means in which the assignment to the centroids is the cheapest one with as many samples in each cluster
+    (Malinen and Fränti 2014). It ends after `most` passes at the latest.
+    """
+    from scipy.optimize import linear_sum_assignment  # here, because the workflow imports this file only for the names
+    from scipy.spatial.distance import cdist
+    from sklearn.cluster import kmeans_plusplus
+
+    h_n_d = h_n_d.astype(float)
+    centers_B_d, _ = kmeans_plusplus(h_n_d, clusters, random_state=int(random.integers(2**31)))
+    place_n = np.arange(len(h_n_d)) % clusters  # of each place, its cluster
+    cluster_n = np.full(len(h_n_d), -1)
+    for _ in range(most):
+        _, assigned_n = linear_sum_assignment(cdist(h_n_d, centers_B_d, "sqeuclidean")[:, place_n])
+        before_n, cluster_n = cluster_n, place_n[assigned_n]
+        if np.array_equal(before_n, cluster_n):
+            break
+        centers_B_d = np.stack([h_n_d[cluster_n == cluster].mean(axis=0) for cluster in range(clusters)])
+    return cluster_n, centers_B_d
 
 
 def bald_stochastic(pool: Pool, batch: int, random: np.random.Generator) -> np.ndarray:

@@ -7,6 +7,7 @@ from gpca.active_learning.acquisition import (
     EXPANSION,
     STRATEGIES,
     Pool,
+    balanced_kmeans,
     bald_kmeans,
     bald_stochastic,
     require_strategy,
@@ -132,6 +133,32 @@ def test_bald_kmeans_takes_the_middle_of_each_cluster_of_uncertain_samples(batch
         members = np.flatnonzero(np.linalg.norm(h - center, axis=1) < 1)
         expected.add(int(members[np.linalg.norm(h[members] - h[members].mean(axis=0), axis=1).argmin()]))
     assert set(selected("bald_kmeans", pool, batch, seed)) == expected
+
+
+@pytest.mark.parametrize("n, clusters", [(16, 4), (10, 4), (5, 1), (3, 3)])
+def test_balanced_clusters_hold_as_many_samples_each_and_none_gains_by_an_exchange(n, clusters):
+    h = np.random.default_rng(n).normal(size=(n, 3))
+    cluster, centers = balanced_kmeans(h, clusters, np.random.default_rng(0))
+    sizes = np.bincount(cluster, minlength=clusters)
+    assert sizes.max() - sizes.min() <= 1
+    assert centers == pytest.approx(np.stack([h[cluster == k].mean(axis=0) for k in range(clusters)]))
+    cost = np.square(h[:, None] - centers).sum(axis=2)
+    for one in range(n):
+        for other in range(one):
+            a, b = cluster[one], cluster[other]
+            assert cost[one, a] + cost[other, b] <= cost[one, b] + cost[other, a] + 1e-9
+
+
+def test_a_crowd_of_uncertain_samples_gets_as_many_labels_as_it_has_shares_of_the_candidates():
+    crowd, outliers, certain = (
+        around([[0, 0]], 12),
+        around([[90, 0], [0, 90], [90, 90], [45, 45]], 1),
+        around([[9, 9]], 14),
+    )
+    uncertain = np.arange(30) < 16
+    pool = make_pool(30, h_N_d=np.concatenate([crowd, outliers, certain]), bald_N=uncertain.astype(float))
+    rows = np.array(selected("bald_kmeans", pool, 4))
+    assert ((rows < 12).sum(), uncertain[rows].sum()) == (3, 4)
 
 
 def test_bald_kmeans_names_the_most_uncertain_of_its_choice_first():
