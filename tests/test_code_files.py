@@ -99,7 +99,7 @@ STEPS = {  # module -> files that it depends on, and some that it does not
         {"gpca/classifier/gpc.py", "gpca/active_learning/acquisition.py"},
     ),
     "gpca.experiments.active_learning.step": (
-        {"gpca/classifier/latents.py", "gpca/active_learning/stream.py"},
+        {"gpca/classifier/latents.py", "gpca/active_learning/stream.py", "gpca/active_learning/retraining.py"},
         {"gpca/explainers/interface.py", "gpca/encoders/training.py"},
     ),
     "gpca.experiments.new_concepts.step": (
@@ -107,7 +107,7 @@ STEPS = {  # module -> files that it depends on, and some that it does not
         {"gpca/explainers/interface.py", "gpca/active_learning/stream.py"},
     ),
     "gpca.experiments.frame_labels.step": (
-        {"gpca/active_learning/new_concepts.py", "gpca/features/registered.py"},
+        {"gpca/active_learning/retraining.py", "gpca/features/registered.py"},
         {"gpca/explainers/interface.py", "gpca/active_learning/stream.py", "gpca/frames/synthesis.py"},
     ),
     "gpca.steps.uncertainty": (

@@ -15,7 +15,12 @@ if TYPE_CHECKING:
 TABLE = "active_learning/"  # `table` of the tidy rows reads this and the setting
 RANDOM = "random"  # the strategy that the others are compared with, seed by seed
 # A count that ended with the budget where the share beside it is below 1: its mean is a lower bound then.
-CENSORED_BY = {"labels_to_target": "reached", "epochs_to_target": "reached", "delay": "recognised"}
+CENSORED_BY = {
+    "labels_to_target": "reached",
+    "epochs_to_target": "reached",
+    "epochs_at_target": "reached",
+    "delay": "recognised",
+}
 RECOGNIZED = 0.5  # share of a new concept's test samples named right, from which on it counts as recognized
 
 
@@ -31,20 +36,27 @@ def collect_curves(files: Iterable[str | Path], target: float) -> pd.DataFrame:
         baseline = curves.get((source, RANDOM, seed), {})
         for (setting, held_out), curve in of_file.items():
             values = stream_metrics(curve) if "arrived" in curve else pool_metrics(curve, target)
-            if (setting, held_out) in baseline and "area_under_curve" in values and strategy != RANDOM:
-                values["area_gain"] = values["area_under_curve"] - area_under_curve(baseline[setting, held_out])
+            at_random = baseline.get((setting, held_out))
+            if at_random is not None and "area_under_curve" in values and strategy != RANDOM:
+                of_random = pool_metrics(at_random, target)
+                if values["labels"] == of_random["labels"]:  # or the areas are over other labels
+                    values["area_gain"] = values["area_under_curve"] - of_random["area_under_curve"]
             key = (TABLE + setting, source, strategy)
             records += [(*key, metric, held_out, seed, float(value)) for metric, value in values.items()]
     return tidy(records, "active learning")
 
 
 def pool_metrics(curve: pd.DataFrame, target: float) -> dict[str, float]:
-    """Return the metrics of one learning curve; where the target is missed, labels and epochs are lower bounds."""
+    """Return the metrics of one learning curve; where the target is missed, labels and epochs are lower bounds.
+
+    ``epochs_to_target`` are those of all retrainings, ``epochs_at_target`` those of the one that reached the target.
+    """
     hits = (curve["accuracy"] >= target).to_numpy()
     last = int(hits.argmax()) if hits.any() else len(curve) - 1
     return {
         "labels_to_target": curve["labels"][last],
         "epochs_to_target": curve["epochs"][: last + 1].sum(),
+        "epochs_at_target": curve["epochs"][last],
         "reached": float(hits.any()),
         "start_accuracy": curve["accuracy"].iloc[0],
         "final_accuracy": curve["accuracy"].iloc[-1],

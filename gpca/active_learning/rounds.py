@@ -197,7 +197,7 @@ def pool_of(
     return Pool(h.inputs_N_d, scores_N_C, bald_N, labeled, task.pool.concept_N[left])
 
 
-def step_of(task: LabelingTask[Projection], gpc: GPC, queried: list[int], epochs: int) -> dict[str, float]:
+def step_of(task: LabelingTask, gpc: GPC, queried: list[int], epochs: int) -> dict[str, float]:
     """Return a step of :func:`run_rounds`, after the labels of these rows of the pool are known."""
     accuracy, accuracy_new = accuracies(task, gpc)
     return {
@@ -209,7 +209,7 @@ def step_of(task: LabelingTask[Projection], gpc: GPC, queried: list[int], epochs
     }
 
 
-def accuracies(task: LabelingTask[Projection], classifier) -> tuple[float, float]:
+def accuracies(task: LabelingTask, classifier) -> tuple[float, float]:
     """Return the accuracy over all test samples and over those of the concept held out; NaN where there are none.
 
     The classifier is a GPC, or another object with its ``classes`` and ``scores``.

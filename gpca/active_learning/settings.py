@@ -36,6 +36,46 @@ class ActiveLearningSettings:
         return cls(**own | ({"gpc": GPCSettings(**own["gpc"])} if "gpc" in own else {}))
 
 
+LOOK_EVERY = 5  # passes over the labels between looks at the accuracy, where those up to a target are counted
+
+
+@dataclass(frozen=True)
+class RetrainingSettings:
+    """How the rounds go in which a classifier is fitted to all labels, as in the paper.
+
+    Attributes:
+        labels: the budget of queries, of a pool that may hold fewer.
+        least: labels that are given even where the target is reached before; from then on a round has `late_batch`.
+        batch, late_batch: B, labels per round.
+        gpc: the classifier; by default the paper's.
+    """
+
+    labels: Count = 60
+    least: Count = 60
+    batch: Count = 4
+    late_batch: Count = 10
+    gpc: GPCSettings = field(default_factory=GPCSettings)
+
+
+@dataclass(frozen=True)
+class RareSettings(RetrainingSettings):
+    """The same of a concept that is rare in the pool.
+
+    Attributes:
+        shares: of the pool that is of that concept, each in a run of its own.
+    """
+
+    shares: Distinct[OpenShare] = (0.05,)
+
+
+JUDGED_SHARE = 0.05  # the paper's numbers are compared with the run of this share (docs/comparison.md)
+
+
+def rare_setting(share: float) -> str:
+    """Return the name of that run in a file of curves: ``rare_5`` for a share of 0.05."""
+    return f"rare_{100 * share:g}"
+
+
 @dataclass(frozen=True)
 class StreamSettings:
     """How samples arrive and how many labels may be asked for.

@@ -36,6 +36,10 @@ class GPC:
         axes: names of the seed (source, seed, …).
     """
 
+    _scaler: Standardization
+    _prior: Prior
+    _latents: Latents
+
     def __init__(self, classes: tuple[str, ...], settings: GPCSettings, *axes: object) -> None:
         self.classes = classes
         self.settings = settings
@@ -58,17 +62,34 @@ class GPC:
         return self
 
     def fit_up_to(
-        self, iterations: Iterable[int], h_N_d: np.ndarray, labels_N: np.ndarray, around_R_d: np.ndarray | None = None
+        self,
+        iterations: Iterable[int],
+        h_N_d: np.ndarray,
+        labels_N: np.ndarray,
+        around_R_d: np.ndarray | None = None,
+        before: GPC | None = None,
     ) -> Iterator[int]:
-        """Yield each of these counts in rising order, the classifier then as :meth:`fit` leaves it after so many."""
-        around_R_d = h_N_d if around_R_d is None else around_R_d
-        self._scaler = self.scaling(around_R_d)
-        starts_R_d = self._scaled(around_R_d)
+        """Yield each of these counts in rising order, the classifier then as :meth:`fit` leaves it after so many.
+
+        Args:
+            iterations: the counts.
+            h_N_d, labels_N, around_R_d: as for :meth:`fit`.
+            before: a classifier of the same classes from whose scale of the inputs, covariance, inducing inputs and
+                posterior the fit starts instead; it is not changed.
+        """
+        if before is None:
+            around_R_d = h_N_d if around_R_d is None else around_R_d
+            self._scaler = self.scaling(around_R_d)
+            start = self.start(self._scaled(around_R_d))
+        else:
+            self._scaler = before._scaler
+            start = Start.after(before._prior, self._axes)
         inputs_N_d = self._scaled(h_N_d)
         targets_N = self._targets(labels_N)
-        start = self.start(starts_R_d)
         random = torch.Generator().manual_seed(start.seed)
         model = SparseGPs(start.covariance, start.inducing_M_d, random)
+        if before is not None:
+            model.set_posterior(before._latents)
         optimizer = Adam(model.parameters(), self.settings.learning_rate)
         stops = sorted(set(iterations))
         for done in progress(range(1, stops[-1] + 1), " ".join(map(str, ("GPC", *self._axes)))):

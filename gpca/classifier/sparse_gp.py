@@ -41,6 +41,12 @@ class SparseGPs(nn.Module):
         self.root_C_M_M = nn.Parameter(torch.eye(shape[1]).repeat(shape[0], 1, 1))  # its lower triangle counts
         self._random = random
 
+    def set_posterior(self, latents: Latents) -> None:
+        """Replace the start of the variational parameters by this posterior."""
+        with torch.no_grad():
+            self.mean_C_M.copy_(torch.from_numpy(latents.mean_C_M))
+            self.root_C_M_M.copy_(torch.linalg.cholesky(torch.from_numpy(latents.covariance_C_M_M)))
+
     def marginals(self, inputs_N_d: Tensor) -> tuple[Tensor, Tensor]:
         """Return mean and variance (C, N) of the latents at standardized inputs."""
         jitter_M_M = JITTER * torch.eye(len(self.inducing_M_d))

@@ -6,6 +6,7 @@ The suite's form of the classifier (:mod:`gpca.classifier.gpc`) and that in gpyt
 
 from __future__ import annotations
 
+from copy import deepcopy
 from dataclasses import dataclass
 
 import gpytorch
@@ -13,6 +14,7 @@ import numpy as np
 import torch
 
 from gpca.classifier.covariances import make_covariance
+from gpca.classifier.prior import Prior
 from gpca.classifier.settings import GPCSettings
 from gpca.seeds import generator, seed_of
 
@@ -65,6 +67,11 @@ class Start:
         """Return the start around standardized inputs; `axes` name the seeds."""
         covariance = make_covariance(settings.kernel, n_classes, _median_distance(inputs_N_d, axes))
         return cls(covariance, _inducing_inputs(inputs_N_d, settings.inducing, axes), seed_of(*axes, "gpc"))
+
+    @classmethod
+    def after(cls, prior: Prior, axes: tuple) -> Start:
+        """Return the start at what an earlier fit learned."""
+        return cls(deepcopy(prior.covariance).requires_grad_(True), prior.inducing_M_d, seed_of(*axes, "gpc"))
 
 
 def _inducing_inputs(inputs_N_d: torch.Tensor, most: int, axes: tuple) -> torch.Tensor:

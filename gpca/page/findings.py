@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gpca.active_learning.metrics import TABLE
+from gpca.active_learning.settings import JUDGED_SHARE, rare_setting
 from gpca.attribution.metrics import ALL, read_metrics
 from gpca.attribution.paired import UNTRAINED
 from gpca.experiments.diagnosis.judged import CEILING, POOLED
@@ -186,8 +188,8 @@ def _labels(metrics: pd.DataFrame, titles: Titles) -> Finding | None:
     if bald is None or random is None:
         return None
     text = (
-        f"A concept that the classifier has never seen is known after {bald} chosen by BALD and k-means, and after "
-        f"{random} drawn at random (medians)."
+        f"A concept that the classifier has never seen, {100 * JUDGED_SHARE:g} % of the pool, is known after {bald} "
+        f"chosen by BALD and k-means, and after {random} drawn at random (medians)."
     )
     return Finding(bald, text, "table3_active_learning")
 
@@ -214,8 +216,8 @@ def _accuracies(metrics: pd.DataFrame) -> dict[str, np.ndarray]:
 
 
 def _median_labels(metrics: pd.DataFrame, strategy: str) -> str | None:
-    """Return the median number of labels in words, over datasets, concepts and seeds; a bound where it is none."""
-    rows = metrics[(metrics["table"] == "active_learning/pretrained") & (metrics["method"] == strategy)]
+    """Return the median number of labels in words, over datasets and seeds; a bound where it is none."""
+    rows = metrics[(metrics["table"] == TABLE + rare_setting(JUDGED_SHARE)) & (metrics["method"] == strategy)]
     rows = rows[rows["concept"].isin(CONCEPTS)].set_index(["source", "concept", "seed"])
     of = {name: rows.loc[rows["metric"] == name, "value"] for name in ("labels_to_target", "reached", "labels")}
     if of["reached"].empty:

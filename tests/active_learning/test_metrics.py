@@ -39,6 +39,7 @@ def frame(steps):
 def test_labels_and_epochs_count_to_the_first_time_that_the_target_is_reached():
     metrics = pool_metrics(frame(pool_curve(0.6, 0.7, 0.9, 0.8, 0.95)), target=0.9)
     assert (metrics["labels_to_target"], metrics["epochs_to_target"], metrics["reached"]) == (8, 6, 1)
+    assert metrics["epochs_at_target"] == 3
     assert (metrics["start_accuracy"], metrics["final_accuracy"], metrics["final_accuracy_new"]) == (0.6, 0.95, 0.475)
 
 
@@ -97,6 +98,11 @@ def test_metrics_are_tidy_and_gains_are_paired_with_random_of_the_same_start(fil
     assert values["active_learning/pretrained", "stream_bald", "pose", "delay"] == 10
     assert set(metrics["seed"]) == {3}
     assert "area_gain" not in set(metrics.loc[metrics["method"] == "random", "metric"])
+
+
+def test_curves_that_end_at_other_labels_have_no_gain(files):
+    write_curves(files["bald"], {("pretrained", "pose"): pool_curve(0.5, 0.95, 0.95)}, POOL_COLUMNS)
+    assert "area_gain" not in set(collect_curves(files.values(), target=0.9)["metric"])
 
 
 @pytest.mark.parametrize(

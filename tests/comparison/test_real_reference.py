@@ -49,6 +49,9 @@ def test_the_comparison_of_the_reference_is_that_of_its_numbers(shown):
     assert len(rows) == len(shown) == 112
     # The file behind Table V is too large to be kept.
     kept = (rows["verdict"] != "not run").to_numpy()
+    if not is_of_this_version():  # then its labels are those of the protocol before 2026-11-25
+        of_labels = rows["table"].eq("III") | rows["column"].eq("Labels to 70 %")
+        rows, shown, kept = (part[~of_labels.to_numpy()] for part in (rows, shown, kept))
     assert set(rows.loc[~kept, "table"]) <= {"V"}
     numbers = ("published", "paper_low", "paper_high", "reproduced", "ci_low")
     for column in ("table", "row", "column", *numbers, "repeat_of"):

@@ -25,6 +25,7 @@ def test_what_is_false_is_left_out_as_if_it_were_not_there(key):
         named = never_there["real_world"][part]
         there = [name for name in named if name in never_there["encoders"]]
         never_there["real_world"][part] = there if part == "backbones" else {name: named[name] for name in there}
+    never_there["frame_labels"]["backbones"] = [n for n in ("dgcnn", "pointnet2") if n in never_there["encoders"]]
     never_there["real_world"]["reductions"] = ["none", *never_there["reductions"]]
     never_there["exchange"]["estimators"] = [
         name for name in never_there["exchange"]["estimators"] if name in never_there["estimators"]

@@ -55,7 +55,7 @@ def folder(tmp_path):
         for strategy, values in (("bald_kmeans", (12, 1, 60)), ("random", (60, 0, 60)))
         for metric, value in zip(("labels_to_target", "reached", "labels"), values, strict=True)
     ]
-    write_metrics(tmp_path / "active_learning.csv", labels, "active_learning/pretrained", "pose")
+    write_metrics(tmp_path / "active_learning.csv", labels, "active_learning/rare_5", "overlap")
     lines = [
         f"pooled,{method},balanced_accuracy,90,1,{value},{value - 0.05},{value + 0.05},,,,,{gain}"
         for method, value, gain in (

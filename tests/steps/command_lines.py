@@ -11,8 +11,11 @@ POLICY = {
     "loop": {"budget": 3},
 }
 LEARNING = {
-    "held_out": ["noise", "overlap"], "initial": 6, "labels": 4, "batch": 2, "rare_share": 0.2, "rare_labels": 2,
+    "held_out": ["noise", "overlap"], "initial": 6, "labels": 4, "batch": 2, "target": 0.9,
     "gpc": {"iterations": 5, "inducing": 6, "draws": 20},
+    "rare": {
+        "shares": [0.2], "labels": 2, "least": 1, "batch": 2, "gpc": {"iterations": 5, "inducing": 6, "draws": 20},
+    },
     "stream": {"arrivals": 8, "quiet": 2, "budget": 0.5, "every": 2},
 }  # fmt: skip
 SHIFT = {
@@ -215,7 +218,10 @@ STEP_OPTIONS = {
         "--out": ["new_bald_kmeans.csv", "new_all_labels.csv"],
     },
     "frame_labels": COMMON | {
-        "--settings": {"frame_labels": {"initial": 6, "labels": 2, "points": 64}, "active_learning": LEARNING},
+        "--settings": {
+            "frame_labels": {"initial": 6, "share": 0.4, "labels": 2, "least": 1, "points": 64},
+            "active_learning": LEARNING,
+        },
         "--seed": 0, "--registrations": "registrations.npz", "--backbones": "dgcnn", "--embeddings": "embeddings.npz",
         "--strategies": ["random", "all_labels"], "--out": ["frame_random.csv", "frame_all_labels.csv"],
     },

@@ -49,7 +49,14 @@ def test_what_is_exchanged_follows_from_what_an_explainer_reads(made):
 def test_curves_of_frame_labels_are_of_every_backbone_and_of_the_pair(made):
     rows = [line.split(",") for line in (made / "frame_all_labels.csv").read_text().splitlines()[1:]]
     assert {(row[0], row[1]) for row in rows} == {("dgcnn", "overlap"), ("pair", "overlap")}
-    assert [row[2] for row in rows] == ["0", "12", "0", "12"]  # none, and the whole pool of 18 samples less 6
+    # None, and the whole pool: of 12 known samples 6, and 4 new ones, which are 40 % of it.
+    assert [row[2] for row in rows] == ["0", "10", "0", "10"]
+
+
+def test_a_rare_concept_is_learned_beside_the_common_one(made):
+    settings = [line.split(",")[0] for line in (made / "bald_kmeans.csv").read_text().splitlines()[1:]]
+    assert set(settings) == {"pretrained", "unseen", "rare_20"}
+    assert "rare_20" not in (made / "stream_bald.csv").read_text()
 
 
 def test_an_explainer_measures_each_registration_once(registrations, tmp_path, monkeypatch):

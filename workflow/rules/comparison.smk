@@ -83,7 +83,7 @@ rule comparison:
             "recovery": SHOWN["compared_sources"]["recovery"],
         },
         tolerances=config["comparison"]["tolerances"],
-        floors={"labels": config["active_learning"]["batch"]},
+        floors={"labels": 1},
     script:
         "../scripts/comparison.py"
 

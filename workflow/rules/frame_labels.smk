@@ -1,10 +1,10 @@
-# Embeddings of depth frames -> learning curves of a new concept, by every backbone and by the pair.
+# Embeddings of depth frames -> learning curves of a new concept, by backbones and by the pair.
 rule learn_on_frames:
     input:
         registrations=f"<results>/registrations/{FRAMES}/seed{{seed}}.npz",
         embeddings=collect(
             f"<results>/embeddings/{FRAMES}/{{encoder}}/none/seed{{{{seed}}}}.npz",
-            encoder=config["real_world"]["backbones"],
+            encoder=NAMES["frame_label_backbone"],
         ),
         code=code_files("gpca.experiments.frame_labels.step"),
     output:
@@ -28,7 +28,7 @@ rule learn_on_frames:
             }
         ),
         source=FRAMES,
-        backbones=config["real_world"]["backbones"],
+        backbones=NAMES["frame_label_backbone"],
         strategies=NAMES["new_concept_strategy"],
     script:
         "../scripts/step.py"

@@ -143,11 +143,6 @@ rule real_world:
             strategy=NAMES["new_concept_strategy"],
             seed=NAMES["frame_label_seed"],
         ),
-        curve_files=collect(
-            f"<results>/encoders/{FRAMES}/{{encoder}}/seed{{seed}}.csv",
-            encoder=REAL_WORLD["backbones"],
-            seed=SEEDS,
-        ),
         code=collector_code("gpca.experiments.frame_labels.metrics:collect"),
     output:
         "<results>/real_world.csv",

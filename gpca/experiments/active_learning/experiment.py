@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from gpca.active_learning.acquisition import STRATEGIES, STREAMS
-from gpca.active_learning.settings import ActiveLearningSettings, StreamSettings
+from gpca.active_learning.settings import ActiveLearningSettings, RareSettings, StreamSettings
 from gpca.encoders.settings import EncoderChanges, require_draws
 from gpca.errors import require_names
 from gpca.experiments.experiment import Experiment, LeftOut, Names, Tidy
 from gpca.pairs.perturbation import Concept
-from gpca.settings import Count, Distinct, OpenShare, PositiveShare
+from gpca.settings import Distinct, PositiveShare
 
 
 def titles() -> dict[str, str]:
@@ -26,8 +26,7 @@ class Section(ActiveLearningSettings):
 
     held_out: Distinct[Concept]
     target: PositiveShare
-    rare_share: OpenShare | None = None
-    rare_labels: Count = 1
+    rare: RareSettings | None = None
     without: EncoderChanges
     stream: StreamSettings
     strategies: Distinct[str]

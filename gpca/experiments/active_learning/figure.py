@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 ROWS = {"pretrained": "encoder saw\nall concepts", "unseen": "encoder never saw\nthe new concept"}
-OVERLAP_ROWS = {**ROWS, "rare": "encoder saw all;\nthe new one is rare"}
+OVERLAP_ROWS = {**ROWS, "rare_5": "encoder saw all;\n5 % of the pool new"}
 LEGEND_COLUMNS = 5
 LEGEND_LETTERS, LEGEND_LETTERS_OF_LINE = 130, 8  # in a line of the legend, and those that a line's sign takes
 STYLES = {  # The paper's two strategies are thick, with their intervals; an unknown one has the style _OTHER.
@@ -123,7 +123,8 @@ def mean_curves(
 ) -> dict[tuple[str, str, str], pd.DataFrame]:
     """Return curves of accuracy in % by source, strategy and setting: labels, mean, low, high, number of seeds.
 
-    The intervals are over the seeds; of one seed they are NaN.
+    The intervals are over the seeds; of one seed they are NaN. Counts of labels at which not every seed has been looked
+    at are left out.
 
     Args:
         curve_files: As for :func:`draw_learning_curves`.
@@ -141,9 +142,11 @@ def mean_curves(
     means = {}
     for key, of_key in parts.items():
         of_seed = pd.concat(of_key).groupby(["labels", "seed"])["accuracy"].mean()
+        seeds = len(of_seed.index.unique("seed"))
         rows = [
             (labels, *(100 * np.array(mean_interval(part))), len(part))
             for labels, part in of_seed.groupby(level="labels")
+            if len(part) == seeds
         ]
         means[key] = pd.DataFrame(rows, columns=["labels", "mean", "low", "high", "seeds"])
     return means

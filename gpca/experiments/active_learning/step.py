@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
+import numpy as np
+
 from gpca.active_learning.acquisition import STRATEGIES, STREAMS
 from gpca.active_learning.curves import POOL_COLUMNS, STREAM_COLUMNS, write_curves
+from gpca.active_learning.retraining import Retraining, Step, learn
 from gpca.active_learning.rounds import LabelingTask, initial_gpc, make_task, run_rounds
-from gpca.active_learning.settings import ActiveLearningSettings, StreamSettings
+from gpca.active_learning.settings import ActiveLearningSettings, RareSettings, StreamSettings, rare_setting
 from gpca.active_learning.stream import run_stream
 from gpca.classifier.gpc import GPC
 from gpca.classifier.latents import Projection
@@ -18,8 +21,10 @@ from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.job import Job
 from gpca.process.progress import progress
 from gpca.process.provenance import record_provenance
+from gpca.settings import read_settings
 
-PAPERS = ("random", "bald_kmeans")  # the paper's two strategies, which also meet a rare concept
+NEW = "overlap"  # the paper's new concept, which is also learned where it is rare,
+PAPERS = ("random", "bald_kmeans", "bald")  # by the strategies that the paper compares
 
 
 def run(job: Job) -> None:
@@ -36,30 +41,48 @@ def run(job: Job) -> None:
             for strategy in job.strategies:
                 if strategy in STREAMS and setting == "pretrained":
                     curve = run_stream(task, gpc, strategy, settings, stream, *axes)
-                elif strategy in STRATEGIES and (setting != "rare" or strategy in PAPERS):
-                    labels = job.settings.get("rare_labels", settings.labels) if setting == "rare" else settings.labels
-                    curve = run_rounds(task, gpc, strategy, replace(settings, labels=labels), *axes, setting)
+                elif strategy in STRATEGIES:
+                    curve = run_rounds(task, gpc, strategy, settings, *axes, setting)
                 else:
                     continue
                 curves[strategy][setting, task.held_out] = curve
+        for setting, strategy, curve in _of_a_rare_concept(job, settings):
+            curves[strategy][setting, NEW] = curve
         for strategy, path in zip(job.strategies, job.out, strict=True):
             write_curves(path, curves[strategy], STREAM_COLUMNS if strategy in STREAMS else POOL_COLUMNS)
 
 
 def _tasks(job: Job, settings: ActiveLearningSettings) -> Iterator[tuple[str, LabelingTask[Projection], GPC]]:
-    """Yield setting, task and the GPC that knows two concepts: for each concept held out, and for a rare one."""
-    registrations = Registrations.load(job.registrations, (job.source, job.seed))
+    """Yield setting, task and the GPC that knows two concepts, for each concept held out."""
+    registrations = _embedded(job)
     held_out = job.settings.get("held_out", CONCEPTS)
-    seen_S_d = read_embedding(job.embeddings, registrations)["embedding"]
     shapes = {f"h_{c}": ("S", "d") for c in held_out}
     unseen = load_embeddings(job.embeddings_without, registrations, shapes)
-    rare_share = job.settings.get("rare_share")
-    chosen = [("pretrained", c, seen_S_d, None) for c in held_out]
-    chosen += [("unseen", c, unseen[f"h_{c}"], None) for c in held_out]
-    chosen += [("rare", c, seen_S_d, rare_share) for c in held_out if rare_share and c == "overlap"]
+    chosen = [("pretrained", c, registrations.embedding) for c in held_out]
+    chosen += [("unseen", c, unseen[f"h_{c}"]) for c in held_out]
     axes = (job.source, job.seed)
-    for setting, concept, h_S_d, share in chosen:
+    for setting, concept, h_S_d in chosen:
         attached = replace(registrations, attached={"embedding": h_S_d})
-        task = make_task(attached, concept, settings, *axes, new_share=share)
+        task = make_task(attached, concept, settings, *axes)
         gpc = initial_gpc(task, settings, *axes, setting)
         yield setting, task.project(gpc), gpc
+
+
+def _of_a_rare_concept(job: Job, settings: ActiveLearningSettings) -> Iterator[tuple[str, str, list[Step]]]:
+    """Yield setting, strategy and learning curve of the paper's experiment, in which the new concept is rare."""
+    if not (section := job.settings.get("rare")) or NEW not in job.settings.get("held_out", CONCEPTS):
+        return
+    rare = read_settings(RareSettings, section)
+    registrations, axes = _embedded(job), (job.source, job.seed)
+    for share in rare.shares:
+        task: LabelingTask[np.ndarray] = make_task(registrations, NEW, settings, *axes, new_share=share)
+        setting = rare_setting(share)
+        retraining = Retraining(task, rare.gpc, *axes, setting)
+        for strategy in progress([name for name in job.strategies if name in PAPERS], f"{setting} on {job.source}"):
+            yield setting, strategy, learn(retraining, strategy, rare, [job.settings["target"]], *axes, setting).steps
+
+
+def _embedded(job: Job) -> Registrations:
+    """Return the samples in the embedding of the encoder that saw all concepts."""
+    registrations = Registrations.load(job.registrations, (job.source, job.seed))
+    return replace(registrations, attached=read_embedding(job.embeddings, registrations))

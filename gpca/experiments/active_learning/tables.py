@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from gpca.active_learning.acquisition import STRATEGIES, STREAMS
 from gpca.active_learning.metrics import CENSORED_BY, TABLE
+from gpca.active_learning.settings import LOOK_EVERY, rare_setting
 from gpca.experiments.active_learning.clusters import Clusters
 from gpca.reporting.tables.builder import TableBuilder, cautious_over, crossed, titles_of
 from gpca.reporting.tables.cells import cautious_cell, cell_of_repeats, rows_where
@@ -22,11 +23,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 PAPERS_HELD_OUT = "overlap"  # The paper's GPC knows noise and pose (Sec. IV-C).
-SETTINGS = {
-    "pretrained": "all concepts",
-    "unseen": "the known concepts only",
-    "rare": "all concepts; the new one rare",
-}
+SETTINGS = {"pretrained": "all concepts", "unseen": "the known concepts only"}
 COUNT: dict[str, Any] = {"decimals": 0, "limits": (0, inf), "least_is_best": True}
 _SHARES = ("reached", "area_under_curve", "area_gain")  # These and every accuracy lie in [0, 1] and are printed in %.
 _OF_TEST_SAMPLES = ("final_accuracy", "final_accuracy_new", "area_under_curve")
@@ -49,22 +46,28 @@ def table3_active_learning(
     strategies: Mapping[str, str],
     conditions: Mapping,
 ) -> Table:
-    """Return the labels to the target accuracy by BALD with k-means and at random (Table III), sources × settings."""
+    """Return the labels to the target accuracy by BALD, also with k-means, and at random (Table III).
+
+    The rows are sources × settings: first those in which the new concept is rare and the paper's classifier learns it.
+    """
     of_table = metrics[metrics["concept"] == PAPERS_HELD_OUT]
+    shares = conditions["rare"]["shares"] if conditions["rare"] else ()
+    settings = {rare_setting(share): f"all concepts; {100 * share:g} % of the pool new" for share in shares} | SETTINGS
     quantities = {
         "labels_bald_kmeans": Quantity(
             "labels_to_target", Column("Labels, BALD + k-means", **COUNT), strategy="bald_kmeans"
         ),
+        "labels_bald": Quantity("labels_to_target", Column("Labels, BALD", **COUNT), strategy="bald"),
         "labels_random": Quantity("labels_to_target", Column("Labels, random", **COUNT), strategy="random"),
         "accuracy_bald_kmeans": Quantity("final_accuracy", Column("Acc. BALD (%)"), strategy="bald_kmeans"),
         "accuracy_random": Quantity("final_accuracy", Column("Acc. random (%)"), strategy="random"),
-        "epochs_bald_kmeans": Quantity("epochs_to_target", Column("Epochs", **COUNT), strategy="bald_kmeans"),
+        "epochs_bald_kmeans": Quantity("epochs_at_target", Column("Epochs", **COUNT), strategy="bald_kmeans"),
     }
     table = TableBuilder("table3_active_learning", {"source": "Dataset", "setting": "Encoder saw"})
-    for (source, setting), labels in crossed(titles_of(sources), SETTINGS):
+    for (source, setting), labels in crossed(titles_of(sources), settings):
         of_row = rows_where(of_table, source=source, table=TABLE + setting)
         table.add_row(labels, _cells(of_row, quantities, conditions, clusters))
-    table.compare_across(["labels_bald_kmeans", "labels_random"])
+    table.compare_across(["labels_bald_kmeans", "labels_bald", "labels_random"])
     return table.build(
         caption=f"Labels until a GPC that knew noise and pose reaches {conditions['target']:.0%} on all concepts"
         + table.stand_in_clause(sources, partly=False),
@@ -72,19 +75,26 @@ def table3_active_learning(
         columns=_columns(quantities),
         footnotes=(
             f"{cautious_over(table.most_seeds(), conditions['test'])}.",
-            _protocol(conditions),
             *_rare(conditions),
-            f"Retraining is a warm start of at most {conditions['iterations']} passes over the labels. Epochs: passes "
-            "until the target, over all rounds. Acc.: after all labels.",
+            f"{'Other rows: ' if shares else ''}{_protocol(conditions)} It moves the posterior alone, in at most "
+            f"{conditions['iterations']} passes over the labels.",
+            "Epochs: passes of the retraining that reached the target. Acc.: after all labels.",
         ),
     )
 
 
 def _rare(conditions: Mapping) -> list[str]:
-    if not conditions["rare_share"]:
+    if not (rare := conditions["rare"]):
         return []
-    labels = f"up to {conditions['rare_labels']} labels are given"
-    return [f"Rare: {conditions['rare_share']:.0%} of the pool belong to the new concept, and {labels}."]
+    gpc = rare["gpc"]
+    return [
+        "Where so many percent of the pool are new (5 % are compared with the paper), the paper's classifier "
+        f"({gpc['kernel']}, rate {gpc['learning_rate']:g}, {gpc['iterations']} passes) is fitted anew in each round of "
+        f"{rare['batch']} labels, and labels are counted one by one (docs/comparison.md). Start: "
+        f"{conditions['initial']} labeled samples of the two known concepts. Labels are given until the target, at "
+        f"least {rare['least']} (then {rare['late_batch']} a round), at most {rare['labels']} or the whole pool; '>': "
+        f"some runs did not reach it. Epochs are counted in steps of {LOOK_EVERY}."
+    ]
 
 
 def table3_extended(

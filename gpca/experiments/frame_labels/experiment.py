@@ -5,17 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from gpca.errors import InputError
+from gpca.errors import InputError, require_names
 from gpca.experiments.experiment import Experiment, LeftOut
 from gpca.experiments.frame_labels.settings import FrameLabelSettings, in_percent
 from gpca.pairs.perturbation import CONCEPTS
 
 
-def check(config: dict, _left_out: LeftOut) -> None:
-    """Check that the targets differ in percent, and that the labels at the start leave a pool.
+def check(config: dict, left_out: LeftOut) -> None:
+    """Check the backbones, that the targets differ in percent, and that the labels at the start leave a pool.
 
     A third of the training samples is of each concept.
     """
+    key, encoders = "frame_labels.backbones", left_out("encoders")
+    require_names(key, config["frame_labels"]["backbones"], config["encoders"], "encoder", encoders)
     targets = config["frame_labels"]["targets"]
     if len(set(map(in_percent, targets))) < len(targets):
         raise InputError("config key frame_labels.targets", "two are equal in whole percent", "remove one")
@@ -26,8 +28,12 @@ def check(config: dict, _left_out: LeftOut) -> None:
 
 
 def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
-    """Return the seeds."""
-    return {"frame_label_seed": list(config["seeds"])[: config["frame_labels"]["seeds"]]}
+    """Return the seeds, and the backbones that the depth frames have."""
+    section = config["frame_labels"]
+    return {
+        "frame_label_seed": list(config["seeds"])[: section["seeds"]],
+        "frame_label_backbone": [name for name in config["real_world"]["backbones"] if name in section["backbones"]],
+    }
 
 
 def shown(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
@@ -38,5 +44,10 @@ def shown(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
 
 
 EXPERIMENT = Experiment(
-    name="frame_labels", sections={"frame_labels": FrameLabelSettings}, names=names, shown=shown, check=check
+    name="frame_labels",
+    sections={"frame_labels": FrameLabelSettings},
+    names=names,
+    shown=shown,
+    check=check,
+    lists={"frame_labels.backbones": "encoders"},
 )

@@ -6,28 +6,34 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from gpca.pairs.perturbation import Concept
-from gpca.settings import Bounds, Count, Distinct, PositiveShare
+from gpca.settings import Bounds, Count, Different, Distinct, OpenShare, PositiveShare
 
 PAIR = "pair"  # the embedding that is measurements of the pair, beside those by the backbones
 
 
 @dataclass(frozen=True)
 class FrameLabelSettings:
-    """The settings that differ from active learning on whole objects.
+    """The settings that differ from those of a rare concept on whole objects.
 
     Attributes:
         seeds: how many of the run's seeds are used, from the first.
+        backbones: those whose embeddings are learned from, where the depth frames have them.
         held_out: the new concepts, in turn.
         initial: labeled samples of the known concepts before the first query, balanced.
-        labels: L, the budget of queries.
+        share: of the pool that is of the new concept.
+        labels: the budget of queries.
+        least: labels that are given even where all targets are reached before.
         targets: accuracies on the test samples to which labels are counted.
         points: drawn from each cloud to describe a pair.
     """
 
     seeds: Count = 1
+    backbones: Annotated[tuple[str, ...], Different(fewest=0)] = ("dgcnn", "pointnet2")
     held_out: Distinct[Concept] = ("overlap",)
-    initial: Annotated[int, Bounds(minimum=2)] = 60
-    labels: Count = 80
+    initial: Annotated[int, Bounds(minimum=2)] = 10
+    share: OpenShare = 0.05
+    labels: Count = 60
+    least: Count = 20
     targets: Distinct[PositiveShare] = (0.65, 0.7, 0.75)
     points: Annotated[int, Bounds(minimum=32, maximum=65536)] = 512
 

@@ -1,4 +1,4 @@
-"""Step ``frame_labels``: learning curves on depth frames, from the embeddings of every backbone and from the pair."""
+"""Step ``frame_labels``: learning curves on depth frames, from embeddings by backbones and from the pair."""
 
 from __future__ import annotations
 
@@ -7,35 +7,49 @@ from collections.abc import Iterator
 import numpy as np
 
 from gpca.active_learning.curves import POOL_COLUMNS, write_curves
-from gpca.active_learning.new_concepts import NewConceptTrial, run_trial
-from gpca.active_learning.rounds import Embedded
-from gpca.active_learning.settings import ActiveLearningSettings
+from gpca.active_learning.retraining import Retraining, Step, learn
+from gpca.active_learning.rounds import Embedded, make_task
+from gpca.active_learning.settings import ALL_LABELS, ActiveLearningSettings, RetrainingSettings
 from gpca.experiments.frame_labels.settings import PAIR, FrameLabelSettings
 from gpca.explainers.pair_classifier import NormalizedFeatures
 from gpca.features.registered import describe_registrations
 from gpca.pairs.dataset import Registrations, load_embeddings
-from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.job import Job
 from gpca.process.progress import progress
 from gpca.process.provenance import record_provenance
+from gpca.settings import read_settings
 
 
 def run(job: Job) -> None:
     """Learn every concept held out from every embedding."""
     inputs = [job.registrations, *job.embeddings]
+    axes = (job.source, job.seed)
     with record_provenance(job.out, inputs, job.settings, seed=job.seed):
-        own = FrameLabelSettings(**job.section("frame_labels"))
-        changed = {"initial": own.initial, "labels": own.labels}
-        settings = ActiveLearningSettings.from_dict(job.section("active_learning") | changed)
+        own = read_settings(FrameLabelSettings, job.section("frame_labels"))
+        rare = job.section("active_learning").get("rare") or {}
+        shared = {name: value for name, value in rare.items() if name != "shares"}
+        rounds = read_settings(RetrainingSettings, shared | {"labels": own.labels, "least": own.least})
+        start = ActiveLearningSettings(initial=own.initial)
         curves: dict[str, dict] = {strategy: {} for strategy in job.strategies}
         for name, samples in progress(_embedded(job, own.points), f"labels of {job.source}"):
             for concept in own.held_out:
-                experiment = NewConceptTrial(name, samples, concept, CONCEPTS)
-                learnt = run_trial(experiment, job.strategies, settings, job.source, job.seed)
-                for setting, strategy, curve in learnt:
-                    curves[strategy][setting, concept] = curve
+                task = make_task(samples, concept, start, *axes, new_share=own.share)
+                retraining = Retraining(task, rounds.gpc, *axes, name)
+                for strategy in job.strategies:
+                    if strategy == ALL_LABELS:
+                        curve = _of_all_labels(retraining)
+                    else:
+                        curve = learn(retraining, strategy, rounds, own.targets, *axes, name).steps
+                    curves[strategy][name, concept] = curve
         for strategy, path in zip(job.strategies, job.out, strict=True):
             write_curves(path, curves[strategy], POOL_COLUMNS)
+
+
+def _of_all_labels(retraining: Retraining) -> list[Step]:
+    """Return the steps before any label and after those of the whole pool."""
+    none: list[int] = []
+    rows = list(range(len(retraining.task.pool)))
+    return [retraining.look(retraining.fit(queried, None), queried) for queried in (none, rows)]
 
 
 def _embedded(job: Job, points: int) -> Iterator[tuple[str, Embedded]]:

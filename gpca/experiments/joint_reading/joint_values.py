@@ -186,12 +186,15 @@ def _steps(
 
 
 def _labeled(steps: list[dict[str, float]], target: float) -> dict[str, float]:
-    """Return the metrics of a learning curve; where the target is missed, labels and epochs are lower bounds."""
+    """Return the metrics of a learning curve; where the target is missed, labels and epochs are lower bounds.
+
+    Epochs are read as the passes of all rounds, in the place of the printed number.
+    """
     hits = [step["accuracy"] >= target for step in steps]
     last = hits.index(True) if any(hits) else len(steps) - 1
     return {
         "labels_to_target": float(steps[last]["labels"]),
-        "epochs_to_target": float(sum(step["epochs"] for step in steps[: last + 1])),
+        "epochs_at_target": float(sum(step["epochs"] for step in steps[: last + 1])),
         "reached": float(any(hits)),
         "final_accuracy": float(steps[-1]["accuracy"]),
     }

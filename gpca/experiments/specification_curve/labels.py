@@ -7,23 +7,31 @@ from dataclasses import replace
 
 import numpy as np
 
+from gpca.active_learning.retraining import Retraining, learn
 from gpca.active_learning.rounds import LabelingTask, initial_gpc, make_task, rounds
-from gpca.active_learning.settings import ActiveLearningSettings
+from gpca.active_learning.settings import JUDGED_SHARE, ActiveLearningSettings, RareSettings, rare_setting
 from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
 from gpca.experiments.specification_curve.run_files import Row, RunFiles
 from gpca.experiments.specification_curve.settings import Reading, ReadingSizes
+from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.progress import progress
+from gpca.settings import read_settings
 
 NEW = "overlap"  # the paper's new concept
 RANDOM_BATCH = 10  # random choice is the same in rounds of any size, and needs many labels
+JUDGED = rare_setting(JUDGED_SHARE)
 EVERY, MOST = 5, 200  # epochs between looks at the accuracy, and the most of them
 
 
 def pool(run_files: RunFiles, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iterator[Row]:
-    """Yield labels and epochs to the target under each reading, by BALD with k-means and by random choice."""
+    """Yield labels and epochs to the target under each reading, by BALD with k-means and by random choice.
+
+    Further labels move the posterior alone, as the classifier of the protocol would take hours, and epochs are read as
+    the passes of all rounds.
+    """
     base, target = base_settings(run_files)
     for source, seed, _, registrations in run_files.in_distribution():
         started: dict[tuple, tuple[LabelingTask, GPC] | None] = {}
@@ -50,7 +58,7 @@ def pool(run_files: RunFiles, readings: Sequence[Reading], _sizes: ReadingSizes)
                     steps, _ = until(target, *begun, strategy, budget, source, seed)
                     labeled[key] = {
                         "labels_to_target": steps[-1]["labels"],
-                        "epochs_to_target": sum(step["epochs"] for step in steps),
+                        "epochs_at_target": sum(step["epochs"] for step in steps),
                         "reached": float(steps[-1]["accuracy"] >= target),
                     }
                 for metric, value in labeled[key].items():
@@ -75,15 +83,14 @@ def until(
 
 
 def epochs(run_files: RunFiles, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iterator[Row]:
-    """Yield the passes of Adam that a classifier started anew takes to the target."""
-    base, target = base_settings(run_files)
+    """Yield the passes of Adam that a classifier takes to the target, on labels of the protocol's run."""
+    rare, target = rare_settings(run_files)
     for source, seed, _, registrations in run_files.in_distribution():
-        task = make_task(registrations, NEW, base, source, seed)
-        begun = (task, initial_gpc(task, base, source, seed, "reading"))
-        ends = {"at_target": target, "all": np.inf}
-        queried = {name: until(end, *begun, "bald_kmeans", base, source, seed)[1] for name, end in ends.items()}
+        task, axes = judged_task(run_files, registrations, source, seed)
+        learned = learn(Retraining(task, rare.gpc, *axes), "bald_kmeans", rare, [target], *axes)
+        queried = {"at_target": learned.labels_to(target), "all": learned.queried}
         for reading in progress(readings, f"epochs on {source}, seed {seed}"):
-            settings = replace(base.gpc, learning_rate=reading["learning_rate"])
+            settings = replace(rare.gpc, learning_rate=reading["learning_rate"])
             values = passes(task, queried[reading["labels"]], settings, target, source, seed)
             for metric, value in values.items():
                 yield reading, source, "bald_kmeans", metric, NEW, seed, value
@@ -99,8 +106,23 @@ def passes(
     for done in gpc.fit_up_to(range(EVERY, MOST + 1, EVERY), labeled_L_d, concept_L):
         named_N = np.array(CONCEPTS)[gpc.attribute(task.test.h)[0].argmax(axis=1)]
         if np.mean(named_N == task.test.concept_N) >= target:
-            return {"epochs_to_target": float(done), "reached": 1.0}
-    return {"epochs_to_target": float(MOST), "reached": 0.0}
+            return {"epochs_at_target": float(done), "reached": 1.0}
+    return {"epochs_at_target": float(MOST), "reached": 0.0}
+
+
+def judged_task(
+    run_files: RunFiles, registrations: Registrations, source: str, seed: int
+) -> tuple[LabelingTask[np.ndarray], tuple]:
+    """Return the task of the row that is judged, in which the new concept is rare, and the axes of its draws."""
+    base, _ = base_settings(run_files)
+    task = make_task(registrations, NEW, base, source, seed, new_share=JUDGED_SHARE)
+    return task, (source, seed, JUDGED)
+
+
+def rare_settings(run_files: RunFiles) -> tuple[RareSettings, float]:
+    """Return the settings by which that task is learned, and its target accuracy."""
+    section = run_files.section("active_learning")
+    return read_settings(RareSettings, section.get("rare") or {}), section["target"]
 
 
 def base_settings(run_files: RunFiles) -> tuple[ActiveLearningSettings, float]:

@@ -169,7 +169,7 @@ GROUPS = {
         {
             "learning_rate": LearningRate,
             "iterations": Count,
-            "start": Literal["warm", "cold"],
+            "start": Literal["cold", "warm", "posterior"],
             "inputs": Literal["pool", "labeled"],
         },
         "labels_classifier:run",

@@ -45,7 +45,7 @@ WORDS = {  # field of a group's choices -> what its values are called
     "lengthscale": {"median": "lengthscale from the median distance", "default": "default lengthscale"},
     "batch": {"full": "all samples at once", "minibatch": "minibatches"},
     "kernel": {"rbf": "RBF", "matern32": "Matérn 3/2", "polynomial": "polynomial"},
-    "start": {"warm": "warm start", "cold": "cold start"},
+    "start": {"warm": "warm start", "cold": "cold start", "posterior": "the posterior alone moves"},
     "machine": {"svc": "SVC", "linear_svc": "LinearSVC"},
     "probability": {"platt": "Platt scaling", "softmax": "softmax of the decision values"},
     "head": {"linear": "linear head", "two_layer": "head of two layers"},

@@ -46,6 +46,15 @@ def test_curves_are_means_over_concepts_and_intervals_over_seeds(files):
     assert curve["seeds"].tolist() == [2] * 4
 
 
+def test_labels_that_not_every_seed_was_looked_at_are_left_out(files):
+    key = ("ycb", "random", "pretrained")
+    [path] = [file for file in files if file.parts[-3:] == ("ycb", "random", "seed1.csv")]
+    step = {"new_labels": 1, "accuracy": 0.9, "accuracy_new": 0.9, "epochs": 1}
+    steps = [{"labels": labels, **step} for labels in (0, 3, 4, 8)]
+    write_curves(path, {("pretrained", "noise"): steps}, POOL_COLUMNS)
+    assert mean_curves(files)[key]["labels"].tolist() == [0, 4, 8]
+
+
 def test_the_target_is_named_and_the_seeds_are_counted(files):
     figure = draw_learning_curves(files, SOURCES, TITLES, 0.9)
     assert [text.get_text() for text in figure.legends[0].get_texts()] == [*TITLES.values(), "target (90 %)"]

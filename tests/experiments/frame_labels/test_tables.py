@@ -1,13 +1,13 @@
 import pandas as pd
 import pytest
 
-from gpca.attribution.metrics import ALL, TIDY_COLUMNS
+from gpca.attribution.metrics import TIDY_COLUMNS
 from gpca.errors import InputError
 from gpca.experiments.frame_labels.tables import table6_labels
 
-CONDITIONS = {"targets": [0.65, 0.7], "held_out": ["overlap"], "initial": 60, "labels": 80, "batch": 4}
-CONDITIONS |= {"train": 300, "test": 300}
-ENCODERS = {"dgcnn": "DGCNN", "pointnet": "PointNet"}
+CONDITIONS = {"targets": [0.65, 0.7], "held_out": ["overlap"], "initial": 10, "share": 0.05, "labels": 300}
+CONDITIONS |= {"least": 60, "train": 600, "test": 300}
+ENCODERS = {"dgcnn": "DGCNN", "pointnet": "PointNet", "pointnet2": "PointNet++"}
 
 
 def rows(table, strategy, metric, *of_seeds):
@@ -16,36 +16,34 @@ def rows(table, strategy, metric, *of_seeds):
 
 
 def metrics():
-    found = rows("dgcnn/65", "bald_kmeans", "labels_to_target", 8, 12) + rows(
-        "dgcnn/65", "bald_kmeans", "reached", 1, 1
-    )
+    found = rows("dgcnn/65", "bald_kmeans", "labels_to_target", 8, 12)
+    found += rows("dgcnn/65", "bald_kmeans", "reached", 1, 1)
     found += rows("dgcnn/65", "random", "labels_to_target", 20, 80) + rows("dgcnn/65", "random", "reached", 1, 0)
     found += rows("dgcnn/70", "bald_kmeans", "labels_to_target", 16, 20)
     found += rows("dgcnn", "all_labels", "final_accuracy", 0.8, 0.9)
+    found += rows("pointnet2/70", "random", "labels_to_target", 30, 40)
     found += rows("pair", "all_labels", "final_accuracy", 1.0, 1.0)
-    found += rows("chosen/65", "random", "labels_to_target", 4, 4)
-    for backbone, value in (("dgcnn", 0.9), ("pointnet", 0.8)):
-        found += [("validation", "real_rgbd", backbone, "accuracy", ALL, seed, value) for seed in (0, 1, 2)]
     return pd.DataFrame(found, columns=list(TIDY_COLUMNS))
 
 
-def test_a_row_is_what_the_samples_are_seen_by_and_the_chosen_backbone_is_named():
+def test_a_row_is_what_the_samples_are_seen_by():
     table = table6_labels(metrics(), "frames", ENCODERS, CONDITIONS)
-    assert [label for [label] in table.rows] == [("dgcnn", "DGCNN (chosen)"), ("pair", "Measurements of the pair")]
+    assert [label for [(_, label)] in table.rows] == ["DGCNN", "PointNet++", "Measurements of the pair"]
     assert table.cells[0, "bald_kmeans_65"].mean == 10
     assert not table.cells[0, "bald_kmeans_65"].at_least
     assert table.cells[0, "random_65"].at_least
     assert table.cells[0, "bald_kmeans_70"].mean == 18
+    assert table.cells[1, "random_70"].mean == 35
     assert table.cells[0, "all_labels"].mean == pytest.approx(85)
-    assert table.cells[0, "validation"].mean == pytest.approx(90)
     markdown = table.markdown()
     assert "| > 50 |" in markdown
     assert "Mean over 2 seeds, 300 test samples each" in markdown
     assert "| BALD, to 65 % (labels) | Random, to 65 % (labels) |" in markdown
     assert "Bold: the fewer labels" in markdown
+    for words in ("Start: 10 labeled samples", "5 % of it", "to 60 labels at least and 300 at most"):
+        assert words in markdown
 
 
 def test_metrics_without_learning_curves_are_refused():
-    of_validation = metrics().query("table == 'validation'")
     with pytest.raises(InputError, match="has nothing to show"):
-        table6_labels(of_validation, "frames", ENCODERS, CONDITIONS)
+        table6_labels(metrics().query("table == 'attribution'"), "frames", ENCODERS, CONDITIONS)

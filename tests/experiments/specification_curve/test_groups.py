@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from baselines.learners import linear_svm
+from gpca.active_learning.retraining import Retraining, learn
 from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
@@ -151,7 +152,7 @@ def test_epochs_fall_with_the_rate(run_files, monkeypatch):
     within_reach = SECTIONS["active_learning"] | {"target": 0.5}
     run_files = replace(run_files, settings=SECTIONS | {"active_learning": within_reach})
     found = rows_of(labels.epochs, run_files, {"learning_rate": [0.001, 0.3], "labels": ["at_target", "all"]})
-    slow, fast = (found[(rate, "all"), "bald_kmeans", "epochs_to_target", "overlap"] for rate in (0.001, 0.3))
+    slow, fast = (found[(rate, "all"), "bald_kmeans", "epochs_at_target", "overlap"] for rate in (0.001, 0.3))
     assert fast < slow <= labels.MOST
 
 
@@ -216,30 +217,26 @@ def test_a_group_that_needs_more_samples_than_there_are_says_how_to_get_on(run_f
     assert not (tmp_path / "pool.csv").exists()
 
 
-def test_the_warm_classifier_that_sees_the_pool_is_the_protocols(run_files):
-    choices = {"learning_rate": [0.1], "iterations": [20], "start": ["warm"], "inputs": ["pool"]}
+def test_the_cold_classifier_of_the_labels_is_the_protocols(run_files):
+    choices = {"learning_rate": [0.1], "iterations": [20], "start": ["cold", "warm"], "inputs": ["labeled", "pool"]}
     found = rows_of(labels_classifier.run, run_files, choices)
-    base, target = labels.base_settings(run_files)
+    rare, target = labels.rare_settings(run_files)
     [(source, seed, _, registrations)] = run_files.in_distribution()
-    task = labels.make_task(registrations, labels.NEW, base, source, seed)
-    steps, _ = labels.until(
-        target, task, labels.initial_gpc(task, base, source, seed, "reading"), "bald_kmeans", base, source, seed
-    )
-    assert found[(0.1, 20, "warm", "pool"), "bald_kmeans", "labels_to_target", "overlap"] == steps[-1]["labels"]
+    task, axes = labels.judged_task(run_files, registrations, source, seed)
+    learned = learn(Retraining(task, rare.gpc, *axes), "bald_kmeans", rare, [target], *axes)
+    of_cold = found[(0.1, 20, "cold", "labeled"), "bald_kmeans", "labels_to_target", "overlap"]
+    assert of_cold == len(learned.labels_to(target))
+    assert {(reading, metric) for reading, _, metric, _ in found} == {
+        ((0.1, 20, start, inputs), metric)
+        for start in choices["start"]
+        for inputs in choices["inputs"]
+        for metric in ("labels_to_target", "epochs_at_target", "reached")
+    }
 
 
-def test_a_cold_start_learns_from_all_labels_and_asks_for_every_sample_once(run_files):
-    base, _ = labels.base_settings(run_files)
-    [(source, seed, _, registrations)] = run_files.in_distribution()
-    task = labels.make_task(registrations, labels.NEW, base, source, seed)
-    whole = replace(base, labels=len(task.pool), batch=max(2, len(task.pool) // 2))
-    steps = list(labels_classifier.cold(task, "random", whole, False, source, seed))
-    assert steps[0]["labels"] == 0
-    assert steps[-1]["labels"] == len(task.pool)
-    assert steps[-1]["new_labels"] == (task.pool.concept_N == labels.NEW).sum()
-    assert steps[0]["accuracy"] < steps[-1]["accuracy"]
-    seen, alone = (
-        labels_classifier._fitted(task, [], base, sees_pool, source, seed).attribute(task.test.h)[0]
-        for sees_pool in (True, False)
-    )
-    assert np.abs(seen - alone).max() > 1e-3
+def test_where_the_posterior_alone_moves_no_epochs_are_counted(run_files):
+    choices = {"learning_rate": [0.1], "iterations": [20], "start": ["posterior"], "inputs": ["pool"]}
+    found = rows_of(labels_classifier.run, run_files, choices)
+    assert {metric for _, _, metric, _ in found} == {"labels_to_target", "reached"}
+    reading = (0.1, 20, "posterior", "pool")
+    assert 0 < found[reading, "random", "labels_to_target", "overlap"] <= 6
