@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from gpca.active_learning.rounds import LabelingTask, make_task, rounds
-from gpca.active_learning.settings import ActiveLearningSettings
+from gpca.active_learning.settings import LOOK_EVERY, ActiveLearningSettings
 from gpca.attribution import diagnostics
 from gpca.attribution.metrics import ALL
 from gpca.classifier.gpc import GPC
@@ -25,7 +25,7 @@ from gpca.experiments.out_of_distribution.sets import DISTANCES, ShiftedSets
 from gpca.experiments.specification_curve.diagnostics import accuracies
 from gpca.experiments.specification_curve.gpc_start import FITTED, StartedGPC, of_unit_norm, relevant
 from gpca.experiments.specification_curve.knobs import accuracies_of_magnitudes, runs_of
-from gpca.experiments.specification_curve.labels import NEW, RANDOM_BATCH
+from gpca.experiments.specification_curve.labels import NEW
 from gpca.experiments.specification_curve.learners import FOREST, SVM, svm_scores
 from gpca.experiments.specification_curve.run_files import like_the_training
 from gpca.explainers.registry import explainer_entry
@@ -37,6 +37,7 @@ from gpca.uncertainty.knobs import MIDDLE, UPPER
 LOWER = (0.01, 1.5, 0.20)  # the knobs at the lower ends of the severities
 KNOBS = {"low": LOWER, "middle": MIDDLE, "high": UPPER}
 PRINTED = (*FITTED, ("polynomial", 0.01, 200))  # kernel, rate and iterations of Table IV's rows
+RANDOM_ROUND = 25  # random choice is the same in rounds of any size, and needs many labels
 Value = tuple[str, str, str, str, float]  # part, method, metric, concept, value
 
 
@@ -162,39 +163,65 @@ def _of_labels(
         gpc = StartedGPC(of_kernel, joint, *subjects.axes, "reading", NEW)
         gpc.fit(task.initial.h, task.initial.concept_N, np.concatenate([task.initial.h, task.pool.h]))
         gpc.level()
-        # Random choice is the same in rounds of any size; it has the whole pool, and ends at the target.
+        # Random choice has the whole pool, and ends at the target.
         in_rounds = {
             "bald_kmeans": (settings.labels, np.inf),
-            "random": (replace(settings.labels, batch=RANDOM_BATCH, labels=len(task.pool)), settings.target),
+            "random": (replace(settings.labels, batch=RANDOM_ROUND, labels=len(task.pool)), settings.target),
         }
         for strategy, (rounds_settings, end) in in_rounds.items():
-            steps = _steps(task, gpc, strategy, rounds_settings, end, subjects.axes)
-            for metric, value in _labeled(steps, settings.target).items():
+            steps, rows = _steps(task, gpc, strategy, rounds_settings, end, settings.target, subjects.axes)
+            values = _labeled(steps, settings.target)
+            if strategy == "bald_kmeans":
+                values["epochs_at_target"] = _passes(task, rows, of_kernel, joint, settings.target, subjects.axes)
+            for metric, value in values.items():
                 yield part_name("labels", joint | {"new_share": new_share}), strategy, metric, NEW, value
 
 
 def _steps(
-    task: LabelingTask[np.ndarray], gpc: GPC, strategy: str, settings: ActiveLearningSettings, end: float, axes
-) -> list[dict[str, float]]:
-    """Return the rounds up to the first of that accuracy, or all of them."""
-    steps = []
-    for step, _ in rounds(task.project(gpc), gpc, strategy, settings, *axes, "reading"):
+    task: LabelingTask[np.ndarray],
+    gpc: GPC,
+    strategy: str,
+    settings: ActiveLearningSettings,
+    end: float,
+    target: float,
+    axes: tuple[str, int],
+) -> tuple[list[dict[str, float]], list[int]]:
+    """Return the rounds up to the first with the accuracy `end`, and the rows of the pool labeled at the target."""
+    steps: list[dict[str, float]] = []
+    at_target: list[int] = []
+    for step, rows in rounds(task.project(gpc), gpc, strategy, settings, *axes, "reading"):
+        if all(before["accuracy"] < target for before in steps):
+            at_target = list(rows)
         steps.append(step)
         if step["accuracy"] >= end:
             break
-    return steps
+    return steps, at_target
+
+
+def _passes(
+    task: LabelingTask[np.ndarray],
+    rows: list[int],
+    settings: GPCSettings,
+    start: Joint,
+    target: float,
+    axes: tuple[str, int],
+) -> float:
+    """Return the passes over these labels, a multiple of `LOOK_EVERY` or all, to a new classifier's target accuracy."""
+    gpc, most = StartedGPC(settings, start, *axes, "epochs", NEW), settings.iterations
+    labeled_L_d = np.concatenate([task.initial.h, task.pool.h[rows]])
+    concept_L = np.concatenate([task.initial.concept_N, task.pool.concept_N[rows]])
+    for done in gpc.fit_up_to([*range(LOOK_EVERY, most, LOOK_EVERY), most], labeled_L_d, concept_L):
+        if accuracies(task.test.concept_N, gpc.attribute(task.test.h)[0])["accuracy", ALL] >= target:
+            return float(done)
+    return float(most)
 
 
 def _labeled(steps: list[dict[str, float]], target: float) -> dict[str, float]:
-    """Return the metrics of a learning curve; where the target is missed, labels and epochs are lower bounds.
-
-    Epochs are read as the passes of all rounds, in the place of the printed number.
-    """
+    """Return the metrics of a learning curve; where the target is missed, its labels are a lower bound."""
     hits = [step["accuracy"] >= target for step in steps]
     last = hits.index(True) if any(hits) else len(steps) - 1
     return {
         "labels_to_target": float(steps[last]["labels"]),
-        "epochs_at_target": float(sum(step["epochs"] for step in steps[: last + 1])),
         "reached": float(any(hits)),
         "final_accuracy": float(steps[-1]["accuracy"]),
     }
