@@ -6,6 +6,8 @@ import ast
 from functools import cache
 from pathlib import Path
 
+from gpca.plugins import ROOTS, lone_root
+
 ROOT = Path(__file__).resolve().parent.parent  # the folder that holds both packages: a checkout, or site-packages
 PACKAGES = ("gpca", "baselines")
 BESIDE = {  # what a module reads from its own folder
@@ -22,9 +24,10 @@ def code_files(*modules: str) -> list[str]:
     """Return the files of the given modules and of all project modules they import, anywhere in their text.
 
     What is imported only for type checking never runs, so it does not count; a file in `BESIDE` counts with its module.
-    Paths are sorted, and lead there from the working directory: relative where the packages lie below it, as in a run
-    at the root of a checkout, else absolute. Modules chosen by name at run time (kinds of source, encoders,
-    explainers) are not seen and have to be given.
+    A module from outside (:mod:`gpca.plugins`) counts as one of the project, with what it imports of its own package
+    or, if it is a lone file, from its folder. Paths are sorted, and lead there from the working directory: relative
+    where the files lie below it, as in a run at the root of a checkout, else absolute. Modules chosen by name at run
+    time (kinds of source, encoders, explainers) are not seen and have to be given.
     """
     reached: set[str] = set()
     open_modules = list(modules)
@@ -38,7 +41,13 @@ def code_files(*modules: str) -> list[str]:
         files += _file_of(module).parent.glob(BESIDE[module])
     working = Path.cwd().resolve()  # as ROOT is
     seen = ROOT.relative_to(working) if ROOT.is_relative_to(working) else ROOT
-    return sorted(str(seen / file.relative_to(ROOT)) for file in files)
+    return sorted(
+        str(seen / file.relative_to(ROOT)) if file.is_relative_to(ROOT) else _from(working, file) for file in files
+    )
+
+
+def _from(working: Path, file: Path) -> str:
+    return str(file.relative_to(working) if file.is_relative_to(working) else file)
 
 
 _HOLD_STATEMENTS = (ast.stmt, ast.excepthandler, ast.match_case)  # an import is a statement: no need to go into others
@@ -47,7 +56,8 @@ _HOLD_STATEMENTS = (ast.stmt, ast.excepthandler, ast.match_case)  # an import is
 @cache
 def _imports(module: str) -> tuple[str, ...]:
     names: set[str] = set()
-    nodes: list[ast.AST] = [ast.parse(_file_of(module).read_text(encoding="utf-8"))]
+    file = _file_of(module)
+    nodes: list[ast.AST] = [ast.parse(file.read_text(encoding="utf-8"))]
     while nodes:
         node = nodes.pop()
         if isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING":
@@ -56,21 +66,56 @@ def _imports(module: str) -> tuple[str, ...]:
             nodes += (child for child in ast.iter_child_nodes(node) if isinstance(child, _HOLD_STATEMENTS))
         if isinstance(node, ast.Import):
             names |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
-            names |= {node.module} | {f"{node.module}.{alias.name}" for alias in node.names}
-    return tuple(sorted(name for name in names if name.split(".")[0] in PACKAGES and _file(name) is not None))
+        elif isinstance(node, ast.ImportFrom) and (base := _base(node, module, file)):
+            names |= {base} | {f"{base}.{alias.name}" for alias in node.names}
+    top = module.split(".")[0]
+    if top not in PACKAGES:  # what stands in the packages around it runs first
+        names |= {module.rsplit(".", depth)[0] for depth in range(1, module.count(".") + 1)}
+        _know_beside(top, names)
+    return tuple(sorted(name for name in names if _is_followed(name, top) and _file(name) is not None))
+
+
+def _base(node: ast.ImportFrom, module: str, file: Path) -> str:
+    """Return the module that names are imported from; a dot stands for the package around the importing one."""
+    if not node.level:
+        return node.module or ""
+    package = module.split(".") if file.stem == "__init__" else module.split(".")[:-1]
+    around = package[: len(package) - (node.level - 1)]
+    return ".".join([*around, *([node.module] if node.module else [])])
+
+
+def _know_beside(top: str, names: set[str]) -> None:
+    """Note where modules lie that a lone file of a user's imports from its own folder."""
+    if (folder := lone_root(top)) is not None:
+        for first in {name.split(".")[0] for name in names} - {*PACKAGES}:
+            if (folder / f"{first}.py").is_file() or (folder / first).is_dir():
+                ROOTS.setdefault(first, folder)
+
+
+def _is_followed(name: str, importing: str) -> bool:
+    """Return whether an import leads to code that counts, seen from a module whose name begins with `importing`."""
+    first = name.split(".")[0]
+    if first in PACKAGES or first == importing:
+        return True
+    return importing not in PACKAGES and lone_root(importing) is not None and ROOTS.get(first) == lone_root(importing)
 
 
 def _file_of(module: str) -> Path:
     file = _file(module)
     if file is None:
-        raise ModuleNotFoundError(f"no module {module} in {ROOT}")
+        raise ModuleNotFoundError(f"no module {module} in {_root(module)}")
     return file
 
 
 def _file(module: str) -> Path | None:
-    path = ROOT.joinpath(*module.split("."))
+    path = _root(module).joinpath(*module.split("."))
     for candidate in (path.with_suffix(".py"), path / "__init__.py"):
         if candidate.is_file():
             return candidate
     return None
+
+
+def _root(module: str) -> Path:
+    """Return the folder that a module is imported from."""
+    first = module.split(".")[0]
+    return ROOT if first in PACKAGES else ROOTS.get(first, ROOT)

@@ -10,7 +10,11 @@ from gpca.process.processor import THREAD_VARIABLES, prepare
 # work each, spend most of their time waiting for one another.
 prepare()
 
-pytest_plugins = ("tests.failures", "tests.figures")  # more fixtures, for tests of several folders
+pytest_plugins = (
+    "tests.failures",
+    "tests.figures",
+    "tests.plugins_apart",
+)  # more fixtures, for tests of several folders
 
 # The kernels of the smoke run: what the tests of these compile beside the modules is copied with them for that run.
 COMPILING = ("tests/alignment/test_batched_icp.py", "tests/encoders/test_dgcnn.py", "tests/encoders/test_training.py")

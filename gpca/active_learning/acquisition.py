@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gpca.errors import require_known
+from gpca.plugins import joined_outside, module_outside
 
 EXPANSION = 4  # K: BALD with k-means forms clusters of K of the B·K most uncertain samples
 
@@ -51,10 +52,20 @@ class Strategy:
     needs_scores: bool = True
 
 
+def strategies() -> dict[str, Strategy]:
+    """Return every strategy by name, those from outside included."""
+    return joined_outside("STRATEGIES", "strategy", Strategy, STRATEGIES)
+
+
+def strategy_module(name: str) -> str | None:
+    """Return the module from outside that lists the strategy; None of one of the suite's own."""
+    return module_outside("STRATEGIES", "strategy", Strategy, name)
+
+
 def require_strategy(name: str) -> Strategy:
     """Return the strategy of that name; an unknown one raises an InputError that lists the known."""
-    require_known("strategy", name, STRATEGIES)
-    return STRATEGIES[name]
+    require_known("strategy", name, strategies())
+    return strategies()[name]
 
 
 def select(name: str, pool: Pool, batch: int, random: np.random.Generator) -> np.ndarray:

@@ -18,10 +18,11 @@ from gpca.explainers.registry import explainer_entry, require_settings
 from gpca.frames.source import REAL_WORLD
 from gpca.io.structured_text import require_plain
 from gpca.objects.source import require_place, resolve
+from gpca.plugins import use
 from gpca.settings import read_settings
 
-# Folders of results/ that no run may take: reference runs are kept in one, logs beside all runs in the other.
-TAKEN = ("reference", "logs")
+# Folders of results/ that no run may take: of reference runs, submissions, and logs beside all runs.
+TAKEN = ("reference", "leaderboard", "logs")
 BYTES_PER_POINT = 2 * 3 * 4  # in source and target, three float32
 LARGEST_BYTES = 2**36  # few machines have more memory, and five seeds of the paper's protocol take a thousandth
 
@@ -55,10 +56,12 @@ def check(config: dict) -> dict[str, dict]:
         the resolved entry of every source, by name, with ``stand_in`` set.
 
     Raises:
-        InputError: unknown key, wrong type, value out of range; unknown source, family, kind, explainer or backbone,
-            or one that is left out; data that is neither in its folder nor downloadable. The line names the key.
+        InputError: unknown key, wrong type, value out of range; a plugin that cannot be used; unknown source, family,
+            kind, explainer or backbone, or one that is left out; data that is neither in its folder nor
+            downloadable. The line names the key.
     """
     require_plain(config, "config key")
+    with_key("plugins", use, config.get("plugins") or [])
     whole = without_false(config)
     read_settings(whole_config(), whole, "config key")
     whole = with_success(whole)

@@ -20,7 +20,7 @@ from gpca.experiments.experiment import ByName
 from gpca.experiments.registry import experiments
 from gpca.objects.entry import Name, NamedSource, Place, SurfacePoints
 from gpca.pairs.synthesis import RegistrationSettings
-from gpca.settings import Bounds, Distinct, Keys, OpenShare, changes_of, part_of
+from gpca.settings import Bounds, Different, Distinct, Keys, OpenShare, changes_of, part_of
 from gpca.uncertainty.settings import UncertaintySettings
 
 DESIGNS = ("additive", "latin", "saltelli", "oracle", "removal", "causal")  # gpca.uncertainty.designs needs numba
@@ -107,6 +107,7 @@ class SharedSections:
     run: Annotated[str, Field(pattern="^[A-Za-z0-9][A-Za-z0-9_-]*$", max_length=100)]
     data_dir: Place | None
     downloads: Place
+    plugins: Annotated[tuple[Place, ...], Different(fewest=0)]
     seeds: Distinct[Annotated[int, Bounds(minimum=0, maximum=2**32 - 1)]]
     objects: Objects
     splits: Splits

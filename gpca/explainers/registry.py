@@ -1,4 +1,4 @@
-"""Every explainer by name: GP-CA itself and the rivals, one per file of ``baselines/``.
+"""Every explainer by name: GP-CA itself, the rivals, one per file of ``baselines/``, and those from outside.
 
 A file lists those of concepts as ``EXPLAINERS`` and those of causes as ``CAUSE_EXPLAINERS``, which have names of their
 own. The folder is found by its name, as the rivals import this package and not the other way round.
@@ -14,8 +14,8 @@ from gpca.settings import require_arguments
 
 CONCEPTS, CAUSES = "concepts", "causes"  # what explainers name: what was perturbed, or what is wrong
 REGISTRIES: dict[str, Registry[ExplainerEntry]] = {
-    CONCEPTS: Registry("explainer", "baselines", "EXPLAINERS", first=("gpca.explainers.gpca",)),
-    CAUSES: Registry("explainer", "baselines", "CAUSE_EXPLAINERS"),
+    CONCEPTS: Registry("explainer", "baselines", "EXPLAINERS", first=("gpca.explainers.gpca",), outside=ExplainerEntry),
+    CAUSES: Registry("explainer", "baselines", "CAUSE_EXPLAINERS", outside=ExplainerEntry),
 }
 
 

@@ -3,7 +3,8 @@
 A kind of source is a module beside this one with ``from_entry(entry, folder) -> Iterator[Surface]``; a new kind is
 such a file and nothing else; with a ``require_entry(entry, folder)`` it can refuse an entry whose data is at hand, as
 far as names of files tell, when a workflow loads. ``procedural`` needs no data and has ``surfaces(family)`` instead.
-Kinds that read or render depth frames stand among those (`OF_FRAMES`).
+Kinds that read or render depth frames stand among those (`OF_FRAMES`). A module from outside lists kinds by name as
+``SOURCES``, each with the name of such a module.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from gpca.io.files import sha256_of_file
 from gpca.objects import archive, download, procedural
 from gpca.objects.repository import folders_of_data, require_whole_if_ours
 from gpca.objects.surface import Surface
+from gpca.plugins import joined_outside
 
 # Kinds whose modules read depth frames, or render them, and stand there.
 OF_FRAMES = {"bop_views": "gpca.frames.bop_views", "mesh_views": "gpca.frames.mesh_views"}
@@ -216,7 +218,8 @@ def _module_of(kind: object) -> ModuleType:
 
 def _kinds() -> dict[str, str]:
     """Return the module of every kind by name; not each module beside this one is of a kind."""
-    return {module.name: f"gpca.objects.{module.name}" for module in pkgutil.iter_modules(objects.__path__)} | OF_FRAMES
+    beside = {module.name: f"gpca.objects.{module.name}" for module in pkgutil.iter_modules(objects.__path__)}
+    return joined_outside("SOURCES", "kind of source", str, beside | OF_FRAMES)
 
 
 def _as_list(value: str | list | None) -> list:

@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from gpca.errors import require_known
+from gpca.plugins import joined_outside, module_outside
 from gpca.recovery.deciders import (
     Decide,
     Means,
@@ -94,9 +95,19 @@ POLICIES = {
 }
 
 
+def named_policies() -> dict[str, PolicyEntry]:
+    """Return the policies that have a name of their own, those from outside included."""
+    return joined_outside("POLICIES", "recovery policy", PolicyEntry, POLICIES)
+
+
+def policy_module(name: str) -> str | None:
+    """Return the module from outside that lists the policy; None of one of the suite's own."""
+    return module_outside("POLICIES", "recovery policy", PolicyEntry, name)
+
+
 def is_fixed(name: str, actions: Sequence[str]) -> bool:
     """Return whether the policy takes the same actions in the same order whatever it is told and observes."""
-    return name in policies(actions) and name not in POLICIES
+    return name in policies(actions) and name not in named_policies()
 
 
 def policies(actions: Sequence[str]) -> dict[str, PolicyEntry]:
@@ -106,7 +117,7 @@ def policies(actions: Sequence[str]) -> dict[str, PolicyEntry]:
         name: PolicyEntry(title_of_sequence(order), follow_sequence(order))
         for name, order in sequences(actions).items()
     }
-    return POLICIES | always | fixed
+    return named_policies() | always | fixed
 
 
 def policy_entry(name: str, actions: Sequence[str]) -> PolicyEntry:

@@ -148,9 +148,9 @@ EXPLAINERS = {"fitness_only": ExplainerEntry("Fitness only", FitnessOnly, ("pair
 """
 
 
-def test_an_explainer_dropped_into_baselines_becomes_a_row(finished):
-    (finished.folder / "baselines/fitness_only.py").write_text(EXPLAINER)
-    finished.append("config/smoke.yaml", "  fitness_only: {sharpness: 50.0}\n")
+def test_an_explainer_in_a_file_of_ones_own_becomes_a_row(finished):
+    (finished.folder / "fitness_only.py").write_text(EXPLAINER)
+    finished.append("config/smoke.yaml", "  fitness_only: {sharpness: 50.0}\nplugins: [fitness_only.py]\n")
     planned = finished.dry_run("all", *SMOKE)
     assert without_ends(planned.jobs) == COLLECTORS | {"attribute": 2}
 
@@ -161,6 +161,9 @@ def test_an_explainer_dropped_into_baselines_becomes_a_row(finished):
         predictions = list(csv.DictReader(file))
     assert {row["concept_predicted"] for row in predictions} <= {"noise", "pose", "overlap"}
     assert len(predictions) == 48
+    finished.append("fitness_only.py", "\n# edited\n")
+    again = finished.dry_run("results/smoke/tables/table1_extended.md", *SMOKE)
+    assert again.jobs == {"attribute": 2, "metrics": 1, "attribution_intervals": 1, "table1_extended": 1}
 
 
 def test_a_wrong_setting_of_an_own_explainer_stops_at_load(project):

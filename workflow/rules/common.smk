@@ -6,7 +6,7 @@ from gpca.explainers.interface import BARE, REENACTED
 from gpca.explainers.registry import CAUSES, explainer_entry, explainer_module
 from gpca.alignment.methods.registry import method_module
 from gpca.code_files import code_files
-from gpca.encoders.registry import ENCODERS
+from gpca.encoders.registry import encoders
 from gpca.objects.procedural import FAMILIES
 from gpca.objects.source import find_file
 from gpca.experiments.run import names_of, settings_of
@@ -74,7 +74,7 @@ def encoder_module(encoder):
 
 
 def backbone_module(settings):
-    return ENCODERS[settings["backbone"]].split(":")[0]
+    return encoders()[settings["backbone"]].split(":")[0]
 
 
 def encoder_code(step):

@@ -1,7 +1,19 @@
 # Registrations with measured causes -> what every estimator says of their uncertainty -> estimators.csv.
+from gpca.experiments.estimators.experiment import estimates_of
+from gpca.plugins import is_outside
 from gpca.uncertainty.estimators.registry import estimator_module
 
-ESTIMATES = NAMES["estimate"]
+# Those from outside have jobs of their own.
+OUTSIDE_ESTIMATORS = [
+    name for name in NAMES["estimator"] if is_outside(estimator_module(name))
+]
+OUTSIDE_ESTIMATES = {
+    estimate: name
+    for name in OUTSIDE_ESTIMATORS
+    for estimate in estimates_of(name, config, SOURCES)
+}
+ESTIMATORS = [name for name in NAMES["estimator"] if name not in OUTSIDE_ESTIMATORS]
+ESTIMATES = [name for name in NAMES["estimate"] if name not in OUTSIDE_ESTIMATES]
 
 
 rule estimates:
@@ -9,7 +21,7 @@ rule estimates:
         collect(
             "<results>/estimates/{source}/{estimator}/seed{seed}.csv",
             source=SOURCES,
-            estimator=ESTIMATES,
+            estimator=NAMES["estimate"],
             seed=SEEDS,
         ),
 
@@ -28,7 +40,7 @@ rule estimate:
         ),
         code=code_files(
             "gpca.experiments.estimators.step",
-            *map(estimator_module, NAMES["estimator"]),
+            *map(estimator_module, ESTIMATORS),
             *map(method_module, config["estimator_pairs"]["methods"]),
         ),
     output:
@@ -56,15 +68,51 @@ rule estimate:
         "../envs/gpca.yaml"
     params:
         step="gpca.experiments.estimators.step",
-        settings=as_json(
-            {
-                name: config[name]
-                for name in ("estimator_pairs", "estimators", "causes", "success")
-            }
-            | ICP
-        ),
+        settings=estimator_settings(ESTIMATORS),
         other=lambda wildcards: "".join(next_source(wildcards)),
-        estimators=NAMES["estimator"],
+        estimators=ESTIMATORS,
+        estimates=ESTIMATES,
         seeds=SEEDS,
     script:
         "../scripts/step.py"
+
+
+use rule estimate as estimate_outside with:
+    input:
+        objects="<results>/objects/{source}.npz",
+        causes=collect("<results>/causes/{{source}}/seed{seed}.npz", seed=SEEDS),
+        other_objects=lambda wildcards: collect(
+            "<results>/objects/{source}.npz", source=next_source(wildcards)
+        ),
+        other_causes=lambda wildcards: collect(
+            "<results>/causes/{source}/seed{seed}.npz",
+            source=next_source(wildcards),
+            seed=SEEDS,
+        ),
+        code=lambda wildcards: code_files(
+            "gpca.experiments.estimators.step",
+            estimator_module(OUTSIDE_ESTIMATES[wildcards.outside_estimate]),
+            *map(method_module, config["estimator_pairs"]["methods"]),
+        ),
+    output:
+        rows=collect(
+            "<results>/estimates/{{source}}/{{outside_estimate}}/seed{seed}.csv",
+            seed=SEEDS,
+        ),
+        timings=collect(
+            "<results>/timings/{{source}}/estimator_{{outside_estimate}}/seed{seed}.csv",
+            seed=SEEDS,
+        ),
+    log:
+        "<logs>/estimates/{source}/{outside_estimate}.log",
+    benchmark:
+        "<benchmarks>/estimates/{source}/{outside_estimate}.tsv"
+    wildcard_constraints:
+        source="|".join(SOURCES),
+        outside_estimate="|".join(OUTSIDE_ESTIMATES) or "none",
+    params:
+        settings=lambda wildcards: estimator_settings(
+            [OUTSIDE_ESTIMATES[wildcards.outside_estimate]]
+        ),
+        estimators=lambda wildcards: [OUTSIDE_ESTIMATES[wildcards.outside_estimate]],
+        estimates=lambda wildcards: [wildcards.outside_estimate],

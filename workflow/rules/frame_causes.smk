@@ -5,6 +5,10 @@ FRAME_CAUSES = {
     "causes": config["causes"],
     **ICP,
 }
+# Those from outside have jobs of their own, so that an edit of one leaves the others, and what follows, as they are.
+FRAME_EXPLAINERS = [
+    name for name in DIAGNOSIS["explainers"] if name not in NAMES["outside_explainer"]
+]
 
 
 rule measure_frame_causes:
@@ -88,7 +92,7 @@ rule diagnose_frames:
         code=code_files(
             "gpca.experiments.frame_causes.diagnosis_step",
             backbone_module(DIAGNOSIS["encoder"]),
-            *(explainer_module(name, CAUSES) for name in DIAGNOSIS["explainers"]),
+            *(explainer_module(name, CAUSES) for name in FRAME_EXPLAINERS),
         ),
     output:
         predictions="<results>/frame_diagnoses/seed{seed}.csv",
@@ -100,7 +104,43 @@ rule diagnose_frames:
         "../envs/gpca.yaml"
     params:
         step="gpca.experiments.frame_causes.diagnosis_step",
-        settings=as_json(DIAGNOSIS | ICP),
+        settings=frame_diagnosis(FRAME_EXPLAINERS),
         source=FRAMES,
     script:
         "../scripts/step.py"
+
+
+use rule diagnose_frames as diagnose_frames_outside with:
+    input:
+        frame_causes="<results>/frame_causes/seed{seed}.npz",
+        frame_reenactments=if_enacted(
+            f"<results>/reenactments/{FRAMES}/seed{{seed}}.npz"
+        ),
+        causes=collect("<results>/causes/{source}/seed{{seed}}.npz", source=SOURCES),
+        descriptors=collect(
+            "<results>/descriptors/{source}/seed{{seed}}.npz", source=SOURCES
+        ),
+        reenactments=if_enacted(
+            collect("<results>/reenactments/{source}/seed{{seed}}.npz", source=SOURCES)
+        ),
+        encoders=collect(
+            "<results>/cause_encoders/{source}/seed{{seed}}.pt", source=SOURCES
+        ),
+        embeddings=collect(
+            "<results>/cause_embeddings/{source}/seed{{seed}}.npz", source=SOURCES
+        ),
+        code=lambda wildcards: code_files(
+            "gpca.experiments.frame_causes.diagnosis_step",
+            backbone_module(DIAGNOSIS["encoder"]),
+            explainer_module(wildcards.outside_explainer, CAUSES),
+        ),
+    output:
+        predictions="<results>/frame_diagnoses/{outside_explainer}/seed{seed}.csv",
+    log:
+        "<logs>/frame_diagnoses/{outside_explainer}/seed{seed}.log",
+    benchmark:
+        "<benchmarks>/frame_diagnoses/{outside_explainer}/seed{seed}.tsv"
+    wildcard_constraints:
+        outside_explainer="|".join(NAMES["outside_explainer"]) or "none",
+    params:
+        settings=lambda wildcards: frame_diagnosis([wildcards.outside_explainer]),

@@ -24,7 +24,7 @@ rule learn_on_frames:
         settings=as_json(
             {
                 "frame_labels": config["frame_labels"],
-                "active_learning": config["active_learning"],
+                "active_learning": LEARNING_SETTINGS,
             }
         ),
         source=FRAMES,

@@ -91,6 +91,21 @@ def if_enacted(files):
     return files if REENACTED in read else []
 
 
+def frame_diagnosis(explainers):
+    """Return the settings of a job that asks some explainers of causes about depth frames."""
+    asked = {name: config["diagnosis"]["explainers"][name] for name in explainers}
+    icp = {"icp": config["registrations"]["icp"]}
+    return as_json(config["diagnosis"] | icp | {"explainers": asked})
+
+
+def estimator_settings(estimators):
+    """Return the settings of a job that asks some estimators about registrations with measured causes."""
+    names = ("estimator_pairs", "causes", "success")
+    asked = {name: config["estimators"][name] for name in estimators}
+    icp = {"icp": config["registrations"]["icp"]}
+    return as_json({name: config[name] for name in names} | icp | {"estimators": asked})
+
+
 def encoders_of_others(wildcards):
     """Return encoders that saw other samples: those of the next seed, and of the next source, where there are any."""
     seeds, sources = [str(seed) for seed in SEEDS], list(SOURCES)

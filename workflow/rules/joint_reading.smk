@@ -7,7 +7,7 @@ JOINT = config["joint_reading"]
 JOINT_SIZES = {"sizes": {"samples": JOINT["samples"]}}
 JOINT_SECTIONS = {
     "gpca_paper": config["explainers"].get("gpca_paper") or {},
-    "active_learning": config["active_learning"],
+    "active_learning": LEARNING_SETTINGS,
     "labels": {name: JOINT[name] for name in ("batch", "labels")},
     "uncertainty": config["uncertainty"].get("additive", {}),
     "icp": config["registrations"]["icp"],

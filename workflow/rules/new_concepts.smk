@@ -3,7 +3,7 @@ NEW = config["new_concepts"]
 NEW_ENCODER = config["embedding"]["encoder"]
 NEW_SETTINGS = {
     "new_concepts": NEW,
-    "active_learning": config["active_learning"],
+    "active_learning": LEARNING_SETTINGS,
     "encoder": config["encoders"][NEW_ENCODER],
     "cause_encoder": DIAGNOSIS["encoder"],
     "causes": config["causes"],

@@ -1,6 +1,6 @@
 # Failures on virtual tables, and what every policy makes of them -> recovery.csv.
 from gpca.objects.source import data_files, data_folders, source_modules
-from gpca.recovery.policies import policy_entry
+from gpca.recovery.policies import policy_entry, policy_module
 
 RECOVERY = config["recovery"]
 STANDING = SOURCES[RECOVERY["objects"]]  # what stands on the tables
@@ -33,6 +33,7 @@ rule recover:
             "gpca.experiments.recovery.step",
             encoder_module(config["embedding"]["encoder"]),
             *map(explainer_module, RECOVERY_EXPLAINERS),
+            *filter(None, map(policy_module, RECOVERY["policies"])),
             *source_modules(STANDING),
         ),
     output:

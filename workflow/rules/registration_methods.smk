@@ -1,7 +1,15 @@
 # The test pairs of the registrations by every registration method -> registration_methods.csv.
 from gpca.alignment.methods.registry import left_out
+from gpca.plugins import is_outside
 
-METHODS = NAMES["method"]
+START = config["method_pairs"]["global_start"]
+# Those from outside have jobs of their own, but for the global start, which all jobs run.
+OUTSIDE_METHODS = [
+    name
+    for name in NAMES["method"]
+    if is_outside(method_module(name)) and name != START
+]
+METHODS = [name for name in NAMES["method"] if name not in OUTSIDE_METHODS]
 for name, package in left_out(config["methods"]).items():
     if workflow.is_main_process:
         print(
@@ -15,7 +23,7 @@ rule methods:
         collect(
             "<results>/methods/{source}/{method}/seed{seed}.csv",
             source=SOURCES,
-            method=METHODS,
+            method=NAMES["method"],
             seed=SEEDS,
         ),
 
@@ -61,3 +69,41 @@ rule register_methods:
         seeds=SEEDS,
     script:
         "../scripts/step.py"
+
+
+use rule register_methods as register_method_outside with:
+    input:
+        objects="<results>/objects/{source}.npz",
+        registrations=collect(
+            "<results>/registrations/{{source}}/seed{seed}.npz", seed=SEEDS
+        ),
+        code=lambda wildcards: code_files(
+            "gpca.experiments.registration_methods.step",
+            *map(method_module, (START, wildcards.outside_method)),
+        ),
+    output:
+        rows=collect(
+            "<results>/methods/{{source}}/{{outside_method}}/seed{seed}.csv",
+            seed=SEEDS,
+        ),
+        timings=collect(
+            "<results>/timings/{{source}}/method_{{outside_method}}/seed{seed}.csv",
+            seed=SEEDS,
+        ),
+    log:
+        "<logs>/methods/{source}/{outside_method}.log",
+    benchmark:
+        "<benchmarks>/methods/{source}/{outside_method}.tsv"
+    wildcard_constraints:
+        outside_method="|".join(OUTSIDE_METHODS) or "none",
+    params:
+        settings=lambda wildcards: as_json(
+            {
+                "method_pairs": config["method_pairs"],
+                "methods": {
+                    name: config["methods"][name]
+                    for name in (START, wildcards.outside_method)
+                },
+            }
+        ),
+        methods=lambda wildcards: [wildcards.outside_method],

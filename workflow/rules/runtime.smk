@@ -20,7 +20,7 @@ rule time_stages:
         source=MODEL_SOURCE,
         seed=SEEDS[0],
         settings=as_json(
-            {name: config[name] for name in ("runtime", "active_learning")}
+            {"runtime": config["runtime"], "active_learning": LEARNING_SETTINGS}
         ),
     script:
         "../scripts/step.py"

@@ -22,7 +22,7 @@ READING_SECTIONS = {
     "uncertainty": config["uncertainty"].get("additive", {}),
     "icp": config["registrations"]["icp"],
     "encoder": config["encoders"][config["embedding"]["encoder"]],
-    "active_learning": config["active_learning"],
+    "active_learning": LEARNING_SETTINGS,
     **{name: config["explainers"].get(name) or {} for name in ("gpca_paper", "gpca")},
     "gpca_matern": LEARNER_SETTINGS.get("gpca_matern", {}),
 }

@@ -14,9 +14,7 @@ from gpca.registry import Registry
 from gpca.settings import require_arguments
 
 # Those without their package too.
-REGISTRY: Registry[MethodEntry] = Registry(
-    "registration method", __package__, "METHODS"
-)  # those without their package too
+REGISTRY: Registry[MethodEntry] = Registry("registration method", __package__, "METHODS", outside=MethodEntry)
 methods, method_entry, method_module = REGISTRY.entries, REGISTRY.entry, REGISTRY.module
 
 

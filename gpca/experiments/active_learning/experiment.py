@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from gpca.active_learning.acquisition import STRATEGIES, STREAMS
+from gpca.active_learning.acquisition import STREAMS, strategies
 from gpca.active_learning.settings import ActiveLearningSettings, RareSettings, StreamSettings
 from gpca.encoders.settings import EncoderChanges, require_draws
 from gpca.errors import require_names
@@ -17,7 +17,7 @@ from gpca.settings import Distinct, PositiveShare
 
 def titles() -> dict[str, str]:
     """Return the titles of all strategies by name."""
-    return {name: strategy.title for name, strategy in STRATEGIES.items()} | STREAMS
+    return {name: strategy.title for name, strategy in strategies().items()} | STREAMS
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,8 +43,8 @@ def check(config: dict, _left_out: LeftOut) -> None:
 
 def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
     """Return the strategies, and those of them that choose from a pool."""
-    strategies = list(config["active_learning"]["strategies"])
-    return {"strategy": strategies, "pool_strategy": [name for name in strategies if name in STRATEGIES]}
+    chosen = list(config["active_learning"]["strategies"])
+    return {"strategy": chosen, "pool_strategy": [name for name in chosen if name not in STREAMS]}
 
 
 def shown(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gpca.active_learning.acquisition import STRATEGIES, STREAMS
+from gpca.active_learning.acquisition import STREAMS, strategies
 from gpca.active_learning.curves import POOL_COLUMNS, STREAM_COLUMNS, write_curves
 from gpca.active_learning.retraining import Retraining, Step, learn
 from gpca.active_learning.rounds import LabelingTask, initial_gpc, make_task, run_rounds
@@ -30,7 +30,7 @@ PAPERS = ("random", "bald_kmeans", "bald")  # by the strategies that the paper c
 def run(job: Job) -> None:
     """Run every strategy in every setting for every concept held out."""
     for strategy in job.strategies:
-        require_known("strategy", strategy, (*STRATEGIES, *STREAMS))
+        require_known("strategy", strategy, (*strategies(), *STREAMS))
     inputs = [job.registrations, job.embeddings, job.embeddings_without]
     axes = (job.source, job.seed)
     with record_provenance(job.out, inputs, job.settings, seed=job.seed):
@@ -41,7 +41,7 @@ def run(job: Job) -> None:
             for strategy in job.strategies:
                 if strategy in STREAMS and setting == "pretrained":
                     curve = run_stream(task, gpc, strategy, settings, stream, *axes)
-                elif strategy in STRATEGIES:
+                elif strategy not in STREAMS:
                     curve = run_rounds(task, gpc, strategy, settings, *axes, setting)
                 else:
                     continue

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from math import inf
 from typing import TYPE_CHECKING, Any
 
-from gpca.active_learning.acquisition import STRATEGIES, STREAMS
+from gpca.active_learning.acquisition import STREAMS, require_strategy
 from gpca.active_learning.metrics import CENSORED_BY, TABLE
 from gpca.active_learning.settings import LOOK_EVERY, rare_setting
 from gpca.experiments.active_learning.clusters import Clusters
@@ -117,10 +117,11 @@ def table3_extended(
     }
     table = TableBuilder("table3_extended", {"source": "Dataset", "setting": "Encoder saw", "strategy": "Strategy"})
     settings = {name: SETTINGS[name] for name in ("pretrained", "unseen")}
-    of_pool = {name: title for name, title in strategies.items() if name in STRATEGIES}
+    of_pool = {name: title for name, title in strategies.items() if name not in STREAMS}
     for (source, setting, strategy), labels in crossed(titles_of(sources), settings, of_pool):
         of_row = rows_where(metrics, source=source, table=TABLE + setting, method=strategy)
-        table.add_row(labels, _cells(of_row, quantities, conditions, clusters), rival=not STRATEGIES[strategy].oracle)
+        is_rival = not require_strategy(strategy).oracle
+        table.add_row(labels, _cells(of_row, quantities, conditions, clusters), rival=is_rival)
     table.compare_down([key for key in quantities if key != "reached"], same=2)
     return table.build(
         caption=f"Active learning of a held-out concept by every strategy, to {conditions['target']:.0%}"

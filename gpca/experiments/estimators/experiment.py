@@ -46,6 +46,12 @@ def shown(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str
     }
 
 
+def estimates_of(estimator: str, config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> list[str]:
+    """Return the names under which an estimator has files: its own, and those by which it is taught otherwise."""
+    others = _taught_otherwise(config, sources)
+    return [estimator, *(name for name, (learner, _) in others.items() if learner == estimator)]
+
+
 def _taught_otherwise(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str, tuple[str, str]]:
     """Return name -> what learns, and with what else than the training samples of its own source."""
     shifts = (MILD, OTHER_SOURCE) if len(sources) > 1 else (MILD,)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from pathlib import Path
+
 from gpca.alignment.methods.registry import require_local
 from gpca.causes.dataset import Causes
 from gpca.causes.settings import CauseSettings
@@ -31,14 +34,17 @@ def run(job: Job) -> None:
         return Situations(source, seed, causes, drawn_by, objects[source], judges[source])
 
     others = job.files("other_causes") if job.get("other") else []
-    for i, (seed, path, samples) in enumerate(job.per_seed("causes", "samples")):
+    samples: Sequence[Path | None] = job.files("samples") if job.get("samples") else [None] * len(job.seeds)
+    for i, (seed, path) in enumerate(job.per_seed("causes")):
         of_seed = slice(i, None, len(job.seeds))
         out, timings = job.rows[of_seed], job.timings[of_seed]
         inputs = [*named.values(), path, *others[i : i + 1]]
-        with record_provenance([*out, *timings, samples], inputs, job.settings, seed=seed):
+        with record_provenance([*out, *timings, *filter(None, samples[i : i + 1])], inputs, job.settings, seed=seed):
             other = situations(job.other, seed, others[i]) if others else None
             rows, cases = try_estimators(situations(job.source, seed, path), other, estimators, settings)
-            reference_samples(cases).save(samples, (job.source, seed))
-            for of_estimator, own_out, own_timings in zip(rows.values(), out, timings, strict=True):
+            if (sampled := samples[i]) is not None:
+                reference_samples(cases).save(sampled, (job.source, seed))
+            for name, own_out, own_timings in zip(job.get("estimates", list(rows)), out, timings, strict=True):
+                of_estimator = rows[name]
                 write_csv(own_out, of_estimator.drop(columns="seconds"))
                 write_csv(own_timings, of_estimator[["sample", "method", "seconds"]])

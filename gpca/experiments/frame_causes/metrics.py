@@ -36,7 +36,10 @@ COUNTED = ("starts", "instances", "scenes", "objects", *LABELS, BORDERLINE, GEOM
 
 
 def collect(
-    causes_files: Iterable[str | Path], sample_files: Iterable[str | Path], prediction_files: Iterable[str | Path]
+    causes_files: Iterable[str | Path],
+    sample_files: Iterable[str | Path],
+    prediction_files: Iterable[str | Path],
+    outside_files: Iterable[str | Path] = (),
 ) -> pd.DataFrame:
     """Return the intervals of the diagnosis for explainers that learned from no frame.
 
@@ -50,6 +53,7 @@ def collect(
 
     Args:
         causes_files, sample_files, prediction_files: one of each seed, in the same order, named ``…/seed{seed}.…``.
+        outside_files: predictions of explainers from outside, each of one seed and named so too.
 
     Raises:
         InputError: files that cannot be read, or are of different samples.
@@ -58,7 +62,10 @@ def collect(
 
     samples_of: dict[str, list[Judged]] = {}
     seen: list[pd.DataFrame] = []
-    for seed, causes, samples, predictions in _seeds(causes_files, sample_files, prediction_files):
+    outside = list(outside_files)
+    for seed, causes, samples, own in _seeds(causes_files, sample_files, prediction_files):
+        further = [_predictions(path, causes) for path in outside if seed_of_file(path) == seed]
+        predictions = pd.concat([own, *further])
         for explainer, said in predictions.groupby("explainer", sort=False):
             samples_of.setdefault(str(explainer), []).append(judged_by(said, causes, seed))
         samples_of.setdefault(CEILING, []).append(ceiling_of(causes, seed))
@@ -102,16 +109,21 @@ def _seeds(*file_lists: Iterable[str | Path]) -> Iterator[tuple[int, Causes, pd.
         raise InputError("causes of frames", "need files of every seed", "give the same number of each kind")
     for causes_file, sample_file, prediction_file in zip(*files, strict=True):
         causes = Causes.load(causes_file)
-        numbers = [str(number) for number in causes.registrations.sample]
         samples = read_csv(sample_file, SAMPLE_COLUMNS, others=ANY)
-        predictions = read_predictions(prediction_file, labels=("explainer",))
-        of_explainers = [rows for _, rows in predictions.groupby("explainer")]
-        for path, of_path in ((sample_file, [samples]), (prediction_file, of_explainers)):
-            if any(rows["sample"].tolist() != numbers for rows in of_path):
-                raise InputError(
-                    path, "its samples differ from those of the causes", "regenerate both from the same config"
-                )
-        yield seed_of_file(causes_file), causes, samples[list(SAMPLE_COLUMNS)], predictions
+        _require_same(sample_file, samples, causes)
+        yield seed_of_file(causes_file), causes, samples[list(SAMPLE_COLUMNS)], _predictions(prediction_file, causes)
+
+
+def _predictions(path: str | Path, causes: Causes) -> pd.DataFrame:
+    predictions = read_predictions(path, labels=("explainer",))
+    for _, rows in predictions.groupby("explainer"):
+        _require_same(path, rows, causes)
+    return predictions
+
+
+def _require_same(path: str | Path, rows: pd.DataFrame, causes: Causes) -> None:
+    if rows["sample"].tolist() != [str(number) for number in causes.registrations.sample]:
+        raise InputError(path, "its samples differ from those of the causes", "regenerate both from the same config")
 
 
 def _measured(samples: Judged, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:

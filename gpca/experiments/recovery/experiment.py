@@ -12,7 +12,7 @@ from gpca.explainers.registry import explainer_entry, require_settings
 from gpca.frames.situations import SituationSettings
 from gpca.objects.title import dataset_of, title_of
 from gpca.recovery.actions import ACTIONS, action_of
-from gpca.recovery.policies import POLICIES, policies, policy_entry
+from gpca.recovery.policies import named_policies, policies, policy_entry
 from gpca.recovery.policy import Thresholds
 
 DECLARED = ("uncertain", "dominant", "improvement")  # thresholds that are given; null leaves one to the calibration
@@ -56,7 +56,7 @@ def _check_policy(name: str, config: dict, left_out: LeftOut) -> None:
 def policies_without(left_out: LeftOut) -> set[str]:
     """Return the policies that go with the actions and the uncertainty that the config leaves out."""
     designs = left_out("uncertainty")
-    reading = {name: entry.explainer for name, entry in POLICIES.items() if entry.explainer}
+    reading = {name: entry.explainer for name, entry in named_policies().items() if entry.explainer}
     actions = [action for action in ACTIONS if action not in left_out("recovery.actions")]
     return {
         *(policies(tuple(ACTIONS)).keys() - policies(actions).keys()),

@@ -12,9 +12,10 @@ from gpca.process.provenance import record_provenance
 
 
 def run(job: Job) -> None:
-    """Register by every method, seed by seed."""
+    """Register by every method, seed by seed; the one that gives the others a start runs in any case."""
     settings = PairSettings(**job.section("method_pairs"))
-    methods = job.by_name("methods", job.methods)
+    start = [settings.global_start] if settings.global_start in job.section("methods") else []
+    methods = job.by_name("methods", dict.fromkeys([*job.methods, *start]))
     objects = ObjectClouds.load(job.objects, job.source)
     for i, (seed, path) in enumerate(job.per_seed("registrations")):
         of_seed = slice(i, None, len(job.seeds))
@@ -23,6 +24,7 @@ def run(job: Job) -> None:
         with record_provenance([*outputs[0], *outputs[1]], inputs, job.settings, seed=seed):
             registrations = Registrations.load(path, (job.source, seed))
             trials = try_methods(registrations, objects, job.source, seed, methods, settings)
-            for rows, out, timings in zip(trials.values(), *outputs, strict=True):
+            for name, out, timings in zip(job.methods, *outputs, strict=True):
+                rows = trials[name]
                 write_csv(out, rows.drop(columns="seconds"))
                 write_csv(timings, rows[["sample", "start", "seconds"]])

@@ -11,7 +11,7 @@ from gpca.registry import Registry
 from gpca.settings import require_arguments
 from gpca.uncertainty.estimators.interface import Estimate, EstimatorEntry, Example, FailedEstimate, RegisteredPair
 
-REGISTRY: Registry[EstimatorEntry] = Registry("estimator", __package__, "ESTIMATORS")
+REGISTRY: Registry[EstimatorEntry] = Registry("estimator", __package__, "ESTIMATORS", outside=EstimatorEntry)
 estimators, estimator_entry, estimator_module = REGISTRY.entries, REGISTRY.entry, REGISTRY.module
 
 

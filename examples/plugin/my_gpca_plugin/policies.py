@@ -1,0 +1,20 @@
+"""A policy of recovery."""
+
+from __future__ import annotations
+
+from gpca.recovery.deciders import Case, Decide, Means
+from gpca.recovery.policies import PolicyEntry
+from gpca.recovery.policy import Decision
+
+
+def take_the_last_first(means: Means) -> Decide:
+    """Take the robot's actions in turn, the last one first."""
+
+    def decide(case: Case) -> Decision:
+        order = means.actions[::-1]
+        return Decision(order[len(case.actions) % len(order)], "", "the last one first")
+
+    return decide
+
+
+POLICIES = {"my_last_first": PolicyEntry("Last action first (mine)", take_the_last_first)}
