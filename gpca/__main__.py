@@ -15,7 +15,11 @@ from gpca.process.processor import prepare
 COMMANDS = {  # those for a registration of one's own first, then those for a run
     "explain": "files of points -> why their registration is uncertain, and what to do",
     "label": "registrations and embeddings -> labels that a person gives when the classifier asks",
+    "bench": "method of your own -> its row among the published ones of a track",
+    "score": "predictions made anywhere -> the same",
+    "leaderboard": "submitted predictions -> a page that ranks them",
     "ship": "model of a run -> the model that comes with the package, and its card",
+    "ship-predictions": "run -> the predictions and truths that bench and score read",
     "check-config": "configs -> whether a run can use them",
     "check-reference": "folder of a run -> whether its numbers agree with the reference",
 }

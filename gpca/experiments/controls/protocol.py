@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpca.attribution.predictions import prediction_frame
+from gpca.attribution.scores import Attribution
 from gpca.experiments.controls.costs import ASKED, Costs
 from gpca.experiments.controls.rivals import Embed, Rival, described_for
 from gpca.experiments.controls.settings import (
@@ -99,6 +100,15 @@ class ControlRun:
                 if control == UNSEEN:
                     frames += self._trained_otherwise(changed)
         return pd.concat(frames, ignore_index=True)
+
+    def of_hard(self, name: str) -> tuple[Attribution, float]:
+        """Return what one explainer says of the hard test samples, and its seconds for each of them."""
+        assert self.hard is not None
+        changed = self._changed(HARD, self.hard, {})
+        explainer, test = self.rivals[name].make(), changed.subset(changed.rows("test"))
+        explainer.fit(changed.subset(changed.rows("train")))
+        attribution = explainer.explain(test.without_labels())
+        return attribution, float(attribution.seconds_N.mean())
 
     def _admits(self, control: str, registrations: Registrations, others: Mapping) -> bool:
         why = left_out(control, registrations, self.settings, self.backbone)

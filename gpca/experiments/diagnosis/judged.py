@@ -25,6 +25,27 @@ POOLED = "pooled"  # all sources together
 
 
 @dataclass(frozen=True)
+class SampleTruth:
+    """N test samples with their truth, without their clouds.
+
+    Attributes:
+        truth, truth_again: as of :class:`gpca.causes.dataset.Causes`.
+        cluster, symmetric, error_shown: (N,) the same.
+    """
+
+    truth: Truth
+    truth_again: Truth
+    cluster: np.ndarray
+    symmetric: np.ndarray
+    error_shown: np.ndarray
+
+    @classmethod
+    def of(cls, causes: Causes) -> SampleTruth:
+        """Return what is kept of registrations that are all for testing."""
+        return cls(causes.truth, causes.truth_again, causes.registrations.cluster, causes.symmetric, causes.error_shown)
+
+
+@dataclass(frozen=True)
 class Judged:
     """N test samples with an explainer's predictions.
 
@@ -113,12 +134,18 @@ def judged_by(rows: pd.DataFrame, truth: Causes, seed: int) -> Judged:
     """Return test samples with the predictions of a file whose rows are in the same order."""
     scores_N_4 = rows[[f"score_{label}" for label in LABELS]].to_numpy(float)
     named_N = np.where(rows["abstained"], "", rows["concept_predicted"].to_numpy(str))
-    return _judged(truth, seed, 1 - scores_N_4[:, 0], scores_N_4, named_N)
+    return judged_of(SampleTruth.of(truth), seed, scores_N_4, named_N)
 
 
-def ceiling_of(causes: Causes, seed: int) -> Judged:
+def judged_of(tested: SampleTruth, seed: int, scores_N_4: np.ndarray, named_N: np.ndarray) -> Judged:
+    """Return test samples with scores of :data:`gpca.causes.dataset.LABELS` and the labels named, empty for none."""
+    return _judged(tested, seed, 1 - scores_N_4[:, 0], scores_N_4, named_N)
+
+
+def ceiling_of(causes: Causes | SampleTruth, seed: int) -> Judged:
     """Return test samples with the truth measured from other starts as their predictions."""
-    again: Truth = causes.truth_again
+    tested = SampleTruth.of(causes) if isinstance(causes, Causes) else causes
+    again = tested.truth_again
     error_N = again.error[:, -1]
     shares_N_3 = np.maximum(again.phi, 0) + 1e-12
     shares_N_3 = shares_N_3 / shares_N_3.sum(axis=1, keepdims=True)
@@ -126,22 +153,22 @@ def ceiling_of(causes: Causes, seed: int) -> Judged:
     is_nominal_N = error_N < (again.nominal_limit + again.failed_limit) / 2
     scores_N_4 = np.column_stack([is_nominal_N.astype(float), ~is_nominal_N[:, None] * shares_N_3])
     named_N = np.where(is_nominal_N, NOMINAL, np.array(CONCEPTS)[again.phi.argmax(axis=1)])
-    return _judged(causes, seed, error_N, scores_N_4, named_N)
+    return _judged(tested, seed, error_N, scores_N_4, named_N)
 
 
-def _judged(causes: Causes, seed: int, alarm_N, scores_N_4: np.ndarray, named_N: np.ndarray) -> Judged:
-    truth = causes.truth
+def _judged(tested: SampleTruth, seed: int, alarm_N, scores_N_4: np.ndarray, named_N: np.ndarray) -> Judged:
+    truth = tested.truth
     return Judged(
         label=labels_of(truth),
-        instance=causes.registrations.cluster,
+        instance=tested.cluster,
         seed=np.full(len(truth), seed),
         error=truth.error,
         phi=truth.phi,
         causes=truth.causes,
         tied=truth.tied,
         margin=truth.margin,
-        shown=state_of_errors(causes.error_shown, truth),
-        symmetric=causes.symmetric,
+        shown=state_of_errors(tested.error_shown, truth),
+        symmetric=tested.symmetric,
         alarm=np.asarray(alarm_N, float),
         scores=scores_N_4[:, 1:],
         named=named_N,

@@ -47,7 +47,7 @@ def run(job: Job) -> None:
     inputs = read + [path for paths in lessons.values() for path in paths]
     with record_provenance([job.predictions], inputs, job.settings, seed=job.seed):
         causes = Causes.load(job.frame_causes, (job.source, job.seed))
-        explained = _FramesToExplain(job, causes, enacted, lessons)
+        explained = FramesToExplain(job, causes, enacted, lessons)
         said_of: list[pd.DataFrame] = []
         for name, own in job.section("explainers").items():
             attribution = explained.attribution(name, own or {})
@@ -55,7 +55,7 @@ def run(job: Job) -> None:
         write_csv(job.predictions, pd.concat(said_of))
 
 
-class _FramesToExplain:
+class FramesToExplain:
     """Registrations of frames to be explained, and the training data of the explainers.
 
     Args:
@@ -73,6 +73,10 @@ class _FramesToExplain:
         reenactment = ReenactmentSettings(**job.section("reenactment")).calls(starts)
         self._calls = partial(icp_calls, starts=starts, descriptors=self._settings, reenactment=reenactment)
         self._pairs: dict[str, list[tuple[Registrations, Registrations]]] = {}
+
+    def prepare(self, name: str) -> None:
+        """Measure what an explainer reads, once for all that read the same."""
+        self._learned_and_explained(explainer_entry(name, CAUSES))
 
     def attribution(self, name: str, settings: dict) -> Attribution:
         """Return the mean of the scores over all that the explainer learns from.

@@ -1,0 +1,152 @@
+"""The samples of a track as an object: NumPy arrays, a pandas frame, a torch dataset."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gpca.causes.dataset import LABELS, Causes, labels_of
+from gpca.errors import InputError, require_known
+from gpca.io.names import SPLITS
+from gpca.pairs.dataset import Registrations
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.tracks.samples import Samples
+from gpca.tracks.track import FRAMES_TRACK, HARD_TRACK, track_of
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+NO_LABEL = -1  # of what is borderline, and in no measure
+
+
+@dataclass(frozen=True)
+class TrackData:
+    """S registrations of a track. Lengths are relative to the object's diameter.
+
+    Attributes:
+        track, source, split, seed, version: which they are; the split is None where they are of both.
+        registrations: clouds, poses and ICP's results (:class:`gpca.pairs.dataset.Registrations`).
+        labels: (C,) what there is to be named.
+        label: (S,) the true one; ``borderline`` between nominal and failed, which counts in no measure.
+        error: (S, 8) mean error with each subset of the causes alone, bit i of the number for cause i.
+        phi: (S, 3) what each of noise, pose and overlap adds to the error.
+        causes: (S, 3) whether each is one of the causes.
+    """
+
+    track: str
+    source: str
+    split: str | None
+    seed: int
+    version: str
+    registrations: Registrations
+    labels: tuple[str, ...]
+    label: np.ndarray
+    error: np.ndarray
+    phi: np.ndarray
+    causes: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.registrations)
+
+    def __repr__(self) -> str:
+        split = self.split or "train and test"
+        return f"<{len(self)} samples of {self.track} {self.version}: {self.source}, {split}, seed {self.seed}>"
+
+    @property
+    def sources(self) -> list[np.ndarray]:
+        """The observed clouds (P, 3) float32, where ICP put them, in the frame of the targets."""
+        return [self.registrations.cloud(row) for row in range(len(self))]
+
+    @property
+    def targets(self) -> list[np.ndarray]:
+        """The models' clouds (Q, 3) float32."""
+        return [self.registrations.target(row) for row in range(len(self))]
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Return one array (S, …) for each quantity that is known of every sample, by name."""
+        own = self.registrations
+        names = ["sample", "split", "object_name", "cluster", "diameter_m", "fitness", "inlier_rmse"]
+        names += [name for name in vars(own) if name.startswith(("severity_", "T_target_source_"))]
+        truth = {name: getattr(self, name) for name in ("label", "error", "phi", "causes")}
+        return {name: getattr(own, name) for name in names} | truth
+
+    def frame(self) -> pd.DataFrame:
+        """Return a row for each sample with all that is one number or word; the true φ of each cause among it."""
+        import pandas as pd
+
+        arrays = self.arrays()
+        columns: dict[str, Any] = {name: array for name, array in arrays.items() if array.ndim == 1}
+        columns["points"] = np.diff(self.registrations.offsets)
+        columns["target_points"] = np.diff(self.registrations.target_offsets)
+        columns["error"] = self.error[:, -1]
+        columns |= {f"phi_{concept}": self.phi[:, place] for place, concept in enumerate(CONCEPTS)}
+        return pd.DataFrame(columns)
+
+    def torch(self, points: int = 512):
+        """Return a torch dataset of (source (points, 3), target (points, 3), number of the label), float32.
+
+        Clouds are in random order, so their first points are a draw; one of fewer points repeats some. What is
+        borderline has the label `NO_LABEL`.
+        """
+        import torch
+
+        place = {label: number for number, label in enumerate(self.labels)}
+        numbers = torch.tensor([place.get(label, NO_LABEL) for label in self.label.tolist()])
+        clouds = [
+            torch.from_numpy(np.stack([np.resize(cloud, (points, 3)) for cloud in of_kind]))
+            for of_kind in (self.sources, self.targets)
+        ]
+        return torch.utils.data.TensorDataset(*clouds, numbers)
+
+
+def load(
+    track: str = "causes",
+    source: str | None = None,
+    split: str | None = None,
+    seed: int = 0,
+    samples: str | Path | None = None,
+) -> TrackData:
+    """Return samples of a track; they are made from the repository's data where the cache lacks them.
+
+    Args:
+        track: ``causes``, ``hard`` or ``frames``.
+        source: of the samples, such as ``ycb``; the first one by default.
+        split: ``train``, ``test`` or None for both. Depth frames are all for testing.
+        seed: the repeat.
+        samples: the folder that they are kept in, by default the user's cache.
+
+    Raises:
+        InputError: an unknown name, or samples that cannot be made or are not the published ones.
+    """
+    chosen = Samples.of(track_of(track), Path(samples) if samples else None)
+    published = chosen.published
+    parts = [(name, number) for name, number, _ in published.rows.parts()]
+    source = source or parts[0][0]
+    require_known("source", source, sorted({name for name, _ in parts}))
+    if (source, seed) not in parts:
+        known = ", ".join(str(number) for name, number in parts if name == source)
+        raise InputError(f"seed {seed}", f"has no samples of the track {track}", f"choose one of {known}")
+    if split is not None:
+        require_known("split", split, SPLITS)
+    if split == "train" and track == FRAMES_TRACK:
+        raise InputError("split 'train'", "has no depth frames", "learn from the track causes")
+    [path] = chosen.files([chosen.track.file(source, seed)])
+    causes = Causes.load(path, (source, seed))
+    causes = causes.subset(causes.rows(split)) if split else causes
+    of_hard = track == HARD_TRACK
+    return TrackData(
+        track=track,
+        source=source,
+        split=split,
+        seed=seed,
+        version=published.version,
+        registrations=causes.registrations,
+        labels=CONCEPTS if of_hard else LABELS,
+        label=causes.registrations.concept if of_hard else labels_of(causes.truth),
+        error=causes.truth.error,
+        phi=causes.truth.phi,
+        causes=causes.truth.causes,
+    )

@@ -1,0 +1,182 @@
+"""What is shipped of each track: the truth of its test samples, what the published methods said of them, and hashes."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gpca.causes.shapley import SUBSETS
+from gpca.causes.truth import Truth
+from gpca.code_files import ROOT
+from gpca.errors import InputError
+from gpca.experiments.diagnosis.judged import SampleTruth
+from gpca.io.arrays import REAL, TEXT, WHOLE, load_arrays
+from gpca.io.files import whole_file
+from gpca.tracks.track import Track
+
+FOLDER = ROOT / "results/leaderboard/published"
+NO_CALLS = -1  # of ICP, where their number is not known
+NOTHING_NAMED = -1  # in the place of a label's number
+LIMITS = ("nominal_limit", "failed_limit", "cause_limit")
+
+
+@dataclass(frozen=True)
+class Rows:
+    """N test samples of a track, part by part, with their truth.
+
+    Attributes:
+        source, seed, sample: (N,) which they are.
+        object, cluster, concept, symmetric: (N,) as in the files of samples.
+        start, instance, scene: (N,) of depth frames: kind of start, its instance, dataset and scene; else empty or 0.
+        counted: (N,) whether it measures anything; scenes whose true poses were made by ICP do not.
+        error, uncertainty: (N, 8) of the truth; error_again, uncertainty_again those from other starts.
+        error_shown: (N,) of the registration that is shown.
+        uncertainty_limit: (N,) of a nominal registration, nats.
+    """
+
+    source: np.ndarray
+    seed: np.ndarray
+    sample: np.ndarray
+    object: np.ndarray
+    cluster: np.ndarray
+    concept: np.ndarray
+    symmetric: np.ndarray
+    start: np.ndarray
+    instance: np.ndarray
+    scene: np.ndarray
+    counted: np.ndarray
+    error: np.ndarray
+    uncertainty: np.ndarray
+    error_again: np.ndarray
+    uncertainty_again: np.ndarray
+    error_shown: np.ndarray
+    uncertainty_limit: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.sample)
+
+    def parts(self) -> Iterator[tuple[str, int, np.ndarray]]:
+        """Yield source, seed and row numbers of each part, in order."""
+        keys = list(zip(self.source.tolist(), self.seed.tolist(), strict=True))
+        for source, seed in dict.fromkeys(keys):
+            yield source, seed, np.flatnonzero((self.source == source) & (self.seed == seed))
+
+
+@dataclass(frozen=True)
+class Method:
+    """A method and what it said of all rows.
+
+    Attributes:
+        name, title: of it.
+        reads: what it sees of a registration, in words; empty where that is not known.
+        icp_calls: runs of ICP beyond the one that it explains; `NO_CALLS` where that is not known.
+        scores: (N, C) of the track's labels.
+        named: (N,) number of the label that it names; `NOTHING_NAMED` where it names none.
+    """
+
+    name: str
+    title: str
+    reads: str
+    icp_calls: int
+    scores: np.ndarray
+    named: np.ndarray
+
+    def labels_named(self, labels: tuple[str, ...]) -> np.ndarray:
+        """Return the labels named (N,), empty for none."""
+        return np.array([*labels, ""])[self.named]
+
+
+@dataclass(frozen=True)
+class Published:
+    """All that is shipped of a track.
+
+    Attributes:
+        track: of which.
+        rows: the test samples.
+        limits: of errors, that all samples share (:class:`gpca.causes.truth.Truth`).
+        methods: the published ones.
+        hashes: SHA-256 of the arrays of every file of samples, by its path below the folder of a run.
+        commit: that the run was made with; empty where it is not known.
+    """
+
+    track: Track
+    rows: Rows
+    limits: Mapping[str, float]
+    methods: tuple[Method, ...]
+    hashes: Mapping[str, str]
+    commit: str = ""
+
+    @cached_property
+    def version(self) -> str:
+        """Names the samples: other samples have another one."""
+        own = {file: of for file, of in self.hashes.items() if file.split("/")[0] == self.track.samples.split("/")[0]}
+        text = "\n".join(f"{file} {of}" for file, of in sorted(own.items()))
+        return hashlib.sha256(text.encode()).hexdigest()[:12]
+
+    def truth_of(self, rows: np.ndarray) -> SampleTruth:
+        """Return the truth of rows of one part, given by their numbers."""
+        own: dict[str, Any] = {**self.limits, "uncertainty_limit": float(self.rows.uncertainty_limit[rows[0]])}
+        truth, again = (
+            Truth(getattr(self.rows, f"error{which}")[rows], getattr(self.rows, f"uncertainty{which}")[rows], **own)
+            for which in ("", "_again")
+        )
+        cluster, symmetric, shown = (getattr(self.rows, name)[rows] for name in ("cluster", "symmetric", "error_shown"))
+        return SampleTruth(truth, again, cluster, symmetric, shown)
+
+    def save(self, path: Path) -> None:
+        """Write the npz; the same contents give the same bytes."""
+        arrays = {name: getattr(self.rows, name) for name in _SHAPES}
+        arrays |= {name: np.array(self.limits[name]) for name in LIMITS}
+        arrays |= {f"method_{name}": np.array([getattr(each, name) for each in self.methods]) for name in _WORDS}
+        arrays |= {name: np.stack([getattr(each, name) for each in self.methods]) for name in ("scores", "named")}
+        files = sorted(self.hashes.items())
+        arrays |= {"files": np.array([file for file, _ in files]), "sha256": np.array([of for _, of in files])}
+        arrays |= {"commit": np.array(self.commit or "unknown")}
+        with whole_file(path) as partial:
+            np.savez_compressed(partial, allow_pickle=False, **arrays)
+
+    @classmethod
+    def load(cls, track: Track, path: Path | None = None) -> Published:
+        """Read what is shipped of a track.
+
+        Raises:
+            InputError: it is missing, damaged, or of another track.
+        """
+        path = path or FOLDER / f"{track.name}.npz"
+        if not path.is_file():
+            remedy = "restore it, or make it from a run: gpca ship-predictions"
+            raise InputError(path, "no such file, in which the published rows are", remedy)
+        labels = len(track.labels)
+        shapes: dict[str, tuple[int | str, ...]] = dict(_SHAPES) | dict.fromkeys(LIMITS, ())
+        shapes |= {f"method_{name}": ("M",) for name in _WORDS} | {"scores": ("M", "N", labels), "named": ("M", "N")}
+        shapes |= {"files": ("F",), "sha256": ("F",), "commit": ()}
+        kinds = dict.fromkeys(shapes, TEXT) | dict.fromkeys((*LIMITS, *_REAL, "scores"), REAL)
+        kinds |= dict.fromkeys(("seed", "sample", "instance", "named", "method_icp_calls"), WHOLE)
+        kinds |= {"symmetric": "b", "counted": "b"}
+        arrays = load_arrays(path, shapes, kinds)
+        if not ((arrays["named"] >= NOTHING_NAMED) & (arrays["named"] < labels)).all():
+            raise InputError(path, "names labels that the track does not have", "restore it")
+        words = [arrays[f"method_{name}"].tolist() for name in _WORDS]
+        said = zip(*words, arrays["scores"], arrays["named"], strict=True)
+        return cls(
+            track=track,
+            rows=Rows(**{name: arrays[name] for name in _SHAPES}),
+            limits={name: float(arrays[name]) for name in LIMITS},
+            methods=tuple(Method(*each) for each in said),
+            hashes=dict(zip(arrays["files"].tolist(), arrays["sha256"].tolist(), strict=True)),
+            commit="" if str(arrays["commit"]) == "unknown" else str(arrays["commit"]),
+        )
+
+
+_WORDS = ("name", "title", "reads", "icp_calls")
+_OF_SUBSETS = ("error", "uncertainty", "error_again", "uncertainty_again")
+_REAL = (*_OF_SUBSETS, "error_shown", "uncertainty_limit")
+_SHAPES: Mapping[str, tuple[int | str, ...]] = {
+    field.name: ("N", len(SUBSETS)) if field.name in _OF_SUBSETS else ("N",) for field in fields(Rows)
+}

@@ -1,0 +1,116 @@
+"""The fixed samples of the tracks: kept in a cache, made from the repository's data where they are not, and checked."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+import zipfile
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gpca.errors import InputError
+from gpca.objects.repository import DATA
+from gpca.plugins import named
+from gpca.tracks.making import make
+from gpca.tracks.published import Published
+from gpca.tracks.track import Track
+
+LEARNED = ("cause_embeddings", "cause_encoders", "control_embeddings")  # by encoders, whose last digits may differ
+
+
+@dataclass(frozen=True)
+class Samples:
+    """The samples of a track.
+
+    Attributes:
+        track: of which.
+        published: what is known of them, their hashes among it.
+        folder: where they are kept, as in the folder of a run; a finished run's own will do.
+        processes: so many files are made at a time.
+    """
+
+    track: Track
+    published: Published
+    folder: Path
+    processes: int = 1
+
+    @classmethod
+    def of(cls, track: Track, cache: Path | None = None, processes: int | None = None) -> Samples:
+        """Return the samples of a track, in the user's cache or another folder."""
+        published = Published.load(track)
+        return cls(track, published, cache or default_cache(), processes or os.cpu_count() or 1)
+
+    @cached_property
+    def config(self) -> dict[str, Any]:
+        """The suite's default config, by which samples are made."""
+        from gpca.config.check import read
+        from gpca.config.layers import DEFAULTS, with_defaults
+
+        if not DEFAULTS[0].is_file() or not DATA.is_dir():
+            fault = "needs the configs and the data of the repository, which the installed package does not bring"
+            raise InputError(f"track {self.track.name}", fault, "work in a clone of it")
+        return read(with_defaults({"plugins": named()}), {})[0]
+
+    def files(self, names: Iterable[str]) -> list[Path]:
+        """Return files by their paths below the folder; what is missing is made, and all are checked.
+
+        Raises:
+            InputError: a file that is not the one that the published rows were made with, or that cannot be made.
+        """
+        names = list(names)
+        if self.folder == default_cache() and any(self._fault(name) for name in names):
+            shutil.rmtree(self.folder)  # of an earlier version
+        if missing := [name for name in names if not (self.folder / name).is_file()]:
+            make(missing, self.folder, self.config, self.processes)
+        for name in names:
+            if fault := self._fault(name):
+                remedy = "remove it, and make it with the commit that published them"
+                remedy += f", {self.published.commit[:12]}" if self.published.commit else ""
+                raise InputError(self.folder / name, fault, remedy)
+        return [self.folder / name for name in names]
+
+    def _fault(self, name: str) -> str:
+        """Return in what a file differs from what is expected; empty where it does not, or is not there yet."""
+        expected, path = self.published.hashes.get(name), self.folder / name
+        if expected is None or name.split("/")[0] in LEARNED or not path.is_file():
+            return ""
+        found = sha256_of_arrays(path)
+        if found == expected:
+            return ""
+        return f"differs from what the published rows were made with ({found[:12]} is not {expected[:12]})"
+
+
+def default_cache() -> Path:
+    """Return the folder of the user's in which samples are kept."""
+    import pooch
+
+    return Path(pooch.os_cache("gpca-bench"))
+
+
+def sha256_of_arrays(path: str | Path) -> str:
+    """Return the hexadecimal SHA-256 of the arrays of an npz, their names, types and shapes, however it is packed.
+
+    Raises:
+        InputError: it cannot be read.
+    """
+    digest = hashlib.sha256()
+    try:
+        with np.load(path, allow_pickle=False) as arrays:
+            for name in sorted(arrays.files):
+                array = np.ascontiguousarray(arrays[name])
+                digest.update(f"{name}|{array.dtype.str}|{array.shape}|".encode())
+                digest.update(array.tobytes())
+    except (OSError, ValueError, zipfile.BadZipFile) as fault:
+        raise InputError(path, "is not a readable npz archive", "remove it; it is made anew") from fault
+    return digest.hexdigest()
+
+
+def hashes_of(folder: Path, files: Iterable[str]) -> Mapping[str, str]:
+    """Return the hash of each file below a folder, by its path there."""
+    return {file: sha256_of_arrays(folder / file) for file in files}

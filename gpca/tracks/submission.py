@@ -1,0 +1,228 @@
+"""A CSV of predictions made anywhere: a head of comments that says what made them, and a row for each test sample.
+
+::
+
+    # track: causes
+    # version: 0123456789ab
+    # method: My method
+    # authors: A. Author, B. Author
+    # link: https://github.com/author/my-method
+    # seconds: 0.02
+    # hardware: two cores of a laptop
+    source,seed,sample,score_nominal,score_noise,score_pose,score_overlap
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from gpca.errors import InputError
+from gpca.io.files import whole_file
+from gpca.io.limits import require_file
+from gpca.io.names import is_name
+from gpca.numerals import decimal, whole
+from gpca.tracks.published import NO_CALLS, NOTHING_NAMED, Method, Published
+from gpca.tracks.track import TRACKS, Track
+
+HEAD = {  # what the head has to say -> what that is
+    "track": "causes, hard or frames",
+    "version": "of the samples, as gpca bench and gpca.load print it",
+    "method": "its name",
+    "authors": "who made it",
+    "link": "to code or a paper, or none",
+    "seconds": "for each registration, on one core where that is known",
+    "hardware": "what it ran on",
+}
+OPTIONAL = {"reads": "what it sees of a registration", "icp_calls": "runs of ICP beyond the one that it explains"}
+KEYS = ("source", "seed", "sample")
+NO_LINK = "none"
+NAMED = "named"  # optional column: the label named, empty for none; without it, that of the largest score
+LARGEST_BYTES = 10**8
+MOST_FAULTS = 20  # that are listed
+
+
+@dataclass(frozen=True)
+class Submission:
+    """Predictions for all test samples of a track.
+
+    Attributes:
+        head: what made them, by the keys of `HEAD` and `OPTIONAL`.
+        method: what it said.
+    """
+
+    head: Mapping[str, str]
+    method: Method
+
+    def write(self, path: Path, published: Published) -> None:
+        """Write the CSV."""
+        labels, rows = published.track.labels, published.rows
+        with whole_file(path) as partial, partial.open("w", encoding="utf-8", newline="") as file:
+            file.writelines(f"# {key}: {self.head[key]}\n" for key in (*HEAD, *OPTIONAL) if self.head.get(key))
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow([*KEYS, *(f"score_{label}" for label in labels), NAMED])
+            named_N = self.method.labels_named(labels)
+            for row in range(len(rows)):
+                keys = (rows.source[row], rows.seed[row], rows.sample[row])
+                writer.writerow([*keys, *(f"{value:.6f}" for value in self.method.scores[row]), named_N[row]])
+
+
+@dataclass
+class _Reader:
+    """Reads a submission and collects its faults, each a line."""
+
+    path: Path
+    published: Published
+    faults: list[str] = field(default_factory=list)
+
+    def fault(self, place: str, what: str, remedy: str) -> None:
+        self.faults.append(f"{self.path}{', ' if place else ''}{place}: {what}; {remedy}")
+
+    def read(self) -> Submission | None:
+        require_file(self.path, "no such file", "give a CSV file of predictions", LARGEST_BYTES)
+        try:
+            lines = self.path.read_text("utf-8-sig").splitlines()
+        except UnicodeDecodeError:
+            self.fault("", "is not a text file in UTF-8", "write it anew")
+            return None
+        length = next((number for number, line in enumerate(lines) if not line.startswith("#")), len(lines))
+        head = self._head(lines[:length])
+        said = self._rows(lines[length:], length)
+        if self.faults or said is None:
+            return None
+        calls = int(head["icp_calls"]) if head.get("icp_calls") else NO_CALLS
+        scores_N_C, named_N = said
+        name = f"{self.path.stem} (submitted)"  # apart from the published ones
+        method = Method(name, head["method"], head.get("reads", ""), calls, scores_N_C, named_N)
+        return Submission(head, method)
+
+    def _head(self, lines: list[str]) -> dict[str, str]:
+        head: dict[str, str] = {}
+        for number, line in enumerate(lines, 1):
+            key, colon, value = (part.strip() for part in line[1:].partition(":"))
+            if not colon or key not in {**HEAD, **OPTIONAL}:
+                continue  # any other comment
+            if key in head:
+                self.fault(f"line {number}", f"'{key}' stands there twice", "keep one of them")
+            head[key] = value
+        for key, words in HEAD.items():
+            if not is_name(head.get(key, "")):
+                self.fault("", f"its head lacks '{key}'", f"add a line '# {key}: …', {words}")
+        self._check_head(head)
+        return head
+
+    def _check_head(self, head: Mapping[str, str]) -> None:
+        track, version = self.published.track.name, self.published.version
+        if head.get("track", track) != track:
+            self.fault("", f"is of the track '{head['track']}', not {track}", "name the track that it is of")
+        elif head.get("version", version) != version:
+            fault = f"is of version '{head['version']}' of the samples, and these are of {version}"
+            self.fault("", fault, "predict these: gpca.load makes them")
+        if (link := head.get("link", NO_LINK)) != NO_LINK and not link.startswith(("https://", "http://")):
+            self.fault("", f"'link' is '{link[:40]}'", f"give an address that begins with https://, or {NO_LINK}")
+        for key, read in (("seconds", decimal), ("icp_calls", whole)):
+            text = head.get(key, "")
+            try:
+                if text and read(text) < 0:
+                    raise ValueError
+            except ValueError:
+                self.fault("", f"'{key}' is '{text[:40]}'", "give a number of 0 or more")
+
+    def _rows(self, lines: list[str], before: int) -> tuple[np.ndarray, np.ndarray] | None:
+        track, rows = self.published.track, self.published.rows
+        scores = [f"score_{label}" for label in track.labels]
+        table = csv.reader(lines)
+        columns = next(table, [])
+        wanted = [*KEYS, *scores]
+        for name in (name for name in wanted if columns.count(name) != 1):
+            fault = f"column '{name}' is {'missing' if name not in columns else 'there twice'}"
+            self.fault(f"line {before + 1}", fault, f"the columns are {', '.join(wanted)} and, if you like, {NAMED}")
+        for name in (name for name in columns if name not in (*wanted, NAMED)):
+            self.fault(f"line {before + 1}", f"column '{name}' is unknown", "remove it")
+        if self.faults and any(columns.count(name) != 1 for name in wanted):
+            return None
+        place = {key: row for row, key in enumerate(_keys(rows.source, rows.seed, rows.sample))}
+        scores_N_C = np.full((len(rows), len(scores)), np.nan)
+        named_N = np.full(len(rows), NOTHING_NAMED)
+        seen: dict[int, int] = {}
+        for number, cells in enumerate(table, before + 2):
+            if not cells:
+                continue
+            line = f"line {number}"
+            if len(cells) != len(columns):
+                self.fault(line, f"has {len(cells)} entries, not {len(columns)}", "give one for each column")
+                continue
+            entry = dict(zip(columns, cells, strict=True))
+            row = place.get(tuple(entry[name].strip() for name in KEYS))
+            if row is None:
+                words = f"source {entry['source']}, seed {entry['seed']}, sample {entry['sample']}"
+                self.fault(line, f"{words} is no test sample", "give those of gpca.load with split='test'")
+                continue
+            if row in seen:
+                self.fault(line, f"is of the same sample as line {seen[row]}", "keep one of them")
+            seen[row] = number
+            for column, name in enumerate(scores):
+                try:
+                    scores_N_C[row, column] = decimal(entry[name].strip())
+                except ValueError:
+                    self.fault(line, f"'{name}' is '{entry[name][:40]}', no finite number", "give a number")
+            named_N[row] = self._named(entry, scores_N_C[row], track, line)
+        if missing := [key for key, row in place.items() if row not in seen]:
+            source, seed, sample = missing[0]
+            words = f"{len(missing)} of {len(place)} test samples are missing, first source {source}, seed {seed}"
+            self.fault("", f"{words}, sample {sample}", "give every sample once")
+        return scores_N_C, named_N
+
+    def _named(self, entry: Mapping[str, str], scores_C: np.ndarray, track: Track, line: str) -> int:
+        if NAMED not in entry:
+            return int(scores_C.argmax())
+        if not (label := entry[NAMED].strip()):
+            return NOTHING_NAMED
+        if label not in track.labels:
+            self.fault(line, f"'{label[:40]}' is no label", f"choose one of {', '.join(track.labels)}")
+            return NOTHING_NAMED
+        return track.labels.index(label)
+
+
+def read_submission(path: Path, published: Published) -> tuple[Submission | None, list[str]]:
+    """Return a submission to a track, or None, and its faults, a line each, no more than `MOST_FAULTS`.
+
+    Raises:
+        InputError: no such file, or one that cannot be read.
+    """
+    reader = _Reader(path, published)
+    submission = reader.read()
+    faults = reader.faults
+    if len(faults) > MOST_FAULTS:
+        faults = [*faults[:MOST_FAULTS], f"{path}: {len(faults) - MOST_FAULTS} faults more"]
+    return (None if faults else submission), faults
+
+
+def track_in_head(path: Path) -> str:
+    """Return the track that the head of a submission names.
+
+    Raises:
+        InputError: no such file, no text, or a head that names no track.
+    """
+    require_file(path, "no such file", "give a CSV file of predictions", LARGEST_BYTES)
+    with path.open(encoding="utf-8-sig", errors="replace") as file:
+        for line in _comments(file):
+            key, _, value = (part.strip() for part in line[1:].partition(":"))
+            if key == "track" and value in TRACKS:
+                return value
+    raise InputError(path, "its head names no track", f"add a line '# track: …', one of {', '.join(TRACKS)}")
+
+
+def _comments(lines: Iterable[str]) -> Iterator[str]:
+    for line in lines:
+        if not line.startswith("#"):
+            return
+        yield line
+
+
+def _keys(*columns: np.ndarray) -> list[tuple[str, ...]]:
+    return list(zip(*(map(str, column.tolist()) for column in columns), strict=True))

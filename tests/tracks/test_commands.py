@@ -1,0 +1,100 @@
+"""The commands of the tracks, from a method in a file to its row, and from a CSV to the page."""
+
+import json
+import re
+
+import pytest
+
+from gpca import plugins
+from gpca.__main__ import main
+from gpca.tracks import leaderboard
+from gpca.tracks.table import MARK
+
+from ..documents import block
+from .conftest import SOURCE
+
+
+@pytest.fixture
+def method(tmp_path, monkeypatch, apart):
+    """The method of docs/outside.md, in a file of its own."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "my_method.py").write_text(block("my_method.py", page="docs/outside.md"))
+    return "my_method.py"
+
+
+def test_a_method_in_a_file_stands_among_the_published_rows(method, published, run, tmp_path, capsys):
+    assert main(["bench", "causes", method, "--samples", str(run), "--out", "said.csv", "--authors", "Me"]) == 0
+    shown = capsys.readouterr().out
+    assert f"{MARK}RMSE below its median" in shown and "Minus RMSE below its median (points)" in shown
+    said = (tmp_path / "said.csv").read_text()
+    assert said.startswith(f"# track: causes\n# version: {published.version}\n# method: RMSE below its median\n")
+    assert said.count(f"\n{SOURCE},") == len(published.rows)
+    assert main(["score", "causes", "said.csv"]) == 0
+    again = capsys.readouterr().out
+    [row], [other] = (re.findall(f"^{MARK}.+$", text, re.MULTILINE) for text in (shown, again))
+    assert row.split() == other.split()
+
+
+def test_an_explainer_of_the_suite_can_be_run_again(published, run, apart, capsys):
+    assert main(["bench", "causes", "chance", "--samples", str(run)]) == 0
+    assert f"{MARK}Chance (here)" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("words", "line"),
+    [
+        (["causes", "none.py"], "none.py: no such file"),
+        (["causes", "none_such"], "explainer 'none_such': unknown; choose one of "),
+        (["hard", "my_method.py"], "my_method.py: lists no EXPLAINERS, whom the track hard asks; give it EXPLAINERS"),
+        (["clouds", "my_method.py"], "track 'clouds': unknown; choose one of causes, hard, frames"),
+        (["causes", "my_method.py", "--settings", json.dumps({"sharp": 1})], "setting sharp: unknown"),
+    ],
+)
+def test_a_method_that_cannot_be_asked_is_refused_in_one_line(words, line, method, published, run, capsys):
+    assert main(["bench", *words, "--samples", str(run)]) == 2
+    said = [text for text in capsys.readouterr().err.splitlines() if "learning and" not in text]
+    assert len(said) == 1 and line in said[0]
+
+
+def test_faults_of_predictions_are_lines_and_the_status_says_so(published, tmp_path, capsys):
+    (tmp_path / "said.csv").write_text("# track: causes\nsource,seed,sample\n")
+    assert main(["score", "causes", str(tmp_path / "said.csv")]) == 2
+    said = capsys.readouterr()
+    assert len(said.err.splitlines()) == 6 + 4 and said.out == ""
+
+
+@pytest.fixture
+def board(published, run, method, tmp_path, monkeypatch, capsys):
+    """A folder with one submission."""
+    monkeypatch.setattr(leaderboard, "PUBLISHED", tmp_path / "published")
+    words = ["--samples", str(run), "--out", "board/rmse.csv", "--authors", "<b>Me</b>"]
+    (tmp_path / "board").mkdir()
+    assert main(["bench", "causes", method, *words, "--link", "https://github.com/me/rmse"]) == 0
+    capsys.readouterr()
+    return tmp_path / "board"
+
+
+def test_the_page_ranks_submissions_and_can_be_sorted(board, capsys):
+    assert main(["leaderboard", "--submissions", str(board)]) == 0
+    assert "submissions: 1 of the track causes" in capsys.readouterr().out
+    page = (board / "index.html").read_text()
+    assert page.count('<tr class="submitted">') == 1
+    assert '<a href="https://github.com/me/rmse" rel="nofollow">' in page
+    assert "&lt;b&gt;Me&lt;/b&gt;" in page and "<b>Me" not in page
+    assert "http" not in page.replace("https://github.com/me/rmse", "")  # nothing is fetched
+    [table] = re.findall(r"<tbody>(.*?)</tbody>", page, re.DOTALL)
+    rows = re.findall(r"<tr.*?</tr>", table, re.DOTALL)
+    assert len({row.count("<td") for row in rows}) == 1 and len(rows) == 4
+    assert rows[0].count("<td") == page.count('<th scope="col"')
+
+
+def test_a_faulty_submission_makes_no_page(board, capsys):
+    text = (board / "rmse.csv").read_text()
+    (board / "rmse.csv").write_text(text.replace(f"\n{SOURCE},100,0,", f"\n{SOURCE},100,99,"))
+    assert main(["leaderboard", "--submissions", str(board), "--check"]) == 2
+    assert "sample 99 is no test sample" in capsys.readouterr().err
+    assert not (board / "index.html").exists()
+
+
+def test_plugins_of_a_command_are_those_of_its_process_alone(apart):
+    assert plugins.named() == []

@@ -1,0 +1,94 @@
+"""Scores beside the published rows, and the table that shows them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gpca.experiments.diagnosis.judged import CEILING, POOLED
+from gpca.experiments.diagnosis.metrics import collect_intervals
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.tracks.published import Method
+from gpca.tracks.scoring import groups_of, score
+from gpca.tracks.table import MARK, as_text, table_of
+from gpca.tracks.track import TRACKS
+
+from .conftest import SEED, SOURCE
+
+
+def of(rows, **wanted):
+    for column, value in wanted.items():
+        rows = rows[rows[column] == value]
+    [row] = rows.to_dict("records")
+    return row
+
+
+@pytest.fixture
+def mine(shipped):
+    return replace(shipped.methods[0], name="mine", title="Mine")  # as `chance`
+
+
+def test_published_rows_have_the_numbers_of_the_runs_own_table(shipped, run):
+    scores, _ = score(shipped, {})
+    files = [run / f"diagnoses/{SOURCE}/{name}/seed{SEED}.csv" for name in ("chance", "rule")]
+    table = collect_intervals(files, [run / f"causes/{SOURCE}/seed{SEED}.npz"])
+    assert set(scores["method"]) == {"chance", "rule", CEILING}
+    for row in table.to_dict("records"):
+        own = of(scores, method=row["method"], metric=row["metric"])
+        assert (own["value"], own["samples"]) == (pytest.approx(row["value"]), row["samples"])
+
+
+def test_differences_are_paired_and_have_the_sign_of_the_other_minus_mine(shipped, mine):
+    scores, against = score(shipped, {"mine": mine})
+    assert set(against["method"]) == {"chance", "rule"}
+    same, better = of(against, method="chance"), of(against, method="rule")
+    assert same["difference"] == 0
+    accuracy = {name: of(scores, method=name, metric="balanced_accuracy")["value"] for name in ("rule", "mine")}
+    assert better["difference"] == pytest.approx(accuracy["rule"] - accuracy["mine"]) and better["difference"] > 0
+    assert better["difference_low"] <= better["difference"] <= better["difference_high"]
+
+
+def test_the_table_ranks_by_the_headline_marks_the_new_row_and_ends_with_the_ceiling(shipped, mine):
+    table = table_of(shipped, {"mine": mine}, *score(shipped, {"mine": mine}))
+    names = [labels[0][0] for labels in table.rows]
+    assert names[0] == "rule" and names[-1] == CEILING and set(names) == {"rule", "chance", "mine", CEILING}
+    text = as_text(table)
+    [line] = [line for line in text.splitlines() if MARK in line]
+    assert line.startswith(f"{MARK}Mine") and "nothing" in line
+    assert "Minus Mine (points)" in text and shipped.version in text
+
+
+@pytest.fixture
+def hard(shipped):
+    """The same samples as those of the track `hard`, of which the published method names two thirds rightly."""
+    rows = replace(shipped.rows, concept=np.resize(CONCEPTS, len(shipped.rows)))
+    right_N = np.arange(len(rows)) % len(CONCEPTS)
+    named_N = np.where(right_N == 2, 0, right_N)
+    scores_N_3 = np.where(named_N[:, None] == np.arange(3), 0.8, 0.1)
+    published = Method("rule", "Rule", "pair", 0, scores_N_3, named_N)
+    return replace(shipped, track=TRACKS["hard"], rows=rows, methods=(published,))
+
+
+def test_hard_samples_are_scored_by_accuracy_and_by_concept(hard):
+    scores, _ = score(hard, {})
+    concept_N = hard.rows.concept
+    assert of(scores, metric="accuracy")["value"] == pytest.approx((concept_N != "overlap").mean())
+    recalls = {name: of(scores, metric=f"recall_{name}")["value"] for name in CONCEPTS}
+    assert recalls == {"noise": 1.0, "pose": 1.0, "overlap": 0.0}
+    assert of(scores, metric="accuracy")["group"] == POOLED
+    assert "Of overlap (%)" in as_text(table_of(hard, {}, *score(hard, {})))
+
+
+def test_starts_of_depth_frames_are_scored_by_kind_and_an_instance_counts_once(shipped):
+    n = len(shipped.rows)
+    start, counted = np.resize(["native", "ladder"], n), np.arange(n) != 0
+    rows = replace(shipped.rows, start=start, instance=np.arange(n) // 4, counted=counted)
+    frames = replace(shipped, track=TRACKS["frames"], rows=rows)
+    groups = {kind: (chosen, once_N) for kind, chosen, _, once_N in groups_of(frames)}
+    assert set(groups) == {"native", "ladder"}
+    assert 0 not in groups["native"][0]
+    for chosen, once_N in groups.values():
+        assert once_N.sum() == pytest.approx(len(set(rows.instance[chosen])))
+    scores, _ = score(frames, {})
+    assert set(scores["group"]) == {"native", "ladder"}
+    assert "Ladder of errors" in as_text(table_of(frames, {}, *score(frames, {})))
