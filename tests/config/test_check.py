@@ -165,7 +165,7 @@ FAULTS = [
     ("active_learning.without.backbone", "pointnet", "active_learning.without.backbone: unknown"),
     ("recovery.encoder.options", {"kk": 3}, "recovery.encoder.options: unknown"),
     ("methods.trimmed.overlap", 5, "setting overlap: 5 should be less than or equal to 1"),
-    ("learners.learner_dropout.rate", 1, "setting rate: 1 should be less than 1"),
+    ("learners.learner_dropout", {"rate": 1}, "setting rate: 1 should be less than 1"),
     ("encoders.dgcnn.epochs", -1, "encoders.dgcnn.epochs: -1 should be greater than or equal to 1"),
     ("encoders.dgcnn.learning_rate", NAN, "encoders.dgcnn.learning_rate: nan should be a finite number"),
     ("encoders.dgcnn.weight_decay", float("inf"), "encoders.dgcnn.weight_decay: inf should be a finite number"),

@@ -21,6 +21,7 @@ def test_what_is_false_is_left_out_as_if_it_were_not_there(key):
     config, never_there = changed(key, False), changed(key, MISSING)
     # The rows that need it.
     never_there["kernel_grid"]["sources"] = [n for n in ("ycb", "linemod") if n in never_there["sources"]]
+    never_there["oracles"]["sources"] = [n for n in ("linemod", "ycb") if n in never_there["sources"]]
     for part in ("backbones", "training"):
         named = never_there["real_world"][part]
         there = [name for name in named if name in never_there["encoders"]]
