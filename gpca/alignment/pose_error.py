@@ -27,6 +27,16 @@ def pose_error(points_N_3: np.ndarray, T_estimated: np.ndarray, T_true: np.ndarr
     return (adds_error if symmetric else add_error)(points_N_3, T_estimated, T_true)
 
 
+def displacements(T_n: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Return the root mean square distance (n,) by which each transform (n, 4, 4) moves the points (N, 3)."""
+    x, y, z = points.T
+    squared_n = np.zeros(len(T_n))
+    for i, own in enumerate((x, y, z)):
+        a, b, c, t = (T_n[:, i, j, None] for j in range(4))
+        squared_n += np.square(a * x + b * y + c * z + t - own).mean(axis=1)
+    return np.sqrt(squared_n)
+
+
 class PoseErrors:
     """Errors of many estimates of one object's pose, where the truth is the identity.
 

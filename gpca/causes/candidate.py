@@ -63,6 +63,10 @@ class Candidate:
         """Return the model's points that a registration with these of the applied causes is given."""
         return self.model if POSE in causes or self.model_at_truth is None else self.model_at_truth
 
+    def changing_reference(self, causes: tuple[int, ...]) -> tuple[int, ...]:
+        """Return those of the causes that change :meth:`reference`: where they are the same, so are its points."""
+        return () if self.model_at_truth is None else tuple(cause for cause in causes if cause == POSE)
+
     def start(self, causes: tuple[int, ...]) -> np.ndarray:
         """Return the pose, 4×4, that a registration with these of the applied causes starts from."""
         return self.T_init if POSE in causes else self.T_near

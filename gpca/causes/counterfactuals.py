@@ -61,8 +61,8 @@ class Registrar:
         observed, model = self.candidate.observed(causes), self.candidate.reference(causes)
         started = perf_counter()
         if self._settings.moved == OBSERVED:
-            rendered = () if model is self.candidate.model else (POSE,)  # which of the two models
-            poses_n, fitness_n, rmse_n = self._target(rendered, model).register(observed, starts_n)
+            changing = self.candidate.changing_reference(causes)
+            poses_n, fitness_n, rmse_n = self._target(changing, model).register(observed, starts_n)
         else:
             alike = tuple(cause for cause in causes if cause != POSE)  # a pose error changes no cloud
             poses_n, fitness_n, rmse_n = self._target(alike, observed).register(model, inverses(starts_n))

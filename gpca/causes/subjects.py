@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,7 +39,7 @@ class Subject:
         index: its number in the file of the objects.
         family, fold: as :class:`gpca.objects.canonical.ObjectClouds` has them.
         surface: (N, 3) its points, in diameters.
-        errors: of its pose.
+        errors: of poses (n, 4, 4) of it, in diameters (n,); the identity is right.
     """
 
     index: int
@@ -46,7 +47,7 @@ class Subject:
     diameter_m: float
     surface: np.ndarray
     symmetric: bool
-    errors: PoseErrors
+    errors: Callable[[np.ndarray], np.ndarray]
     family: str
     fold: int
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from gpca.alignment.icp import ICPSettings
+from gpca.alignment.pose_error import displacements
 from gpca.alignment.rigid import inverse
 from gpca.alignment.twist import log
-from gpca.features.pair import ObservedPair, displacements
+from gpca.features.pair import ObservedPair
 
 FLOOR = 1e-4  # of the spread's variances, as in the truth (docs/causes.md)
 SMALLEST_COST = 1e-9  # squared diameters

@@ -51,13 +51,3 @@ def observed_pair(causes: Causes, row: int, *axes: object) -> ObservedPair:
         inlier_rmse_n=causes.inlier_rmse_runs[row],
         axes=(*axes, registrations.split[row], registrations.sample[row]),
     )
-
-
-def displacements(T_n: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Return the root mean square distance (n,) by which each transform (n, 4, 4) moves the points (N, 3)."""
-    x, y, z = points.T
-    squared_n = np.zeros(len(T_n))
-    for i, own in enumerate((x, y, z)):
-        a, b, c, t = (T_n[:, i, j, None] for j in range(4))
-        squared_n += np.square(a * x + b * y + c * z + t - own).mean(axis=1)
-    return np.sqrt(squared_n)

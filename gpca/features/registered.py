@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from gpca.alignment.pose_error import displacements
 from gpca.alignment.rigid import inverse
 from gpca.alignment.twist import log
 from gpca.features.distances import CHANNELS, MatchedPair, describe_distances, describe_points, log_of_ratio
-from gpca.features.pair import ObservedPair, displacements
+from gpca.features.pair import ObservedPair
 from gpca.features.settings import QUANTILES
 from gpca.pairs.dataset import Registrations
 from gpca.process.progress import progress

@@ -15,11 +15,12 @@ from scipy.spatial import cKDTree
 
 from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.icp import ICPSettings, clipped_cost
+from gpca.alignment.pose_error import displacements
 from gpca.alignment.rigid import inverse, inverses
 from gpca.alignment.twist import exp
 from gpca.causes.shapley import SUBSETS, shapley_values
 from gpca.causes.truth import LARGEST_ERROR
-from gpca.features.pair import ObservedPair, displacements
+from gpca.features.pair import ObservedPair
 from gpca.features.settings import DescriptorSettings
 from gpca.pairs.perturbation import NOISE, OVERLAP, POSE
 from gpca.seeds import generator

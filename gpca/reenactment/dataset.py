@@ -9,13 +9,14 @@ from time import perf_counter
 
 import numpy as np
 
+from gpca.alignment.pose_error import displacements
 from gpca.alignment.rigid import transform
 from gpca.causes.dataset import LABELS, Causes
 from gpca.causes.settings import CauseSettings
 from gpca.causes.shapley import SUBSETS
 from gpca.errors import InputError
 from gpca.features.dataset import WIDTHS, describe_plainly
-from gpca.features.pair import ObservedPair, displacements, observed_pair
+from gpca.features.pair import ObservedPair, observed_pair
 from gpca.io.arrays import REAL, REGENERATE, TEXT, WHOLE, load_arrays, save_arrays
 from gpca.io.names import Axes
 from gpca.pairs.dataset import Registrations

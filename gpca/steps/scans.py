@@ -2,24 +2,38 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from gpca.errors import InputError
 from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
 from gpca.scans.dataset import ScanPairs
+from gpca.scans.pair import ScanPair
 from gpca.scans.selection import choose_pairs
 from gpca.scans.source import entry_of, scenes_of
 
 
 def run(job: Job) -> None:
     """Read or make the scenes, and draw their pairs."""
-    entry, choice = entry_of(job.section("entry")), job.section("choice")
-    place = Path(job.place) if job.get("place") else None
     with record_provenance([job.out], job.get("data", []), job.settings, seed=job.seed):
-        scenes = scenes_of(entry, place, job.settings["role"], choice["scan_points"])
-        pairs = choose_pairs(scenes, choice["strata"], choice["pairs"], job.source, job.seed)
-        if not pairs:
-            fault = f"has no two scans that overlap by {choice['strata'][0]:g} or more"
-            raise InputError(place or entry.title, fault, "check its poses and its unit")
-        ScanPairs.of(pairs).save(job.out, (job.source, job.seed))
+        ScanPairs.of(drawn_pairs(job, job.section("choice"))).save(job.out, (job.source, job.seed))
+
+
+def drawn_pairs(job: Job, choice: Mapping[str, Any]) -> list[ScanPair]:
+    """Return pairs of the data set that a job names by its entry, place and role.
+
+    Args:
+        choice: edges of the strata, pairs of each scene and stratum, and points of a scan, at most.
+
+    Raises:
+        InputError: what readers refuse, or no two scans that overlap.
+    """
+    entry, place = entry_of(job.section("entry")), Path(job.place) if job.get("place") else None
+    scenes = scenes_of(entry, place, job.settings["role"], choice["scan_points"])
+    pairs = choose_pairs(scenes, choice["strata"], choice["pairs"], job.source, job.seed)
+    if not pairs:
+        fault = f"has no two scans that overlap by {choice['strata'][0]:g} or more"
+        raise InputError(place or entry.title, fault, "check its poses and its unit")
+    return pairs

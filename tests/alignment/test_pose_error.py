@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from gpca.alignment.pose_error import PoseErrors, add_error, adds_error, pose_error
+from gpca.alignment.pose_error import PoseErrors, add_error, adds_error, displacements, pose_error
+from gpca.alignment.rigid import transform
 
 
 def pose(angle_deg=0.0, axis="z", shift=(0.0, 0.0, 0.0)):
@@ -49,3 +50,12 @@ def test_errors_of_many_poses_are_those_of_each(square):
 def test_the_nearest_point_is_sought_among_all_and_not_among_the_judged(square):
     errors = PoseErrors(square, 2, symmetric=True)(np.stack([pose(90), pose(180)]))
     assert errors == pytest.approx([0, 0], abs=1e-12)
+
+
+def test_a_displacement_is_the_rms_distance_that_points_are_moved():
+    points = np.random.default_rng(0).normal(size=(50, 3))
+    T = np.eye(4)
+    T[:3, :3] = Rotation.from_rotvec([0.3, -0.2, 0.5]).as_matrix()
+    T[:3, 3] = [0.1, 0.2, -0.3]
+    expected = np.sqrt(np.square(transform(T, points) - points).sum(axis=1).mean())
+    assert displacements(np.array([np.eye(4), T]), points) == pytest.approx([0, expected])

@@ -59,7 +59,7 @@ def test_scores_are_over_the_labels_and_the_same_again(name, seen):
     assert first.scores_N_C.shape == (len(seen), 4)
     assert ((first.scores_N_C >= 0) & (first.scores_N_C <= 1)).all()
     assert np.array_equal(first.scores_N_C, again.scores_N_C)
-    assert first.abstained_N.all() == name.startswith("gate_")
+    assert first.abstained_N.all() == name.startswith(("gate_", "alarm_"))
 
 
 @pytest.mark.parametrize("name", ["gpca", "softmax_head", "concept_vectors", "pair_forest", "gpca_pair"])

@@ -1,18 +1,8 @@
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 from gpca.alignment.rigid import inverse, scale_translation, transform
-from gpca.features.pair import displacements, observed_pair
-
-
-def test_a_displacement_is_the_rms_distance_that_points_are_moved():
-    points = np.random.default_rng(0).normal(size=(50, 3))
-    T = np.eye(4)
-    T[:3, :3] = Rotation.from_rotvec([0.3, -0.2, 0.5]).as_matrix()
-    T[:3, 3] = [0.1, 0.2, -0.3]
-    expected = np.sqrt(np.square(transform(T, points) - points).sum(axis=1).mean())
-    assert displacements(np.array([np.eye(4), T]), points) == pytest.approx([0, expected])
+from gpca.features.pair import observed_pair
 
 
 def test_a_pair_lies_where_icp_put_it_and_knows_the_way_back(causes):

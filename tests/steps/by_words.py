@@ -41,6 +41,8 @@ MODULES = {  # of steps whose module is not gpca.steps.<name>
     "runtime": IN + "runtime.step",
     "draw_scans": "gpca.steps.scans",
     "register_scans": IN + "scans.step",
+    "scan_causes": IN + "scan_causes.step",
+    "diagnose_scans": IN + "scan_causes.diagnosis_step",
     "readings": IN + "specification_curve.step",
     "retrain": IN + "specification_curve.retrain_step",
     "measure_joint": IN + "joint_reading.measure_step",
@@ -73,6 +75,10 @@ LISTS = {  # which names of a step are lists, and not of one seed, file or name
     "choose_joint": "measured",
     "apply_joint": "sets other_sets",
     "judge_joint": "values",
+    "scan_causes": "data",
+    "diagnose_scans": (
+        "scan_causes scan_descriptors scan_reenactments causes descriptors reenactments encoders embeddings"
+    ),
     "exchange": "seeds registrations encoders out",
     "attribute": "seeds registrations embeddings uncertainty uncertainty_timings input_timings predictions timings",
     "model": "causes reenactments",

@@ -16,6 +16,7 @@ ELSEWHERE = {
     *("scenes", "instances", "frame_registrations", "frame_causes", "reenact_frames", "diagnose_frames"),
     *("guarantee", "live_shap", "recover", "readings", "ship"),
     *("retrain", "measure_joint", "choose_joint", "apply_joint", "judge_joint"),
+    *("scan_causes", "diagnose_scans"),
     *("check-config", "check-reference"),
 }
 BY_HAND = {"labels.csv", "answers.txt"}  # given by a person, not made

@@ -1,0 +1,199 @@
+"""Step ``diagnose_scans``: registrations of scans with measured causes -> explainers' predictions.
+
+An explainer has learned from objects, and is asked as it then is, or from scans: of all scenes but those of the fold
+that it is asked about. Encoders of the aligned source are those of objects in both cases: what is learned from scans is
+the classifier of their embeddings.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import cached_property, partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gpca.attribution.predictions import prediction_frame
+from gpca.attribution.scores import Attribution
+from gpca.causes.dataset import LABELS, Causes, labeled
+from gpca.causes.truth import BORDERLINE
+from gpca.encoders.settings import EncoderSettings
+from gpca.errors import InputError
+from gpca.experiments.diagnosis.step import observed_only, training_rows, with_what_it_reads
+from gpca.experiments.scan_causes.settings import OBJECTS, ScanSamples
+from gpca.explainers.interface import REENACTED, ExplainerEntry
+from gpca.explainers.registry import CAUSES, explainer_entry
+from gpca.explainers.sight import icp_calls
+from gpca.features.dataset import Descriptors
+from gpca.features.settings import DescriptorSettings
+from gpca.io.csv_file import write_csv
+from gpca.pairs.dataset import Registrations, joined
+from gpca.process.job import Job
+from gpca.process.provenance import record_provenance
+from gpca.reenactment.dataset import Reenactments
+from gpca.reenactment.features import reenactment_features
+from gpca.reenactment.settings import ReenactmentSettings
+from gpca.settings import read_settings
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+EMBEDDED, DESCRIBED = "embeddings", "descriptors"  # `reads` of explainers; all but these and `REENACTED` need neither
+FEWEST_LABELS = 2  # among the samples that an explainer learns from
+
+
+def run(job: Job) -> None:
+    """Ask every explainer about the registrations of all data sets of scans."""
+    import pandas as pd
+
+    scans = [job.scan_causes, job.scan_descriptors, job.scan_reenactments]
+    # Of each source; re-enactments only where an explainer reads them.
+    lessons = {name: job.get(name, []) for name in ("causes", DESCRIBED, REENACTED, "encoders", EMBEDDED)}
+    inputs = [path for files in (*scans, *lessons.values()) for path in files]
+    with record_provenance([job.predictions], inputs, job.settings, seed=job.seed):
+        explained = _ScansToExplain(job, lessons)
+        said_of: list[pd.DataFrame] = []
+        for name, learned_from in job.section("explainers").items():
+            for learned in learned_from:
+                attribution = explained.attribution(name, learned, job.section("settings").get(name) or {})
+                if attribution is None:
+                    fault = "is left out: what it would learn from has fewer than two labels"
+                    print(f"explainer '{name}', learned from {learned}, {fault}", file=sys.stderr)
+                    continue
+                said_of.append(explained.predictions(attribution).assign(learned=learned, explainer=name))
+        if not said_of:
+            remedy = "raise scan_causes.pairs, or let an explainer learn from objects"
+            raise InputError("predictions of scans", "no explainer has anything to learn from", remedy)
+        write_csv(job.predictions, pd.concat(said_of))
+
+
+def folds_of(cluster_S: np.ndarray, most: int) -> np.ndarray:
+    """Deal the clusters into folds, at most so many, and return the fold (S,) of each row."""
+    clusters, number_S = np.unique(cluster_S, return_inverse=True)
+    return number_S % min(most, len(clusters))
+
+
+class _ScansToExplain:
+    """Registrations of scans to be explained, and the training data of the explainers.
+
+    Args:
+        lessons: files of all sources of objects, by what explainers read.
+    """
+
+    def __init__(self, job: Job, lessons: dict[str, list[Path]]) -> None:
+        self._axes, self._lessons = (job.source, job.seed), lessons
+        self._encoder = EncoderSettings(**job.section("encoder"))
+        folds = read_settings(ScanSamples, job.section("samples")).folds
+        files = zip(job.scan_causes, job.scan_descriptors, job.scan_reenactments, strict=True)
+        parts = [_measured(*paths) for paths in files]
+        self._names, self._own = [path.parent.name for path in job.scan_causes], [own for own, _ in parts]
+        self._registrations = joined([with_labels for _, with_labels in parts])
+        self._fold_S = folds_of(self._registrations.cluster, folds)
+        starts = job.section("causes")["starts"]
+        reenactment = read_settings(ReenactmentSettings, job.section("reenactment")).calls(starts)
+        descriptors = DescriptorSettings(**job.section("descriptors"))
+        self._calls = partial(icp_calls, starts=starts, descriptors=descriptors, reenactment=reenactment)
+        self._of_objects: dict[str, list[Registrations]] = {}
+
+    def predictions(self, attribution: Attribution) -> pd.DataFrame:
+        """Return the rows of a prediction file, the data set of each in column ``scans``."""
+        import pandas as pd
+
+        frames, first = [], 0
+        for name, own in zip(self._names, self._own, strict=True):
+            rows = slice(first, first := first + len(own))
+            of_own = Attribution.of_scores(
+                LABELS,
+                attribution.scores_N_C[rows],
+                seconds=0.0,
+                icp_calls=attribution.icp_calls_N[rows],
+                abstained_N=attribution.abstained_N[rows],
+            )
+            frames.append(prediction_frame(own, of_own).assign(scans=name))
+        return pd.concat(frames)
+
+    def attribution(self, name: str, learned: str, settings: dict) -> Attribution | None:
+        """Return the mean of the scores over all that the explainer reads; several are the encoders of embeddings.
+
+        None where it would have to learn from fewer labels than tell anything apart.
+        """
+        entry = explainer_entry(name, CAUSES)
+        said: list[Attribution] = []
+        for lessons, asked in self._learned_and_asked(entry, learned):
+            answers = []
+            for rows, taught in self._parts(lessons, asked):
+                if len(np.unique(taught.concept)) < FEWEST_LABELS:
+                    return None
+                explainer = entry.make(*self._axes, **settings)
+                explainer.fit(taught)
+                answers.append((rows, explainer.explain(observed_only(asked.subset(rows)))))
+            order = np.argsort(np.concatenate([rows for rows, _ in answers]))
+            scores_N_4 = np.concatenate([answer.scores_N_C for _, answer in answers])[order]
+            abstained_N = np.concatenate([answer.abstained_N for _, answer in answers])[order]
+            said.append(Attribution.of_scores(LABELS, scores_N_4, seconds=0.0, abstained_N=abstained_N))
+        return Attribution.of_scores(
+            LABELS,
+            np.mean([each.scores_N_C for each in said], axis=0),
+            seconds=0.0,
+            icp_calls=self._calls(entry.sees),
+            abstained_N=np.all([each.abstained_N for each in said], axis=0),
+        )
+
+    def _parts(self, lessons: Registrations | None, asked: Registrations) -> Iterator[tuple[np.ndarray, Registrations]]:
+        """Yield rows that are asked about, and what is learned for them: the lessons, or the rows of other folds."""
+        if lessons is not None:
+            yield np.arange(len(asked)), lessons
+            return
+        labeled_S = asked.concept != BORDERLINE
+        for fold in np.unique(self._fold_S):
+            taught = np.flatnonzero(labeled_S & (self._fold_S != fold))
+            yield np.flatnonzero(self._fold_S == fold), asked.subset(taught)
+
+    def _learned_and_asked(
+        self, entry: ExplainerEntry, learned: str
+    ) -> Iterator[tuple[Registrations | None, Registrations]]:
+        reads = entry.reads if entry.reads in (EMBEDDED, REENACTED) else DESCRIBED
+        if reads == EMBEDDED:
+            of_objects = self._taught_by_objects(entry, reads) if learned == OBJECTS else [None] * len(self._embedded)
+            yield from zip(of_objects, self._embedded, strict=True)
+            return
+        entry = entry if reads == REENACTED else explainer_entry("gpca_pair", CAUSES)
+        yield joined(self._taught_by_objects(entry, reads)) if learned == OBJECTS else None, self._registrations
+
+    def _taught_by_objects(self, entry: ExplainerEntry, reads: str) -> list[Registrations]:
+        """Return the training rows of each source of objects, with what an explainer reads."""
+        if reads not in self._of_objects:
+            parts = []
+            for causes, path in zip(self._lessons["causes"], self._lessons[reads], strict=True):
+                registrations = with_what_it_reads(labeled(Causes.load(causes)), entry, path)
+                parts.append(registrations.subset(training_rows(registrations, causes)))
+            self._of_objects[reads] = parts
+        return self._of_objects[reads]
+
+    @cached_property
+    def _embedded(self) -> list[Registrations]:
+        """The registrations with the embeddings of each source's encoder."""
+        from gpca.encoders.training import embed
+        from gpca.encoders.weights import load_model
+
+        observed, embedded = observed_only(self._registrations), []
+        for weights in self._lessons["encoders"]:
+            h_S_d, logits_S_C = embed(load_model(weights, self._encoder, LABELS), observed, *self._axes, self._encoder)
+            attached = {"embedding": h_S_d, "head_logits": logits_S_C, "causes": self._registrations.attached["causes"]}
+            embedded.append(replace(self._registrations, attached=attached))
+        return embedded
+
+
+def _measured(
+    causes_file: Path, descriptors_file: Path, reenactments_file: Path
+) -> tuple[Registrations, Registrations]:
+    """Return the registrations of a data set, and the same with labels and all that explainers read but embeddings."""
+    causes = Causes.load(causes_file)
+    enacted = Reenactments.load(reenactments_file, causes.registrations)
+    read = dict(Descriptors.load(descriptors_file, causes.registrations).groups)
+    read |= {"verdict": enacted.verdict, "reenactment": reenactment_features(enacted)}
+    with_labels = labeled(causes)
+    return causes.registrations, replace(with_labels, attached={**with_labels.attached, **read})

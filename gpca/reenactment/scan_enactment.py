@@ -1,0 +1,112 @@
+"""Re-enactments of registrations of scans: the counterfactuals of scans, at hypotheses of the true pose.
+
+As for whole objects, but neither scan holds all of the other. So missing overlap is not surface to be filled in: under
+a hypothesis, both scans are cropped to what they then have in common, as the truth crops them. A pose error is taken
+away by a start from the hypothesis, noise by moving the source's common points to the target's planes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from gpca.alignment.rigid import inverse, transform
+from gpca.causes.dataset import Causes
+from gpca.causes.scan_candidate import OverlapErrors, ScanCandidate
+from gpca.causes.settings import FEWEST_POINTS, CauseSettings
+from gpca.features.pair import ObservedPair, observed_pair
+from gpca.pairs.perturbation import CONCEPTS, NOISE, OVERLAP, POSE
+from gpca.process.progress import progress
+from gpca.reenactment.dataset import Reenactments, row_of
+from gpca.reenactment.enactment import Enactment, register, start_twists
+from gpca.reenactment.hypotheses import Hypothesis, find_hypotheses
+from gpca.reenactment.observation import QUIET, NoiseScale
+from gpca.reenactment.settings import ReenactmentSettings
+from gpca.reenactment.surface import ModelSurface
+from gpca.scans.pair import near
+from gpca.seeds import generator
+
+REACH = 2.0  # of the target's spacing: so near points of the two scans show the same surface
+
+
+def reenact_scans(
+    causes: Causes,
+    error_factor_S: np.ndarray,
+    settings: ReenactmentSettings,
+    truth: CauseSettings,
+    T_found_S: Sequence[np.ndarray] | None = None,
+) -> Reenactments:
+    """Return the re-enactments of every row; of the causes it reads what may be observed.
+
+    Args:
+        causes: as :func:`gpca.causes.scans.measure_scans` returns them.
+        error_factor_S: (S,) of :class:`gpca.causes.scan_candidate.DrawnScans`: what counts as a failure.
+        truth: how counterfactuals are registered, and the limits of the states.
+        T_found_S: (k, 4, 4) for each row, where else the source may belong: what global methods found takes it there
+            from where the registration began.
+    """
+    registrations, rows = causes.registrations, []
+    for row in progress(range(len(causes)), "re-enactments of scans"):
+        pair = observed_pair(causes, row, *(registrations.axes or ()), "reenactment")
+        found_k = None if T_found_S is None else T_found_S[row]
+        enactments = reenact_scan(pair, float(error_factor_S[row]), settings, truth, found_k)
+        rows.append(row_of(enactments, pair, settings, truth))
+    return Reenactments.of_rows(rows, truth, registrations)
+
+
+def reenact_scan(
+    pair: ObservedPair,
+    error_factor: float,
+    settings: ReenactmentSettings,
+    truth: CauseSettings,
+    T_found_k: np.ndarray | None = None,
+) -> list[Enactment]:
+    """Find hypotheses of the true pose of a pair of scans and enact each, the most probable first."""
+    surface = ModelSurface(pair.model)
+    before = transform(pair.T_init, pair.observed)
+    random = generator(*pair.axes, "hypotheses")
+    found_n = pair.T_runs @ inverse(pair.T_init)
+    if T_found_k is not None and len(T_found_k):
+        found_n = np.concatenate([found_n, T_found_k])
+    hypotheses = find_hypotheses(before, surface, found_n, settings, random)
+    scale, xi_n_6 = NoiseScale(surface, random), start_twists(pair.axes, truth)
+    enactments = []
+    for hypothesis in hypotheses:
+        candidate = cropped(hypothesis, before, surface, scale)
+        errors = OverlapErrors(candidate.clean[candidate.seen], error_factor)
+        enactments.append(register(hypothesis, candidate, errors, xi_n_6, truth, misses=True))
+    return enactments
+
+
+def cropped(hypothesis: Hypothesis, before: np.ndarray, surface: ModelSurface, scale: NoiseScale) -> ScanCandidate:
+    """Return the pair as a candidate of the truth's, as if a hypothesis were true.
+
+    Where hardly any point is common then, nothing can be cropped.
+
+    Args:
+        before: (N, 3) the source, before the registration, in the target's frame.
+    """
+    points, reach = transform(hypothesis.T, before), REACH * surface.spacing
+    common_N, common_M = near(points, surface.points, reach), near(surface.points, points, reach)
+    share = float(common_N.mean())
+    if min(common_N.sum(), common_M.sum()) < FEWEST_POINTS:
+        common_N, common_M = np.ones(len(points), bool), np.ones(len(surface.points), bool)
+    residuals, rows = surface.residuals(points)
+    noise = scale.noise(residuals[common_N])
+    applied = np.zeros(len(CONCEPTS), bool)
+    applied[NOISE], applied[POSE], applied[OVERLAP] = noise > QUIET, True, not (common_N.all() and common_M.all())
+    moved_N = np.where(common_N, residuals, 0.0) * (noise**2 / (noise**2 + surface.roughness) if noise > QUIET else 0.0)
+    return ScanCandidate(
+        applied=applied,
+        model=surface.points,
+        noisy_model=surface.points,
+        clean=points - moved_N[:, None] * surface.normals[rows],
+        noisy=points,
+        seen=np.flatnonzero(common_N),
+        model_common=np.flatnonzero(common_M),
+        kept=np.arange(len(points)),
+        T_near=np.eye(4),
+        T_init=inverse(hypothesis.T),
+        severity={"noise": noise, "outliers": 1 - share, "crop": 1 - share},
+    )

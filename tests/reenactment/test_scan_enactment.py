@@ -1,0 +1,99 @@
+"""A corner of a room whose registrations are re-enacted by an observer who does not know the true pose."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gpca.alignment.rigid import rotation_angle_rad, scale_translation
+from gpca.causes.dataset import LABELS
+from gpca.causes.scans import LADDER, ScanStart, measure_scans
+from gpca.causes.settings import OBSERVED, CauseSettings
+from gpca.causes.shapley import ALL
+from gpca.reenactment.dataset import SHAPES
+from gpca.reenactment.hypotheses import Hypothesis
+from gpca.reenactment.observation import NoiseScale
+from gpca.reenactment.scan_enactment import cropped, reenact_scans
+from gpca.reenactment.settings import ReenactmentSettings
+from gpca.reenactment.surface import ModelSurface
+from gpca.scans.success import ScanSuccess
+from tests.scans.corner import corner_pair, start_off
+
+TRUTH = CauseSettings(moved=OBSERVED, clean_pairs=20)
+SETTINGS = ReenactmentSettings(2)
+POINTS = 192
+
+
+def measured(pair, *starts):
+    registered = [ScanStart(0, LADDER, f"rung{n}", start) for n, start in enumerate(starts)]
+    return measure_scans([pair], registered, "corner", 100, TRUTH, ScanSuccess(), POINTS)
+
+
+@pytest.fixture(scope="module")
+def good_and_bad():
+    """A registration from near the truth, and one from far off."""
+    pair = corner_pair(0.8)
+    return measured(pair, start_off(pair, 4, 0.05), start_off(pair, 70, 0.9))
+
+
+@pytest.fixture(scope="module")
+def enacted(good_and_bad):
+    causes, table = good_and_bad
+    return reenact_scans(causes, table["error_factor"].to_numpy(), SETTINGS, TRUTH)
+
+
+def test_what_is_wrong_is_named_without_the_truth(good_and_bad, enacted):
+    causes, _ = good_and_bad
+    named = [LABELS[row] for row in enacted.verdict.argmax(axis=1)]
+    assert named == ["nominal", "pose"] == [causes.truth.state[0], causes.truth.dominant[1]]
+    assert enacted.error[:, 0, ALL] == pytest.approx(causes.truth.error[:, ALL], abs=0.05)
+
+
+def test_the_best_hypothesis_is_the_true_pose(good_and_bad, enacted):
+    registrations = good_and_bad[0].registrations
+    T_true = scale_translation(registrations.T_target_source_true[1], 1 / registrations.diameter_m[1])
+    T_off = enacted.T_model_observed[1, 0] @ np.linalg.inv(T_true)
+    assert np.rad2deg(rotation_angle_rad(T_off)) < 8  # of 70 at the start
+
+
+def test_nothing_that_only_the_truth_knows_is_read(good_and_bad, enacted):
+    causes, table = good_and_bad
+    blank = {name: np.zeros_like(getattr(causes, name)) for name in ("applied", "severity_outliers", "error_shown")}
+    unknown = replace(causes.truth, error=causes.truth.error * np.nan, uncertainty=causes.truth.uncertainty * np.nan)
+    registrations = causes.registrations.without_labels()
+    without = replace(causes, registrations=registrations, truth=unknown, truth_again=unknown, **blank)
+    again = reenact_scans(without, table["error_factor"].to_numpy(), SETTINGS, TRUTH)
+    for name in (*SHAPES, "verdict"):
+        assert np.array_equal(getattr(enacted, name), getattr(again, name)), name
+
+
+def at(T, points):
+    return Hypothesis(T, np.ones(len(points)), 0.0, 0.02, 1.0, 0.0)
+
+
+def test_both_scans_are_cropped_to_what_they_have_in_common_under_a_hypothesis():
+    random = np.random.default_rng(100)
+    model, observed = (np.column_stack([random.uniform(0, 1, (400, 2)), np.zeros(400)]) for _ in range(2))
+    observed[:, 0] += 0.5  # half of either lies beside the other
+    surface = ModelSurface(model)
+    scale = NoiseScale(surface, random)
+    candidate = cropped(at(np.eye(4), observed), observed, surface, scale)
+    assert len(candidate.seen) / 400 == pytest.approx(0.6, abs=0.15)
+    assert candidate.clean[candidate.seen, 0].max() < 1.2 and candidate.reference(())[:, 0].min() > 0.3
+    assert candidate.severity["crop"] == pytest.approx(0.45, abs=0.15)
+    away = np.eye(4)
+    away[0, 3] = 5.0
+    nothing = cropped(at(away, observed), observed, surface, scale)
+    assert not nothing.applied[2] and len(nothing.seen) == 400
+
+
+def test_noise_is_taken_from_the_common_points_alone():
+    random = np.random.default_rng(100)
+    model, observed = (np.column_stack([random.uniform(0, 1, (400, 2)), np.zeros(400)]) for _ in range(2))
+    observed[:, 0] += 0.5
+    observed[:, 2] += 0.03 * random.normal(size=400)
+    surface = ModelSurface(model)
+    candidate = cropped(at(np.eye(4), observed), observed, surface, NoiseScale(surface, random))
+    moved = np.abs(candidate.clean - candidate.noisy).max(axis=1) > 0
+    assert candidate.applied[0] and set(np.flatnonzero(moved)) <= set(candidate.seen)
+    assert np.abs(candidate.clean[candidate.seen, 2]).mean() < 0.5 * np.abs(candidate.noisy[candidate.seen, 2]).mean()
