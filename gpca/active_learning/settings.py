@@ -53,7 +53,7 @@ class RetrainingSettings:
     labels: Count = 60
     least: Count = 60
     batch: Count = 4
-    late_batch: Count = 10
+    late_batch: Count = 25
     gpc: GPCSettings = field(default_factory=GPCSettings)
 
 
