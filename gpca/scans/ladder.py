@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -29,6 +30,17 @@ class Rung:
     def name(self) -> str:
         """E.g. ``20deg_0.25m``."""
         return f"{self.rotation_deg:g}deg_{self.translation_m:g}m"
+
+
+def rungs_of(pairs: int, ladder: Sequence[Rung], *axes: object) -> list[Rung]:
+    """Return the rung of each pair: of as many pairs in a row as there are rungs each has another, in a drawn order.
+
+    So every stratum and scene meets all rungs, with no more of one than of another.
+    """
+    random, order = generator(*axes, "rungs"), list[int]()
+    while len(order) < pairs:
+        order += random.permutation(len(ladder)).tolist()
+    return [ladder[i] for i in order[:pairs]]
 
 
 def disturbed(pair: ScanPair, rung: Rung, *axes: object) -> np.ndarray:

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from gpca.alignment.rigid import inverse, rotation_angle_rad, transform
-from gpca.scans.ladder import Rung, disturbed
+from gpca.scans.ladder import Rung, disturbed, rungs_of
 
 from .tiny import pair
 
@@ -23,3 +23,11 @@ def test_the_lowest_rung_is_the_truth_and_draws_are_named():
     first, again, other = (disturbed(scans, Rung(10, 0.1), "tiny", seed) for seed in (0, 0, 1))
     assert (first == again).all() and not np.allclose(first, other)
     assert Rung(10, 0.25).name == "10deg_0.25m"
+
+
+def test_pairs_in_a_row_are_on_different_rungs_whose_order_is_drawn():
+    ladder = [Rung(10 * i, 0) for i in range(5)]
+    rungs = rungs_of(23, ladder, "tiny", 0)
+    blocks = [tuple(rung.rotation_deg for rung in rungs[i : i + 5]) for i in range(0, 20, 5)]
+    assert all(sorted(block) == [0, 10, 20, 30, 40] for block in blocks) and len(set(blocks)) > 1
+    assert rungs_of(8, ladder, "tiny", 0) == rungs[:8] != rungs_of(8, ladder, "tiny", 1)

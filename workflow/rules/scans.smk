@@ -1,16 +1,10 @@
 # Data sets of scans -> pairs by overlap -> each registered by every method -> scans.csv.
-from gpca.experiments.scans.experiment import missing, present
+from gpca.experiments.scans.experiment import present
 from gpca.scans.source import data_files as files_of_scans, place_of
 
 SCANS, SCAN_ENTRIES = config["scans"], present(config)
 SCAN_CHOICE = ("strata", "pairs", "scan_points")
 SCAN_TRIALS = ("voxel_m", "points", "ladder", "global_start")
-for title, address in missing(config).items():
-    if workflow.is_main_process:
-        print(
-            f"gpca: {title} is left out: its data is not there; see {address}",
-            file=sys.stderr,
-        )
 
 
 wildcard_constraints:

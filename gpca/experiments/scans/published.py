@@ -52,6 +52,6 @@ def table17_published(
             f"{over_clusters(seeds, clusters=('scenes', 'scene'))}. Correct: rotation off by less than {CLOSE_DEG:g}° "
             f"and translation by less than {100 * CLOSE_M:g} cm, as where the others were published: {sources}. Those "
             "match learned features (FCGF) on all pairs of the benchmark's eight scenes; this run has a sample of the "
-            "pairs of the scenes that it was given.",
+            "pairs, as many of each stratum, of the scenes that it was given.",
         ),
     )

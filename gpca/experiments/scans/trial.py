@@ -16,7 +16,7 @@ from gpca.experiments.scans.settings import TrialSettings
 from gpca.process.environment import open3d_cloud, require_open3d
 from gpca.process.progress import progress
 from gpca.scans.dataset import ScanPairs
-from gpca.scans.ladder import Rung, disturbed
+from gpca.scans.ladder import Rung, disturbed, rungs_of
 from gpca.scans.overlap import voxels
 from gpca.scans.pair import ScanPair
 from gpca.scans.success import overlap_rmse
@@ -49,9 +49,10 @@ def try_methods(
     if start not in made:
         raise InputError("scans.global_start", f"'{start}' is not among the methods", "add it or name another")
     records: dict[str, list[dict]] = {method: [] for method in made}
+    rungs = rungs_of(len(pairs), settings.ladder, name, seed)
     warm = False
     for k, pair in enumerate(progress(pairs, f"registration of scans of {name}, seed {seed}")):
-        rung = settings.ladder[k % len(settings.ladder)]
+        rung = rungs[k]
         given = pair_to_register(pair, rung, settings, name, seed)
         if not warm:
             for method in made.values():

@@ -12,7 +12,7 @@ from gpca.errors import InputError
 from gpca.experiments.scans.settings import TrialSettings
 from gpca.experiments.scans.trial import errors_of, pair_to_register, scan_normals, try_methods
 from gpca.scans.dataset import ScanPairs
-from gpca.scans.ladder import Rung
+from gpca.scans.ladder import Rung, rungs_of
 from tests.scans.tiny import pair
 
 LADDER = (Rung(0, 0), Rung(20, 0.3))
@@ -47,11 +47,13 @@ def rows(monkeypatch):
 def test_local_methods_start_on_the_ladder_and_at_the_pose_of_a_global_one(rows):
     still = rows["still"]
     assert still["start"].tolist() == ["initial", "oracle"] * 3
-    assert still["rung"].tolist() == ["0deg_0m"] * 2 + ["20deg_0.3m"] * 2 + ["0deg_0m"] * 2
+    rungs = rungs_of(3, LADDER, "tiny", 0)
+    assert still["rung"].tolist() == [rung.name for rung in rungs for _ in range(2)]
     assert still["kind"].tolist() == ["room"] * 2 + ["object"] * 2 + ["room"] * 2
     first = still[still["start"] == "initial"]
-    assert first["rmse_m"].to_numpy()[[0, 2]] == pytest.approx([0, 0], abs=1e-9)
-    assert first["rotation_error_rad"].iloc[1] == pytest.approx(np.deg2rad(20))
+    off_3 = np.array([rung.rotation_deg for rung in rungs])
+    np.testing.assert_allclose(np.rad2deg(first["rotation_error_rad"]), off_3, atol=1e-5)
+    assert ((first["rmse_m"] > 1e-3) == (off_3 > 0)).all()
     # At the pose of the global method they are right, whatever the unit that they were given.
     assert still[still["start"] == "oracle"]["rmse_m"].tolist() == pytest.approx([0, 0, 0], abs=1e-9)
     assert rows["oracle"]["start"].tolist() == ["none"] * 3 and (rows["oracle"]["seconds"] >= 0).all()
