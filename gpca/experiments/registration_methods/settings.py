@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Annotated
 
+from gpca.alignment.features import NEIGHBORS
 from gpca.settings import Bounds
 
 Points = Annotated[int, Bounds(minimum=64, maximum=65536)]
@@ -29,3 +30,7 @@ class PairSettings:
     def points_for(self, method: str) -> int:
         """Return how many points of either cloud a method gets."""
         return self.points_of.get(method, self.points)
+
+    def neighbors_among(self, points: int) -> int:
+        """Return of how many neighbors normals are estimated: with more points, on as much of the surface."""
+        return round(NEIGHBORS * max(1.0, points / self.points))

@@ -6,12 +6,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
-from functools import cache
+from functools import lru_cache
 from time import perf_counter
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gpca.alignment.features import NEIGHBORS
 from gpca.alignment.methods.interface import Outcome, Pair
 from gpca.alignment.methods.registry import make_method, method_entry, require_global
 from gpca.errors import InputError
@@ -61,11 +62,13 @@ def try_methods(
     rows = _chosen(registrations, source, settings.samples)
     of_objects = Judges(objects, f"objects of {source}")
     judges = [of_objects.of(registrations, row) for row in rows]
+    pair_of = lru_cache(maxsize=4)(
+        lambda row, points: pair_to_register(registrations, row, source, seed, points, settings.neighbors_among(points))
+    )
     for name, method in made.items():
-        method(pair_to_register(registrations, rows[0], source, seed, settings.points_for(name)))
+        method(pair_of(rows[0], settings.points_for(name)))
     records: dict[str, list[dict]] = {name: [] for name in made}
     for i, row in enumerate(progress(rows, f"registration methods on {source}, seed {seed}")):
-        pair_of = cache(lambda points, row=row: pair_to_register(registrations, row, source, seed, points))
         T_true = registrations.T_target_source("true", row)
         judge = judges[i]
         known = {
@@ -75,9 +78,9 @@ def try_methods(
             **{name: getattr(registrations, name)[row] for name in SEVERITY_COLUMNS},
             "symmetric": judge.symmetric,
         }
-        coarse = timed(made[start], pair_of(settings.points_for(start)))
+        coarse = timed(made[start], pair_of(row, settings.points_for(start)))
         for name, method in made.items():
-            pair = pair_of(settings.points_for(name))
+            pair = pair_of(row, settings.points_for(name))
             known_of_pair = known | {"points": (len(pair.source) + len(pair.target)) / 2}
             for started_at, outcome, seconds in attempts(name, method, pair, start, coarse):
                 errors = judge(outcome.T_target_source, T_true)
@@ -87,7 +90,9 @@ def try_methods(
     return {name: pd.DataFrame(of_method) for name, of_method in records.items()}
 
 
-def pair_to_register(registrations: Registrations, row: int, source: str, seed: int, points: int) -> Pair:
+def pair_to_register(
+    registrations: Registrations, row: int, source: str, seed: int, points: int, neighbors: int = NEIGHBORS
+) -> Pair:
     """Return the input of a method for a registration: clouds thinned to `points`, normals estimated on these."""
     axes = (source, seed, "methods", registrations.split[row], registrations.sample[row])
     observed = registrations.source(row)
@@ -97,7 +102,7 @@ def pair_to_register(registrations: Registrations, row: int, source: str, seed: 
         registrations.target(row)[:points].astype(np.float64),  # in random order
         registrations.T_target_source("init", row),
         seed=seed_of(*axes, "draws"),
-    ).with_normals()
+    ).with_normals(neighbors)
 
 
 def attempts(
