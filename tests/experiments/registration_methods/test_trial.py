@@ -52,7 +52,8 @@ def test_a_method_can_have_more_points_than_the_others(rows, registrations, obje
     first = [rows["point_to_point"]["fitness"][::2].tolist(), tried_with["point_to_point"]["fitness"][::2].tolist()]
     assert first[0] == first[1]  # from its own start, a local method sees what it saw before
     row = registrations.rows("test")[1]
-    pairs = [pair_to_register(registrations, row, "tiny", 100, points) for points in (200, 100)]
+    counts = ((200, 40), (100, 20))  # of points, and of neighbors that a normal is of
+    pairs = [pair_to_register(registrations, row, "tiny", 100, *of) for of in counts]
     coarse = make_method("fgr")(pairs[0])
     fine = make_method("point_to_point")(pairs[1].started_at(coarse.T_target_source))
     second = tried_with["point_to_point"].iloc[3]
