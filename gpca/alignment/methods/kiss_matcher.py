@@ -15,51 +15,28 @@ from gpca.alignment.methods.interface import (
     Outcome,
     Pair,
 )
-from gpca.alignment.rigid import rigid_motion, rotate
+from gpca.alignment.rigid import rigid_motion
 
 # Diameters. On a development seed, the best of 0.02 to 0.13 for clouds of some 500 points; for 2000 it is 0.05.
 VOXEL = 0.08
-SOLVER_SHARE = 0.75  # of the noise that the package's pruning allows, its solver allows so much
 # Somewhat more than the package needs: it looks for three neighbors within three voxels, at each of the points left.
 NEAR, NEIGHBORS, FEATURES = 2.0, 4, 10
 
 
-def align(
-    pair: Pair,
-    voxel: float = VOXEL,
-    correspondence_distance: float = CORRESPONDENCE_DISTANCE,
-    centered: bool = False,
-    normal_gain: float = 3.0,
-    feature_gain: float = 5.0,
-    noise_gain: float = 1.0,
-) -> Outcome:
-    """Match both clouds, thinned to voxels of an edge in diameters, from which all of its radii follow.
-
-    Args:
-        voxel: edge of the voxels, in diameters.
-        centered: whether each cloud is moved to its own center first. The package turns normals to the origin, where
-            its authors' sensors stand; the center of an object is the same side of all of its surface.
-        normal_gain, feature_gain, noise_gain: radii of normals and features, and how far a right match may be off, in
-            voxels; those of the package.
-    """
+def align(pair: Pair, voxel: float = VOXEL, correspondence_distance: float = CORRESPONDENCE_DISTANCE) -> Outcome:
+    """Match both clouds, thinned to voxels of an edge in diameters, from which all of its radii follow."""
     package = import_module("kiss_matcher")
     for name in ("source", "target"):
         if not _has_features(getattr(pair, name), voxel):
             raise FailedRegistration(f"of the {name}, voxels of {voxel:g} diameters leave too few points")
-    origins_2_3 = [points.mean(axis=0) if centered else np.zeros(3) for points in (pair.source, pair.target)]
-    gains = {"normal_r_gain": normal_gain, "fpfh_r_gain": feature_gain}
-    gains |= {"robin_noise_bound_gain": noise_gain, "solver_noise_bound_gain": SOLVER_SHARE * noise_gain}
     try:  # it does not take voxels below 0.005, nor clouds of which too little is left
-        matcher = package.KISSMatcher(package.KISSMatcherConfig(voxel, **gains))
-        clouds = [points - origin for points, origin in zip((pair.source, pair.target), origins_2_3, strict=True)]
-        result = matcher.estimate(*(cloud.astype(np.float32) for cloud in clouds))
+        matcher = package.KISSMatcher(package.KISSMatcherConfig(voxel))
+        result = matcher.estimate(pair.source.astype(np.float32), pair.target.astype(np.float32))
     except RuntimeError as fault:
         raise FailedRegistration(f"KISS-Matcher: {fault}") from fault
     if not result.valid or matcher.get_num_final_inliers() < FEWEST:
         raise FailedRegistration(f"fewer than {FEWEST} correspondences agree")
-    source_3, target_3 = origins_2_3
-    shift_3 = np.ravel(result.translation) + target_3 - rotate(np.asarray(result.rotation), source_3)
-    T_target_source = rigid_motion(result.rotation, shift_3)
+    T_target_source = rigid_motion(result.rotation, np.ravel(result.translation))
     return Outcome.at(pair, T_target_source, correspondence_distance)
 
 

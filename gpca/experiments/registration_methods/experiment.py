@@ -22,8 +22,9 @@ def check(config: dict, names_left_out: LeftOut) -> None:
     """Check that every method takes its settings, and that the global start is one that runs here."""
     for name, settings in config["methods"].items():
         with_key(f"methods.{name}", require_settings, name, settings or {})
-    key, own = "method_pairs.points_of", config["method_pairs"].get("points_of") or {}
-    require_names(key, list(own), config["methods"], "registration method", names_left_out("methods"))
+    for part in ("points_of", "neighbors_of"):
+        own, left_out_here = list(config["method_pairs"].get(part) or {}), names_left_out("methods")
+        require_names(f"method_pairs.{part}", own, config["methods"], "registration method", left_out_here)
     key, start = "method_pairs.global_start", config["method_pairs"]["global_start"]
     require_names(key, [start], config["methods"], "registration method", names_left_out("methods"))
     with_key(key, require_global, start)
@@ -68,5 +69,5 @@ EXPERIMENT = Experiment(
     shown=shown,
     check=check,
     leavable={"methods": Names("registration method", methods)},
-    lists={"method_pairs.points_of": "methods"},
+    lists={"method_pairs.points_of": "methods", "method_pairs.neighbors_of": "methods"},
 )

@@ -62,11 +62,13 @@ def try_methods(
     rows = _chosen(registrations, source, settings.samples)
     of_objects = Judges(objects, f"objects of {source}")
     judges = [of_objects.of(registrations, row) for row in rows]
-    pair_of = lru_cache(maxsize=4)(
-        lambda row, points: pair_to_register(registrations, row, source, seed, points, settings.neighbors_among(points))
-    )
+    given = lru_cache(maxsize=4)(lambda *of: pair_to_register(registrations, of[0], source, seed, *of[1:]))
+
+    def pair_of(row: int, name: str) -> Pair:
+        return given(row, settings.points_for(name), settings.neighbors_for(name))
+
     for name, method in made.items():
-        method(pair_of(rows[0], settings.points_for(name)))
+        method(pair_of(rows[0], name))
     records: dict[str, list[dict]] = {name: [] for name in made}
     for i, row in enumerate(progress(rows, f"registration methods on {source}, seed {seed}")):
         T_true = registrations.T_target_source("true", row)
@@ -78,9 +80,9 @@ def try_methods(
             **{name: getattr(registrations, name)[row] for name in SEVERITY_COLUMNS},
             "symmetric": judge.symmetric,
         }
-        coarse = timed(made[start], pair_of(row, settings.points_for(start)))
+        coarse = timed(made[start], pair_of(row, start))
         for name, method in made.items():
-            pair = pair_of(row, settings.points_for(name))
+            pair = pair_of(row, name)
             known_of_pair = known | {"points": (len(pair.source) + len(pair.target)) / 2}
             for started_at, outcome, seconds in attempts(name, method, pair, start, coarse):
                 errors = judge(outcome.T_target_source, T_true)

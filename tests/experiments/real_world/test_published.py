@@ -54,6 +54,7 @@ def test_they_have_the_published_sizes():
         ("real_world.reductions", ["pca"], "real_world.condition_reductions: no reduction 'none'; choose one of pca"),
         ("real_world.condition_reductions", ["tsne"], "real_world.condition_reductions.0: 'tsne' should be"),
         ("method_pairs.points_of", {"icp": 512}, "method_pairs.points_of: no registration method 'icp'"),
+        ("method_pairs.neighbors_of", {"icp": 40}, "method_pairs.neighbors_of: no registration method 'icp'"),
         ("method_pairs.points_of", {"fgr": 10}, "method_pairs.points_of.fgr: 10 should be greater than or equal to 64"),
     ],
 )

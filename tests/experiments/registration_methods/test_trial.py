@@ -46,14 +46,13 @@ def test_a_row_is_what_the_method_found_on_that_pair(rows, registrations):
 
 
 def test_a_method_can_have_more_points_than_the_others(rows, registrations, objects):
-    tried_with = tried(registrations, objects, points_of={"fgr": 200})
+    tried_with = tried(registrations, objects, points_of={"fgr": 200}, neighbors_of={"fgr": 40})
     assert tried_with["point_to_point"]["points"].tolist() == rows["point_to_point"]["points"].tolist()
     assert rows["fgr"]["points"].max() == 100 and tried_with["fgr"]["points"].max() == 200
     first = [rows["point_to_point"]["fitness"][::2].tolist(), tried_with["point_to_point"]["fitness"][::2].tolist()]
     assert first[0] == first[1]  # from its own start, a local method sees what it saw before
     row = registrations.rows("test")[1]
-    counts = ((200, 40), (100, 20))  # of points, and of neighbors that a normal is of
-    pairs = [pair_to_register(registrations, row, "tiny", 100, *of) for of in counts]
+    pairs = [pair_to_register(registrations, row, "tiny", 100, *of) for of in ((200, 40), (100,))]
     coarse = make_method("fgr")(pairs[0])
     fine = make_method("point_to_point")(pairs[1].started_at(coarse.T_target_source))
     second = tried_with["point_to_point"].iloc[3]
