@@ -98,3 +98,17 @@ def test_every_folder_of_the_results_that_rules_write_has_its_stage():
     assert {f"{folder}/" for folder in written} == {
         name for files, *_ in rows("Stages") for name in code(files) if name.endswith("/") and "{" not in name
     }
+
+
+def test_no_name_of_the_rules_is_bound_in_two_ways():
+    # All rule files share one namespace: a later import or assignment silently replaces what rules before it read.
+    bound: dict[str, set[str]] = {}
+    for path in sorted((ROOT / "workflow/rules").glob("*.smk")):
+        text = path.read_text()
+        for module, names in re.findall(r"^from ([\w.]+) import (\([^)]*\)|[^\n]+)", text, re.MULTILINE):
+            for name in re.findall(r"(\w+)(?=\s*(?:,|$|\n))", re.sub(r"\w+ as ", "", names.strip("()"))):
+                bound.setdefault(name, set()).add(module)
+        for function, *assigned in re.findall(r"^(?:def (\w+)|(\w+)(?:, (\w+))? = )", text, re.MULTILINE):
+            for name in filter(None, (function, *assigned)):
+                bound.setdefault(name, set()).add(path.name)
+    assert {name: places for name, places in bound.items() if len(places) > 1} == {}

@@ -17,7 +17,7 @@ ELSEWHERE = {
     *("guarantee", "live_shap", "recover", "readings", "ship"),
     *("retrain", "measure_joint", "choose_joint", "apply_joint", "judge_joint"),
     *("scan_causes", "diagnose_scans"),
-    *("check-config", "check-reference"),
+    *("check-config", "check-reference", "bench", "score", "leaderboard", "ship-predictions"),
 }
 BY_HAND = {"labels.csv", "answers.txt"}  # given by a person, not made
 

@@ -141,8 +141,8 @@ def read_by_readings(wildcards):
     sources = [name for name in group.sources if name in SOURCES]
     seeds = SEEDS[: 1 if group.costly else READINGS["seeds"]]
     ranges = []
-    if wildcards.reading_group == RETRAINED:
-        seeds, ranges = RETRAINED_SEEDS, READINGS["groups"][RETRAINED]["range"]
+    if wildcards.reading_group == SEVERITIES_RETRAINED:
+        seeds, ranges = RETRAINED_SEEDS, READINGS["groups"][SEVERITIES_RETRAINED]["range"]
     made = "predictions"
     methods = [name for name in group.methods if name in config["explainers"]]
     if wildcards.reading_group == "diagnostics":

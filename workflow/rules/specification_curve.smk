@@ -5,7 +5,7 @@ from gpca.experiments.specification_curve.registry import (
     FRAME_INPUT,
     FRAME_START,
     GROUPS,
-    RETRAINED,
+    SEVERITIES_RETRAINED,
 )
 
 READINGS = config["readings"]

@@ -12,7 +12,7 @@ from gpca.experiments.specification_curve.registry import (
     FRAME_INPUT,
     FRAME_START,
     GROUPS,
-    RETRAINED,
+    SEVERITIES_RETRAINED,
     OtherSeverities,
 )
 from gpca.experiments.specification_curve.settings import ReadingSizes
@@ -50,7 +50,7 @@ def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
         FRAME_INPUT: readings["frame_seeds"] and "none" in frames["reductions"],
         FRAME_ENCODER: frames["published"],
         FRAME_START: estimated and frames["condition_backbones"],
-        RETRAINED: readings["encoders"],
+        SEVERITIES_RETRAINED: readings["encoders"],
     }
     groups = [name for name in readings["groups"] if readable.get(name, True)]
     return {

@@ -16,7 +16,7 @@ from gpca.settings import Bounds, Count, Distinct, Keys, OpenShare, Positive
 
 FRAME_INPUT = "frame_input"  # the group whose encoders of frames see other clouds
 FRAME_ENCODER, FRAME_START = "frame_encoder", "frame_start"  # those that read other rows on frames than the judged
-RETRAINED = "severities_retrained"  # the group whose encoders learn from other severities
+SEVERITIES_RETRAINED = "severities_retrained"  # the group whose encoders learn from other severities
 ALL_SOURCES = ("coffee_cup", "linemod", "ycb")
 AboveOne = Annotated[float, Bounds(exclusiveMinimum=1)]
 AtLeastTwo = Annotated[int, Bounds(minimum=2)]
@@ -107,7 +107,7 @@ GROUPS = {
         ("registrations", "predictions"),
         methods=("gpca_paper", "gpca"),
     ),
-    RETRAINED: Group(
+    SEVERITIES_RETRAINED: Group(
         "How strong the perturbations are, in training too",
         {"range": OtherSeverities, "classifier": Literal["paper", "converged"]},
         "severities:retrained",
