@@ -87,6 +87,6 @@ def from_rival(
     smaller_is_better: bool = False,
     drawn_B_N: np.ndarray | None = None,
 ) -> Difference:
-    """Return how far an explainer lies above the best of its rivals, other than itself; of equals, the first by name."""
+    """Return how far an explainer lies above the best of its other rivals; of equals, the first by name."""
     others = sorted(other for other in rivals if other != name)
     return difference(values, name, best_of(values, others, smaller_is_better), drawn_B_N)

@@ -25,7 +25,14 @@ def imported(folder, code=CODE, **variables):
 @pytest.fixture
 def package(tmp_path):
     """A package with a loop that calls one of another module."""
-    for name in ("__init__.py", "code_files.py", "errors.py", "plugins.py", "process/__init__.py", "process/compilation.py"):
+    for name in (
+        "__init__.py",
+        "code_files.py",
+        "errors.py",
+        "plugins.py",
+        "process/__init__.py",
+        "process/compilation.py",
+    ):
         (tmp_path / "gpca" / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / "gpca" / name, tmp_path / "gpca" / name)
     upper = "from gpca.lower import lower\n@njit(cache=True)\ndef upper(x):\n    return 10 * lower(x)\n"
