@@ -40,11 +40,15 @@ def entry_of(settings: Mapping[str, Any]) -> ScanEntry:
 
 
 def place_of(entry: ScanEntry, data_dir: str | None) -> Path | None:
-    """Return the file or folder of a data set, in `data_dir` or the repository's data; None of an optional one.
+    """Return the file or folder of a data set, in `data_dir` or the repository's data.
+
+    A virtual one has none, nor has an optional one that is not there.
 
     Raises:
         InputError: it is nowhere, and not optional.
     """
+    if entry.kind == "virtual":
+        return None
     places = places_of(entry.location or "", data_dir)
     if place := next((place for place in places if place.exists()), None):
         return place
@@ -56,7 +60,7 @@ def place_of(entry: ScanEntry, data_dir: str | None) -> Path | None:
 
 def data_files(entry: ScanEntry, data_dir: str | None) -> list[Path]:
     """Return the files that a data set is read from, sorted; none of a virtual one."""
-    if entry.kind == "virtual" or (place := place_of(entry, data_dir)) is None:
+    if (place := place_of(entry, data_dir)) is None:
         return []
     files = [place] if place.is_file() else [path for path in place.rglob("*") if path.suffix.lower() in SUFFIXES]
     return sorted(files)
