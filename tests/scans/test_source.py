@@ -24,6 +24,7 @@ def test_an_optional_data_set_may_be_missing_and_another_not(tmp_path):
     assert place_of(entry_of(FOLDER), str(tmp_path)) == path.parent
     assert data_files(entry_of(FOLDER), str(tmp_path)) == [path]
     assert data_files(entry_of(VIRTUAL), None) == []
+    assert place_of(entry_of(VIRTUAL), None) is None  # wherever the repository is
 
 
 @pytest.mark.parametrize(
