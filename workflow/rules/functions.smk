@@ -142,7 +142,8 @@ def read_by_readings(wildcards):
     seeds = SEEDS[: 1 if group.costly else READINGS["seeds"]]
     ranges = []
     if wildcards.reading_group == SEVERITIES_RETRAINED:
-        seeds, ranges = RETRAINED_SEEDS, READINGS["groups"][SEVERITIES_RETRAINED]["range"]
+        seeds = RETRAINED_SEEDS
+        ranges = READINGS["groups"][SEVERITIES_RETRAINED]["range"]
     made = "predictions"
     methods = [name for name in group.methods if name in config["explainers"]]
     if wildcards.reading_group == "diagnostics":
@@ -217,3 +218,10 @@ def retrained_on(severities):
     """Return the section `registrations` with the severities of that name; the protocol's own where there are none."""
     other = READINGS["severities"].get(severities)
     return config["registrations"] | ({"severities": other} if other else {})
+
+
+def other_cloud_settings(wildcards, changes):
+    """Return the settings of an encoder of depth frames that sees another cloud, with changes, and the cloud."""
+    icp = {"icp": config["registrations"]["icp"]}
+    encoder = config["encoders"][BACKBONE] | (changes or {}) | icp
+    return as_json(encoder | {"reading": wildcards.cloud})

@@ -115,12 +115,6 @@ rule retrain:
 
 
 # Encoders of depth frames that see other clouds, one job each: trained as that of the protocol is.
-def other_cloud_settings(wildcards, changes):
-    icp = {"icp": config["registrations"]["icp"]}
-    encoder = config["encoders"][BACKBONE] | (changes or {}) | icp
-    return as_json(encoder | {"reading": wildcards.cloud})
-
-
 rule pretrain_on_other_cloud:
     input:
         registrations=pretrained_on(BACKBONE)[1],
