@@ -28,7 +28,7 @@ def test_all_pages_have_the_numbers_of_the_reference(capsys):
     assert fill.main(["--check"]) == 0, capsys.readouterr().out
 
 
-@pytest.mark.parametrize(("run", "name"), [("stand_ins", "stand-ins"), ("full", "full protocol")])
+@pytest.mark.parametrize(("run", "name"), [("default", "default"), ("full", "full protocol")])
 def test_the_readme_has_the_times_of_the_page_of_all_targets(run, name):
     page = (ROOT / "docs/reproducing.md").read_text()
     block = page.split(f"<!-- times of results/{run} -->")[1].split(f"<!-- end of results/{run} -->")[0]
