@@ -12,7 +12,13 @@ from .configs import MISSING, changed, load, merged
 @pytest.mark.parametrize(
     "key",
     [
-        *("sources.linemod", "encoders.pointnet2", "reductions.umap", "uncertainty.oracle", "explainers.shap_supervised"),
+        *(
+            "sources.linemod",
+            "encoders.pointnet2",
+            "reductions.umap",
+            "uncertainty.oracle",
+            "explainers.shap_supervised",
+        ),
         *("methods.trimmed", "estimators.stein_icp", "estimator_pairs.methods.point_to_plane"),
         *("learners.learner_forest", "recovery.policies.random", "active_learning.strategies.badge"),
     ],
