@@ -52,25 +52,23 @@ class LearnedPairGPCA(PairDescription, GPCA):
         """Train the encoder on the labeled pairs, and return a function that attaches its embeddings."""
         from gpca.encoders.settings import EncoderSettings
         from gpca.explainers.pair_encoder import PairDraw, learn_pair_encoder
-        from gpca.features.registered import FIT, MOTION
 
-        told = MOTION if self._motion else FIT
-        draw = PairDraw(self._prefix + "points", f"{self._prefix}last_{told}")
+        draw = PairDraw(self._prefix + "points", self._prefix + "told")
 
         def seen(pairs: Registrations) -> Registrations:
             described = self.describe(pairs)
-            motion = self.features(described)[:, -told:]
-            return replace(described, attached={**described.attached, draw.motion: motion})
+            return replace(described, attached={**described.attached, draw.motion: self.told(described)})
 
+        labeled = seen(registrations)
         draw_points, epochs, learning_rate = self._training
         settings = EncoderSettings(
             *(self._encoder, draw_points),
             draws=2,
             epochs=epochs,
             learning_rate=learning_rate,
-            options={"motion": told},
+            options={"motion": labeled.attached[draw.motion].shape[1]},
         )
-        encoder = learn_pair_encoder(seen(registrations), settings, draw, *self._axes)
+        encoder = learn_pair_encoder(labeled, settings, draw, *self._axes, classes=self.labels)
 
         def embed(pairs: Registrations) -> Registrations:
             described = self.describe(pairs)
@@ -78,9 +76,16 @@ class LearnedPairGPCA(PairDescription, GPCA):
 
         return embed
 
+    def told(self, registrations: Registrations) -> np.ndarray:
+        """Return what the encoder is told of the motion of ICP (N, M), the last of the relations."""
+        from gpca.features.registered import FIT, MOTION
+
+        return self.features(registrations)[:, -(MOTION if self._motion else FIT) :]
+
     def fit(self, registrations: Registrations) -> None:
         """Fit the GPC to the labeled pairs, after the encoder, unless its embeddings are attached."""
         if self._embedding not in registrations.attached:
+            registrations = self.describe(registrations)
             self._embed = self.learn_encoder(registrations)
         super().fit(registrations)
 

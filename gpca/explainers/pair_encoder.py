@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -12,6 +12,7 @@ from gpca.encoders.pair import PAIR_ENCODERS
 from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.training import TrainingTask, embed, train_encoder
 from gpca.pairs.dataset import Registrations
+from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import generator
 
 
@@ -41,17 +42,24 @@ class PairDraw:
 
 
 def learn_pair_encoder(
-    registrations: Registrations, settings: EncoderSettings, draw: PairDraw, source: str, seed: int
+    registrations: Registrations,
+    settings: EncoderSettings,
+    draw: PairDraw,
+    source: str,
+    seed: int,
+    classes: tuple[str, ...] = CONCEPTS,
 ) -> Callable[[Registrations], np.ndarray]:
-    """Train an encoder with a head over the concepts, drop the head, and return a function to embeddings (N, d).
+    """Train an encoder with a head over the classes, drop the head, and return a function to embeddings (N, d).
 
     Args:
-        registrations: labeled, with the arrays of `draw` attached.
+        registrations: labeled, with the arrays of `draw` attached; all are learned from, whatever their split.
         settings: how it is trained; the backbone is one of :data:`gpca.encoders.pair.PAIR_ENCODERS`.
         draw: the view of the encoder.
         source, seed: name what is random.
+        classes: the labels.
     """
     make = PAIR_ENCODERS[settings.backbone]
-    task = TrainingTask(make=lambda: make(**settings.options), draw=draw)
-    model, _ = train_encoder(registrations, source, seed, settings, task=task)
+    task = TrainingTask(classes, make=lambda: make(**settings.options), draw=draw)
+    taught = replace(registrations, split=np.full(len(registrations), "train"))
+    model, _ = train_encoder(taught, source, seed, settings, task=task)
     return lambda asked: embed(model, asked, source, seed, settings, draw)[0]

@@ -19,6 +19,7 @@ FAST = {
     "gpca": {"learning_rate": 0.1, "iterations": 60, "inducing": 8, "draws": 50},
     "gpca_pair": {"learning_rate": 0.1, "iterations": 60, "inducing": 8, "draws": 50},
     "gpca_multilabel": {"learning_rate": 0.1, "iterations": 60, "inducing": 8, "draws": 50},
+    "gpca_pair_dgcnn": {"iterations": 20, "inducing": 8, "draws": 50, "points": 32, "draw_points": 16, "epochs": 1},
     "pair_forest": {"trees": 10},
     "pair_boosting": {"iterations": 3},
 }
