@@ -5,7 +5,7 @@ SHELL := /bin/bash
 .ONESHELL:
 .DELETE_ON_ERROR:
 .PHONY: results report check test test-library test-processes test-workflow coverage smoke lint check-reference \
-        environment lock clean-environment help
+        environment lock docs clean-environment help
 
 CORES ?= 2
 SNAKEMAKE_ARGS ?=
@@ -68,6 +68,12 @@ check-reference: environment ## compare the numbers of results/CHECKED with its 
 	$(RUN) python -m gpca check-reference results/$(CHECKED)
 
 environment: .venv/complete ## only the virtual environment
+
+docs: environment ## the site of the docs, build/docs/html/index.html, with packages of its own beside those of .venv
+	rm -rf build/docs
+	.venv/bin/python $(INSTALL) --no-deps --require-hashes --target build/docs/packages -r docs/requirements.txt
+	PYTHONPATH=build/docs/packages $(RUN) python -m sphinx -q -W --keep-going -c docs -d build/docs/doctrees \
+	    . build/docs/html
 
 # Sets `python` to the first interpreter that runs, is 3.11 or 3.12 and can make virtual environments.
 # A name on PATH is not enough: version managers put shims there that only print an error.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from argparse import ArgumentParser
 from importlib import import_module
 from pathlib import Path
 
@@ -16,7 +17,7 @@ COMMANDS = {  # those for a registration of one's own first, then those for a ru
     "explain": "files of points -> why their registration is uncertain, and what to do",
     "label": "registrations and embeddings -> labels that a person gives when the classifier asks",
     "bench": "method of your own -> its row among the published ones of a track",
-    "score": "predictions made anywhere -> the same",
+    "score": "predictions made anywhere -> their row among the published ones",
     "leaderboard": "submitted predictions -> a page that ranks them",
     "ship": "model of a run -> the model that comes with the package, and its card",
     "ship-predictions": "run -> the predictions and truths that bench and score read",
@@ -41,10 +42,7 @@ def _run(arguments: list[str], chosen: str | None) -> int:
     commands = parser.add_subparsers(dest="command", required=True, metavar="command")
     for name, summary in COMMANDS.items():
         command = commands.add_parser(name, help=summary, description=summary)
-        command.add_argument(
-            "--threads", type=THREADS, default=1, help="number of threads for torch, numba and OpenMP (default 1)"
-        )
-        command.add_argument("--settings", default="{}", help="the command's section of the config, as JSON")
+        add_common_arguments(command)
         if name == chosen:  # the others bring libraries that take seconds to load
             _set_threads(arguments)
             keep_freed_memory()
@@ -54,6 +52,14 @@ def _run(arguments: list[str], chosen: str | None) -> int:
     options = parser.parse_args(arguments)
     options.settings = _mapping(options.settings)
     return options.run(options) or 0
+
+
+def add_common_arguments(command: ArgumentParser) -> None:
+    """Declare what every command takes."""
+    command.add_argument(
+        "--threads", type=THREADS, default=1, help="number of threads for torch, numba and OpenMP (default 1)"
+    )
+    command.add_argument("--settings", default="{}", help="the command's section of the config, as JSON")
 
 
 def _program() -> str:
