@@ -79,7 +79,8 @@ def write_uncertainties(path, registrations):
 @pytest.fixture
 def same_bytes(tmp_path):
     """Check that a figure that is drawn twice is the same files, and return its pixels."""
-    from gpca.io.files import read_image
+    from PIL import Image
+
     from gpca.reporting.figures.style import save_figure
 
     def pixels(draw):
@@ -89,7 +90,7 @@ def same_bytes(tmp_path):
             save_figure(draw(), *paths)
             files.append([path.read_bytes() for path in paths])
         assert files[0] == files[1]
-        return read_image(paths[1], "")
+        return np.asarray(Image.open(paths[1]).convert("RGB"))
 
     return pixels
 
