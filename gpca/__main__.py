@@ -19,6 +19,7 @@ COMMANDS = {  # those for a registration of one's own first, then those for a ru
     "bench": "method of your own -> its row among the published ones of a track",
     "score": "predictions made anywhere -> their row among the published ones",
     "leaderboard": "submitted predictions -> a page that ranks them",
+    "compare": "two runs -> a page with their tables and figures side by side",
     "ship": "model of a run -> the model that comes with the package, and its card",
     "ship-predictions": "run -> the predictions and truths that bench and score read",
     "check-config": "configs -> whether a run can use them",

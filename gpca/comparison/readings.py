@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 from gpca.comparison.closeness import exactly
 from gpca.comparison.published import Counterpart, Number
@@ -150,6 +150,16 @@ class OfGroup:
         return "produced" if self.close else "between" if self.inside else "outside"
 
 
+class Words(Protocol):
+    """Says what readers call the groups of readings and their choices."""
+
+    def group(self, name: str) -> str:
+        """Return what a group leaves open."""
+
+    def reading(self, group: str, name: str) -> str:
+        """Return the choices of a reading of that group."""
+
+
 def asked_about(judged: pd.DataFrame) -> pd.DataFrame:
     """Return the rows of numbers that are not reproduced, or not judged because of their objects."""
     return judged[judged["verdict"].isin([NOT_REPRODUCED, NOT_COMPARABLE])]
@@ -181,28 +191,31 @@ def summarize(judged: pd.DataFrame) -> dict[tuple[str, str, str], dict[str, OfGr
     return summaries
 
 
-def sentence(groups: Mapping[str, OfGroup]) -> str:
-    """Return the sentence of a reason about the readings."""
+def sentence(groups: Mapping[str, OfGroup], words: Words) -> str:
+    """Return the sentences of a reason about the readings, one for each group."""
     sentences = []
-    for group, of in groups.items():
-        span, nearest = f"{of.least:.3g} to {of.most:.3g}", f"{of.nearest}, {of.value:.3g}"
+    for name, of in groups.items():
+        group = words.group(name)
+        span, nearest = f"{of.least:.3g} to {of.most:.3g}", f"{of.value:.3g} ({words.reading(name, of.nearest)})"
         if of.close:
             by_chance = f"{of.chance:.0%} of their span is, so that this may be chance"
             sentences.append(
-                f"Readings of {group}: {of.close} of {of.readings} are close, the nearest {nearest}; {by_chance}."
+                f"{group}: {of.close} of {of.readings} readings are close, the nearest gives {nearest}; {by_chance}."
             )
         elif of.inside:
-            sentences.append(f"Readings of {group}: none of {of.readings} is close, {span}, the nearest {nearest}.")
+            sentences.append(
+                f"{group}: none of {of.readings} readings is close; they give {span}, the nearest {nearest}."
+            )
         else:
-            sentences.append(f"Readings of {group}: outside of all {of.readings}, {span}.")
+            sentences.append(f"{group}: outside of all {of.readings} readings, which give {span}.")
     return " ".join(sentences)
 
 
-def with_readings(comparison: pd.DataFrame, judged: pd.DataFrame) -> pd.DataFrame:
-    """Return the comparison in which the reasons of misses say what the readings give."""
+def with_readings(comparison: pd.DataFrame, judged: pd.DataFrame, words: Words) -> pd.DataFrame:
+    """Return the comparison in which the reasons of misses say, in words, what the readings give."""
     summaries = summarize(judged[judged["verdict"] == NOT_REPRODUCED])
     reasons = [
-        f"{reason} {sentence(summaries[key])}" if key in summaries else reason
+        f"{reason} {sentence(summaries[key], words)}" if key in summaries else reason
         for *key, reason in comparison[["table", "row", "column", "reason"]].itertuples(index=False)
         for key in [tuple(key)]
     ]

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from gpca.comparison.published import TABLES, TEXT
 from gpca.comparison.verdicts import CLOSE, COMPARISON_COLUMNS, NOT_REPRODUCED, REPRODUCED
 from gpca.io.csv_file import read_csv
 
@@ -15,10 +16,11 @@ _NUMBERS = ("published", "upper", "deviation", "reproduced", "ci_low", "ci_high"
 
 
 def page_comparison(path: str | Path, reference: str | Path | None = None) -> dict | None:
-    """Return the rows of ``comparison.csv`` in words, its tables, and verdicts with tone and number; None without it.
+    """Return the rows of ``comparison.csv`` in words by table, and verdicts with tone and number; None without it.
 
     Where no number of the run is judged, as on stand-ins, the rows are those of the reference, and each has what the
-    run gives as ``this_run``. Repeats of a value and standard deviations are counted apart.
+    run gives as ``this_run``. Repeats of a value and standard deviations are counted apart. What a table was measured
+    on is said once, with its title; a row says it where the table has several and the row's names do not tell which.
 
     Args:
         path: The file of the run.
@@ -35,10 +37,29 @@ def page_comparison(path: str | Path, reference: str | Path | None = None) -> di
     order = [*TONES, *sorted(set(counts) - {*TONES, DEVIATION, REPEAT}), DEVIATION, REPEAT]
     return {
         "of_reference": of_reference,
-        "rows": rows,
-        "tables": list(dict.fromkeys(row["table"] for row in rows)),
+        "tables": [_of_table(name, of) for name, of in _by_table(rows).items()],
         "verdicts": [(verdict, TONES.get(verdict, ""), counts[verdict]) for verdict in order if counts[verdict]],
     }
+
+
+def _by_table(rows: Sequence[dict[str, str]]) -> dict[str, list[dict[str, str]]]:
+    tables: dict[str, list[dict[str, str]]] = {}
+    for row in rows:
+        tables.setdefault(row["table"], []).append(row)
+    return tables
+
+
+def _of_table(name: str, rows: Sequence[dict[str, str]]) -> dict:
+    objects = list(dict.fromkeys(row["objects"] for row in rows if row["objects"]))
+    said = [row | {"objects": "" if len(objects) == 1 or _is_named(row) else row["objects"]} for row in rows]
+    title = TABLES[name].title if name in TABLES else ""
+    words = title if name == TEXT else f"Table {name}: {title}"
+    return {"name": name, "title": words, "objects": "; ".join(objects), "rows": said}
+
+
+def _is_named(row: Mapping[str, str]) -> bool:
+    """Return whether a row's or a column's name tells the objects, as "YCB" does."""
+    return any(row["objects"].startswith(row[key]) for key in ("row", "column"))
 
 
 def _key(row: Mapping[str, str]) -> tuple[str, ...]:

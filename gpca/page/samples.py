@@ -8,40 +8,36 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.alignment.rigid import inverse
 from gpca.attribution.predictions import concepts_of, read_predictions
 from gpca.causes.settings import Limits
 from gpca.errors import InputError
 from gpca.experiments.method.shown_sample import observed_uncertainties, registration_error, state_of_error
+from gpca.page.scenes import packed_registration
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.reporting.figures.cloud_views import thinned
 
 if TYPE_CHECKING:
     import pandas as pd
 
 OF_EACH_CONCEPT = 2  # The page shows this many samples of each concept in every source.
-POINTS = 600  # It shows at most this many points of a cloud.
 RULE = (
     f"Of every source, the first {OF_EACH_CONCEPT} test samples of each concept in the run's first seed, in the order "
     "of their numbers, right or wrong."
 )
-_STEPS_PER_DIAMETER = 1000  # Coordinates are whole thousandths of the diameter.
 
 
-def page_samples(files: Mapping[str, str | Path], source: Mapping, limits: Limits) -> list[dict]:
+def page_samples(files: Mapping[str, str | Path], source: Mapping, limits: Limits, reach: float) -> list[dict]:
     """Return the samples of one source that `RULE` names, for the page's 3-D view, as plain JSON values.
 
-    Each holds the target and the ICP-aligned source as flat lists x, y, z of at most `POINTS` points each, in
-    thousandths of the object's diameter, and the 4×4 transforms (row by row, in diameters) that take the aligned source
-    to its initial and to its true pose; object, concept, severity, scores, standard deviations, fitness, and how far
-    off ICP ends (ADD-S in % of the diameter) with the state that this is called; the uncertainty in nats and that
-    below which 95 % of the clean pairs lie, where they are known.
+    Each holds its ``scene`` (:func:`gpca.page.scenes.packed_registration`), object, concept, severity, scores with
+    standard deviations, fitness, how far off ICP ends (ADD-S in % of the diameter) and the state that this is called;
+    the uncertainty in nats and that below which 95 % of the clean pairs lie, where they are known.
 
     Args:
         files: The ``registrations`` and ``predictions`` of one source and seed, and perhaps its ``uncertainty``.
         source: The ``title`` of the source, and whether it is a ``stand_in``.
         limits: What states are told apart by.
+        reach: How far ICP looks for a partner, in diameters.
 
     Raises:
         InputError: an unusable file, or a sample that was not predicted.
@@ -61,6 +57,7 @@ def page_samples(files: Mapping[str, str | Path], source: Mapping, limits: Limit
         samples.append(
             _sample(registrations, row, test.loc[number], concepts_of(predictions))
             | {"error_percent": _number(100 * error), "state": state_of_error(error, limits)}
+            | {"scene": packed_registration(registrations, row, reach)}
             | {"uncertainty": _number(u_S[row]), "clean_uncertainty": _number(clean), "source": dict(source)}
         )
     return samples
@@ -85,7 +82,6 @@ def severity_words(registrations: Registrations, row: int) -> str:
 
 
 def _sample(registrations: Registrations, row: int, prediction: pd.Series, concepts: list[str]) -> dict:
-    T_icp_target = inverse(registrations.T_target_source("icp", row))
     return {
         "object": str(registrations.object_name[row]),
         "sample": int(registrations.sample[row]),
@@ -101,22 +97,9 @@ def _sample(registrations: Registrations, row: int, prediction: pd.Series, conce
             }
             for concept in concepts
         ],
-        "target_points": _flat(registrations.target(row)),
-        "points": _flat(registrations.cloud(row)),
-        "initial": _transform(registrations.T_target_source("init", row) @ T_icp_target),
-        "truth": _transform(registrations.T_target_source("true", row) @ T_icp_target),
     }
 
 
 def _number(value: float) -> float | None:
     """Return a rounded number, or None for NaN, which JSON lacks: it is the score of an explainer that abstains."""
     return round(float(value), 3) if np.isfinite(value) else None
-
-
-def _flat(points: np.ndarray) -> list[int]:
-    """Return the coordinates of a thinned cloud, one after the other, in whole steps."""
-    return np.rint(thinned(points, POINTS) * _STEPS_PER_DIAMETER).astype(int).ravel().tolist()
-
-
-def _transform(T: np.ndarray) -> list[float]:
-    return [round(float(value), 5) for value in T.ravel()]

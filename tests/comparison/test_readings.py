@@ -6,9 +6,11 @@ import pytest
 from gpca.attribution.metrics import TIDY_COLUMNS
 from gpca.comparison.readings import chance_of, judge_readings, read_judged, summarize, with_readings
 from gpca.errors import InputError
+from gpca.experiments.specification_curve.words import ReadingWords
 
 from .made_up import ACCURACY, LABELS, TOLERANCES, compared, number, tidy
 
+WORDS = ReadingWords()
 KEY, OTHER = ("I", "YCB", "GP-CA"), ("I", "Cups", "GP-CA")
 OF_CUPS = ACCURACY.__class__(**{**ACCURACY.__dict__, "sources": ("cups",)})
 
@@ -38,16 +40,18 @@ def test_a_number_is_produced_or_between_readings_or_outside(printed, values, wh
     of = summarize(found)[KEY]["start"]
     assert (of.where, of.nearest, of.readings) == (where, nearest, 2)
     assert (of.least, of.most) == (100 * min(values.values()), 100 * max(values.values()))
-    [reason] = with_readings(comparison, found)["reason"]
-    assert {"produced": "1 of 2 are close", "between": "none of 2 is close", "outside": "outside of all 2"}[
-        where
-    ] in reason
+    [reason] = with_readings(comparison, found, WORDS)["reason"]
+    assert {
+        "produced": "1 of 2 readings are close",
+        "between": "none of 2 readings is close",
+        "outside": "outside of all 2",
+    }[where] in reason
 
 
 def test_a_number_that_is_reproduced_needs_no_reading():
     found, comparison = judged(97.0, {"random": 0.5}, here=0.97)
     assert summarize(found) == {}
-    assert with_readings(comparison, found)["reason"].tolist() == comparison["reason"].tolist()
+    assert with_readings(comparison, found, WORDS)["reason"].tolist() == comparison["reason"].tolist()
 
 
 def test_the_joint_reading_fits_most_numbers_of_its_group():
@@ -99,4 +103,4 @@ def test_the_chance_is_the_share_of_the_span_within_the_tolerance():
     assert chance_of([], [7], percent) == 0
     found, comparison = judged(50.0, {"random": 0.515, "kmeans": 0.97})
     assert summarize(found)[KEY]["start"].chance == pytest.approx(6 / 45.5)
-    assert "13% of their span is" in with_readings(comparison, found)["reason"][0]
+    assert "13% of their span is" in with_readings(comparison, found, WORDS)["reason"][0]

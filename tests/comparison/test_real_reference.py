@@ -11,6 +11,7 @@ from gpca.comparison.published import NONE_YET, read_published, read_reasons
 from gpca.comparison.readings import READINGS, judge_readings, with_readings
 from gpca.comparison.values import read_results
 from gpca.comparison.verdicts import JUDGED, NOT_COMPARABLE, Tolerance, compare
+from gpca.experiments.specification_curve.words import ReadingWords
 from gpca.reporting.tables.claims import counted
 from gpca.reporting.tables.comparison import counts_table, summary
 
@@ -27,7 +28,8 @@ def reference():
     named = {number.counterpart.file for number in numbers if number.counterpart}
     results = read_results(path for path in sorted(folder.glob("*.csv")) if path.name in named | {READINGS})
     comparison = compare(numbers, results, objects, TOLERANCES, read_reasons())
-    return with_readings(comparison, judge_readings(numbers, comparison, results[READINGS], TOLERANCES))
+    judged = judge_readings(numbers, comparison, results[READINGS], TOLERANCES)
+    return with_readings(comparison, judged, ReadingWords())
 
 
 def is_of_this_version():

@@ -10,7 +10,7 @@ import pytest
 from gpca.alignment.rigid import transform
 from gpca.causes.shapley import ALL, BY_SIZE
 from gpca.model.shown.packing import MOST_POINTS, packed, unpacked
-from gpca.model.shown.parts import taken_out
+from gpca.model.shown.subsets import taken_out
 
 from ..page.test_in_a_browser import chromium, in_a_browser
 

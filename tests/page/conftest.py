@@ -1,11 +1,14 @@
 """The results folder of a small run with its page."""
 
+import json
 import shutil
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from gpca.page.page import write_page
+from gpca.process.processor import describe
 from gpca.process.provenance import record_provenance
 from gpca.reporting.figures.style import save_figure, use_style
 from gpca.reporting.registry import SUFFIXES
@@ -59,3 +62,34 @@ def copied(folder, tmp_path):
     copy = tmp_path / "results/tiny"
     (copy / "index.html").unlink()
     return copy, run_of(copy)
+
+
+@pytest.fixture
+def two_runs(tmp_path):
+    """The folders of two runs: a table whose row 3 differs and of which the second has a row more, and a figure."""
+    folders = tmp_path / "results/one", tmp_path / "results/other"
+    for which, folder in enumerate(folders):
+        rows = range(12 + which)
+        table = Table(
+            name="table9_long",
+            caption="Accuracy (%)",
+            row_heads={"row": "Row"},
+            rows=tuple(((f"{row}", f"row {row}"),) for row in rows),
+            column_head="metric",
+            columns={"accuracy": Column("Accuracy (%)")},
+            cells={(row, "accuracy"): Cell(50 + row + 10 * which * (row == 3), 0.4, 3, 270) for row in rows},
+        )
+        table.write(folder / "tables/table9_long")
+        record = {"code": {"commit": ("abc", "def")[which], "dirty": bool(which)}, "python": "3.11", "libraries": {}}
+        record |= {"config_sha256": {"seeds": "1", "causes": str(which)}, "environment_lock_sha256": "1"}
+        record |= {"device": describe() | {"gpu": None}}
+        (folder / "tables/table9_long.csv.provenance.json").write_text(json.dumps(record))
+        Image.new("RGB", (4, 4), ("red", "blue")[which]).save(written(folder / "figures/mine.png"))
+    (folders[0] / "tables/only_here.md").write_text((folders[0] / "tables/table9_long.md").read_text())
+    return folders
+
+
+def written(path):
+    """A path whose folder is there."""
+    path.parent.mkdir(exist_ok=True)
+    return path

@@ -23,7 +23,7 @@ class Page(HTMLParser):
         self.ids += [attributes["id"]] if "id" in attributes else []
         self.links += [attributes["href"]] if attributes.get("href") else []
         self.sources += [attributes["src"]] if "src" in attributes else []
-        if tag not in ("meta", "link", "img", "br"):
+        if tag not in ("meta", "link", "img", "br", "input"):
             self.stack.append(tag)
 
     def handle_endtag(self, tag):
@@ -60,6 +60,7 @@ def run_of(folder, **changes):
                 "predictions": folder / "predictions/bricks/gpca/seed0.csv",
             }
         },
+        "causes": {},
         "titles": Titles({"gpca": {"title": "GP-CA", "oracle": False}}, {}, 3),
         "reference": None,
         "config": {

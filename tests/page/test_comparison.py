@@ -21,16 +21,21 @@ def written(folder, text):
     return path
 
 
+def rows_of(shown):
+    return [row for table in shown["tables"] for row in table["rows"]]
+
+
 def test_numbers_have_the_papers_digits_and_verdicts_a_tone(tmp_path):
     shown = page_comparison(written(tmp_path, HEAD + "".join(LINES)))
-    close, same, bound, not_run = shown["rows"]
+    close, same, bound, not_run = rows_of(shown)
     assert (close["published"], close["reproduced"], close["interval"]) == ("99.6", "97.4", "[95.4, 99.4]")
     assert (close["difference"], close["tone"], close["reason"]) == ("-2.2", "near", "too few epochs")
     assert same["difference"] == "0.02"  # not "0.0", which would claim more
     assert (bound["published"], bound["reproduced"], bound["interval"]) == ("350 to 550", "> 812", "")
     assert (bound["difference"], bound["factor"]) == ("262", "× 1.5")
     assert (not_run["published"], not_run["reproduced"], not_run["tone"]) == ("85.2 ± 2.4", "", "")
-    assert shown["tables"] == ["I", "III", "VI"]
+    assert [table["name"] for table in shown["tables"]] == ["I", "III", "VI"]
+    assert shown["tables"][0]["title"] == "Table I: Single-concept attribution"
 
 
 def test_verdicts_are_counted_from_the_best_to_the_worst(tmp_path):
@@ -49,11 +54,11 @@ def test_where_nothing_is_judged_the_verdicts_are_the_references(tmp_path):
     own = LINES[0].replace(",close,", ",not comparable,").replace("97.44", "88.8")
     shown = page_comparison(written(tmp_path, HEAD + own), reference)
     assert shown["of_reference"]
-    assert [row["verdict"] for row in shown["rows"]] == ["close", "reproduced", "not reproduced", "not run"]
-    assert [row["this_run"] for row in shown["rows"]] == ["88.8", "", "", ""]
+    assert [row["verdict"] for row in rows_of(shown)] == ["close", "reproduced", "not reproduced", "not run"]
+    assert [row["this_run"] for row in rows_of(shown)] == ["88.8", "", "", ""]
     judged = page_comparison(written(tmp_path, HEAD + own + LINES[1]), reference)
     assert not judged["of_reference"]
-    assert [row["verdict"] for row in judged["rows"]] == ["not comparable", "reproduced"]
+    assert [row["verdict"] for row in rows_of(judged)] == ["not comparable", "reproduced"]
 
 
 def test_repeats_and_standard_deviations_are_counted_apart(tmp_path):
@@ -61,8 +66,17 @@ def test_repeats_and_standard_deviations_are_counted_apart(tmp_path):
     deviation = LINES[1].replace("mean,", "deviation,")
     shown = page_comparison(written(tmp_path, HEAD + repeat + deviation))
     assert shown["verdicts"] == [("standard deviation", "", 1), ("repeat", "", 1)]
-    assert shown["rows"][0]["reason"] == "repeat of I / YCB / SA; too few epochs"
-    assert (shown["rows"][0]["group"], shown["rows"][0]["verdict"]) == ("repeat", "close")
+    assert rows_of(shown)[0]["reason"] == "repeat of I / YCB / SA; too few epochs"
+    assert (rows_of(shown)[0]["group"], rows_of(shown)[0]["verdict"]) == ("repeat", "close")
+
+
+def test_what_a_table_was_measured_on_is_said_once(tmp_path):
+    cups = LINES[0].replace("I,YCB,", "I,Coffee Cup,").replace(",YCB,mean", ",Coffee Cup (scans),mean")
+    other = LINES[0].replace("I,YCB,", "I,All,").replace(",YCB,mean", ",Coffee Cup (scans),mean")
+    table_i, table_iii = page_comparison(written(tmp_path, HEAD + LINES[0] + cups + other + LINES[2]))["tables"]
+    assert table_i["objects"] == "YCB; Coffee Cup (scans)"
+    assert [row["objects"] for row in table_i["rows"]] == ["", "", "Coffee Cup (scans)"]
+    assert (table_iii["objects"], table_iii["rows"][0]["objects"]) == ("YCB", "")
 
 
 def test_there_need_not_be_a_comparison(tmp_path):

@@ -1,12 +1,13 @@
-"""The page in a real browser."""
+"""The pages in a real browser."""
 
 import re
 import shutil
 import subprocess
+from pathlib import Path
 
-import numpy as np
 import pytest
 
+from gpca.__main__ import main
 from gpca.page.page import write_page
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
@@ -14,17 +15,39 @@ in_a_browser = pytest.mark.skipif(CHROMIUM is None, reason="no chromium: install
 
 # Notes on speed that a software renderer gives.
 SPEED = ("Canvas2D: Multiple readback", "GL Driver Message")
-# What a reader does: hide a verdict, choose a table; look at the last sample in its initial pose.
+# What a reader does: hide a verdict, choose a table, look for a row and sort; look at the last sample in its initial
+# pose. What was drawn is counted: points of the target are red, those of the source blue.
 READER = """<script>
 addEventListener("load", () => {
   document.querySelector('#verdict-filters [data-verdict="close"]').click();
   const table = document.getElementById("table-filter");
   table.value = "I";
   table.dispatchEvent(new Event("change"));
-  document.querySelector('[data-pose="initial"]').click();
+  for (let click = 0; click < 2; click += 1) document.querySelector("#table2_per_concept thead th button").click();
+  document.querySelector('[data-view="start"]').click();
   const sample = document.getElementById("sample");
   sample.value = "5";
   sample.dispatchEvent(new Event("change"));
+  setTimeout(() => {
+    const view = document.getElementById("view");
+    const { data } = view.getContext("2d").getImageData(0, 0, view.width, view.height);
+    let [red, blue] = [0, 0];
+    for (let i = 0; i < data.length; i += 4) {
+      red += data[i] > data[i + 2] + 60;
+      blue += data[i + 2] > data[i] + 60;
+    }
+    document.body.dataset.drawn = `${red > 200} ${blue > 200}`;
+    document.body.dataset.menu = document.querySelector("nav").offsetHeight
+      < parseFloat(getComputedStyle(document.documentElement).scrollPaddingTop);
+    document.body.dataset.wide = document.documentElement.scrollWidth > document.documentElement.clientWidth;
+  }, 500);
+});
+</script></body>"""
+SEARCHED = """<script>
+addEventListener("load", () => {
+  const search = document.querySelector('input[type="search"]');
+  search.value = "row 3";
+  search.dispatchEvent(new Event("input"));
 });
 </script></body>"""
 
@@ -41,36 +64,39 @@ def chromium(path, profile, *options):
 
 
 @in_a_browser
-def test_a_browser_draws_both_clouds_and_has_nothing_to_complain_about(folder, tmp_path):
-    from PIL import Image
-
-    chromium(folder / "index.html", tmp_path, f"--screenshot={tmp_path / 'page.png'}", "--window-size=1000,5000")
-    with Image.open(tmp_path / "page.png") as image:
-        pixels = np.asarray(image.convert("RGB")).astype(int)
-    for color in ((213, 94, 0), (0, 114, 178)):  # of target and source
-        of_color = (np.abs(pixels - color).max(axis=2) < 12).sum(axis=1)
-        assert (of_color > 0).sum() > 100  # rows of pixels: a cloud, not the key below it
-
-
-@in_a_browser
 def test_verdicts_tables_samples_and_poses_can_be_chosen(copied, tmp_path):
     folder, run = copied
     write_page(folder, run)
     driven = folder / "driven.html"
     driven.write_text((folder / "index.html").read_text().replace("</body>", READER))
     shown = chromium(driven, tmp_path, "--dump-dom", "--window-size=400,800")
-    assert 'data-shown="5 initial"' in shown
-    assert "WebGL is not supported" not in shown
-    assert re.search(r'<div id="clouds"[^>]*>.*<canvas', shown, flags=re.DOTALL)
+    assert 'data-shown="5"' in shown and 'data-shown="start"' in shown
     assert "1 of 4 numbers" in shown
     assert re.findall(r'<tr data-verdict="([^"]*)" data-table="[^"]*">', shown) == ["reproduced"]
     assert "True cause: overlap" in shown
+    assert "Before the registration: the median distance to the target is" in shown
+    assert 'data-drawn="true true"' in shown
+    assert 'data-menu="true"' in shown and 'data-wide="false"' in shown
+    # Sorted by the names, the last first; other tables keep their order.
+    tables = {name: re.findall(r'<th scope="row">([^<]*)<', part) for name, part in articles(shown).items()}
+    assert tables["table2_per_concept"] == ["Cones", "Bricks"]
+    assert tables["table1_single_baselines"] == ["Bricks", "Cones"]
+    assert 'aria-sort="descending"' in articles(shown)["table2_per_concept"]
+    assert 'data-kept="1"' in articles(shown)["table2_per_concept"]
+
+
+def articles(text):
+    """The HTML of every table and figure, by name."""
+    return dict(re.findall(r'<article id="([^"]+)">(.*?)</article>', text, flags=re.DOTALL))
 
 
 @in_a_browser
-def test_without_its_script_the_view_says_what_is_missing(copied, tmp_path):
-    folder, run = copied
-    write_page(folder, run)
-    alone = tmp_path / "index.html"
-    alone.write_text(re.sub(r'<script src="[^"]*" defer></script>', "", (folder / "index.html").read_text()))
-    assert "needs page/plotly.min.js beside this page" in chromium(alone, tmp_path, "--dump-dom")
+def test_two_runs_show_what_differs_and_can_be_searched(two_runs, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["compare", *map(str, two_runs), "--out", "compare.html"]) == 0
+    page = Path("compare.html")
+    page.write_text(page.read_text().replace("</body>", SEARCHED))
+    shown = chromium(page.resolve(), tmp_path / "profile", "--dump-dom", "--window-size=820,800")
+    rows = re.findall(r'<tr(?: class="([^"]*)")?[^>]*><th scope="row">(row \d+)', articles(shown)["table9_long"])
+    assert [name for kinds, name in rows if "alike" not in kinds and "unfound" not in kinds] == ["row 3"]
+    assert re.search(r'<tr class="alike[^"]*" hidden', shown)

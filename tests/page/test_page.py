@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 
 import pytest
 
@@ -38,8 +39,8 @@ def test_every_table_and_figure_is_shown_with_its_caption_in_the_papers_order(pa
     for name in shown:
         assert f"Title of {name}" in page.text
         assert f'What <span class="docutils literal">{name}</span> shows.' in page.text
-    assert page.text.count('<td class="number best">97.7 ± 0.4</td>') == len(TABLES)
-    assert page.text.count('<td class="number">33.3 ± 2.0</td>') == len(TABLES)
+    assert page.text.count("<td><b>97.7 ± 0.4</b></td>") == len(TABLES)
+    assert page.text.count("<td>33.3 ± 2.0</td>") == len(TABLES)
     assert page.text.count("A footnote.") == len(TABLES)
 
 
@@ -63,7 +64,7 @@ def test_a_run_on_stand_ins_shows_the_verdicts_of_the_reference_as_such(copied):
     assert "These are the verdicts <strong>of the reference run on real objects</strong>" in text
     assert re.search(r'aria-pressed="true"><b>1</b> close<', text)
     assert "not comparable" not in text
-    assert '<td data-label="This run" class="number">88.8</td>' in text
+    assert '<td data-label="This run">88.8</td>' in text
     assert "The objects of this run are stand-ins, so none of its numbers is judged" in text
 
 
@@ -105,7 +106,29 @@ def test_the_same_results_give_the_same_bytes_and_not_many(folder, copied):
     write_page(copy, run)
     assert (copy / "index.html").read_bytes() == (folder / "index.html").read_bytes()
     assert (folder / "index.html").stat().st_size < 1e6
-    assert (folder / "page/plotly.min.js").stat().st_size < 6e6
+    assert not (folder / "page").exists()
+
+
+def test_pages_of_the_docs_are_links_where_they_are(copied):
+    folder, _ = copied
+    (folder / "../../docs").mkdir()
+    (folder / "../../docs/protocol.md").write_text("")
+    shown = results(
+        {"reliability": "As docs/protocol.md says, not docs/none.md; see ``metrics.csv``, table4_mine and reliability."}
+    )
+    write_page(folder, run_of(folder, results=shown))
+    text = (folder / "index.html").read_text()
+    assert 'As <a href="../../docs/protocol.md">docs/protocol.md</a> says, not docs/none.md' in text
+    assert '<a href="metrics.csv">metrics.csv</a>' in text
+    assert '<a href="#table4_mine">table4_mine</a> and reliability.' in text
+    assert [link for link in Page(text).links if link.startswith("..") and not (folder / link).is_file()] == []
+
+
+def test_a_title_says_the_dataset_as_readers_do(copied):
+    folder, run = copied
+    own = replace(run.results[0], title="Objects: cones")
+    write_page(folder, replace(run, results=[own, *run.results[1:]]))
+    assert "<h3>Objects: Cones</h3>" in (folder / "index.html").read_text()
 
 
 def test_without_comparison_and_samples_there_is_no_word_of_them(copied):

@@ -8,14 +8,16 @@ from gpca.alignment.rigid import inverse, transform
 from gpca.causes.settings import Limits
 from gpca.errors import InputError
 from gpca.experiments.method.concepts import source_before_icp
-from gpca.page.samples import OF_EACH_CONCEPT, POINTS, first_of_each_concept, page_samples, severity_words
+from gpca.model.shown.packing import unpacked
+from gpca.page.samples import OF_EACH_CONCEPT, first_of_each_concept, page_samples, severity_words
+from gpca.page.scenes import POINTS
 from gpca.pairs.perturbation import CONCEPTS
 from tests.figures import write_uncertainties
 
 SOURCE = {"title": "Bricks", "stand_in": True}
 
 
-LIMITS = Limits(nominal=0.02, failed=0.03)
+LIMITS, REACH = Limits(nominal=0.02, failed=0.03), 0.1
 
 
 @pytest.fixture
@@ -25,12 +27,19 @@ def files(registrations, predicted, tmp_path):
 
 @pytest.fixture
 def samples(files):
-    return page_samples(files, SOURCE, LIMITS)
+    return page_samples(files, SOURCE, LIMITS, REACH)
 
 
-def moved(sample, which):
-    points = np.array(sample["points"]).reshape(-1, 3) / 1000
-    return transform(np.array(sample[which]).reshape(4, 4), points)
+def drawn(sample, T=None):
+    """The source of a scene in a pose; or, by default, where the registration began."""
+    points = unpacked(sample["scene"]["source"])
+    return points if T is None else transform(np.reshape(T, (4, 4)), points)
+
+
+def centered(points, registrations, row):
+    """Points of a row in the frame of the view, whose origin is in the middle of the target."""
+    target = registrations.target(row)
+    return points - (target.min(axis=0) + target.max(axis=0)) / 2
 
 
 def test_the_first_test_samples_of_each_concept_are_shown(registrations):
@@ -44,27 +53,29 @@ def test_the_first_test_samples_of_each_concept_are_shown(registrations):
         assert shuffled.sample[of_concept].tolist() == numbers[:OF_EACH_CONCEPT].tolist()
 
 
-def test_the_clouds_are_those_of_the_file_to_a_thousandth_of_the_diameter(samples, registrations):
+def test_the_clouds_are_those_of_the_file_in_all_three_poses(samples, registrations):
     for sample, row in zip(samples, first_of_each_concept(registrations), strict=True):
-        cloud = registrations.cloud(row)
+        scene, cloud = sample["scene"], registrations.cloud(row)
         assert len(cloud) < POINTS  # so that none is left out
-        np.testing.assert_allclose(np.array(sample["points"]).reshape(-1, 3) / 1000, cloud, atol=5.1e-4)
-        target = np.array(sample["target_points"]).reshape(-1, 3) / 1000
-        np.testing.assert_allclose(target, registrations.target(row), atol=5.1e-4)
-
-
-def test_the_transforms_take_the_source_to_its_initial_and_to_its_true_pose(samples, registrations):
-    for sample, row in zip(samples, first_of_each_concept(registrations), strict=True):
-        np.testing.assert_allclose(moved(sample, "initial"), source_before_icp(registrations, row), atol=1e-3)
+        target = centered(registrations.target(row), registrations, row)
+        np.testing.assert_allclose(unpacked(scene["target"]), target, atol=1e-3)
         T_true_icp = registrations.T_target_source("true", row) @ inverse(registrations.T_target_source("icp", row))
-        np.testing.assert_allclose(moved(sample, "truth"), transform(T_true_icp, registrations.cloud(row)), atol=1e-3)
+        [truth] = scene["poses"]
+        for points, expected in (
+            (drawn(sample), source_before_icp(registrations, row)),
+            (drawn(sample, scene["found"]), cloud),
+            (drawn(sample, truth["T"]), transform(T_true_icp, cloud)),
+        ):
+            np.testing.assert_allclose(points, centered(expected, registrations, row), atol=1e-3)
+        assert truth["what_ifs"] == []
+        assert (scene["reach"], scene["titles"]) == (REACH, {"pose:0": "In the true pose"})
 
 
 def test_a_large_cloud_is_thinned_evenly(registrations, predicted, tmp_path):
     many = np.repeat(registrations.points, 20, axis=0)
     large = replace(registrations, points=many, offsets=registrations.offsets * 20)
-    for sample in page_samples(predicted(large, tmp_path), SOURCE, LIMITS):
-        assert len(sample["points"]) == 3 * POINTS
+    for sample in page_samples(predicted(large, tmp_path), SOURCE, LIMITS, REACH):
+        assert len(unpacked(sample["scene"]["source"])) == POINTS
 
 
 def test_scores_and_deviations_are_those_of_the_predictions(samples, files):
@@ -84,7 +95,7 @@ def test_an_abstention_has_no_scores(registrations, files):
     rows["abstained"], rows["concept_predicted"] = "True", ""
     rows[[f"score_{c}" for c in CONCEPTS]] = ""
     rows.to_csv(files["predictions"], index=False)
-    shown = page_samples(files, SOURCE, LIMITS)
+    shown = page_samples(files, SOURCE, LIMITS, REACH)
     assert {sample["predicted"] for sample in shown} == {""}
     assert {score["mean"] for sample in shown for score in sample["scores"]} == {None}
 
@@ -100,7 +111,7 @@ def test_predictions_of_other_samples_are_refused(files):
     rows = pd.read_csv(files["predictions"], dtype=str)
     rows[rows["split"] == "train"].to_csv(files["predictions"], index=False)
     with pytest.raises(InputError, match=r"seed0\.csv: lacks test sample \d+ of .*; regenerate both"):
-        page_samples(files, SOURCE, LIMITS)
+        page_samples(files, SOURCE, LIMITS, REACH)
 
 
 def test_the_page_says_how_far_off_icp_ends(samples, registrations):
@@ -118,7 +129,7 @@ def test_the_page_says_how_far_off_icp_ends(samples, registrations):
 def test_states_follow_the_limits_and_uncertainties_are_those_of_the_file(files, registrations, tmp_path):
     write_uncertainties(tmp_path / "u.csv", registrations)
     strict = Limits(nominal=1e-6, failed=1e-5)
-    for sample in page_samples(files | {"uncertainty": tmp_path / "u.csv"}, SOURCE, strict):
+    for sample in page_samples(files | {"uncertainty": tmp_path / "u.csv"}, SOURCE, strict, REACH):
         assert sample["state"] == "failed"
         assert sample["uncertainty"] == sample["sample"] / 10
         assert sample["clean_uncertainty"] == 1

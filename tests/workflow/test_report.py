@@ -60,7 +60,8 @@ def test_the_page_holds_every_table_and_figure_of_the_run(smoke):
     text = (folder / "index.html").read_text()
     assert set(re.findall(r'<article id="([^"]+)">', text)) == shown_in(folder)
     assert "procedural stand-in" in text
-    assert (folder / "page/plotly.min.js").is_file()
+    assert (folder / "index.html").stat().st_size < 2e6
+    assert '"shares":' in text  # failures whose causes were measured
 
 
 def test_the_crate_of_the_run_names_every_result_with_a_record(smoke):
@@ -70,5 +71,5 @@ def test_the_crate_of_the_run_names_every_result_with_a_record(smoke):
     parts = {entity["@id"].rstrip("/") for entity in crate["@graph"] if entity["@type"] in ("File", "Dataset")}
     recorded = {str(path.relative_to(folder)) for path in folder.rglob("*.provenance.json")}
     # The records of the job that wrote the crate come after it.
-    own = {"index.html", "page/plotly.min.js", NAME}
+    own = {"index.html", NAME}
     assert parts - {"."} == {name.removesuffix(".provenance.json") for name in recorded} - own

@@ -36,6 +36,8 @@ COMPARED_PREDICTIONS = [
 SAMPLED = {source: NAMES["gpca"] for source in SOURCES if NAMES["gpca"]}
 SAMPLED |= {FRAMES: NAMES["first_backbone"]}
 UNCERTAIN = [source for source in SAMPLED if source in SOURCES]
+# Sources whose first failures the page shows with their measured causes.
+MEASURED = SOURCES if NAMES["cause_explainer"] else []
 # What the page says first comes from these; where all objects of the run are stand-ins, the verdicts are those of the
 # reference on real ones.
 FOUND = [
@@ -60,6 +62,7 @@ rule comparison:
             "gpca.comparison.claim_verdicts",
             "gpca.comparison.clusters",
             "gpca.comparison.readings",
+            "gpca.experiments.specification_curve.words",
             "gpca.reporting.tables.comparison",
             "gpca.process.job",
         ),
@@ -105,11 +108,14 @@ rule page:
             f"<results>/uncertainty/{{source}}/causal/seed{SEEDS[0]}.csv",
             source=UNCERTAIN,
         ),
+        objects=collect("<results>/objects/{source}.npz", source=MEASURED),
+        causes=collect(
+            f"<results>/causes/{{source}}/seed{SEEDS[0]}.npz", source=MEASURED
+        ),
         code=code_files("gpca.page.page", "gpca.page.crate", "gpca.process.job"),
     output:
         page="<results>/index.html",
         crate="<results>/ro-crate-metadata.json",
-        script="<results>/page/plotly.min.js",
     log:
         "<logs>/page.log",
     benchmark:
@@ -125,6 +131,7 @@ rule page:
         ],
         samples=list(SAMPLED),
         uncertain=UNCERTAIN,
+        measured=MEASURED,
         titles={
             name: SHOWN[name] for name in ("explainers", "cause_explainers", "budget")
         },

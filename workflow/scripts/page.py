@@ -17,12 +17,17 @@ with workflow_script(snakemake):
     }
     for source, uncertainty in zip(given.uncertain, files.uncertainty, strict=True):
         samples[source]["uncertainty"] = uncertainty
+    causes = {
+        source: {"objects": objects, "causes": causes}
+        for source, objects, causes in zip(given.measured, files.objects, files.causes, strict=True)
+    }
     run = Run(
         name=given.run,
         seeds=given.config["seeds"],
         sources=given.sources,
         results=[Shown(*fields) for fields in given.shown],
         samples=samples,
+        causes=causes,
         titles=Titles(**given.titles),
         reference=next(iter(files.reference), None),
         config=given.config,

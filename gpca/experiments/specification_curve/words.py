@@ -112,3 +112,15 @@ def words_of(name: str, value: str) -> str:
     if value not in of_name and name in NUMBERS:
         return NUMBERS[name].format(value)
     return " and ".join(of_name.get(part, part) for part in value.split("+"))
+
+
+class ReadingWords:
+    """Says what readers call groups and readings (:class:`gpca.comparison.readings.Words`)."""
+
+    def group(self, name: str) -> str:
+        """Return what a group leaves open: ``How the GPC starts``; an unknown name stays as it is."""
+        return GROUPS[name].title if name in GROUPS else name
+
+    def reading(self, group: str, name: str) -> str:
+        """Return the choices of a reading: ``RBF, 100 iterations``."""
+        return reading_in_words(group, name)

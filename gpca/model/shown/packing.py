@@ -3,31 +3,46 @@
 from __future__ import annotations
 
 from base64 import b64decode, b64encode
+from pathlib import Path
 
 import numpy as np
 
+from gpca.alignment.rigid import transform
 from gpca.causes.shapley import BY_SIZE
 from gpca.model.scene import Possibility, Scene
 
+ASSETS = Path(__file__).with_name("assets")  # style and script of the view
 MOST_POINTS = 3000  # of each cloud; more hide one another
 LARGEST_STEP = 2**15 - 1
 FARTHEST = 4.0  # diameters from the target's center: what lies beyond is not in view
 
 
 def packed_scene(scene: Scene, unit: str) -> dict[str, object]:
-    """Return a scene as plain JSON values.
+    """Return a scene as plain JSON values; see :func:`packed_pair`."""
+    pair = packed_pair(scene.target, scene.source, scene.T_found, scene.reach, scene.frame.diameter, unit)
+    return pair | {"poses": [_pose(possibility) for possibility in scene.possibilities]}
 
-    Lengths are in diameters of the target, but for ``diameter``, which is in the unit of the user.
+
+def packed_pair(
+    target: np.ndarray, source: np.ndarray, T_found: np.ndarray, reach: float, diameter: float, unit: str
+) -> dict[str, object]:
+    """Return the two clouds of a registration as plain JSON values, without poses.
+
+    Lengths are in diameters of the target, but for ``diameter``, which is in the unit of the reader.
+
+    Args:
+        target: (M, 3). source: (N, 3) where the registration began.
+        T_found: 4×4, takes the source from there to where it ended.
+        reach: distance from which on all look alike.
     """
     return {
         "unit": unit,
-        "diameter": scene.frame.diameter,
-        "reach": scene.reach,
-        "radius": _radius(scene),
-        "target": packed(scene.target),
-        "source": packed(scene.source),
-        "found": flat(scene.T_found),
-        "poses": [_pose(possibility) for possibility in scene.possibilities],
+        "diameter": diameter,
+        "reach": reach,
+        "radius": _radius(target, source, transform(T_found, source)),
+        "target": packed(target),
+        "source": packed(source),
+        "found": flat(T_found),
     }
 
 
@@ -54,9 +69,9 @@ def flat(T: np.ndarray) -> list[float]:
     return [float(f"{value:.7g}") for value in T.ravel()]
 
 
-def _radius(scene: Scene) -> float:
-    """Return the distance from the target's center within which both clouds lie, but for a few far points."""
-    return float(np.clip(max(map(_reach, (scene.target, scene.source, scene.aligned))), 0.5, FARTHEST))
+def _radius(*clouds: np.ndarray) -> float:
+    """Return the distance from the target's center within which the clouds lie, but for a few far points."""
+    return float(np.clip(max(map(_reach, clouds)), 0.5, FARTHEST))
 
 
 def _reach(points: np.ndarray) -> float:

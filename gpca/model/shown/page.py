@@ -6,18 +6,17 @@ import json
 from collections.abc import Mapping, Sequence
 from functools import cache
 from html import escape
-from pathlib import Path
 
 from gpca.model.advice import CHECK
 from gpca.model.reenacted import Reenacted
 from gpca.model.scene import Scene
 from gpca.model.shown import parts
-from gpca.model.shown.packing import packed_scene
+from gpca.model.shown.packing import ASSETS, packed_scene
 
-ASSETS = Path(__file__).with_name("assets")
 # A browser then refuses whatever this page might ask of a network.
 ALONE = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:"
 FRAME_HEIGHT = 900  # pixels of the frame in a notebook
+SHOW = 'openView().load(JSON.parse(document.getElementById("scene").textContent));\n'
 
 
 def page(
@@ -123,7 +122,7 @@ def _view(poses: int) -> str:
 
 def _script(data: Mapping) -> str:
     text = json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")
-    return f'<script type="application/json" id="scene">{text}</script>\n<script>\n{_asset("view.js")}</script>\n'
+    return f'<script type="application/json" id="scene">{text}</script>\n<script>\n{_asset("view.js")}{SHOW}</script>\n'
 
 
 @cache

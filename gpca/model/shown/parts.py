@@ -6,16 +6,15 @@ from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from math import sqrt
 
-from gpca.causes.shapley import BY_SIZE, SUBSETS
+from gpca.causes.shapley import BY_SIZE
 from gpca.guarantee.alarm import ALARM, GOOD
 from gpca.guarantee.states import STATES
 from gpca.model.diagnosis import UNKNOWN
 from gpca.model.guaranteed import IN_WORDS
 from gpca.model.reenacted import FittingPose, Reenacted
-from gpca.pairs.perturbation import CONCEPTS
+from gpca.model.shown.subsets import WITHOUT, taken_out
 from gpca.recovery.policy import NOTHING
 
-WITHOUT = {"noise": "clean points", "pose": "right start", "overlap": "whole surface"}  # a cause that is taken out
 CALLS = {GOOD: "good", ALARM: "bad"}  # the look of a call; neither is doubtful
 TONES = {"nominal": "good", "failed": "bad", UNKNOWN: "doubt"}
 
@@ -147,12 +146,6 @@ def counterfactuals(
         "Choose a row to see its cloud, from the start itself."
     )
     return section("What if?", f'<p class="note">{note}</p>{"".join(groups)}')
-
-
-def taken_out(subset: int, without: Mapping[str, str] = WITHOUT) -> str:
-    """Return what a subset of the causes leaves out, in words."""
-    gone = [without[name] for cause, name in enumerate(CONCEPTS) if cause not in SUBSETS[subset]]
-    return ", ".join(gone).capitalize() or "As it was"
 
 
 def as_in_the_paper(explained: Mapping) -> str:

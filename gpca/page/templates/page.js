@@ -2,9 +2,14 @@
 
 // The comparison: verdicts are switched by their buttons, the table is chosen in its list.
 function filterComparison() {
-  const rows = [...document.querySelectorAll("#comparison-table tbody tr")];
+  const comparison = document.getElementById("comparison-table");
+  const rows = [...comparison.querySelectorAll("tbody tr:not(.group)")];
   const buttons = [...document.querySelectorAll("#verdict-filters button")];
   const tables = document.getElementById("table-filter");
+  function count() {
+    const [seen, all] = countRows(comparison);
+    document.getElementById("comparison-count").textContent = `${seen} of ${all} numbers`;
+  }
   function show() {
     const verdicts = new Set(
       buttons.filter((button) => button.ariaPressed === "true").map((button) => button.dataset.verdict),
@@ -12,8 +17,7 @@ function filterComparison() {
     for (const row of rows) {
       row.hidden = !verdicts.has(row.dataset.verdict) || (tables.value !== "" && row.dataset.table !== tables.value);
     }
-    const shown = rows.filter((row) => !row.hidden).length;
-    document.getElementById("comparison-count").textContent = `${shown} of ${rows.length} numbers`;
+    count();
   }
   for (const button of buttons) {
     button.addEventListener("click", () => {
@@ -22,62 +26,28 @@ function filterComparison() {
     });
   }
   tables.addEventListener("change", show);
+  comparison.addEventListener("searched", count);
   show();
 }
 
-// The 3-D view: one sample in one of its poses, and its scores beside it.
+// The 3-D view: one registration in one of its poses, and beside it what is known of it.
 function showRegistrations() {
   const samples = JSON.parse(document.getElementById("samples").textContent);
   const chosen = document.getElementById("sample");
-  const poses = [...document.querySelectorAll("#poses button")];
-  const view = document.getElementById("clouds");
-  if (typeof Plotly === "undefined") {
-    view.textContent = "The view needs page/plotly.min.js beside this page, which is not there.";
-    return;
-  }
+  const view = openView();
 
   const groups = new Map();
   samples.forEach((sample, index) => {
     const { title, stand_in: standIn } = sample.source;
-    if (!groups.has(title)) {
+    const measured = sample.shares ? ": failed, with measured causes" : "";
+    const name = `${title}${standIn ? " (procedural stand-in)" : ""}${measured}`;
+    if (!groups.has(name)) {
       const group = document.createElement("optgroup");
-      group.label = standIn ? `${title} (procedural stand-in)` : title;
-      groups.set(title, chosen.appendChild(group));
+      group.label = name;
+      groups.set(name, chosen.appendChild(group));
     }
-    groups.get(title).append(new Option(`${sample.concept}: ${sample.object}, sample ${sample.sample}`, index));
+    groups.get(name).append(new Option(`${sample.concept}: ${sample.object}, sample ${sample.sample}`, index));
   });
-
-  // Whole thousandths of the diameter, x y z after one another, moved by a 4×4 matrix given row by row.
-  function coordinates(points, matrix = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]) {
-    const axes = { x: [], y: [], z: [] };
-    for (let i = 0; i < points.length; i += 3) {
-      const [x, y, z] = [points[i] / 1000, points[i + 1] / 1000, points[i + 2] / 1000];
-      ["x", "y", "z"].forEach((axis, row) => {
-        const [a, b, c, shift] = matrix.slice(4 * row, 4 * row + 4);
-        axes[axis].push(a * x + b * y + c * z + shift);
-      });
-    }
-    return axes;
-  }
-
-  function cloud(name, colour, axes) {
-    const marker = { size: 2, color: colour };
-    return { type: "scatter3d", mode: "markers", name, marker, hoverinfo: "skip", ...axes };
-  }
-
-  // Equal steps on all axes, and the same extent in every pose, so that the eye sees what the pose changes.
-  function axes(clouds) {
-    const [low, high] = [Math.min, Math.max].map((end) =>
-      ["x", "y", "z"].map((axis) => end(...clouds.flatMap((points) => points[axis]))),
-    );
-    const half = Math.max(...high.map((value, axis) => value - low[axis])) / 2;
-    const scene = { aspectmode: "cube", uirevision: "kept", camera: { eye: { x: 1.1, y: 1.1, z: 0.7 } } };
-    ["x", "y", "z"].forEach((axis, row) => {
-      const middle = (low[row] + high[row]) / 2;
-      scene[`${axis}axis`] = { visible: false, range: [middle - half, middle + half] };
-    });
-    return scene;
-  }
 
   function element(tag, className, text = "") {
     const made = document.createElement(tag);
@@ -86,6 +56,15 @@ function showRegistrations() {
     return made;
   }
 
+  function head(sample) {
+    const { title, stand_in: standIn } = sample.source;
+    return [
+      element("h3", "", sample.object),
+      element("p", "footnote", title + (standIn ? ", procedural stand-in" : "")),
+    ];
+  }
+
+  // What GP-CA says of a perturbed registration.
   function scores(sample) {
     const named = sample.predicted === "" ? "names no concept" : `names ${sample.predicted}`;
     const verdict = sample.predicted === sample.concept ? ["right", "good"] : ["wrong", "bad"];
@@ -107,9 +86,7 @@ function showRegistrations() {
       row.append(element("span", "", concept), bar, element("span", "", number));
       return row;
     });
-    document.getElementById("scores").replaceChildren(
-      element("h3", "", sample.object),
-      element("p", "footnote", sample.source.title + (sample.source.stand_in ? ", procedural stand-in" : "")),
+    return [
       element("p", "", `True cause: ${sample.concept} (${sample.severity})`),
       said,
       ...rows,
@@ -118,38 +95,53 @@ function showRegistrations() {
         + `its fitness is ${sample.fitness}`
         + (sample.uncertainty === null ? "." : `, its uncertainty u ${sample.uncertainty.toFixed(1)} nats `
           + `(of 95 % of the clean pairs: at most ${sample.clean_uncertainty.toFixed(1)}).`)),
-    );
+    ];
   }
 
-  function draw() {
-    const sample = samples[chosen.value];
-    const pose = poses.find((button) => button.ariaPressed === "true").dataset.pose;
-    const target = coordinates(sample.target_points);
-    const inPose = {
-      initial: coordinates(sample.points, sample.initial),
-      icp: coordinates(sample.points),
-      truth: coordinates(sample.points, sample.truth),
+  // The measured share of each cause in a failure, and every counterfactual as a button that shows its cloud.
+  function measured(sample) {
+    const most = Math.max(...sample.what_ifs.map(({ percent }) => percent), 1.2 * sample.limit);
+    const bar = (percent) => {
+      const made = element("span", "bar");
+      made.appendChild(document.createElement("i")).style.width = `${Math.max(0, 100 * percent / most)}%`;
+      return made;
     };
-    const traces = [cloud("target", "#d55e00", target), cloud("source", "#0072b2", inPose[pose])];
-    const scene = axes([target, ...Object.values(inPose)]);
-    const layout = { scene, margin: { l: 0, r: 0, t: 0, b: 0 }, showlegend: false };
-    const config = { displaylogo: false, responsive: true, modeBarButtons: [["toImage", "resetCameraDefault3d"]] };
-    Plotly.react(view, traces, layout, config).then(() => {
-      view.dataset.shown = `${chosen.value} ${pose}`;
+    const shares = sample.shares.map(({ concept, percent }) => {
+      const row = element("div", concept === sample.concept ? "score true" : "score");
+      row.append(element("span", "", concept), bar(percent), element("span", "", `${percent.toFixed(1)} %`));
+      return row;
     });
-    scores(sample);
+    const whatIfs = sample.what_ifs.map(({ words, percent }, place) => {
+      const button = element("button", "what-if");
+      button.type = "button";
+      button.dataset.view = `what:0:${place}`;
+      const ofRow = bar(percent);
+      const limit = ofRow.appendChild(element("b", "limit"));
+      limit.style.left = `${100 * sample.limit / most}%`;
+      button.append(element("span", "", words), ofRow, element("span", "", `${percent.toFixed(1)} %`));
+      return button;
+    });
+    return [
+      element("h4", "", "What each cause adds to the error"),
+      ...shares,
+      element("h4", "", "Registered again without some causes"),
+      ...whatIfs.reverse(),
+      element("p", "footnote", `Mean errors over many starts, in % of the diameter; the line is the limit of a failure, `
+        + `${sample.limit} %. What a cause adds is its Shapley value in these eight errors. Choose a row to see where `
+        + `the cloud ends from the start itself; the registration that explainers see ends `
+        + `${sample.error_percent.toFixed(1)} % off.`),
+    ];
   }
 
-  for (const button of poses) {
-    button.addEventListener("click", () => {
-      for (const other of poses) {
-        other.ariaPressed = String(other === button);
-      }
-      draw();
-    });
+  function show() {
+    const sample = samples[chosen.value];
+    const facts = sample.shares ? measured(sample) : scores(sample);
+    document.getElementById("scores").replaceChildren(...head(sample), ...facts);
+    view.load(sample.scene);
+    chosen.dataset.shown = chosen.value;
   }
-  chosen.addEventListener("change", draw);
-  draw();
+  chosen.addEventListener("change", show);
+  show();
 }
 
 document.addEventListener("DOMContentLoaded", () => {

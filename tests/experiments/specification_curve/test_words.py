@@ -8,7 +8,7 @@ import yaml
 from gpca.code_files import ROOT
 from gpca.experiments.specification_curve.registry import GROUPS
 from gpca.experiments.specification_curve.settings import name_of
-from gpca.experiments.specification_curve.words import NUMBERS, WORDS, reading_in_words
+from gpca.experiments.specification_curve.words import NUMBERS, WORDS, ReadingWords, reading_in_words
 
 CHOICES = yaml.safe_load((ROOT / "config/readings.yaml").read_text())["readings"]["groups"]
 
@@ -46,3 +46,10 @@ def test_every_reading_of_the_suite_has_words_of_its_own(group):
     for reading in readings:
         for name, value in reading.items():
             assert name in NUMBERS or all(part in WORDS[name] for part in str(value).split("+"))
+
+
+def test_reasons_say_groups_and_readings_in_words():
+    words = ReadingWords()
+    assert words.group("gpc_start") == "How the GPC starts"
+    assert "/" not in words.reading("diagnostics", "in_distribution/knn_analytical/max_score/auroc_error")
+    assert words.group("mine") == "mine"

@@ -1,8 +1,7 @@
 "use strict";
 
 // Two clouds on a plain canvas: the target, and the source in the pose that was chosen.
-(() => {
-  const scene = JSON.parse(document.getElementById("scene").textContent);
+function openView() {
   const canvas = document.getElementById("view");
   const context = canvas.getContext("2d");
   const box = document.querySelector(".view");
@@ -51,18 +50,22 @@
     return MAP[low].map((value, part) => value + (place - low) * (MAP[low + 1][part] - value));
   }
 
-  const target = unpack(scene.target);
-  const source = unpack(scene.source);
+  let scene = null, target = null, source = null;
   const clouds = new Map();
   const camera = { ...INITIAL };
   let shown = "found";
   let hypothesis = 0;
 
+  // Registrations that are the same one are kept once: the others are its place in the list.
+  function whatIf(clouds, row) {
+    return typeof clouds[row] === "number" ? clouds[clouds[row]] : clouds[row];
+  }
+
   // The source as one view has it, and its distances, each computed when it is first looked at.
   function cloudOf(view) {
     if (!clouds.has(view)) {
       const [kind, k, row] = view.split(":");
-      const points = kind === "what" ? unpack(scene.poses[k].what_ifs[row])
+      const points = kind === "what" ? unpack(whatIf(scene.poses[k].what_ifs, row))
         : moved(source, { start: IDENTITY, found: scene.found }[kind] || scene.poses[k].T);
       clouds.set(view, { points, distances: nearest(points, target) });
     }
@@ -74,6 +77,7 @@
   }
 
   function title(view) {
+    if (scene.titles && view in scene.titles) return scene.titles[view];
     const [kind, k] = view.split(":");
     if (kind === "what") {
       const button = document.querySelector(`.what-if[data-view="${view}"] span`);
@@ -202,13 +206,26 @@
   byId("reset").addEventListener("click", () => { Object.assign(camera, INITIAL); redraw(); });
   for (const name of ["show-source", "show-target"]) byId(name).addEventListener("change", redraw);
   byId("by-distance").addEventListener("change", color);
-  for (const button of document.querySelectorAll("[data-view]")) {
-    button.addEventListener("click", () => choose(button.dataset.view));
-  }
+  document.addEventListener("click", (event) => {
+    const button = event.target.closest("[data-view]");
+    if (button) choose(button.dataset.view);
+  });
   const [, bar, most] = byId("scale").children;
   bar.style.background = `linear-gradient(to right, ${MAP.map((rgb) => `rgb(${rgb})`).join(", ")})`;
-  most.textContent = `${length(scene.reach)} or more`;
-  new ResizeObserver(redraw).observe(canvas);
-  color();
-  choose("found");
-})();
+  new ResizeObserver(() => { if (scene) redraw(); }).observe(canvas);
+
+  // Shows another pair of clouds, in the view that was chosen where it has that too.
+  function load(given) {
+    scene = given;
+    [target, source] = [unpack(scene.target), unpack(scene.source)];
+    clouds.clear();
+    most.textContent = `${length(scene.reach)} or more`;
+    const [kind, k] = shown.split(":");
+    const pose = scene.poses[k];
+    const there = kind === "what" ? pose && pose.what_ifs.length : k === undefined || pose;
+    choose(there ? shown : "found");
+    color();
+  }
+
+  return { load };
+}
