@@ -11,8 +11,20 @@ import numpy as np
 from gpca.active_learning.curves import read_curves
 from gpca.attribution.metrics import mean_interval, source_method_seed
 from gpca.errors import InputError
-from gpca.reporting.figures.panels import legend_below, panels
-from gpca.reporting.figures.style import BLACK, BLUE, GRAY, GREEN, ORANGE, PURPLE, SKY_BLUE, VERMILION, write_title
+from gpca.reporting.figures.panels import fitting_columns, legend_below, panels
+from gpca.reporting.figures.style import (
+    BLACK,
+    BLUE,
+    GRAY,
+    GREEN,
+    ORANGE,
+    PURPLE,
+    SKY_BLUE,
+    SMALL_PT,
+    TEXT_WIDTH_IN,
+    VERMILION,
+    write_title,
+)
 from gpca.reporting.words import plural, span
 
 if TYPE_CHECKING:
@@ -21,8 +33,7 @@ if TYPE_CHECKING:
 
 ROWS = {"pretrained": "encoder saw\nall concepts", "unseen": "encoder never saw\nthe new concept"}
 OVERLAP_ROWS = {**ROWS, "rare_5": "encoder saw all;\n5 % of the pool new"}
-LEGEND_COLUMNS = 5
-LEGEND_LETTERS, LEGEND_LETTERS_OF_LINE = 130, 8  # in a line of the legend, and those that a line's sign takes
+MOST_LINES = 6  # in a panel; of more, none can be followed
 STYLES = {  # The paper's two strategies are thick, with their intervals; an unknown one has the style _OTHER.
     "bald_kmeans": (BLUE, "-", 1.8),
     "random": (BLACK, "-", 1.8),
@@ -76,7 +87,8 @@ def draw_curves(
 ) -> Figure:
     """Draw curves as lines of panels; rows share an axis of labels where they have as many of them.
 
-    The title says over how many seeds the means are.
+    A row of more than `MOST_LINES` lines is drawn as several, and those with an interval are in each of them. The title
+    says over how many seeds the means are.
 
     Args:
         curves: What :func:`mean_curves` makes of them, by source, row and line.
@@ -85,37 +97,52 @@ def draw_curves(
         target: The accuracy that a dashed line marks.
     """
     shown = {key for key in curves if key[0] in sources and key[1] in rows and key[2] in lines}
-    columns, down, across = ([name for name in part if any(key[i] == name for key in shown)]
-                             for i, part in enumerate((sources, rows, lines)))  # fmt: skip
+    columns, settings, across = ([name for name in part if any(key[i] == name for key in shown)]
+                                 for i, part in enumerate((sources, rows, lines)))  # fmt: skip
     if not shown:
         raise InputError("active learning", "has no curve of these sources and strategies", "run it first")
-    longest = max(len(lines[line]) for line in across)
-    beside = max(1, min(LEGEND_COLUMNS, LEGEND_LETTERS // (longest + LEGEND_LETTERS_OF_LINE)))
-    below = -(-(len(across) + 1) // beside)
-    height_in = 0.42 + 0.2 * below + 1.5 * len(down)
+    down = [
+        (name, group)
+        for name in settings
+        for group in _groups([line for line in across if any(key[1:] == (name, line) for key in shown)], styles)
+    ]
     aim = f"target ({100 * target:g} %)"
+    ordered = [*(lines[line] for line in across), aim]
+    below = -(-len(ordered) // fitting_columns(ordered, TEXT_WIDTH_IN))
+    height_in = 0.42 + 0.2 * below + (1.5 if len(down) < 4 else 1.25) * len(down)
     alike = len({curves[key]["labels"].iloc[-1] for key in shown}) == 1
     sharex = True if alike else "row"
     figure, axes = panels(len(down), len(columns), height_in, sharex=sharex, sharey=True)
-    for row, name in enumerate(down):
+    for row, (name, group) in enumerate(down):
         for column, source in enumerate(columns):
             panel = axes[row, column]
             panel.axhline(100 * target, color=GRAY, linewidth=0.6, linestyle=(0, (4, 3)), label=aim)
-            for line in reversed(across):
+            for line in reversed(group):
                 if (source, name, line) in shown:
                     _draw(panel, styles.get(line, _OTHER), lines[line], curves[source, name, line])
+            if len(panel.get_lines()) == 1:
+                panel.text(0.5, 0.5, "no curve", transform=panel.transAxes, ha="center", va="center", color=GRAY)
             panel.margins(x=0.01)
             if row == 0:
                 panel.set_title(sources[source])
             if row == len(down) - 1:
                 panel.set_xlabel("labels")
-        axes[row, 0].set_ylabel(f"accuracy (%)\n{rows[name]}")
+        axes[row, 0].set_ylabel(f"accuracy (%)\n{rows[name]}", fontsize=SMALL_PT)
     handles = {line.get_label(): line for panel in axes.flat for line in panel.get_lines()}
-    ordered = [*(lines[line] for line in across), aim]
-    legend_below(figure, [handles[title] for title in ordered], ordered, beside)
+    legend_below(figure, [handles[title] for title in ordered], ordered)
     seeds = {count for key in shown for count in curves[key]["seeds"]}
     write_title(figure, f"Means over {plural(span(seeds), 'seed')}")
     return figure
+
+
+def _groups(lines: list[str], styles: Mapping[str, tuple]) -> list[list[str]]:
+    """Return the lines of a setting as groups of at most `MOST_LINES`; lines with an interval are in each."""
+    if len(lines) <= MOST_LINES:
+        return [lines]
+    always = [line for line in lines if styles.get(line, _OTHER)[2] > 1][: MOST_LINES - 1]
+    others = [line for line in lines if line not in always]
+    parts = -(-len(others) // (MOST_LINES - len(always)))
+    return [[*always, *map(str, part)] for part in np.array_split(others, parts)]
 
 
 def mean_curves(

@@ -7,18 +7,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gpca.attribution.confidence import wilson_interval
 from gpca.causes.truth import BORDERLINE, NOMINAL
 from gpca.errors import InputError
 from gpca.experiments.diagnosis.judged import Judged
 from gpca.experiments.diagnosis.measures import BINS as BINS_OF_NOMINAL
-from gpca.reporting.figures.panels import label_outer, legend_below, panels_in_lines
-from gpca.reporting.figures.style import BLUE, GRAY, LIGHT_GRAY, SMALL_PT, write_title
+from gpca.reporting.figures.panels import MOST_PER_ROW, label_outer, legend_below, panels_in_lines
+from gpca.reporting.figures.style import BLUE, GRAY, LIGHT_GRAY, SMALL_PT, TEXT_WIDTH_IN, write_title
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FEWEST = 5  # A bin with fewer samples has no point.
 HEADROOM = 2.0  # The axis of the numbers is this many times as high as the highest bar.
+BESIDE_IN, ABOVE_IN = 0.42, 0.42  # what stands beside a square panel, and above and below it
+WIDEST_IN = 1.6  # of a panel
 
 
 def draw_nominal_reliability(
@@ -66,9 +69,11 @@ def reliability_figure(
         label: That of the curves, in the legend.
         least: The smallest probability that there can be.
     """
-    figure, panels = panels_in_lines(len(samples), 1.85 if least == 0 else 1.55)
+    lines = -(-len(samples) // MOST_PER_ROW)
+    square_in = TEXT_WIDTH_IN / -(-len(samples) // lines) - BESIDE_IN
+    figure, panels = panels_in_lines(len(samples), min(square_in, WIDEST_IN) + ABOVE_IN)
     for panel, (words, (probability_S, true_S)) in zip(panels, samples.items(), strict=True):
-        gap = draw_reliability_panel(panel, probability_S, true_S, bins, label)
+        gap = draw_reliability_panel(panel, probability_S, true_S, bins, f"{label}, 95 % interval")
         panel.set_title(f"{words}\npooled ECE {gap:.3f}", fontsize=SMALL_PT)
         if least:
             panel.set_xlim(least - 0.03, 1.02)
@@ -82,9 +87,10 @@ def reliability_figure(
 def draw_reliability_panel(
     panel, probability_S: np.ndarray, true_S: np.ndarray, bins: int, label: str = "accuracy"
 ) -> float:
-    """Draw in each bin the share that came true, and the number of samples; return the expected calibration error.
+    """Draw the share that came true and its Wilson interval (95 %) by bin; return the expected calibration error.
 
-    The panel is square, and its diagonal calibrated. The numbers are bars with an axis of their own at the right.
+    The panel is square, and its diagonal calibrated. The numbers of samples are bars with an axis of their own at the
+    right.
 
     Args:
         panel: axes of matplotlib.
@@ -96,7 +102,8 @@ def draw_reliability_panel(
     bin_S = np.minimum((probability_S * bins).astype(int), bins - 1)
     counts_B = np.bincount(bin_S, minlength=bins)
     drawn = counts_B >= FEWEST
-    true_B = np.bincount(bin_S, weights=true_S, minlength=bins)[drawn] / counts_B[drawn]
+    hits_B = np.bincount(bin_S, weights=true_S, minlength=bins)[drawn]
+    true_B = hits_B / counts_B[drawn]
     mean_B = np.bincount(bin_S, weights=probability_S, minlength=bins)[drawn] / counts_B[drawn]
     centers_B = (np.arange(bins) + 0.5) / bins
     counts = panel.twinx()
@@ -112,6 +119,8 @@ def draw_reliability_panel(
     panel.patch.set_visible(False)
     panel.bar(0.5, 0, color=LIGHT_GRAY, label="samples (right axis)")
     panel.plot([0, 1], [0, 1], color=GRAY, linewidth=0.6, linestyle=(0, (4, 3)), label="calibrated")
+    bounds_B_2 = [wilson_interval(hits, count) for hits, count in zip(hits_B, counts_B[drawn], strict=True)]
+    panel.vlines(mean_B, *np.reshape(bounds_B_2, (-1, 2)).T, color=BLUE, linewidth=0.7)
     panel.plot(mean_B, true_B, "o-", color=BLUE, markersize=2.5, linewidth=1.0, label=label)
     panel.set(xlim=(0, 1.02), ylim=(0, 1.02), box_aspect=1)
     counts.set_box_aspect(1)

@@ -38,7 +38,7 @@ STYLES: dict[str, tuple[str, Any]] = {  # An estimator has a color and a line ev
 _OTHER = (YELLOW, "-")
 TURN = np.linspace(0, 2 * np.pi, 181)
 PLANE = 95.0  # percent that an ellipse holds
-WIDEST = 2.0  # An ellipse may make a panel this many times as wide as dots and true pose do; a wider one is cut.
+WIDEST = 2.0  # An ellipse may make a panel this many times as wide as dots and true pose do; a wider one is left out.
 
 
 def style_of(name: str) -> tuple[str, Any]:
@@ -55,8 +55,10 @@ def ellipse(covariance_2_2: np.ndarray) -> np.ndarray:
 
 def draw_ellipses(
     panel, samples: ReferenceSamples, place: int, estimates: Mapping, block: slice, factor: float
-) -> None:
+) -> list[str]:
     """Draw one registration in the plane in which the results of other starts and data spread most.
+
+    Returns the estimators whose ellipses are far wider than the results and are therefore left out.
 
     Args:
         panel: the matplotlib axes.
@@ -72,12 +74,15 @@ def draw_ellipses(
     dots_n_2, true_2 = twists_n_3 @ plane_3_2, factor * samples.true_twist[place, block] @ plane_3_2
     panel.scatter(*dots_n_2.T, s=1.2, color=LIGHT_GRAY, linewidths=0, rasterized=True, zorder=1)
     reach = max(np.quantile(np.abs(dots_n_2), 0.985), 2.6 * np.sqrt(max(values_3[-1], 0)), *np.abs(true_2))
-    most = WIDEST * reach
+    most, left_out = WIDEST * reach, []
     for name, row in estimates.items():
         if row is None:
             continue
         outline_n_2 = ellipse(factor**2 * plane_3_2.T @ covariance_of(row)[block, block] @ plane_3_2)
-        reach = max(reach, min(np.abs(outline_n_2).max(), most))
+        if (widest := np.abs(outline_n_2).max()) > most:
+            left_out.append(name)
+            continue
+        reach = max(reach, widest)
         color, line = style_of(name)
         look = {"linewidth": 1.8, "zorder": 2} if name in REFERENCES else {"linewidth": 0.9, "zorder": 3}
         panel.plot(*outline_n_2.T, color=color, linestyle=line, **look)
@@ -85,3 +90,4 @@ def draw_ellipses(
     panel.set(xlim=(-1.05 * reach, 1.05 * reach), ylim=(-1.05 * reach, 1.05 * reach), aspect="equal")
     panel.locator_params(nbins=4)
     panel.tick_params(pad=1.5, length=2)
+    return left_out

@@ -52,7 +52,7 @@ def draw_estimators(
     plt = use_style()
     figure = plt.figure(figsize=(TEXT_WIDTH_IN, 5.35), layout="constrained")
     upper, lower = figure.subfigures(2, 1, height_ratios=(2.1, 3))
-    _draw_shown(upper.subplots(1, 2 * len(shown)), shown, samples, of_shown)
+    _draw_shown(upper.subplots(1, 2 * len(shown)), shown, samples, of_shown, titles)
     names = [name for name in titles if len(pooled[name])]
     informative = [SHOWN, *(name for name in names if name not in REFERENCES)][:8]
     left, right = lower.subfigures(1, 2, width_ratios=(0.69, 0.31))
@@ -84,8 +84,13 @@ def draw_estimators(
     return figure
 
 
-def _draw_shown(panels, shown: Mapping[str, int], samples: ReferenceSamples, of_shown: Mapping) -> None:
-    """Draw the ellipses of each registration that is shown, in a plane of its rotation and one of its translation."""
+def _draw_shown(
+    panels, shown: Mapping[str, int], samples: ReferenceSamples, of_shown: Mapping, titles: Mapping[str, str]
+) -> None:
+    """Draw the ellipses of each registration that is shown, in a plane of its rotation and one of its translation.
+
+    Estimators whose ellipses would not fit are named instead.
+    """
     parts = {
         "rotation": (slice(0, 3), "degrees", np.rad2deg(1.0)),
         "translation": (slice(3, 6), "% of the diameter", 100.0),
@@ -94,9 +99,10 @@ def _draw_shown(panels, shown: Mapping[str, int], samples: ReferenceSamples, of_
         panels, product(shown.items(), parts.items()), strict=True
     ):
         estimates = {name: _estimate_of(rows, samples.sample[place]) for name, rows in of_shown.items()}
-        draw_ellipses(panel, samples, place, estimates, axes, factor)
+        left_out = draw_ellipses(panel, samples, place, estimates, axes, factor)
         panel.set_title(f"{kind}: {part}", fontsize=8, pad=3)
-        panel.set_xlabel(f"first axis ({unit})", fontsize=SMALL_PT, labelpad=1)
+        words = "\n".join([f"first axis ({unit})", *(f"far wider: {titles[name]}" for name in left_out)])
+        panel.set_xlabel(words, fontsize=SMALL_PT, labelpad=1, linespacing=1.1)
         panel.set_ylabel(f"second axis ({unit})", fontsize=SMALL_PT, labelpad=0)
 
 

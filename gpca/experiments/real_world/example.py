@@ -38,19 +38,22 @@ def draw_real_world_example(
     poses_csv: str | Path,
     predictions_csv: str | Path,
     title: str,
+    success: float,
 ) -> Figure:
     """Draw (a) a part of the frame with the object's region and what of it is covered, (b) its points at the initial
     pose over the model as the camera sees both, (c) after ICP, with the estimated axes, and (d) the concept scores.
 
-    The figure shows a test sample that an occluder covers (else any overlap sample) and that is attributed rightly: of
-    the half of such samples that are the largest in their images, the one with the median score.
+    The figure shows a failure that missing overlap caused: a test sample that an occluder covers and that is attributed
+    rightly, whose initial pose was right and whose pose after ICP is not, and of the half of such samples that are the
+    largest in their images the one with the median score. Where there is none such, the wishes are dropped from the
+    last on. A pose is right whose error is below `success`, in diameters.
     """
     instances = Instances.load(instances_npz)
     objects = ObjectClouds.load(objects_npz)
     registrations = Registrations.load(registrations_npz)
     samples = read_samples(poses_csv, predictions_csv)
     shown_px = np.where(instances.is_colored, np.diff(instances.offsets), 0)
-    row = choose_sample(samples, predictions_csv, shown_px)
+    row = choose_sample(samples, predictions_csv, shown_px, success)
     sample = samples.iloc[row]
     i = int(sample["instance"])
     camera = _Camera(instances, i, registrations, row)
@@ -97,10 +100,11 @@ def draw_real_world_example(
         letter: dict[str, Any] = {"path_effects": outline, "fontweight": "bold"}
         drawn[2].text(x, y, name, color=BLACK, ha="center", va="center", **letter)
     draw_scores(drawn[3], sample)
+    failed = ", failed" if sample["icp_error"] >= success else ""
     captions = (
         "(a) Region of interest; black: covered",
         f"(b) Initial pose: {100 * sample['init_error']:.1f} % $d$ off",
-        f"(c) After ICP: {100 * sample['icp_error']:.1f} % $d$ off",
+        f"(c) After ICP: {100 * sample['icp_error']:.1f} % $d$ off{failed}",
     )
     for panel, caption in zip(drawn[:3], captions, strict=True):
         panel.set_axis_off()
@@ -113,14 +117,20 @@ def draw_real_world_example(
     return figure
 
 
-def choose_sample(samples: pd.DataFrame, path: str | Path, pixels_I: np.ndarray) -> int:
+def choose_sample(samples: pd.DataFrame, path: str | Path, pixels_I: np.ndarray, success: float) -> int:
     """Return the row that is shown; see :func:`draw_real_world_example`. Instance i shows ``pixels_I[i]`` colors."""
     is_seen = pixels_I[samples["instance"].to_numpy(int)] > 0
     overlap = samples[is_seen & (samples["split"] == "test") & (samples["concept_true"] == "overlap")]
     if overlap.empty:
         raise InputError(path, "has no test sample of overlap in a frame with colors", "raise real_world.test")
-    for column, wanted in (("lost_to", OCCLUDER), ("concept_predicted", "overlap")):
-        narrower = overlap[overlap[column] == wanted]
+    wishes = (
+        samples["lost_to"] == OCCLUDER,
+        samples["concept_predicted"] == "overlap",
+        samples["icp_error"] >= success,
+        samples["init_error"] < success,
+    )
+    for wish in wishes:
+        narrower = overlap[wish.reindex(overlap.index)]
         overlap = overlap if narrower.empty else narrower
     sized = overlap.assign(pixels=pixels_I[overlap["instance"].to_numpy(int)])
     ranked = sized.nlargest((len(sized) + 1) // 2, "pixels").sort_values(["score_overlap", "sample"])

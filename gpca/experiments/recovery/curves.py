@@ -48,6 +48,7 @@ ALONE: dict[str, Look] = {  # policies that have to recognize failures themselve
 ALWAYS: Look = (ORANGE, (0, (4, 2)))  # the best of the sequences
 FACTORS = np.geomspace(0.3, 3, 21)  # on the costs of all actions
 FAILED = (0.5, 0.1)  # shares of the registrations
+LOSSES = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)  # that the axis names
 
 
 def draw_recovery_thresholds(
@@ -75,6 +76,9 @@ def draw_recovery_thresholds(
             look = {"color": color, "linestyle": line, "linewidth": 1.4, "marker": "o", "markersize": 3}
             panel.plot(*zip(*points, strict=True), label=policies[name], **look)
         panel.axvline(100 * success, color=LIGHT_GRAY, linestyle=":", zorder=0)
+        panel.set_xscale("log")
+        panel.set_xticks([100 * limit for limit in curve], [f"{100 * limit:g}" for limit in curve])
+        panel.minorticks_off()
         panel.set(title=f"within {plural(k, 'action')}", ylim=(-2, 102), xlabel="error allowed (% of the diameter)")
     drawn[0].set_ylabel("recovered (%)")
     handles, labels = drawn[0].get_legend_handles_labels()
@@ -94,13 +98,17 @@ def draw_recovery_costs(
         needless: What it costs to act on a good registration, besides the action.
     """
     shown = _shown(metrics, policies, ALONE, budget)
-    figure, [drawn] = panels(1, len(FAILED), 2.8, sharex=True)
+    from matplotlib.ticker import FixedLocator
+
+    figure, [drawn] = panels(1, len(FAILED), 2.8, sharex=True, sharey=True)
     for panel, failed in zip(drawn, FAILED, strict=True):
         for name, (color, line) in shown.items():
             loss_F = losses(metrics, name, budget, needless, failed, FACTORS)
             panel.plot(FACTORS, loss_F, color=color, linestyle=line, linewidth=1.4, label=policies[name])
-        panel.set(xscale="log", title=f"{100 * failed:.0f} % have failed", xlabel="factor on the costs of actions")
-        panel.set_ylim(bottom=0)
+        panel.set(xscale="log", yscale="log", xlabel="factor on the costs of actions")
+        panel.set_title(f"{100 * failed:.0f} % have failed")
+        panel.yaxis.set_major_locator(FixedLocator(LOSSES))
+        panel.yaxis.set_major_formatter("{x:g}")
         panel.set_xticks([0.3, 1, 3], ["0.3", "1", "3"])
         panel.minorticks_off()
     drawn[0].set_ylabel("loss per registration")

@@ -80,6 +80,7 @@ def shown(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str
         "recovery_title": f"Tables of the virtual camera, {title_of(objects)}",
         "recovery_dataset": dataset_of(objects),
         "treatments": recovery["treatments"],
+        "policy_thresholds": recovery["thresholds"],
         "budget": recovery["loop"]["budget"],
         "needless": recovery["needless"],
     }

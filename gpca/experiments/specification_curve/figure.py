@@ -1,9 +1,9 @@
-"""Draws specification curves: the value that every reading gives in place of a printed number."""
+"""Draws the value that every reading gives in place of a printed number: a line of dots for each number."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from textwrap import shorten, wrap
+from textwrap import shorten
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,72 +12,65 @@ from gpca.comparison.readings import asked_about
 from gpca.errors import InputError
 from gpca.objects.title import stand_in_clause
 from gpca.reporting.figures.panels import panels
-from gpca.reporting.figures.style import LIGHT_GRAY, PALETTE, SMALL_PT, YELLOW, write_title
+from gpca.reporting.figures.style import BLUE, GRAY, LIGHT_GRAY, SMALL_PT, write_title
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-COLUMNS = 3
-PANEL_IN, LINE_IN = 1.9, 0.13  # the height of a row of panels, and what each line of the legends below it adds
+ROW_IN, HEAD_IN = 0.165, 0.85  # the height of a line, and what title and axis take
 FARTHEST = 30.0  # times the close tolerance
-COLORS = tuple(color for color in PALETTE if color != YELLOW)  # Yellow lines are hard to see on white.
 NUMBER = ["table", "row", "column"]  # what names a printed number
-LETTERS = 48  # of a number's name, which a panel has room for
-LINES = ("-", "--", ":")  # of the first numbers in a panel that have a color each, the next such, …
+LETTERS = 52  # of a number's name, which there is room for
 
 
 def draw_readings(judged: pd.DataFrame, groups: Mapping[str, str], sources: Mapping[str, Mapping]) -> Figure:
-    """Draw a panel per group: a curve for each number that is not reproduced, its readings in order of their values.
+    """Draw the readings of each number that is not reproduced as dots in a line, the lines of a group below its name.
+
+    At the right stands how many of a number's readings are close.
 
     Args:
         judged: the rows that :func:`gpca.comparison.readings.read_judged` returned.
     """
     missed = asked_about(judged)
-    shown = [name for name in groups if (missed["group"] == name).any()]
-    if not shown:
+    of_groups = {
+        name: dict(list(missed[missed["group"] == name].groupby(NUMBER, sort=False)))
+        for name in groups
+        if (missed["group"] == name).any()
+    }
+    if not of_groups:
         raise InputError("reading_verdicts.csv", "has no readings of these groups", "run the readings first")
-    columns = min(COLUMNS, len(shown))
-    of_groups = [dict(list(missed[missed["group"] == name].groupby(NUMBER, sort=False))) for name in shown]
-    rows = [of_groups[i : i + columns] for i in range(0, len(shown), columns)]
-    height_in = sum(PANEL_IN + LINE_IN * max(map(len, row)) for row in rows) + 0.5
-    figure, axes = panels(len(rows), columns, height_in, sharey=True)
-    for panel, group, of_group in zip(axes.flat, shown, of_groups, strict=False):
-        _draw_group(panel, of_group)
-        panel.set_title("\n".join(wrap(groups[group], 40)), fontsize=8)
-    for panel in axes.flat[len(shown) :]:
-        panel.set_visible(False)
-    linear = "linear up to what is close, logarithmic beyond"
-    figure.supylabel(f"distance from the printed number (times what is close; {linear})", fontsize=8)
-    figure.supxlabel("share of the readings (%), from the lowest to the highest value", fontsize=8)
-    write_title(figure, f"Every reading of the unstated{stand_in_clause(sources.values())}")
+    figure, [[panel]] = panels(1, 1, HEAD_IN + ROW_IN * sum(len(of_group) + 1 for of_group in of_groups.values()))
+    panel.axvspan(-1, 1, color=LIGHT_GRAY, alpha=0.6, linewidth=0)
+    panel.axvline(0, color=GRAY, linewidth=0.6)
+    names: list[str] = []
+    headings = []
+    for group, of_group in of_groups.items():
+        headings.append(len(names))
+        names.append(groups[group])
+        for key, rows in of_group.items():
+            _draw_number(panel, len(names), rows)
+            names.append(_words(key))
+    panel.set_yticks(range(len(names)), names, fontsize=SMALL_PT)
+    for place in headings:
+        panel.get_yticklabels()[place].set_fontweight("bold")
+    panel.tick_params(axis="y", length=0)
+    panel.set_ylim(len(names) - 0.4, -0.6)
+    panel.set_xscale("symlog", linthresh=1)
+    panel.set_xlim(-1.1 * FARTHEST, 1.1 * FARTHEST)
+    panel.set_xticks([-10, -1, 0, 1, 10], ["-10", "-1", "0", "1", "10"])
+    panel.set_xlabel("distance from the printed number (times what is close; linear up to it, logarithmic beyond)")
+    write_title(figure, f"Every reading of the unstated{stand_in_clause(sources.values())}; right: how many are close")
     return figure
 
 
-def _draw_group(panel, of_numbers: Mapping[tuple[str, str, str], pd.DataFrame]) -> None:
-    """Draw the curve of each number, and name them all below the panel, where no curve is."""
-    panel.axhspan(-1, 1, color=LIGHT_GRAY, linewidth=0)
-    for place, (key, of_number) in enumerate(of_numbers.items()):
-        distance_R = np.sort(of_number["distance"].to_numpy().clip(-FARTHEST, FARTHEST))
-        share_R = np.linspace(0, 100, len(distance_R)) if len(distance_R) > 1 else np.array([50.0])
-        look = {
-            "color": COLORS[place % len(COLORS)],
-            "linestyle": LINES[place // len(COLORS) % len(LINES)],
-            "label": _words(key),
-        }
-        panel.plot(share_R, distance_R, marker="o", markersize=1.6, linewidth=0.8, **look)
-    panel.legend(
-        fontsize=SMALL_PT,
-        loc="upper left",
-        bbox_to_anchor=(-0.1, -0.16),
-        handlelength=1.6,
-        borderaxespad=0,
-        borderpad=0,
-        labelspacing=0.2,
-    )
-    panel.set_yscale("symlog", linthresh=1)
-    panel.set_ylim(-FARTHEST, FARTHEST)
-    panel.set_yticks([-10, -1, 0, 1, 10], ["-10", "-1", "0", "1", "10"])
+def _draw_number(panel, place: int, rows: pd.DataFrame) -> None:
+    """Draw the readings of one number as dots on the line that joins them, and count those that are close."""
+    distance_R = np.sort(rows["distance"].to_numpy(float).clip(-FARTHEST, FARTHEST))
+    panel.plot(distance_R[[0, -1]], [place, place], color=GRAY, linewidth=0.6)
+    panel.scatter(distance_R, np.full(len(distance_R), place), s=9, color=BLUE, alpha=0.45, linewidths=0, zorder=3)
+    words = f"{rows['close'].sum():.0f} of {len(rows)}"
+    panel.text(1.01, place, words, transform=panel.get_yaxis_transform(), va="center", fontsize=SMALL_PT)
 
 
 def _words(key: tuple[str, str, str]) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 from gpca.reporting.figures.style import SMALL_PT, TEXT_WIDTH_IN, blues, use_style
 
 MOST_PER_ROW = 5
+LETTERS_PER_IN, LETTERS_OF_SIGN = 18, 8  # of a legend, and those that a sign before a label takes the room of
 
 
 def panels(rows: int, columns: int, height_in: float, width_in: float = TEXT_WIDTH_IN, **options):
@@ -39,9 +40,20 @@ def label_outer(of_panels: list, across: str, up: str) -> None:
 
 
 def legend_below(figure, handles: list, labels: list[str] | None = None, columns: int = 0, **style) -> None:
-    """Name lines and markers below all panels, in one line or in columns."""
+    """Name lines and markers below all panels, in columns, or in one line where the figure is wide enough for it."""
     labels = [handle.get_label() for handle in handles] if labels is None else labels
-    figure.legend(handles, labels, loc="outside lower center", ncols=columns or len(labels), columnspacing=1.4, **style)
+    columns = columns or fitting_columns(labels, figure.get_figwidth())
+    figure.legend(handles, labels, loc="outside lower center", ncols=columns, columnspacing=1.4, **style)
+
+
+def fitting_columns(labels: list[str], width_in: float) -> int:
+    """Return how many columns of a legend fit a width: all labels in one line, or fewer of the longest label each."""
+    room = LETTERS_PER_IN * width_in
+    if sum(len(label) + LETTERS_OF_SIGN for label in labels) <= room:
+        return len(labels)
+    longest = max(len(label) for label in labels) + LETTERS_OF_SIGN
+    most = max(1, min(len(labels), int(room // longest)))
+    return -(-len(labels) // -(-len(labels) // most))  # as even as they can be
 
 
 def draw_percentages(panel, percentages: np.ndarray, form: str, counts: np.ndarray | None = None, **style) -> None:

@@ -3,7 +3,7 @@ import pytest
 
 from gpca.active_learning.curves import POOL_COLUMNS, write_curves
 from gpca.errors import InputError
-from gpca.experiments.active_learning.figure import STYLES, draw_learning_curves, mean_curves
+from gpca.experiments.active_learning.figure import MOST_LINES, STYLES, draw_learning_curves, mean_curves
 from gpca.reporting.figures.cloud_views import draw_query
 
 TITLES = {"random": "Random", "bald_kmeans": "BALD + k-means", "mine": "Mine"}
@@ -82,3 +82,19 @@ def test_a_query_is_drawn_with_few_or_many_points(tmp_path):
             random.normal(size=(points, 3)), random.normal(size=(points, 3)), "train sample 1: cup", tmp_path / "q.png"
         )
         assert (tmp_path / "q.png").read_bytes()[:4] == b"\x89PNG"
+
+
+def test_a_panel_has_at_most_six_lines_and_the_papers_strategies_are_in_each(tmp_path):
+    names = list(STYLES)
+    paths = []
+    for strategy in names:
+        path = tmp_path / "ycb" / strategy / "seed0.csv"
+        path.parent.mkdir(parents=True)
+        steps = [{"labels": n, "new_labels": n, "accuracy": 0.5, "accuracy_new": 0.5, "epochs": 1} for n in range(2)]
+        write_curves(path, {("pretrained", "noise"): steps}, POOL_COLUMNS)
+        paths.append(path)
+    figure = draw_learning_curves(paths, {"ycb": "YCB"}, {name: name for name in names}, 0.9)
+    drawn = [{line.get_label() for line in panel.get_lines()} - {"target (90 %)"} for panel in figure.axes]
+    assert max(map(len, drawn)) <= MOST_LINES
+    assert all({"bald_kmeans", "random"} < lines for lines in drawn)
+    assert set().union(*drawn) == set(names)

@@ -6,7 +6,7 @@ import pytest
 
 from gpca.attribution.paired import Difference
 from gpca.errors import InputError
-from gpca.experiments.controls.figures import SUCCEEDS, draw_severity_curves, draw_transfer
+from gpca.experiments.controls.figures import SAMPLES, SUCCEEDS, draw_severity_curves, draw_transfer
 from gpca.experiments.controls.metrics import COLUMNS as INTERVALS
 from gpca.experiments.controls.severity import COLUMNS as SEVERITIES
 from gpca.experiments.controls.severity import REGISTRATION
@@ -56,24 +56,29 @@ def test_a_figure_is_the_same_bytes_each_time(draw, numbers, same_bytes):
     same_bytes(lambda: draw(numbers()))
 
 
-def test_severities_have_scales_of_their_values_and_success_lies_on_top():
+def test_severities_are_numbers_with_their_samples_and_edges():
     figure = draw_severity_curves(severities(), EXPLAINERS, "Title")
-    noise, _, *maps = figure.axes
-    assert noise.get_ylim()[0] == 30  # the least value is 40 %
-    assert noise.get_lines()[-1].get_label() == SUCCEEDS
-    looks = {(line.get_color(), str(line.get_linestyle()), line.get_marker()) for line in noise.get_lines()}
-    assert len(looks) == len(noise.get_lines()) == 3
-    [mesh] = maps[0].collections
-    assert mesh.get_clim() == (30, 100)
+    noise, _, rotation, translation = figure.axes
+    assert [label.get_text() for label in noise.get_yticklabels()] == [SAMPLES, SUCCEEDS, "Good", "Poor (forest)"]
+    assert [label.get_text() for label in noise.get_xticklabels()] == ["0", "50", "100"]
+    assert [label.get_text() for label in rotation.get_xticklabels()] == ["15", "15.5", "16"]
+    assert [label.get_text() for label in translation.get_xticklabels()] == ["10", "20"]
+    written = [text.get_text() for text in translation.texts]
+    assert sorted(written) == sorted(["18", "90", "80", "40"])  # Two bins of rotation have this translation.
 
 
-def test_a_map_with_none_below_it_has_numbers_on_its_axis():
-    names = [f"explainer_{i}" for i in range(5)]
-    parts = [severities()] + [severities().query("method == 'good'").assign(method=name) for name in names]
-    figure = draw_severity_curves(pd.concat(parts), dict(zip(names, names, strict=True)), "Title")
-    maps = [axes for axes in figure.axes[2:] if axes.get_visible()][:6]
-    shown = [axes.xaxis.get_tick_params()["labelbottom"] for axes in maps]
-    assert shown == [False, False, True, True, True, True]
+def test_bins_of_one_severity_are_weighted_by_their_samples():
+    rows = severities()
+    many = (rows["method"] == "good") & (rows["concept"] == "pose") & (rows["low"] == 15)
+    rows.loc[many, ["samples", "value"]] = [27, 0.4]
+    translation = draw_severity_curves(rows, EXPLAINERS, "Title").axes[3]
+    assert "50" in [text.get_text() for text in translation.texts]  # (27 * 40 + 9 * 80) / 36
+
+
+def test_sources_are_named_on_the_axes_of_transfer():
+    figure = draw_transfer(intervals(), {"ycb": "YCB", "cups": "Cups (procedural stand-in)"}, EXPLAINERS)
+    assert [label.get_text() for label in figure.axes[0].get_yticklabels()] == ["YCB", "Cups"]
+    assert figure.axes[-1].get_ylabel() == "accuracy (%)"
 
 
 @pytest.mark.parametrize(("draw", "numbers"), DRAWN)

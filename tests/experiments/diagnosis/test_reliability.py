@@ -2,6 +2,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
+from gpca.attribution.confidence import wilson_interval
 from gpca.errors import InputError
 from gpca.experiments.diagnosis.measures import measure
 from gpca.experiments.diagnosis.reliability import draw_nominal_reliability, draw_reliability_panel
@@ -50,3 +51,13 @@ def test_the_figure_is_the_same_bytes_each_time(same_bytes):
     same_bytes(lambda: draw_nominal_reliability(judged, SOURCES, EXPLAINERS))
     with pytest.raises(InputError, match="have no predictions of these sources and explainers"):
         draw_nominal_reliability(judged, {"mugs": "Mugs"}, EXPLAINERS)
+
+
+def test_every_point_has_its_wilson_interval():
+    probability = np.repeat([0.25, 0.85], [8, 40])
+    _, panel = plt.subplots()
+    draw_reliability_panel(panel, probability, np.arange(48) % 4 > 0, bins=10)
+    [lines] = panel.collections
+    expected = [wilson_interval(6, 8), wilson_interval(30, 40)]
+    assert [segment[:, 1].tolist() for segment in lines.get_segments()] == [pytest.approx(pair) for pair in expected]
+    plt.close()

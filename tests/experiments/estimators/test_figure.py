@@ -79,7 +79,7 @@ def test_estimators_of_one_color_differ_in_their_line():
 
 
 @pytest.mark.parametrize(("times", "whole"), [(1.5, True), (10.0, False)])
-def test_a_panel_holds_whole_ellipses_unless_they_are_far_wider(times, whole):
+def test_an_ellipse_is_drawn_whole_or_named_where_it_is_far_wider(times, whole):
     import matplotlib.pyplot as plt
 
     random = np.random.default_rng(0)
@@ -90,10 +90,11 @@ def test_a_panel_holds_whole_ellipses_unless_they_are_far_wider(times, whole):
     deviation = times * 2.6 / np.sqrt(-2 * np.log(0.05))  # of an ellipse that is so many times as wide as the dots
     row = pd.Series(covariance_columns(deviation**2 * np.eye(6)))
     figure, panel = plt.subplots()
-    draw_ellipses(panel, samples, 0, {"own": row, "censi": None}, slice(0, 3), 1.0)
-    [outline, _] = panel.get_lines()
-    widest, edge = np.abs(outline.get_xydata()).max(), panel.get_xlim()[1]
-    assert (widest < edge) == whole
+    left_out = draw_ellipses(panel, samples, 0, {"own": row, "censi": None}, slice(0, 3), 1.0)
+    assert left_out == ([] if whole else ["own"])
+    *outlines, _ = panel.get_lines()
+    edge = panel.get_xlim()[1]
+    assert [np.abs(outline.get_xydata()).max() < edge for outline in outlines] == [True] * whole
     assert edge < 1.1 * WIDEST * 3.0
     plt.close(figure)
 

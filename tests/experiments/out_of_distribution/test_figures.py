@@ -9,7 +9,7 @@ from gpca.experiments.out_of_distribution.figures import (
     draw_uncertainty_vs_distance,
 )
 from gpca.experiments.out_of_distribution.learners import predict_sets
-from gpca.experiments.out_of_distribution.metrics import read_learner_predictions, sets_of, uncertainty_metrics
+from gpca.experiments.out_of_distribution.metrics import read_learner_predictions, sets_of
 from gpca.experiments.out_of_distribution.sets import DISTANCES
 from gpca.explainers.registry import explainer_entry
 from gpca.io.csv_file import write_csv
@@ -53,31 +53,32 @@ def test_without_predictions_nothing_is_drawn(learned, draw):
             draw(learned, sources, learners)
 
 
-def test_rho_is_the_tables_alone_and_with_each_shift(learned):
+def test_a_panel_says_of_how_many_samples_it_is_and_lines_have_bands(learned):
     figure = draw_uncertainty_vs_distance(learned, SOURCES, LEARNERS)
-    written = [[text.get_text() for text in panel.texts] for panel in figure.axes]
     names = ("in_distribution", "in_distribution+severity", "seen_objects+objects")  # There is no other source.
     assert len(figure.axes) == len(names) * len(SOURCES)
-    rho = f"rho_max_score_{DISTANCES[0]}"
     for row, name in enumerate(names):
         for column, source in enumerate(SOURCES):
-            expected = uncertainty_metrics(sets_of(learned[source, "gpca", 0])[name])[rho]
-            assert f"a {expected:.3f}" in written[2 * row + column], (name, source)
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["a: GPC", "2 others"]
+            panel = figure.axes[2 * row + column]
+            samples = len(sets_of(learned[source, "gpca", 0])[name])
+            assert [text.get_text() for text in panel.texts] == [f"$n$ = {samples}"], (name, source)
+            assert len(panel.get_lines()) == len(panel.collections) == 1
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["GPC"]
 
 
-@pytest.mark.parametrize("draw", [draw_coverage_risk, draw_uncertainty_vs_distance])
-def test_the_papers_learners_have_a_color_and_the_others_are_gray(learned, draw):
-    figure = draw(learned, SOURCES, LEARNERS)
-    colors = [line.get_color() for line in figure.axes[0].get_lines()]
-    assert colors == [style.LIGHT_GRAY, style.LIGHT_GRAY, style.BLUE]  # in the order of drawing
-    assert [text.get_text()[-8:] for text in figure.legends[0].get_texts()] == [
-        "GPC" if draw is draw_coverage_risk else "a: GPC",
-        "2 others",
-    ]
+def test_every_line_of_risk_is_named_and_has_its_own_look(learned):
+    figure = draw_coverage_risk(learned, SOURCES, LEARNERS)
+    named = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert named == ["GPC", "k nearest", "Mine"]
+    looks = [(line.get_color(), line.get_linestyle()) for line in figure.legends[0].get_lines()]
+    assert len(set(looks)) == len(looks)
+    above, below = figure.axes[0], figure.axes[len(SOURCES)]
+    assert [line.get_color() for line in above.get_lines()] == [style.BLUE]
+    assert [line.get_color() for line in below.get_lines()] == [style.GREEN, style.BLACK, style.BLUE]
+    assert figure.legends[0].get_window_extent().width < figure.bbox.width
 
 
-def test_curves_of_risk_start_where_a_tenth_is_covered_and_a_panel_without_errors_says_so(learned):
+def test_curves_of_risk_start_at_zero_and_a_panel_without_errors_says_so(learned):
     right = {
         key: rows.assign(concept_predicted=rows["concept_true"], abstained=False) if key[0] == "cups" else rows
         for key, rows in learned.items()
@@ -86,14 +87,15 @@ def test_curves_of_risk_start_where_a_tenth_is_covered_and_a_panel_without_error
         key: rows.assign(concept_predicted="none", abstained=False) if key[0] == "parts" else rows
         for key, rows in right.items()
     }
-    cups, parts = draw_coverage_risk(wrong, SOURCES, LEARNERS).axes
+    cups, parts = draw_coverage_risk(wrong, SOURCES, LEARNERS).axes[:2]
     assert [text.get_text() for text in cups.texts] == ["no errors"]
     assert not parts.texts
-    assert all(line.get_xdata()[0] == 10 for line in parts.get_lines())
+    assert all(line.get_xdata()[0] == 0 for line in parts.get_lines())
 
 
 def test_bins_of_distance_hold_equally_many_samples():
     rows = pd.DataFrame({DISTANCES[0]: range(20, 0, -1), "max_score": [0.1] * 10 + [0.5] * 10})
-    distance, score = distance_curve([rows[:5], rows[5:]])
+    distance, score, half = distance_curve([rows[:5], rows[5:]])
     assert distance.tolist() == [1.5 + 2 * n for n in range(10)]
     assert score.tolist() == pytest.approx([0.5] * 5 + [0.1] * 5)
+    assert half.tolist() == pytest.approx([0.0] * 10)

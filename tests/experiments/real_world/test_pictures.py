@@ -64,20 +64,31 @@ def test_the_most_confident_mistakes_come_first(results):
 def test_fig5_shows_a_test_sample_that_an_occluder_covers_and_that_is_named_right(results):
     samples = read_samples(results / "poses.csv", results / "real_rgbd/dgcnn-none/seed0.csv")
     pixels_I = np.arange(samples["instance"].max() + 1)
-    shown = samples.iloc[choose_sample(samples, "predictions", pixels_I)]
+    shown = samples.iloc[choose_sample(samples, "predictions", pixels_I, 0.03)]
     assert (shown["split"], shown["concept_true"], shown["lost_to"]) == ("test", "overlap", OCCLUDER)
     wrong = samples.assign(concept_predicted="noise")
-    assert wrong.iloc[choose_sample(wrong, "predictions", pixels_I)]["concept_true"] == "overlap"
+    assert wrong.iloc[choose_sample(wrong, "predictions", pixels_I, 0.03)]["concept_true"] == "overlap"
     with pytest.raises(InputError, match="has no test sample of overlap"):
-        choose_sample(samples[samples["concept_true"] != "overlap"], "predictions", pixels_I)
+        choose_sample(samples[samples["concept_true"] != "overlap"], "predictions", pixels_I, 0.03)
 
 
 def test_fig5_shows_an_object_that_is_large_in_its_image():
     rows = {"split": "test", "concept_true": "overlap", "concept_predicted": "overlap", "lost_to": OCCLUDER}
+    errors = {"init_error": 0.01, "icp_error": 0.05}
     samples = pd.DataFrame(
-        {**rows, "instance": range(5), "sample": range(5), "score_overlap": [0.9, 0.8, 0.7, 0.6, 0.5]}
+        {**rows, **errors, "instance": range(5), "sample": range(5), "score_overlap": [0.9, 0.8, 0.7, 0.6, 0.5]}
     )
-    assert choose_sample(samples, "predictions", np.array([100, 3, 200, 1, 300])) == 2  # the median of 0, 2 and 4
+    pixels_I = np.array([100, 3, 200, 1, 300])
+    assert choose_sample(samples, "predictions", pixels_I, 0.03) == 2  # the median of 0, 2 and 4
+
+
+def test_fig5_shows_a_registration_that_icp_made_wrong_where_there_is_one():
+    rows = {"split": "test", "concept_true": "overlap", "concept_predicted": "overlap", "lost_to": OCCLUDER}
+    errors = {"init_error": [0.01, 0.05, 0.01], "icp_error": [0.02, 0.06, 0.07], "score_overlap": [0.7, 0.8, 0.9]}
+    samples = pd.DataFrame({**rows, "instance": range(3), "sample": range(3), **errors})
+    assert choose_sample(samples, "predictions", np.array([300, 200, 100]), 0.03) == 2
+    assert choose_sample(samples[:2], "predictions", np.array([300, 200]), 0.03) == 1
+    assert choose_sample(samples[:1], "predictions", np.array([300]), 0.03) == 0
 
 
 @pytest.mark.parametrize(
@@ -108,8 +119,9 @@ def test_what_is_covered_is_what_lies_not_between_the_points_that_were_kept():
 def test_a_picture_is_drawn_and_drawing_again_changes_no_byte(picture, results, same_bytes):
     poses, predictions = results / "poses.csv", results / "real_rgbd/dgcnn-none/seed0.csv"
     instances, objects, registrations = (results / f"{name}.npz" for name in ("instances", "objects", "registrations"))
+    of_example = instances, objects, registrations, poses, predictions
     draw = {
-        "example": lambda: draw_real_world_example(instances, objects, registrations, poses, predictions, "Frames"),
+        "example": lambda: draw_real_world_example(*of_example, "Frames", 0.03),
         "failures": lambda: draw_real_world_failures(objects, [registrations], [poses], [predictions], "Frames"),
         "confusions": lambda: draw_real_world_confusions(results / "metrics.csv", "Frames", ["dgcnn-none"]),
     }
