@@ -6,6 +6,7 @@ _EXPORTS = {
     "CanonicalFrame": "gpca.alignment.canonical_frame",
     "Explainer": "gpca.model.explainer",
     "Explanation": "gpca.model.explanation",
+    "explain_scans": "gpca.model.scan_explainer",
     "load": "gpca.tracks.loading",
 }
 __all__ = ["__version__", *_EXPORTS]

@@ -13,17 +13,19 @@ from typing import TYPE_CHECKING
 from gpca.errors import InputError
 from gpca.io.files import require_outputs
 from gpca.model.location import model_path, require_model
-from gpca.model.point_file import read_points, read_pose, require_format
+from gpca.model.point_file import read_points, read_pose, read_scan, require_format
 from gpca.objects.mesh_folder import METERS_PER_UNIT
 from gpca.uncertainty.settings import MONTE_CARLO, UncertaintySettings
 
 if TYPE_CHECKING:
     from gpca.model.explainer import Explainer
     from gpca.model.explanation import Explanation
+    from gpca.model.scan_explanation import ScanExplanation
 
 UNKNOWN_STATUS = 3  # of the process; 1 is a failed check of another step, 2 a fault of the user's
 FORMATS = "PLY, PCD, OBJ, STL, OFF, npy, npz, xyz, csv, KITTI's bin, LAS, E57"
 FIGURE = "gpca.reporting.figures.explanation"  # by its name, since it needs matplotlib, which nothing else here does
+NOT_OF_SCANS = ("model", "fast", "uncertainty", "estimator", "queue", "png")  # what they say was learned from objects
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -40,6 +42,8 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--html", type=Path, metavar="FILE", help="write one page that shows all of it in 3-D")
     parser.add_argument("--png", type=Path, metavar="FILE", help="write one figure that shows it")
     parser.add_argument("--queue", type=Path, metavar="FILE", help="add what is queued to a file for 'gpca label'")
+    parser.add_argument("--scans", action="store_true", help="both are scans of any size, of which neither is whole")
+    parser.add_argument("--voxel", type=float, help="edge of the voxels of scans (default: chosen by their spacing)")
     form = parser.add_mutually_exclusive_group()
     form.add_argument("--json", action="store_true", help="print one JSON object")
     form.add_argument("--json-lines", action="store_true", help="print one line of JSON per source")
@@ -54,10 +58,11 @@ def run(options: Namespace) -> int:
         `UNKNOWN_STATUS` where one of the explanations means nothing, otherwise 0.
     """
     _require_fitting(options)
+    if options.scans:
+        return _explain_scans(options)
     path = model_path(options.model)
     require_model(path)
-    for cloud in (*options.source, options.target):
-        require_format(cloud)
+    _require_formats(options)
     T_init = read_pose(options.init) if options.init else None
     sources = [read_points(source, options.unit)[0] for source in options.source]
     target, frame = read_points(options.target, options.unit)
@@ -86,17 +91,8 @@ def run(options: Namespace) -> int:
         except InputError as fault:
             raise InputError(name, str(fault)) from fault
         status = UNKNOWN_STATUS if explanation.unknown else status
-        as_json = options.json or options.json_lines
-        # A text begins with its warnings.
-        warnings = [f"warning: {line}" for line in explanation.warnings] if as_json else []
-        for line in (*explanation.notes, *warnings):
-            print(line if len(sources) == 1 else f"{name}: {line}", file=sys.stderr)
         names = {"source": str(name), "target": str(options.target), "model": str(path)}
-        if as_json:
-            told = explanation.as_dict() | names | {"trained_on": trained_on}
-            print(json.dumps(told), flush=options.json_lines)
-        else:
-            print(explanation.text(), end="")
+        _print(options, explanation, names | {"trained_on": trained_on})
         _write(options, explanation, names)
         _queue(options.queue, explainer, explanation, f"{name} to {options.target}")
     print(f"model {path}: {model.learning}", file=sys.stderr)
@@ -109,6 +105,10 @@ def _require_fitting(options: Namespace) -> None:
         raise InputError("--settings", "is not used by explain", "make another model to change its settings")
     if len(options.source) > 1 and not options.json_lines:
         raise InputError("explain", f"{len(options.source)} sources need one line each", "add --json-lines")
+    for name in NOT_OF_SCANS if options.scans else ("voxel",):
+        if (given := getattr(options, name)) is not None and given is not False:
+            fault = "is not for scans" if options.scans else "is for scans alone"
+            raise InputError(f"--{name}", fault, "leave it out" if options.scans else "add --scans")
     for name in ("html", "png"):
         if getattr(options, name) and len(options.source) > 1:
             raise InputError(f"--{name}", "shows one source", "explain one source after the other")
@@ -117,6 +117,12 @@ def _require_fitting(options: Namespace) -> None:
     read = [*options.source, options.target, options.init, options.model]
     outputs = [path for path in (options.html, options.png, options.queue) if path]
     require_outputs(outputs, [path for path in read if path])
+
+
+def _require_formats(options: Namespace) -> None:
+    """Refuse files that are missing or of another format, before the first of them is read."""
+    for cloud in (*options.source, options.target):
+        require_format(cloud)
 
 
 def _require_known(method: str | None, estimator: str | None) -> None:
@@ -131,7 +137,47 @@ def _require_known(method: str | None, estimator: str | None) -> None:
         spread_estimator(estimator, UncertaintySettings())
 
 
-def _write(options: Namespace, explanation: Explanation, names: dict[str, str]) -> None:
+def _explain_scans(options: Namespace) -> int:
+    """Explain scans without any model; returns 0."""
+    _require_formats(options)
+    T_init = read_pose(options.init) if options.init else None
+    sources = [read_scan(source) for source in options.source]
+    target = read_scan(options.target)
+    _require_known(options.method, None)
+    from gpca.model.scan_explainer import explain_scans
+    from gpca.model.scan_explanation import LEARNED
+    from gpca.model.voxels import require_edge
+    from gpca.process.compilation import say_when_compiling
+
+    if options.voxel is not None:
+        require_edge(options.voxel, "--voxel")
+    say_when_compiling()
+    for name, source in zip(options.source, sources, strict=True):
+        try:
+            explanation = explain_scans(source, target, T_init, options.unit, options.voxel, options.method)
+        except InputError as fault:
+            raise InputError(name, str(fault)) from fault
+        names = {"source": str(name), "target": str(options.target)}
+        _print(options, explanation, names)
+        _write(options, explanation, names)
+    print(LEARNED, file=sys.stderr)
+    return 0
+
+
+def _print(options: Namespace, explanation: Explanation | ScanExplanation, told: dict[str, str]) -> None:
+    """Print an explanation; as JSON with what else is told of it."""
+    as_json = options.json or options.json_lines
+    # A text begins with its warnings.
+    warnings = [f"warning: {line}" for line in explanation.warnings] if as_json else []
+    for line in (*explanation.notes, *warnings):
+        print(line if len(options.source) == 1 else f"{told['source']}: {line}", file=sys.stderr)
+    if as_json:
+        print(json.dumps(explanation.as_dict() | told), flush=options.json_lines)
+    else:
+        print(explanation.text(), end="")
+
+
+def _write(options: Namespace, explanation: Explanation | ScanExplanation, names: dict[str, str]) -> None:
     """Write the page and the figure that were asked for."""
     if options.html:
         explanation.save_html(options.html, names)

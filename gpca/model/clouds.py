@@ -18,6 +18,7 @@ from gpca.objects.units import AS_ARGUMENT
 LARGEST_RATIO = 8.0  # the extents of source and target may differ so much; in the wrong unit they differ by 10 or more
 # Diameters of the target between its center and the source: farther off, nothing can meet, and the unit may be wrong.
 FARTHEST_START = 10.0
+OR_SCANS = f"{AS_ARGUMENT} (scans of places: gpca.explain_scans)"
 
 
 @dataclass(frozen=True)
@@ -67,7 +68,7 @@ class Clouds:
         T_init = np.eye(4) if T_target_source_init is None else np.array(T_target_source_init, np.float64)
         require_rigid(T_init, "initial pose")
         require_cloud_points(source, "source")
-        frame = frame or CanonicalFrame.of(target, unit, say=AS_ARGUMENT)
+        frame = frame or CanonicalFrame.of(target, unit, say=OR_SCANS)
         target = frame.coordinates(_thinned(target, cloud_points, "target", notes))
         seen = _thinned(source, cloud_points, "source", notes)
         source = frame.coordinates(transform(T_init, seen))

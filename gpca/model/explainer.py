@@ -27,7 +27,7 @@ from gpca.causes.truth import NOMINAL
 from gpca.encoders.training import best_device
 from gpca.errors import InputError
 from gpca.model.advice import CHECK
-from gpca.model.clouds import Clouds
+from gpca.model.clouds import OR_SCANS, Clouds
 from gpca.model.diagnoser import QUICK_HYPOTHESES, QUICK_POINTS
 from gpca.model.diagnosis import Diagnosis
 from gpca.model.explanation import Explanation, PoseSpread
@@ -37,7 +37,6 @@ from gpca.model.location import model_path
 from gpca.model.pose_spread import NAMES, estimated_spread, spread_estimator, spread_of_icp
 from gpca.model.scene import Scene
 from gpca.objects.cloud_objects import as_points
-from gpca.objects.units import AS_ARGUMENT
 from gpca.recovery.policy import NOTHING, Decision, RecoveryPolicy
 from gpca.seeds import generator, seed_of
 from gpca.uncertainty.settings import MONTE_CARLO, UncertaintySettings
@@ -198,7 +197,7 @@ class Explainer:
             try:
                 if frame is None or target_points is not known:
                     points = as_points(target_points, "target")
-                    known, frame = target_points, CanonicalFrame.of(points, unit, say=AS_ARGUMENT)
+                    known, frame = target_points, CanonicalFrame.of(points, unit, say=OR_SCANS)
                 T_init = init[0] if init else None
                 explanation = self.explain(source_points, target_points, T_init, unit, frame, *options)
                 yield replace(explanation, scene=None)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from gpca.alignment.canonical_frame import CanonicalFrame
+from gpca.alignment.canonical_frame import CanonicalFrame, require_cloud_points
 from gpca.alignment.rigid import require_rigid
 from gpca.errors import InputError
 from gpca.io.limits import require_file
@@ -17,6 +18,7 @@ from gpca.objects.units import AS_OPTION
 
 SAMPLED_POINTS = 16384  # so many are drawn on a mesh, as on the objects of the training
 LARGEST_POSE_BYTES = 10**5  # 16 numbers, however they are written
+OR_SCANS = f"{AS_OPTION} (scans of places: --scans)"  # since the limits of an object's size do not hold for those
 SUFFIXES = (*mesh_folder.SUFFIXES, ".pcd", *point_tables.READERS, *scanner_files.PACKAGES)
 
 
@@ -42,13 +44,34 @@ def read_points(path: Path, unit: str) -> tuple[np.ndarray, CanonicalFrame]:
     if path.suffix.lower() in mesh_folder.SUFFIXES:
         surface = mesh_folder.read_surface(path, scale)
         if surface.faces is not None:
-            points_m, _, diameter_m = canonical_cloud(surface, "mesh", SAMPLED_POINTS, AS_OPTION)
+            points_m, _, diameter_m = canonical_cloud(surface, "mesh", SAMPLED_POINTS, OR_SCANS)
             frame = CanonicalFrame(bounding_center(surface) / scale, diameter_m / scale)
             return points_m.astype(np.float64) / scale + frame.center_3, frame
         points = surface.vertices_m / scale
     else:
         points = _cloud(path)
-    return points, CanonicalFrame.of(points, unit, path, AS_OPTION)
+    return points, CanonicalFrame.of(points, unit, path, OR_SCANS)
+
+
+def read_scan(path: Path) -> np.ndarray:
+    """Return the points (N, 3) of a scan, or drawn on a mesh, in the file's unit, whatever their extent.
+
+    Raises:
+        InputError: as :func:`read_points`, but for the diameter.
+    """
+    require_format(path)
+    if path.suffix.lower() not in mesh_folder.SUFFIXES:
+        points = _cloud(path)
+    else:
+        surface = mesh_folder.read_surface(path, 1.0)
+        points = surface.vertices_m
+        if surface.faces is not None:  # drawn at a size that every mesh may have
+            extent = float(np.linalg.norm(np.ptp(points, axis=0))) or 1.0
+            surface = replace(surface, vertices_m=points / extent)
+            drawn, _, _ = canonical_cloud(surface, "mesh", SAMPLED_POINTS)
+            points = extent * (drawn.astype(np.float64) + bounding_center(surface))
+    require_cloud_points(points, path)
+    return points
 
 
 def _cloud(path: Path) -> np.ndarray:

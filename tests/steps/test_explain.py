@@ -35,6 +35,7 @@ FAULTS = [
     (untouched, {"--settings": {"draws": 3}}, r"--settings: is not used by explain"),
     (untouched, {"--html": "meshes/cone.ply"}, r"cone.ply: is also an input or another output"),
     (untouched, {"--png": "lost/../model.pt", "--model": "model.pt"}, r"model.pt: is also an input"),
+    (untouched, {"--voxel": 0.1}, r"--voxel: is for scans alone; add --scans"),
 ]
 
 

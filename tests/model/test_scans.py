@@ -1,0 +1,167 @@
+"""Scans explained without a model: a room that was seen from two places."""
+
+import json
+import sys
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import trimesh
+
+from gpca import explain_scans
+from gpca.__main__ import main
+from gpca.alignment.rigid import inverse, transform
+from gpca.alignment.twist import exp
+from gpca.errors import InputError
+from gpca.model.point_file import read_scan
+from gpca.model.scan_explanation import NOT_SURE
+from gpca.model.voxels import in_voxels, voxel_size
+from gpca.process.environment import open3d_cloud
+
+
+def room(seed, low, high, size=12.0):
+    """Points on two walls, the floor and two boxes of a room, where x lies between two shares of its size."""
+    random = np.random.default_rng(seed)
+    parts = []
+    for center, extent in (
+        ((0.5, 0.5, 0.0), (1, 1, 0)), ((0.5, 0.0, 0.15), (1, 0, 0.3)), ((0.0, 0.5, 0.15), (0, 1, 0.3)),
+        ((0.35, 0.4, 0.1), (0.2, 0.1, 0.2)), ((0.6, 0.7, 0.06), (0.1, 0.25, 0.12)),
+    ):  # fmt: skip
+        unit = random.uniform(-0.5, 0.5, (2500, 3))
+        if min(extent) > 0:  # on the sides of a box
+            side = random.integers(0, 3, 2500)
+            unit[np.arange(2500), side] = np.sign(unit[np.arange(2500), side]) / 2
+        parts.append(np.array(center) + unit * extent)
+    points = np.concatenate(parts)
+    points = points[(points[:, 0] >= low) & (points[:, 0] <= high)]
+    return size * points + random.normal(scale=0.002, size=points.shape)
+
+
+TRUE = exp(np.array([[0.02, -0.03, 0.05, 0.2, -0.1, 0.05]]))[0]
+
+
+@pytest.fixture(scope="module")
+def scans():
+    """A source and a target that share 60 % of a room of 12 m, beyond what an object may measure."""
+    return transform(inverse(TRUE), room(0, 0.0, 0.8)), room(1, 0.2, 1.0)
+
+
+@pytest.fixture(scope="module")
+def right(scans):
+    source, target = scans
+    return explain_scans(open3d_cloud(source), target)
+
+
+def test_a_right_registration_is_told_from_a_wrong_one(scans, right):
+    source, target = scans
+    error = transform(right.T_target_source, source) - transform(TRUE, source)
+    assert np.linalg.norm(error, axis=1).max() < 0.1
+    assert right.state == "nominal"
+    assert 0.6 < right.overlap[0] < 0.9
+    turned = exp(np.array([[0, 0, 2.5, 0, 0, 0]]))[0]
+    wrong = explain_scans(source, target, turned)
+    assert wrong.failure > right.failure
+    assert wrong.state in ("failed", NOT_SURE)
+    assert "nothing was learned from scans" in wrong.learned_from
+    said = json.loads(json.dumps(wrong.as_dict()))
+    assert said["state"] == wrong.state
+    for words in (wrong.advice, wrong.reason, "overlap   "):
+        assert words in wrong.text()
+
+
+def test_the_command_explains_scans_of_two_formats_in_another_unit_without_a_model(
+    scans, right, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    source, target = (100 * points for points in scans)
+    np.column_stack([source, np.zeros(len(source))]).astype("<f4").tofile("scan1.bin")
+    np.savez("scan2.npz", points=target)
+    words = ["explain", "scan1.bin", "scan2.npz", "--scans", "--unit", "cm", "--json", "--html", "page.html"]
+    assert main(words) == 0
+    out, err = capsys.readouterr()
+    in_cm = json.loads(out)
+    assert (in_cm["state"], in_cm["unit"], in_cm["source"]) == (right.state, "cm", "scan1.bin")
+    assert in_cm["voxel"] == pytest.approx(100 * right.voxel, rel=1e-3)
+    assert in_cm["limit"] == pytest.approx(100 * right.limit, rel=1e-2)
+    assert f"page page.html\n{right.learned_from}\n" in err
+    page = (tmp_path / "page.html").read_text()
+    assert "<dt>Source</dt><dd>scan1.bin</dd>" in page
+    assert "Common parts alone" in page
+    assert len(page) < 2 * 10**6
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--voxel", "-1"], "--voxel: -1 is no length; give a positive one"),
+        (["--fast"], "--fast: is not for scans; leave it out"),
+        (["--method", "nearest"], "registration method 'nearest': unknown"),
+        (["--init", "lost.txt"], "lost.txt: no such file"),
+    ],
+)
+def test_an_option_that_does_not_fit_scans_is_one_line(scans, tmp_path, monkeypatch, capsys, words, message):
+    monkeypatch.chdir(tmp_path)
+    np.save("scan.npy", scans[0])
+    assert main(["explain", "scan.npy", "scan.npy", "--scans", *words]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert message in err.splitlines()[-1]
+
+
+WIDE = np.random.default_rng(0).uniform(-40, 40, (200, 3))
+WRITERS = {
+    "npy": np.save,
+    "npz": lambda path, points: np.savez(path, points=points),
+    "xyz": np.savetxt,
+    "csv": lambda path, points: np.savetxt(path, points, delimiter=","),
+    "bin": lambda path, points: np.column_stack([points, points[:, 0]]).astype("<f4").tofile(path),
+    "ply": lambda path, points: trimesh.PointCloud(points).export(path),
+    "las": lambda path, points: path.write_bytes(b"LASF"),
+}
+
+
+@pytest.mark.parametrize("suffix", WRITERS)
+def test_a_scan_of_80_m_is_read_from_every_format(tmp_path, monkeypatch, suffix):
+    WRITERS[suffix](path := tmp_path / f"scan.{suffix}", WIDE)
+    monkeypatch.setitem(sys.modules, "laspy", SimpleNamespace(read=lambda path: SimpleNamespace(xyz=WIDE)))
+    np.testing.assert_allclose(read_scan(path), WIDE, atol=1e-5)
+
+
+def test_points_are_drawn_on_a_mesh_of_any_size(tmp_path):
+    box = trimesh.creation.box((30, 40, 120)).apply_translation((500, 0, 0))
+    box.export(tmp_path / "box.stl")
+    points = read_scan(tmp_path / "box.stl")
+    np.testing.assert_allclose([points.min(axis=0), points.max(axis=0)], box.bounds, atol=0.05)
+    assert voxel_size({"box": points}, "m") < 5
+
+
+def test_voxels_are_chosen_by_the_spacing_and_leave_few(scans):
+    clouds = {"source": scans[0], "target": scans[1]}
+    edge = voxel_size(clouds, "m")
+    assert 0.05 < edge < 1
+    assert 1000 < len(in_voxels(scans[0], edge, "source", "m")) <= 4000
+    twice = {name: np.concatenate([points, points]) for name, points in clouds.items()}
+    assert voxel_size(twice, "m") == pytest.approx(edge, rel=0.2)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (
+            {"voxel": 20.0},
+            "source: fills .* voxels of 20 m; give both in one unit, and voxels so small that",
+        ),
+        ({"voxel": 1e-9}, "source: spans .* m, too much for voxels of 1e-09 m; leave out points that are far away"),
+        ({"voxel": -1.0}, "voxel: -1 is no length"),
+        ({"method": "nearest"}, "registration method 'nearest': unknown"),
+        ({"unit": "feet"}, "unit 'feet'"),
+        ({"T_target_source_init": 2 * np.eye(4)}, "initial pose: the pose is not a rigid transform"),
+        (
+            {"source_points": np.zeros((99, 3)), "target_points": np.zeros((99, 3))},
+            "source: has all its points in one place",
+        ),
+    ],
+)
+def test_bad_input_is_one_line(scans, change, message):
+    with pytest.raises(InputError, match=message):
+        explain_scans(**{"source_points": scans[0], "target_points": scans[1]} | change)
