@@ -2,16 +2,19 @@
 
     python benchmarks/scale.py results/full [--configfile config/full.yaml] [--config data_dir=/data] [--cores 1 2 4 8]
     python benchmarks/scale.py results/full --sources 100 --seeds 10 --explainers 20 [--write docs/cluster.md]
+    python benchmarks/scale.py results/default --expect config/full.yaml [--given train_encoder=2x readings/pool=90s]
 
 The first form schedules the jobs of a finished run, each with the seconds of its benchmark file, on several
 numbers of cores (Snakemake's own start and the cores' shared memory are not in it), and names the chain of jobs that no
-core shortens. The second plans the default run with so many datasets (copies of its own), seeds and explainers,
-dry, and takes the core time and memory of that plan. A job of the plan takes the mean seconds of its rule in the
-finished run, in proportion to the results that it reads and writes: many jobs loop over the seeds. A rule that was not
-measured counts as the mean of the others, in the queue or out of it. Transfer between datasets is left out, as its cost
-grows with the square of their number. --write puts both tables between the comments that the page has for the run. The
-last line is a JSON object: speedup_<cores>, critical_s; and jobs, submitted, core_h, longest_s, results,
-plan_s, plan_mb.
+core shortens; --rules 10 adds the rules that take most. The second plans the default run with so many datasets (copies
+of its own), seeds and explainers, dry, and takes the core time and memory of that plan. A job of the plan takes the
+mean seconds of its rule in the finished run, in proportion to the results that it reads and writes: many jobs loop over
+the seeds. A rule that was not measured counts as the mean of the others, in the queue or out of it. Transfer between
+datasets is left out, as its cost grows with the square of their number. The third schedules another config before it is
+run, with jobs that grow in the same way. Where its sizes differ too, --given says by what factor the jobs of a rule or
+a benchmark file grow besides, or how many seconds they take; names may be patterns, and the last one that fits counts.
+--write puts the tables between the comments that the page has for the run. The last line is a JSON object:
+speedup_<cores>, critical_s, core_min; and jobs, submitted, core_h, longest_s, results, plan_s, plan_mb.
 """
 
 from __future__ import annotations
@@ -24,6 +27,7 @@ import sys
 import tempfile
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
+from fnmatch import fnmatchcase
 from functools import cache
 from itertools import cycle, islice
 from pathlib import Path
@@ -46,6 +50,9 @@ WAIT_S = 10.0  # that a submitted job takes besides its work: the queue's turn, 
 def main(arguments: list[str] | None = None) -> int:
     parser = parser_of_run(__doc__)
     parser.add_argument("--cores", type=int, nargs="+", default=[1, 2, 4, 8, 16], help="default 1 2 4 8 16")
+    parser.add_argument("--rules", type=int, default=0, help="show the rules that take most, so many; default none")
+    parser.add_argument("--expect", type=Path, metavar="CONFIG", help="config of a run that has not been made")
+    parser.add_argument("--given", nargs="+", default=[], metavar="NAME=VALUE", help="factor (2x) or seconds (90s)")
     parser.add_argument(
         "--sources", type=int, default=0, help="number of datasets of the larger run; by default none is planned"
     )
@@ -57,7 +64,13 @@ def main(arguments: list[str] | None = None) -> int:
         run = name_of_run(options.folder)
         jobs = read_plan(plan(run, options.configfile, options.config), run)
         seconds = measured(jobs, options.folder)
-        lines, found = on_cores(jobs, seconds, options.cores)
+        planned, taken = jobs, seconds
+        if options.expect:
+            planned = read_plan(plan(RUN, options.expect, []), RUN)
+            taken = given(planned, estimated(jobs, seconds, planned), options.given)
+        lines, found = on_cores(planned, taken, options.cores)
+        if options.rules:
+            lines += ["", *by_rules(planned, taken, options.rules)]
         if options.sources:
             more, found_more = on_a_cluster(jobs, seconds, options)
             lines, found = [*lines, "", *more], found | found_more
@@ -102,7 +115,43 @@ def on_cores(jobs: Sequence[Job], seconds: Mapping[str, float], cores: Sequence[
     lines = markdown.table(["cores", "wall time (min)", "times as fast as one core"], rows)
     lines += ["", f"The longest chain of jobs takes {critical_s / 60:.1f} minutes (in seconds: {steps})."]
     speedups = {f"speedup_{count}": round(alone_s / wall_s, 2) for count, wall_s in walls_s.items()}
-    return lines, speedups | {"critical_s": round(critical_s, 1)}
+    return lines, speedups | {"critical_s": round(critical_s, 1), "core_min": round(alone_s / 60, 1)}
+
+
+def by_rules(jobs: Sequence[Job], seconds: Mapping[str, float], most: int) -> list[str]:
+    """Return the table of the rules that take most, with the number of their jobs and the longest one."""
+    of_rule: dict[str, list[float]] = defaultdict(list)
+    for job in jobs:
+        of_rule[job.rule].append(seconds[job.benchmark])
+    longest = sorted(of_rule.items(), key=lambda item: -sum(item[1]))[:most]
+    rows = [[f"`{rule}`", len(own), f"{sum(own) / 60:.1f}", f"{max(own) / 60:.1f}"] for rule, own in longest]
+    return markdown.table(["rule", "jobs", "core time (min)", "longest job (min)"], rows)
+
+
+def given(jobs: Sequence[Job], seconds: Mapping[str, float], values: Sequence[str]) -> dict[str, float]:
+    """Return the seconds with those of some jobs multiplied or replaced.
+
+    Args:
+        values: ``name=2x`` or ``name=90s``, of a rule or of a benchmark file without folder and ending, or a pattern.
+
+    Raises:
+        InputError: another form, or a name that no job has.
+    """
+    changed = dict(seconds)
+    for text in values:
+        form = re.fullmatch(r"(.+)=(\d+(?:\.\d+)?)([sx])", text)
+        if not form:
+            raise InputError(f"--given {text}", "is no factor or time", "give such as pool=2x or pool=90s")
+        name, number_of, unit = form.groups()
+        meant = [job.benchmark for job in jobs if fnmatchcase(job.rule, name) or fnmatchcase(_path(job), name)]
+        if not meant:
+            raise InputError(f"--given {text}", "names no job of the plan", "name a rule, or a benchmark file")
+        changed |= {job: float(number_of) * (seconds[job] if unit == "x" else 1) for job in meant}
+    return changed
+
+
+def _path(job: Job) -> str:
+    return job.benchmark.removeprefix("benchmarks/").removesuffix(".tsv")
 
 
 def on_a_cluster(

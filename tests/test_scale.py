@@ -77,3 +77,25 @@ def test_a_run_with_a_job_that_was_not_recorded_is_refused(run_folder, tmp_path,
     assert capsys.readouterr().err.endswith(
         "has no benchmarks/objects/ycb.tsv; finish the run, or give its --configfile and --config\n"
     )
+
+
+def test_a_run_that_was_not_made_is_expected_from_the_times_of_its_rules(run_folder, tmp_path, capsys):
+    jobs = len(list(run_folder.rglob("*.tsv")))
+    expect = [str(run_folder), "--cores", "1", "2", "--expect", str(tmp_path / "other.yaml"), "--rules", "99"]
+    assert scale.main(expect) == 0
+    same = json.loads(capsys.readouterr().out.splitlines()[-1])
+    assert same["core_min"] == pytest.approx(jobs / 2, rel=0.01)  # rates are means over the jobs of a rule
+    assert scale.main([*expect, "--given", "train_*=2x", "encoders/*=90s"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert any(line.startswith("| `train_encoder` | ") and line.endswith(" | 1.5 |") for line in lines)
+    assert json.loads(lines[-1])["core_min"] > same["core_min"]
+    for value, fault in {"page=2": "is no factor or time", "no_rule=2x": "names no job of the plan"}.items():
+        assert scale.main([*expect, "--given", value]) == 2
+        assert f"--given {value}: {fault}; " in capsys.readouterr().err
+
+
+def test_the_last_name_that_fits_counts():
+    jobs = [Job((), ("a",), "benchmarks/readings/pool.tsv", 0, 1, "reading"), Job((), ("b",), "b.tsv", 0, 1, "page")]
+    seconds = {job.benchmark: 10.0 for job in jobs}
+    assert list(scale.given(jobs, seconds, ["reading=3x"]).values()) == [30, 10]
+    assert list(scale.given(jobs, seconds, ["*=2x", "readings/p*=2.5s"]).values()) == [2.5, 20]

@@ -63,9 +63,11 @@ class RareSettings(RetrainingSettings):
 
     Attributes:
         shares: of the pool that is of that concept, each in a run of its own.
+        beside_seeds: how many of the run's seeds, from the first, have more than the first share; null: all.
     """
 
     shares: Distinct[OpenShare] = (0.05,)
+    beside_seeds: Count | None = None
 
 
 JUDGED_SHARE = 0.05  # the paper's numbers are compared with the run of this share (docs/comparison.md)

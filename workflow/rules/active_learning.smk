@@ -60,7 +60,7 @@ rule learn_actively:
         "../envs/gpca.yaml"
     params:
         step="gpca.experiments.active_learning.step",
-        settings=as_json(LEARNING_SETTINGS),
+        settings=lambda wildcards: as_json(learning_settings(wildcards.seed)),
         strategies=STRATEGIES,
     script:
         "../scripts/step.py"

@@ -9,6 +9,7 @@ from gpca.code_files import code_files
 from gpca.encoders.registry import encoders
 from gpca.objects.procedural import FAMILIES
 from gpca.objects.source import find_file
+from gpca.experiments.real_world.experiment import pretraining_of
 from gpca.experiments.run import names_of, settings_of
 from gpca.frames.source import RENDERED
 
@@ -25,24 +26,22 @@ SHOWN = settings_of(config, SOURCES)
 FRAMES = NAMES["frames"]
 EMBEDDING = NAMES["embedding"]
 REDUCTIONS = [name for name in config["reductions"] if name != "none"]
+RENDERED_ENCODERS = [name.split("-")[0] for name in NAMES["rendered"]]
+EXPLAINED = [
+    *config["explainers"],
+    *NAMES["frame_explainer"],
+    *NAMES["backbone"],
+    *NAMES["published"],
+    *NAMES["rendered"],
+]
 
 
 wildcard_constraints:
     source="|".join([*SOURCES, FRAMES, *NAMES["condition"]]),
     seed=r"\d+",
-    backbone="|".join(
-        [*config["encoders"], *(name.split("-")[0] for name in NAMES["rendered"])]
-    ),
+    backbone="|".join([*config["encoders"], *RENDERED_ENCODERS]),
     reduction="|".join(REDUCTIONS),
-    explainer="|".join(
-        [
-            *config["explainers"],
-            *NAMES["frame_explainer"],
-            *NAMES["backbone"],
-            *NAMES["published"],
-            *NAMES["rendered"],
-        ]
-    ),
+    explainer="|".join(EXPLAINED),
     cause_explainer="|".join(config["diagnosis"]["explainers"]),
     design="|".join(config["uncertainty"]),
 

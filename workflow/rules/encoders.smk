@@ -76,7 +76,7 @@ rule pretrain_encoder:
         step="gpca.steps.train",
         source="pretraining",
         settings=lambda wildcards: encoder_settings(
-            wildcards, REAL_WORLD["pretraining"]
+            wildcards, pretraining_of(REAL_WORLD, unrendered(wildcards))
         ),
         seed=SEEDS[0],
         registrations_of=lambda wildcards: pretrained_on(wildcards.backbone)[0],
@@ -169,6 +169,8 @@ rule reduce_embeddings:
         "<logs>/embeddings/{source}/{backbone}/{reduction}.log",
     benchmark:
         "<benchmarks>/embeddings/{source}/{backbone}/{reduction}.tsv"
+    wildcard_constraints:
+        backbone=but_published([*config["encoders"], *RENDERED_ENCODERS]),
     conda:
         "../envs/gpca.yaml"
     params:
@@ -177,3 +179,22 @@ rule reduce_embeddings:
         seeds=SEEDS,
     script:
         "../scripts/step.py"
+
+
+# Encoders as published have fewer seeds.
+use rule reduce_embeddings as reduce_published with:
+    input:
+        embeddings=collect(
+            "<results>/embeddings/{{source}}/{{backbone}}/none/seed{seed}.npz",
+            seed=NAMES["published_seed"],
+        ),
+        code=code_files("gpca.steps.reduce"),
+    output:
+        out=collect(
+            "<results>/embeddings/{{source}}/{{backbone}}/{{reduction}}/seed{seed}.npz",
+            seed=NAMES["published_seed"],
+        ),
+    wildcard_constraints:
+        backbone="|".join(REAL_WORLD["published"].values()) or "none",
+    params:
+        seeds=NAMES["published_seed"],

@@ -15,14 +15,7 @@ rule predictions:
 
 rule attribute:
     input:
-        unpack(
-            lambda wildcards: {
-                option: collect(
-                    f"<results>/{pattern}", source=wildcards.source, seed=SEEDS
-                )
-                for option, pattern in files_behind(wildcards.explainer, NAMES).items()
-            }
-        ),
+        unpack(lambda wildcards: read_by_explainer(wildcards, SEEDS)),
         registrations=collect(
             "<results>/registrations/{{source}}/seed{seed}.npz", seed=SEEDS
         ),
@@ -41,6 +34,8 @@ rule attribute:
         "<logs>/predictions/{source}/{explainer}.log",
     benchmark:
         "<benchmarks>/predictions/{source}/{explainer}.tsv"
+    wildcard_constraints:
+        explainer=but_published(EXPLAINED),
     priority: 11  # as `embed`
     conda:
         "../envs/gpca.yaml"
@@ -51,6 +46,30 @@ rule attribute:
         seeds=SEEDS,
     script:
         "../scripts/step.py"
+
+
+# Encoders as published have fewer seeds.
+use rule attribute as attribute_published with:
+    input:
+        unpack(lambda wildcards: read_by_explainer(wildcards, NAMES["published_seed"])),
+        registrations=collect(
+            "<results>/registrations/{{source}}/seed{seed}.npz",
+            seed=NAMES["published_seed"],
+        ),
+        code=code_files("gpca.steps.attribute", explainer_module("gpca")),
+    output:
+        predictions=collect(
+            "<results>/predictions/{{source}}/{{explainer}}/seed{seed}.csv",
+            seed=NAMES["published_seed"],
+        ),
+        timings=collect(
+            "<results>/timings/{{source}}/{{explainer}}/seed{seed}.csv",
+            seed=NAMES["published_seed"],
+        ),
+    wildcard_constraints:
+        explainer="|".join(NAMES["published"]) or "none",
+    params:
+        seeds=NAMES["published_seed"],
 
 
 # Classifiers of several seeds on what the first seed's encoder makes of the first seed's frames.

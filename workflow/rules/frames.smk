@@ -33,7 +33,7 @@ FRAME_PREDICTIONS = [
     f"<results>/predictions/{source}/{method}/seed{seed}.csv"
     for source, methods in ASKED.items()
     for method in methods
-    for seed in SEEDS
+    for seed in seeds_of_frame_row(method)
 ]
 
 

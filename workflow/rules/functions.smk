@@ -23,6 +23,20 @@ def pretrained_on(backbone):
     ]
 
 
+def but_published(names):
+    """Return the pattern of these encoders or rows, without those as published, which have fewer seeds."""
+    published = [*REAL_WORLD["published"].values(), *NAMES["published"]]
+    return "|".join(name for name in names if name not in published) or "none"
+
+
+def read_by_explainer(wildcards, seeds):
+    """Return what an explainer reads of these seeds besides registrations, by option."""
+    return {
+        option: collect(f"<results>/{pattern}", source=wildcards.source, seed=seeds)
+        for option, pattern in files_behind(wildcards.explainer, NAMES).items()
+    }
+
+
 def explainer_settings(wildcards):
     """Return the settings of an explainer in the config, or of one that is asked about frames alone."""
     name = explainer_of(wildcards.explainer, NAMES)
@@ -106,6 +120,14 @@ def estimator_settings(estimators):
     return as_json({name: config[name] for name in names} | icp | {"estimators": asked})
 
 
+def learning_settings(seed):
+    """Return the settings of active learning; seeds beyond the first few have one share of a rare concept."""
+    rare = LEARNING_SETTINGS.get("rare")
+    if not rare or int(seed) in SEEDS[: rare.get("beside_seeds")]:
+        return LEARNING_SETTINGS
+    return LEARNING_SETTINGS | {"rare": rare | {"shares": rare["shares"][:1]}}
+
+
 def encoders_of_others(wildcards):
     """Return encoders that saw other samples: those of the next seed, and of the next source, where there are any."""
     seeds, sources = [str(seed) for seed in SEEDS], list(SOURCES)
@@ -132,7 +154,7 @@ def next_source(wildcards):
 
 
 def read_by_readings(wildcards):
-    """Return what a group of readings reads, by kind of file; those on depth frames see all seeds."""
+    """Return what a group of readings reads, by kind of file."""
     group = GROUPS[wildcards.reading_group]
     if wildcards.reading_group == FRAME_INPUT:
         return read_by_frame_input()
@@ -149,25 +171,45 @@ def read_by_readings(wildcards):
     if wildcards.reading_group == "diagnostics":
         made = "learners"
         methods = [name for name in group.methods if name in config["learners"]]
-    if not group.sources:
-        sources, seeds, methods = [FRAMES], SEEDS, NAMES["backbone"]
     patterns = {
         "registrations": "<results>/registrations/{source}/seed{seed}.npz",
         "sets": "<results>/shifted/{source}/seed{seed}.npz",
         "predictions": f"<results>/{made}/{{source}}/{{method}}/seed{{seed}}.csv",
-        "embeddings": "<results>/embeddings/{source}/{method}/seed{seed}.npz",
         "retrained": "<results>/retrained/{range}/{source}/seed{seed}.npz",
     }
-    embedded = [method.replace("-", "/") for method in methods]
     return {
         kind: collect(
             patterns[kind],
             source=sources,
-            method=embedded if kind == "embeddings" else methods,
+            method=methods,
             range=ranges,
-            seed=SEEDS[:1] if kind == "embeddings" else seeds,
+            seed=seeds,
         )
         for kind in group.reads
+    }
+
+
+def read_by_repeats(wildcards):
+    """Return the frames of all seeds, what a backbone's rows say of them, and the first seed's embeddings."""
+    of = {"source": FRAMES, "seed": SEEDS}
+    reductions = REAL_WORLD["reductions"]
+    return {
+        "registrations": collect(
+            "<results>/registrations/{source}/seed{seed}.npz", **of
+        ),
+        "predictions": collect(
+            "<results>/predictions/{source}/{backbone}-{reduction}/seed{seed}.csv",
+            backbone=wildcards.backbone,
+            reduction=reductions,
+            **of,
+        ),
+        "embeddings": collect(
+            "<results>/embeddings/{source}/{backbone}/{reduction}/seed{seed}.npz",
+            source=FRAMES,
+            backbone=wildcards.backbone,
+            reduction=reductions,
+            seed=SEEDS[0],
+        ),
     }
 
 
@@ -189,6 +231,11 @@ def read_by_frame_input():
     }
 
 
+def seeds_of_frame_row(method):
+    """Return the seeds of a row on depth frames."""
+    return NAMES["published_seed"] if method in NAMES["published"] else SEEDS
+
+
 def read_by_frame_rows(group):
     """Return the predictions of the judged rows on frames and of those in their place, and what they are of."""
     asked = {FRAMES: [*NAMES["backbone"], *NAMES["published"]]}
@@ -204,11 +251,12 @@ def read_by_frame_rows(group):
         "predictions": [
             path
             for source, methods in asked.items()
+            for method in methods
             for path in collect(
                 "<results>/predictions/{source}/{method}/seed{seed}.csv",
                 source=source,
-                method=methods,
-                seed=SEEDS,
+                method=method,
+                seed=seeds_of_frame_row(method),
             )
         ],
     }

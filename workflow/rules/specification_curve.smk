@@ -3,6 +3,7 @@ from gpca.experiments.specification_curve.frame_input import ALIGNED
 from gpca.experiments.specification_curve.registry import (
     FRAME_ENCODER,
     FRAME_INPUT,
+    FRAME_REPEATS,
     FRAME_START,
     GROUPS,
     SEVERITIES_RETRAINED,
@@ -56,7 +57,7 @@ rule reading:
     benchmark:
         "<benchmarks>/readings/{reading_group}.tsv"
     wildcard_constraints:
-        reading_group="|".join(GROUPS),
+        reading_group="|".join(name for name in GROUPS if name != FRAME_REPEATS),
     priority: 9
     conda:
         "../envs/gpca.yaml"
@@ -79,6 +80,57 @@ rule reading:
         ),
     script:
         "../scripts/step.py"
+
+
+# Repeats on depth frames fit a classifier for each row and seed: each kind of repeat and backbone has a job.
+use rule reading as repeat_on_frames with:
+    input:
+        unpack(read_by_repeats),
+        code=code_files(
+            "gpca.experiments.specification_curve.step",
+            GROUPS[FRAME_REPEATS].module,
+        ),
+    output:
+        out=f"<results>/readings/{FRAME_REPEATS}/{{repeats}}/{{backbone}}.csv",
+    log:
+        f"<logs>/readings/{FRAME_REPEATS}/{{repeats}}/{{backbone}}.log",
+    benchmark:
+        f"<benchmarks>/readings/{FRAME_REPEATS}/{{repeats}}/{{backbone}}.tsv"
+    wildcard_constraints:
+        repeats=r"\w+",
+    params:
+        group=FRAME_REPEATS,
+        settings=lambda wildcards: as_json(
+            {
+                "choices": READINGS["groups"][FRAME_REPEATS]
+                | {"repeats": [wildcards.repeats]},
+                "sizes": READING_SIZES,
+                **READING_SECTIONS,
+            }
+        ),
+
+
+rule join_repeats:
+    input:
+        paths=collect(
+            f"<results>/readings/{FRAME_REPEATS}/{{repeats}}/{{backbone}}.csv",
+            repeats=READINGS["groups"].get(FRAME_REPEATS, {}).get("repeats", []),
+            backbone=REAL_WORLD["backbones"],
+        ),
+        code=collector_code("gpca.attribution.metrics:read_all_metrics"),
+    output:
+        f"<results>/readings/{FRAME_REPEATS}.csv",
+    log:
+        f"<logs>/readings/{FRAME_REPEATS}.log",
+    benchmark:
+        f"<benchmarks>/readings/{FRAME_REPEATS}.tsv"
+    localrule: True
+    conda:
+        "../envs/gpca.yaml"
+    params:
+        collector="gpca.attribution.metrics:read_all_metrics",
+    script:
+        "../scripts/collect.py"
 
 
 # Other severities, in training too.

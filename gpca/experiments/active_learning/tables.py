@@ -18,6 +18,7 @@ from gpca.experiments.active_learning.clusters import Clusters
 from gpca.reporting.tables.builder import TableBuilder, cautious_over, crossed, titles_of
 from gpca.reporting.tables.cells import cautious_cell, cell_of_repeats, rows_where
 from gpca.reporting.tables.table import Cell, Column, Table
+from gpca.reporting.words import plural
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -87,13 +88,15 @@ def _rare(conditions: Mapping) -> list[str]:
     if not (rare := conditions["rare"]):
         return []
     gpc = rare["gpc"]
+    few = rare.get("beside_seeds")
+    beside = f" Shares but the first: over at most the first {plural(few, 'seed')}." if few else ""
     return [
         "Where so many percent of the pool are new (5 % are compared with the paper), the paper's classifier "
         f"({gpc['kernel']}, rate {gpc['learning_rate']:g}, {gpc['iterations']} passes) is fitted anew in each round of "
         f"{rare['batch']} labels, and labels are counted one by one (docs/comparison.md). Start: "
         f"{conditions['initial']} labeled samples of the two known concepts. Labels are given until the target, at "
         f"least {rare['least']} (then {rare['late_batch']} a round), at most {rare['labels']} or the whole pool; '>': "
-        f"some runs did not reach it. Epochs are counted in steps of {LOOK_EVERY}."
+        f"some runs did not reach it. Epochs are counted in steps of {LOOK_EVERY}.{beside}"
     ]
 
 

@@ -70,7 +70,7 @@ def _check_training(config: dict) -> None:
                 raise InputError("config key real_world.virtual", fault, f"set {needed}, or virtual to null")
     require_names("real_world.training", list(section["training"] or {}), encoders, "encoder", set())
     for name in (*section["backbones"], *section["published"].values()):
-        changes = {"pretraining": section["pretraining"] or {}, "training": (section["training"] or {}).get(name, {})}
+        changes = {"pretraining": pretraining_of(section, name), "training": (section["training"] or {}).get(name, {})}
         for part, settings in changes.items():
             with_key(f"real_world.{part}", lambda whole: EncoderSettings(**whole), encoders[name] | settings)
 
@@ -96,6 +96,7 @@ def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
         "backbone": backbones,
         "first_backbone": backbones[0],
         "published": published_backbones(frames),
+        "published_seed": list(config["seeds"])[: frames.get("published_seeds")],
         "rendered": rendered_backbones(frames),
         "classic": [name for name in CLASSIC if name in config["explainers"]],
         "frame_explainer": list(frames["explainers"]),
@@ -159,6 +160,12 @@ def reduced_backbones(frames: Mapping) -> list[str]:
 def published_backbones(frames: Mapping) -> list[str]:
     """Return the rows beside them whose encoders are as published, with every reduction."""
     return [f"{encoder}-{name}" for encoder in frames["published"].values() for name in frames["reductions"]]
+
+
+def pretraining_of(frames: Mapping, encoder: str) -> dict[str, Any]:
+    """Return how an encoder of frames is pretrained; those as published have changes of their own."""
+    own = frames.get("published_pretraining", {}) if encoder in frames["published"].values() else {}
+    return {**frames["pretraining"], **own} if frames["pretraining"] else {}
 
 
 def rendered_backbones(frames: Mapping) -> list[str]:

@@ -26,7 +26,8 @@ def collect_intervals(
     """Return accuracies of `real_world.csv` over all seeds, with 95 % intervals (:mod:`gpca.attribution.clustered`).
 
     - accuracy: of every part of the test samples that the column `table` names; of all of them by concept as well.
-    - difference: of that of all from the first method's, on the same draws, where both have the same samples.
+    - difference: of that of all from the first method's in the same seeds, on the same draws, where both have the same
+      samples.
 
     Clusters are scenes; the draws of a source are the same for all methods.
 
@@ -57,8 +58,9 @@ def collect_intervals(
         samples = Clustered.drawn(rows["seed"], rows["cluster"], "frame intervals", source)
         for table, metric, concept, own, estimate in _estimates(rows, samples):
             records.append(own.record((table, source, method, metric, concept), estimate))
-        other = together.get((source, first))
-        if method != first and other is not None and rows[SAMPLE].equals(other[SAMPLE]):
+        other = together.get((source, first), rows.iloc[:0])
+        other = other[other["seed"].isin(rows["seed"])].reset_index(drop=True)  # some methods have fewer seeds
+        if method != first and rows[SAMPLE].equals(other[SAMPLE]):
             apart = samples.difference(rows["right"].to_numpy(), other["right"].to_numpy())
             records.append(samples.record((TOGETHER, source, method, "difference", ALL), apart))
     return intervals(records, "predictions")

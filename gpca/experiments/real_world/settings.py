@@ -64,6 +64,8 @@ class RealWorldSettings:
 
     Attributes:
         published: judged backbone -> encoder of its published architecture, whose rows stand beside the judged ones.
+        published_seeds: how many of the run's seeds, from the first, these rows have; null: all.
+        published_pretraining: changes of `pretraining` for these encoders.
     """
 
     title: Text | None
@@ -88,3 +90,5 @@ class RealWorldSettings:
     one_encoder: bool
     causes: FrameCauseSettings
     reenactment: Reenactment
+    published_seeds: Count | None = None
+    published_pretraining: Pretraining = field(default_factory=dict)

@@ -108,8 +108,10 @@ def table6_backbones(
             cells = _cells(intervals, metrics, method, parameters)
             table.add_row(labels, cells | {"classifiers": _deviation(one_encoder, method)} if cells else {})
     beside = {name: BACKBONES.get(name, name) for name in published or {}}
+    seeds_beside: set[int] = set()
     for (name, reduction), labels in crossed(beside, {name: REDUCTIONS[name] for name in reductions}):
         cells = _cells(intervals, metrics, f"{name}-{reduction}", (published or {})[name])
+        seeds_beside |= {cell.seeds for cell in cells.values() if cell}
         table.add_row(labels, cells, rival=False)
     for backbone in rendered:
         name = f"{backbone}{RENDERED}"
@@ -121,6 +123,8 @@ def table6_backbones(
         table.add_row(labels, _cells(intervals, metrics, method))
     table.compare_down(["accuracy"])
     shown = table.first_cell("accuracy")
+    few = max(seeds_beside, default=shown.seeds)
+    fewer = f", over the first {plural(few, 'seed')}" if few < shown.seeds else ""
     rival = f"To {BACKBONES.get(first, first)}"
     encoder = f"encoder that goes on from one pretrained on {pretrained_on}" if pretrained_on else "encoder"
     other = " without reduction" if reductions[0] == "none" else f" with {REDUCTIONS[reductions[0]]}"
@@ -142,7 +146,7 @@ def table6_backbones(
             "the seeds of the accuracy.",
             f"{rival}: paired difference to it{other}. By concept: the share of its samples that is attributed to it. "
             "Parameters: of the encoder.",
-            *([f"{', '.join(beside.values())}: {PUBLISHED_NOTE}"] if beside else ()),
+            *([f"{', '.join(beside.values())}{fewer}: {PUBLISHED_NOTE}"] if beside else ()),
             *([RENDERED_NOTE] if rendered else ()),
         ),
     )

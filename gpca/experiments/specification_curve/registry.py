@@ -14,6 +14,7 @@ from gpca.pairs.reading import Reading as ReadAs
 from gpca.registry import load
 from gpca.settings import Bounds, Count, Distinct, Keys, OpenShare, Positive
 
+FRAME_REPEATS = "frames"  # the group that fits classifiers to depth frames anew
 FRAME_INPUT = "frame_input"  # the group whose encoders of frames see other clouds
 FRAME_ENCODER, FRAME_START = "frame_encoder", "frame_start"  # those that read other rows on frames than the judged
 SEVERITIES_RETRAINED = "severities_retrained"  # the group whose encoders learn from other severities
@@ -181,7 +182,7 @@ GROUPS = {
         "labels:epochs",
         ("sets",),
     ),
-    "frames": Group(
+    FRAME_REPEATS: Group(
         "What varies on depth frames",
         {"repeats": Literal["everything", "classifiers", "samples"], "objects": ShownObjects},
         "frames:run",

@@ -72,6 +72,17 @@ def test_differences_are_paired_with_the_first_method(found):
     assert ("attribution", "dgcnn-none", "difference", "all") not in found.index
 
 
+def test_a_method_of_fewer_seeds_is_compared_in_these(files):
+    said, poses = files
+    first_alone = collect_intervals(said[:2], poses[:1], "dgcnn-none")
+    fewer = collect_intervals([path for path in said if path != said[3]], poses, "dgcnn-none")
+    of = {"method": "pointnet-none", "table": "attribution", "concept": "all"}
+    for rows in (first_alone, fewer):
+        told = rows[(rows[list(of)] == list(of.values())).all(axis=1)].set_index("metric")
+        assert told.loc["difference", "value"] == pytest.approx(-2 / 12)
+        assert told["seeds"].tolist() == [1, 1]
+
+
 def test_faults_are_one_line(files):
     said, poses = files
     with pytest.raises(InputError, match="no files were given"):

@@ -8,6 +8,7 @@ from gpca.config.check import check
 from gpca.config.leave_out import without_false
 from gpca.encoders.registry import make_encoder
 from gpca.errors import InputError
+from gpca.experiments.real_world.experiment import pretraining_of
 from gpca.experiments.run import explainer_of, files_behind, names_of, settings_of
 
 from ...config.configs import changed, load
@@ -25,7 +26,10 @@ def test_the_full_protocol_has_them_with_every_reduction_and_the_default_has_non
     assert {"frame_encoder", "frame_start"} <= set(names["reading_group"])
     assert names["estimated"] == "real_rgbd_estimated"
     assert list(settings["published_encoders"]) == ["dgcnn_1024", "pointnet_tnet", "pointnet2_ssg"]
+    assert names["published_seed"] == config["seeds"][:2]
     usual = names_of(without_false(load()), sources)
+    for name, epochs in {"dgcnn": 8, "dgcnn_1024": 4}.items():
+        assert pretraining_of(config["real_world"], name)["epochs"] == epochs
     assert usual["published"] == [] and usual["condition_backbone"] == ["dgcnn-none"]
     assert not {"frame_encoder", "frame_start"} & set(usual["reading_group"])
 

@@ -109,6 +109,9 @@ def test_encoders_as_published_stand_below_the_judged_ones_and_are_never_the_bes
     assert table.cells[3, "parameters"].mean == 750 and table.best() == make().best()
     assert "DGCNN of 1024 features: readings of which architecture" in " ".join(table.footnotes)
     assert "readings of" not in " ".join(make(values).footnotes)
+    fewer = values | {"dgcnn_1024-none": (0.9, 0.9), "dgcnn_1024-pca": (0.9, 0.8)}
+    few = table6_backbones(intervals(fewer), metrics(fewer), *of[2:], published={"dgcnn_1024": 750_000})
+    assert "DGCNN of 1024 features, over the first 2 seeds: readings of" in " ".join(few.footnotes)
 
 
 def test_a_backbone_without_a_title_has_its_name():
