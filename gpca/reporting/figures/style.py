@@ -6,6 +6,8 @@ import io
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from gpca.io.files import whole_file
 
 MATPLOTLIBRC = str(Path(__file__).with_name("matplotlibrc"))
@@ -102,5 +104,5 @@ def _fewer_colors(image):
     from PIL import Image, ImageChops
 
     few = image.quantize(256, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
-    largest = max(high for _, high in ImageChops.difference(image, few.convert("RGB")).getextrema())
+    largest = np.asarray(ImageChops.difference(image, few.convert("RGB"))).max()
     return few if largest <= 255 // 12 else image
