@@ -14,6 +14,7 @@ from packaging.utils import canonicalize_name
 
 from gpca.alignment.methods.registry import methods
 from gpca.code_files import code_files
+from gpca.process.extras import MODULES
 
 from .documents import ROOT
 
@@ -36,9 +37,13 @@ RUN = {"mypy", "pytest-cov", "ruff", "setuptools", "snakefmt", "snakemake", "sna
 
 
 def requirements(*lists):
-    """What pyproject.toml names for this system: for the library, and in the lists of extras."""
+    """What pyproject.toml names for this system: for the library, and in extras and those that they hold."""
     named = [PROJECT["dependencies"], *(PROJECT["optional-dependencies"][name] for name in lists)]
     found = [Requirement(line) for lines in named for line in lines]
+    held = {extra for requirement in found if requirement.name == PROJECT["name"] for extra in requirement.extras}
+    if held - set(lists):
+        return requirements(*lists, *sorted(held - set(lists)))
+    found = [requirement for requirement in found if requirement.name != PROJECT["name"]]
     return [requirement for requirement in found if requirement.marker is None or requirement.marker.evaluate()]
 
 
@@ -78,8 +83,9 @@ def required_by(package):
         return ()
 
 
-def test_the_lock_holds_nothing_that_nothing_needs():
-    needed, open_requirements = set(), requirements(*EXTRAS)
+def needed_by(requirements):
+    """The packages of the lock that these requirements name, and that those need."""
+    needed, open_requirements = set(), list(requirements)
     while open_requirements:
         requirement = open_requirements.pop()
         key = canonicalize_name(requirement.name), *sorted(requirement.extras)
@@ -90,7 +96,11 @@ def test_the_lock_holds_nothing_that_nothing_needs():
             extras = requirement.extras or {""}
             if further.marker is None or any(further.marker.evaluate({"extra": extra}) for extra in extras):
                 open_requirements.append(further)
-    assert set(pinned()) == {name for name, *_ in needed}
+    return {name for name, *_ in needed}
+
+
+def test_the_lock_holds_nothing_that_nothing_needs():
+    assert set(pinned()) == needed_by(requirements(*EXTRAS))
 
 
 def files_of(*folders):
@@ -120,7 +130,7 @@ def imported(files):
 
 @pytest.mark.parametrize(
     ("files", "lists"),
-    [(library(), ()), (files_of(*RUNS), ("workflow",)), (files_of(*RUNS, *CHECKS), ("workflow", "dev"))],
+    [(library(), ("suite",)), (files_of(*RUNS), ("workflow",)), (files_of(*RUNS, *CHECKS), ("workflow", "dev"))],
 )
 def test_what_is_imported_is_named_where_it_is_needed(files, lists):
     assert imported(files) <= {canonicalize_name(requirement.name) for requirement in requirements(*lists)}
@@ -129,6 +139,14 @@ def test_what_is_imported_is_named_where_it_is_needed(files, lists):
 def test_what_is_named_is_imported_or_run():
     named = {canonicalize_name(requirement.name) for requirement in requirements(*EXTRAS)}
     assert named == imported(files_of(*RUNS, *CHECKS)) | RUN | OPTIONAL
+
+
+def test_what_an_extra_installs_is_named_by_it_where_it_is_missing():
+    assert set(MODULES) < set(PROJECT["optional-dependencies"])
+    for extra, modules in MODULES.items():
+        own = {canonicalize_name(Requirement(line).name) for line in PROJECT["optional-dependencies"][extra]}
+        own -= {PROJECT["name"], "open3d", *map(canonicalize_name, RUN - {"snakemake"})}
+        assert {canonicalize_name(CALLED.get(module, module)) for module in modules} == own
 
 
 def test_what_is_optional_is_an_extra_of_its_own():

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from gpca.errors import InputError
+from gpca.process.extras import remedy
 
 # Shared library -> package (Debian and Ubuntu, Fedora). Any other library is named as it is.
 SYSTEM_PACKAGES = {
@@ -41,13 +42,16 @@ def require_open3d() -> ModuleType:
     """Import and return Open3D.
 
     Raises:
-        InputError: it cannot be imported; the line names the missing system library and its package.
+        InputError: it is not installed or cannot be imported; the line names the extra, or the system library that is
+            missing and its package.
     """
     try:
         import open3d
     except (ImportError, OSError) as fault:
-        remedy = system_library_hint(str(fault)) or "run 'make environment', on Python 3.11 or 3.12"
-        raise InputError("Open3D", f"cannot be imported ({fault})", remedy) from fault
+        if isinstance(fault, ModuleNotFoundError) and fault.name == "open3d":
+            raise InputError("Open3D", "is not installed", remedy("suite")) from fault
+        hint = system_library_hint(str(fault)) or "run 'make environment', on Python 3.11 or 3.12"
+        raise InputError("Open3D", f"cannot be imported ({fault})", hint) from fault
     return open3d
 
 

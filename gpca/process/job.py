@@ -14,6 +14,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from gpca.errors import InputError
+from gpca.process.extras import missing
 from gpca.process.interrupts import certain_interrupts
 from gpca.process.processor import prepare
 from gpca.process.standard_streams import say, standard_streams
@@ -128,7 +129,8 @@ def _print_to(logs: Any) -> None:
 def as_process(name: str, function: Callable[[], int | None]) -> int:
     """Call a function and return the status of the process: 0, or what the function returns.
 
-    A fault of the input ends as one line on stderr and status 2, Ctrl-C as status 130.
+    A fault of the input ends as one line on stderr and status 2, and so does the lack of a package that
+    an extra installs; Ctrl-C as status 130.
     """
     with _as_process(f"{name}: ") as process:
         process.status = function() or 0
@@ -145,6 +147,11 @@ def _as_process(prefix: str = "") -> Iterator[SimpleNamespace]:
             yield process
     except (InputError, OSError) as fault:
         say(f"{prefix}{fault}")
+        process.status = 2
+    except ModuleNotFoundError as fault:
+        if (line := missing(fault)) is None:
+            raise
+        say(f"{prefix}{line}")
         process.status = 2
     except MemoryError:
         say(f"{prefix}this machine ran out of memory; use smaller settings or another machine")

@@ -57,6 +57,12 @@ def test_what_a_rule_gives_is_an_attribute_and_what_it_lacks_is_named():
     ("fault", "status", "line"),
     [
         (InputError("a.csv", "is empty", "fill it"), 2, "step: a.csv: is empty; fill it\n"),
+        (
+            ModuleNotFoundError("No module named 'shap.plots'", name="shap.plots"),
+            2,
+            "step: shap: this Python package is not installed; "
+            "install it, 'pip install \".[suite]\"' in the folder of the suite\n",
+        ),
         (FileNotFoundError(2, "No such file", "a.csv"), 2, "step: [Errno 2] No such file: 'a.csv'\n"),
         (MemoryError(), 2, "step: this machine ran out of memory; use smaller settings or another machine\n"),
         (KeyboardInterrupt(), 130, "step: stopped; repeat the command to continue\n"),
