@@ -8,6 +8,7 @@ from gpca.config.layers import DEFAULTS, require_sound
 from gpca.config.restart import clear_leftovers
 from gpca.errors import one_line
 from gpca.experiments.registry import experiments
+from gpca.process.time_left import tell_time_left
 
 given, module = workflow.config_settings, workflow.modifier
 with one_line():
@@ -48,6 +49,7 @@ onstart:
     # What starts on one machine is limited by its cores.
     if workflow.local_exec:
         workflow.scheduler.job_rate_limiter = None
+    tell_time_left(workflow, config["run"])
 
 
 rule all:

@@ -3,6 +3,7 @@
     python benchmarks/scale.py results/full [--configfile config/full.yaml] [--config data_dir=/data] [--cores 1 2 4 8]
     python benchmarks/scale.py results/full --sources 100 --seeds 10 --explainers 20 [--write docs/cluster.md]
     python benchmarks/scale.py results/default --expect config/full.yaml [--given train_encoder=2x readings/pool=90s]
+    python benchmarks/scale.py results/default --times
 
 The first form schedules the jobs of a finished run, each with the seconds of its benchmark file, on several
 numbers of cores (Snakemake's own start and the cores' shared memory are not in it), and names the chain of jobs that no
@@ -13,13 +14,15 @@ the seeds. A rule that was not measured counts as the mean of the others, in the
 datasets is left out, as its cost grows with the square of their number. The third schedules another config before it is
 run, with jobs that grow in the same way. Where its sizes differ too, --given says by what factor the jobs of a rule or
 a benchmark file grow besides, or how many seconds they take; names may be patterns, and the last one that fits counts.
---write puts the tables between the comments that the page has for the run. The last line is a JSON object:
-speedup_<cores>, critical_s, core_min; and jobs, submitted, core_h, longest_s, results, plan_s, plan_mb.
+--write puts the tables between the comments that the page has for the run, --times the mean seconds of each rule into
+workflow/measured_times.csv, by which a run tells its time left. The last line is a JSON object: speedup_<cores>,
+critical_s, core_min; and jobs, submitted, core_h, longest_s, results, plan_s, plan_mb.
 """
 
 from __future__ import annotations
 
 import argparse
+import csv
 import json
 import re
 import resource
@@ -41,6 +44,8 @@ from benchmarks.schedule import Job, critical_path, wall_time  # noqa: E402
 from benchmarks.targets import name_of_run, parser_of_run, plan, read_plan  # noqa: E402
 from gpca.errors import InputError  # noqa: E402
 from gpca.experiments.registry import experiments  # noqa: E402
+from gpca.io.files import whole_file  # noqa: E402
+from gpca.process.time_left import TIMES, read_times  # noqa: E402
 
 RUN = "scale"
 SLOTS = (50, 500)  # jobs of a cluster at once
@@ -59,11 +64,14 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--seeds", type=int, default=10, help="number of seeds of the larger run, default 10")
     parser.add_argument("--explainers", type=int, default=20, help="number of explainers of the larger run, default 20")
     parser.add_argument("--write", type=Path, metavar="PAGE", help="Markdown page with a place for the tables")
+    parser.add_argument("--times", action="store_true", help="write the mean seconds of each rule for later runs")
     options = parser.parse_args(arguments)
     try:
         run = name_of_run(options.folder)
         jobs = read_plan(plan(run, options.configfile, options.config), run)
         seconds = measured(jobs, options.folder)
+        if options.times:
+            write_times(TIMES, run, jobs, seconds)
         planned, taken = jobs, seconds
         if options.expect:
             planned = read_plan(plan(RUN, options.expect, []), RUN)
@@ -102,6 +110,19 @@ def measured(jobs: Sequence[Job], folder: Path) -> dict[str, float]:
         else:
             raise InputError(folder, f"has no {job.benchmark}", "finish the run, or give its --configfile and --config")
     return seconds
+
+
+def write_times(path: Path, run: str, jobs: Sequence[Job], seconds: Mapping[str, float]) -> None:
+    """Write the mean seconds of each rule of a run into a table, beside those of other runs."""
+    of_rule = defaultdict(list)
+    for job in jobs:
+        of_rule[job.rule].append(seconds[job.benchmark])
+    times = read_times(path) | {run: {rule: fmean(values) for rule, values in sorted(of_rule.items())}}
+    with whole_file(path) as half, half.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["run", "rule", "seconds"])
+        for name, by_rule in sorted(times.items()):
+            writer.writerows([name, rule, f"{mean_s:.2f}"] for rule, mean_s in by_rule.items())
 
 
 def on_cores(jobs: Sequence[Job], seconds: Mapping[str, float], cores: Sequence[int]) -> tuple[list[str], dict]:

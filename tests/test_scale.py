@@ -9,6 +9,7 @@ from benchmarks.schedule import Job
 from gpca.config.check import check
 from gpca.config.leave_out import without_false
 from gpca.errors import InputError
+from gpca.process.time_left import read_times
 
 from .config.configs import load, merged
 
@@ -99,3 +100,12 @@ def test_the_last_name_that_fits_counts():
     seconds = {job.benchmark: 10.0 for job in jobs}
     assert list(scale.given(jobs, seconds, ["reading=3x"]).values()) == [30, 10]
     assert list(scale.given(jobs, seconds, ["*=2x", "readings/p*=2.5s"]).values()) == [2.5, 20]
+
+
+def test_the_times_of_rules_are_kept_for_later_runs(run_folder, tmp_path, monkeypatch):
+    times = tmp_path / "times.csv"
+    times.write_text("run,rule,seconds\nfull,page,5.00\nsmoke,gone,1.00\n")
+    monkeypatch.setattr(scale, "TIMES", times)
+    assert scale.main([str(run_folder), "--times"]) == 0
+    rules = {job.rule for job in scale.read_plan(scale.plan("smoke", None, []), "smoke")}
+    assert read_times(times) == {"full": {"page": 5.0}, "smoke": dict.fromkeys(rules, 30.0)}

@@ -1,0 +1,145 @@
+"""How long a run still takes: beside Snakemake's count of jobs, by how long the same jobs took before.
+
+A job is expected to take what its benchmark file says of an earlier run in the same folder, else the mean of its rule
+in a run that was measured (`TIMES`), else the mean of all others.
+"""
+
+from __future__ import annotations
+
+import csv
+import logging
+from collections.abc import Callable, Mapping
+from functools import partial
+from pathlib import Path
+from statistics import fmean
+from time import monotonic
+from typing import Any
+
+TIMES = Path(__file__).parents[2] / "workflow/measured_times.csv"  # python benchmarks/scale.py results/default --times
+USUAL_RUN = "default"  # whose times tell how the jobs of a run that was never measured compare with each other
+EVERY_S = 20.0  # between two lines
+TRUST_S = 120.0  # core time after which this machine's speed counts as much as that of the machine that was measured
+_PROGRESS = "progress"  # the event of Snakemake's own count of jobs
+
+
+class TimeLeft:
+    """Work that is left, in seconds of one core.
+
+    Args:
+        expected: job, by the path of its benchmark file -> seconds that it took before; None where nobody knows.
+        cores: how many jobs of one core run side by side.
+        trust_s: core time for which the seconds are believed, before those of the jobs that have ended correct them.
+    """
+
+    def __init__(self, expected: Mapping[str, float | None], cores: int, trust_s: float = TRUST_S) -> None:
+        usual_s = fmean([seconds for seconds in expected.values() if seconds is not None])
+        self._left = {job: usual_s if seconds is None else seconds for job, seconds in expected.items()}
+        self._cores = cores
+        self._expected_s = self._took_s = trust_s
+
+    @property
+    def jobs(self) -> list[str]:
+        """The jobs that have not ended."""
+        return list(self._left)
+
+    def finish(self, job: str, took_s: float | None) -> None:
+        """Note that a job has ended, and the seconds that it took where that is known."""
+        expected_s = self._left.pop(job)
+        if took_s is not None:
+            self._expected_s += expected_s
+            self._took_s += took_s
+
+    def seconds(self) -> float:
+        """Return the expected seconds until the last job ends, if all go on as fast as those that have ended.
+
+        That is the work for each core, or the longest job where that takes longer. Jobs that run count as a whole.
+        """
+        longest_s = max(self._left.values(), default=0.0)
+        return max(sum(self._left.values()) / self._cores, longest_s) * self._took_s / self._expected_s
+
+
+class TimeLeftHandler(logging.Handler):
+    """Follows Snakemake's counts of jobs by a line about the time left, at most one in `EVERY_S`.
+
+    Args:
+        time_left: what is left.
+        has_ended: tells whether a job has ended.
+        say: writes a line.
+        clock: monotonic seconds.
+    """
+
+    def __init__(
+        self,
+        time_left: TimeLeft,
+        has_ended: Callable[[str], bool],
+        say: Callable[[str], object],
+        clock: Callable[[], float] = monotonic,
+    ) -> None:
+        super().__init__(logging.INFO)
+        self._time_left, self._has_ended, self._say, self._clock = time_left, has_ended, say, clock
+        self._said_s = clock()
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Take a message of Snakemake's; all but its counts of jobs are ignored."""
+        if getattr(record, "event", None) != _PROGRESS or self._clock() - self._said_s < EVERY_S:
+            return
+        self._said_s = self._clock()
+        for job in filter(self._has_ended, self._time_left.jobs):
+            self._time_left.finish(job, seconds_of(job))
+        self._say(in_words(self._time_left.seconds()))
+
+
+def tell_time_left(workflow: Any, run: str) -> None:
+    """Let a run that begins tell how long it still takes; nothing where none of its jobs was ever measured.
+
+    Args:
+        workflow: Snakemake's object of that name, within ``onstart``.
+        run: the name of the run.
+    """
+    from snakemake.logging import logger
+    from snakemake.settings.enums import Quietness
+
+    times = read_times(TIMES)
+    by_rule = times.get(run, times.get(USUAL_RUN, {}))
+    jobs = {str(job.benchmark): job for job in workflow.dag.needrun_jobs() if job.benchmark}
+    before = {path: seconds_of(path) for path in jobs}
+    of_rule = {path: by_rule.get(job.rule.name) for path, job in jobs.items()}
+    expected = {path: of_rule[path] if before[path] is None else before[path] for path in jobs}
+    if not any(expected.values()):
+        return
+    side_by_side = workflow.cores if workflow.local_exec else workflow.nodes
+    measured = run in times or any(before.values())
+    time_left = TimeLeft(expected, max(1, min(int(side_by_side or 1), len(jobs))), TRUST_S if measured else 1.0)
+    say = partial(logger.info, extra={"quietness": Quietness.PROGRESS})
+    if measured:
+        say(in_words(time_left.seconds()))
+    logger.addHandler(TimeLeftHandler(time_left, lambda path: workflow.dag.finished(jobs[path]), say))
+
+
+def seconds_of(benchmark: str | Path) -> float | None:
+    """Return the seconds that a benchmark file says, the sum of its repeats; None where it says nothing."""
+    try:
+        rows = list(csv.DictReader(Path(benchmark).read_text(encoding="utf-8").splitlines(), delimiter="\t"))
+        return sum(float(row["s"]) for row in rows) if rows else None
+    except (OSError, KeyError, TypeError, ValueError):  # it is being written, or another program's
+        return None
+
+
+def read_times(path: Path) -> dict[str, dict[str, float]]:
+    """Return run -> rule -> mean seconds of its jobs; none where there is no such file."""
+    times: dict[str, dict[str, float]] = {}
+    if path.is_file():
+        with path.open(encoding="utf-8", newline="") as file:
+            for row in csv.DictReader(file):
+                times.setdefault(row["run"], {})[row["rule"]] = float(row["seconds"])
+    return times
+
+
+def in_words(seconds: float) -> str:
+    """Return a line such as ``about 35 minutes left``."""
+    minutes = round(seconds / 60)
+    if minutes < 1:
+        return "less than a minute left"
+    if minutes < 120:
+        return f"about {minutes} minute{'s' * (minutes > 1)} left"
+    return f"about {seconds / 3600:.1f} hours left"
