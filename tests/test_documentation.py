@@ -124,7 +124,8 @@ def snakemake_plans():
 @pytest.mark.parametrize(("options", "targets"), snakemake_plans(), ids=lambda part: " ".join(sorted(part)))
 def test_every_snakemake_command_can_be_planned(options, targets, tmp_path):
     if "profile" in options:
-        pytest.importorskip("snakemake_executor_plugin_slurm")
+        executor = yaml.safe_load((ROOT / options["profile"] / "config.yaml").read_text())["executor"]
+        pytest.importorskip(f"snakemake_executor_plugin_{executor.replace('-', '_')}")
     words = [word for name, value in options.items() for word in (f"--{name}", *value.split())]
     words = [word.replace("data_dir=/data", f"data_dir={tmp_path}") for word in (*words, "--", *sorted(targets))]
     plan = subprocess.run(

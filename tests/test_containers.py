@@ -1,0 +1,41 @@
+"""The recipes of the images; building them needs a network and is left to those who have one."""
+
+import re
+
+import yaml
+
+from gpca.process.environment import SYSTEM_PACKAGES
+
+from .documents import ROOT
+
+DOCKER = (ROOT / "containers/Dockerfile").read_text()
+APPTAINER = (ROOT / "containers/gpca.def").read_text()
+
+
+def packages(recipe):
+    """What the recipe installs of the system."""
+    [words] = re.findall(r"--no-install-recommends \\\n([^&\n]+?)(?: \\)?\n", recipe)
+    return set(words.split())
+
+
+def test_both_install_what_the_check_of_every_commit_takes_for_granted():
+    check = (ROOT / ".ci/run").read_text()
+    libraries = {debian for library, (debian, _) in SYSTEM_PACKAGES.items() if library in check}
+    assert libraries == {"libgl1", "libx11-6", "libgomp1"}
+    workflow = yaml.safe_load((ROOT / ".github/workflows/ci.yml").read_text())["jobs"]["check"]
+    [given] = re.findall(r"--no-install-recommends (.+)", workflow["steps"][0]["run"])
+    assert packages(DOCKER) == packages(APPTAINER) == libraries | {"python3-venv", *given.split()}
+    for recipe in (DOCKER, APPTAINER):
+        assert f"debian:{workflow['container'].removeprefix('debian:')}-slim" in recipe
+
+
+def test_both_make_the_environment_and_run_the_results_unless_told_otherwise():
+    assert re.search(r"^RUN make environment\n\nCMD \[\"make\", \"results\"\]\n\Z", DOCKER, re.MULTILINE)
+    assert re.search(r"^    make environment\n\n%runscript\n", APPTAINER, re.MULTILINE)
+    assert "set -- make results" in APPTAINER
+
+
+def test_the_image_holds_what_git_keeps_of_the_results():
+    kept = {line for line in (ROOT / ".gitignore").read_text().splitlines() if line.startswith("!/results/")}
+    ignored = (ROOT / "containers/Dockerfile.dockerignore").read_text().splitlines()
+    assert {line.strip("!/") for line in kept} == {line.strip("!/") for line in ignored if line.startswith("!")}
