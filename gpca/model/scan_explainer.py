@@ -24,6 +24,7 @@ from gpca.model.scan_registration import Scans
 from gpca.model.scan_verdict import LIMIT, decision, failure_of, refined, state_of, warnings_of
 from gpca.model.scene import Scene
 from gpca.model.voxels import in_voxels, require_edge, voxel_size
+from gpca.objects.canonical import diameter
 from gpca.objects.cloud_objects import as_points
 from gpca.objects.mesh_folder import meters_per
 from gpca.reenactment.enactment import Enactment
@@ -56,8 +57,8 @@ def explain_scans(
         method: registration method (docs/registration.md); by default point-to-plane ICP, coarse to fine.
 
     Raises:
-        InputError: too few points, NaN, an initial pose that is no rigid transform, voxels that leave too few points,
-            an unknown method or one whose package is missing.
+        InputError: too few points, NaN, points on one line, an initial pose that is no rigid transform, voxels that
+            leave too few points, an unknown method or one whose package is missing.
     """
     started = perf_counter()
     meters_per(unit)
@@ -116,6 +117,7 @@ def _prepared(
         if len(thinned) < FEWEST_VOXELS:
             remedy = f"give both in one unit, and voxels so small that it fills {FEWEST_VOXELS}"
             raise InputError(name, f"fills {len(thinned)} voxels of {voxel:.3g} {unit}", remedy)
+        diameter(thinned, name)  # which a line does not have
     low, high = np.quantile(clouds["target"], (OUTSIDE, 1 - OUTSIDE), axis=0)
     frame = CanonicalFrame((low + high) / 2, float(np.sqrt(np.square(high - low).sum())))
     began = frame.coordinates(transform(T_init, clouds["source"]))

@@ -51,14 +51,15 @@ def failure_of(scans: Scans, enactments: Sequence[Enactment], T_found: np.ndarra
     Args:
         enactments: of the :func:`refined` poses; errors are over the surface that is common at each.
     """
+    found = scans.outcome(T_found)
+    if not found.fitness > 0:
+        return 1.0
     error_k = np.array([0.0, *(_distance(enactment, T_found) for enactment in enactments)])
     posteriors = (enactment.hypothesis.log_posterior for enactment in enactments)
     posterior_k = np.array([-INDEPENDENT * scans.misfit(T_found), *posteriors])
     weight_k = np.exp(posterior_k - posterior_k.max())
     by_poses = (weight_k * expit(STEEPNESS * np.log(np.maximum(error_k, LEAST) / LIMIT))).sum() / weight_k.sum()
-    found = scans.outcome(T_found)
-    apart = found.inlier_rmse / scans.voxel if found.fitness > 0 else np.inf
-    by_fit = expit(CLOSE_STEEPNESS * np.log(max(apart, LEAST) / CLOSE))
+    by_fit = expit(CLOSE_STEEPNESS * np.log(max(found.inlier_rmse / scans.voxel, LEAST) / CLOSE))
     return float(by_poses + by_fit) / 2
 
 
@@ -73,6 +74,8 @@ def decision(state: str, reenacted: Reenacted, overlap: float) -> tuple[str, str
     """Return what to do next, and why."""
     if state == NOMINAL:
         return NOTHING, "the scans lie close to each other, and no other pose fits as well"
+    if overlap == 0:
+        return TREATMENTS["pose"], "no point of the source lies on the target: give an initial pose or a global method"
     if not reenacted.poses[0].registered:
         return TREATMENTS["pose"], "another pose may be right: start from pose 1"
     if overlap < LEAST_OVERLAP:

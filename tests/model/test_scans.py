@@ -69,6 +69,13 @@ def test_a_right_registration_is_told_from_a_wrong_one(scans, right):
         assert words in wrong.text()
 
 
+def test_a_source_far_from_the_target_has_failed(scans):
+    source, target = scans
+    far = explain_scans(source, target + np.array([0, 5000, 0]))
+    assert (far.state, far.failure, far.overlap) == ("failed", 1.0, (0.0, 0.0))
+    assert far.reason.startswith("no point of the source lies on the target")
+
+
 def test_the_command_explains_scans_of_two_formats_in_another_unit_without_a_model(
     scans, right, tmp_path, monkeypatch, capsys
 ):
