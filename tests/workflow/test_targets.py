@@ -104,7 +104,7 @@ EDITS = {  # a module: what is made again where it has changed, and what is not
         "control_embeddings/ saliency/ table2_per_concept",
         "registrations uncertainty/ causes/ descriptors predictions/real_rgbd/gpca_pair residuals_forest methods/",
     ),
-    "gpca/objects/uw_rgbd.py": ("", "objects/ tables/ figures/ page index.html"),
+    "gpca/objects/uw_rgbd.py": ("", "objects/ tables/ figures/ index.html"),
     "gpca/objects/shapes/cups.py": (
         "objects/coffee_cup registrations/coffee_cup predictions/coffee_cup objects_coffee_cup",
         "objects/ycb registrations/ycb kernels/ scenes instances exchange/ recovery",
