@@ -15,6 +15,7 @@ from gpca.io.files import require_outputs
 from gpca.model.location import model_path, require_model
 from gpca.model.point_file import read_points, read_pose, read_scan, require_format
 from gpca.objects.mesh_folder import METERS_PER_UNIT
+from gpca.process.arguments import length
 from gpca.uncertainty.settings import MONTE_CARLO, UncertaintySettings
 
 if TYPE_CHECKING:
@@ -43,7 +44,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--png", type=Path, metavar="FILE", help="write one figure that shows it")
     parser.add_argument("--queue", type=Path, metavar="FILE", help="add what is queued to a file for 'gpca label'")
     parser.add_argument("--scans", action="store_true", help="both are scans of any size, of which neither is whole")
-    parser.add_argument("--voxel", type=float, help="edge of the voxels of scans (default: chosen by their spacing)")
+    parser.add_argument("--voxel", type=length, help="edge of the voxels of scans (default: chosen by their spacing)")
     form = parser.add_mutually_exclusive_group()
     form.add_argument("--json", action="store_true", help="print one JSON object")
     form.add_argument("--json-lines", action="store_true", help="print one line of JSON per source")
@@ -146,11 +147,8 @@ def _explain_scans(options: Namespace) -> int:
     _require_known(options.method, None)
     from gpca.model.scan_explainer import explain_scans
     from gpca.model.scan_explanation import LEARNED
-    from gpca.model.voxels import require_edge
     from gpca.process.compilation import say_when_compiling
 
-    if options.voxel is not None:
-        require_edge(options.voxel, "--voxel")
     say_when_compiling()
     for name, source in zip(options.source, sources, strict=True):
         try:

@@ -8,7 +8,7 @@ from typing import NoReturn
 
 from gpca.errors import InputError
 from gpca.io.names import is_name
-from gpca.numerals import whole
+from gpca.numerals import decimal, whole
 
 
 class OneLineParser(argparse.ArgumentParser):
@@ -39,6 +39,17 @@ def whole_number(least: int, most: int) -> Callable[[str], int]:
             raise argparse.ArgumentTypeError(str(fault)) from fault
 
     return read
+
+
+def length(text: str) -> float:
+    """Read an option that takes a length above 0, in whatever unit the clouds have."""
+    try:
+        value = decimal(text)
+    except ValueError as fault:
+        raise argparse.ArgumentTypeError(str(fault)) from fault
+    if value <= 0:
+        raise argparse.ArgumentTypeError(f"{value:g} is no length; give a positive one")
+    return value
 
 
 # More threads than any machine of today has cores; OpenMP and numba crash where they cannot start as many as they are

@@ -100,7 +100,6 @@ def test_the_command_explains_scans_of_two_formats_in_another_unit_without_a_mod
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--voxel", "-1"], "--voxel: -1 is no length; give a positive one"),
         (["--fast"], "--fast: is not for scans; leave it out"),
         (["--method", "nearest"], "registration method 'nearest': unknown"),
         (["--init", "lost.txt"], "lost.txt: no such file"),

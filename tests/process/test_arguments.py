@@ -45,6 +45,11 @@ def test_both_ends_are_allowed():
     assert [whole_number(-2, 2)(text) for text in ("-2", "2")] == [-2, 2]
 
 
+@pytest.mark.parametrize("text", [*(text for text in BAD if text not in ("1e12", "1.5", "9" * 30, "--")), "0"])
+def test_lengths_that_cannot_be(tmp_path, text):
+    refusal(["explain", "a.npy", "b.npy", "--scans", f"--voxel={text}"], tmp_path, "argument --voxel", "--help")
+
+
 SETTINGS = {
     "no JSON": ("{", "invalid JSON"),
     "list": ("[]", "not a JSON object"),
