@@ -86,6 +86,13 @@ def test_an_object_is_in_one_source_and_the_mug_in_ycb_alone():
     assert set(rows.loc[rows["name"].str.contains("mug"), "source"]) == {"ycb"}
 
 
+@pytest.mark.parametrize("config", ["sources.yaml", "development.yaml", "cup_views.yaml"])
+def test_a_folder_with_other_data_hides_none_of_ours(config, tmp_path):
+    sources = yaml.safe_load((DATA.parent / "config" / config).read_text())["sources"]
+    for entry in filter(None, sources.values()):
+        assert resolve(entry, str(tmp_path)) == resolve(entry, None)
+
+
 @pytest.mark.parametrize(
     ("name", "count", "smallest_m", "largest_m"),
     [("ycb", 21, 0.08, 0.28), ("linemod", 13, 0.10, 0.30), ("coffee_cup", 10, 0.07, 0.13),
