@@ -1,8 +1,9 @@
-"""A gate by an estimated covariance: a pose that the clouds hardly hold is taken for a wrong one. It names no cause."""
+"""Gates by an estimated covariance: a pose that the clouds hardly hold is taken for a wrong one. They name no cause."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -16,20 +17,21 @@ from gpca.settings import Positive
 from gpca.uncertainty.settings import UncertaintySettings
 
 
-class CensiGate(ScoringExplainer):
-    """The alarm is ln |Σ + εI| of the covariance in closed form (Censi 2007) at the result of ICP.
+class CovarianceGate(ScoringExplainer):
+    """The alarm is ln |Σ + εI| of the covariance that an estimator gives at the result of ICP.
 
     A registration without an estimate, as nothing holds it, counts as one of covariance I.
 
     Args:
+        estimator: by its name in the registry, one that learns nothing.
         source, seed: not used; nothing is drawn.
         floor: ε, of the variances.
     """
 
     labels = LABELS
 
-    def __init__(self, source: str, seed: int, floor: Positive = 1e-12) -> None:
-        self._floor = floor
+    def __init__(self, estimator: str, source: str, seed: int, floor: Positive = 1e-12) -> None:
+        self._estimator, self._floor = estimator, floor
 
     def fit(self, registrations: Registrations) -> None:
         """Learn the threshold."""
@@ -50,15 +52,23 @@ class CensiGate(ScoringExplainer):
         from gpca.uncertainty.estimators.registry import make_estimator
         from gpca.uncertainty.spread import log_determinant
 
-        estimate, deviation_6 = make_estimator("censi"), UncertaintySettings().deviation_6()
+        estimate, deviation_6 = make_estimator(self._estimator), UncertaintySettings().deviation_6()
         covariances = []
         for row in range(len(registrations)):
             # The source lies where ICP put it, so the pose is the identity.
-            pair = Pair(registrations.cloud(row).astype(np.float64), registrations.target(row).astype(np.float64))
+            clouds = registrations.cloud(row), registrations.target(row)
+            pair = Pair(*(cloud.astype(np.float64) for cloud in clouds)).with_normals()
             outcome = Outcome(np.eye(4), float(registrations.fitness[row]), float(registrations.inlier_rmse[row]))
             estimated = estimate(RegisteredPair(pair, outcome, POINT_TO_POINT, deviation_6)).covariance_6_6
             covariances.append(np.eye(6) if estimated is None else estimated)
         return log_determinant(np.array(covariances).reshape(-1, 6, 6), self._floor)
 
 
-CAUSE_EXPLAINERS = {"gate_censi": ExplainerEntry("Covariance by Censi (gate)", CensiGate, ("pair",))}
+CAUSE_EXPLAINERS = {
+    "gate_censi": ExplainerEntry(
+        "Covariance by Censi (gate)", partial(CovarianceGate, "censi"), ("pair",)
+    ),  # in closed form (Censi 2007)
+    "gate_brossard": ExplainerEntry(
+        "Covariance by Brossard (gate)", partial(CovarianceGate, "brossard"), ("pair", "runs")
+    ),  # its sigma points are 12 further runs
+}

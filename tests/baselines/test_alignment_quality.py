@@ -43,7 +43,8 @@ def test_where_all_failed_that_is_the_answer_for_all(seen):
     assert (explainer.explain(seen).scores_N_C[:, 0] == 0).all()
 
 
-def test_a_pose_that_hardly_anything_holds_raises_the_gate_of_the_covariance(seen):
+@pytest.mark.parametrize("gate", ["gate_censi", "gate_brossard"])
+def test_a_pose_that_hardly_anything_holds_raises_the_gate_of_the_covariance(gate, seen):
     random = np.random.default_rng(0)
     wall = np.column_stack([random.uniform(-0.5, 0.5, (200, 2)), 0.01 * random.normal(size=200)])
     corner = np.concatenate([wall, wall[:, [2, 0, 1]], wall[:, [1, 2, 0]]])[::3]
@@ -53,7 +54,7 @@ def test_a_pose_that_hardly_anything_holds_raises_the_gate_of_the_covariance(see
     points = np.concatenate([cloud + np.float32(0.005) for cloud in clouds])
     few = replace(few, points=points, offsets=ends, target_points=np.concatenate(clouds), target_offsets=ends)
     few = replace(few, fitness=np.ones(2))
-    gate = explainer_entry("gate_censi", CAUSES).make("four", 100)
+    gate = explainer_entry(gate, CAUSES).make("four", 100)
     gate.fit(few)
     alarm = 1 - gate.explain(few).scores_N_C[:, 0]
     assert alarm[0] > alarm[1]

@@ -72,8 +72,9 @@ def table18_scan_causes(
     natural = rows_where(measured, condition=NATURAL, stratum=EVERY)
     counts = {name: counted(measured, name, NATURAL, EVERY) for name in titles}
     for name in (name for name in titles if counts[name]):
-        enough = failed(counts[name]) >= FEWEST_FAILURES
-        title = f"{titles[name]} ({failed(counts[name])} failed{'' if enough else ', too few'})"
+        n_failed, n_nominal = failed(counts[name]), counts[name][NOMINAL]
+        enough = min(n_failed, n_nominal) >= FEWEST_FAILURES
+        title = f"{titles[name]} ({n_failed} failed, {n_nominal} nominal{'' if enough else ': too few'})"
         for explainer, words in {**explainers, **AGAIN}.items():
             for learned, words_of_learned in LEARNED.items():
                 rows = rows_where(natural, source=name, method=explainer, learned=learned).set_index("metric")
@@ -88,8 +89,8 @@ def table18_scan_causes(
         footnotes=(
             *(in_words(titles[name], of) for name, of in counts.items() if of),
             f"n: registrations that are nominal or failed, over {plural(table.most_seeds(), 'seed')}. In brackets: the "
-            f"95 % interval of {REPEATS} bootstrap draws over scenes. Too few: below {FEWEST_FAILURES} failures "
-            "nothing is concluded, and no row is bold.",
+            f"95 % interval of {REPEATS} bootstrap draws over scenes. Too few: below {FEWEST_FAILURES} failed or "
+            "nominal ones nothing is concluded, and no row is bold.",
             "Learned from: objects, as in Table IX, or the other scenes of these data sets. AUROC: of failed against "
             "nominal; over the best gate: minus that of the best other gate (the alarms by a single number, RMSE, "
             "fitness and the like), on the same draws, so that it is better where the interval is above 0. False "

@@ -126,12 +126,17 @@ def test_the_tables_show_every_row_and_count_what_they_are_of(measured):
     assert "| Things | 2 times the sensor's noise added | all |" in counts
 
 
-def test_below_thirty_failures_no_row_is_bold(measured):
+@pytest.mark.parametrize(
+    ("counts", "words"),
+    [({**dict.fromkeys(CONCEPTS, 9.0), NOMINAL: 40.0}, "27 failed, 40 nominal: too few"),
+     ({**dict.fromkeys(CONCEPTS, 20.0), NOMINAL: 29.0}, "60 failed, 29 nominal: too few")],
+)  # fmt: skip
+def test_below_thirty_failed_or_nominal_no_row_is_bold(counts, words, measured):
     few = measured.copy()
-    of_counts = few["metric"].isin([f"count_{concept}" for concept in CONCEPTS])
-    few.loc[of_counts, "value"] = 9.0
+    for label, count in counts.items():
+        few.loc[few["metric"] == f"count_{label}", "value"] = count
     text = table18_scan_causes(few, TITLES, EXPLAINERS, COSTS).markdown()
-    assert "(27 failed, too few)" in text and "**" not in text.split("| Scans |")[1].split("\n\n")[0]
+    assert f"({words})" in text and "**" not in text.split("| Scans |")[1].split("\n\n")[0]
 
 
 def test_the_figure_has_a_panel_for_each_data_set_and_kind_of_start(measured):
