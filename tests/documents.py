@@ -30,10 +30,22 @@ PAGES = [path for path in our_files() if path.suffix == ".md" and "reference" no
 
 def code_in(text):
     """Command lines in fenced blocks, without their comments, and spans of code in the running text."""
-    blocks = re.findall(r"^```sh\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
     prose = re.sub(r"^```.*?^```", "", text, flags=re.MULTILINE | re.DOTALL)
-    lines = [line.split("  #")[0].strip() for block in blocks for line in block.splitlines()]
+    lines = command_lines(text)
     return [code for code in (*lines, *re.findall(r"`([^`\n]+)`", prose)) if code and not code.startswith("#")]
+
+
+def command_lines(text):
+    """Command lines in fenced blocks, without their comments."""
+    blocks = re.findall(r"^```sh\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    return [line.split("  #")[0].strip() for block in blocks for line in block.splitlines()]
+
+
+def tasks_beside_a_clone():
+    """The five tasks that docs/tasks.md shows whole: title -> text."""
+    _, beside, _ = re.split(r"^## .+$", (ROOT / "docs/tasks.md").read_text(), flags=re.MULTILINE)
+    _, *parts = re.split(r"^### (.+) \(\d+ minutes\)$", beside, flags=re.MULTILINE)
+    return dict(zip(parts[::2], parts[1::2], strict=True))
 
 
 def section(page, anchor):
@@ -58,8 +70,13 @@ def commands(program):
 
 
 def blocks_of(page):
-    """Fenced blocks whose first line names the file they belong to, in order: (file, text)."""
-    fenced = re.findall(r"^```\w+\n# (\S+\.\w+)\n(.*?)^```", (ROOT / page).read_text(), re.MULTILINE | re.DOTALL)
+    """Fenced blocks of a page whose first line names the file they belong to, in order: (file, text)."""
+    return blocks_in((ROOT / page).read_text())
+
+
+def blocks_in(text):
+    """The same, of a text."""
+    fenced = re.findall(r"^```\w+\n# (\S+\.\w+)\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
     assert fenced
     return fenced
 

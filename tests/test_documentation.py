@@ -26,7 +26,8 @@ VOCABULARIES = {"w3id.org"}  # of the RO-Crate: names of terms, which nothing is
 DATA = {"rgbd-dataset.cs.washington.edu", "huggingface.co", "3dmatch.cs.princeton.edu", "graphics.stanford.edu"}
 
 
-SHOWN = ("my_run.yaml", "fewer.yaml", "my_lab.yaml")
+BESIDE_A_CLONE = "gp-ca-bench/config/smoke.yaml my_parts.yaml"  # which tests/workflow/test_tasks.py runs
+SHOWN = ("my_run.yaml", "fewer.yaml", "my_lab.yaml", BESIDE_A_CLONE)
 WHOLE = ("", "config/full.yaml", "config/smoke.yaml", "config/stand_ins.yaml")
 
 
@@ -95,7 +96,7 @@ def snakemake_plans():
     parser = ArgumentParser()
     for option in ("--profile", "--configfile", "--config"):
         parser.add_argument(option, **({"nargs": "+"} if option == "--configfile" else {}))
-    for option in ("-j", "-q", "--report"):  # a report is not made in a dry run
+    for option in ("-j", "-q", "-s", "--report"):  # a report is not made in a dry run
         parser.add_argument(option, dest="unplanned")
     parser.add_argument("-n", "--report-after-run", action="store_true", dest="unplanned")
     parser.add_argument("targets", nargs="*")

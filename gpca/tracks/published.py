@@ -18,12 +18,20 @@ from gpca.errors import InputError
 from gpca.experiments.diagnosis.judged import SampleTruth
 from gpca.io.arrays import REAL, TEXT, WHOLE, load_arrays
 from gpca.io.files import whole_file
+from gpca.objects.repository import DATA
 from gpca.tracks.track import Track
 
 FOLDER = ROOT / "results/leaderboard/published"
 NO_CALLS = -1  # of ICP, where their number is not known
 NOTHING_NAMED = -1  # in the place of a label's number
 LIMITS = ("nominal_limit", "failed_limit", "cause_limit")
+
+
+def require_clone(subject: str) -> None:
+    """Raise an InputError where the package was copied out of its repository, whose data it then lacks."""
+    if not DATA.is_dir():
+        fault = "needs the data and the published predictions of the repository, which the installed package lacks"
+        raise InputError(subject, fault, "install it from a clone with 'pip install -e'")
 
 
 @dataclass(frozen=True)
@@ -148,6 +156,7 @@ class Published:
         Raises:
             InputError: it is missing, damaged, or of another track.
         """
+        require_clone(f"track {track.name}")
         path = path or FOLDER / f"{track.name}.npz"
         if not path.is_file():
             remedy = "restore it, or make it from a run: gpca ship-predictions"

@@ -15,10 +15,9 @@ from typing import Any
 import numpy as np
 
 from gpca.errors import InputError
-from gpca.objects.repository import DATA
 from gpca.plugins import named
 from gpca.tracks.making import make
-from gpca.tracks.published import Published
+from gpca.tracks.published import Published, require_clone
 from gpca.tracks.track import Track
 
 LEARNED = ("cause_embeddings", "cause_encoders", "control_embeddings")  # by encoders, whose last digits may differ
@@ -50,11 +49,9 @@ class Samples:
     def config(self) -> dict[str, Any]:
         """The suite's default config, by which samples are made."""
         from gpca.config.check import read
-        from gpca.config.layers import DEFAULTS, with_defaults
+        from gpca.config.layers import with_defaults
 
-        if not DEFAULTS[0].is_file() or not DATA.is_dir():
-            fault = "needs the configs and the data of the repository, which the installed package does not bring"
-            raise InputError(f"track {self.track.name}", fault, "work in a clone of it")
+        require_clone(f"track {self.track.name}")
         return read(with_defaults({"plugins": named()}), {})[0]
 
     def files(self, names: Iterable[str]) -> list[Path]:

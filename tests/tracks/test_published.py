@@ -10,6 +10,7 @@ from gpca.config.check import check
 from gpca.config.leave_out import without_false
 from gpca.errors import InputError
 from gpca.frames.source import REAL_WORLD
+from gpca.tracks import published as module
 from gpca.tracks.published import Published, Rows
 from gpca.tracks.shipping import collect
 from gpca.tracks.track import TRACKS, track_of
@@ -59,6 +60,12 @@ def test_a_file_that_is_missing_or_says_what_no_track_asks_is_refused(shipped, t
     replace(shipped, methods=(wrong,)).save(tmp_path / "causes.npz")
     with pytest.raises(InputError, match="names labels that the track does not have"):
         Published.load(TRACKS["causes"], tmp_path / "causes.npz")
+
+
+def test_a_package_without_its_repository_is_refused(monkeypatch, tmp_path):
+    monkeypatch.setattr(module, "DATA", tmp_path / "data")
+    with pytest.raises(InputError, match=r"track hard: needs the data and the published .* 'pip install -e'"):
+        Published.load(TRACKS["hard"])
 
 
 def test_predictions_of_other_samples_are_refused(run, config, tmp_path):

@@ -1,8 +1,12 @@
-"""A stranger's twelve tasks: the commands that docs/tasks.md points to, run at tiny size, or by the test named."""
+"""A stranger's tasks: the commands that docs/tasks.md points to or shows, run at tiny size, or by the test named.
+
+The other four of those that it shows whole are in tests/tracks/test_tasks.py.
+"""
 
 import re
 import shlex
 import sys
+from contextlib import chdir
 
 import yaml
 
@@ -10,7 +14,8 @@ import gpca
 from gpca.config.layers import read_file, with_defaults
 from tests.steps.by_words import main
 
-from ..documents import ROOT, block, code_in, section
+from ..documents import ROOT, block, blocks_in, code_in, command_lines, section, tasks_beside_a_clone
+from .conftest import Project
 
 SMOKE = ("--configfile", "config/smoke.yaml")
 PAGE = ROOT / "docs/tasks.md"
@@ -118,6 +123,28 @@ def test_samples_are_labelled(smoke, tmp_path, monkeypatch, capsys):
         assert main(words) == 0
     assert (tmp_path / "my_labels.csv").read_text().count("\n") == 2
     assert "answered" in capsys.readouterr().out
+
+
+def test_a_dataset_of_ones_own_becomes_a_row_in_a_folder_beside_a_clone(tmp_path, capsys):
+    import trimesh
+
+    task = tasks_beside_a_clone()["Use a dataset of your own"]
+    (tmp_path / "gp-ca-bench").symlink_to(ROOT)
+    for name, text in blocks_in(task):
+        (tmp_path / name).write_text(text)
+    (tmp_path / "my_parts").mkdir()
+    trimesh.creation.box((40, 70, 100)).export(tmp_path / "my_parts/brick.stl")
+    trimesh.creation.cone(30, 90).export(tmp_path / "my_parts/cone.ply")
+    trimesh.creation.annulus(20, 35, 25).export(tmp_path / "my_parts/ring.obj")
+    (gpca_itself, *checked), (snakemake, *made) = map(shlex.split, command_lines(task))
+    assert (gpca_itself, snakemake) == ("gpca", "snakemake")
+    with chdir(tmp_path):
+        assert main(checked) == 0
+    assert capsys.readouterr().out == "run my_parts: valid; sources ycb, my_parts; seeds 0\n"
+    Project(tmp_path).snakemake(*made)
+    [table] = re.findall(r"`(results/my_parts/\S+)`", task)
+    assert "\n| My parts |" in (tmp_path / table).read_text()
+    assert not (ROOT / "results/my_parts").exists()
 
 
 def test_the_suite_is_cited_by_a_file_that_names_the_paper_of_the_readme():
