@@ -18,13 +18,16 @@ version = release = gpca.__version__
 html_title = f"{project} {release}"
 html_theme = "furo"
 root_doc = "docs/README"
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_gallery.gen_gallery"]
 
+EXECUTED = "build/docs/executed"  # where the tutorial is put as it ran
 include_patterns = [
     *("*.md", "docs/*.md", "docs/*.rst", "*/README.md", "data/*/LICENSE.md", "examples/*/README.md"),
     *("results/*/README.md", "results/reference/*/*.md", "results/reference/*/tables/*.md", "gpca/model/shipped.md"),
+    f"{EXECUTED}/tutorial.rst",
 ]
-exclude_patterns = [".*", "build", "downloads", "tests", "results/[!Rlr]*"]  # else all files of all runs are looked at
+# Else all files of all runs and of all packages are looked at.
+exclude_patterns = [".*", "build/[!d]*", "build/docs/[!e]*", "downloads", "tests", "results/[!Rlr]*"]
 
 myst_heading_anchors = 4
 suppress_warnings = [
@@ -32,6 +35,17 @@ suppress_warnings = [
     "myst.header",  # these have no heading
     "misc.highlighting_failure",  # rules of Snakemake are shown as Python
 ]
+
+sphinx_gallery_conf = {  # runs the tutorial, and shows what it printed and drew
+    "examples_dirs": "docs",
+    "gallery_dirs": EXECUTED,
+    "filename_pattern": r"/tutorial\.py$",
+    "ignore_pattern": r"^(?!tutorial\.py$)",
+    "abort_on_example_error": True,
+    "download_all_examples": False,
+    "show_signature": False,
+    "write_computation_times": False,
+}
 
 default_role = "literal"  # docstrings write `code` as Markdown does
 autodoc_member_order = "bysource"
@@ -41,7 +55,8 @@ napoleon_numpy_docstring = False
 
 
 def with_menu(_app, name: str, source: list[str]) -> None:
-    """Give the index a table of contents of the pages that it lists, for the menu beside each page."""
+    """Lead to the tutorial as it ran, and give the index a table of contents for the menu beside each page."""
+    source[0] = source[0].replace("](tutorial.py)", f"](../{EXECUTED}/tutorial.rst)")
     if name != root_doc:
         return
     parts = re.split(r"^## (.+)$", source[0], flags=re.MULTILINE)

@@ -2,6 +2,7 @@
 
 import inspect
 import re
+import runpy
 from argparse import ArgumentParser
 from pkgutil import resolve_name
 
@@ -93,4 +94,27 @@ def test_packages_of_the_site_are_pinned_with_hashes_beside_those_of_the_lock():
         assert str(requirement.specifier).startswith("==")
         assert hashes and all(re.fullmatch(r"--hash=sha256:[0-9a-f]{64}", found) for found in hashes)
         assert requirement.name.lower() not in lock
-    assert {"sphinx", "myst-parser"} <= {Requirement(pin).name.lower() for pin, *_ in entries}
+    assert {"sphinx", "myst-parser", "sphinx-gallery"} <= {Requirement(pin).name.lower() for pin, *_ in entries}
+
+
+def test_the_site_shows_the_tutorial_as_it_ran():
+    conf = runpy.run_path(str(ROOT / "docs/conf.py"))
+    gallery = conf["sphinx_gallery_conf"]
+    scripts = sorted((ROOT / gallery["examples_dirs"]).glob("*.py"))
+    shown = [path for path in scripts if not re.search(gallery["ignore_pattern"], path.name)]
+    assert shown == [ROOT / "docs/tutorial.py"] and re.search(gallery["filename_pattern"], str(shown[0]))
+    page = f"{gallery['gallery_dirs']}/tutorial.rst"
+    assert page in conf["include_patterns"]
+    for name in ("README", "explain"):
+        source = [(ROOT / f"docs/{name}.md").read_text()]
+        conf["with_menu"](None, f"docs/{name}", source)
+        assert f"[tutorial](../{page})" in source[0] and "tutorial.py)" not in source[0]
+
+
+def test_every_cell_of_the_tutorial_begins_with_a_heading():
+    text = (ROOT / "docs/tutorial.py").read_text()
+    cells = re.findall(r"^# %%(.*)\n# (.+)\n# (-+)\n", text, re.MULTILINE)
+    assert len(cells) == text.count("\n# %%") > 5  # what stands behind the marks would be lost
+    assert all(not rest and len(title) == len(line) for rest, title, line in cells)
+    _, title, line, *_ = text.splitlines()
+    assert set(line) == {"="} and len(line) == len(title)
