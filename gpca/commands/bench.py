@@ -15,9 +15,8 @@ from gpca.process.arguments import COUNT
 from gpca.process.processor import cpu_name
 from gpca.tracks.published import Method
 from gpca.tracks.samples import Samples
-from gpca.tracks.scoring import score
 from gpca.tracks.submission import Submission
-from gpca.tracks.table import as_text, table_of
+from gpca.tracks.table import as_text_among
 from gpca.tracks.track import TRACKS, Track, track_of
 from gpca.tracks.trial import try_method
 
@@ -30,6 +29,8 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--authors", default="unknown", help="for the head of that file")
     parser.add_argument("--link", default="none", help="to code or a paper, for the same")
     parser.add_argument("--samples", type=Path, help="folder of the samples (default: the user's cache)")
+    parser.add_argument("--data-dir", type=Path, help="folder of data that the repository does not have (track scans)")
+    parser.add_argument("--learn-from", help="what it learns from, where there is a choice: scans (default) or objects")
     parser.add_argument("--processes", type=COUNT, help="how many make samples at a time (default: one for each core)")
 
 
@@ -42,21 +43,22 @@ def run(options: Namespace) -> None:
     if options.out and len(names) > 1:
         fault = f"lists {len(names)} methods for this track, and --out holds the predictions of one"
         raise InputError(options.method, fault, "give each a file of its own")
-    samples = Samples.of(track, options.samples, options.processes)
+    lesson = track.lesson(options.learn_from)
+    samples = Samples.of(track, options.samples, options.processes, options.data_dir)
     known = {method.name for method in samples.published.methods}
     mine: dict[str, Method] = {}
     for name in names:
         print(f"{name}: learning and predicting", file=sys.stderr)
-        method, seconds = try_method(samples, name, options.settings)
-        if name in known:
-            method = replace(method, name=f"{name} (here)", title=f"{method.title} (here)")
+        method, seconds = try_method(samples, name, options.settings, lesson)
+        if method.name in known:
+            method = replace(method, name=f"{method.name} (here)", title=f"{method.title} (here)")
         mine[method.name] = method
         if options.out:
             head = {"track": track.name, "version": samples.published.version, "method": method.title}
             head |= {"authors": options.authors, "link": options.link, "seconds": f"{seconds:.4g}"}
             head |= {"hardware": cpu_name(), "reads": method.reads, "icp_calls": str(method.icp_calls)}
             Submission(head, method).write(options.out, samples.published)
-    print(as_text(table_of(samples.published, mine, *score(samples.published, mine))))
+    print(as_text_among(samples.published, mine))
 
 
 def _names(method: str, track: Track) -> list[str]:

@@ -8,9 +8,8 @@ from pathlib import Path
 
 from gpca.errors import InputError
 from gpca.tracks.published import Published
-from gpca.tracks.scoring import score
 from gpca.tracks.submission import read_submission
-from gpca.tracks.table import as_text, table_of
+from gpca.tracks.table import as_text_among
 from gpca.tracks.track import TRACKS, track_of
 
 
@@ -29,6 +28,5 @@ def run(options: Namespace) -> int:
     if submission is None:
         print(*faults, sep="\n", file=sys.stderr)
         return 2
-    mine = {submission.method.name: submission.method}
-    print(as_text(table_of(published, mine, *score(published, mine))))
+    print(as_text_among(published, {submission.method.name: submission.method}))
     return 0

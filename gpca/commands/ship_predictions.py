@@ -1,4 +1,4 @@
-"""Command ``ship-predictions``: a finished run of the default config -> what is shipped of the tracks; for releases."""
+"""Command ``ship-predictions``: a finished run -> what is shipped of the tracks of its samples; for releases."""
 
 from __future__ import annotations
 
@@ -6,31 +6,34 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from gpca.config.check import read
-from gpca.config.layers import with_defaults
+from gpca.config.layers import read_file, with_defaults
 from gpca.errors import InputError
 from gpca.tracks.published import FOLDER
 from gpca.tracks.shipping import collect
-from gpca.tracks.track import TRACKS, track_of
+from gpca.tracks.track import DEFAULT, TRACKS, track_of
 
 LARGEST_BYTES = 10**7  # of all tracks together, as they are kept in git
 
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare folders."""
-    parser.add_argument(
-        "--run", dest="folder", type=Path, default=Path("results/default"), help="folder of the run (results/default)"
-    )
+    folder = Path("results") / DEFAULT
+    parser.add_argument("--run", dest="folder", type=Path, default=folder, help=f"folder of the run ({folder})")
     parser.add_argument("--out", type=Path, default=FOLDER, help="folder that they go to")
-    parser.add_argument("--tracks", nargs="+", default=list(TRACKS), help="which (default: all)")
+    of_default = [name for name, track in TRACKS.items() if track.run == DEFAULT]
+    words = "; ".join(f"{name} needs the run {track.run}" for name, track in TRACKS.items() if track.run != DEFAULT)
+    parser.add_argument(
+        "--tracks", nargs="+", default=of_default, help=f"which (default: those of the default run; {words})"
+    )
 
 
 def run(options: Namespace) -> None:
     """Write a file for each track; the same run gives the same bytes."""
     if options.settings:
         raise InputError("--settings", "is not used by ship-predictions", "leave it out")
-    config, _ = read(with_defaults(), {})
     total = 0
     for track in map(track_of, options.tracks):
+        config, _ = read(with_defaults(*map(read_file, track.layers)), {})
         published = collect(track, options.folder, config)
         published.save(path := options.out / f"{track.name}.npz")
         total += path.stat().st_size

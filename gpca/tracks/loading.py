@@ -14,7 +14,7 @@ from gpca.io.names import SPLITS
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.tracks.samples import Samples
-from gpca.tracks.track import FRAMES_TRACK, HARD_TRACK, track_of
+from gpca.tracks.track import HARD_TRACK, track_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -108,20 +108,23 @@ def load(
     split: str | None = None,
     seed: int = 0,
     samples: str | Path | None = None,
+    data_dir: str | Path | None = None,
 ) -> TrackData:
     """Return samples of a track; they are made from the repository's data where the cache lacks them.
 
     Args:
-        track: ``causes``, ``hard`` or ``frames``.
+        track: ``causes``, ``hard``, ``frames`` or ``scans``.
         source: of the samples, such as ``ycb``; the first one by default.
-        split: ``train``, ``test`` or None for both. Depth frames are all for testing.
+        split: ``train``, ``test`` or None for both. Depth frames and scans are all for testing.
         seed: the repeat.
         samples: the folder that they are kept in, by default the user's cache.
+        data_dir: the folder of scans that the repository does not have.
 
     Raises:
         InputError: an unknown name, or samples that cannot be made or are not the published ones.
     """
-    chosen = Samples.of(track_of(track), Path(samples) if samples else None)
+    folder, data = (Path(path) if path else None for path in (samples, data_dir))
+    chosen = Samples.of(track_of(track), folder, data_dir=data)
     published = chosen.published
     parts = [(name, number) for name, number, _ in published.rows.parts()]
     source = source or parts[0][0]
@@ -131,8 +134,8 @@ def load(
         raise InputError(f"seed {seed}", f"has no samples of the track {track}", f"choose one of {known}")
     if split is not None:
         require_known("split", split, SPLITS)
-    if split == "train" and track == FRAMES_TRACK:
-        raise InputError("split 'train'", "has no depth frames", "learn from the track causes")
+    if split == "train" and chosen.track.untaught:
+        raise InputError("split 'train'", f"has no samples of the track {track}", chosen.track.untaught)
     [path] = chosen.files([chosen.track.file(source, seed)])
     causes = Causes.load(path, (source, seed))
     causes = causes.subset(causes.rows(split)) if split else causes

@@ -42,7 +42,8 @@ class Rows:
         source, seed, sample: (N,) which they are.
         object, cluster, concept, symmetric: (N,) as in the files of samples.
         start, instance, scene: (N,) of depth frames: kind of start, its instance, dataset and scene; else empty or 0.
-        counted: (N,) whether it measures anything; scenes whose true poses were made by ICP do not.
+        counted: (N,) whether it measures anything; scenes whose true poses were made by ICP do not, nor do scans to
+            which noise was added.
         error, uncertainty: (N, 8) of the truth; error_again, uncertainty_again those from other starts.
         error_shown: (N,) of the registration that is shown.
         uncertainty_limit: (N,) of a nominal registration, nats.
@@ -84,7 +85,7 @@ class Method:
         name, title: of it.
         reads: what it sees of a registration, in words; empty where that is not known.
         icp_calls: runs of ICP beyond the one that it explains; `NO_CALLS` where that is not known.
-        scores: (N, C) of the track's labels.
+        scores: (N, C) of the track's labels; NaN where it was not asked, as somebody lacks the data of a source.
         named: (N,) number of the label that it names; `NOTHING_NAMED` where it names none.
     """
 
@@ -159,7 +160,7 @@ class Published:
         require_clone(f"track {track.name}")
         path = path or FOLDER / f"{track.name}.npz"
         if not path.is_file():
-            remedy = "restore it, or make it from a run: gpca ship-predictions"
+            remedy = f"restore it, or make it from a run: gpca ship-predictions --tracks {track.name}"
             raise InputError(path, "no such file, in which the published rows are", remedy)
         labels = len(track.labels)
         shapes: dict[str, tuple[int | str, ...]] = dict(_SHAPES) | dict.fromkeys(LIMITS, ())

@@ -9,8 +9,14 @@ from typing import Any
 
 from gpca.errors import InputError
 from gpca.experiments.controls.settings import HARD
+from gpca.experiments.scan_causes.experiment import sample_settings
+from gpca.experiments.scans.settings import ChoiceSettings, TrialSettings
 from gpca.frames.source import REAL_WORLD
 from gpca.objects.source import find_file
+from gpca.scans.source import entry_of, place_of
+
+# Folders of the files that are made of scans, and what the step calls them.
+OF_SCANS = {"scan_causes": "scan_causes", "scan_descriptors": "descriptors", "scan_reenactments": "reenactments"}
 
 
 @dataclass(frozen=True)
@@ -42,6 +48,8 @@ def recipe_of(file: str, config: Mapping[str, Any]) -> Recipe:
     seed = int(rest[-1].removeprefix("seed"))
     if kind == "timings":  # written beside what they are of
         return recipe_of(f"{rest[1]}/{rest[0]}/{rest[2]}.npz", config)
+    if kind in OF_SCANS:
+        return _of_scans(rest[-2], seed, config)
     kind = "frame_causes" if kind == "frame_starts" else kind
     if kind == "frame_causes" or (kind == "reenactments" and rest[0] == REAL_WORLD):
         return _of_frames(kind, seed, config)
@@ -114,6 +122,27 @@ def _of_frames(kind: str, seed: int, config: Mapping[str, Any]) -> Recipe:
     settings |= {"reenactment": config["diagnosis"]["reenactment"] | section["reenactment"]}
     outputs = {"reenactments": f"reenactments/{REAL_WORLD}/seed{seed}.npz"}
     return Recipe("gpca.steps.reenact_frames", given | {"settings": settings}, inputs | measured, outputs)
+
+
+def _of_scans(name: str, seed: int, config: Mapping[str, Any]) -> Recipe:
+    scans, own, diagnosis = config["scans"], config["scan_causes"], config["diagnosis"]
+    choice, trials = (kind.__dataclass_fields__ for kind in (ChoiceSettings, TrialSettings))
+    first = scans["global_start"]
+    settings = {
+        "samples": sample_settings(own),
+        "entry": scans["datasets"][name],
+        "role": config["splits"]["role"],
+        "scans": {key: scans[key] for key in (*choice, *trials, "success")},
+        "methods": {first: scans["methods"].get(first) or config["methods"].get(first)},
+        "causes": config["causes"],
+        "descriptors": diagnosis["descriptors"],
+        "reenactment": diagnosis["reenactment"] | (own.get("reenactment") or {}),
+    }
+    place = place_of(entry_of(scans["datasets"][name]), config["data_dir"])
+    given = {"source": name, "seed": seed, "settings": settings, "place": str(place or "")}
+    outputs = {argument: f"{kind}/{name}/seed{seed}.npz" for kind, argument in OF_SCANS.items()}
+    outputs |= {"samples": f"scan_causes/{name}/seed{seed}.csv"}
+    return Recipe("gpca.experiments.scan_causes.step", given, {}, outputs)
 
 
 def _data(config: Mapping[str, Any]) -> dict[str, Any]:

@@ -17,10 +17,14 @@ from gpca.causes.dataset import LABELS
 from gpca.causes.truth import BORDERLINE, NOMINAL
 from gpca.experiments.diagnosis.judged import CEILING, POOLED, Judged, ceiling_of, joined, judged_of
 from gpca.experiments.diagnosis.measures import SHARES, counted, measure, ranking
+from gpca.experiments.scan_causes.metrics import CAUSES as OF_SCANS
+from gpca.experiments.scan_causes.metrics import EVERY, NATURAL
+from gpca.experiments.scan_causes.metrics import _counted as counted_of_scans
+from gpca.experiments.scan_causes.metrics import _measured as measured_of_scans
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import generator
 from gpca.tracks.published import Method, Published
-from gpca.tracks.track import CAUSES_TRACK, FRAMES_TRACK, HARD_TRACK
+from gpca.tracks.track import FRAMES_TRACK, HARD_TRACK, SCANS_TRACK
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -28,6 +32,7 @@ if TYPE_CHECKING:
 COLUMNS = ("group", "method", "metric", "samples", "seeds", "value", "low", "high")
 AGAINST = ("against", "difference", "difference_low", "difference_high")  # of one method's headline minus another's
 OF_HARD = ("accuracy", *(f"recall_{concept}" for concept in CONCEPTS), "auroc_error")
+SHARED = (*SHARES, *OF_HARD, OF_SCANS)  # an interval of these is never of no width
 Measured = Mapping[str, np.ndarray]  # metric -> values on the samples as they are, and then on every draw
 
 
@@ -39,7 +44,8 @@ def score(published: Published, mine: Mapping[str, Method]) -> tuple[pd.DataFram
 
     Returns:
         a row of `COLUMNS` for each group of samples, method and measure; and a row of group, method and `AGAINST` for
-        each further method (``against``) and each other one: the method's headline minus the further one's.
+        each further method (``against``) and each other one: the method's headline minus the further one's. A method
+        that was not asked about all samples of a group has no row of it.
     """
     import pandas as pd
 
@@ -51,14 +57,15 @@ def score(published: Published, mine: Mapping[str, Method]) -> tuple[pd.DataFram
         weights_B_N = np.vstack([np.ones(len(chosen)), drawn_B_N])
         values: dict[str, Measured] = {}
         counts: dict[str, dict[str, np.ndarray]] = {}
-        for name, measured in _measured(published, methods, chosen):
+        asked = {name: method for name, method in methods.items() if np.isfinite(method.scores[chosen]).all()}
+        for name, measured in _measured(published, asked, chosen):
             values[name], counts[name] = measured(weights_B_N * once_N)
         seeds = len(set(published.rows.seed[chosen].tolist()))
         for name, of_method in values.items():
             for metric, value_B in of_method.items():
                 if np.isfinite(value_B[0]):
                     counted_N = counts[name][metric]
-                    drawn = drawn_B_N[:, counted_N] if metric in (*SHARES, *OF_HARD) else None
+                    drawn = drawn_B_N[:, counted_N] if metric in SHARED else None
                     own = (group, name, metric, int(counted_N.sum()), seeds)
                     rows.append((*own, value_B[0], *bounds(value_B[1:], drawn)))
         headline = track.headline
@@ -74,28 +81,42 @@ def score(published: Published, mine: Mapping[str, Method]) -> tuple[pd.DataFram
     )
 
 
-def groups_of(published: Published) -> Iterator[tuple[str, np.ndarray, np.ndarray, np.ndarray]]:
+Group = tuple[str, np.ndarray, np.ndarray, np.ndarray]
+
+
+def groups_of(published: Published) -> Iterator[Group]:
     """Yield each group of samples that is scored by itself: name, rows, bootstrap's weights, weight of each sample.
 
-    Of depth frames these are the kinds of starts, in which an instance counts once, however many starts it has. Draws
-    are those of the tables that have the published rows, where these are of the same samples.
+    Of depth frames these are the kinds of starts, in which an instance counts once, however many starts it has; of
+    scans the data sets, and all together where there are several. Draws are those of the tables that have the published
+    rows, where these are of the same samples.
     """
+    return {FRAMES_TRACK: _kinds_of_starts, SCANS_TRACK: _data_sets}.get(published.track.name, _one_group)(published)
+
+
+def _one_group(published: Published) -> Iterator[Group]:
+    rows, cluster_N = published.rows, published.rows.cluster
+    if published.track.name == HARD_TRACK:
+        cluster_N = np.array([f"{source}/{cluster}" for source, cluster in zip(rows.source, cluster_N, strict=True)])
+    drawn_B_N = pigeonhole_weights(generator(published.track.draws, POOLED), rows.seed, cluster_N)
+    yield POOLED, np.arange(len(rows)), drawn_B_N, np.ones(len(rows))
+
+
+def _kinds_of_starts(published: Published) -> Iterator[Group]:
     rows = published.rows
-    if published.track.name != FRAMES_TRACK:
-        all_N = np.arange(len(rows))
-        name = {CAUSES_TRACK: "cause intervals", HARD_TRACK: "control intervals"}[published.track.name]
-        cluster_N = rows.cluster
-        if published.track.name == HARD_TRACK:
-            cluster_N = np.array(
-                [f"{source}/{cluster}" for source, cluster in zip(rows.source, cluster_N, strict=True)]
-            )
-        yield POOLED, all_N, pigeonhole_weights(generator(name, POOLED), rows.seed, cluster_N), np.ones(len(all_N))
-        return
     for kind in dict.fromkeys(rows.start[rows.counted].tolist()):
         chosen = np.flatnonzero((rows.start == kind) & rows.counted)
-        drawn_B_N = pigeonhole_weights(generator("frame cause intervals", kind), rows.scene[chosen])
+        drawn_B_N = pigeonhole_weights(generator(published.track.draws, kind), rows.seed[chosen], rows.scene[chosen])
         _, place, count = np.unique(rows.instance[chosen], return_inverse=True, return_counts=True)
         yield kind, chosen, drawn_B_N, 1 / count[place]
+
+
+def _data_sets(published: Published) -> Iterator[Group]:
+    rows, names = published.rows, list(dict.fromkeys(published.rows.source.tolist()))
+    for name in [POOLED, *names] if len(names) > 1 else names:
+        chosen = np.flatnonzero(rows.counted & ((rows.source == name) | (name == POOLED)))
+        random = generator(published.track.draws, name, NATURAL, EVERY)
+        yield name, chosen, pigeonhole_weights(random, rows.seed[chosen], rows.cluster[chosen]), np.ones(len(chosen))
 
 
 Measure = Callable[[np.ndarray], tuple[Measured, dict[str, np.ndarray]]]
@@ -109,13 +130,19 @@ def _measured(published: Published, methods: Mapping[str, Method], chosen: np.nd
         return
     judged = {name: judged_by_method(published, method).subset(chosen) for name, method in methods.items()}
     judged[CEILING] = ceiling(published).subset(chosen)
+    of_samples = _of_scans if published.track.name == SCANS_TRACK else _of_causes
     for name, samples in judged.items():
-        yield name, partial(_of_causes, samples)
+        yield name, partial(of_samples, samples)
 
 
 def _of_causes(samples: Judged, weights_B_N: np.ndarray) -> tuple[Measured, dict[str, np.ndarray]]:
     values = measure(samples, weights_B_N)
     return values, {metric: counted(samples, metric) for metric in values}
+
+
+def _of_scans(samples: Judged, weights_B_N: np.ndarray) -> tuple[Measured, dict[str, np.ndarray]]:
+    values = measured_of_scans(samples, weights_B_N)
+    return values, {metric: counted_of_scans(samples, metric) for metric in values}
 
 
 def _hard(published: Published, method: Method) -> Measure:
@@ -150,10 +177,13 @@ def ceiling(published: Published) -> Judged:
     return joined(ceiling_of(published.truth_of(rows), seed) for _, seed, rows in published.rows.parts())
 
 
-def failures(published: Published) -> dict[str, int]:
-    """Return how many samples of each kind of start of depth frames have failed; none for other tracks."""
-    if published.track.name != FRAMES_TRACK:
+def counts(published: Published) -> dict[str, dict[str, int]]:
+    """Return how many samples of each group are ``failed`` and ``nominal``; none for tracks of one group."""
+    if not published.track.groups:
         return {}
     label_N = ceiling(published).label
-    failed_N = (label_N != BORDERLINE) & (label_N != NOMINAL)
-    return {kind: int(failed_N[chosen].sum()) for kind, chosen, _, _ in groups_of(published)}
+    states = {"failed": (label_N != BORDERLINE) & (label_N != NOMINAL), NOMINAL: label_N == NOMINAL}
+    return {
+        name: {state: int(of_N[chosen].sum()) for state, of_N in states.items()}
+        for name, chosen, _, _ in groups_of(published)
+    }

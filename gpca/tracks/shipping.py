@@ -15,21 +15,19 @@ from gpca.errors import InputError
 from gpca.experiments.controls.settings import HARD
 from gpca.experiments.diagnosis.experiment import shown as titles_and_costs
 from gpca.experiments.frame_causes.metrics import SAMPLE_COLUMNS
+from gpca.experiments.scan_causes.metrics import SAMPLE_COLUMNS as SCAN_COLUMNS
 from gpca.explainers.registry import explainer_entry
-from gpca.io.csv_file import ANY, read_csv
+from gpca.io.csv_file import ANY, numbers, read_csv
 from gpca.objects.splits import BY_ICP
 from gpca.tracks.published import LIMITS, NO_CALLS, NOTHING_NAMED, Method, Published, Rows
+from gpca.tracks.recipes import recipe_of
 from gpca.tracks.samples import hashes_of
-from gpca.tracks.track import CAUSES_TRACK, FRAMES_TRACK, HARD_TRACK, Track
+from gpca.tracks.track import CAUSES_TRACK, FRAMES_TRACK, HARD_TRACK, SCANS_TRACK, Track
 
 if TYPE_CHECKING:
     import pandas as pd
 
-ALSO_HASHED = {  # of a track, beside its samples: what methods may read
-    CAUSES_TRACK: ("descriptors/{source}/seed{seed}.npz", "reenactments/{source}/seed{seed}.npz"),
-    HARD_TRACK: (),
-    FRAMES_TRACK: ("reenactments/{source}/seed{seed}.npz",),
-}
+Key = tuple[str, str]  # name of an explainer, and where it learned if there is a choice
 
 
 def collect(track: Track, run: Path, config: Mapping[str, Any]) -> Published:
@@ -39,21 +37,22 @@ def collect(track: Track, run: Path, config: Mapping[str, Any]) -> Published:
         config: that the run was made with, as :func:`gpca.config.check.read` returned it.
 
     Raises:
-        InputError: a file that is missing or damaged, predictions of other samples.
+        InputError: a file that is missing or damaged, samples of another config, predictions of other samples.
     """
-    parts = track.parts(config)
+    parts = [part for part in track.parts(config) if not track.may_lack(part[0]) or (run / track.file(*part)).is_file()]
+    for source, seed in parts if track.layers else ():
+        _require_config(run, track.file(source, seed), config)
     tested = {part: _tested(run / track.file(*part), part) for part in parts}
     rows = _rows(track, run, tested)
     methods = []
-    for name, of_part in _said(track, run, config, parts).items():
-        methods.append(_method(name, track, config, [_of_part(of_part[part], tested[part], run) for part in parts]))
-    also = [pattern.format(source=source, seed=seed) for pattern in ALSO_HASHED[track.name] for source, seed in parts]
+    for key, of_part in _said(track, run, config, parts).items():
+        methods.append(_method(key, track, config, [_of_part(of_part.get(part), tested[part], run) for part in parts]))
+    also = [pattern.format(source=source, seed=seed) for pattern in track.read for source, seed in parts]
     lessons = [
         f"{folder}/{source}/seed{seed}.npz"
-        for folder in ("causes", "descriptors", "reenactments")
+        for folder in track.lessons
         for source in config["sources"]
-        for _, seed in parts
-        if track.name == FRAMES_TRACK
+        for seed in dict.fromkeys(seed for _, seed in parts)
     ]
     files = [track.file(*part) for part in parts] + [file for file in also + lessons if (run / file).is_file()]
     truth = tested[parts[0]].truth
@@ -91,15 +90,15 @@ def _rows(track: Track, run: Path, tested: Mapping[tuple[str, int], Causes]) -> 
         }
         if track.name == FRAMES_TRACK:
             of_part |= _of_frames(run / f"frame_causes/seed{seed}.csv", registrations.sample)
+        if track.name == SCANS_TRACK:
+            of_part |= _of_scans(run / f"scan_causes/{source}/seed{seed}.csv", registrations.sample)
         for name, column in of_part.items():
             columns.setdefault(name, []).append(column)
     return Rows(**{name: np.concatenate(parts) for name, parts in columns.items()})
 
 
 def _of_frames(path: Path, sample_N: np.ndarray) -> dict[str, np.ndarray]:
-    rows = read_csv(path, SAMPLE_COLUMNS, others=ANY)
-    if rows["sample"].tolist() != [str(number) for number in sample_N]:
-        raise InputError(path, "its samples differ from those of the causes", "regenerate both from the same config")
+    rows = _of_samples(path, SAMPLE_COLUMNS, sample_N)
     return {
         "start": rows["start"].to_numpy(str),
         "instance": rows["instance"].to_numpy(int),
@@ -108,37 +107,71 @@ def _of_frames(path: Path, sample_N: np.ndarray) -> dict[str, np.ndarray]:
     }
 
 
+def _of_scans(path: Path, sample_N: np.ndarray) -> dict[str, np.ndarray]:
+    rows = _of_samples(path, SCAN_COLUMNS, sample_N)
+    return {"start": rows["start"].to_numpy(str), "counted": numbers(path, rows, "times") == 0}
+
+
+def _of_samples(path: Path, columns: tuple[str, ...], sample_N: np.ndarray) -> pd.DataFrame:
+    rows = read_csv(path, columns, others=ANY)
+    if rows["sample"].tolist() != [str(number) for number in sample_N]:
+        raise InputError(path, "its samples differ from those of the causes", "regenerate both from the same config")
+    return rows
+
+
+LABELED_BY = {  # columns that say of which the rows of a file of predictions are
+    HARD_TRACK: ("control", "tested", "explainer"),
+    FRAMES_TRACK: ("explainer",),
+    SCANS_TRACK: ("scans", "learned", "explainer"),
+}
+
+
 def _said(
     track: Track, run: Path, config: Mapping[str, Any], parts: Iterable[tuple[str, int]]
-) -> dict[str, dict[tuple[str, int], pd.DataFrame]]:
+) -> dict[Key, dict[tuple[str, int], pd.DataFrame]]:
     """Return the predictions of every method, by part."""
-    said: dict[str, dict[tuple[str, int], pd.DataFrame]] = {}
+    said: dict[Key, dict[tuple[str, int], pd.DataFrame]] = {}
     for source, seed in parts:
         if track.name == CAUSES_TRACK:
             for name in config["diagnosis"]["explainers"]:
                 path = run / f"diagnoses/{source}/{name}/seed{seed}.csv"
-                said.setdefault(name, {})[source, seed] = read_predictions(path)
+                said.setdefault((name, ""), {})[source, seed] = read_predictions(path)
             continue
-        if track.name == FRAMES_TRACK:
-            rows = read_predictions(run / f"frame_diagnoses/seed{seed}.csv", labels=("explainer",))
-        else:
-            rows = read_predictions(run / f"controls/{source}/seed{seed}.csv", ("control", "tested", "explainer"))
-            rows = rows[rows["control"] == HARD]
-        for name, of_method in rows.groupby("explainer", sort=False):
-            said.setdefault(str(name), {})[source, seed] = of_method
+        path = run / track.said.format(source=source, seed=seed)
+        rows = read_predictions(path, labels=LABELED_BY[track.name]).assign(
+            **{} if track.learn_from else {"learned": ""}
+        )
+        if "scans" in rows and set(rows["scans"]) != {name for name, of in parts if of == seed}:
+            raise InputError(path, "is of other data sets than there are samples of", "finish the run")
+        for column, wanted in {"control": HARD, "scans": source}.items():
+            rows = rows[rows[column] == wanted] if column in rows else rows
+        for key, of_method in rows.groupby(["explainer", "learned"], sort=False):
+            said.setdefault((str(key[0]), str(key[1])), {})[source, seed] = of_method
     if not said:
         raise InputError(run, f"has no predictions for the track {track.name}", "finish the run")
     return said
 
 
-def _of_part(rows: pd.DataFrame, causes: Causes, run: Path) -> pd.DataFrame:
-    rows = rows[rows["split"] == "test"]
-    if rows["sample"].tolist() != [str(number) for number in causes.registrations.sample]:
+def _require_config(run: Path, file: str, config: Mapping[str, Any]) -> None:
+    """Raise an InputError for a file that was made with other settings than the config has, where it says with which.
+
+    Else nobody could make it again.
+    """
+    said = _provenance(run / file).get("settings")
+    if said is not None and said != json.loads(json.dumps(recipe_of(file, config).given["settings"])):
+        raise InputError(
+            run / file, f"was not made with the config of run {config['run']}", "give the folder of that run"
+        )
+
+
+def _of_part(rows: pd.DataFrame | None, causes: Causes, run: Path) -> pd.DataFrame:
+    rows = rows[rows["split"] == "test"] if rows is not None else None
+    if rows is None or rows["sample"].tolist() != [str(number) for number in causes.registrations.sample]:
         raise InputError(run, "has predictions of other test samples than its own", "finish the run")
     return rows
 
 
-def _method(name: str, track: Track, config: Mapping[str, Any], parts: list[pd.DataFrame]) -> Method:
+def _method(key: Key, track: Track, config: Mapping[str, Any], parts: list[pd.DataFrame]) -> Method:
     import pandas as pd
 
     rows = pd.concat(parts)
@@ -146,18 +179,26 @@ def _method(name: str, track: Track, config: Mapping[str, Any], parts: list[pd.D
     number = {label: place for place, label in enumerate(track.labels)}
     named = np.where(rows["abstained"], "", rows["concept_predicted"].to_numpy(str))
     named_N = np.array([number.get(label, NOTHING_NAMED) for label in named])
+    name, lesson = key
     entry = explainer_entry(name, track.kind)
     costs = titles_and_costs(config, {})["cause_costs"]
-    calls = costs[name]["icp_calls"] if track.name != HARD_TRACK and name in costs else NO_CALLS
-    if track.name == HARD_TRACK:
+    calls = costs[name]["icp_calls"] if name in costs else NO_CALLS
+    if track.name in (HARD_TRACK, SCANS_TRACK):  # their files have it
         calls = round(rows["icp_calls"].mean())
-    return Method(name, entry.title, entry.sight, int(calls), np.nan_to_num(scores_N_C), named_N)
+    name, title = (track.with_lesson(text, lesson) for text in (name, entry.title))
+    return Method(name, title, entry.sight, int(calls), np.nan_to_num(scores_N_C), named_N)
 
 
 def _commit(path: Path) -> str:
-    """Return the commit that a file of the run was made with, from its provenance."""
-    sidecar = path.with_name(path.name + ".provenance.json")
+    """Return the commit that a file of the run was made with, empty where that is not known."""
+    code = _provenance(path).get("code")
+    return code.get("commit") or "" if isinstance(code, dict) else ""
+
+
+def _provenance(path: Path) -> dict[str, Any]:
+    """Return what is known of how a file of the run was made; nothing where it does not say."""
     try:
-        return json.loads(sidecar.read_text("utf-8"))["code"].get("commit") or ""
-    except (OSError, ValueError, LookupError, AttributeError):
-        return ""
+        record = json.loads(path.with_name(path.name + ".provenance.json").read_text("utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return record if isinstance(record, dict) else {}

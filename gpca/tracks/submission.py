@@ -30,7 +30,7 @@ from gpca.tracks.published import NO_CALLS, NOTHING_NAMED, Method, Published
 from gpca.tracks.track import TRACKS, Track
 
 HEAD = {  # what the head has to say -> what that is
-    "track": "causes, hard or frames",
+    "track": f"one of {', '.join(TRACKS)}",
     "version": "of the samples, as gpca bench and gpca.load print it",
     "method": "its name",
     "authors": "who made it",
@@ -48,7 +48,7 @@ MOST_FAULTS = 20  # that are listed
 
 @dataclass(frozen=True)
 class Submission:
-    """Predictions for all test samples of a track.
+    """Predictions for all test samples of a track, or of those of its sources whose data somebody has.
 
     Attributes:
         head: what made them, by the keys of `HEAD` and `OPTIONAL`.
@@ -66,7 +66,7 @@ class Submission:
             writer = csv.writer(file, lineterminator="\n")
             writer.writerow([*KEYS, *(f"score_{label}" for label in labels), NAMED])
             named_N = self.method.labels_named(labels)
-            for row in range(len(rows)):
+            for row in np.flatnonzero(np.isfinite(self.method.scores).all(axis=1)):
                 keys = (rows.source[row], rows.seed[row], rows.sample[row])
                 writer.writerow([*keys, *(f"{value:.6f}" for value in self.method.scores[row]), named_N[row]])
 
@@ -171,9 +171,11 @@ class _Reader:
                 except ValueError:
                     self.fault(line, f"'{name}' is '{entry[name][:40]}', no finite number", "give a number")
             named_N[row] = self._named(entry, scores_N_C[row], track, line)
-        if missing := [key for key, row in place.items() if row not in seen]:
+        asked = {str(rows.source[row]) for row in seen}
+        needed = {key: row for key, row in place.items() if key[0] in asked or not track.may_lack(key[0])}
+        if missing := [key for key, row in needed.items() if row not in seen]:
             source, seed, sample = missing[0]
-            words = f"{len(missing)} of {len(place)} test samples are missing, first source {source}, seed {seed}"
+            words = f"{len(missing)} of {len(needed)} test samples are missing, first source {source}, seed {seed}"
             self.fault("", f"{words}, sample {sample}", "give every sample once")
         return scores_N_C, named_N
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
@@ -30,7 +30,8 @@ from gpca.reenactment.settings import ReenactmentSettings
 from gpca.settings import read_settings
 from gpca.tracks.published import NOTHING_NAMED, Method
 from gpca.tracks.samples import Samples
-from gpca.tracks.track import CAUSES_TRACK, FRAMES_TRACK
+from gpca.tracks.scans import ask
+from gpca.tracks.track import CAUSES_TRACK, FRAMES_TRACK, SCANS_TRACK
 from gpca.uncertainty.settings import UncertaintySettings
 
 EMBEDDED = "embeddings"  # `reads` of explainers
@@ -43,7 +44,7 @@ class Answer:
     Attributes:
         scores: (n, C). named: (n,) labels, empty for none.
         calls: runs of ICP beyond the one that it explains, mean.
-        seconds: of explaining, for each registration; of depth frames, learning counts too.
+        seconds: of explaining, for each registration; of depth frames and scans, learning counts too.
     """
 
     scores: np.ndarray
@@ -58,10 +59,13 @@ class Answer:
         return cls(attribution.scores_N_C[rows], named_N, float(attribution.icp_calls_N[rows].mean()), seconds)
 
 
-def try_method(samples: Samples, name: str, settings: Mapping[str, Any]) -> tuple[Method, float]:
+def try_method(samples: Samples, name: str, settings: Mapping[str, Any], lesson: str = "") -> tuple[Method, float]:
     """Return what an explainer says of all test samples of a track, and its seconds for each registration.
 
     What it reads is measured beforehand, and its time is not counted.
+
+    Args:
+        lesson: where it learns, of a track that has a choice.
 
     Raises:
         InputError: unknown settings, samples that cannot be made, or a fault in the method.
@@ -69,22 +73,32 @@ def try_method(samples: Samples, name: str, settings: Mapping[str, Any]) -> tupl
     track, rows = samples.track, samples.published.rows
     require_settings(name, settings, track.kind)
     entry = explainer_entry(name, track.kind)
-    samples.files([track.file(source, seed) for source, seed, _ in rows.parts()])  # together, for some at a time
-    answers: list[Answer] = []
-    try_part = {CAUSES_TRACK: _causes, FRAMES_TRACK: _frames}.get(track.name, _hard)
-    for source, seed, own in rows.parts():
-        answer = try_part(samples, name, entry, dict(settings), source, seed)
+    parts = samples.parts()
+    samples.files([track.file(source, seed) for source, seed, _ in parts])  # together, for some at a time
+    number = {label: place for place, label in enumerate(track.labels)}
+    scores_N_C, named_N = np.full((len(rows), len(track.labels)), np.nan), np.full(len(rows), NOTHING_NAMED)
+    answers = list(_answers(samples, name, entry, dict(settings), lesson))
+    for (_, _, own), answer in zip(parts, answers, strict=True):
         if answer.scores.shape != (len(own), len(track.labels)) or not np.isfinite(answer.scores).all():
             fault = f"gives scores of shape {answer.scores.shape}, or such as are no finite numbers"
             remedy = f"give one of {', '.join(track.labels)} for each of the {len(own)} registrations"
             raise InputError(f"explainer '{name}'", fault, remedy)
-        answers.append(answer)
-    number = {label: place for place, label in enumerate(track.labels)}
-    named_N = np.concatenate([[number.get(label, NOTHING_NAMED) for label in answer.named] for answer in answers])
+        scores_N_C[own] = answer.scores
+        named_N[own] = [number.get(label, NOTHING_NAMED) for label in answer.named]
     calls = round(float(np.mean([answer.calls for answer in answers])))
-    scores_N_C = np.concatenate([answer.scores for answer in answers])
     seconds = float(np.mean([answer.seconds for answer in answers]))
-    return Method(name, entry.title, entry.sight, calls, scores_N_C, named_N.astype(int)), seconds
+    name, title = (track.with_lesson(text, lesson) for text in (name, entry.title))
+    return Method(name, title, entry.sight, calls, scores_N_C, named_N), seconds
+
+
+def _answers(samples: Samples, name: str, entry: ExplainerEntry, settings: dict, lesson: str) -> Iterator[Answer]:
+    """Yield the answer of each part."""
+    if samples.track.name == SCANS_TRACK:
+        yield from _scans(samples, name, entry, settings, lesson)
+        return
+    try_part = {CAUSES_TRACK: _causes, FRAMES_TRACK: _frames}.get(samples.track.name, _hard)
+    for source, seed, _ in samples.parts():
+        yield try_part(samples, name, entry, settings, source, seed)
 
 
 def _causes(samples: Samples, name: str, entry: ExplainerEntry, settings: dict, source: str, seed: int) -> Answer:
@@ -155,3 +169,17 @@ def _frames(samples: Samples, name: str, entry: ExplainerEntry, settings: dict, 
     attribution = asked.attribution(name, settings)
     seconds = (perf_counter() - started) / len(causes)
     return Answer.of(attribution, np.arange(len(causes)), seconds)
+
+
+def _scans(samples: Samples, name: str, entry: ExplainerEntry, settings: dict, lesson: str) -> Iterator[Answer]:
+    """Yield the answer for each data set; all of a seed are asked about, and learned from, together."""
+    parts = samples.parts()
+    said = {
+        seed: ask(samples, name, entry, settings, lesson, seed, [source for source, of, _ in parts if of == seed])
+        for seed in dict.fromkeys(seed for _, seed, _ in parts)
+    }
+    for source, seed, _ in parts:
+        rows = said[seed].by_set[source]
+        scores_n_4 = rows[[f"score_{label}" for label in samples.track.labels]].to_numpy(float)
+        named_n = np.where(rows["abstained"], "", rows["concept_predicted"].to_numpy(str))
+        yield Answer(scores_n_4, named_n, float(rows["icp_calls"].mean()), said[seed].seconds)

@@ -77,8 +77,8 @@ def test_predictions_of_other_samples_are_refused(run, config, tmp_path):
 
 
 def test_an_unknown_track_is_answered_with_the_known():
-    with pytest.raises(InputError, match="track 'scans': unknown; choose one of causes, hard, frames"):
-        track_of("scans")
+    with pytest.raises(InputError, match="track 'clouds': unknown; choose one of causes, hard, frames, scans"):
+        track_of("clouds")
 
 
 def test_the_parts_of_the_tracks_are_those_of_the_default_config():
@@ -89,3 +89,5 @@ def test_the_parts_of_the_tracks_are_those_of_the_default_config():
     hard = config["controls"]["seeds"]
     assert TRACKS["hard"].parts(config) == [(source, seed) for seed in seeds[:hard] for source in sources]
     assert TRACKS["frames"].parts(config) == [(REAL_WORLD, seeds[0])]
+    assert TRACKS["scans"].parts(config) == [(name, seeds[0]) for name in config["scans"]["datasets"]]
+    assert set(TRACKS["scans"].everywhere) <= set(config["scans"]["datasets"])

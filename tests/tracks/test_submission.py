@@ -116,7 +116,7 @@ def test_all_faults_are_told_but_no_more_than_can_be_read(written, shipped, head
 def test_what_is_no_text_or_names_no_track_is_refused(shipped, tmp_path):
     (path := tmp_path / "mine.csv").write_bytes(b"\xff\xfe\x00")
     assert read_submission(path, shipped)[1] == [f"{path}: is not a text file in UTF-8; write it anew"]
-    path.write_text("# track: scans\n")
+    path.write_text("# track: clouds\n")
     with pytest.raises(InputError, match="its head names no track; add a line '# track: …', one of causes, hard"):
         track_in_head(path)
     with pytest.raises(InputError, match="no such file"):
