@@ -18,9 +18,7 @@ from gpca.causes.truth import BORDERLINE, NOMINAL
 from gpca.experiments.diagnosis.judged import CEILING, POOLED, Judged, ceiling_of, joined, judged_of
 from gpca.experiments.diagnosis.measures import SHARES, counted, measure, ranking
 from gpca.experiments.scan_causes.metrics import CAUSES as OF_SCANS
-from gpca.experiments.scan_causes.metrics import EVERY, NATURAL
-from gpca.experiments.scan_causes.metrics import _counted as counted_of_scans
-from gpca.experiments.scan_causes.metrics import _measured as measured_of_scans
+from gpca.experiments.scan_causes.metrics import EVERY, NATURAL, counted_of_scans, scan_measures
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import generator
 from gpca.tracks.published import Method, Published
@@ -141,7 +139,7 @@ def _of_causes(samples: Judged, weights_B_N: np.ndarray) -> tuple[Measured, dict
 
 
 def _of_scans(samples: Judged, weights_B_N: np.ndarray) -> tuple[Measured, dict[str, np.ndarray]]:
-    values = measured_of_scans(samples, weights_B_N)
+    values = scan_measures(samples, weights_B_N)
     return values, {metric: counted_of_scans(samples, metric) for metric in values}
 
 

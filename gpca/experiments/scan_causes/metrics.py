@@ -152,13 +152,13 @@ def _measures(
     any_samples = next(iter(judged.values()))
     drawn_B_N = pigeonhole_weights(generator("scan cause intervals", *place), any_samples.seed, cluster_N)
     weights_B_N = np.vstack([np.ones(len(any_samples)), drawn_B_N])
-    values = {key: _measured(samples, weights_B_N) for key, samples in judged.items()}
+    values = {key: scan_measures(samples, weights_B_N) for key, samples in judged.items()}
     names = {key: "/".join(key).strip("/") for key in judged}
     for metric, key in product(MEASURED, judged):
         of_metric = {names[other]: of_other[metric] for other, of_other in values.items() if metric in of_other}
         if names[key] not in of_metric or not np.isfinite(of_metric[names[key]][0]):
             continue
-        counted_N = _counted(any_samples, metric)
+        counted_N = counted_of_scans(any_samples, metric)
         drawn_B_n = drawn_B_N[:, counted_N] if metric in (*SHARES, CAUSES) else None
         gates = [names[other] for other in judged if other[1].startswith(GATE) and other != key]
         lead = Difference()
@@ -171,7 +171,8 @@ def _measures(
         yield (*place, *key, metric, *counts, value_B[0], *interval, *lead.cells)
 
 
-def _measured(samples: Judged, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
+def scan_measures(samples: Judged, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the measures (B,) of a diagnosis, those of scans alone among them, by weights of the samples (B, N)."""
     measures = measure(samples, weights_B_N)
     measures[SAMPLES] = np.full(len(weights_B_N), float((samples.label != BORDERLINE).sum()))
     if samples.names_causes:
@@ -195,7 +196,8 @@ def _frequent(samples: Judged) -> list[str]:
     return [concept for concept in CONCEPTS if (samples.label == concept).sum() >= FEWEST_OF_A_CAUSE]
 
 
-def _counted(samples: Judged, metric: str) -> np.ndarray:
+def counted_of_scans(samples: Judged, metric: str) -> np.ndarray:
+    """Return which samples (N,) a measure is taken over."""
     return np.isin(samples.label, _frequent(samples)) if metric == CAUSES else counted(samples, metric)
 
 
