@@ -3,7 +3,7 @@
     python docs/cli.py            # writes the page
     python docs/cli.py --check    # writes nothing; the exit status is 1 if the page is out of date
 
-Its words are those of the commands' own help, so edit these.
+The text is the commands' own help, so edit that.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ HEAD = """\
 
 <!-- Made by `python docs/cli.py` from what the commands declare; edit their help instead. -->
 
-`gpca` and `python -m gpca` are the same. Results go to stdout, everything else to stderr. A mistake is one line and
-exit status 2, a failed check is status 1. `gpca --version` names the version. The workflow's steps are no commands but
-[targets of Snakemake](../README.md#parts-of-a-run).
+`gpca` and `python -m gpca` are the same. Results go to stdout, everything else to stderr. A mistake gives one line and
+exit status 2; a failed check gives status 1. `gpca --version` prints the version. The steps of the workflow are
+[targets of Snakemake](../README.md#parts-of-a-run), not commands.
 """
 
 
@@ -58,7 +58,7 @@ def page() -> str:
 
 
 def usage(name: str, command: argparse.ArgumentParser) -> str:
-    """Return the command with what it needs; options that may be left out are `[options]`."""
+    """Return the command with the arguments that it needs; `[options]` stands for the others."""
     needed = [words_of(action) for action in command._actions if action.option_strings and action.required]
     positional = [words_of(action) for action in command._actions if not action.option_strings]
     return " ".join(["gpca", name, *positional, *needed, "[options]"])
@@ -81,9 +81,9 @@ def table(command: argparse.ArgumentParser) -> str:
 
 
 def meaning(action: argparse.Action) -> str:
-    """Return the help of an argument, with what may be chosen and whether it is needed."""
+    """Return the help of an argument, with its choices and whether it is required."""
     chosen = one_of(action.choices) if action.choices else ""
-    needed = "needed" if action.option_strings and action.required else ""
+    needed = "required" if action.option_strings and action.required else ""
     return "; ".join(filter(None, [str(action.help), chosen, needed]))
 
 
@@ -93,13 +93,12 @@ def one_of(choices: Iterable[str]) -> str:
 
 
 def sentence(summary: str) -> str:
-    """Return the summary of a command, from what it reads to what it makes, as a sentence."""
-    read, _, made = summary.partition(" -> ")
-    return f"Reads: {read}. Gives: {made}."
+    """Return the summary of a command as a sentence."""
+    return f"{summary[0].upper()}{summary[1:]}."
 
 
 def escaped(cell: str) -> str:
-    """Return a cell in which nothing ends it, or is taken for HTML."""
+    """Return a cell without characters that would end it or read as HTML."""
     return cell.replace("|", "\\|").replace("<", "&lt;")
 
 

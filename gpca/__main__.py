@@ -14,16 +14,16 @@ from gpca.process.job import as_process, keep_freed_memory
 from gpca.process.processor import prepare
 
 COMMANDS = {  # those for a registration of one's own first, then those for a run
-    "explain": "files of points -> why their registration is uncertain, and what to do",
-    "label": "registrations and embeddings -> labels that a person gives when the classifier asks",
-    "bench": "method of your own -> its row among the published ones of a track",
-    "score": "predictions made anywhere -> their row among the published ones",
-    "leaderboard": "submitted predictions -> a page that ranks them",
-    "compare": "two runs -> a page with their tables and figures side by side",
-    "ship": "model of a run -> the model that comes with the package, and its card",
-    "ship-predictions": "run -> the predictions and truths that bench and score read",
-    "check-config": "configs -> whether a run can use them",
-    "check-reference": "folder of a run -> whether its numbers agree with the reference",
+    "explain": "say whether a registration succeeded and, if not, why and what to do",
+    "label": "ask a person for the labels that help the classifier most",
+    "bench": "run a method of your own on a track, and show its row among the published ones",
+    "score": "score predictions made anywhere, and show their row among the published ones",
+    "leaderboard": "make a page that ranks submitted predictions",
+    "compare": "make a page with the tables and figures of two runs side by side",
+    "ship": "make the model of the package and its card from the model of a run",
+    "ship-predictions": "extract from a run the predictions and truths that bench and score read",
+    "check-config": "check whether a run can use these configs",
+    "check-reference": "check whether the numbers of a run agree with its reference",
 }
 
 
@@ -38,7 +38,9 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _run(arguments: list[str], chosen: str | None) -> int:
-    parser = OneLineParser(prog=_program(), description="Commands for people; the workflow's steps are targets of it.")
+    parser = OneLineParser(
+        prog=_program(), description="Commands to run by hand; the steps of the workflow are its targets."
+    )
     parser.add_argument("--version", action="version", version=f"gpca {__version__}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="command")
     for name, summary in COMMANDS.items():

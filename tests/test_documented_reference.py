@@ -41,7 +41,7 @@ def test_arguments_stand_as_they_are_typed():
         "| `files …` | what is read |",
         "| `--unit UNIT` | a \\| b; one of `m`, `mm` |",
         "| `--fast` | soon |",
-        "| `--out FILE` | &lt;folder>; needed |",
+        "| `--out FILE` | &lt;folder>; required |",
     ]
 
 

@@ -24,14 +24,14 @@ from gpca.tracks.trial import try_method
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the track and the method; ``--settings`` are those of the method."""
     parser.add_argument("track", help=f"one of {', '.join(TRACKS)}")
-    parser.add_argument("method", help="file such as my_method.py, an installed module, or the name of an explainer")
-    parser.add_argument("--out", type=Path, help="CSV of its predictions, as gpca score and the leaderboard take it")
-    parser.add_argument("--authors", default="unknown", help="for the head of that file")
-    parser.add_argument("--link", default="none", help="to code or a paper, for the same")
+    parser.add_argument("method", help="a file such as my_method.py, an installed module, or the name of an explainer")
+    parser.add_argument("--out", type=Path, help="CSV of its predictions, for gpca score and the leaderboard")
+    parser.add_argument("--authors", default="unknown", help="authors, for the head of that file")
+    parser.add_argument("--link", default="none", help="link to code or a paper, for that head")
     parser.add_argument("--samples", type=Path, help="folder of the samples (default: the user's cache)")
     parser.add_argument("--data-dir", type=Path, help="folder of data that the repository does not have (track scans)")
     parser.add_argument("--learn-from", help="what it learns from, where there is a choice: scans (default) or objects")
-    parser.add_argument("--processes", type=COUNT, help="how many make samples at a time (default: one for each core)")
+    parser.add_argument("--processes", type=COUNT, help="processes that make samples (default: one per core)")
 
 
 def run(options: Namespace) -> None:

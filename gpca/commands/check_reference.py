@@ -18,7 +18,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     """Declare the folders; ``--settings`` replaces keys of the config's section ``reference``."""
     parser.add_argument("folder", type=Path, help="folder of the run, such as results/full")
     parser.add_argument(
-        "--reference", type=Path, help="its reference (default: the folder of the same name in reference/ beside it)"
+        "--reference", type=Path, help="its reference (default: reference/ and the same name, beside the run)"
     )
     parser.add_argument(
         "--config",

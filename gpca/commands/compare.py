@@ -13,7 +13,7 @@ from gpca.page.two_runs import ALONE, APART, DIFFERENT, compare_tables, write_co
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the folders and the page."""
-    parser.add_argument("one", type=Path, help="folder of a run, such as results/default, or of a reference")
+    parser.add_argument("one", type=Path, help="folder of a run or a reference, such as results/default")
     parser.add_argument("other", type=Path, help="folder of another run")
     parser.add_argument("--out", type=Path, default=Path("compare.html"), help="the page (default: compare.html)")
 

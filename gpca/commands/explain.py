@@ -31,20 +31,30 @@ NOT_OF_SCANS = ("model", "fast", "uncertainty", "estimator", "queue", "png")  # 
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare files and options."""
-    parser.add_argument("source", type=Path, nargs="+", help=f"what was observed: points or a mesh ({FORMATS})")
-    parser.add_argument("target", type=Path, help="the reference that each source is aligned to")
-    parser.add_argument("--init", type=Path, help="text file with the 4×4 numbers of T_target_source")
-    parser.add_argument("--unit", choices=METERS_PER_UNIT, default="m", help="unit of files and pose (default m)")
-    parser.add_argument("--model", type=Path, help="model file (default: GPCA_MODEL, one in ./results/, the package's)")
+    parser.add_argument("source", type=Path, nargs="+", help=f"observed cloud or mesh ({FORMATS})")
+    parser.add_argument("target", type=Path, help="reference to which each source is aligned")
+    parser.add_argument("--init", type=Path, help="text file with the 4×4 matrix T_target_source, the initial pose")
+    parser.add_argument(
+        "--unit", choices=METERS_PER_UNIT, default="m", help="unit of the files and the pose (default m)"
+    )
+    parser.add_argument(
+        "--model", type=Path, help="model file (default: GPCA_MODEL, one in ./results/, or the package's)"
+    )
     parser.add_argument("--method", help="registration method, such as gicp (default: the model's ICP)")
-    parser.add_argument("--uncertainty", action="store_true", help="measure the uncertainty of the pose")
-    parser.add_argument("--estimator", help="measure it with an estimator such as brossard (default: Monte-Carlo)")
-    parser.add_argument("--fast", action="store_true", help="re-enact with fewer points and poses, without a promise")
-    parser.add_argument("--html", type=Path, metavar="FILE", help="write one page that shows all of it in 3-D")
-    parser.add_argument("--png", type=Path, metavar="FILE", help="write one figure that shows it")
-    parser.add_argument("--queue", type=Path, metavar="FILE", help="add what is queued to a file for 'gpca label'")
-    parser.add_argument("--scans", action="store_true", help="both are scans of any size, of which neither is whole")
-    parser.add_argument("--voxel", type=length, help="edge of the voxels of scans (default: chosen by their spacing)")
+    parser.add_argument(
+        "--uncertainty", action="store_true", help="measure how much the pose varies over other ICP starts"
+    )
+    parser.add_argument("--estimator", help="measure this by an estimator such as brossard (default: Monte-Carlo)")
+    parser.add_argument("--fast", action="store_true", help="re-enact fewer points and poses, without a guarantee")
+    parser.add_argument("--html", type=Path, metavar="FILE", help="write a page with all results and 3-D views")
+    parser.add_argument("--png", type=Path, metavar="FILE", help="write a figure of the results")
+    parser.add_argument(
+        "--queue", type=Path, metavar="FILE", help="add the registration, if queued, to a file for 'gpca label'"
+    )
+    parser.add_argument("--scans", action="store_true", help="both clouds are partial scans of any size")
+    parser.add_argument(
+        "--voxel", type=length, help="edge length of voxels for scans (default: from the point spacing)"
+    )
     form = parser.add_mutually_exclusive_group()
     form.add_argument("--json", action="store_true", help="print one JSON object")
     form.add_argument("--json-lines", action="store_true", help="print one line of JSON per source")

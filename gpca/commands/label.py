@@ -54,11 +54,9 @@ def add_arguments(parser: ArgumentParser) -> None:
     )
     parser.add_argument("--picture", type=Path, default=Path("query.png"), help="image, redrawn for every question")
     parser.add_argument("--answers", type=Path, help="file with one answer per line, instead of the terminal")
-    parser.add_argument(
-        "--predictions", type=Path, help="CSV of what the classifier says about every sample at the end"
-    )
-    parser.add_argument("--model", type=Path, help="model that explained a queue (default: as of 'gpca explain')")
-    parser.add_argument("--out", type=Path, help="model file to write with what was learned from a queue")
+    parser.add_argument("--predictions", type=Path, help="CSV of the classifier's final predictions for all samples")
+    parser.add_argument("--model", type=Path, help="model that explained a queue (default: that of 'gpca explain')")
+    parser.add_argument("--out", type=Path, help="model file to write, which has learned from a queue")
 
 
 def run(options: Namespace) -> None:

@@ -13,7 +13,9 @@ from gpca.tracks.leaderboard import FOLDER, read_submissions, write_page
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the folder and the page."""
-    parser.add_argument("--submissions", type=Path, default=FOLDER, help="folder of CSV files (results/leaderboard)")
+    parser.add_argument(
+        "--submissions", type=Path, default=FOLDER, help="folder of CSV files (default: results/leaderboard)"
+    )
     parser.add_argument("--out", type=Path, help="the page (default: index.html in that folder)")
     parser.add_argument("--check", action="store_true", help="only check the files")
 

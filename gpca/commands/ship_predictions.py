@@ -19,11 +19,14 @@ def add_arguments(parser: ArgumentParser) -> None:
     """Declare folders."""
     folder = Path("results") / DEFAULT
     parser.add_argument("--run", dest="folder", type=Path, default=folder, help=f"folder of the run ({folder})")
-    parser.add_argument("--out", type=Path, default=FOLDER, help="folder that they go to")
+    parser.add_argument("--out", type=Path, default=FOLDER, help="folder to write them to")
     of_default = [name for name, track in TRACKS.items() if track.run == DEFAULT]
     words = "; ".join(f"{name} needs the run {track.run}" for name, track in TRACKS.items() if track.run != DEFAULT)
     parser.add_argument(
-        "--tracks", nargs="+", default=of_default, help=f"which (default: those of the default run; {words})"
+        "--tracks",
+        nargs="+",
+        default=of_default,
+        help=f"tracks to extract (default: those of the default run; {words})",
     )
 
 
