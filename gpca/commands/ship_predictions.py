@@ -18,7 +18,9 @@ LARGEST_BYTES = 10**7  # of all tracks together, as they are kept in git
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare folders."""
     folder = Path("results") / DEFAULT
-    parser.add_argument("--run", dest="folder", type=Path, default=folder, help=f"folder of the run ({folder})")
+    parser.add_argument(
+        "--run", dest="folder", type=Path, default=folder, help=f"folder of the run (default: {folder})"
+    )
     parser.add_argument("--out", type=Path, default=FOLDER, help="folder to write them to")
     of_default = [name for name, track in TRACKS.items() if track.run == DEFAULT]
     words = "; ".join(f"{name} needs the run {track.run}" for name, track in TRACKS.items() if track.run != DEFAULT)
