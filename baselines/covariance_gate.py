@@ -56,8 +56,8 @@ class CovarianceGate(ScoringExplainer):
         covariances = []
         for row in range(len(registrations)):
             # The source lies where ICP put it, so the pose is the identity.
-            clouds = registrations.cloud(row), registrations.target(row)
-            pair = Pair(*(cloud.astype(np.float64) for cloud in clouds)).with_normals()
+            source, target = registrations.cloud(row), registrations.target(row)
+            pair = Pair(source.astype(np.float64), target.astype(np.float64)).with_normals()
             outcome = Outcome(np.eye(4), float(registrations.fitness[row]), float(registrations.inlier_rmse[row]))
             estimated = estimate(RegisteredPair(pair, outcome, POINT_TO_POINT, deviation_6)).covariance_6_6
             covariances.append(np.eye(6) if estimated is None else estimated)
