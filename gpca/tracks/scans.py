@@ -17,11 +17,12 @@ from gpca.experiments.scan_causes.settings import OBJECTS
 from gpca.explainers.interface import REENACTED, ExplainerEntry
 from gpca.process.job import Job
 from gpca.tracks.samples import Samples
+from gpca.tracks.shipping import LABELED_BY
+from gpca.tracks.track import SCANS_TRACK
 
 if TYPE_CHECKING:
     import pandas as pd
 
-LABELED_BY = ("scans", "learned", "explainer")  # columns of predictions
 FOLDER_OF = {REENACTED: "reenactments", EMBEDDED: "cause_embeddings", DESCRIBED: "descriptors"}  # of what is read
 
 
@@ -83,7 +84,7 @@ def ask(
         started = perf_counter()
         diagnosis_step.run(job)
         seconds = perf_counter() - started
-        rows = read_predictions(job.predictions, labels=LABELED_BY)
+        rows = read_predictions(job.predictions, labels=LABELED_BY[SCANS_TRACK])
     return Said({each: rows[rows["scans"] == each] for each in sets}, seconds / len(rows))
 
 
