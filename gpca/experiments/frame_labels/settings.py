@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
+from gpca.active_learning.settings import RetrainingSettings
 from gpca.pairs.perturbation import Concept
-from gpca.settings import Bounds, Count, Different, Distinct, OpenShare, PositiveShare
+from gpca.settings import Bounds, Count, Different, Distinct, OpenShare, PositiveShare, read_settings
 
 PAIR = "pair"  # the embedding that is measurements of the pair, beside those by the backbones
 
@@ -36,6 +38,12 @@ class FrameLabelSettings:
     least: Count = 20
     targets: Distinct[PositiveShare] = (0.65, 0.7, 0.75)
     points: Annotated[int, Bounds(minimum=32, maximum=65536)] = 512
+
+
+def rounds_of(own: FrameLabelSettings, rare: Mapping[str, Any]) -> RetrainingSettings:
+    """Return how the rounds go: as those of a concept that is rare on whole objects, with the labels of frames."""
+    shared = {name: value for name, value in rare.items() if name in RetrainingSettings.__dataclass_fields__}
+    return read_settings(RetrainingSettings, shared | {"labels": own.labels, "least": own.least})
 
 
 def in_percent(target: float) -> str:

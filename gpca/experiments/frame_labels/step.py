@@ -9,8 +9,8 @@ import numpy as np
 from gpca.active_learning.curves import POOL_COLUMNS, write_curves
 from gpca.active_learning.retraining import Retraining, Step, learn
 from gpca.active_learning.rounds import Embedded, make_task
-from gpca.active_learning.settings import ALL_LABELS, ActiveLearningSettings, RetrainingSettings
-from gpca.experiments.frame_labels.settings import PAIR, FrameLabelSettings
+from gpca.active_learning.settings import ALL_LABELS, ActiveLearningSettings
+from gpca.experiments.frame_labels.settings import PAIR, FrameLabelSettings, rounds_of
 from gpca.explainers.pair_classifier import NormalizedFeatures
 from gpca.features.registered import describe_registrations
 from gpca.pairs.dataset import Registrations, load_embeddings
@@ -26,9 +26,7 @@ def run(job: Job) -> None:
     axes = (job.source, job.seed)
     with record_provenance(job.out, inputs, job.settings, seed=job.seed):
         own = read_settings(FrameLabelSettings, job.section("frame_labels"))
-        rare = job.section("active_learning").get("rare") or {}
-        shared = {name: value for name, value in rare.items() if name != "shares"}
-        rounds = read_settings(RetrainingSettings, shared | {"labels": own.labels, "least": own.least})
+        rounds = rounds_of(own, job.section("active_learning").get("rare") or {})
         start = ActiveLearningSettings(initial=own.initial)
         curves: dict[str, dict] = {strategy: {} for strategy in job.strategies}
         for name, samples in progress(_embedded(job, own.points), f"labels of {job.source}"):
