@@ -229,8 +229,9 @@ def read_judged(path: str | Path) -> pd.DataFrame:
         InputError: missing, empty or unreadable file, missing column, something that is not a number.
     """
     rows = read_csv(path, READING_COLUMNS)
-    for column in ("published", "upper", "value", "n", "distance", "chance"):
+    for column in ("published", "upper", "value", "n", "chance"):
         rows[column] = numbers_in(path, rows, column)
+    rows["distance"] = numbers_in(path, rows, "distance", needed=rows["distance"] != "-inf")  # of 0, by a ratio
     rows["reproduced"] = numbers_in(path, rows, "reproduced", needed=rows["reproduced"] != "")
     for column in ("close", "at_least"):
         rows[column] = rows[column] == "True"

@@ -92,6 +92,16 @@ def test_what_was_judged_is_read_back_or_refused(tmp_path):
         read_judged(path)
 
 
+def test_a_risk_of_nothing_is_infinitely_far_by_its_ratio_and_read_back(tmp_path):
+    risk = number(0.0078, decimals=4, unit="risk")
+    comparison = compared([risk], {"metrics.csv": tidy([0.003, 0.003])})
+    found = judge_readings([risk], comparison, readings({"perfect": 0.0, "random": 0.004}), TOLERANCES)
+    assert found["distance"].tolist()[0] == -float("inf") and not found["close"][0]
+    path = tmp_path / "reading_verdicts.csv"
+    found.to_csv(path, index=False)
+    pd.testing.assert_frame_equal(read_judged(path), found, check_dtype=False)
+
+
 def test_the_chance_is_the_share_of_the_span_within_the_tolerance():
     percent, labels = TOLERANCES["%"], TOLERANCES["labels"]
     assert chance_of([10, 50], [10, 50], percent) == pytest.approx(2 * 3 / 40)
