@@ -93,7 +93,7 @@ class LearnedPairGPCA(PairDescription, GPCA):
         return (self._embed(registrations) if self._embed else registrations).attached[self._embedding]
 
 
-ENCODERS = {"dgcnn": "DGCNN", "attention": "cross-attention"}
+ENCODERS = {"dgcnn": "DGCNN"}
 EXPLAINERS = {
     f"gpca_pair_{name}": ExplainerEntry(
         f"GP-CA on the pair ({words})", partial(LearnedPairGPCA, f"pair_{name}", True), WITH_MOTION

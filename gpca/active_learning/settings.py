@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
-from gpca.settings import Bounds, Count, Distinct, OpenShare, PositiveShare, read_settings
+from gpca.settings import Bounds, Count, Distinct, OpenShare, PositiveShare
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,7 @@ FROM_OTHERS = {  # embeddings by encoders of other jobs -> what there has to be
     "other_samples": "two seeds or more",
     "other_source": "two sources or more",
 }
-SeenBy = Literal["other_samples", "other_source", "self_supervised", "pair"]
+SeenBy = Literal["other_samples", "other_source", "pair"]
 NewCause = Literal["nominal", "geometry"]
 
 
@@ -114,7 +114,7 @@ class NewConceptSettings:
     Attributes:
         seeds: the first so many of the run's.
         embeddings: of the samples: by an encoder that learned from other samples of the same source, or from another
-            source; the predictions of one that learned without labels; or the descriptors of the pair.
+            source; or the descriptors of the pair.
         errors: shares of the oracle's answers that are wrong.
         erring: embeddings with which such an oracle is asked.
         points: drawn from each cloud to describe a pair.
@@ -124,7 +124,7 @@ class NewConceptSettings:
     """
 
     seeds: Count = 3
-    embeddings: Distinct[SeenBy] = ("other_samples", "other_source", "self_supervised", "pair")
+    embeddings: Distinct[SeenBy] = ("other_samples", "other_source", "pair")
     errors: Distinct[OpenShare] = (0.05, 0.1, 0.2, 0.3)
     erring: Distinct[SeenBy] = ("other_samples", "pair")
     points: Annotated[int, Bounds(minimum=32, maximum=65536)] = 512
@@ -137,8 +137,3 @@ class NewConceptSettings:
         if missing := set(self.erring) - set(self.embeddings):
             fault = f"'{sorted(missing)[0]}' is not among the embeddings"
             raise InputError("setting erring of new_concepts", fault, f"choose from {', '.join(self.embeddings)}")
-
-    @classmethod
-    def from_dict(cls, section: dict) -> NewConceptSettings:
-        """Build from the config's section ``new_concepts``, of which the encoder is another part."""
-        return read_settings(cls, {name: value for name, value in section.items() if name != "encoder"})

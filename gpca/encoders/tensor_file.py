@@ -12,7 +12,6 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import torch
 
 from gpca.io.files import whole_file
@@ -88,10 +87,9 @@ def _require_sound(name: str, tensor: torch.Tensor) -> None:
         raise ValueError(f"'{name}' contains NaN, infinity or numbers above {LARGEST_NUMBER:.0e}")
 
 
-def fingerprint(registrations: Registrations, targets_S_C: np.ndarray | None) -> str:
-    """Hash the data of a training: the clouds, their labels or targets, and their splits."""
+def fingerprint(registrations: Registrations) -> str:
+    """Hash the data of a training: the clouds, their labels, and their splits."""
     digest = hashlib.sha256(registrations.points.tobytes())
-    digest.update(b"" if targets_S_C is None else targets_S_C.tobytes())
     for column in (registrations.offsets, registrations.concept, registrations.split, registrations.sample):
         digest.update(repr(column.tolist()).encode())
     return digest.hexdigest()

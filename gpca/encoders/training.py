@@ -59,18 +59,15 @@ def _on(device: torch.device, clouds: Any) -> Any:
 
 @dataclass(frozen=True)
 class TrainingTask:
-    """The task of an encoder: its view of a registration, and the targets of its head.
+    """The task of an encoder: its view of a registration, and the classes of its head.
 
     Attributes:
         classes: the names that ``concept`` may have.
-        targets_S_C: numbers that the head learns to predict, by least squares, in the place of the concepts; `classes`
-            then names its columns, and the curve has no accuracy.
         make: makes the encoder, where it is none of the registry.
         draw: what the encoder sees of a row, anew in every epoch.
     """
 
     classes: tuple[str, ...] = CONCEPTS
-    targets_S_C: np.ndarray | None = None
     make: Callable[[], nn.Module] | None = None
     draw: Draw = draw_points
 
@@ -79,10 +76,8 @@ class TrainingTask:
         return with_head(self.make(), settings, self.classes) if self.make else make_model(settings, self.classes)
 
     def targets(self, registrations: Registrations) -> torch.Tensor:
-        """Return the number of each row's class (S,), or the numbers that are to be predicted (S, C)."""
-        if self.targets_S_C is None:
-            return torch.from_numpy(np.array([self.classes.index(concept) for concept in registrations.concept]))
-        return torch.from_numpy(self.targets_S_C.astype(np.float32))
+        """Return the number of each row's class (S,)."""
+        return torch.from_numpy(np.array([self.classes.index(concept) for concept in registrations.concept]))
 
 
 def train_encoder(
@@ -120,7 +115,7 @@ def train_encoder(
     training = _Training(model, registrations, rows, task, (source, seed), settings)
     best = deepcopy(model) if len(held_out) else model
     state = training.state | ({"best": best} if len(held_out) else {})
-    data = (fingerprint(registrations, task.targets_S_C), fingerprint_of(start))
+    data = (fingerprint(registrations), fingerprint_of(start))
     identity = repr((source, seed, asdict(settings), *data))
     curve = resume(checkpoint, identity, state)
 
@@ -169,7 +164,7 @@ class _Training:
         order = generator(*self._axes, "order", epoch).permutation(self._rows)
         for batch_rows in np.array_split(order, self._batches):
             outputs_B_C, targets_B = self._predict(batch_rows, "epoch", epoch)
-            loss = _loss(outputs_B_C, targets_B)
+            loss = nn.functional.cross_entropy(outputs_B_C, targets_B)
             if (penalty := getattr(self._model.encoder, "penalty", None)) is not None:
                 loss = loss + penalty
             self._optimizer.zero_grad()
@@ -190,7 +185,7 @@ class _Training:
         batches = np.array_split(rows, -(-len(rows) // self._settings.batch_size))
         parts = [self._predict(batch_rows, "validation") for batch_rows in batches]
         outputs_R_C, targets_R = (torch.cat(part).cpu() for part in zip(*parts, strict=True))
-        loss = _loss(outputs_R_C, targets_R).item()
+        loss = nn.functional.cross_entropy(outputs_R_C, targets_R).item()
         return {"validation_loss": loss, "validation_accuracy": _hits(outputs_R_C, targets_R) / len(rows)}
 
     def _predict(self, rows: np.ndarray, *axes: object) -> tuple[torch.Tensor, torch.Tensor]:
@@ -215,15 +210,9 @@ def _held_out(
     return rows[~is_held_out], rows[is_held_out]
 
 
-def _loss(outputs_B_C: torch.Tensor, targets_B: torch.Tensor) -> torch.Tensor:
-    """Return the mean squared error where the targets are numbers, else the cross-entropy."""
-    least_squares = targets_B.is_floating_point()
-    return (nn.functional.mse_loss if least_squares else nn.functional.cross_entropy)(outputs_B_C, targets_B)
-
-
 def _hits(outputs_B_C: torch.Tensor, targets_B: torch.Tensor) -> float:
-    """Return how many classes are right; NaN of numbers."""
-    return np.nan if targets_B.is_floating_point() else float((outputs_B_C.argmax(dim=1) == targets_B).sum())
+    """Return how many classes are right."""
+    return float((outputs_B_C.argmax(dim=1) == targets_B).sum())
 
 
 def _is_settled(curve: list[dict[str, float]], patience: int | None) -> bool:

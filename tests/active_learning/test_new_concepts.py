@@ -65,7 +65,7 @@ def test_samples_follow_each_other(samples):
 
 def test_embeddings_with_an_erring_oracle_are_among_those_that_are_tried():
     with pytest.raises(InputError, match="erring of new_concepts: 'pair' is not among the embeddings; choose from oth"):
-        NewConceptSettings.from_dict({"embeddings": ["other_samples"], "erring": ["pair"]})
+        NewConceptSettings(embeddings=("other_samples",), erring=("pair",))
 
 
 # The oracle

@@ -4,7 +4,7 @@ import torch
 from gpca.encoders.layers import stacked_product
 from gpca.encoders.pair import CHANNELS, MOTION, PAIR_ENCODERS
 
-OPTIONS = {"pair_dgcnn": {"k": 6, "widths": (8, 8), "point_features": 8}, "pair_attention": {"width": 8}}
+OPTIONS = {"pair_dgcnn": {"k": 6, "widths": (8, 8), "point_features": 8}}
 
 
 @pytest.fixture
@@ -37,16 +37,6 @@ def test_both_clouds_count_and_which_is_which(encoder, pairs):
         moved[:, 1] += 1  # the model alone
         assert not torch.allclose(swapped, found, atol=1e-3)
         assert not torch.allclose(encoder((moved, motion))[:, :-MOTION], found, atol=1e-3)
-
-
-def test_what_is_pooled_of_a_cloud_has_attended_to_the_other(pairs):
-    encoder = PAIR_ENCODERS["pair_attention"](width=8).eval()
-    points, motion = pairs
-    moved = points.clone()
-    moved[:, 1] += 1
-    with torch.no_grad():
-        of_observed = [encoder((given, motion))[:, :16] for given in (points, moved)]
-    assert not torch.allclose(*of_observed, atol=1e-3)
 
 
 def test_every_weight_of_an_encoder_learns(encoder, pairs):

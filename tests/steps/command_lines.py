@@ -202,8 +202,8 @@ STEP_OPTIONS = {
     "new_concepts": COMMON | {
         "--settings": {
             "new_concepts": {
-                "embeddings": ["other_source", "self_supervised", "pair"], "errors": [0.5], "erring": ["pair"],
-                "points": 64, "encoder": {"epochs": 1}, "geometry_train": 2, "geometry_test": 1,
+                "embeddings": ["other_source", "pair"], "errors": [0.5], "erring": ["pair"],
+                "points": 64, "geometry_train": 2, "geometry_test": 1,
                 "geometry_candidates": 2,
             },
             "active_learning": LEARNING | {"held_out": ["overlap"], "initial": 4},

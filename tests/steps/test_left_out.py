@@ -29,7 +29,7 @@ def test_new_concepts_that_cannot_be_tried_are_left_out_and_named(folder, capsys
     assert "new concepts of tiny: 'other_source' is skipped: it needs two sources or more" in err
     assert "'geometry' is skipped: none of 2 candidates of a split fails without a cause" in err
     tried = {line.split(",")[0] for line in (folder / "new_bald_kmeans.csv").read_text().splitlines()[1:]}
-    assert tried == {"self_supervised", "pair", "pair_errors_50", "pretrained"}
+    assert tried == {"pair", "pair_errors_50", "pretrained"}
 
 
 EXCHANGE = STEP_OPTIONS["exchange"]["--settings"]["exchange"]

@@ -19,7 +19,7 @@ from gpca.reporting.words import plural, span
 if TYPE_CHECKING:
     import pandas as pd
 
-TRAINED = {"random_draws": "draws of random size", "two_layer_head": "head of two layers"}
+TRAINED = {"random_draws": "draws of random size"}
 SAME_SEEDS = "paper_same_seeds"  # the paper's training, over the seeds of the encoders trained in other ways
 KNOWN = {PAPER: TITLES[PAPER], SEEN: "Objects that it learned from (%)", UNSEEN: "Unseen objects (%)"}
 

@@ -36,7 +36,7 @@ def encode(
 
     With matched density every draw from a cloud has a random number of points; the clouds are whole, as each epoch
     draws anew. An encoder for unseen objects sees no sample of them; nor does one that is trained in another way, by
-    such draws or with a head of two layers. Hard samples are of unseen objects as they are.
+    such draws. Hard samples are of unseen objects as they are.
 
     Returns:
         the arrays of a file of embeddings, and the training curve.
@@ -44,8 +44,6 @@ def encode(
     if control in ("density", "random_draws"):
         fewest, most = settings.draw_points
         encoder = replace(encoder, fewest_points=fewest, draw_points=most)
-    if control == "two_layer_head":
-        encoder = replace(encoder, head="two_layer")
     if control not in ("density", HARD):
         registrations = of_unseen_objects(registrations, settings.folds, source, seed)
     name = f"{source} under {control}"

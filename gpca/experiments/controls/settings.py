@@ -14,9 +14,6 @@ Control = Literal[
     "unseen_objects",
     "hard",
     "reversed",
-    "label_noise_5",
-    "label_noise_10",
-    "label_noise_20",
     "label_noise_30",
     "shuffled",
     "transfer",
@@ -27,9 +24,9 @@ SEEN = "seen_objects"  # tests of the explainers for unseen objects on new sampl
 HARD = "hard"  # samples of its own, in which no state is perfect and the label is what was measured
 RETRAINED = ("density", UNSEEN, HARD)  # need an encoder of their own
 OF_EVERY_SEED = (UNSEEN, HARD)  # of these, the ones for which every seed has one
-Training = Literal["random_draws", "two_layer_head"]
+Training = Literal["random_draws"]
 TRAININGS: tuple[str, ...] = get_args(Training)  # other ways to train the encoder, on the samples for unseen objects
-WRONG_LABELS = {f"label_noise_{percent}": percent / 100 for percent in (5, 10, 20, 30)}  # share of the training labels
+WRONG_LABELS = {"label_noise_30": 0.3}  # share of the training labels
 RELABELED = (*WRONG_LABELS, "shuffled")
 TRANSFER = "transfer"
 Points = Annotated[int, Bounds(minimum=32, maximum=65536)]
@@ -49,7 +46,7 @@ class ControlSettings:
         bins: the number of equally wide bins of each severity.
     """
 
-    controls: Distinct[Control] = ("density", "unseen_objects", "label_noise_10", "shuffled", "transfer")
+    controls: Distinct[Control] = ("density", "unseen_objects", "label_noise_30", "shuffled", "transfer")
     encoders: Annotated[tuple[Training, ...], Different(fewest=0)] = ()
     encoder_seeds: Count = 1
     seeds: Count = 3

@@ -3,26 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from gpca.active_learning.settings import NEW_CONCEPT_STRATEGIES, NewConceptSettings
-from gpca.encoders.settings import EncoderChanges, require_draws
-from gpca.experiments.experiment import Experiment, LeftOut, Tidy
-
-
-@dataclass(frozen=True, kw_only=True)
-class Section(NewConceptSettings):
-    """The settings of the new concepts, with the encoder that learns without labels."""
-
-    encoder: EncoderChanges
-
-
-def check(config: dict, _left_out: LeftOut) -> None:
-    """Check that the encoder that learns without labels has enough points."""
-    encoder = config["encoders"][config["embedding"]["encoder"]] | config["new_concepts"]["encoder"]
-    points = config["registrations"]["cloud_points"]
-    require_draws("new_concepts.encoder", encoder, points, "registrations.cloud_points")
+from gpca.experiments.experiment import Experiment, Tidy
 
 
 def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
@@ -49,7 +33,7 @@ def shown(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str
 
 EXPERIMENT = Experiment(
     name="new_concepts",
-    sections={"new_concepts": Section},
+    sections={"new_concepts": NewConceptSettings},
     tidy=(
         Tidy(
             "new_concepts.csv",
@@ -60,5 +44,4 @@ EXPERIMENT = Experiment(
     ),
     names=names,
     shown=shown,
-    check=check,
 )

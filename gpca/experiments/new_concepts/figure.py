@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from gpca.experiments.active_learning.figure import draw_curves, mean_curves
 from gpca.experiments.new_concepts.tables import SEEN
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.reporting.figures.style import BLUE, GRAY, GREEN, ORANGE, SKY_BLUE, VERMILION
+from gpca.reporting.figures.style import BLUE, GRAY, GREEN, SKY_BLUE, VERMILION
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -22,7 +22,6 @@ STYLES = {
     "other_samples": (BLUE, "-", 0.9),
     "other_source": (SKY_BLUE, "-", 0.9),
     "unseen": (VERMILION, "-", 1.8),
-    "self_supervised": (ORANGE, "-", 0.9),
     "pair": (GREEN, "-", 1.8),
 }
 

@@ -22,7 +22,7 @@ from gpca.causes.drawing import draw_geometry
 from gpca.causes.settings import CauseSettings
 from gpca.causes.truth import BORDERLINE, GEOMETRY, NOMINAL
 from gpca.encoders.settings import EncoderSettings
-from gpca.encoders.training import TrainingTask, embed, train_encoder
+from gpca.encoders.training import embed
 from gpca.encoders.weights import load_model
 from gpca.explainers.pair_classifier import NormalizedFeatures
 from gpca.features.dataset import Descriptors, describe_all
@@ -34,11 +34,12 @@ from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.job import Job
 from gpca.process.progress import progress
 from gpca.process.provenance import record_provenance
+from gpca.settings import read_settings
 
 
 def run(job: Job) -> None:
     """Learn every new concept from every embedding."""
-    own = NewConceptSettings.from_dict(job.section("new_concepts"))
+    own = read_settings(NewConceptSettings, job.section("new_concepts"))
     inputs = [job.registrations, *job.encoders, job.objects, job.causes, job.descriptors]
     inputs += [job.cause_encoder, job.cause_embeddings]
     with record_provenance(job.out, inputs, job.settings, seed=job.seed):
@@ -90,11 +91,6 @@ class _Work:
         for name in self._own.embeddings:
             if name == "pair":
                 yield name, pair_S_F
-            elif name == "self_supervised":
-                own = EncoderSettings(
-                    **self._job.section("encoder") | self._job.section("new_concepts").get("encoder", {})
-                )
-                yield name, self_supervised(registrations, pair_S_F, *self._axes, own)
             elif name in self._models:
                 yield name, embed(self._models[name], registrations, *self._axes, self._encoder)[0]
             else:
@@ -150,26 +146,3 @@ def _seen(causes: Causes, h_S_d: np.ndarray, described: Descriptors, label: str 
 
 def _leave_out(source: str, name: str, why: str) -> None:
     print(f"new concepts of {source}: '{name}' is skipped: {why}", file=sys.stderr)
-
-
-def self_supervised(
-    registrations: Registrations, measured_S_F: np.ndarray, source: str, seed: int, settings: EncoderSettings
-) -> np.ndarray:
-    """Train the encoder to predict measurements of the pairs, without labels; return what it predicts of each (S, F).
-
-    The measurements see both clouds, the encoder the aligned source alone; so it learns what in a cloud goes with how
-    it lies on its model, whatever the concepts are. In the few dimensions of the measurements a few labels say more
-    than in the hundreds of the layer before.
-
-    Args:
-        registrations: S of them; their concepts are not read.
-        measured_S_F: of each pair, normalized.
-        source, seed: they name the random numbers.
-        settings: of the encoder.
-    """
-    train = registrations.rows("train")
-    name = f"{source} without labels"
-    columns = tuple(f"measurement_{i}" for i in range(measured_S_F.shape[1]))
-    lessons = registrations.subset(train)
-    model, _ = train_encoder(lessons, name, seed, settings, task=TrainingTask(columns, measured_S_F[train]))
-    return embed(model, registrations, name, seed, settings)[1]

@@ -32,7 +32,6 @@ SEEN = {
     "other_samples": "other samples, all concepts",
     "other_source": "another dataset, all concepts",
     "unseen": "same samples, known concepts only",
-    "self_supervised": "same samples, no labels",
     "pair": "nothing: measurements of the pair",
 }
 NO_LABELS = {"chance": "no labels: chance", "rule": "no labels: rule of three lines"}  # what needs none

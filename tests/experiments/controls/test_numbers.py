@@ -110,12 +110,12 @@ def test_a_control_of_some_seeds_is_compared_with_the_same_seeds_of_the_papers_p
 
 def test_the_change_of_an_encoder_trained_otherwise_is_against_the_papers_training_on_the_same_samples(files):
     frame = pd.read_csv(files[0], keep_default_na=False)  # of one seed alone
-    added = [("seen_objects", "gpca", 3), ("seen_objects", "gpca_two_layer_head", 6)]
+    added = [("seen_objects", "gpca", 3), ("seen_objects", "gpca_random_draws", 6)]
     write_csv(files[0], pd.concat([frame, *(said("a", "a", *of[:2], of[2]) for of in added)]))
     second = pd.read_csv(files[1], keep_default_na=False)
     write_csv(files[1], pd.concat([second, said("a", "a", "seen_objects", "gpca", 30)]))
     rows = collect_intervals(files).set_index(["control", "source", "method", "metric"])
-    otherwise = rows.loc["seen_objects", "a", "gpca_two_layer_head", "accuracy"]
+    otherwise = rows.loc["seen_objects", "a", "gpca_random_draws", "accuracy"]
     assert (otherwise["value"], otherwise["change"]) == pytest.approx((0.8, -0.1))
     assert rows.loc["seen_objects", "a", "gpca", "accuracy"]["value"] == pytest.approx(0.45)
 

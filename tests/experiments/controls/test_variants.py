@@ -67,13 +67,12 @@ def test_icp_backwards_finds_normals_for_its_target(six):
     assert not np.array_equal(planes.T_target_source_icp, registered_backwards(part, ICPSettings()).T_target_source_icp)
 
 
-@pytest.mark.parametrize(("control", "share"), [("label_noise_10", 0.1), ("label_noise_30", 0.3)])
-def test_so_many_labels_are_wrong(six, control, share):
+def test_so_many_labels_are_wrong(six):
     train = six.subset(six.rows("train"))
-    changed = relabeled(control, train, "tiny", 100)
-    assert (changed.concept != train.concept).sum() == round(share * len(train))
+    changed = relabeled("label_noise_30", train, "tiny", 100)
+    assert (changed.concept != train.concept).sum() == round(0.3 * len(train))
     assert set(changed.concept) == set(CONCEPTS)
-    assert np.array_equal(relabeled(control, train, "tiny", 100).concept, changed.concept)
+    assert np.array_equal(relabeled("label_noise_30", train, "tiny", 100).concept, changed.concept)
 
 
 def test_shuffled_labels_say_nothing_of_the_concept(six):
@@ -81,7 +80,7 @@ def test_shuffled_labels_say_nothing_of_the_concept(six):
     changed = relabeled("shuffled", train, "tiny", 100)
     counts = [[(changed.concept[train.concept == true] == label).sum() for label in CONCEPTS] for true in CONCEPTS]
     assert np.array_equal(counts, np.full((3, 3), 4))
-    assert set(RELABELED) == {"label_noise_5", "label_noise_10", "label_noise_20", "label_noise_30", "shuffled"}
+    assert set(RELABELED) == {"label_noise_30", "shuffled"}
 
 
 def test_what_a_source_does_not_admit_is_said(six, registrations):
@@ -94,7 +93,6 @@ def test_what_a_source_does_not_admit_is_said(six, registrations):
     assert left_out("density", six, settings, "pointnet") == "backbone 'pointnet' accepts clouds of one size only"
     fewest = np.diff(six.offsets).min()
     assert left_out("random_draws", six, settings, "pointnet") == "backbone 'pointnet' accepts clouds of one size only"
-    assert left_out("two_layer_head", six, settings, "pointnet") is None
     words = f"its smallest draw has 200 points, but a cloud has only {fewest}"
     assert left_out("density", six, replace(settings, draw_points=(200, 512)), "dgcnn") == words
 
