@@ -28,6 +28,7 @@ from gpca.plugins import joined_outside
 # Kinds whose modules read depth frames, or render them, and stand there.
 OF_FRAMES = {"bop_views": "gpca.frames.bop_views", "mesh_views": "gpca.frames.mesh_views"}
 SYSTEM = ("/dev", "/proc", "/sys")
+TEXTS = (".md", ".txt")  # beside data, as licenses are
 # Keys of an entry that a procedural source has no use for: a config may lay one over a source of files.
 OF_FILES = ("location", "files", "objects", "unit", "url", "urls", "sha256", "views_per_instance")
 
@@ -110,13 +111,13 @@ def folders(entry: dict, cache_folder: str | Path, unpack: bool = True) -> list[
 def data_files(entry: dict) -> list[Path]:
     """Return the files that a resolved local entry is read from, sorted; none for other origins.
 
-    Without patterns these are all files of its folder and of `models` in it, as BOP lays them out.
+    Without patterns these are all files of its folder and of `models` in it, as BOP lays them out, except texts.
     """
     if entry["origin"] != "local":
         return []
     patterns = entry.get("files") or ["*", "models/*"]
     matching = {path for pattern in patterns for path in Path(entry["location"]).glob(pattern)}
-    return sorted(path for path in matching if path.is_file())
+    return sorted(path for path in matching if path.is_file() and path.suffix not in TEXTS)
 
 
 def data_folders(entry: dict, data_dir: str | None, downloads: str) -> dict[str, str]:

@@ -12,13 +12,11 @@ from typing import TYPE_CHECKING, Any
 from gpca.attribution.predictions import read_predictions
 from gpca.experiments.scan_causes import diagnosis_step
 from gpca.experiments.scan_causes.diagnosis_step import DESCRIBED, EMBEDDED
-from gpca.experiments.scan_causes.experiment import sample_settings
+from gpca.experiments.scan_causes.experiment import diagnosis_settings
 from gpca.experiments.scan_causes.settings import OBJECTS
 from gpca.explainers.interface import REENACTED, ExplainerEntry
 from gpca.process.job import Job
 from gpca.tracks.samples import Samples
-from gpca.tracks.shipping import LABELED_BY
-from gpca.tracks.track import SCANS_TRACK
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -58,8 +56,6 @@ def ask(
     Raises:
         InputError: samples that cannot be made, or nothing that could be learned from.
     """
-    config = samples.config
-    section = config["scan_causes"]
     files = {
         kind: samples.files(f"{kind}/{each}/seed{seed}.npz" for each in sets)
         for kind in ("scan_causes", "scan_descriptors", "scan_reenactments")
@@ -68,15 +64,7 @@ def ask(
         job = Job(
             source="scans",
             seed=seed,
-            settings={
-                "samples": sample_settings(section),
-                "explainers": {name: [learned]},
-                "settings": {name: dict(settings)},
-                "causes": {"starts": config["causes"]["starts"]},
-                "descriptors": config["diagnosis"]["descriptors"],
-                "reenactment": config["diagnosis"]["reenactment"] | (section.get("reenactment") or {}),
-                "encoder": config["diagnosis"]["encoder"],
-            },
+            settings=diagnosis_settings(samples.config, {name: [learned]}, {name: dict(settings)}),
             predictions=Path(folder) / f"seed{seed}.csv",
             **files,
             **_lessons(samples, entry, learned, seed),
@@ -84,7 +72,7 @@ def ask(
         started = perf_counter()
         diagnosis_step.run(job)
         seconds = perf_counter() - started
-        rows = read_predictions(job.predictions, labels=LABELED_BY[SCANS_TRACK])
+        rows = read_predictions(job.predictions, labels=samples.track.labeled_by)
     return Said({each: rows[rows["scans"] == each] for each in sets}, seconds / len(rows))
 
 

@@ -22,7 +22,7 @@ from gpca.objects.splits import BY_ICP
 from gpca.tracks.published import LIMITS, NO_CALLS, NOTHING_NAMED, Method, Published, Rows
 from gpca.tracks.recipes import recipe_of
 from gpca.tracks.samples import hashes_of
-from gpca.tracks.track import CAUSES_TRACK, FRAMES_TRACK, HARD_TRACK, SCANS_TRACK, Track
+from gpca.tracks.track import FRAMES_TRACK, HARD_TRACK, SCANS_TRACK, Track
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -119,28 +119,19 @@ def _of_samples(path: Path, columns: tuple[str, ...], sample_N: np.ndarray) -> p
     return rows
 
 
-LABELED_BY = {  # columns that say of which the rows of a file of predictions are
-    HARD_TRACK: ("control", "tested", "explainer"),
-    FRAMES_TRACK: ("explainer",),
-    SCANS_TRACK: ("scans", "learned", "explainer"),
-}
-
-
 def _said(
     track: Track, run: Path, config: Mapping[str, Any], parts: Iterable[tuple[str, int]]
 ) -> dict[Key, dict[tuple[str, int], pd.DataFrame]]:
     """Return the predictions of every method, by part."""
     said: dict[Key, dict[tuple[str, int], pd.DataFrame]] = {}
     for source, seed in parts:
-        if track.name == CAUSES_TRACK:
+        if not track.said:
             for name in config["diagnosis"]["explainers"]:
                 path = run / f"diagnoses/{source}/{name}/seed{seed}.csv"
                 said.setdefault((name, ""), {})[source, seed] = read_predictions(path)
             continue
         path = run / track.said.format(source=source, seed=seed)
-        rows = read_predictions(path, labels=LABELED_BY[track.name]).assign(
-            **{} if track.learn_from else {"learned": ""}
-        )
+        rows = read_predictions(path, labels=track.labeled_by).assign(**{} if track.learn_from else {"learned": ""})
         if "scans" in rows and set(rows["scans"]) != {name for name, of in parts if of == seed}:
             raise InputError(path, "is of other data sets than there are samples of", "finish the run")
         for column, wanted in {"control": HARD, "scans": source}.items():

@@ -40,6 +40,7 @@ class Track:
         seeds: key of the config that says how many of its seeds there are samples of; none for all.
         run: that the samples are of: ``default``, or the name of a config that is laid over the default one.
         said: pattern of the files of predictions in a run, where one holds those of all methods.
+        labeled_by: columns that say of which such a row is.
         read: patterns of the files that methods may read, beside those of the samples.
         lessons: folders of what they learn from objects, of every source.
         learn_from: where a method may learn, if there is a choice; the first is the usual one.
@@ -66,6 +67,7 @@ class Track:
     seeds: str = ""
     run: str = DEFAULT
     said: str = ""
+    labeled_by: tuple[str, ...] = ()
     read: tuple[str, ...] = ()
     lessons: tuple[str, ...] = ()
     learn_from: tuple[str, ...] = ()
@@ -135,6 +137,7 @@ TRACKS = {
             measures="AUROC of errors: how well the entropy of the scores tells wrong answers from right ones.",
             seeds="controls.seeds",
             said="controls/{source}/seed{seed}.csv",
+            labeled_by=("control", "tested", "explainer"),
         ),
         Track(
             FRAMES_TRACK,
@@ -149,6 +152,7 @@ TRACKS = {
             sources=(REAL_WORLD,),
             seeds="real_world.causes.seeds",
             said="frame_diagnoses/seed{seed}.csv",
+            labeled_by=("explainer",),
             read=READS[1:],
             lessons=LESSONS,
             untaught="learn from the track causes",
@@ -170,6 +174,7 @@ TRACKS = {
             seeds="scans.seeds",
             run="full",
             said="scan_diagnoses/seed{seed}.csv",
+            labeled_by=("scans", "learned", "explainer"),
             read=("scan_descriptors/{source}/seed{seed}.npz", "scan_reenactments/{source}/seed{seed}.npz"),
             lessons=LESSONS,
             learn_from=(SCANS, OBJECTS),

@@ -153,6 +153,7 @@ def test_downloaded_tars_of_views(server, tmp_path):
 def test_data_files_are_those_that_are_read(tmp_path):
     entry = CUPS | {"kind": "mesh_folder", "files": ["cups/*.ply", "more/cup_?.ply"]}
     write_bop(tmp_path / "bop" / "toy")
+    (tmp_path / "bop" / "toy" / "LICENSE.md").write_text("of the models")
     (tmp_path / "cups").mkdir()
     (tmp_path / "more").mkdir()
     for name in ("cups/b.ply", "cups/a.ply", "cups/notes.txt", "more/cup_1.ply"):

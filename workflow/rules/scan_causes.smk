@@ -1,11 +1,12 @@
 # Data sets of scans -> registrations with measured causes, and what explainers read of them -> what explainers say.
 from gpca.experiments.scan_causes.experiment import (
+    diagnosis_settings,
+    reenactment_settings,
     sample_settings,
     settings_of_explainers,
 )
 
 SCAN_CAUSES = config["scan_causes"]
-SCAN_REENACTMENT = DIAGNOSIS["reenactment"] | (SCAN_CAUSES.get("reenactment") or {})
 
 
 rule scan_causes:
@@ -60,7 +61,7 @@ rule measure_scan_causes:
                 },
                 "causes": config["causes"],
                 "descriptors": DIAGNOSIS["descriptors"],
-                "reenactment": SCAN_REENACTMENT,
+                "reenactment": reenactment_settings(config),
             }
         ),
     script:
@@ -111,15 +112,9 @@ rule diagnose_scans:
         step="gpca.experiments.scan_causes.diagnosis_step",
         source="scans",
         settings=as_json(
-            {
-                "samples": sample_settings(SCAN_CAUSES),
-                "explainers": SCAN_CAUSES["explainers"],
-                "settings": settings_of_explainers(config),
-                "causes": {"starts": config["causes"]["starts"]},
-                "descriptors": DIAGNOSIS["descriptors"],
-                "reenactment": SCAN_REENACTMENT,
-                "encoder": DIAGNOSIS["encoder"],
-            }
+            diagnosis_settings(
+                config, SCAN_CAUSES["explainers"], settings_of_explainers(config)
+            )
         ),
     script:
         "../scripts/step.py"

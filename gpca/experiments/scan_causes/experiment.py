@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal
 
@@ -50,6 +50,31 @@ def sample_settings(section: Mapping[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in section.items() if name in ScanSamples.__dataclass_fields__}
 
 
+def reenactment_settings(config: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the settings of re-enactments of scans: those of objects, with changes."""
+    return config["diagnosis"]["reenactment"] | (config["scan_causes"].get("reenactment") or {})
+
+
+def diagnosis_settings(
+    config: Mapping[str, Any], explainers: Mapping[str, Sequence[str]], settings: Mapping[str, Mapping]
+) -> dict[str, Any]:
+    """Return what the step that explains scans is given.
+
+    Args:
+        explainers: name -> where it learns.
+        settings: of each.
+    """
+    return {
+        "samples": sample_settings(config["scan_causes"]),
+        "explainers": explainers,
+        "settings": settings,
+        "causes": {"starts": config["causes"]["starts"]},
+        "descriptors": config["diagnosis"]["descriptors"],
+        "reenactment": reenactment_settings(config),
+        "encoder": config["diagnosis"]["encoder"],
+    }
+
+
 def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
     """Return the explainers."""
     return {"scan_explainer": list(config["scan_causes"]["explainers"])}
@@ -58,8 +83,7 @@ def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
 def shown(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
     """Return the titles of the explainers, what each sees, and the runs of ICP that it costs."""
     starts, descriptors = config["causes"]["starts"], DescriptorSettings(**config["diagnosis"]["descriptors"])
-    settings = config["diagnosis"]["reenactment"] | (config["scan_causes"].get("reenactment") or {})
-    reenactment = ReenactmentSettings(**settings).calls(starts)
+    reenactment = ReenactmentSettings(**reenactment_settings(config)).calls(starts)
     entries = {name: explainer_entry(name, CAUSES) for name in config["scan_causes"]["explainers"]}
     costs = {
         name: {"sees": entry.sight, "icp_calls": icp_calls(entry.sees, starts, descriptors, reenactment)}
