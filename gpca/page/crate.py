@@ -24,7 +24,13 @@ SPECIFICATION = "https://w3id.org/ro/crate/1.1"
 PROFILE = "https://w3id.org/ro/wfrun/process/0.5"
 CONTEXT = (f"{SPECIFICATION}/context", "https://w3id.org/ro/terms/workflow-run/context")
 PAPER = "https://arxiv.org/abs/2509.18786"
-LICENSE = "The suite is under the MIT license; the datasets that the run read keep their own licenses."
+LICENSE = {
+    "@id": "https://spdx.org/licenses/MIT",
+    "@type": "CreativeWork",
+    "name": "MIT",
+    "description": "The suite is under the MIT license; the datasets that the run read keep their own licenses.",
+}
+FORMS = {".npz": "application/zip", ".pt": "application/zip"}  # beside those that Python knows
 
 
 def write_crate(folder: str | Path, run: str, sources: Iterable[str], seeds: Sequence[int]) -> None:
@@ -91,7 +97,7 @@ def crate(jobs: Sequence[Mapping[str, Any]], name: str, description: str) -> dic
         "name": name,
         "description": description,
         "datePublished": max(job["ended"] for job in jobs).date().isoformat(),
-        "license": LICENSE,
+        "license": {"@id": LICENSE["@id"]},
         "conformsTo": {"@id": PROFILE},
         "citation": {"@id": PAPER},
         "hasPart": _references(parts),
@@ -107,6 +113,7 @@ def crate(jobs: Sequence[Mapping[str, Any]], name: str, description: str) -> dic
     known: list[dict[str, Any]] = [
         {"@id": PROFILE, "@type": "CreativeWork", "name": "Process Run Crate", "version": "0.5"},
         {"@id": PAPER, "@type": "ScholarlyArticle", "name": title},
+        LICENSE,
     ]
     graph = {entity["@id"]: entity for entity in (about, root, *known, *entities, *actions)}
     return {"@context": list(CONTEXT), "@graph": list(graph.values())}
@@ -118,7 +125,7 @@ def _relative(folder: Path, path: Path) -> str:
 
 def _part(path: str, digest: str | None) -> dict[str, Any]:
     """Return a result of the run; its hash is known where another job read it."""
-    form = mimetypes.guess_type(path)[0]
+    form = FORMS.get(Path(path).suffix) or mimetypes.guess_type(path)[0]
     entity: dict[str, Any] = {"@id": path, "@type": "Dataset" if path.endswith("/") else "File", "name": path}
     entity |= {"encodingFormat": form} if form else {}
     return entity | ({"sha256": digest} if digest else {})
@@ -165,5 +172,7 @@ def _library(name: str, version: str) -> dict[str, Any]:
     }
 
 
-def _references(identifiers: Iterable[str]) -> list[dict[str, str]]:
-    return [{"@id": identifier} for identifier in dict.fromkeys(identifiers)]
+def _references(identifiers: Iterable[str]) -> dict[str, str] | list[dict[str, str]]:
+    """Return references to entities; one alone is no list, as RO-Crate wants it."""
+    references = [{"@id": identifier} for identifier in dict.fromkeys(identifiers)]
+    return references[0] if len(references) == 1 else references

@@ -72,10 +72,9 @@ def test_each_job_names_what_it_read_and_wrote(folder):
     assert entities["./"]["datePublished"] == "2023-11-14"
     assert "on Cups, Mugs; seeds 0, 1." in entities["./"]["description"]
     drawn, objects = (entities[part["@id"]] for part in entities["./"]["mentions"])
-    assert drawn["object"] == objects["result"] == [{"@id": "objects/cup.npz"}]
+    assert drawn["object"] == objects["result"] == {"@id": "objects/cup.npz"}
     assert sorted(part["@id"] for part in drawn["result"]) == ["figures/fig1.png", "tables/table1.csv"]
-    [read] = objects["object"]
-    assert entities[read["@id"]]["name"] == "cup.ply"
+    assert entities[objects["object"]["@id"]]["name"] == "cup.ply"
     assert "secret" not in (folder / NAME).read_text()  # where data lies is nobody's business
     assert entities[drawn["instrument"]["@id"]]["name"] == "GP-CA Bench"
     assert (
@@ -85,6 +84,8 @@ def test_each_job_names_what_it_read_and_wrote(folder):
         ]
     )
     assert entities["tables/table1.csv"]["encodingFormat"] == "text/csv"
+    assert all("encodingFormat" in entity for entity in entities.values() if entity["@type"] == "File")
+    assert entities[entities["./"]["license"]["@id"]]["name"] == "MIT"
 
 
 def test_the_same_run_is_described_by_the_same_bytes(folder):
