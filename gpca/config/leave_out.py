@@ -51,7 +51,6 @@ def without_false(config: Mapping[str, Any]) -> dict[str, Any]:
         _change(whole, key, partial(_without, gone=gone), (list, dict))
     if left_out["real_world.datasets"] and not _at(whole, "real_world.datasets"):
         _change(whole, "real_world.virtual", lambda _frames: None)  # no models are left to render
-        _change(whole, "real_world.rendered", lambda _names: [])
     without = {name for name, entry in explainers().items() if entry.design in left_out["uncertainty"]}
     for key in (key for key, names in LEAVABLE.items() if names is EXPLAINERS):
         _change(whole, key, partial(_without, gone=without))

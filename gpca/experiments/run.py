@@ -77,7 +77,7 @@ def explainer_of(method: str, names: Mapping[str, Any]) -> str:
 
 def _embedded(names: Mapping[str, Any]) -> list[str]:
     """Return the rows of depth frames that read embeddings."""
-    return [*names["backbone"], *names["published"], *names["rendered"]]
+    return [*names["backbone"], *names["published"]]
 
 
 def files_behind(method: str, names: Mapping[str, Any]) -> dict[str, str]:

@@ -10,8 +10,6 @@ from gpca.objects.source import data_files, places_of, resolve
 
 REAL_WORLD = "real_rgbd"  # the source that the frames of a run are
 VIRTUAL = "virtual_rgbd"  # frames rendered of models of a run's datasets
-VIRTUAL_TESTED = f"{VIRTUAL}_tested"  # the same, where those of tested objects are rendered on purpose
-RENDERED = "_rendered"  # after the name of an encoder: it was pretrained on these
 ONE_ENCODER = f"{REAL_WORLD}_one_encoder"  # the same, where seeds are those of the classifier alone
 
 

@@ -88,7 +88,6 @@ FAULTS = [
     ("real_world.datasets", {}, "real_world.virtual: needs real_world.datasets: it renders their models"),
     ("real_world.virtual", {"count": 4, "views": 1}, "real_world.virtual.objects: is missing; add it, as in config/c"),
     ("real_world.virtual.objects", "tested", "real_world.virtual.objects: 'tested' should be 'training' or 'all'"),
-    ("real_world.rendered", ["pointnet3"], "real_world.rendered: no backbone 'pointnet3'; choose one of dg"),
     ("real_world.scenes.views", 0, "real_world.scenes.views: 0 should be greater than or equal to 1"),
     ("real_world.scenes.distance_m", [0.9, 0.6], "real_world.scenes: scenes distance_m: [0.9, 0.6] is in descending "),
     ("real_world.scenes.families", ["tools"], "real_world.scenes.families: family 'tools': no such procedural family"),

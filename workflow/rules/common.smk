@@ -11,7 +11,7 @@ from gpca.objects.procedural import FAMILIES
 from gpca.objects.source import find_file
 from gpca.experiments.real_world.experiment import pretraining_of
 from gpca.experiments.run import names_of, settings_of
-from gpca.frames.source import RENDERED
+from gpca.frames.source import VIRTUAL
 
 # An own kind of source is a file in sources/ that writes <results>/objects/<name>.npz and adds itself to SOURCES.
 CONFIGURED_SOURCES = list(SOURCES)
@@ -26,20 +26,19 @@ SHOWN = settings_of(config, SOURCES)
 FRAMES = NAMES["frames"]
 EMBEDDING = NAMES["embedding"]
 REDUCTIONS = [name for name in config["reductions"] if name != "none"]
-RENDERED_ENCODERS = [name.split("-")[0] for name in NAMES["rendered"]]
+PRETRAINED_ON = [*SOURCES, *([VIRTUAL] if config["real_world"]["virtual"] else [])]
 EXPLAINED = [
     *config["explainers"],
     *NAMES["frame_explainer"],
     *NAMES["backbone"],
     *NAMES["published"],
-    *NAMES["rendered"],
 ]
 
 
 wildcard_constraints:
     source="|".join([*SOURCES, FRAMES, *NAMES["condition"]]),
     seed=r"\d+",
-    backbone="|".join([*config["encoders"], *RENDERED_ENCODERS]),
+    backbone="|".join(config["encoders"]),
     reduction="|".join(REDUCTIONS),
     explainer="|".join(EXPLAINED),
     cause_explainer="|".join(config["diagnosis"]["explainers"]),
@@ -69,7 +68,7 @@ def as_json(section):
 
 
 def encoder_module(encoder):
-    return backbone_module(config["encoders"][encoder.removesuffix(RENDERED)])
+    return backbone_module(config["encoders"][encoder])
 
 
 def backbone_module(settings):

@@ -57,7 +57,11 @@ rule train_encoder:
 
 rule pretrain_encoder:
     input:
-        registrations=lambda wildcards: pretrained_on(wildcards.backbone)[1],
+        registrations=collect(
+            "<results>/registrations/{source}/seed{seed}.npz",
+            source=PRETRAINED_ON,
+            seed=SEEDS[0],
+        ),
         code=encoder_code("train"),
     output:
         weights="<results>/encoders/pretrained/{backbone}.pt",
@@ -76,10 +80,10 @@ rule pretrain_encoder:
         step="gpca.steps.train",
         source="pretraining",
         settings=lambda wildcards: encoder_settings(
-            wildcards, pretraining_of(REAL_WORLD, unrendered(wildcards))
+            wildcards, pretraining_of(REAL_WORLD, wildcards.backbone)
         ),
         seed=SEEDS[0],
-        registrations_of=lambda wildcards: pretrained_on(wildcards.backbone)[0],
+        registrations_of=PRETRAINED_ON,
     script:
         "../scripts/step.py"
 
@@ -109,7 +113,7 @@ rule train_on_frames:
     params:
         step="gpca.steps.train",
         settings=lambda wildcards: encoder_settings(
-            wildcards, (REAL_WORLD["training"] or {}).get(unrendered(wildcards))
+            wildcards, (REAL_WORLD["training"] or {}).get(wildcards.backbone)
         ),
         source=FRAMES,
     script:
@@ -170,7 +174,7 @@ rule reduce_embeddings:
     benchmark:
         "<benchmarks>/embeddings/{source}/{backbone}/{reduction}.tsv"
     wildcard_constraints:
-        backbone=but_published([*config["encoders"], *RENDERED_ENCODERS]),
+        backbone=but_published(config["encoders"]),
     conda:
         "../envs/gpca.yaml"
     params:

@@ -20,7 +20,6 @@ ASKED = {
     FRAMES: [
         *NAMES["backbone"],
         *NAMES["published"],
-        *NAMES["rendered"],
         *NAMES["classic"],
         *NAMES["frame_explainer"],
     ],

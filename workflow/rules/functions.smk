@@ -4,23 +4,7 @@
 def encoder_settings(wildcards, changes=None):
     """Return an encoder's section of the config, with changes and the ICP that a reading repeats."""
     icp = {"icp": config["registrations"]["icp"]}
-    return as_json(config["encoders"][unrendered(wildcards)] | (changes or {}) | icp)
-
-
-def unrendered(wildcards):
-    """Return the name of an encoder in the config, whatever it was pretrained on."""
-    return wildcards.backbone.removesuffix(RENDERED)
-
-
-def pretrained_on(backbone):
-    """Return the sources that an encoder of frames is pretrained on, and the files of their registrations."""
-    tested = backbone.endswith(RENDERED)
-    virtual = [VIRTUAL_TESTED if tested else VIRTUAL] if REAL_WORLD["virtual"] else []
-    sources = [*SOURCES, *virtual]
-    seed = SEEDS[0]
-    return sources, [
-        f"<results>/registrations/{name}/seed{seed}.npz" for name in sources
-    ]
+    return as_json(config["encoders"][wildcards.backbone] | (changes or {}) | icp)
 
 
 def but_published(names):

@@ -169,7 +169,11 @@ rule retrain:
 # Encoders of depth frames that see other clouds, one job each: trained as that of the protocol is.
 rule pretrain_on_other_cloud:
     input:
-        registrations=pretrained_on(BACKBONE)[1],
+        registrations=collect(
+            "<results>/registrations/{source}/seed{seed}.npz",
+            source=PRETRAINED_ON,
+            seed=SEEDS[0],
+        ),
         code=code_files("gpca.steps.train", encoder_module(BACKBONE)),
     output:
         weights=f"<results>/other_clouds/pretrained/{BACKBONE}/{{cloud}}.pt",
@@ -193,7 +197,7 @@ rule pretrain_on_other_cloud:
             wildcards, REAL_WORLD["pretraining"]
         ),
         seed=SEEDS[0],
-        registrations_of=pretrained_on(BACKBONE)[0],
+        registrations_of=PRETRAINED_ON,
     script:
         "../scripts/step.py"
 

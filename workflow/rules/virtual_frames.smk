@@ -1,13 +1,6 @@
 # Frames rendered of the datasets' own models -> registrations that encoders are pretrained on.
-from gpca.frames.source import RENDERED, VIRTUAL, VIRTUAL_TESTED
-
 SCENES = REAL_WORLD["scenes"]
 TABLES = {name: (REAL_WORLD["virtual"] or SCENES)[name] for name in ("count", "views")}
-OBJECTS = {VIRTUAL: (REAL_WORLD["virtual"] or {}).get("objects"), VIRTUAL_TESTED: "all"}
-
-
-wildcard_constraints:
-    virtual="|".join(OBJECTS),
 
 
 use rule render_scenes as render_models with:
@@ -16,57 +9,57 @@ use rule render_scenes as render_models with:
         splits=split_file("scenes"),
         code=code_files("gpca.steps.scenes"),
     output:
-        out=directory("<results>/scenes/{virtual}"),
+        out=directory(f"<results>/scenes/{VIRTUAL}"),
     log:
-        "<logs>/scenes/{virtual}.log",
+        f"<logs>/scenes/{VIRTUAL}.log",
     benchmark:
-        "<benchmarks>/scenes/{virtual}.tsv"
+        f"<benchmarks>/scenes/{VIRTUAL}.tsv"
     params:
-        settings=lambda wildcards: as_json(
+        settings=as_json(
             {
                 **SCENES,
                 **TABLES,
                 "datasets": REAL_WORLD["datasets"],
                 "role": config["splits"]["role"],
-                "rendered": OBJECTS[wildcards.virtual],
+                "rendered": (REAL_WORLD["virtual"] or {}).get("objects"),
             }
         ),
-        source="{virtual}",
+        source=VIRTUAL,
         folders=DATA_FOLDERS,
 
 
 use rule instances as virtual_instances with:
     input:
-        scenes="<results>/scenes/{virtual}",
+        scenes=f"<results>/scenes/{VIRTUAL}",
         code=code_files("gpca.steps.instances"),
     output:
-        instances="<results>/instances/{virtual}.npz",
-        objects="<results>/objects/{virtual}.npz",
+        instances=f"<results>/instances/{VIRTUAL}.npz",
+        objects=f"<results>/objects/{VIRTUAL}.npz",
     log:
-        "<logs>/instances/{virtual}.log",
+        f"<logs>/instances/{VIRTUAL}.log",
     benchmark:
-        "<benchmarks>/instances/{virtual}.tsv"
+        f"<benchmarks>/instances/{VIRTUAL}.tsv"
     params:
         settings=as_json({"initial_pose": {"form": "true_pose"}}),
-        source="{virtual}",
-        name="{virtual}",
+        source=VIRTUAL,
+        name=VIRTUAL,
         folders={},
         surface_points=config["objects"]["surface_points"],
 
 
 use rule register_frames as register_virtual_frames with:
     input:
-        instances="<results>/instances/{virtual}.npz",
-        objects="<results>/objects/{virtual}.npz",
+        instances=f"<results>/instances/{VIRTUAL}.npz",
+        objects=f"<results>/objects/{VIRTUAL}.npz",
         code=code_files("gpca.steps.frame_registrations"),
     output:
-        registrations="<results>/registrations/{virtual}/seed{seed}.npz",
-        poses="<results>/poses/{virtual}/seed{seed}.csv",
-        timings="<results>/timings/{virtual}/icp/seed{{seed}}.csv",
+        registrations=f"<results>/registrations/{VIRTUAL}/seed{{seed}}.npz",
+        poses=f"<results>/poses/{VIRTUAL}/seed{{seed}}.csv",
+        timings=f"<results>/timings/{VIRTUAL}/icp/seed{{{{seed}}}}.csv",
     log:
-        "<logs>/registrations/{virtual}/seed{seed}.log",
+        f"<logs>/registrations/{VIRTUAL}/seed{{seed}}.log",
     benchmark:
-        "<benchmarks>/registrations/{virtual}/seed{seed}.tsv"
+        f"<benchmarks>/registrations/{VIRTUAL}/seed{{seed}}.tsv"
     params:
         settings=as_json(
             config["registrations"]
@@ -77,5 +70,5 @@ use rule register_frames as register_virtual_frames with:
                 "occluders": REAL_WORLD["occluders"],
             }
         ),
-        source="{virtual}",
-        name="{virtual}",
+        source=VIRTUAL,
+        name=VIRTUAL,

@@ -13,7 +13,7 @@ from gpca.experiments.explained import titles
 from gpca.experiments.real_world.settings import RealWorldSettings
 from gpca.experiments.real_world.tables import CLASSIC, encoder_title
 from gpca.explainers.registry import explainer_entry, require_settings
-from gpca.frames.source import ONE_ENCODER, REAL_WORLD, RENDERED, conditions_of, has_estimates, resolve_datasets
+from gpca.frames.source import ONE_ENCODER, REAL_WORLD, conditions_of, has_estimates, resolve_datasets
 from gpca.objects import procedural
 from gpca.objects.title import title_of
 from gpca.reporting.words import dataset_in_words
@@ -37,10 +37,6 @@ def check(config: dict, left_out: LeftOut) -> None:
         raise InputError("config key real_world.initial_pose", fault, "name the files or choose another form")
     _check_published(config, encoders_left_out)
     _check_training(config)
-    require_names("real_world.rendered", section["rendered"], section["backbones"], "backbone", encoders_left_out)
-    if section["rendered"] and (section["virtual"] or {}).get("objects") != "training":
-        fault = "stands beside encoders that saw no tested object, so it needs real_world.virtual.objects: training"
-        raise InputError("config key real_world.rendered", fault, "set that, or rendered to []")
     key, backbones = "real_world.condition_backbones", section["backbones"]
     require_names(key, section["condition_backbones"], backbones, "backbone", encoders_left_out)
     key, reductions = "real_world.condition_reductions", section["reductions"]
@@ -97,7 +93,6 @@ def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
         "first_backbone": backbones[0],
         "published": published_backbones(frames),
         "published_seed": list(config["seeds"])[: frames.get("published_seeds")],
-        "rendered": rendered_backbones(frames),
         "classic": [name for name in CLASSIC if name in config["explainers"]],
         "frame_explainer": list(frames["explainers"]),
         "compared_backbone": list(frames["backbones"])[1:],
@@ -125,9 +120,8 @@ def shown(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
         "frames_pretrained_on": _pretrained_on(frames),
         "frames_rendered": (frames["virtual"] or {}).get("objects") == "all",
         "frame_conditions": {name: POSES.get(entry.get("form", ""), GLOBAL_POSE) for name, entry in poses.items()},
-        "frame_methods": [*reduced_backbones(frames), *published_backbones(frames), *rendered_backbones(frames)],
+        "frame_methods": [*reduced_backbones(frames), *published_backbones(frames)],
         "published_encoders": {name: config["encoders"][name] for name in frames["published"].values()},
-        "rendered": list(frames["rendered"]),
         "frame_explainers": titles(frames["explainers"]),
         "frame_sees": {name: explainer_entry(explainer).sight for name, explainer in _behind(frames).items()},
         "frame_encoders": {name: encoder_title(name, "none") for name in frames["backbones"]},
@@ -141,7 +135,7 @@ def shown(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
 def _behind(frames: Mapping) -> dict[str, str]:
     """Return the explainer behind each method: itself, or GP-CA for a ``{backbone}-{reduction}``."""
     own = {name: name for name in (*CLASSIC, *frames["explainers"])}
-    embedded = [*reduced_backbones(frames), *published_backbones(frames), *rendered_backbones(frames)]
+    embedded = [*reduced_backbones(frames), *published_backbones(frames)]
     return dict.fromkeys(embedded, "gpca") | own
 
 
@@ -166,11 +160,6 @@ def pretraining_of(frames: Mapping, encoder: str) -> dict[str, Any]:
     """Return how an encoder of frames is pretrained; those as published have changes of their own."""
     own = frames.get("published_pretraining", {}) if encoder in frames["published"].values() else {}
     return {**frames["pretraining"], **own} if frames["pretraining"] else {}
-
-
-def rendered_backbones(frames: Mapping) -> list[str]:
-    """Return the rows whose encoders were pretrained on renderings of the tested objects' models."""
-    return [f"{name}{RENDERED}-none" for name in frames["rendered"]]
 
 
 def unreduced_methods(frames: Mapping) -> dict[str, str]:
@@ -202,7 +191,6 @@ EXPERIMENT = Experiment(
         "real_world.backbones": "encoders",
         "real_world.condition_backbones": "encoders",
         "real_world.published": "encoders",
-        "real_world.rendered": "encoders",
         "real_world.training": "encoders",
         "real_world.reductions": "reductions",
         "real_world.condition_reductions": "reductions",

@@ -84,7 +84,6 @@ class RealWorldSettings:
     pretraining: Pretraining | None
     virtual: VirtualFrames | None
     published: dict[str, str]
-    rendered: list[str]
     training: dict[str, Training] | None
     explainers: dict[str, dict | None] | None
     one_encoder: bool

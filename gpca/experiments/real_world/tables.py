@@ -16,7 +16,7 @@ from gpca.attribution.metrics import ALL
 from gpca.attribution.paired import UNTRAINED
 from gpca.encoders.registry import make_encoder, parameter_count
 from gpca.experiments.real_world.metrics import DATASET, SEEN, TOGETHER, UNSEEN
-from gpca.frames.source import ONE_ENCODER, REAL_WORLD, RENDERED
+from gpca.frames.source import ONE_ENCODER, REAL_WORLD
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.tables.builder import TableBuilder, crossed, over_clusters
 from gpca.reporting.tables.cells import cell_of_repeats, clustered_cell, plain_cell, rows_where
@@ -36,19 +36,13 @@ CLASSIC = {
     "analytical_gpc_no_counts": "Classic features without point counts",
 }
 NOT_SHARES = ("ece", "nll", "icp_calls")  # of which there is one number for all samples
-RENDERED_TITLE = ", tested objects rendered"
-RENDERED_NOTE = (
-    "Tested objects rendered: pretrained on frames rendered of the tested objects' own models, which is no row of the "
-    "paper's and is not compared with it."
-)
 SCENES = ("scenes", "scene")
 EVERYTHING_SEEN = {TOGETHER: "All (%)", SEEN: "Seen objects (%)", UNSEEN: "Unseen objects (%)"}
 
 
 def encoder_title(encoder: str, reduction: str) -> str:
     """Return the name of an encoder and the reduction after it in figures."""
-    name = encoder.removesuffix(RENDERED)
-    named = BACKBONES.get(name, name) + (RENDERED_TITLE if name != encoder else "")
+    named = BACKBONES.get(encoder, encoder)
     return named if reduction == "none" else f"{named}, {REDUCTIONS.get(reduction, reduction)}"
 
 
@@ -59,7 +53,6 @@ def table6_of_encoders(
     encoders: Mapping[str, Mapping],
     reductions: Sequence[str],
     pretrained_on: str = "",
-    rendered: Sequence[str] = (),
     explainers: Mapping[str, str] | None = None,
     published: Mapping[str, Mapping] | None = None,
 ) -> Table:
@@ -71,7 +64,7 @@ def table6_of_encoders(
         }
         for of in (encoders, published or {})
     )
-    return table6_backbones(intervals, metrics, title, counted, reductions, pretrained_on, rendered, explainers, beside)
+    return table6_backbones(intervals, metrics, title, counted, reductions, pretrained_on, explainers, beside)
 
 
 def table6_backbones(
@@ -81,7 +74,6 @@ def table6_backbones(
     backbones: Mapping[str, int],
     reductions: Sequence[str],
     pretrained_on: str = "",
-    rendered: Sequence[str] = (),
     explainers: Mapping[str, str] | None = None,
     published: Mapping[str, int] | None = None,
 ) -> Table:
@@ -92,7 +84,6 @@ def table6_backbones(
             with the first reduction.
         reductions: The names of the reductions, in order.
         pretrained_on: What the encoders learned from before the frames, if anything.
-        rendered: Those that stand here once more, pretrained on frames rendered of the tested objects' models.
         explainers: The titles of the other explainers on frames, of which those without training stand last.
         published: The number of parameters of each encoder whose published architecture stands beside the judged one.
     """
@@ -113,10 +104,6 @@ def table6_backbones(
         cells = _cells(intervals, metrics, f"{name}-{reduction}", (published or {})[name])
         seeds_beside |= {cell.seeds for cell in cells.values() if cell}
         table.add_row(labels, cells, rival=False)
-    for backbone in rendered:
-        name = f"{backbone}{RENDERED}"
-        labels = [(name, encoder_title(name, "none")), ("none", REDUCTIONS["none"])]
-        table.add_row(labels, _cells(intervals, metrics, f"{name}-none", backbones[backbone]), rival=False)
     untrained = {name: title for name, title in (explainers or {}).items() if name in UNTRAINED}
     for method, name in {**CLASSIC, **untrained}.items():
         labels = [(method, name), ("none", REDUCTIONS["none"])]
@@ -147,7 +134,6 @@ def table6_backbones(
             f"{rival}: paired difference to it{other}. By concept: the share of its samples that is attributed to it. "
             "Parameters: of the encoder.",
             *([f"{', '.join(beside.values())}{fewer}: {PUBLISHED_NOTE}"] if beside else ()),
-            *([RENDERED_NOTE] if rendered else ()),
         ),
     )
 
