@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from gpca.causes.settings import CauseSettings
-from gpca.config.layers import with_defaults, with_types
+from gpca.config.layers import in_order, with_defaults, with_types
 from gpca.config.leave_out import check_left_out, names_left_out, without_false
 from gpca.config.schema import whole_config
 from gpca.config.success import with_success
@@ -35,13 +35,13 @@ def read(config: dict, command_line: Mapping, of_module: bool = False) -> tuple[
         of_module: it is what another workflow gives this one as a module, so that the defaults are not below it yet.
 
     Returns:
-        the config of this run, without what it leaves out, with its definition of success wherever it is needed; the
-        sources that :func:`check` returns.
+        the config of this run in the order of the defaults, without what it leaves out, with its definition of success
+        wherever it is needed; the sources that :func:`check` returns.
 
     Raises:
         InputError: what :func:`check` raises.
     """
-    whole = with_types(with_defaults(config) if of_module else config, command_line)
+    whole = in_order(with_types(with_defaults(config) if of_module else config, command_line))
     sources = check(whole)
     return with_success(without_false(whole)), sources
 

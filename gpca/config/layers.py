@@ -42,6 +42,23 @@ def with_defaults(*configs: Mapping[str, Any]) -> dict[str, Any]:
     return whole
 
 
+def in_order(config: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a config whose keys stand in the order of the defaults, further ones behind them.
+
+    Snakemake puts the keys of ``--configfile`` first, and tables have a row for each explainer in the config's order.
+    """
+    return _in_order_of(config, with_defaults())
+
+
+def _in_order_of(config: Mapping[str, Any], lower: Mapping[str, Any]) -> dict[str, Any]:
+    whole: dict[str, Any] = {}
+    for key in (*(key for key in lower if key in config), *(key for key in config if key not in lower)):
+        value, below = config[key], lower.get(key)
+        both = isinstance(value, Mapping) and isinstance(below, Mapping)
+        whole[key] = _in_order_of(value, below or {}) if both else value
+    return whole
+
+
 def _laid_over(lower: Mapping[str, Any], upper: Mapping[str, Any]) -> dict[str, Any]:
     """Return both; where both have a mapping, the two are merged, and of all else the upper one's counts."""
     whole = dict(lower)
