@@ -5,8 +5,7 @@ import pytest
 import yaml
 
 from gpca.code_files import ROOT
-from gpca.comparison.claim_verdicts import CLAIM_COLUMNS, read_verdicts
-from gpca.comparison.claims import read_claims
+from gpca.comparison.claim_verdicts import read_verdicts
 from gpca.comparison.published import NONE_YET, read_published, read_reasons
 from gpca.comparison.readings import READINGS, judge_readings, with_readings
 from gpca.comparison.values import read_results
@@ -32,13 +31,6 @@ def reference():
     return with_readings(comparison, judged, ReadingWords())
 
 
-def is_of_this_version():
-    """Return whether the reference was made with the sentences, and so the texts, of now."""
-    claims = pd.read_csv(ROOT / "results/reference/full/claims.csv")
-    is_new = set(CLAIM_COLUMNS) <= set(claims.columns)
-    return is_new and list(dict.fromkeys(claims["claim"])) == [claim.name for claim in read_claims()]
-
-
 @pytest.fixture(scope="module")
 def shown():
     """The comparison that the reference keeps."""
@@ -51,9 +43,6 @@ def test_the_comparison_of_the_reference_is_that_of_its_numbers(shown):
     assert len(rows) == len(shown) == 112
     # The file behind Table V is too large to be kept.
     kept = (rows["verdict"] != "not run").to_numpy()
-    if not is_of_this_version():  # then its labels are those of the protocol before 2026-11-25
-        of_labels = rows["table"].eq("III") | rows["column"].eq("Labels to 70 %")
-        rows, shown, kept = (part[~of_labels.to_numpy()] for part in (rows, shown, kept))
     assert set(rows.loc[~kept, "table"]) <= {"V"}
     numbers = ("published", "paper_low", "paper_high", "reproduced", "ci_low")
     for column in ("table", "row", "column", *numbers, "repeat_of"):
@@ -61,7 +50,7 @@ def test_the_comparison_of_the_reference_is_that_of_its_numbers(shown):
     # Predictions are not kept either: where they widen the interval, the verdict may have become another.
     kept = kept & shown["cluster_low"].isna().to_numpy()
     assert kept.sum() > 30
-    for column in ("verdict", "reason") if is_of_this_version() else ("verdict",):
+    for column in ("verdict", "reason"):
         assert rows.loc[kept, column].tolist() == shown.loc[kept, column].tolist()
 
 
@@ -76,13 +65,11 @@ def test_every_miss_of_the_reference_has_a_reason(shown):
 def test_every_repeat_has_the_value_that_was_judged(shown):
     values = {" / ".join(row[:3]): row[3] for row in shown[["table", "row", "column", "reproduced"]].to_numpy()}
     repeats = shown[shown["repeat_of"] != ""]
-    assert len(repeats) >= 7
+    assert len(repeats) == 3
     assert repeats["reproduced"].tolist() == [values[key] for key in repeats["repeat_of"]]
 
 
 def test_the_verdicts_of_the_reference_are_of_every_sentence():
-    if not is_of_this_version():
-        pytest.skip("the reference is of an earlier version")
     verdicts = read_verdicts(ROOT / "results/reference/full/claims.csv")
     assert counted(verdicts) in (ROOT / "results/reference/full/tables/claims.md").read_text()
 
