@@ -22,7 +22,7 @@ from .documents import PAGES, ROOT, anchor_of, commands, our_files, relative
 
 # Hosts that our own files may name; those of datasets stand in the config alone.
 LITERATURE = {"arxiv.org", "github.com", "pointclouds.org", "json-schema.org"}
-VOCABULARIES = {"w3id.org"}  # of the RO-Crate: names of terms, which nothing is fetched from
+VOCABULARIES = {"w3id.org", "spdx.org"}  # of the RO-Crate: names of terms and licenses, which nothing is fetched from
 DATA = {"rgbd-dataset.cs.washington.edu", "huggingface.co", "3dmatch.cs.princeton.edu", "graphics.stanford.edu"}
 
 
