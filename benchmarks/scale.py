@@ -28,6 +28,7 @@ import re
 import resource
 import sys
 import tempfile
+import textwrap
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from fnmatch import fnmatchcase
@@ -49,6 +50,7 @@ from gpca.process.time_left import TIMES, read_times  # noqa: E402
 
 RUN = "scale"
 SLOTS = (50, 500)  # jobs of a cluster at once
+LINE = 120  # letters of a page
 WAIT_S = 10.0  # that a submitted job takes besides its work: the queue's turn, and Snakemake once more on the node
 
 
@@ -134,7 +136,8 @@ def on_cores(jobs: Sequence[Job], seconds: Mapping[str, float], cores: Sequence[
     critical_s = sum(seconds[job.benchmark] for job in chain)
     steps = " → ".join(f"`{job.rule}` {seconds[job.benchmark]:.0f}" for job in chain)
     lines = markdown.table(["cores", "wall time (min)", "times as fast as one core"], rows)
-    lines += ["", f"The longest chain of jobs takes {critical_s / 60:.1f} minutes (in seconds: {steps})."]
+    sentence = f"The longest chain of jobs takes {critical_s / 60:.1f} minutes (in seconds: {steps})."
+    lines += ["", *textwrap.wrap(sentence, LINE)]
     speedups = {f"speedup_{count}": round(alone_s / wall_s, 2) for count, wall_s in walls_s.items()}
     return lines, speedups | {"critical_s": round(critical_s, 1), "core_min": round(alone_s / 60, 1)}
 
