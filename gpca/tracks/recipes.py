@@ -9,8 +9,7 @@ from typing import Any
 
 from gpca.errors import InputError
 from gpca.experiments.controls.settings import HARD
-from gpca.experiments.scan_causes.experiment import sample_settings
-from gpca.experiments.scans.settings import ChoiceSettings, TrialSettings
+from gpca.experiments.scan_causes.experiment import measurement_settings
 from gpca.frames.source import REAL_WORLD
 from gpca.objects.source import find_file
 from gpca.scans.source import entry_of, place_of
@@ -125,21 +124,8 @@ def _of_frames(kind: str, seed: int, config: Mapping[str, Any]) -> Recipe:
 
 
 def _of_scans(name: str, seed: int, config: Mapping[str, Any]) -> Recipe:
-    scans, own, diagnosis = config["scans"], config["scan_causes"], config["diagnosis"]
-    choice, trials = (kind.__dataclass_fields__ for kind in (ChoiceSettings, TrialSettings))
-    first = scans["global_start"]
-    settings = {
-        "samples": sample_settings(own),
-        "entry": scans["datasets"][name],
-        "role": config["splits"]["role"],
-        "scans": {key: scans[key] for key in (*choice, *trials, "success")},
-        "methods": {first: scans["methods"].get(first) or config["methods"].get(first)},
-        "causes": config["causes"],
-        "descriptors": diagnosis["descriptors"],
-        "reenactment": diagnosis["reenactment"] | (own.get("reenactment") or {}),
-    }
-    place = place_of(entry_of(scans["datasets"][name]), config["data_dir"])
-    given = {"source": name, "seed": seed, "settings": settings, "place": str(place or "")}
+    place = place_of(entry_of(config["scans"]["datasets"][name]), config["data_dir"])
+    given = {"source": name, "seed": seed, "settings": measurement_settings(config, name), "place": str(place or "")}
     outputs = {argument: f"{kind}/{name}/seed{seed}.npz" for kind, argument in OF_SCANS.items()}
     outputs |= {"samples": f"scan_causes/{name}/seed{seed}.csv"}
     return Recipe("gpca.experiments.scan_causes.step", given, {}, outputs)

@@ -1,8 +1,7 @@
 # Data sets of scans -> registrations with measured causes, and what explainers read of them -> what explainers say.
 from gpca.experiments.scan_causes.experiment import (
     diagnosis_settings,
-    reenactment_settings,
-    sample_settings,
+    measurement_settings,
     settings_of_explainers,
 )
 
@@ -46,23 +45,7 @@ rule measure_scan_causes:
             place_of(SCAN_ENTRIES[wildcards.scan_set], config["data_dir"]) or ""
         ),
         settings=lambda wildcards: as_json(
-            {
-                "samples": sample_settings(SCAN_CAUSES),
-                "entry": config["scans"]["datasets"][wildcards.scan_set],
-                "role": config["splits"]["role"],
-                "scans": {
-                    name: config["scans"][name]
-                    for name in (*SCAN_CHOICE, *SCAN_TRIALS, "success")
-                },
-                "methods": {
-                    name: config["scans"]["methods"].get(name)
-                    or config["methods"].get(name)
-                    for name in [config["scans"]["global_start"]]
-                },
-                "causes": config["causes"],
-                "descriptors": DIAGNOSIS["descriptors"],
-                "reenactment": reenactment_settings(config),
-            }
+            measurement_settings(config, wildcards.scan_set)
         ),
     script:
         "../scripts/step.py"

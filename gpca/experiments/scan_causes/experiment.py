@@ -11,6 +11,7 @@ from pydantic import Field
 from gpca.errors import with_key
 from gpca.experiments.experiment import Experiment, LeftOut, Names, Tidy
 from gpca.experiments.scan_causes.settings import ScanSamples
+from gpca.experiments.scans.settings import ChoiceSettings, TrialSettings
 from gpca.explainers.registry import CAUSES, explainer_entry, explainers, require_settings
 from gpca.explainers.sight import icp_calls
 from gpca.features.settings import DescriptorSettings
@@ -53,6 +54,23 @@ def sample_settings(section: Mapping[str, Any]) -> dict[str, Any]:
 def reenactment_settings(config: Mapping[str, Any]) -> dict[str, Any]:
     """Return the settings of re-enactments of scans: those of objects, with changes."""
     return config["diagnosis"]["reenactment"] | (config["scan_causes"].get("reenactment") or {})
+
+
+def measurement_settings(config: Mapping[str, Any], scan_set: str) -> dict[str, Any]:
+    """Return what the step that measures the causes of a data set of scans is given."""
+    scans = config["scans"]
+    choice, trials = (kind.__dataclass_fields__ for kind in (ChoiceSettings, TrialSettings))
+    first = scans["global_start"]
+    return {
+        "samples": sample_settings(config["scan_causes"]),
+        "entry": scans["datasets"][scan_set],
+        "role": config["splits"]["role"],
+        "scans": {name: scans[name] for name in (*choice, *trials, "success")},
+        "methods": {first: scans["methods"].get(first) or config["methods"].get(first)},
+        "causes": config["causes"],
+        "descriptors": config["diagnosis"]["descriptors"],
+        "reenactment": reenactment_settings(config),
+    }
 
 
 def diagnosis_settings(
