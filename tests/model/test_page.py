@@ -12,7 +12,7 @@ from gpca.causes.shapley import ALL, BY_SIZE
 from gpca.model.shown.packing import MOST_POINTS, packed, unpacked
 from gpca.model.shown.subsets import taken_out
 
-from ..page.test_in_a_browser import chromium, in_a_browser
+from ..page.test_in_a_browser import chromium, in_a_browser, with_script
 
 LARGEST_BYTES = 2 * 10**6
 
@@ -125,9 +125,9 @@ def test_a_browser_draws_every_view_and_has_nothing_to_complain_about(html, tmp_
     choose = """<script>addEventListener("load", () => {
       for (const button of document.querySelectorAll("[data-view]")) button.click();
       document.querySelector('[data-view="what:0:3"]').click();
-    });</script></body>"""
+    });</script>"""
     # The page's policy allows scripts that stand in it.
-    (tmp_path / "page.html").write_text(html.replace("</body>", choose))
+    (tmp_path / "page.html").write_text(with_script(html, choose))
     shown = chromium(tmp_path / "page.html", tmp_path / "profile", "--dump-dom", "--window-size=400,900")
     assert 'data-shown="what:0:3"' in shown
     assert "Re-enacted as if pose 1 were true, " in shown
