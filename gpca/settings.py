@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
-from dataclasses import is_dataclass
+from dataclasses import fields, is_dataclass
 from difflib import get_close_matches
 from functools import cache, partial
 from inspect import Parameter, isclass, signature
@@ -109,6 +109,12 @@ def changes_of(settings: type, without: Collection[str] = ()) -> Keys:
     """Mark a mapping as settings of that class that replace others; of these none need be there, and some may not."""
     hints = get_type_hints(settings, include_extras=True)
     return Keys({name: kind for name, kind in hints.items() if name not in without})
+
+
+def settings_of(section: Mapping[str, Any], *kinds: type) -> dict[str, Any]:
+    """Return those entries of a section that are fields of one of these settings classes."""
+    names = {field.name for kind in kinds for field in fields(kind)}
+    return {name: value for name, value in section.items() if name in names}
 
 
 class ArgumentsOf:

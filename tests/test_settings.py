@@ -17,6 +17,7 @@ from gpca.settings import (
     part_of,
     read_settings,
     require_arguments,
+    settings_of,
 )
 
 
@@ -131,3 +132,13 @@ def test_a_number_without_bounds_of_its_own_has_those_of_its_type():
     assert read_settings(Annotated[float, Bounds(minimum=0)], 1e12) == 1e12
     with pytest.raises(InputError, match="less than or equal to"):
         read_settings(Annotated[float, Bounds(minimum=0)], 1e13)
+
+
+def test_the_settings_of_several_classes_are_taken_out_of_a_section():
+    @dataclass(frozen=True)
+    class Others:
+        role: str = "final"
+
+    section = {"size": 3, "role": "development", "methods": {}}
+    assert settings_of(section, Inner) == {"size": 3}
+    assert settings_of(section, Inner, Others) == {"size": 3, "role": "development"}

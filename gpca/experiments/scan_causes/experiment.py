@@ -16,7 +16,7 @@ from gpca.explainers.registry import CAUSES, explainer_entry, explainers, requir
 from gpca.explainers.sight import icp_calls
 from gpca.features.settings import DescriptorSettings
 from gpca.reenactment.settings import ReenactmentSettings
-from gpca.settings import Distinct, changes_of
+from gpca.settings import Distinct, changes_of, settings_of
 
 Learned = Distinct[Literal["objects", "scans"]]
 
@@ -46,11 +46,6 @@ def settings_of_explainers(config: Mapping[str, Any]) -> dict[str, dict]:
     return {name: of_diagnosis.get(name) or {} for name in config["scan_causes"]["explainers"]}
 
 
-def sample_settings(section: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the part of the section that says which registrations are measured."""
-    return {name: value for name, value in section.items() if name in ScanSamples.__dataclass_fields__}
-
-
 def reenactment_settings(config: Mapping[str, Any]) -> dict[str, Any]:
     """Return the settings of re-enactments of scans: those of objects, with changes."""
     return config["diagnosis"]["reenactment"] | (config["scan_causes"].get("reenactment") or {})
@@ -59,13 +54,12 @@ def reenactment_settings(config: Mapping[str, Any]) -> dict[str, Any]:
 def measurement_settings(config: Mapping[str, Any], scan_set: str) -> dict[str, Any]:
     """Return what the step that measures the causes of a data set of scans is given."""
     scans = config["scans"]
-    choice, trials = (kind.__dataclass_fields__ for kind in (ChoiceSettings, TrialSettings))
     first = scans["global_start"]
     return {
-        "samples": sample_settings(config["scan_causes"]),
+        "samples": settings_of(config["scan_causes"], ScanSamples),
         "entry": scans["datasets"][scan_set],
         "role": config["splits"]["role"],
-        "scans": {name: scans[name] for name in (*choice, *trials, "success")},
+        "scans": settings_of(scans, ChoiceSettings, TrialSettings) | {"success": scans["success"]},
         "methods": {first: scans["methods"].get(first) or config["methods"].get(first)},
         "causes": config["causes"],
         "descriptors": config["diagnosis"]["descriptors"],
@@ -83,7 +77,7 @@ def diagnosis_settings(
         settings: of each.
     """
     return {
-        "samples": sample_settings(config["scan_causes"]),
+        "samples": settings_of(config["scan_causes"], ScanSamples),
         "explainers": explainers,
         "settings": settings,
         "causes": {"starts": config["causes"]["starts"]},
