@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import os
+from contextlib import suppress
+from functools import cache
 from importlib import import_module
+from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -25,7 +29,7 @@ NEAR, NEIGHBORS, FEATURES = 2.0, 4, 10
 
 def align(pair: Pair, voxel: float = VOXEL, correspondence_distance: float = CORRESPONDENCE_DISTANCE) -> Outcome:
     """Match both clouds, thinned to voxels of an edge in diameters, from which all of its radii follow."""
-    package = import_module("kiss_matcher")
+    package = _in_one_thread(import_module("kiss_matcher"))
     for name in ("source", "target"):
         if not _has_features(getattr(pair, name), voxel):
             raise FailedRegistration(f"of the {name}, voxels of {voxel:g} diameters leave too few points")
@@ -38,6 +42,25 @@ def align(pair: Pair, voxel: float = VOXEL, correspondence_distance: float = COR
         raise FailedRegistration(f"fewer than {FEWEST} correspondences agree")
     T_target_source = rigid_motion(result.rotation, np.ravel(result.translation))
     return Outcome.at(pair, T_target_source, correspondence_distance)
+
+
+@cache
+def _in_one_thread(package: Any) -> Any:
+    """Return the package, after a first call that left it one thread: several overwrite each other's bits.
+
+    A pose would now and then be another one. TBB has no variable for its threads; when it is first called, it starts
+    one for each processor that the process may use.
+    """
+    process = os.getpid()
+    allowed = os.sched_getaffinity(process)
+    cube_N_3 = 0.1 * np.indices((6, 6, 6)).reshape(3, -1).T.astype(np.float32)
+    os.sched_setaffinity(process, {min(allowed)})
+    try:
+        with suppress(RuntimeError):  # whatever it makes of a cube
+            package.KISSMatcher(package.KISSMatcherConfig(0.1)).estimate(cube_N_3, cube_N_3)
+    finally:
+        os.sched_setaffinity(process, allowed)
+    return package
 
 
 def _has_features(points_N_3: np.ndarray, voxel: float) -> bool:
