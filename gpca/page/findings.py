@@ -140,8 +140,8 @@ def _causes(intervals: pd.DataFrame, titles: Titles) -> Finding | None:
     )
     if own["untrained"] in titles.cause_explainers:
         text += (
-            f" Its lead over the best that needs no training, {titles.cause_explainers[own['untrained']]}, is "
-            f"{100 * own['gain']:.0f} points ({_bounds(own, 'gain_low', 'gain_high')})."
+            f" The best untrained rival, {titles.cause_explainers[own['untrained']]}, is "
+            f"{100 * own['gain']:.0f} points behind ({_bounds(own, 'gain_low', 'gain_high')})."
         )
     if "gpca" in trained and best != "gpca":
         text += f" {titles.cause_explainers['gpca']} has {_percent(rows.loc['gpca', 'value'])}."

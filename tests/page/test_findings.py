@@ -87,7 +87,7 @@ def test_findings_of_causes_and_of_recovery_stand_apart(folder):
     assert len(texts) == 3
     for words in ("70 % (95 % interval 65 to 75 %): GP-CA on the pair", "GP-CA (aligned source) has 50 %", "90 %"):
         assert words in texts[0]
-    assert "Its lead over the best that needs no training, Rule and gate, is 30 points (20 to 40)." in texts[0]
+    assert "The best untrained rival, Rule and gate, is 30 points behind (20 to 40)." in texts[0]
     for words in ("25 % of the error", "GP-CA on the pair", "the untrained rule leaves 60 %"):
         assert words in texts[1]
     for words in ("70 % of the failed", "3 actions", "random actions 40 %"):
