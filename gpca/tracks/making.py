@@ -54,7 +54,7 @@ def make(files: Iterable[str], folder: Path, config: Mapping[str, Any], processe
 
 
 def _run(recipe: Recipe, folder: Path) -> None:
-    print(f"making {next(iter(recipe.outputs.values()))}", file=sys.stderr)
+    sys.stderr.write(f"making {next(iter(recipe.outputs.values()))}\n")  # whole: several are made at once
     files = {name: str(folder / path) for name, path in {**recipe.inputs, **recipe.outputs}.items()}
     # Sorted, as rules give settings: the first of several datasets comes first in the samples.
     given = json.dumps({"step": recipe.step, "given": dict(recipe.given), "files": files}, sort_keys=True)

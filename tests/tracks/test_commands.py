@@ -88,6 +88,10 @@ def test_the_page_ranks_submissions_and_can_be_sorted(board, capsys):
     assert rows[0].count("<td") == page.count('<th scope="col"')
 
 
+def test_the_submissions_of_the_repository_are_without_fault():
+    assert main(["leaderboard", "--check"]) == 0
+
+
 def test_a_faulty_submission_makes_no_page(board, capsys):
     text = (board / "rmse.csv").read_text()
     (board / "rmse.csv").write_text(text.replace(f"\n{SOURCE},100,0,", f"\n{SOURCE},100,99,"))
