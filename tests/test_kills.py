@@ -1,5 +1,6 @@
 """The benchmark that kills a run again and again, with a command in place of Snakemake that ends when it is told to."""
 
+import csv
 import fcntl
 import json
 import random
@@ -9,6 +10,8 @@ from types import SimpleNamespace
 import pytest
 
 from benchmarks import kills
+
+from .documents import ROOT
 
 HALF = "results/smoke/.seed0.partial.npz"
 
@@ -124,3 +127,15 @@ def test_a_kill_ends_the_whole_process_group(tmp_path):
     with (tmp_path / "held").open() as file:
         fcntl.flock(file, fcntl.LOCK_EX)  # the child's, until it is dead or has ended
         assert file.read() == ""
+
+
+def test_what_differs_from_run_to_run_is_what_shows_seconds_and_the_docs_say_so():
+    shown = set()
+    for path in (ROOT / "results/reference/default").rglob("*.csv"):
+        with path.open(newline="") as file:
+            if any("second" in cell for row in csv.reader(file) for cell in row):
+                shown.add(path.stem)
+    assert "table17_scans" in shown
+    assert shown <= {*kills.DRAWN_FROM_IT, *(name.removesuffix(".csv") for name in kills.MEASURED)}
+    said = (ROOT / "results/README.md").read_text().split("## What is the same in every run")[1].split("\n## ")[0]
+    assert {name for name in (*shown, *kills.DRAWN_FROM_IT) if name not in said} == set()
