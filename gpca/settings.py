@@ -111,7 +111,7 @@ def changes_of(settings: type, without: Collection[str] = ()) -> Keys:
     return Keys({name: kind for name, kind in hints.items() if name not in without})
 
 
-def settings_of(section: Mapping[str, Any], *kinds: type) -> dict[str, Any]:
+def fields_of(section: Mapping[str, Any], *kinds: type) -> dict[str, Any]:
     """Return those entries of a section that are fields of one of these settings classes."""
     names = {field.name for kind in kinds for field in fields(kind)}
     return {name: value for name, value in section.items() if name in names}

@@ -14,10 +14,10 @@ from gpca.settings import (
     Keys,
     Share,
     changes_of,
+    fields_of,
     part_of,
     read_settings,
     require_arguments,
-    settings_of,
 )
 
 
@@ -140,5 +140,5 @@ def test_the_settings_of_several_classes_are_taken_out_of_a_section():
         role: str = "final"
 
     section = {"size": 3, "role": "development", "methods": {}}
-    assert settings_of(section, Inner) == {"size": 3}
-    assert settings_of(section, Inner, Others) == {"size": 3, "role": "development"}
+    assert fields_of(section, Inner) == {"size": 3}
+    assert fields_of(section, Inner, Others) == {"size": 3, "role": "development"}

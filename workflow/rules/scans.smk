@@ -2,7 +2,7 @@
 from gpca.experiments.scans.experiment import present
 from gpca.experiments.scans.settings import ChoiceSettings, TrialSettings
 from gpca.scans.source import data_files as files_of_scans, place_of
-from gpca.settings import settings_of
+from gpca.settings import fields_of
 
 SCANS, SCAN_ENTRIES = config["scans"], present(config)
 
@@ -41,7 +41,7 @@ rule draw_scans:
         settings=lambda wildcards: as_json(
             {
                 "entry": SCANS["datasets"][wildcards.scan_set],
-                "choice": settings_of(SCANS, ChoiceSettings),
+                "choice": fields_of(SCANS, ChoiceSettings),
                 "role": config["splits"]["role"],
             }
         ),
@@ -80,7 +80,7 @@ rule register_scans:
         source=lambda wildcards: wildcards.scan_set,
         settings=as_json(
             {
-                "scans": settings_of(SCANS, TrialSettings),
+                "scans": fields_of(SCANS, TrialSettings),
                 "methods": {
                     name: SCANS["methods"].get(name) or config["methods"][name]
                     for name in NAMES["scan_method"]

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 from gpca.active_learning.settings import RetrainingSettings
 from gpca.pairs.perturbation import Concept
-from gpca.settings import Bounds, Count, Different, Distinct, OpenShare, PositiveShare, read_settings, settings_of
+from gpca.settings import Bounds, Count, Different, Distinct, OpenShare, PositiveShare, fields_of, read_settings
 
 PAIR = "pair"  # the embedding that is measurements of the pair, beside those by the backbones
 
@@ -42,7 +42,7 @@ class FrameLabelSettings:
 
 def rounds_of(own: FrameLabelSettings, rare: Mapping[str, Any]) -> RetrainingSettings:
     """Return how the rounds go: as those of a concept that is rare on whole objects, with the labels of frames."""
-    shared = settings_of(rare, RetrainingSettings)
+    shared = fields_of(rare, RetrainingSettings)
     return read_settings(RetrainingSettings, shared | {"labels": own.labels, "least": own.least})
 
 

@@ -16,7 +16,7 @@ from gpca.explainers.registry import CAUSES, explainer_entry, explainers, requir
 from gpca.explainers.sight import icp_calls
 from gpca.features.settings import DescriptorSettings
 from gpca.reenactment.settings import ReenactmentSettings
-from gpca.settings import Distinct, changes_of, settings_of
+from gpca.settings import Distinct, changes_of, fields_of
 
 Learned = Distinct[Literal["objects", "scans"]]
 
@@ -56,10 +56,10 @@ def measurement_settings(config: Mapping[str, Any], scan_set: str) -> dict[str, 
     scans = config["scans"]
     first = scans["global_start"]
     return {
-        "samples": settings_of(config["scan_causes"], ScanSamples),
+        "samples": fields_of(config["scan_causes"], ScanSamples),
         "entry": scans["datasets"][scan_set],
         "role": config["splits"]["role"],
-        "scans": settings_of(scans, ChoiceSettings, TrialSettings) | {"success": scans["success"]},
+        "scans": fields_of(scans, ChoiceSettings, TrialSettings) | {"success": scans["success"]},
         "methods": {first: scans["methods"].get(first) or config["methods"].get(first)},
         "causes": config["causes"],
         "descriptors": config["diagnosis"]["descriptors"],
@@ -77,7 +77,7 @@ def diagnosis_settings(
         settings: of each.
     """
     return {
-        "samples": settings_of(config["scan_causes"], ScanSamples),
+        "samples": fields_of(config["scan_causes"], ScanSamples),
         "explainers": explainers,
         "settings": settings,
         "causes": {"starts": config["causes"]["starts"]},

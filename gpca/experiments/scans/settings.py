@@ -13,7 +13,7 @@ from gpca.objects.entry import Name
 from gpca.scans.entry import ScanEntry
 from gpca.scans.ladder import Rung
 from gpca.scans.success import ScanSuccess
-from gpca.settings import Bounds, Count, Distinct, Share, read_settings, settings_of
+from gpca.settings import Bounds, Count, Distinct, Share, fields_of, read_settings
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,4 +71,4 @@ class ScanSettings(ChoiceSettings, TrialSettings):
 
 def part(kind: type, section: Mapping[str, Any]) -> Any:
     """Return those settings of the section that are of one of its bases."""
-    return read_settings(kind, settings_of(section, kind))
+    return read_settings(kind, fields_of(section, kind))
