@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
 from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
-from gpca.settings import Bounds, Count, Distinct, OpenShare, PositiveShare
+from gpca.settings import Bounds, Count, Distinct, OpenShare, PositiveShare, fields_of
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class ActiveLearningSettings:
     @classmethod
     def from_dict(cls, section: dict) -> ActiveLearningSettings:
         """Build from the config's section ``active_learning``, of which other parts read the rest."""
-        own = {field.name: section[field.name] for field in fields(cls) if field.name in section}
+        own = fields_of(section, cls)
         return cls(**own | ({"gpc": GPCSettings(**own["gpc"])} if "gpc" in own else {}))
 
 
