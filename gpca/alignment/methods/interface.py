@@ -114,7 +114,7 @@ class Outcome:
     @classmethod
     def at(cls, pair: Pair, T_target_source: np.ndarray, distance: float, failure: str = "") -> Outcome:
         """Measure a pose as Open3D does, whatever the method minimized; without any correspondence it is a failure."""
-        distance_N, _ = pair.target_tree.query(transform(T_target_source, pair.source))
+        distance_N, _ = pair.target_tree.query(transform(T_target_source, pair.source), distance_upper_bound=distance)
         inlier_N = distance_N < distance
         if not inlier_N.any():
             raise FailedRegistration(f"no source point has a target point within {distance:g} diameters")

@@ -12,6 +12,7 @@ from gpca.alignment.methods.interface import FEWEST, FailedRegistration, Outcome
 from gpca.alignment.rigid import best_motion, plane_step, rotate, transform
 
 Metric = Literal["point_to_point", "point_to_plane"]
+ROUNDING = 1 + 1e-9  # the tree may sum a square in another order
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,11 @@ class Matches:
             self.limit,
         )
 
+    def farthest_at(self, T_target_source: np.ndarray) -> float:
+        """Return the largest distance of the same matches at another pose: as many points have a neighbor within it."""
+        offset_n_3 = transform(T_target_source, self.pair.source[self.source_rows]) - self.pair.target[self.rows]
+        return float(np.sqrt(np.square(offset_n_3).sum(axis=1).max()))
+
     def cosines(self) -> np.ndarray:
         """Return the cosines (n,) of the angles between the normals of the two points."""
         source_n_3 = rotate(self.T_target_source, self.pair.normals("source")[self.source_rows])
@@ -56,6 +62,7 @@ class Stages:
 
     Attributes:
         rows: of the source that take part, or None for all.
+        share: of the source's points that are kept, those with the least distances.
         reject: from matches to those that are kept.
         weigh: from matches to their weights (n,).
         metric: the distance that is minimized.
@@ -63,18 +70,26 @@ class Stages:
     """
 
     rows: np.ndarray | None = None
+    share: float = 1.0
     reject: Callable[[Matches], Matches] = lambda matches: matches
     weigh: Callable[[Matches], np.ndarray] = lambda matches: np.ones(len(matches.distance))
     metric: Metric = "point_to_point"
     distance: float = np.inf
 
-    def match(self, pair: Pair, T_target_source: np.ndarray) -> Matches:
-        """Return the matches that are kept at a pose; fewer than three are a failure."""
+    def match(self, pair: Pair, T_target_source: np.ndarray, before: Matches | None = None) -> Matches:
+        """Return the matches that are kept at a pose; fewer than three are a failure.
+
+        Those of the pose before change nothing but how far the search has to look.
+        """
         rows_n = np.arange(len(pair.source)) if self.rows is None else self.rows
         source_n_3 = transform(T_target_source, pair.source[rows_n])
-        distance_n, target_rows_n = pair.target_tree.query(source_n_3)
-        nearest = Matches(pair, T_target_source, rows_n, source_n_3, target_rows_n, distance_n, self.distance)
-        matches = self.reject(nearest.kept(distance_n < self.distance))
+        reach = self.distance if before is None else min(self.distance, before.farthest_at(T_target_source))
+        distance_n, target_rows_n = pair.target_tree.query(source_n_3, distance_upper_bound=reach * ROUNDING)
+        found = Matches(pair, T_target_source, rows_n, source_n_3, target_rows_n, distance_n, self.distance)
+        near = found.kept(distance_n < self.distance)
+        if self.share < 1:
+            near = near.kept(nearest(near.distance, round(self.share * len(rows_n))))
+        matches = self.reject(near)
         if len(matches.distance) < FEWEST:
             raise FailedRegistration(f"fewer than {FEWEST} correspondences are left")
         return matches
@@ -103,7 +118,7 @@ def run_stages(pair: Pair, stages: Stages, max_iterations: int) -> tuple[np.ndar
     matches = stages.match(pair, T)
     for _ in range(max_iterations):
         before, T = matches, stages.step(matches) @ T
-        matches = stages.match(pair, T)
+        matches = stages.match(pair, T, before if stages.share < 1 else None)
         share = abs(len(matches.distance) - len(before.distance)) / len(pair.source)
         if share < CONVERGED and abs(_rmse(matches) - _rmse(before)) < CONVERGED:
             break
@@ -114,6 +129,11 @@ def align_by_stages(pair: Pair, stages: Stages, correspondence_distance: float, 
     """Run the stages and measure the pose that they end at."""
     T, _, failure = run_stages(pair, stages, max_iterations)
     return Outcome.at(pair, T, correspondence_distance, failure)
+
+
+def nearest(distance_n: np.ndarray, count: int) -> np.ndarray:
+    """Return the rows of so many of the least distances, in their order; at least one."""
+    return np.sort(np.argsort(distance_n, kind="stable")[: max(1, count)])
 
 
 def _rmse(matches: Matches) -> float:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
 from gpca.alignment.methods.interface import CORRESPONDENCE_DISTANCE, MAX_ITERATIONS, MethodEntry, Outcome, Pair
-from gpca.alignment.methods.stages import Stages, run_stages
-from gpca.alignment.methods.variants import nearest
+from gpca.alignment.methods.stages import Matches, Stages, run_stages
 from gpca.settings import Share
 
 LEAST_OVERLAP = 0.4  # the paper's; so far down the overlap is searched
@@ -24,29 +25,22 @@ def align(
     The search minimizes ψ(ξ) = e / ξ^(1+λ), e the mean square of the trimmed distances. No distance is too large for a
     correspondence; `correspondence_distance` only measures the outcome.
     """
+
+    @cache
+    def run(share: float) -> tuple[np.ndarray, Matches, str]:
+        return run_stages(pair, Stages(share=share), max_iterations)
+
+    def objective(share: float) -> float:
+        _, matches, _ = run(share)
+        return float(np.square(matches.distance).mean()) / share ** (1 + EXPONENT)
+
     if not overlap:
         from scipy.optimize import minimize_scalar
 
-        optimum = minimize_scalar(
-            lambda share: _objective(pair, share, max_iterations),
-            bounds=(LEAST_OVERLAP, 1.0),
-            method="bounded",
-            options={"xatol": 0.02, "maxiter": 12},
-        )
-        overlap = float(optimum.x)
-    T, _, failure = _run(pair, overlap, max_iterations)
+        bounds, options = (LEAST_OVERLAP, 1.0), {"xatol": 0.02, "maxiter": 12}
+        overlap = minimize_scalar(objective, bounds=bounds, method="bounded", options=options).x
+    T, _, failure = run(overlap)
     return Outcome.at(pair, T, correspondence_distance, failure)
-
-
-def _run(pair: Pair, share: float, max_iterations: int):
-    return run_stages(
-        pair, Stages(reject=lambda matches: matches.kept(nearest(matches.distance, share))), max_iterations
-    )
-
-
-def _objective(pair: Pair, share: float, max_iterations: int) -> float:
-    _, matches, _ = _run(pair, share, max_iterations)
-    return float(np.square(matches.distance).mean()) / share ** (1 + EXPONENT)
 
 
 METHODS = {"trimmed": MethodEntry("Trimmed ICP", align)}

@@ -12,7 +12,7 @@ from typing import Annotated, Literal
 import numpy as np
 
 from gpca.alignment.methods.interface import CORRESPONDENCE_DISTANCE, MAX_ITERATIONS, MethodEntry, Outcome, Pair
-from gpca.alignment.methods.stages import Matches, Metric, Stages, align_by_stages
+from gpca.alignment.methods.stages import Matches, Metric, Stages, align_by_stages, nearest
 from gpca.seeds import generator
 from gpca.settings import Bounds, PositiveShare
 
@@ -88,13 +88,8 @@ def _reject(matches: Matches, criterion: Criterion, deviations: float, angle_deg
     if criterion == "normals":
         return matches.kept(matches.cosines() >= np.cos(np.deg2rad(angle_deg)))
     if criterion == "trimming":
-        return matches.kept(nearest(distance_n, 1 - worst))
+        return matches.kept(nearest(distance_n, round((1 - worst) * len(distance_n))))
     return matches
-
-
-def nearest(distance_n: np.ndarray, share: float) -> np.ndarray:
-    """Return the rows of the share with the least distances, in their order; at least one."""
-    return np.sort(np.argsort(distance_n, kind="stable")[: max(1, round(share * len(distance_n)))])
 
 
 def _weigh(matches: Matches, weighting: Weighting) -> np.ndarray:

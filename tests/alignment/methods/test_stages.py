@@ -52,3 +52,25 @@ def test_normals_of_the_source_turn_with_it(objects):
     matches = Stages().match(pair, T_true)
     assert np.median(matches.cosines()) == pytest.approx(1, abs=1e-6)  # most neighbors lie on the same face
     assert np.median(Stages().match(pair, np.eye(4)).cosines()) < 0.999
+
+
+@pytest.mark.parametrize("share", [0.3, 0.6, 0.95])
+def test_a_search_that_knows_the_matches_before_finds_the_same(objects, share):
+    pair, T_true = perturbed(objects, 0, "overlap")
+    stages = Stages(share=share)
+    for T in (np.eye(4), T_true):
+        before = stages.match(pair, T)
+        for T_next in (T, stages.step(before) @ T, np.linalg.inv(T_true)):
+            bounded, free = stages.match(pair, T_next, before), stages.match(pair, T_next)
+            for name in ("source_rows", "rows", "distance"):
+                np.testing.assert_array_equal(getattr(bounded, name), getattr(free, name))
+
+
+def test_a_share_counts_all_points_of_the_source(objects):
+    pair, T_true = small_motion(objects)
+    rows = np.arange(0, len(pair.source), 2)
+    matches = Stages(rows=rows, share=0.5).match(pair, T_true)
+    least = np.sort(pair.target_tree.query(matches.pair.source @ T_true[:3, :3].T + T_true[:3, 3])[0][rows])
+    np.testing.assert_allclose(np.sort(matches.distance), least[: round(len(rows) / 2)])
+    distance = float(np.median(matches.distance))
+    assert 0 < len(Stages(share=0.5, distance=distance).match(pair, T_true).distance) <= len(pair.source) / 2

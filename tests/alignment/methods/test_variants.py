@@ -3,8 +3,8 @@ import pytest
 
 from gpca.alignment.methods.interface import Pair
 from gpca.alignment.methods.registry import make_method, methods
-from gpca.alignment.methods.stages import Stages
-from gpca.alignment.methods.variants import METHODS, _reject, _sample, _weigh, nearest
+from gpca.alignment.methods.stages import Stages, nearest
+from gpca.alignment.methods.variants import METHODS, _reject, _sample, _weigh
 
 from .pairs import perturbed, small_motion
 
@@ -81,5 +81,5 @@ def test_weights_fall_with_distance_and_angle(objects):
 
 
 def test_the_nearest_are_never_none():
-    assert nearest(np.array([3.0, 1.0, 2.0]), 0.67).tolist() == [1, 2]
-    assert nearest(np.array([3.0, 1.0, 2.0]), 0.01).tolist() == [1]
+    assert nearest(np.array([3.0, 1.0, 2.0]), 2).tolist() == [1, 2]
+    assert nearest(np.array([3.0, 1.0, 2.0]), 0).tolist() == [1]
