@@ -15,7 +15,7 @@ from statistics import fmean
 from time import monotonic
 from typing import Any
 
-TIMES = Path(__file__).parents[2] / "workflow/measured_times.csv"  # python benchmarks/scale.py results/default --times
+TIMES = Path(__file__).parents[2] / "workflow/measured_times.csv"  # python benchmarks/scale.py results/{run} --times
 USUAL_RUN = "default"  # whose times tell how the jobs of a run that was never measured compare with each other
 EVERY_S = 20.0  # between two lines
 TRUST_S = 120.0  # core time after which this machine's speed counts as much as that of the machine that was measured
