@@ -6,6 +6,8 @@ It is what the steps load before they look at their input, and what each of hund
 from importlib import import_module
 
 from gpca.code_files import ROOT
+from gpca.config.check import check
+from gpca.config.layers import with_defaults
 from gpca.explainers.registry import explainers
 
 OURS = ("gpca.config.check", "gpca.encoders.dgcnn", "gpca.objects.uw_rgbd", "gpca.objects.shapes.linemod")
@@ -24,3 +26,4 @@ STEPS = [
 for module in (*STEPS, *OURS, *LIBRARIES):
     import_module(module)
 explainers()
+check(with_defaults())  # which makes the classes that settings are read by

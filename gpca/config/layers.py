@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from copy import deepcopy
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -36,9 +38,17 @@ def require_sound(paths: Iterable[str | Path]) -> None:
 
 def with_defaults(*configs: Mapping[str, Any]) -> dict[str, Any]:
     """Return the defaults of the suite with configs laid over them, as Snakemake does it with ``--configfile``."""
-    whole: dict[str, Any] = {}
-    for config in (*map(read_file, DEFAULTS), *configs):
+    whole = deepcopy(_defaults())
+    for config in configs:
         whole = _laid_over(whole, config)
+    return whole
+
+
+@cache
+def _defaults() -> dict[str, Any]:
+    whole: dict[str, Any] = {}
+    for path in DEFAULTS:
+        whole = _laid_over(whole, read_file(path))
     return whole
 
 

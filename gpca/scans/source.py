@@ -14,7 +14,7 @@ import numpy as np
 
 from gpca.errors import InputError
 from gpca.objects.source import places_of
-from gpca.scans import npz, ply_folder, threedmatch, virtual
+from gpca.scans import npz, ply_folder, threedmatch
 from gpca.scans.entry import ScanEntry
 from gpca.scans.scene import Scan, Scene
 from gpca.seeds import generator
@@ -78,6 +78,8 @@ def scenes_of(entry: ScanEntry, place: Path | None, role: str, most_points: int)
         InputError: no scenes of the role, or what the reader refuses.
     """
     if entry.kind == "virtual":
+        from gpca.scans import virtual  # loads trimesh, which takes longer than to plan a table
+
         found: Iterator[Scene] = virtual.scenes(entry, role == DEVELOPMENT)
     elif place is None:
         raise InputError(entry.title, "its data is not there", "set data_dir")

@@ -1,6 +1,7 @@
 """The shipped configs, as Snakemake merges them."""
 
 import copy
+from functools import cache
 
 import yaml
 from snakemake.utils import update_config
@@ -21,7 +22,12 @@ def merged(*parts):
 
 def load(*names):
     paths = (*DEFAULTS, *(CONFIG / f"{name}.yaml" for name in names))
-    return merged(*(yaml.safe_load(path.read_text()) for path in paths))
+    return merged(*map(_read, paths))
+
+
+@cache
+def _read(path):
+    return yaml.safe_load(path.read_text())
 
 
 def changed(key, value):

@@ -1,3 +1,4 @@
+import re
 import subprocess
 import sys
 from dataclasses import fields
@@ -13,6 +14,8 @@ from gpca.encoders.reduction import REDUCTIONS
 from gpca.encoders.registry import ENCODERS
 from gpca.encoders.settings import OPTIONS
 from gpca.uncertainty import designs
+
+from ..documents import ROOT
 
 SCHEMA = TypeAdapter(whole_config()).json_schema()
 
@@ -41,8 +44,11 @@ def test_every_number_of_the_config_has_its_bounds(ends):
     assert [part for part in numbers if not part.keys() & ends] == []
 
 
-def test_nothing_heavy_is_loaded_to_check_a_config():
-    heavy = {"torch", "open3d", "pandas", "numba", "sklearn"}
-    program = f"import sys, gpca.config.check; sys.exit(str({heavy} & set(sys.modules)))"
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+def test_nothing_heavy_is_loaded_to_plan_a_run():
+    heavy = {"torch", "open3d", "pandas", "numba", "sklearn", "trimesh"}
+    files = (ROOT / "Snakefile", *(ROOT / "workflow").rglob("*.smk"))
+    modules = {name for file in files for name in re.findall(r"^(?:from|import) (gpca[\w.]*)", file.read_text(), re.M)}
+    assert "gpca.config.check" in modules
+    program = f"import sys, {', '.join(sorted(modules))}; sys.exit(str({heavy} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, cwd=ROOT)
     assert done.stderr.strip() == "set()"

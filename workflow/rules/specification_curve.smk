@@ -1,5 +1,4 @@
 # Files of a run -> the printed numbers under every reading of what the paper leaves unstated.
-from gpca.experiments.specification_curve.frame_input import ALIGNED
 from gpca.experiments.specification_curve.registry import (
     FRAME_ENCODER,
     FRAME_INPUT,
@@ -8,6 +7,7 @@ from gpca.experiments.specification_curve.registry import (
     GROUPS,
     SEVERITIES_RETRAINED,
 )
+from gpca.experiments.specification_curve.settings import ALIGNED
 
 READINGS = config["readings"]
 READING_SIZES = {name: READINGS[name] for name in ("seeds", "encoders", "samples")}

@@ -16,11 +16,9 @@ from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
 from gpca.experiments.specification_curve.frames import of_objects, values
 from gpca.experiments.specification_curve.run_files import Row, RunFiles
-from gpca.experiments.specification_curve.settings import Reading, ReadingSizes
+from gpca.experiments.specification_curve.settings import ALIGNED, Reading, ReadingSizes
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
-
-ALIGNED = "aligned"
 
 
 def run(run_files: RunFiles, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iterator[Row]:

@@ -9,6 +9,8 @@ from typing import Annotated, Any
 
 from gpca.settings import Bounds, Count
 
+ALIGNED = "aligned"  # the cloud that the encoder sees, as ICP left it: the protocol's
+
 
 @dataclass(frozen=True)
 class ReadingSizes:
