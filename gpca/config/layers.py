@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from copy import deepcopy
-from functools import cache
+from functools import cache, reduce
 from pathlib import Path
 from typing import Any
 
@@ -32,24 +32,19 @@ def read_file(path: str | Path) -> dict[str, Any]:
 
 def require_sound(paths: Iterable[str | Path]) -> None:
     """Raise an InputError for the first config that :func:`read_file` refuses, be it one of the defaults."""
-    for path in (*DEFAULTS, *paths):
+    _defaults()
+    for path in paths:
         read_file(path)
 
 
 def with_defaults(*configs: Mapping[str, Any]) -> dict[str, Any]:
     """Return the defaults of the suite with configs laid over them, as Snakemake does it with ``--configfile``."""
-    whole = deepcopy(_defaults())
-    for config in configs:
-        whole = _laid_over(whole, config)
-    return whole
+    return reduce(_laid_over, configs, deepcopy(_defaults()))
 
 
 @cache
 def _defaults() -> dict[str, Any]:
-    whole: dict[str, Any] = {}
-    for path in DEFAULTS:
-        whole = _laid_over(whole, read_file(path))
-    return whole
+    return reduce(_laid_over, map(read_file, DEFAULTS), {})
 
 
 def in_order(config: Mapping[str, Any]) -> dict[str, Any]:
@@ -57,7 +52,7 @@ def in_order(config: Mapping[str, Any]) -> dict[str, Any]:
 
     Snakemake puts the keys of ``--configfile`` first, and tables have a row for each explainer in the config's order.
     """
-    return _in_order_of(config, with_defaults())
+    return _in_order_of(config, _defaults())
 
 
 def _in_order_of(config: Mapping[str, Any], lower: Mapping[str, Any]) -> dict[str, Any]:

@@ -78,7 +78,7 @@ def scenes_of(entry: ScanEntry, place: Path | None, role: str, most_points: int)
         InputError: no scenes of the role, or what the reader refuses.
     """
     if entry.kind == "virtual":
-        from gpca.scans import virtual  # loads trimesh, which takes longer than to plan a table
+        from gpca.scans import virtual  # loads trimesh, which nothing needs that plans a run
 
         found: Iterator[Scene] = virtual.scenes(entry, role == DEVELOPMENT)
     elif place is None:
