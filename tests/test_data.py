@@ -19,8 +19,7 @@ from gpca.frames.reading import Dataset, read_instances, read_models
 from gpca.io.csv_file import read_csv
 from gpca.objects.bop import read_models_info
 from gpca.objects.canonical import ObjectClouds, sample_objects, write_objects
-from gpca.objects.repository import DATA, VERSION, require_whole
-from gpca.objects.source import resolve, surfaces
+from gpca.objects.source import DATA, VERSION, require_whole, resolve, surfaces
 from gpca.objects.splits import TRAINING, read_object_splits, read_scene_splits
 
 PARTS = ("ycb", "ycbv", "lm", "lmo", "estimates")

@@ -9,7 +9,7 @@ import numpy as np
 from gpca.errors import InputError
 from gpca.objects.canonical import FEWEST_CLOUD_POINTS, diameter, require_points, require_size
 from gpca.objects.mesh_folder import meters_per
-from gpca.objects.units import IN_CONFIG
+from gpca.objects.surface import IN_CONFIG
 from gpca.seeds import generator
 
 MEASURED_POINTS = 10_000  # so many measure the frame of a larger cloud, since all of them may lie on its hull

@@ -15,9 +15,9 @@ from gpca.causes.settings import CauseSettings
 from gpca.causes.shapley import NONE
 from gpca.errors import InputError
 from gpca.io.names import SPLITS
+from gpca.objects.bop import find_symmetries
 from gpca.objects.canonical import ObjectClouds
 from gpca.objects.splits import drawn, unseen
-from gpca.objects.symmetry import find_symmetries
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.progress import progress
 from gpca.seeds import generator

@@ -14,7 +14,7 @@ from gpca.comparison.clusters import Drawn
 from gpca.comparison.published import TIMES, Counterpart, Number, Reason, reason_of
 from gpca.comparison.values import RUNTIME, Reproduced, deviation_interval, value_of_run
 from gpca.errors import InputError
-from gpca.objects.title import STAND_IN, title_of
+from gpca.objects.entry import STAND_IN, title_of
 from gpca.settings import NotNegative
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ import numpy as np
 from gpca.alignment.pose_error import JUDGED_POINTS, PoseErrors
 from gpca.alignment.rigid import inverse
 from gpca.errors import InputError
+from gpca.objects.bop import angle_up_to_symmetry, find_symmetries
 from gpca.objects.canonical import ObjectClouds
-from gpca.objects.symmetry import angle_up_to_symmetry, find_symmetries
 from gpca.pairs.dataset import Registrations
 
 
@@ -18,7 +18,7 @@ class Judge:
     All lengths are in diameters, and the target's frame is the object's canonical one, with the origin at its center.
 
     Attributes:
-        symmetries: rotations that leave the shape as it is, as :func:`gpca.objects.symmetry.find_symmetries` has them.
+        symmetries: rotations that leave the shape as it is, as :func:`gpca.objects.bop.find_symmetries` has them.
         symmetric: whether ADD-S counts.
     """
 

@@ -13,7 +13,7 @@ from gpca.experiments.registry import experiments
 from gpca.explainers.gpca import GPCA_FORMS
 from gpca.explainers.registry import explainer_entry
 from gpca.frames.source import ONE_ENCODER, REAL_WORLD
-from gpca.objects.title import dataset_of, title_of
+from gpca.objects.entry import dataset_of, title_of
 
 
 def names_of(config: Mapping, sources: Mapping[str, Mapping]) -> dict[str, Any]:

@@ -24,9 +24,9 @@ from gpca.frames.initial_pose import GlobalRegistration, InitialPoseSettings, di
 from gpca.frames.instances import NO_COLOR, Instances
 from gpca.frames.plausibility import Observation, require_plausible, require_shared_form
 from gpca.objects import bop
+from gpca.objects.bop import find_symmetries, read_symmetries
 from gpca.objects.canonical import ObjectClouds, bounding_center
 from gpca.objects.surface import Surface
-from gpca.objects.symmetry import find_symmetries, read_symmetries
 from gpca.process.progress import progress
 from gpca.seeds import generator, seed_of
 

@@ -15,9 +15,9 @@ from gpca.errors import InputError
 from gpca.frames.camera import Camera, DepthNoise, MeshScene, look_at, shade
 from gpca.frames.resting import rest, stable_poses
 from gpca.io.files import whole_folder
+from gpca.objects.bop import find_symmetries
 from gpca.objects.canonical import canonical_cloud, diameter
 from gpca.objects.surface import Surface
-from gpca.objects.symmetry import find_symmetries
 from gpca.process.progress import progress
 from gpca.seeds import generator
 from gpca.settings import Bounds, Count, Distinct

@@ -16,9 +16,9 @@ from gpca.frames.initial_pose import GlobalRegistration, InitialPoseSettings
 from gpca.frames.resting import rest, stable_poses
 from gpca.frames.rgbd_scene import TABLE_M, Placed, SceneSettings, center, lay_table, table
 from gpca.frames.shots import Shot, median_depth
+from gpca.objects.bop import find_symmetries
 from gpca.objects.canonical import ObjectClouds, canonical_cloud
 from gpca.objects.surface import Surface
-from gpca.objects.symmetry import find_symmetries
 from gpca.pairs.perturbation import Hidden, Severities, misplace
 from gpca.seeds import generator, seed_of
 from gpca.settings import NotNegative

@@ -12,8 +12,7 @@ from gpca.alignment.icp import ICPSettings
 from gpca.alignment.rigid import require_rigid, transform
 from gpca.errors import InputError
 from gpca.objects.canonical import normals_towards_camera
-from gpca.objects.cloud_objects import as_points
-from gpca.objects.units import AS_ARGUMENT
+from gpca.objects.surface import AS_ARGUMENT, as_points
 
 LARGEST_RATIO = 8.0  # the extents of source and target may differ so much; in the wrong unit they differ by 10 or more
 # Diameters of the target between its center and the source: farther off, nothing can meet, and the unit may be wrong.

@@ -36,7 +36,7 @@ from gpca.model.file import Model
 from gpca.model.location import model_path
 from gpca.model.pose_spread import NAMES, estimated_spread, spread_estimator, spread_of_icp
 from gpca.model.scene import Scene
-from gpca.objects.cloud_objects import as_points
+from gpca.objects.surface import as_points
 from gpca.recovery.policy import NOTHING, Decision, RecoveryPolicy
 from gpca.seeds import generator, seed_of
 from gpca.uncertainty.settings import MONTE_CARLO, UncertaintySettings

@@ -12,14 +12,14 @@ from gpca.alignment.rigid import require_rigid
 from gpca.errors import InputError
 from gpca.io.limits import require_file
 from gpca.numerals import decimal
-from gpca.objects import mesh_folder, pcd, point_tables, scanner_files
+from gpca.objects import mesh_folder, point_files
 from gpca.objects.canonical import bounding_center, canonical_cloud
-from gpca.objects.units import AS_OPTION
+from gpca.objects.surface import AS_OPTION
 
 SAMPLED_POINTS = 16384  # so many are drawn on a mesh, as on the objects of the training
 LARGEST_POSE_BYTES = 10**5  # 16 numbers, however they are written
 OR_SCANS = f"{AS_OPTION} (scans of places: --scans)"  # since the limits of an object's size do not hold for those
-SUFFIXES = (*mesh_folder.SUFFIXES, ".pcd", *point_tables.READERS, *scanner_files.PACKAGES)
+SUFFIXES = (*mesh_folder.SUFFIXES, ".pcd", *point_files.TABLE_READERS, *point_files.PACKAGES)
 
 
 def require_format(path: Path) -> None:
@@ -77,8 +77,10 @@ def read_scan(path: Path) -> np.ndarray:
 def _cloud(path: Path) -> np.ndarray:
     suffix = path.suffix.lower()
     if suffix == ".pcd":
-        return pcd.parse(path.read_bytes(), path)
-    return point_tables.read_table(path) if suffix in point_tables.READERS else scanner_files.read_scanner_file(path)
+        return point_files.parse_pcd(path.read_bytes(), path)
+    if suffix in point_files.TABLE_READERS:
+        return point_files.read_table(path)
+    return point_files.read_scanner_file(path)
 
 
 def read_pose(path: Path) -> np.ndarray:

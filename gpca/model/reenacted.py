@@ -14,7 +14,7 @@ from gpca.alignment.canonical_frame import CanonicalFrame
 from gpca.alignment.rigid import inverse
 from gpca.alignment.twist import log
 from gpca.causes.shapley import ALL, shapley_values
-from gpca.objects.symmetry import symmetric_turn
+from gpca.objects.bop import symmetric_turn
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reenactment.enactment import Enactment
 from gpca.reenactment.hypotheses import SAME

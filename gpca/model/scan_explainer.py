@@ -25,8 +25,8 @@ from gpca.model.scan_verdict import LIMIT, decision, failure_of, refined, state_
 from gpca.model.scene import Scene
 from gpca.model.voxels import in_voxels, require_edge, voxel_size
 from gpca.objects.canonical import diameter
-from gpca.objects.cloud_objects import as_points
 from gpca.objects.mesh_folder import meters_per
+from gpca.objects.surface import as_points
 from gpca.reenactment.enactment import Enactment
 from gpca.reenactment.hypotheses import weights_of
 from gpca.reenactment.scan_enactment import reenact_scan

@@ -1,19 +1,21 @@
 """Object models in the layout of the BOP benchmark: models/obj_000001.ply and models_info.json, in millimeters.
 
-Format: https://github.com/thodan/bop_toolkit/blob/master/docs/bop_datasets_format.md
-"""
+Format: https://github.com/thodan/bop_toolkit/blob/master/docs/bop_datasets_format.md. Symmetries are read from
+models_info.json, or else sought on the cloud."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from gpca.errors import InputError
 from gpca.io.limits import require_file
-from gpca.io.structured_text import read_json
+from gpca.io.structured_text import finite_numbers, read_json
 from gpca.numerals import whole
 from gpca.objects.canonical import diameter
 from gpca.objects.mesh_folder import meters_per, read_surface
@@ -100,7 +102,7 @@ def read_models_info(path: Path) -> dict[int, dict]:
         InputError: missing, damaged, an id that is no number or stands twice, a diameter that cannot be, or a symmetry
             that is no rigid transform.
     """
-    from gpca.objects.symmetry import require_symmetries  # needs scipy, and the config's checks import this module
+    from gpca.objects.bop import require_symmetries  # needs scipy, and the config's checks import this module
 
     remedy = "fetch the models again"
     require_file(path, "no such file", f"{remedy}, or use kind: mesh_folder for plain meshes")
@@ -115,3 +117,146 @@ def read_models_info(path: Path) -> dict[int, dict]:
         require_symmetries(model, f"{path}: object {key}")
         listed[number] = model | {"diameter": float(diameter_mm)}
     return listed
+
+
+REMEDY = "write it as the BOP format does"
+TOLERANCE = 0.01  # diameters
+SOUGHT_POINTS = 4096  # of a cloud, the first ones, on which symmetries are sought
+DISCRETE_DEG = (90.0, 180.0)
+CONTINUOUS_DEG = (25.0, 50.0, 75.0)  # none is a symmetry of a square or hexagonal shape
+
+
+def read_symmetries(models_info: dict[int, dict], object_id: int) -> dict | None:
+    """Return ``symmetries_discrete`` and ``symmetries_continuous`` of an object, or None where the file lists none.
+
+    The file lists none for an object that has none, and for no object at all where its makers left them out.
+
+    Args:
+        models_info: what :func:`gpca.objects.bop.read_models_info` returns.
+    """
+    lists = {n: {k: v for k, v in entry.items() if k.startswith("symmetries_")} for n, entry in models_info.items()}
+    return lists.get(object_id, {}) if any(lists.values()) else None
+
+
+def require_symmetries(listed: Mapping[str, Any], subject: str) -> None:
+    """Raise an InputError that names `subject` unless every symmetry that is listed of an object is a rigid transform.
+
+    Args:
+        listed: what models_info.json says of the object: ``symmetries_discrete``, matrices of 16 numbers, row by row;
+            ``symmetries_continuous``, each an ``axis`` and an ``offset`` of 3 numbers, in millimeters.
+    """
+    for n, matrix in enumerate(_entries(listed, "symmetries_discrete", subject)):
+        place = f"{subject}, symmetries_discrete {n}"
+        T = finite_numbers(matrix, 16, place, "it", REMEDY).reshape(4, 4)
+        R = T[:3, :3]
+        if not (np.allclose(R @ R.T, np.eye(3), atol=1e-3) and np.linalg.det(R) > 0 and (T[3] == (0, 0, 0, 1)).all()):
+            raise InputError(place, "is not a rotation and a shift", "give a rigid transform, row by row")
+    for n, turn in enumerate(_entries(listed, "symmetries_continuous", subject)):
+        place = f"{subject}, symmetries_continuous {n}"
+        axis, offset = (turn.get(key) if isinstance(turn, Mapping) else None for key in ("axis", "offset"))
+        if not np.linalg.norm(finite_numbers(axis, 3, place, "axis", REMEDY)) > 0:
+            raise InputError(place, "axis has no direction", "give the axis of revolution, such as 0 0 1")
+        finite_numbers(offset, 3, place, "offset", REMEDY)
+
+
+def _entries(listed: Mapping[str, Any], key: str, subject: str) -> list:
+    entries = listed.get(key, [])
+    if not isinstance(entries, list):
+        raise InputError(f"{subject}, {key}", "is not a list", "list the symmetries, or leave the key out")
+    return entries
+
+
+def find_symmetries(points_N_3: np.ndarray, diameter: float) -> dict[str, list]:
+    """Return the rotations about the axes of the bounding box that leave the shape as it is, as BOP writes them.
+
+    A rotation changes nothing where the mean distance from a turned point to its nearest one is within `TOLERANCE` of
+    the diameter beyond the points' own spacing. That finds LINEMOD's two symmetric objects on their scans. Shape alone
+    counts: a printed can is symmetric, since registration sees no print.
+
+    Args:
+        points_N_3: a dense cloud of the whole surface, centered on its bounding box.
+        diameter: the object's, in the unit of the points.
+
+    Returns:
+        ``symmetries_discrete``: 4×4 matrices row by row; ``symmetries_continuous``: axes with their offset. Keys only
+        where there are some.
+    """
+    from scipy.spatial import cKDTree
+    from scipy.spatial.transform import Rotation
+
+    points_N_3 = np.asarray(points_N_3[:SOUGHT_POINTS], np.float64)
+    tree = cKDTree(points_N_3)
+    spacing = tree.query(points_N_3, k=2)[0][:, 1].mean()
+    limit = TOLERANCE * diameter + spacing
+
+    def fits(axis: np.ndarray, angle_deg: float) -> bool:
+        turned = Rotation.from_rotvec(np.deg2rad(angle_deg) * axis).apply(points_N_3)
+        return tree.query(turned)[0].mean() < limit
+
+    continuous, discrete = [], []
+    for axis in np.eye(3):
+        if all(fits(axis, angle) for angle in CONTINUOUS_DEG):
+            continuous.append({"axis": axis.tolist(), "offset": [0.0, 0.0, 0.0]})
+            continue
+        for angle in DISCRETE_DEG:
+            if fits(axis, angle):
+                T = np.eye(4)
+                T[:3, :3] = Rotation.from_rotvec(np.deg2rad(angle) * axis).as_matrix()
+                discrete.append(T.round(9).ravel().tolist())
+    return {
+        **({"symmetries_discrete": discrete} if discrete else {}),
+        **({"symmetries_continuous": continuous} if continuous else {}),
+    }
+
+
+def angle_up_to_symmetry(R_3_3: np.ndarray, symmetries: Mapping[str, list]) -> float:
+    """Return the least angle, in radians, of a rotation that follows one which leaves the shape as it is.
+
+    With a single axis of revolution a, the least over all turns about it has a closed form: for the unit quaternion
+    (w, v) the cosine of half the angle is √(w² + (v·a)²). With two such axes every rotation leaves the shape as it is.
+
+    Args:
+        symmetries: as :func:`find_symmetries` returns them.
+    """
+    from scipy.spatial.transform import Rotation
+
+    axes = [entry["axis"] for entry in symmetries.get("symmetries_continuous", [])]
+    if len(axes) > 1:
+        return 0.0
+    quaternions_K_4 = Rotation.from_matrix(R_3_3 @ _generated(symmetries)).as_quat()
+    cosine_squared_K = quaternions_K_4[:, 3] ** 2
+    for axis in axes:
+        cosine_squared_K += (quaternions_K_4[:, :3] @ np.asarray(axis)) ** 2
+    return float(2 * np.arccos(np.sqrt(min(1.0, cosine_squared_K.max()))))
+
+
+def symmetric_turn(R_3_3: np.ndarray, symmetries: Mapping[str, list]) -> np.ndarray:
+    """Return the rotation S (3, 3) that leaves the shape as it is and makes R S the least one.
+
+    The angle of R S is that of :func:`angle_up_to_symmetry`.
+    """
+    from scipy.spatial.transform import Rotation
+
+    axes = [np.asarray(entry["axis"], np.float64) for entry in symmetries.get("symmetries_continuous", [])]
+    if len(axes) > 1:
+        return R_3_3.T
+    turns = list(_generated(symmetries))
+    for i, turn in enumerate(turns):
+        for axis in axes:
+            x, y, z, w = Rotation.from_matrix(R_3_3 @ turn).as_quat()
+            half_angle = np.arctan2(-(axis @ (x, y, z)), w)
+            turns[i] = turn @ Rotation.from_rotvec(2 * half_angle * axis).as_matrix()
+    cosines = [abs(Rotation.from_matrix(R_3_3 @ turn).as_quat()[3]) for turn in turns]
+    return turns[int(np.argmax(cosines))]
+
+
+def _generated(symmetries: Mapping[str, list]) -> np.ndarray:
+    """Return the rotations (K, 3, 3) that the discrete symmetries make one after the other, the identity first."""
+    listed = [np.reshape(T, (4, 4))[:3, :3] for T in symmetries.get("symmetries_discrete", [])]
+    group = [np.eye(3)]
+    for known in group:  # which grows meanwhile
+        for R in listed:
+            product = R @ known
+            if not any(np.allclose(product, other, atol=1e-6) for other in group):
+                group.append(product)
+    return np.array(group)

@@ -14,8 +14,7 @@ from gpca.errors import InputError
 from gpca.io.arrays import REAL, REGENERATE, TEXT, WHOLE, load_arrays, save_arrays
 from gpca.io.names import is_name
 from gpca.objects.splits import DRAWN, families_and_folds, read_object_splits, without_unused
-from gpca.objects.surface import Surface, instance_of
-from gpca.objects.units import IN_CONFIG
+from gpca.objects.surface import IN_CONFIG, Surface, instance_of
 from gpca.process.environment import open3d_cloud, require_open3d
 
 FEWEST_CLOUD_POINTS = 64

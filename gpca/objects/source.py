@@ -4,8 +4,7 @@ A kind of source is a module beside this one with ``from_entry(entry, folder) ->
 such a file and nothing else; with a ``require_entry(entry, folder)`` it can refuse an entry whose data is at hand, as
 far as names of files tell, when a workflow loads. ``procedural`` needs no data and has ``surfaces(family)`` instead.
 Kinds that read or render depth frames stand among those (`OF_FRAMES`). A module from outside lists kinds by name as
-``SOURCES``, each with the name of such a module.
-"""
+``SOURCES``, each with the name of such a module."""
 
 from __future__ import annotations
 
@@ -13,15 +12,16 @@ import errno
 import os
 import pkgutil
 from collections.abc import Iterator
+from functools import cache
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 
 from gpca import objects
+from gpca.code_files import ROOT
 from gpca.errors import InputError
 from gpca.io.files import sha256_of_file
-from gpca.objects import archive, download, procedural
-from gpca.objects.repository import folders_of_data, require_whole_if_ours
+from gpca.objects import downloads, procedural
 from gpca.objects.surface import Surface
 from gpca.plugins import joined_outside
 
@@ -80,7 +80,7 @@ def surfaces(entry: dict, cache_folder: str | Path) -> Iterator[Surface]:
     """Yield the surfaces of a resolved entry; what has to be downloaded is kept, and unpacked, in `cache_folder`.
 
     Raises:
-        InputError: from :mod:`gpca.objects.download`, :mod:`gpca.objects.archive` and the kind's own reader.
+        InputError: from :mod:`gpca.objects.downloads`, :mod:`gpca.objects.downloads` and the kind's own reader.
     """
     if entry["origin"] == "procedural":
         yield from procedural.surfaces(entry["family"])
@@ -95,7 +95,7 @@ def folders(entry: dict, cache_folder: str | Path, unpack: bool = True) -> list[
     """Return where a resolved entry's data is: its location, or what was downloaded, a folder for each archive.
 
     Raises:
-        InputError: from :mod:`gpca.objects.download`, :mod:`gpca.objects.archive` and :func:`require_place`.
+        InputError: from :mod:`gpca.objects.downloads`, :mod:`gpca.objects.downloads` and :func:`require_place`.
     """
     if entry["origin"] == "local":
         return [Path(entry["location"])]
@@ -103,7 +103,7 @@ def folders(entry: dict, cache_folder: str | Path, unpack: bool = True) -> list[
     urls = _as_list(entry.get("urls") or entry.get("url"))
     checksums = _as_list(entry.get("sha256")) or [None] * len(urls)
     files = [
-        download.fetch(url, sha256, cache, entry.get("location")) for url, sha256 in zip(urls, checksums, strict=True)
+        downloads.fetch(url, sha256, cache, entry.get("location")) for url, sha256 in zip(urls, checksums, strict=True)
     ]
     return [_unpacked(file) for file in files] if unpack else files
 
@@ -139,7 +139,7 @@ def source_modules(entry: dict) -> list[str]:
 
 def _unpacked(file: Path) -> Path:
     # The folder is named by content, so an archive that was fetched anew is unpacked anew.
-    return archive.unpack(file, file.with_name(f"{file.stem}-{sha256_of_file(file)[:12]}"))
+    return downloads.unpack(file, file.with_name(f"{file.stem}-{sha256_of_file(file)[:12]}"))
 
 
 def _local_data(entry: dict, data_dir: str | None) -> Path | None:
@@ -225,3 +225,36 @@ def _kinds() -> dict[str, str]:
 
 def _as_list(value: str | list | None) -> list:
     return value if isinstance(value, list) else [] if value is None else [value]
+
+
+DATA = ROOT / "data"
+VERSION = "2"  # of the data that this code reads
+REMEDY = "restore it: git checkout -- data"
+
+
+def folders_of_data(data_dir: str | Path | None) -> list[Path]:
+    """Return the folders that a relative place of data is looked for in: the user's first, then the repository's."""
+    return [Path(folder) for folder in (data_dir, DATA) if folder]
+
+
+def require_whole_if_ours(place: Path) -> None:
+    """Raise an InputError where a place lies in the repository's data and this is not as it was published."""
+    if place.resolve().is_relative_to(DATA.resolve()):
+        require_whole(DATA)
+
+
+@cache
+def require_whole(folder: Path) -> None:
+    """Raise an InputError for the first file of the data that is missing or changed, and for another version of it."""
+    version = folder / "VERSION"
+    if (found := version.read_text("utf-8").strip() if version.is_file() else "unknown") != VERSION:
+        raise InputError(folder, f"is version {found} of the data, and this code reads version {VERSION}", REMEDY)
+    sums = folder / "SHA256SUMS"
+    if not sums.is_file():
+        raise InputError(sums, "no such file", REMEDY)
+    for line in sums.read_text("utf-8").splitlines():
+        sha256, _, name = line.partition("  ")
+        if not (path := folder / name).is_file():
+            raise InputError(path, "no such file", REMEDY)
+        if sha256_of_file(path) != sha256:
+            raise InputError(path, "is not the file that SHA256SUMS lists", REMEDY)

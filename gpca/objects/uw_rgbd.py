@@ -12,8 +12,9 @@ from pathlib import Path, PurePosixPath
 
 from gpca.errors import InputError
 from gpca.io.limits import require_file
-from gpca.objects import archive, pcd
+from gpca.objects.downloads import open_archive
 from gpca.objects.mesh_folder import files_in, meters_per
+from gpca.objects.point_files import parse_pcd
 from gpca.objects.surface import Surface, evenly, instance_of, view_order
 
 SUFFIXES = (".pcd", ".tar", ".tar.gz", ".tgz")
@@ -46,7 +47,7 @@ def surfaces(paths: Iterable[Path], unit: str = "m", views_per_instance: int = 6
         require_file(path, "no such file", "check files in the config")
     yield from _chosen([(path.stem, path.read_bytes, str(path)) for path in single], scale, views_per_instance)
     for path in (path for path in paths if path not in single):
-        with archive.open_archive(path) as members:
+        with open_archive(path) as members:
             views = [
                 (PurePosixPath(member.name).stem, member.read, f"{path}, member {member.name}")
                 for member in members
@@ -61,4 +62,4 @@ def _chosen(views: list[_View], scale: float, views_per_instance: int) -> Iterat
     views = sorted(views, key=lambda view: view_order(view[0]))
     for _, group in groupby(views, key=lambda view: instance_of(view[0])):
         for name, read, subject in evenly(list(group), views_per_instance):
-            yield Surface(name, pcd.parse(read(), subject) * scale, None)
+            yield Surface(name, parse_pcd(read(), subject) * scale, None)

@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from gpca.alignment.icp_target import make_target
 from gpca.causes.truth import LARGEST_ERROR
 from gpca.features.distances import second_moments
-from gpca.objects.symmetry import find_symmetries
+from gpca.objects.bop import find_symmetries
 from gpca.reenactment.surface_kernels import nearest_rows, surface_distances
 
 JUDGED = 256  # points over which an error is the mean
@@ -53,7 +53,7 @@ class ModelSurface:
 
     @cached_property
     def symmetries(self) -> dict[str, list]:
-        """The turns that leave the shape as it is (:func:`gpca.objects.symmetry.find_symmetries`)."""
+        """The turns that leave the shape as it is (:func:`gpca.objects.bop.find_symmetries`)."""
         return find_symmetries(self.points, 1.0)
 
     @property

@@ -18,7 +18,7 @@ from gpca.errors import InputError
 from gpca.experiments.diagnosis.judged import SampleTruth
 from gpca.io.arrays import REAL, TEXT, WHOLE, load_arrays
 from gpca.io.files import whole_file
-from gpca.objects.repository import DATA
+from gpca.objects.source import DATA
 from gpca.tracks.track import Track
 
 FOLDER = ROOT / "results/leaderboard/published"

@@ -17,8 +17,8 @@ from gpca.io.structured_text import read_json, read_mapping
 from gpca.model.file import Model
 from gpca.model.point_file import read_points, read_pose
 from gpca.objects import uw_rgbd
-from gpca.objects.archive import open_archive
 from gpca.objects.bop import read_models_info
+from gpca.objects.downloads import open_archive
 from gpca.objects.mesh_folder import files_in, surfaces
 
 NOBODY = 65534

@@ -7,7 +7,7 @@ import zipfile
 import pytest
 
 from gpca.errors import InputError
-from gpca.objects.archive import unpack
+from gpca.objects.downloads import unpack
 
 FILES = {"models/obj_000001.ply": os.urandom(5000), "models/deep/er/info.json": b"{}", "top.txt": b"t"}
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gpca.errors import InputError
-from gpca.objects.cloud_objects import as_points
+from gpca.objects.surface import as_points
 from gpca.process.environment import open3d_cloud, require_open3d
 
 POINTS = np.random.default_rng(0).normal(size=(5, 3))

@@ -4,8 +4,8 @@ import socket
 import pytest
 
 from gpca.errors import InputError
-from gpca.objects import download
-from gpca.objects.download import cached_path, fetch
+from gpca.objects import downloads
+from gpca.objects.downloads import cached_path, fetch
 
 CONTENT = b"some archive" * 1000
 SHA256 = hashlib.sha256(CONTENT).hexdigest()
@@ -83,15 +83,15 @@ def test_error_answer_and_interrupted_transfer(server, tmp_path):
 
 @pytest.mark.parametrize("name", ["drip.zip", "drip-head.zip"])
 def test_a_server_that_sends_a_byte_now_and_then_is_left(server, tmp_path, monkeypatch, name):
-    monkeypatch.setattr(download, "GRACE_S", 0)
-    monkeypatch.setattr(download, "SLOWEST_BYTES_PER_S", 10**6)
+    monkeypatch.setattr(downloads, "GRACE_S", 0)
+    monkeypatch.setattr(downloads, "SLOWEST_BYTES_PER_S", 10**6)
     with pytest.raises(InputError, match=rf"{name}: sent \d+ bytes in \d+ s, which is too slow; set data_dir"):
         fetch(f"{server.url}/{name}", None, tmp_path)
     assert files(tmp_path) == []
 
 
 def test_a_download_that_is_larger_than_any_is_stopped(server, url, tmp_path, monkeypatch):
-    monkeypatch.setattr(download, "LARGEST_BYTES", len(CONTENT) - 1)
+    monkeypatch.setattr(downloads, "LARGEST_DOWNLOAD_BYTES", len(CONTENT) - 1)
     with pytest.raises(InputError, match=r"models\.zip: sends more than 11999 bytes"):
         fetch(url, None, tmp_path)
     assert files(tmp_path) == []

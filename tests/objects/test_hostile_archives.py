@@ -9,8 +9,8 @@ import zipfile
 import pytest
 
 from gpca.errors import InputError
-from gpca.objects import archive
-from gpca.objects.archive import unpack
+from gpca.objects import downloads
+from gpca.objects.downloads import unpack
 
 from ..hostile import refusal
 
@@ -77,7 +77,7 @@ def test_compression_that_cannot_be_read_piece_by_piece_is_refused(method, tmp_p
 
 def test_a_disk_that_is_too_small_is_named_before_anything_is_written(tmp_path, monkeypatch):
     zipped(tmp_path / "a.zip", content=bytes(5 * 10**6))
-    monkeypatch.setattr(archive.shutil, "disk_usage", lambda folder: type("Usage", (), {"free": 10**6}))
+    monkeypatch.setattr(downloads.shutil, "disk_usage", lambda folder: type("Usage", (), {"free": 10**6}))
     with pytest.raises(InputError, match=r"a\.zip: unpacks to 0\.005 GB, but 0\.001 GB of the disk are free"):
         unpack(tmp_path / "a.zip", tmp_path / "target")
     assert [path.name for path in tmp_path.iterdir()] == ["a.zip"]

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from gpca.errors import InputError
-from gpca.objects.pcd import parse
+from gpca.objects.point_files import parse_pcd
 
 # The layout of the UW dataset.
 HEADER = """# .PCD v.7 - Point Cloud Data file format
@@ -38,14 +38,14 @@ def binary_pcd(points, header_points=None):
 
 
 def test_ascii():
-    points = parse(ascii_pcd([ROWS[0], ROWS[1], ROWS[3]]), "x")
+    points = parse_pcd(ascii_pcd([ROWS[0], ROWS[1], ROWS[3]]), "x")
     assert points.dtype == np.float64
     assert points.tolist() == [[0.1, 0.2, 0.7], [-0.1, 0.25, 0.75], [0, 0.5, 0.5]]
 
 
 def test_binary_among_other_fields():
     points = np.random.default_rng(0).normal(size=(50, 3)).astype(np.float32)
-    assert np.array_equal(parse(binary_pcd(points), "x"), points)
+    assert np.array_equal(parse_pcd(binary_pcd(points), "x"), points)
 
 
 @pytest.mark.parametrize("encoding", ["ascii", "binary", "binary_compressed"])
@@ -62,24 +62,24 @@ def test_agrees_with_open3d(encoding, tmp_path):
     o3d.io.write_point_cloud(path, cloud, write_ascii=encoding == "ascii", compressed=encoding == "binary_compressed")
     content = (tmp_path / "cloud.pcd").read_bytes()
     assert f"DATA {encoding}\n".encode() in content
-    assert parse(content, "x") == pytest.approx(points, abs=1e-9 if encoding != "ascii" else 1e-6)
+    assert parse_pcd(content, "x") == pytest.approx(points, abs=1e-9 if encoding != "ascii" else 1e-6)
     for kept in (len(content) - 40, len(content) - 400):
         with pytest.raises(InputError, match=r"^x: is not a readable PCD"):
-            parse(content[:kept], "x")
+            parse_pcd(content[:kept], "x")
 
 
 def test_organised_cloud_drops_missing_depth():
-    assert len(parse(ascii_pcd(ROWS, width=2, height=2), "x")) == 3
+    assert len(parse_pcd(ascii_pcd(ROWS, width=2, height=2), "x")) == 3
 
 
 def test_nan_in_an_unorganised_cloud():
     with pytest.raises(InputError, match=r"view\.pcd: 1 of 4 points contain NaN"):
-        parse(ascii_pcd(ROWS), "view.pcd")
+        parse_pcd(ascii_pcd(ROWS), "view.pcd")
 
 
 def test_infinity_in_an_organised_cloud():
     with pytest.raises(InputError, match="infinity"):
-        parse(ascii_pcd([*ROWS[:3], "inf 0 0 0 0 0"], width=2, height=2), "x")
+        parse_pcd(ascii_pcd([*ROWS[:3], "inf 0 0 0 0 0"], width=2, height=2), "x")
 
 
 GOOD = ascii_pcd([ROWS[0], ROWS[1]]).decode()
@@ -111,17 +111,17 @@ WRONG = {
 def test_wrong_header_or_data(fault):
     content, message = WRONG[fault]
     with pytest.raises(InputError, match=f"^view.pcd: .*{message}"):
-        parse(content.encode(), "view.pcd")
+        parse_pcd(content.encode(), "view.pcd")
 
 
 @pytest.mark.parametrize("header_points", [49, 51, 10**15])
 def test_binary_of_another_size(header_points):
     with pytest.raises(InputError, match="bytes of data"):
-        parse(binary_pcd(np.ones((50, 3)), header_points), "x")
+        parse_pcd(binary_pcd(np.ones((50, 3)), header_points), "x")
 
 
 def test_damaged_compression():
     header = HEADER.format(width=1, height=1, points=1, data="binary_compressed").encode()
     for body in (b"", b"\x09\0\0\0", b"\x03\0\0\0\x18\0\0\0\x20\xff\xff", b"\x02\0\0\0\x18\0\0\0\x00\x41"):
         with pytest.raises(InputError, match="not a readable PCD"):
-            parse(header + body, "x")
+            parse_pcd(header + body, "x")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gpca.errors import InputError
-from gpca.objects.point_tables import read_table
+from gpca.objects.point_files import read_table
 
 POINTS = np.random.default_rng(0).normal(size=(70, 3))
 WIDE = np.column_stack([POINTS, np.arange(70)])

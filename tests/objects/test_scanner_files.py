@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gpca.errors import InputError
-from gpca.objects.scanner_files import CARTESIAN, read_scanner_file
+from gpca.objects.point_files import CARTESIAN, read_scanner_file
 
 POINTS = np.arange(12.0).reshape(4, 3)
 

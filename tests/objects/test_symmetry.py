@@ -3,9 +3,9 @@ import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
 
+from gpca.objects.bop import angle_up_to_symmetry, find_symmetries, read_symmetries, symmetric_turn
 from gpca.objects.canonical import canonical_cloud
 from gpca.objects.surface import Surface
-from gpca.objects.symmetry import angle_up_to_symmetry, find_symmetries, read_symmetries, symmetric_turn
 
 create = trimesh.creation
 

@@ -1,4 +1,4 @@
-from gpca.objects.title import stand_in_clause, title_of
+from gpca.objects.entry import stand_in_clause, title_of
 
 REAL = {"title": "YCB", "stand_in": False}
 STAND_IN = {"title": "YCB", "stand_in": True}

@@ -10,7 +10,7 @@ from gpca.experiments.controls.settings import PAPER, SEEN, TRAININGS, TRANSFER,
 from gpca.experiments.controls.tables import ALL_TOGETHER, BOOTSTRAP, CHANGE, TITLES, change_cell
 from gpca.experiments.diagnosis.judged import POOLED
 from gpca.explainers.gpca import GPCA_FORMS
-from gpca.objects.title import stand_in_clause
+from gpca.objects.entry import stand_in_clause
 from gpca.reporting.tables.builder import TableBuilder, crossed, titles_of
 from gpca.reporting.tables.cells import cell_of_repeats, interval_cell, plain_cell, rows_where
 from gpca.reporting.tables.table import Cell, Column, Table

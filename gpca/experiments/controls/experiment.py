@@ -14,7 +14,7 @@ from gpca.experiments.explained import require_explained, titles
 from gpca.explainers.gpca import GPCA_FORMS
 from gpca.explainers.interface import BARE
 from gpca.explainers.registry import explainer_entry
-from gpca.objects.title import stand_in_clause
+from gpca.objects.entry import stand_in_clause
 from gpca.settings import changes_of
 
 

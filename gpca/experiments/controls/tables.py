@@ -12,7 +12,7 @@ from gpca.experiments.controls.metrics import CALLS
 from gpca.experiments.controls.settings import HARD, PAPER, TRANSFER, UNSEEN, WRONG_LABELS
 from gpca.experiments.diagnosis.judged import POOLED
 from gpca.experiments.diagnosis.near_chance import rule_near_chance
-from gpca.objects.title import stand_in_clause
+from gpca.objects.entry import stand_in_clause
 from gpca.reporting.tables.builder import TableBuilder, crossed, titles_of
 from gpca.reporting.tables.cells import interval_cell, plain_cell, rows_where
 from gpca.reporting.tables.table import Cell, Column, Table

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from gpca.attribution.confidence import REPEATS
 from gpca.experiments.diagnosis.judged import POOLED
 from gpca.experiments.diagnosis.tables import NOT_COMPARED, SHOWN, cells_of
-from gpca.objects.title import stand_in_clause
+from gpca.objects.entry import stand_in_clause
 from gpca.reporting.tables.builder import TableBuilder, crossed, titles_of
 from gpca.reporting.tables.cells import rows_where
 from gpca.reporting.tables.table import Table

@@ -10,7 +10,7 @@ from gpca.attribution.confidence import REPEATS
 from gpca.experiments.diagnosis.judged import CEILING, POOLED
 from gpca.experiments.diagnosis.strata import LARGE_ERROR, LARGE_MARGIN, SMALL_ERROR, SMALL_MARGIN
 from gpca.experiments.diagnosis.tables import AGAIN
-from gpca.objects.title import stand_in_clause
+from gpca.objects.entry import stand_in_clause
 from gpca.reporting.tables.builder import TableBuilder
 from gpca.reporting.tables.cells import interval_cell, plain_cell, rows_where
 from gpca.reporting.tables.table import Column, Table

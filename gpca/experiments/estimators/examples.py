@@ -14,7 +14,7 @@ from gpca.experiments.judge import Judge
 from gpca.features.distances import describe_distances
 from gpca.features.entropy import describe_entropy
 from gpca.features.pair import ObservedPair
-from gpca.objects.symmetry import symmetric_turn
+from gpca.objects.bop import symmetric_turn
 from gpca.uncertainty.estimators.interface import Example, FailedEstimate, RegisteredPair, intrinsic_frame
 
 Moved = Literal["model", "observed"]  # which cloud the source is

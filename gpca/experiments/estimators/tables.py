@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from gpca.attribution.confidence import REPEATS
 from gpca.experiments.estimators.calibration import BOTH, FAILED, GATES, SUCCEEDED, TRUTH
 from gpca.experiments.estimators.settings import KINDS, REFERENCE_OF
-from gpca.objects.title import stand_in_clause
+from gpca.objects.entry import stand_in_clause
 from gpca.reporting.tables.builder import TableBuilder, crossed
 from gpca.reporting.tables.cells import interval_cell, plain_cell, rows_where
 from gpca.reporting.tables.table import Cell, Column, Table

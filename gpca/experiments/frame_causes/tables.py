@@ -22,7 +22,7 @@ from gpca.experiments.diagnosis.tables import (
 from gpca.experiments.frame_causes.metrics import PSEUDO, STATE, TRUTH
 from gpca.frames.source import REAL_WORLD
 from gpca.frames.starts import CARRIED, LADDER, NATIVE, TRANSPLANTED
-from gpca.objects.title import title_of
+from gpca.objects.entry import title_of
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.tables.builder import TableBuilder, crossed
 from gpca.reporting.tables.cells import plain_cell, rows_where

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from gpca.experiments.gradients.metrics import SALIENCY, TCAV, percent
-from gpca.objects.title import title_of
+from gpca.objects.entry import title_of
 from gpca.reporting.tables.builder import TableBuilder, crossed, mean_over, titles_of
 from gpca.reporting.tables.cells import cell_of_repeats, rows_where
 from gpca.reporting.tables.table import Cell, Column, Table

@@ -9,8 +9,7 @@ from typing import Annotated, Any
 from gpca.errors import InputError
 from gpca.experiments.experiment import Experiment, LeftOut, Tidy
 from gpca.experiments.joint_reading.choices import PROTOCOL, SEVERITIES, Grid
-from gpca.objects.entry import Name, NamedSource
-from gpca.objects.title import title_of
+from gpca.objects.entry import Name, NamedSource, title_of
 from gpca.settings import Bounds, Count
 
 DevelopmentSeed = Annotated[int, Bounds(minimum=100)]  # no other run has them

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from gpca.experiments.joint_reading.tally import DEVELOPMENT, EVALUATED, EVALUATION, JUDGED
 from gpca.experiments.specification_curve.tables import Plain
 from gpca.experiments.specification_curve.words import words_of
-from gpca.objects.title import stand_in_clause
+from gpca.objects.entry import stand_in_clause
 from gpca.reporting.tables.builder import TableBuilder
 from gpca.reporting.tables.cells import plain_cell, rows_where
 from gpca.reporting.tables.table import Table

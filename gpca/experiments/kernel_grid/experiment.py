@@ -9,7 +9,7 @@ from typing import Any
 from gpca.errors import require_names
 from gpca.experiments.experiment import Experiment, LeftOut, Tidy
 from gpca.experiments.kernel_grid.grid import PRINTED, KernelGrid
-from gpca.objects.title import title_of
+from gpca.objects.entry import title_of
 from gpca.settings import Distinct
 
 

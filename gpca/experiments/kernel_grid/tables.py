@@ -10,7 +10,7 @@ from math import inf
 from typing import TYPE_CHECKING
 
 from gpca.experiments.kernel_grid.grid import BY_GPYTORCH, PRINTED, TABLE, setting_name
-from gpca.objects.title import stand_in_clause, title_of
+from gpca.objects.entry import stand_in_clause, title_of
 from gpca.reporting.tables.builder import TableBuilder, interval_over, over_clusters
 from gpca.reporting.tables.cells import cell_of_repeats, clustered_cell, rows_where
 from gpca.reporting.tables.table import Cell, Column, Table

@@ -9,7 +9,7 @@ from typing import Any
 from gpca.errors import InputError, require_names
 from gpca.experiments.experiment import Experiment, LeftOut, Tidy
 from gpca.experiments.learning_curve.settings import CurveSettings, labeled_samples
-from gpca.objects.title import title_of
+from gpca.objects.entry import title_of
 from gpca.settings import Distinct, read_settings
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from gpca.experiments.out_of_distribution.intervals import RHO
 from gpca.experiments.out_of_distribution.metrics import TABLE, with_training_like
 from gpca.experiments.out_of_distribution.sets import TRAINED_ON
-from gpca.objects.title import stand_in_clause, title_of
+from gpca.objects.entry import stand_in_clause, title_of
 from gpca.reporting.tables.builder import TableBuilder, crossed, over_clusters, titles_of
 from gpca.reporting.tables.cells import clustered_cell, rows_where
 from gpca.reporting.tables.table import Cell, Column, Table

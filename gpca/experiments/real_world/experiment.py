@@ -15,7 +15,7 @@ from gpca.experiments.real_world.tables import CLASSIC, encoder_title
 from gpca.explainers.registry import explainer_entry, require_settings
 from gpca.frames.source import ONE_ENCODER, REAL_WORLD, conditions_of, has_estimates, resolve_datasets
 from gpca.objects import procedural
-from gpca.objects.title import title_of
+from gpca.objects.entry import title_of
 from gpca.reporting.words import dataset_in_words
 
 POSES = {"results": "Pose estimators", "true_pose": "True pose, small error"}  # titles by form; all others:

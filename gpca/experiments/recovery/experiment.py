@@ -10,7 +10,7 @@ from gpca.experiments.experiment import Experiment, LeftOut, Names, Tidy
 from gpca.experiments.recovery.settings import RecoverySettings
 from gpca.explainers.registry import explainer_entry, require_settings
 from gpca.frames.situations import SituationSettings
-from gpca.objects.title import dataset_of, title_of
+from gpca.objects.entry import dataset_of, title_of
 from gpca.recovery.actions import ACTIONS, action_of
 from gpca.recovery.policies import named_policies, policies, policy_entry
 from gpca.recovery.policy import Thresholds

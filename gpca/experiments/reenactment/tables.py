@@ -10,7 +10,7 @@ from gpca.attribution.confidence import REPEATS
 from gpca.experiments.diagnosis.judged import POOLED
 from gpca.experiments.diagnosis.tables import AGAIN, SHOWN
 from gpca.experiments.reenactment.knowledge import KNOWN, in_words
-from gpca.objects.title import stand_in_clause
+from gpca.objects.entry import stand_in_clause
 from gpca.reporting.tables.builder import TableBuilder, crossed, titles_of
 from gpca.reporting.tables.cells import interval_cell, plain_cell, rows_where
 from gpca.reporting.tables.table import Column, Table

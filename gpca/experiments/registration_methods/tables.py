@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from gpca.alignment.success import success_within
 from gpca.attribution.metrics import ALL
 from gpca.experiments.registration_methods.metrics import BINS, INITIAL, NO_START, POINTS, bin_name, row_name
-from gpca.objects.title import stand_in_clause
+from gpca.objects.entry import stand_in_clause
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.tables.builder import TableBuilder, missing_packages, over_clusters
 from gpca.reporting.tables.cells import cell_over_sources, clustered_cell, rows_where

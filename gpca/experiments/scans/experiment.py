@@ -9,7 +9,7 @@ from gpca.alignment.methods.registry import installed, require_global, require_s
 from gpca.errors import InputError, require_names, with_key
 from gpca.experiments.experiment import Experiment, LeftOut, Names, Tidy
 from gpca.experiments.scans.settings import ChoiceSettings, ScanSettings, part
-from gpca.objects.title import title_of
+from gpca.objects.entry import title_of
 from gpca.scans.entry import ScanEntry
 from gpca.scans.source import entry_of, place_of
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from gpca.comparison.readings import asked_about
 from gpca.errors import InputError
-from gpca.objects.title import stand_in_clause
+from gpca.objects.entry import stand_in_clause
 from gpca.reporting.figures.panels import panels
 from gpca.reporting.figures.style import BLUE, GRAY, LIGHT_GRAY, SMALL_PT, write_title
 

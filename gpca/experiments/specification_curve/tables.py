@@ -14,7 +14,7 @@ from gpca.comparison.readings import summarize
 from gpca.experiments.real_world.tables import encoder_title
 from gpca.experiments.specification_curve.registry import FRAME_INPUT
 from gpca.experiments.specification_curve.words import reading_in_words
-from gpca.objects.title import stand_in_clause
+from gpca.objects.entry import stand_in_clause
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.tables.builder import TableBuilder, crossed, interval_over
 from gpca.reporting.tables.cells import cell_of_repeats, plain_cell, rows_where

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from gpca.attribution.metrics import ALL
 from gpca.experiments.substitution.metrics import ANOTHER, MONTE_CARLO
-from gpca.objects.title import stand_in_clause
+from gpca.objects.entry import stand_in_clause
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.tables.builder import TableBuilder, crossed, missing_packages, over_clusters
 from gpca.reporting.tables.cells import clustered_cell, rows_where

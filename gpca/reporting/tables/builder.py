@@ -7,7 +7,7 @@ from itertools import product
 
 from gpca.attribution.confidence import REPEATS
 from gpca.errors import InputError
-from gpca.objects.title import stand_in_clause, title_of
+from gpca.objects.entry import stand_in_clause, title_of
 from gpca.reporting.tables.cells import share_within_limits
 from gpca.reporting.tables.table import LEAST_SEEDS, Cell, Column, Table
 from gpca.reporting.words import plural, span

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from gpca.comparison.claim_verdicts import CLAIM_VERDICTS
 from gpca.comparison.verdicts import NOT_RUN
-from gpca.objects.title import title_of
+from gpca.objects.entry import title_of
 from gpca.reporting.tables.builder import TableBuilder
 from gpca.reporting.tables.table import Cell, Column, Table
 from gpca.reporting.words import plural, span

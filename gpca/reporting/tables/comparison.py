@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from gpca.comparison.chance import ALL, SHUFFLES, Chance, chance
 from gpca.comparison.published import HARDWARE, TABLES, TEXT
 from gpca.comparison.verdicts import VERDICTS, Tolerance, counts, judged_once
-from gpca.objects.title import STAND_IN
+from gpca.objects.entry import STAND_IN
 from gpca.reporting.tables.table import EMPTY
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""Archives read without trust: zip, tar and tgz, every member checked before anything is written."""
+"""Downloads kept in a cache and checked by SHA-256, and archives (zip, tar, tgz) unpacked without trusting them."""
 
 from __future__ import annotations
 
@@ -7,8 +7,10 @@ import hashlib
 import json
 import math
 import os
+import re
 import shutil
 import stat
+import sys
 import tarfile
 import zipfile
 import zlib
@@ -17,14 +19,116 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path, PureWindowsPath
+from threading import Thread
+from time import monotonic
 from typing import IO, Any
+from urllib.parse import urlsplit
 
 from gpca.errors import InputError
 from gpca.io.files import sha256_of_file, whole_file, whole_folder
 from gpca.io.limits import LARGEST_FILE_BYTES, is_bounded, require_file
 from gpca.io.structured_text import read_json
 
-LARGEST_BYTES = 20 * 10**9  # the largest archive of the BOP benchmark unpacks to somewhat less
+TIMEOUT_S = 30
+# A server that sends a byte now and then would keep a run waiting for ever. After a minute a download has to have come
+# at 10 kB/s on average, a fifth of what a modem did; the largest that the suite knows of has 15 GB.
+GRACE_S, SLOWEST_BYTES_PER_S = 60, 10_000
+LARGEST_DOWNLOAD_BYTES = 10**11
+
+
+def fetch(url: str, sha256: str | None, folder: str | Path, location: str | None = None) -> Path:
+    """Return the file of `url`, downloaded when the cache does not hold it yet.
+
+    Args:
+        url: http or https.
+        sha256: the expected checksum; None accepts any and prints the actual one, so that it can be pinned.
+        folder: the cache; the file lies in it under the host and path of the URL, so that no two URLs share a file.
+        location: of the same data below data_dir, named in the message when the network fails.
+
+    Raises:
+        InputError: no network, an error answer, an interrupted transfer, or another checksum. What was downloaded is
+            removed then; a file that was in the cache before stays.
+    """
+    path = cached_path(url, folder)
+    if path.is_file():
+        _check(path, sha256, url, f"delete {path} to fetch it again or correct sha256 in the config")
+        return path
+    print(f"downloading {url} to {path}", file=sys.stderr)
+    with whole_file(path) as partial:
+        _download(url, partial, _remedy(path, location))
+        actual = _check(partial, sha256, url, "the download was removed; try again, or correct sha256 in the config")
+    if sha256 is None:
+        print(f"sha256 of {url}: {actual} (pin it in the config)", file=sys.stderr)
+    return path
+
+
+def cached_path(url: str, folder: str | Path) -> Path:
+    """Return where the cache keeps the file of `url`; InputError for an address that is not http or https."""
+    parts = urlsplit(url)
+    names = [name for name in parts.path.split("/") if name not in ("", ".", "..")]
+    if parts.scheme not in ("http", "https") or not parts.hostname or not names:
+        raise InputError(url, "is not an http or https address of a file", "correct url in the config")
+    if parts.query:
+        names[-1] += "_" + re.sub(r"[^\w.-]", "_", parts.query)
+    return Path(folder, parts.hostname, *names)
+
+
+def _check(path: Path, expected: str | None, url: str, remedy: str) -> str:
+    actual = sha256_of_file(path)
+    if expected is not None and actual != expected.lower():
+        raise InputError(url, f"the checksum does not match: expected sha256 {expected}, got {actual}", remedy)
+    return actual
+
+
+def _download(url: str, path: Path, remedy: str) -> None:
+    import pooch
+    import requests
+
+    download = pooch.HTTPDownloader(progressbar=True, chunk_size=1 << 16, timeout=TIMEOUT_S)
+    try:
+        _within_limits(lambda: download(url, str(path), None), url, path, remedy)
+    except requests.exceptions.HTTPError as fault:
+        answer = str(fault) if fault.response is None else f"{fault.response.status_code} {fault.response.reason}"
+        raise InputError(url, f"cannot be fetched: the server answered {answer}", remedy) from fault
+    except (requests.exceptions.ConnectionError, requests.exceptions.Timeout) as fault:
+        raise InputError(url, "cannot be reached", remedy) from fault
+    except requests.exceptions.RequestException as fault:
+        raise InputError(url, f"the transfer was interrupted ({type(fault).__name__})", remedy) from fault
+
+
+def _within_limits(download: Callable[[], object], url: str, path: Path, remedy: str) -> None:
+    """Run a download in a thread and watch the file grow; what it raises is raised here.
+
+    Raises:
+        InputError: too slow or too large. The thread is left to itself: it ends with the process.
+    """
+    faults = []
+
+    def run() -> None:
+        try:
+            download()
+        except BaseException as fault:
+            faults.append(fault)
+
+    thread = Thread(target=run, daemon=True)
+    started = monotonic()
+    thread.start()
+    while thread.is_alive():
+        thread.join(1)
+        size = path.stat().st_size if path.exists() else 0
+        if thread.is_alive() and size < SLOWEST_BYTES_PER_S * (monotonic() - started - GRACE_S):
+            raise InputError(url, f"sent {size} bytes in {monotonic() - started:.0f} s, which is too slow", remedy)
+        if size > LARGEST_DOWNLOAD_BYTES:
+            raise InputError(url, f"sends more than {LARGEST_DOWNLOAD_BYTES} bytes", remedy)
+    if faults:
+        raise faults[0]
+
+
+def _remedy(path: Path, location: str | None) -> str:
+    return f"set data_dir to a folder that contains {location or 'the data'}, or download it by hand to {path}"
+
+
+LARGEST_UNPACKED_BYTES = 20 * 10**9  # the largest archive of the BOP benchmark unpacks to somewhat less
 LONGEST_HEADER = 2**20  # bytes of what comes before a member, such as its long name; tarfile reads it as a whole
 REMEDY = "delete it and fetch it again, or check the url"
 _DAMAGE = (tarfile.TarError, zipfile.BadZipFile, gzip.BadGzipFile, EOFError, zlib.error, NotImplementedError)
@@ -49,7 +153,7 @@ class Member:
 
 
 @contextmanager
-def open_archive(path: str | Path, largest_bytes: int = LARGEST_BYTES) -> Iterator[list[Member]]:
+def open_archive(path: str | Path, largest_bytes: int = LARGEST_UNPACKED_BYTES) -> Iterator[list[Member]]:
     """Yield the regular files of an archive, readable within the context.
 
     Raises:
@@ -68,7 +172,7 @@ def open_archive(path: str | Path, largest_bytes: int = LARGEST_BYTES) -> Iterat
         yield members
 
 
-def unpack(path: str | Path, folder: str | Path, largest_bytes: int = LARGEST_BYTES) -> Path:
+def unpack(path: str | Path, folder: str | Path, largest_bytes: int = LARGEST_UNPACKED_BYTES) -> Path:
     """Unpack an archive into a folder, whole or not at all; where that was done before, every file is checked.
 
     Beside the folder stands a list of its files with their SHA-256.

@@ -1,0 +1,352 @@
+"""Point clouds in files: PCD (0.6, 0.7), npy, npz, xyz, csv, bin of KITTI, and LAS, LAZ, E57 by packages of their own.
+
+PCD: https://pointclouds.org/documentation/tutorials/pcd_file_format.html. Open3D's reader (0.19) takes a cut ascii
+file, a short row, a header without WIDTH or with an unknown TYPE for whole ones and fills the gaps with whatever the
+memory holds, and it reads a double after bytes as 0."""
+
+from __future__ import annotations
+
+import io
+import struct
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+
+from gpca.errors import InputError
+from gpca.io.limits import require_file, require_memory
+from gpca.numerals import whole
+from gpca.objects.canonical import require_points
+from gpca.objects.mesh_folder import LARGEST_TEXT_BYTES
+
+SCALARS = {
+    f"{kind}{size}" for kind, sizes in (("f", (4, 8)), ("i", (1, 2, 4, 8)), ("u", (1, 2, 4, 8))) for size in sizes
+}
+
+
+@dataclass(frozen=True)
+class _Header:
+    dtype: np.dtype  # one field per column of FIELDS, named by its position, since PCD repeats the name "_"
+    xyz: tuple[int, ...]  # positions of x, y, z
+    points: int
+    organized: bool
+    encoding: str
+
+    @property
+    def columns(self) -> list[np.dtype]:
+        return [self.dtype[name] for name in self.dtype.names or ()]
+
+
+def parse_pcd(content: bytes, subject: object) -> np.ndarray:
+    """Return the points of a PCD file.
+
+    Args:
+        content: the whole file.
+        subject: its name for messages.
+
+    Returns:
+        (P, 3) float64 in the file's unit. An organized cloud (HEIGHT > 1) marks missing depth by NaN, and those
+        points are left out; in any other cloud NaN is a fault.
+
+    Raises:
+        InputError: wrong header, fewer or more data than the header says, no points, NaN.
+    """
+    try:
+        header, body = _parse_header(content)
+        points = _DECODERS[header.encoding](body, header)
+    except (ValueError, KeyError, IndexError, TypeError, struct.error) as fault:
+        raise InputError(subject, f"is not a readable PCD file ({fault})", "fetch or export it again") from fault
+    if header.organized:
+        points = points[~np.isnan(points).any(axis=1)]
+    require_points(points, subject)
+    return points
+
+
+def _parse_header(content: bytes) -> tuple[_Header, bytes]:
+    values: dict[str, list[str]] = {}
+    position = 0
+    while "DATA" not in values:
+        end = content.find(b"\n", position)
+        if end < 0 or end - position > 10_000:
+            raise ValueError("wrong header: no DATA line")
+        key, *words = content[position:end].decode("ascii", "replace").split() or ["#"]
+        if not key.startswith("#"):
+            values[key] = words
+        position = end + 1
+    for key in ("FIELDS", "SIZE", "TYPE", "WIDTH", "HEIGHT", "POINTS"):
+        if not values.get(key):
+            raise ValueError(f"wrong header: no {key} line")
+    fields = values["FIELDS"]
+    sizes = values["SIZE"]
+    types = values["TYPE"]
+    counts = values.get("COUNT", ["1"] * len(fields))
+    if not len(fields) == len(sizes) == len(types) == len(counts):
+        raise ValueError("wrong header: FIELDS, SIZE, TYPE and COUNT differ in length")
+    scalars = [kind.lower() + size for kind, size in zip(types, sizes, strict=True)]
+    if not set(scalars) <= SCALARS:
+        raise ValueError("wrong header: unknown SIZE or TYPE")
+    if not {"x", "y", "z"} <= set(fields) or any(counts[fields.index(axis)] != "1" for axis in "xyz"):
+        raise ValueError("wrong header: FIELDS lacks x, y or z")
+    width, height, points = (whole(values[key][0], most=10**18) for key in ("WIDTH", "HEIGHT", "POINTS"))
+    if width * height != points:
+        raise ValueError("wrong header: POINTS is not WIDTH times HEIGHT")
+    encoding = " ".join(values["DATA"])
+    if encoding not in _DECODERS:
+        raise ValueError(f"wrong header: unknown DATA {encoding}")
+    dtype = np.dtype(
+        [(str(i), f"<{scalar}", (whole(count),)) for i, (scalar, count) in enumerate(zip(scalars, counts, strict=True))]
+    )
+    return _Header(dtype, tuple(fields.index(axis) for axis in "xyz"), points, height > 1, encoding), content[position:]
+
+
+def _ascii(body: bytes, header: _Header) -> np.ndarray:
+    columns = [field.shape[0] for field in header.columns]
+    starts = np.cumsum([0, *columns])
+    if header.points == 0:
+        return np.zeros((0, 3))
+    table = np.loadtxt(io.BytesIO(body), dtype=np.float64, ndmin=2, comments=None)
+    if table.shape != (header.points, starts[-1]):
+        raise ValueError(f"the header states {header.points}×{starts[-1]} values, but the file has {table.shape}")
+    return table[:, starts[list(header.xyz)]]
+
+
+def _binary(body: bytes, header: _Header) -> np.ndarray:
+    if len(body) != header.points * header.dtype.itemsize:
+        raise ValueError(
+            f"the header states {header.points * header.dtype.itemsize} bytes of data, but the file has {len(body)}"
+        )
+    table = np.frombuffer(body, header.dtype)
+    return np.column_stack([table[str(i)][:, 0] for i in header.xyz]).astype(np.float64)
+
+
+def _binary_compressed(body: bytes, header: _Header) -> np.ndarray:
+    compressed, size = struct.unpack_from("<II", body)
+    if len(body) < 8 + compressed:
+        raise ValueError("the file ends within its compressed data")
+    require_memory(size, compressed, "its compressed data", "")
+    columns = _lzf_decompress(body[8 : 8 + compressed], size)
+    if not len(columns) == size == header.points * header.dtype.itemsize:
+        raise ValueError("its compressed data does not have the size that the header states")
+    starts = header.points * np.cumsum([0, *(field.itemsize for field in header.columns)])
+    arrays = [np.frombuffer(columns, header.dtype[i].base, header.points, int(starts[i])) for i in header.xyz]
+    return np.column_stack(arrays).astype(np.float64)
+
+
+_DECODERS = {"ascii": _ascii, "binary": _binary, "binary_compressed": _binary_compressed}
+
+
+def _lzf_decompress(data: bytes, size: int) -> bytearray:
+    """Undo LZF: runs of literal bytes, and copies of up to 264 earlier bytes that may overlap what they write.
+
+    It stops once there are more than `size` bytes.
+    """
+    out = bytearray()
+    i = 0
+    while i < len(data) and len(out) <= size:
+        control = data[i]
+        i += 1
+        if control < 32:
+            out += data[i : i + control + 1]
+            i += control + 1
+            continue
+        length = control >> 5
+        if length == 7:
+            length += data[i]
+            i += 1
+        start = len(out) - ((control & 31) << 8) - data[i] - 1
+        i += 1
+        if start < 0:
+            raise ValueError("its compressed data is damaged")
+        length += 2
+        earlier = out[start : start + length]
+        out += (earlier * (length // len(earlier) + 1))[:length]
+    return out
+
+
+AXES = ("x", "y", "z")
+# What the array of points is called in an npz that holds others too, most usual first.
+NAMES = ("points", "xyz", "positions", "pos", "coords", "vertices", "pcd", "cloud", "data")
+KITTI_COLUMNS = 4  # x, y, z and the intensity, float32
+SEPARATORS = (",", ";", "\t")
+FARTHEST_KITTI = 1e4  # meters; no such scanner sees so far, so the file holds something else
+COLUMNS_REMEDY = "export it as three columns x, y, z"
+
+
+def read_table(path: Path) -> np.ndarray:
+    """Return the points (P, 3) of a file of one of the formats in `TABLE_READERS`, by its suffix."""
+    require_file(path, "no such file", COLUMNS_REMEDY)
+    return TABLE_READERS[path.suffix.lower()](path)
+
+
+def _npy(path: Path) -> np.ndarray:
+    return _points_of(_loaded(path), path)
+
+
+def _npz(path: Path) -> np.ndarray:
+    archive = _loaded(path)
+    with archive:
+        names = [name for name in NAMES if name in archive.files] or archive.files
+        if not names:
+            raise InputError(path, "holds no array", COLUMNS_REMEDY)
+        if len(names) > 1 and names == archive.files:
+            known = ", ".join(archive.files[:8])
+            raise InputError(path, f"holds several arrays ({known}), none of them named 'points'", "rename one")
+        try:
+            array = archive[names[0]]
+        except Exception as fault:  # numpy and zipfile raise errors of many kinds for a damaged archive
+            raise InputError(path, f"array '{names[0]}' cannot be read ({fault})", "save it again") from fault
+    return _points_of(array, path)
+
+
+def _loaded(path: Path):
+    try:
+        if path.suffix.lower() == ".npz":
+            _require_small(path)
+        return np.load(path, allow_pickle=False)
+    except InputError:
+        raise
+    except Exception as fault:
+        raise InputError(path, f"is not a readable {path.suffix} file ({fault})", "save it again") from fault
+
+
+def _require_small(path: Path) -> None:
+    import zipfile
+
+    with zipfile.ZipFile(path) as archive:
+        size = sum(info.file_size for info in archive.infolist())
+    require_memory(size, path.stat().st_size, path, "save it again")
+
+
+def _points_of(array: np.ndarray, path: Path) -> np.ndarray:
+    if array.dtype.names:
+        if not set(AXES) <= set(array.dtype.names):
+            raise InputError(path, f"has the fields {', '.join(array.dtype.names[:8])}, not x, y, z", COLUMNS_REMEDY)
+        array = np.stack([np.asarray(array[axis], np.float64).ravel() for axis in AXES], axis=1)
+    if array.dtype.kind not in "iuf":
+        raise InputError(path, f"holds values of type {array.dtype}, not numbers", COLUMNS_REMEDY)
+    if array.ndim == 3 and array.shape[2] == 3:  # one point per pixel, without one where depth is missing
+        array = array.reshape(-1, 3)
+        array = array[np.isfinite(array).all(axis=1)]
+    wrong = array.ndim == 2 and array.shape[0] == 3 != array.shape[1]  # three points are no cloud
+    if array.ndim != 2 or array.shape[1] < 3 or wrong:
+        raise InputError(path, f"has the shape {array.shape}, not (N, 3)", "transpose it" if wrong else COLUMNS_REMEDY)
+    return np.ascontiguousarray(array[:, :3], np.float64)
+
+
+def _text(path: Path) -> np.ndarray:
+    """Read columns that are parted by spaces, commas, semicolons or tabs; lines that begin with # are comments."""
+    require_file(path, "no such file", COLUMNS_REMEDY, LARGEST_TEXT_BYTES)
+    lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+    kept = [line for line in lines if line.strip() and not line.lstrip().startswith(("#", "//"))]
+    if not kept:
+        raise InputError(path, "has no points", COLUMNS_REMEDY)
+    separator = next((sign for sign in SEPARATORS if sign in kept[0]), None)
+    columns, body = _columns(kept, separator, path)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # of a table without rows
+            text = io.StringIO("\n".join(body))
+            table = np.loadtxt(text, np.float64, delimiter=separator, ndmin=2, usecols=columns, comments=None)
+    except (ValueError, IndexError) as fault:
+        raise InputError(path, f"is no table of numbers ({fault})", COLUMNS_REMEDY) from fault
+    if table.shape[1] != 3 or not len(table):
+        raise InputError(path, "has no points", COLUMNS_REMEDY)
+    return table
+
+
+def _columns(lines: list[str], separator: str | None, path: Path) -> tuple[tuple[int, ...], list[str]]:
+    """Return which columns are x, y, z, and the lines below a header, if there is one."""
+    words = [word.strip().strip('"').lower() for word in lines[0].split(separator)]
+    if not any(map(_is_number, words)):
+        if not set(AXES) <= set(words):
+            raise InputError(path, f"has the columns {', '.join(words[:8])}, not x, y, z", COLUMNS_REMEDY)
+        return tuple(words.index(axis) for axis in AXES), lines[1:]
+    if len(words) == 1 and len(lines) > 1 and _is_number(words[0]):  # how many points follow
+        return (0, 1, 2), lines[1:]
+    if len(words) < 3:
+        raise InputError(path, f"has {len(words)} columns", COLUMNS_REMEDY)
+    return (0, 1, 2), lines
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
+
+
+def _kitti(path: Path) -> np.ndarray:
+    values = np.fromfile(path, "<f4")
+    if path.stat().st_size % (4 * KITTI_COLUMNS):
+        fault = f"has {path.stat().st_size} bytes, which are no rows of 4 float32 (x, y, z, intensity)"
+        raise InputError(path, fault, "give a scan of KITTI, or save it as npy")
+    points = values.reshape(-1, KITTI_COLUMNS)[:, :3].astype(np.float64)
+    with np.errstate(invalid="ignore"):
+        if not (np.abs(points) <= FARTHEST_KITTI).all():
+            fault = "holds no rows of 4 float32 (x, y, z, intensity) in meters, as scans of KITTI do"
+            raise InputError(path, fault, "save it as npy")
+    return points
+
+
+TABLE_READERS: dict[str, Callable[[Path], np.ndarray]] = {
+    ".npy": _npy,
+    ".npz": _npz,
+    ".xyz": _text,
+    ".csv": _text,
+    ".bin": _kitti,
+}
+
+
+PACKAGES = {".las": "laspy", ".laz": "laspy", ".e57": "pye57"}
+INSTALL = {"laspy": "pip install 'laspy[lazrs]'", "pye57": "pip install pye57"}
+CARTESIAN = ("cartesianX", "cartesianY", "cartesianZ")
+
+
+def read_scanner_file(path: Path) -> np.ndarray:
+    """Return the points (P, 3) float64 of a file of one of the formats in `PACKAGES`, by its suffix.
+
+    All scans of an E57 file are joined in the frame of the file.
+
+    Raises:
+        InputError: no such file, a missing package (the line says how to install it), or a file that it cannot read.
+    """
+    require_file(path, "no such file", "give a LAS, LAZ or E57 file")
+    name = PACKAGES[path.suffix.lower()]
+    module = _package(name, path)
+    try:
+        return np.asarray(SCANNER_READERS[name](module, path), np.float64)
+    except InputError:
+        raise
+    except Exception as fault:  # of many kinds, some from C++
+        remedy = INSTALL[name] if "LazBackend" in str(fault) else "export it again, or as PLY"
+        raise InputError(path, f"cannot be read ({fault})", remedy) from fault
+
+
+def _package(name: str, path: Path) -> ModuleType:
+    try:
+        return import_module(name)
+    except ImportError as fault:
+        raise InputError(path, f"needs the package {name}, which is not installed", INSTALL[name]) from fault
+
+
+def _las(laspy: ModuleType, path: Path) -> np.ndarray:
+    return laspy.read(path).xyz
+
+
+def _e57(pye57: ModuleType, path: Path) -> np.ndarray:
+    file = pye57.E57(str(path))
+    try:
+        if not file.scan_count:
+            raise InputError(path, "holds no scan", "export it again")
+        scans = [file.read_scan(number, ignore_missing_fields=True) for number in range(file.scan_count)]
+    finally:
+        file.close()
+    return np.concatenate([np.stack([scan[axis] for axis in CARTESIAN], axis=1) for scan in scans])
+
+
+SCANNER_READERS: dict[str, Callable[[ModuleType, Path], np.ndarray]] = {"laspy": _las, "pye57": _e57}
