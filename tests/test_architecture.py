@@ -9,7 +9,7 @@ import pytest
 from .documents import ROOT
 
 PAGE = (ROOT / "docs/architecture.md").read_text()
-LONGEST = 300  # lines
+LONGEST = 400  # lines
 MOST_AT_THE_TOP = 24  # modules
 MODULES = sorted([*(ROOT / "gpca").rglob("*.py"), *(ROOT / "baselines").rglob("*.py")])
 

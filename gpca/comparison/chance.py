@@ -1,21 +1,32 @@
-"""How informative the verdicts are about rows: how many shuffled values would agree too, and how the ranks agree.
+"""How many shuffled numbers would agree too: chance of the verdicts, and of the share of close numbers.
 
-Within each column of a table, values that stand beside the wrong printed numbers may agree with them as often as beside
-the right ones; then the counts of verdicts carry no information about the rows.
+Within each column of a table, values beside the wrong printed numbers may agree with them as often as beside the right
+ones; the counts of verdicts then carry no information about the rows. Joint readings are searched by the share of close
+numbers with equal weights of tables (docs/comparison.md); its chance is that of permuted printed numbers.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.comparison.published import TIMES, UNITS
+from gpca.comparison.published import TIMES, UNITS, Number
 from gpca.comparison.values import Reproduced
-from gpca.comparison.verdicts import CLOSE, JUDGED, REPRODUCED, Printed, Tolerance, judged_once, verdict_of
+from gpca.comparison.verdicts import (
+    CLOSE,
+    JUDGED,
+    REPRODUCED,
+    Printed,
+    Tolerance,
+    distance,
+    exactly,
+    judged_once,
+    verdict_of,
+)
 from gpca.seeds import generator
 
 if TYPE_CHECKING:
@@ -23,7 +34,10 @@ if TYPE_CHECKING:
 
 SHUFFLES = 10_000
 ALL = "all"
-_TIME = "time"
+WITHIN: Mapping[str, Callable[[Number], tuple[str, ...]]] = {  # printed numbers of one group may change places
+    "unit": lambda number: (number.table, number.unit),
+    "column": lambda number: (number.table, number.column, number.unit),
+}
 
 
 @dataclass(frozen=True)
@@ -32,9 +46,9 @@ class Chance:
 
     Attributes:
         agree: how many numbers are reproduced or close.
-        expected: how many would be, on average, with the run's values shuffled within the column.
-        p: share of the shuffles, the run's own order among them, in which as many are; NaN where none is possible.
-        rho: Spearman's rank correlation, the ranks taken within each column; NaN where no column has two values.
+        expected: the mean of that count with the run's values shuffled within the column.
+        p: share of the shuffles, the run's order included, with at least as many; NaN where no shuffle is possible.
+        rho: Spearman's rank correlation, with ranks within each column; NaN where no column has two values.
     """
 
     agree: int
@@ -44,74 +58,81 @@ class Chance:
 
 
 def chance(comparison: pd.DataFrame, tolerances: Mapping[str, Tolerance]) -> dict[str, Chance]:
-    """Return table (and `ALL`) -> :class:`Chance`, of the judged means; repeats of a value are left out.
+    """Return table (and `ALL`) -> :class:`Chance` of the judged means; repeats of a value are left out.
 
     Args:
         comparison: as :func:`gpca.comparison.verdicts.compare` returns it, or as read from its file.
-        tolerances: one for each unit.
+        tolerances: by unit.
     """
     rows = judged_once(comparison)
     rows = rows[rows["verdict"].isin(JUDGED)]
-    kinds = rows["unit"].where(~rows["unit"].isin(TIMES), _TIME)
-    shuffled: dict[str, np.ndarray] = {}
-    ranked: dict[str, list[np.ndarray]] = {}
-    expected: dict[str, float] = {}
-    agree: dict[str, int] = {}
-    movable: dict[str, bool] = {}
+    kinds = rows["unit"].where(~rows["unit"].isin(TIMES), "time")
+    columns: dict[str, list[tuple]] = {}  # per table: counts of agreement and centered ranks of each column
     for (table, column, _), group in rows.groupby(["table", "column", kinds], sort=False):
         fits_K_K = _fits(group, tolerances)
         random = generator("verdicts by chance", table, column)
         order_B_K = random.permuted(np.tile(np.arange(len(group)), (SHUFFLES, 1)), axis=1)
         hits_B = fits_K_K[np.arange(len(group)), order_B_K].sum(axis=1)
+        factor = group["unit"].map(lambda unit: UNITS[unit].factor)  # times in seconds
+        ranks_K_2 = np.stack([(group[name] / factor).rank() for name in ("published", "reproduced")], axis=1)
+        measured = (int(fits_K_K.trace()), fits_K_K.sum() / len(group), hits_B, ranks_K_2 - ranks_K_2.mean(axis=0))
         for name in (table, ALL):
-            shuffled[name] = shuffled.get(name, 0) + hits_B
-            ranked.setdefault(name, []).append(_centered_ranks(group))
-            expected[name] = expected.get(name, 0.0) + fits_K_K.sum() / len(group)
-            agree[name] = agree.get(name, 0) + int(fits_K_K.trace())
-            movable[name] = movable.get(name, False) or len(group) > 1
-    return {
-        name: Chance(
-            agree[name],
-            float(expected[name]),
-            float((1 + (hits_B >= agree[name]).sum()) / (1 + SHUFFLES)) if movable[name] else math.nan,
-            _correlation(np.concatenate(ranked[name])),
-        )
-        for name, hits_B in shuffled.items()
-    }
+            columns.setdefault(name, []).append(measured)
+    chances = {}
+    for name, parts in columns.items():
+        agree, expected, hits_B = (sum(part[i] for part in parts) for i in range(3))
+        ranks_N_2 = np.concatenate([part[3] for part in parts])
+        movable = len(ranks_N_2) > len(parts)
+        p = float((1 + (hits_B >= agree).sum()) / (1 + SHUFFLES)) if movable else math.nan
+        one_N, other_N = ranks_N_2.T
+        norm = math.sqrt((one_N @ one_N) * (other_N @ other_N))
+        chances[name] = Chance(agree, float(expected), p, float(one_N @ other_N / norm) if norm else math.nan)
+    return chances
 
 
 def _fits(group: pd.DataFrame, tolerances: Mapping[str, Tolerance]) -> np.ndarray:
     """Return (K, K): whether the printed number i agrees with the run's value j."""
     rows = list(group.itertuples())
-    values = [_reproduced(row) for row in rows]
+    values = [
+        Reproduced(
+            row.reproduced, row.ci_low, row.ci_high, int(row.n), bool(row.at_least), row.cluster_low, row.cluster_high
+        )
+        for row in rows
+    ]
     fits_K_K = np.zeros((len(rows), len(rows)), dtype=bool)
-    for i, printed in enumerate(rows):
-        for j, measured in enumerate(rows):
-            in_unit = values[j].times(UNITS[printed.unit].factor / UNITS[measured.unit].factor)
-            fits_K_K[i, j] = verdict_of(_printed(printed), in_unit, tolerances[printed.unit]) in (REPRODUCED, CLOSE)
+    for i, row in enumerate(rows):
+        upper = row.published if math.isnan(row.upper) else row.upper
+        low, high = (row.published, upper) if math.isnan(row.paper_low) else (row.paper_low, row.paper_high)
+        printed = Printed(row.published, upper, 0.5 * 10.0**-row.decimals, low, high)
+        for j, (measured, value) in enumerate(zip(rows, values, strict=True)):
+            in_unit = value.times(UNITS[row.unit].factor / UNITS[measured.unit].factor)
+            fits_K_K[i, j] = verdict_of(printed, in_unit, tolerances[row.unit]) in (REPRODUCED, CLOSE)
     return fits_K_K
 
 
-def _printed(row) -> Printed:
-    upper = row.published if math.isnan(row.upper) else row.upper
-    low, high = (row.published, upper) if math.isnan(row.paper_low) else (row.paper_low, row.paper_high)
-    return Printed(row.published, upper, 0.5 * 10.0**-row.decimals, low, high)
+def is_close(number: Number, value: float, at_least: bool, tolerance: Tolerance) -> bool:
+    """Return whether a value, in the number's unit, lies within the close tolerance; a lower bound never does."""
+    return not at_least and abs(distance(exactly(number), value, tolerance)) <= 1
 
 
-def _reproduced(row) -> Reproduced:
-    return Reproduced(
-        row.reproduced, row.ci_low, row.ci_high, int(row.n), bool(row.at_least), row.cluster_low, row.cluster_high
-    )
+def weights(numbers: Sequence[Number]) -> np.ndarray:
+    """Return the weights (K,) of numbers, which sum to 1: equal for all tables, and for all numbers of a table."""
+    tables = [number.table for number in numbers]
+    return np.array([1 / (len(set(tables)) * tables.count(table)) for table in tables])
 
 
-def _centered_ranks(group: pd.DataFrame) -> np.ndarray:
-    """Return (K, 2): ranks of the printed numbers and of the run's, less their mean; times in seconds."""
-    factor = group["unit"].map(lambda unit: UNITS[unit].factor)
-    ranks_K_2 = np.stack([(group[name] / factor).rank() for name in ("published", "reproduced")], axis=1)
-    return ranks_K_2 - ranks_K_2.mean(axis=0)
+def permuted(numbers: Sequence[Number], within: str, repeats: int) -> np.ndarray:
+    """Return (repeats, K): the number whose printed value takes the place of each, permuted within groups."""
+    groups: dict[tuple[str, ...], list[int]] = {}
+    for index, number in enumerate(numbers):
+        groups.setdefault(WITHIN[within](number), []).append(index)
+    permuted_D_K = np.tile(np.arange(len(numbers)), (repeats, 1))
+    for group, indices in groups.items():
+        random = generator("printed numbers dealt anew", within, *group)
+        permuted_D_K[:, indices] = random.permuted(np.tile(indices, (repeats, 1)), axis=1)
+    return permuted_D_K
 
 
-def _correlation(ranks_N_2: np.ndarray) -> float:
-    one_N, other_N = ranks_N_2.T
-    norm = math.sqrt((one_N @ one_N) * (other_N @ other_N))
-    return float(one_N @ other_N / norm) if norm else math.nan
+def p_value(actual: float, by_chance_D: np.ndarray) -> float:
+    """Return the share of the permutations, the actual order included, that reach as much."""
+    return float((1 + (by_chance_D >= actual - 1e-12).sum()) / (1 + len(by_chance_D)))

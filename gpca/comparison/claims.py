@@ -1,24 +1,53 @@
-"""The paper's claims in sentences, and the comparison of a run's values that each stands for: ``claims.yaml``."""
+"""The paper's claims in sentences (``claims.yaml``) and the verdict on each, from a run's differences.
+
+A difference is taken seed by seed, with Student's interval over the seeds. Shares of samples with stored predictions
+have a second interval, by the bootstrap over clusters and seeds with common draws; the outermost bounds count. "As good
+as" is supported by two one-sided tests: the whole interval lies within the margin. A difference on the claimed side
+that is smaller than the margin is no refutation, and has a verdict of its own.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
 
-from gpca.comparison.published import Counterpart
+import numpy as np
+
+from gpca.attribution.confidence import NO_WIDTH
+from gpca.attribution.diagnostics import calibration_error
+from gpca.attribution.metrics import ALL, TIDY_COLUMNS, mean_interval, source_method_seed
+from gpca.attribution.predictions import concepts_of, read_predictions
+from gpca.comparison.published import UNITS, Counterpart
+from gpca.comparison.values import RUNTIME, ShareDraws, runtime_mean, values_by_seed
+from gpca.comparison.verdicts import INCONCLUSIVE, NOT_COMPARABLE, NOT_RUN
+from gpca.io.csv_file import read_numbers
 from gpca.io.structured_text import load_own_yaml
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 CLAIMS = Path(__file__).with_name("claims.yaml")
-PREDICTIONS = "predictions"  # stands for a file: the calibration that is computed from predictions
+PREDICTIONS = "predictions"  # in the place of a file: scores' measures that are computed from predictions
 FIRST_SET = "2026-11-22"  # a day after the first reference on real objects, which had shown the differences
-Value = str | float | Mapping  # a method, a number, or what differs from the rest of the place
+LEVEL = 0.95
+SUPPORTED, REFUTED, SMALLER = "supported", "refuted", "smaller than the margin"
+CLAIM_VERDICTS = (SUPPORTED, SMALLER, REFUTED, INCONCLUSIVE, NOT_COMPARABLE, NOT_RUN)
+CLAIM_COLUMNS = (
+    *("claim", "sentence", "place", "test", "unit", "margin", "ratio", "source", "table", "one", "other"),
+    *("value", "low", "high", "n", "at_floor", "verdict", "claim_verdict", "note", "margin_set", "values_known"),
+)
+Value = str | float | Mapping  # a method, a number, or the entries that differ from the claim's
+Bounds = tuple[float, float]
 
 
 @dataclass(frozen=True)
 class Compared:
-    """Two values that a claim compares; a number stands for itself, in the claim's unit."""
+    """Two values that a claim compares: a run's, or a constant in the claim's unit."""
 
     one: Counterpart | float
     other: Counterpart | float
@@ -37,7 +66,7 @@ class Claim:
         test: greater, less, not_worse or equivalent.
         margin: the smallest difference that counts, in `unit`; with `ratio`, a factor.
         margin_set: the day on which the margin entered git.
-        values_known: whether the differences that it judges had been seen by then.
+        values_known: whether the differences had been seen by then.
         compared: the comparisons, all of which have to hold; empty where nothing was run, and then `note` says why.
     """
 
@@ -54,43 +83,306 @@ class Claim:
     note: str = ""
 
 
+@dataclass(frozen=True)
+class Difference:
+    """A difference of two values, or of their logarithms for a claim about a ratio.
+
+    Attributes:
+        bounds: of its interval, by level.
+        n: repeats.
+        at_least, at_most: the difference is a lower or an upper bound, as some repeats were censored.
+        at_floor: both values are at the unit's minimum in at least half of the repeats.
+    """
+
+    value: float
+    bounds: Mapping[float, Bounds]
+    n: int
+    at_least: bool = False
+    at_most: bool = False
+    at_floor: bool = False
+
+
 def read_claims() -> list[Claim]:
-    """Return the claims, in the order of the file; a test holds it to what its head says."""
-    return [_claim(entry) for entry in load_own_yaml(CLAIMS)]
+    """Return the claims, in the order of the file; a test checks it against the rules at its head."""
+    claims = []
+    for entry in load_own_yaml(CLAIMS):
+        compared = tuple(pair for each in entry.get("comparisons", ()) for pair in _pairs(entry["of"], **each))
+        fields = {name: value for name, value in entry.items() if name not in ("of", "comparisons")}
+        claims.append(Claim(**fields, compared=compared))
+    return claims
 
 
 def counterparts_of(claims: Iterable[Claim]) -> list[Counterpart]:
     """Return all values of a run that the claims compare."""
-    return [place for claim in claims for compared in claim.compared for place in compared.counterparts]
-
-
-def _claim(entry: Mapping) -> Claim:
-    compared = tuple(pair for comparison in entry.get("comparisons", ()) for pair in _pairs(entry["of"], **comparison))
-    return Claim(**{name: entry[name] for name in entry if name not in ("of", "comparisons")}, compared=compared)
+    return [counterpart for claim in claims for compared in claim.compared for counterpart in compared.counterparts]
 
 
 def _pairs(of: Mapping, one: Value, others: Sequence[Value]) -> Iterator[Compared]:
     """Yield every pair of one comparison, by source and table."""
-    sources, tables = (_listed(of.get(name)) for name in ("source", "in_table"))
-    for other, source, table in product(others, sources, tables):
-        place = {**of, "source": source, "in_table": table}
-        yield Compared(_value(place, one), _value(place, other))
+    listed = (value if isinstance(value, list) else [value] for value in (of.get("source"), of.get("in_table")))
+    for other, source, table in product(others, *listed):
+        shared = {**of, "source": source, "in_table": table}
+        yield Compared(_value(shared, one), _value(shared, other))
 
 
-def _value(place: Mapping, own: Value) -> Counterpart | float:
-    if isinstance(own, int | float):
-        return float(own)
-    full = {**place, **(own if isinstance(own, Mapping) else {"method": own})}
-    return Counterpart(
-        full["in_file"],
-        full["in_table"],
-        (full["source"],),
-        tuple(full["method"].split("+")),
-        tuple(full["metric"].split("/")),
-        full["concept"],
-        "mean",
+def _value(shared: Mapping, value: Value) -> Counterpart | float:
+    if isinstance(value, int | float):
+        return float(value)
+    full = {**shared, **(value if isinstance(value, Mapping) else {"method": value})}
+    methods, metrics = tuple(full["method"].split("+")), tuple(full["metric"].split("/"))
+    return Counterpart(full["in_file"], full["in_table"], (full["source"],), methods, metrics, full["concept"], "mean")
+
+
+def judge(
+    claims: Sequence[Claim],
+    results: Mapping[str, pd.DataFrame],
+    objects: Mapping[str, Mapping],
+    prediction_files: Iterable[str | Path] = (),
+    clusters: Mapping[Counterpart, ShareDraws] = MappingProxyType({}),
+    floors: Mapping[str, float] = MappingProxyType({}),
+) -> pd.DataFrame:
+    """Return `CLAIM_COLUMNS`, a row per comparison, or one for a claim without any.
+
+    A claim is supported if all of its comparisons are. It is refuted, or smaller than the margin, if one comparison is
+    by a Bonferroni interval (level divided by the number of comparisons). Values that the run lacks are "not run", and
+    those of stand-ins "not comparable"; the other comparisons then decide.
+
+    Args:
+        results: file name -> its rows, as :func:`gpca.comparison.values.read_results` reads them.
+        objects: source -> ``{"title": str, "stand_in": bool}``.
+        prediction_files: named ``…/predictions/{source}/{method}/seed{seed}.csv``, for claims about scores.
+        clusters: counterpart -> its bootstrap draws, for claims about shares of samples.
+        floors: unit -> the minimum that a run can have. A comparison is inconclusive where both values are at it in at
+            least half of the seeds.
+    """
+    import pandas as pd
+
+    results = {**results, PREDICTIONS: score_measures(claims, prediction_files)}
+    records = []
+    for claim in claims:
+        fields = {name: getattr(claim, name) for name in ("sentence", "place", "note", "margin_set", "values_known")}
+        fields["claim"] = claim.name
+        if not claim.compared:
+            records.append({**fields, "verdict": NOT_RUN, "claim_verdict": NOT_RUN})
+            continue
+        rows, strict_verdicts = [], []
+        strict = 1 - (1 - LEVEL) / len(claim.compared)
+        for compared in claim.compared:
+            difference = difference_of(claim, compared, results, clusters, (LEVEL, strict), floors.get(claim.unit))
+            row, strict_verdict = _row(claim, compared, difference, objects, strict)
+            rows.append(fields | row)
+            strict_verdicts.append(strict_verdict)
+        verdicts = [row["verdict"] for row in rows]
+        judged = set(verdicts) - {NOT_RUN, NOT_COMPARABLE}
+        if not judged:
+            claim_verdict = NOT_COMPARABLE if NOT_COMPARABLE in verdicts else NOT_RUN
+        else:
+            against = (verdict for verdict in (REFUTED, SMALLER) if verdict in strict_verdicts)
+            claim_verdict = next(against, SUPPORTED if judged == {SUPPORTED} else INCONCLUSIVE)
+        records += [row | {"claim_verdict": claim_verdict} for row in rows]
+    return pd.DataFrame(records, columns=list(CLAIM_COLUMNS)).astype({"n": "Int64"})
+
+
+def _row(claim: Claim, compared: Compared, difference: Difference | None, objects, strict: float) -> tuple[dict, str]:
+    """Return the columns of a comparison, and its verdict by the stricter interval."""
+    counterparts = compared.counterparts
+    row: dict[str, object] = {
+        **{"test": claim.test, "unit": claim.unit, "margin": claim.margin, "ratio": claim.ratio},
+        **{"source": counterparts[0].sources[0], "table": counterparts[0].table, "at_floor": False},
+        **{name: _name(getattr(compared, name), counterparts) for name in ("one", "other")},
+    }
+    if difference is None:
+        return row | {"verdict": NOT_RUN}, NOT_RUN
+    (low, high), strict_bounds = (difference.bounds[level] for level in (LEVEL, strict))
+    shown = (math.exp(bound) if claim.ratio else bound for bound in (difference.value, low, high))
+    row |= {name: round(bound, 6) for name, bound in zip(("value", "low", "high"), shown, strict=True)}
+    row |= {"n": difference.n, "at_floor": difference.at_floor}
+    sources = (counterpart.sources[0] for counterpart in counterparts)
+    if any(objects[source]["stand_in"] for source in sources if source in objects):
+        return row | {"verdict": NOT_COMPARABLE}, NOT_COMPARABLE
+    if difference.at_floor:
+        return row | {"verdict": INCONCLUSIVE}, INCONCLUSIVE
+    # A censored difference may be larger or smaller than it looks, which leaves one of the answers open.
+    may_rise, may_fall = difference.at_least, difference.at_most
+    if claim.test == "less":
+        may_rise, may_fall = may_fall, may_rise
+    is_open = {
+        SUPPORTED: may_fall or (may_rise and claim.test == "equivalent"),
+        SMALLER: may_rise or may_fall,
+        REFUTED: may_rise,
+    }
+    verdicts = (verdict_of_interval(claim, *bounds) for bounds in ((low, high), strict_bounds))
+    verdict, strict_verdict = (INCONCLUSIVE if is_open.get(verdict) else verdict for verdict in verdicts)
+    return row | {"verdict": verdict}, strict_verdict
+
+
+def verdict_of_interval(claim: Claim, low: float, high: float) -> str:
+    """Return whether a difference, of logarithms with `ratio`, with these bounds supports or refutes the claim."""
+    margin = math.log(claim.margin) if claim.ratio else claim.margin
+    if claim.test == "less":
+        low, high = -high, -low
+    if math.isnan(low) or math.isnan(high):
+        return INCONCLUSIVE
+    if claim.test in ("greater", "less"):
+        supported, refuted = low > 0 and high >= margin, high < 0
+        if 0 <= high < margin:
+            return SMALLER
+    elif claim.test == "not_worse":
+        supported, refuted = low > -margin, high < -margin
+    else:
+        supported, refuted = -margin < low and high < margin, low > margin or high < -margin
+    return SUPPORTED if supported else REFUTED if refuted else INCONCLUSIVE
+
+
+def _name(value: Counterpart | float, counterparts: Sequence[Counterpart]) -> str:
+    """Name a value by what distinguishes it from the other: its method, or its metric where both have one method.
+
+    A value that is compared with a constant also names its concept.
+    """
+    if not isinstance(value, Counterpart):
+        return f"{value:g}"
+    if len(counterparts) == 1 and value.concept != ALL:
+        return f"{'+'.join(value.methods)} {value.concept}"
+    if len({counterpart.methods for counterpart in counterparts}) < len(counterparts):
+        return f"{value.concept} {value.metrics[0]}"
+    return "+".join(value.methods)
+
+
+def difference_of(
+    claim: Claim,
+    compared: Compared,
+    results: Mapping[str, pd.DataFrame],
+    clusters: Mapping[Counterpart, ShareDraws],
+    levels: Iterable[float],
+    floor: float | None = None,
+) -> Difference | None:
+    """Return a comparison's difference in the claim's unit, with intervals of these levels; None if the run lacks it.
+
+    Args:
+        floor: the minimum of the unit.
+    """
+    files = {counterpart.file for counterpart in compared.counterparts}
+    if not files <= set(results):
+        return None
+    if files == {RUNTIME}:
+        return _runtime_difference(claim, compared, results[RUNTIME], levels)
+    values: list[Any] = []  # a series by seed, or a constant
+    censored = []
+    for value in (compared.one, compared.other):
+        if isinstance(value, Counterpart):
+            value_R, at_least = values_by_seed(results[value.file], value)
+            values.append(value_R * UNITS[claim.unit].factor)
+            censored.append(at_least)
+        else:
+            values.append(value)
+            censored.append(False)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        one, other = (np.log(value) for value in values) if claim.ratio else values
+        difference_R = np.asarray((one - other).dropna(), dtype=float)
+    if not len(difference_R):
+        return None
+    if not np.isfinite(difference_R).all():
+        difference_R = np.full(len(difference_R), np.nan)
+    bounds = {level: mean_interval(difference_R, level)[1:] for level in levels}
+    if claim.unit == "%" and not claim.ratio:
+        if np.ptp(difference_R) < NO_WIDTH:  # equal seeds do not show how wide the interval of a share is
+            bounds = dict.fromkeys(bounds, (math.nan, math.nan))
+        for level, (low, high) in bounds.items():
+            cluster_low, cluster_high = _cluster_bounds(claim, compared, clusters, level)
+            bounds[level] = float(np.fmin(low, cluster_low)), float(np.fmax(high, cluster_high))
+    at_floor = False
+    if floor is not None and len(compared.counterparts) == 2:
+        at_floor = bool(((values[0] <= floor) & (values[1] <= floor)).mean() >= 0.5)
+    at_least, at_most = censored
+    return Difference(float(difference_R.mean()), bounds, len(difference_R), at_least, at_most, at_floor)
+
+
+def _cluster_bounds(claim: Claim, compared: Compared, clusters: Mapping[Counterpart, ShareDraws], level) -> Bounds:
+    """Return the bounds over clusters and seeds in the claim's unit; NaN where a value is no share of samples."""
+    factor = UNITS[claim.unit].factor
+    one, other = (
+        clusters.get(value) if isinstance(value, Counterpart) else value / factor
+        for value in (compared.one, compared.other)
     )
+    match one, other:
+        case ShareDraws(), ShareDraws():
+            low, high = one.bounds_of_difference(other, level)
+        case ShareDraws(), float():
+            low, high = (bound - other for bound in one.bounds(level))
+        case float(), ShareDraws():
+            high, low = (one - bound for bound in other.bounds(level))
+        case _:
+            return math.nan, math.nan
+    return factor * low, factor * high
 
 
-def _listed(entry: object) -> list:
-    return entry if isinstance(entry, list) else [entry]
+def _runtime_difference(
+    claim: Claim, compared: Compared, rows: pd.DataFrame, levels: Iterable[float]
+) -> Difference | None:
+    """Compare mean seconds of independent measurements; logarithms by the delta method."""
+    from scipy.stats import t as student_t
+
+    means = [mean for counterpart in compared.counterparts if (mean := runtime_mean(rows, counterpart)) is not None]
+    if len(means) < 2:
+        return None
+    (one, error, n), (other, other_error, other_n) = means
+    n = min(n, other_n)
+    if claim.ratio:
+        value, error = math.log(one / other), math.hypot(error / one, other_error / other)
+    else:
+        factor = UNITS[claim.unit].factor
+        value, error = factor * (one - other), factor * math.hypot(error, other_error)
+    widths = {level: student_t.ppf((1 + level) / 2, n - 1) * error if n > 1 else math.nan for level in levels}
+    return Difference(value, {level: (value - width, value + width) for level, width in widths.items()}, n)
+
+
+def score_measures(claims: Sequence[Claim], prediction_files: Iterable[str | Path]) -> pd.DataFrame:
+    """Return the measures of scores in prediction files that the claims compare, tidy, by seed.
+
+    - ece: the expected calibration error.
+    - separability: :func:`separability`.
+    """
+    import pandas as pd
+
+    wanted = {(c.sources[0], c.methods[0]) for c in counterparts_of(claims) if c.file == PREDICTIONS}
+    records = []
+    for path in prediction_files:
+        source, method, seed = source_method_seed(path)
+        if (source, method) in wanted and Path(path).parts[-4] == PREDICTIONS:
+            rows = read_predictions(path)
+            rows = rows[(rows["split"] == "test") & ~rows["abstained"]]
+            concepts = concepts_of(rows)
+            scores_S_C = rows[[f"score_{concept}" for concept in concepts]].to_numpy(float)
+            p_S_C = scores_S_C / scores_S_C.sum(axis=1, keepdims=True)
+            target_S = np.array([concepts.index(concept) for concept in rows["concept_true"]])
+            values = {"ece": calibration_error(p_S_C, target_S), "separability": separability(p_S_C, target_S)}
+            records += [("scores", source, method, name, ALL, seed, value) for name, value in values.items()]
+    return pd.DataFrame(records, columns=list(TIDY_COLUMNS))
+
+
+def separability(p_S_C: np.ndarray, target_S: np.ndarray) -> float:
+    """Return the mean pairwise AUROC of scores (S, C), over all ordered pairs of classes (Hand and Till 2001).
+
+    It is 0.5 by chance, and NaN for fewer than two classes.
+    """
+    from sklearn.metrics import roc_auc_score
+
+    present = np.unique(target_S)
+    areas = [
+        roc_auc_score(target_S[pair_S] == one, p_S_C[pair_S, one])
+        for one in present
+        for other in present
+        if one != other
+        for pair_S in [np.isin(target_S, (one, other))]
+    ]
+    return float(np.mean(areas)) if areas else math.nan
+
+
+def read_verdicts(path: str | Path) -> pd.DataFrame:
+    """Read what :func:`judge` returned; claims that were not run have no numbers.
+
+    Raises:
+        InputError: missing, empty or unreadable file, missing column, invalid number.
+    """
+    measured = ("value", "low", "high", "n")
+    return read_numbers(path, CLAIM_COLUMNS, measured, optional=measured)

@@ -1,7 +1,4 @@
-"""The numbers that the paper prints, in its tables and text, and why some were not reached (docs/comparison.md).
-
-They stand in ``published.csv`` and ``reasons.csv``.
-"""
+"""The numbers that the paper prints (``published.csv``) and the reasons of misses (``reasons.csv``)."""
 
 from __future__ import annotations
 
@@ -13,8 +10,8 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 PUBLISHED = Path(__file__).with_name("published.csv")
-HARDWARE = {"CPU": "Intel i7-12700K", "GPU": "NVIDIA RTX 3090"}  # on which the paper measured its times (Sec. IV-E)
-TEXT = "text"  # stands for the running text in the column `table`; its rows and columns are free
+HARDWARE = {"CPU": "Intel i7-12700K", "GPU": "NVIDIA RTX 3090"}  # of the paper's times (Sec. IV-E)
+TEXT = "text"  # in the column `table`: the running text; its rows and columns are free
 REASONS = PUBLISHED.with_name("reasons.csv")
 NONE_YET = "no reason found yet"
 
@@ -94,13 +91,13 @@ class Counterpart:
     """The value of a run that stands beside a printed number.
 
     Attributes:
-        file: its CSV file in ``results/{run}/``.
-        table: the value of `table` in its tidy rows; "components" for ``runtime.csv``.
-        sources: their mean is taken, seed by seed; of ``runtime.csv`` "model", what the model was trained on.
-        methods: their sum is taken.
-        metrics: one, or two of which the first is divided by the second.
-        concept: the value of `concept` in the tidy rows; the device for ``runtime.csv``.
-        statistic: how the values over the seeds become one, mean or deviation.
+        file: CSV file in ``results/{run}/``.
+        table: as in the tidy rows; "components" for ``runtime.csv``.
+        sources: averaged seed by seed; "model" for ``runtime.csv``.
+        methods: summed.
+        metrics: one, or dividend and divisor.
+        concept: as in the tidy rows; the device for ``runtime.csv``.
+        statistic: over the seeds, mean or deviation.
     """
 
     file: str
@@ -117,9 +114,8 @@ class Number:
     """One printed number, or the range from `value` to `upper`, with `decimals` digits (-1: in tens).
 
     Attributes:
-        paper_n: of how many samples it is a share, or of how many repeats a standard deviation; 0 where that cannot be
-            told.
-        same_as: key of an earlier number beside which the suite sets the same value of its own.
+        paper_n: samples of a share, or repeats of a standard deviation; 0 where unknown.
+        same_as: key of an earlier number that has the same counterpart.
     """
 
     table: str
@@ -149,14 +145,36 @@ class Number:
     def text(self) -> str:
         """Return the number as printed, without its unit."""
         digits = max(self.decimals, 0)
-        if self.upper > self.value:
-            return f"{self.value:.{digits}f} to {self.upper:.{digits}f}"
-        return f"{self.value:.{digits}f}"
+        text = f"{self.value:.{digits}f}"
+        return f"{text} to {self.upper:.{digits}f}" if self.upper > self.value else text
 
 
 def read_published() -> list[Number]:
-    """Return the printed numbers, in the order of the file; a test holds it to the rules of its columns."""
-    return [_number(fields) for fields in read_lines(PUBLISHED)]
+    """Return the printed numbers, in the order of the file; a test checks the rules of its columns."""
+    return [
+        Number(
+            **{name: fields[name] for name in ("table", "row", "column", "unit", "device", "place", "note")},
+            value=float(fields["value"]),
+            upper=float(fields["upper"] or fields["value"]),
+            decimals=int(fields["decimals"]),
+            counterpart=_counterpart(fields) if fields["in_file"] else None,
+            paper_n=int(fields["paper_n"] or 0),
+            same_as=tuple(filter(None, fields["same_as"].split(" / "))),
+        )
+        for fields in read_lines(PUBLISHED)
+    ]
+
+
+def _counterpart(fields: dict[str, str]) -> Counterpart:
+    return Counterpart(
+        fields["in_file"],
+        fields["in_table"],
+        tuple(fields["source"].split()),
+        tuple(fields["method"].split("+")),
+        tuple(fields["metric"].split("/")),
+        fields["concept"],
+        fields["statistic"],
+    )
 
 
 def printed_seconds(numbers: Iterable[Number]) -> dict[str, Number]:
@@ -173,30 +191,6 @@ def read_lines(path: Path) -> list[dict[str, str]]:
     """Return the lines of a CSV file of the package, each by column."""
     with path.open(newline="", encoding="utf-8") as file:
         return list(csv.DictReader(file, strict=True))
-
-
-def _number(fields: dict[str, str]) -> Number:
-    return Number(
-        **{name: fields[name] for name in ("table", "row", "column", "unit", "device", "place", "note")},
-        value=float(fields["value"]),
-        upper=float(fields["upper"] or fields["value"]),
-        decimals=int(fields["decimals"]),
-        counterpart=_counterpart(fields) if fields["in_file"] else None,
-        paper_n=int(fields["paper_n"] or 0),
-        same_as=tuple(filter(None, fields["same_as"].split(" / "))),
-    )
-
-
-def _counterpart(fields: dict[str, str]) -> Counterpart:
-    return Counterpart(
-        fields["in_file"],
-        fields["in_table"],
-        tuple(fields["source"].split()),
-        tuple(fields["method"].split("+")),
-        tuple(fields["metric"].split("/")),
-        fields["concept"],
-        fields["statistic"],
-    )
 
 
 @dataclass(frozen=True)

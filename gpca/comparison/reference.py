@@ -1,30 +1,72 @@
-"""Compares a run's numbers with a reference run's, CSV by CSV: equal to the byte, within rounding, or different.
+"""Compares a run's CSV files with a reference run's: identical, within rounding, or different.
 
-Other libraries, or a processor below the common level, round otherwise. A trained encoder then decides some samples
-otherwise: of n samples on which the two runs differ with probability d, the difference of two shares has the standard
-deviation √(d / n), so the allowed difference follows from n (docs/comparison.md). Every value is judged by itself: one
-that differs by more makes its file different, however many agree.
+Other libraries, or a processor below the common level, round otherwise, and a trained encoder then decides some samples
+otherwise. If two runs differ on a sample with probability d, the difference of two shares of n samples has the standard
+deviation √(d / n), which bounds the allowed difference (docs/comparison.md). Every value is judged by itself: one
+beyond its bound makes the file different.
 """
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from pathlib import Path
+from types import MappingProxyType
 from typing import Annotated
 
-from gpca.comparison.means import KINDS, Mean, kind_of, read_means, samples_of_sources
+from gpca.attribution.metrics import TIDY_COLUMNS, mean_interval
 from gpca.errors import InputError
+from gpca.io.csv_file import ANY, finite_number, read_csv
 from gpca.settings import Keys, NotNegative, Share
 
 VERDICTS = IDENTICAL, ROUNDING, DIFFERENT, MISSING = "identical", "rounding", "different", "missing"
-# These differ from run to run, or are made from files that do, and are never compared.
-NOT_COMPARED = (
+NOT_COMPARED = (  # made from times, which differ from run to run
     *("timings.csv", "runtime.csv", "tables/table7_runtime.csv", "tables/table10_costs.csv"),
     *("comparison.csv", "claims.csv", "tables/claims.csv"),
 )
+TIMES = "*seconds*"
+KINDS = (  # file, metric or column, kind of value; the first that fits
+    ("*", "*rho*", "correlation"),
+    ("*", "rotation_deg", "degrees"),
+    ("*", "spearman_error", "correlation"),
+    *(("*", pattern, "nats") for pattern in ("kl_*", "nne*", "nees*")),
+    *(("tables/table12_*", pattern, "share") for pattern in ("auroc_failed", "lead")),
+    *(("*", pattern, "nats") for pattern in ("*nll*", "*elbo*")),
+    *(("*", f"*{counted}*", "count") for counted in ("labels", "epochs", "samples", "delay", "calls", "parameters")),
+    ("*", "clusters", "count"),
+    *(("*", pattern, "count") for pattern in ("predicted_as_*", "first_*", "*_wrong")),
+    *(("*recovery.csv", counted, "count") for counted in ("episodes", "tries", "acted_first", "actions", "nominal")),
+    ("*recovery.csv", "failures_at_*", "count"),
+    *(("tables/table5_*", pattern, "share") for pattern in ("*aurc", "augrc", "brier")),
+    *(("tables/*", pattern, "share") for pattern in ("ece*", "nominal_calibration")),
+    ("tables/*", "*", "percent"),
+    ("*", "*", "share"),
+)
+SAMPLE_COUNTS = ("test_samples", "episodes")  # metrics that count the samples of the other metrics' shares
+SHARES_OF_RUNS = ("reached", "recognised")  # of the seeds' runs, not of the test samples
+PARTS = ("predicted_as_*", "first_*", "acted_first")  # counts of samples out of these
+
+
+@dataclass(frozen=True)
+class Mean:
+    """A mean over the seeds.
+
+    Attributes:
+        half_width: of its 95 % interval; 0 where it has none.
+        quantity: name of the metric or column.
+        samples: of all seeds, of which it is a share or a count; 0 where unknown.
+        unit: its change when all samples change: 1 for a share, 100 in percent, 0 if neither.
+    """
+
+    value: float
+    half_width: float
+    quantity: str
+    samples: int = 0
+    unit: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -32,11 +74,11 @@ class Allowance:
     """The largest difference allowed between two means: section ``reference`` of the config.
 
     Attributes:
-        tolerances: the largest difference, for each kind in :data:`gpca.comparison.means.KINDS`.
-        flipped: for shares of samples, the share of samples that another rounding may decide otherwise,
-        deviations: and the number of standard deviations of their balance that are allowed.
-        half_widths: for all else, the number of half-widths of the reference's 95 % interval that are allowed.
-        ratio: the share of a number of labels or epochs that is allowed, as a target may be reached a step later.
+        tolerances: the largest difference, for each kind in :data:`KINDS`.
+        half_widths: multiple of the half-width of the reference's 95 % interval, for all but shares of samples.
+        flipped: share of the samples that another rounding may decide otherwise.
+        deviations: number of standard deviations of the balance of flipped samples.
+        ratio: allowed share of a count of labels or epochs, as a target may be reached a step later.
     """
 
     tolerances: Annotated[dict, Keys({kind: NotNegative for *_, kind in KINDS}, required=[kind for *_, kind in KINDS])]
@@ -45,7 +87,7 @@ class Allowance:
     deviations: NotNegative
     ratio: Share
 
-    def of(self, file: str, mean: Mean) -> float:
+    def limit(self, file: str, mean: Mean) -> float:
         """Return the largest difference from a mean of the reference's file that rounding explains."""
         kind = kind_of(file, mean.quantity)
         allowed = self.tolerances[kind]
@@ -67,85 +109,133 @@ class FileCheck:
 
 
 def check_reference(run: Path, reference: Path, allowance: Allowance) -> list[FileCheck]:
-    """Compare every CSV file of means that the reference has.
-
-    Args:
-        run, reference: folders.
-        allowance: the differences that rounding explains.
+    """Compare every CSV file of means in the reference's folder with that of the run's.
 
     Raises:
-        InputError: no reference, none of its files a CSV, a file that cannot be read.
+        InputError: no reference, or a file that cannot be read.
     """
     files = [str(path.relative_to(reference)) for path in sorted(reference.rglob("*.csv"))]
     files = [file for file in files if file not in NOT_COMPARED]
     if not files:
         raise InputError(reference, "has no reference", "give the folder of a run that has one in results/reference")
-    samples = samples_of_sources(reference / "metrics.csv")
+    metrics = reference / "metrics.csv"
+    means = read_means(metrics) if metrics.is_file() else {}
+    samples = {key[1]: mean.samples for key, mean in means.items() if key[-1] == "all" and mean.samples}
     outcomes = []
     for file in files:
-        if (run / file).is_file():
-            here, there = (read_means(folder / file, samples) for folder in (run, reference))
-            outcomes.append(_of_config(_compared(file, here, there, allowance), run, reference))
-        else:
+        if not (run / file).is_file():
             outcomes.append(FileCheck(file, MISSING))
+            continue
+        means_run, means_reference = (read_means(folder / file, samples) for folder in (run, reference))
+        verdict, detail = _compared(file, means_run, means_reference, allowance)
+        # Other settings explain differing values. The record names the whole config, so equal values stay identical.
+        # A section that the reference's record lacks is newer than the reference.
+        config_here, config_there = (
+            _provenance(folder / file).get("config_sha256") or {} for folder in (run, reference)
+        )
+        changed = sorted(name for name, of in config_there.items() if config_here and config_here.get(name) != of)
+        if changed and verdict != IDENTICAL:
+            verdict, detail = DIFFERENT, f"{detail}; config differs in {', '.join(changed)}"
+        outcomes.append(FileCheck(file, verdict, detail))
     return outcomes
 
 
-def _of_config(outcome: FileCheck, run: Path, reference: Path) -> FileCheck:
-    """Return the outcome, which other settings explain where values differ: then it is no matter of rounding.
-
-    Equal values stay `IDENTICAL`, since the record names the whole config, also sections that the file does not depend
-    on. A section that the reference's record does not name is newer than the reference.
-    """
-    records = (_record(folder / f"{outcome.file}.provenance.json") for folder in (run, reference))
-    here, there = (record.get("config_sha256") or {} for record in records)
-    others = sorted(section for section in there if here and here.get(section) != there[section])
-    if outcome.verdict == IDENTICAL or not others:
-        return outcome
-    return FileCheck(outcome.file, DIFFERENT, f"{outcome.detail}; config differs in {', '.join(others)}")
-
-
-def _compared(file: str, here: Mapping[tuple, Mean], there: Mapping[tuple, Mean], allowance: Allowance) -> FileCheck:
+def _compared(file: str, here: Mapping[tuple, Mean], there: Mapping[tuple, Mean], allowance: Allowance):
+    """Return the verdict on a file's means, and its details."""
     for one, other, verb in ((there, here, "lacks"), (here, there, "adds to the reference")):
-        if beyond := [key for key in one if key not in other]:
-            return FileCheck(file, DIFFERENT, f"{verb} {len(beyond)} of {len(one)} values, such as {_named(beyond[0])}")
-    differing = [key for key in there if here[key].value != there[key].value]
-    if not differing:
-        return FileCheck(file, IDENTICAL, f"all {len(there)} values")
-    excess = {key: _excess(here[key].value - there[key].value, allowance.of(file, there[key])) for key in differing}
-    beyond = [key for key in differing if excess[key] > 1]
-    worst = max(differing, key=lambda key: excess[key])
-    largest = _difference(here[worst].value - there[worst].value, allowance.of(file, there[worst]), there[worst])
-    counts = f"{len(differing)} of {len(there)} values differ"
-    if beyond:
-        counts = f"{counts}, {len(beyond)} by more than rounding explains"
-    return FileCheck(file, DIFFERENT if beyond else ROUNDING, f"{counts}; the worst, {_named(worst)}: {largest}")
-
-
-def _excess(difference: float, allowed: float) -> float:
-    return abs(difference) / allowed if allowed else math.inf
-
-
-def _difference(difference: float, allowed: float, mean: Mean) -> str:
-    """A difference and what is allowed, in samples where it is a share of them."""
-    detail = f"{difference:+.4g}, where {allowed:.4g} is allowed"
-    if not (mean.samples and mean.unit):
-        return detail
-    flipped, expected = (x / mean.unit * mean.samples for x in (abs(difference), allowed))
-    return f"{detail} ({flipped:.0f} of {mean.samples} samples, where {expected:.0f} are expected at most)"
+        if extra := [key for key in one if key not in other]:
+            return DIFFERENT, f"{verb} {len(extra)} of {len(one)} values, such as {' / '.join(extra[0])}"
+    differences = {key: here[key].value - mean.value for key, mean in there.items() if here[key].value != mean.value}
+    if not differences:
+        return IDENTICAL, f"all {len(there)} values"
+    limits = {key: allowance.limit(file, there[key]) for key in differences}
+    excess = {key: abs(x) / limits[key] if limits[key] else math.inf for key, x in differences.items()}
+    beyond = [key for key in differences if excess[key] > 1]
+    worst = max(differences, key=lambda key: excess[key])
+    mean, difference, limit = there[worst], differences[worst], limits[worst]
+    largest = f"{difference:+.4g}, where {limit:.4g} is allowed"
+    if mean.samples and mean.unit:
+        flipped, expected = (x / mean.unit * mean.samples for x in (abs(difference), limit))
+        largest += f" ({flipped:.0f} of {mean.samples} samples, where {expected:.0f} are expected at most)"
+    counts = f"{len(differences)} of {len(there)} values differ"
+    counts += f", {len(beyond)} by more than rounding explains" if beyond else ""
+    return DIFFERENT if beyond else ROUNDING, f"{counts}; the worst, {' / '.join(worst)}: {largest}"
 
 
 def device_of(folder: Path, file: str) -> str:
-    """Return the processor that a file was made on, and the level of instructions that its libraries were held to."""
-    device = _record(folder / f"{file}.provenance.json").get("device", {})
-    known = [device.get("name"), *(f"{name} {device[name]}" for name in ("family", "model") if device.get(name))]
-    return ", ".join(filter(None, [*known, device.get("instructions")])) or "on an unrecorded processor"
+    """Return the processor that made a file, and the instruction level that its libraries were limited to."""
+    device = _provenance(folder / file).get("device", {})
+    named = [device.get("name"), *(f"{name} {device[name]}" for name in ("family", "model") if device.get(name))]
+    return ", ".join(filter(None, [*named, device.get("instructions")])) or "on an unrecorded processor"
 
 
-def _record(path: Path) -> dict:
-    """Return a record of provenance, or an empty one where there is none."""
-    return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
+def _provenance(path: Path) -> dict:
+    """Return a file's provenance record, empty where there is none."""
+    record = path.with_name(f"{path.name}.provenance.json")
+    return json.loads(record.read_text(encoding="utf-8")) if record.is_file() else {}
 
 
-def _named(key: tuple[str, ...]) -> str:
-    return " / ".join(key)
+def read_means(path: Path, samples_of_source: Mapping[str, int] = MappingProxyType({})) -> dict[tuple[str, ...], Mean]:
+    """Return the means over the seeds in a tidy file or a table, without times.
+
+    Args:
+        samples_of_source: test samples of all seeds of a source, for tidy files that do not count them.
+
+    Raises:
+        InputError: empty, unreadable, neither tidy nor a table, invalid number.
+    """
+    table = read_csv(path, (), others=ANY)
+    heads = list(table)
+    rows = table.to_dict("records")
+    if tuple(heads) == TIDY_COLUMNS:
+        means = _tidy_means(path, rows, samples_of_source)
+    elif "mean" in heads[1:]:
+        means = _table_means(path, rows, heads)
+    else:
+        raise InputError(path, "is neither tidy metrics nor a table", "regenerate it")
+    return {key: mean for key, mean in means if not fnmatchcase(mean.quantity, TIMES)}
+
+
+def kind_of(file: str, quantity: str) -> str:
+    """Return the kind of a quantity in a file."""
+    return next(kind for files, names, kind in KINDS if fnmatchcase(file, files) and fnmatchcase(quantity, names))
+
+
+def _tidy_means(
+    path: Path, rows: list[dict], samples_of_source: Mapping[str, int]
+) -> Iterator[tuple[tuple[str, ...], Mean]]:
+    values: dict[tuple[str, ...], list[float]] = defaultdict(list)
+    for row in rows:
+        key = tuple(row[name] for name in ("table", "source", "method", "metric", "concept"))
+        values[key].append(finite_number(path, "value", row["value"]))
+    for (table, source, method, quantity, concept), values_R in values.items():
+        mean, low, _ = mean_interval(values_R)
+        counts = [(table, source, method, name, of) for name in SAMPLE_COUNTS for of in (concept, "all")]
+        samples = next((sum(values[key]) for key in counts if key in values), samples_of_source.get(source, 0))
+        samples = len(values_R) if quantity in SHARES_OF_RUNS else samples
+        half_width = 0.0 if math.isnan(low) else mean - low
+        unit = _unit(path.name, quantity, samples, len(values_R))
+        yield (table, source, method, quantity, concept), Mean(mean, half_width, quantity, int(samples), unit)
+
+
+def _table_means(path: Path, rows: list[dict], heads: list[str]) -> Iterator[tuple[tuple[str, ...], Mean]]:
+    # A column of yes and no is a result that follows from the means, not a label.
+    labels = [name for name in heads[: heads.index("mean")] if not {row[name] for row in rows} <= {"yes", "no"}]
+    for row in rows:
+        mean, low, high = (
+            finite_number(path, name, row[name]) if row.get(name) else math.nan
+            for name in ("mean", "ci_low", "ci_high")
+        )
+        half_width = 0.0 if math.isnan(low) or math.isnan(high) else max(mean - low, high - mean)
+        quantity, seeds = row[labels[-1]], int(row.get("n_seeds") or 1)
+        samples = finite_number(path, "n_test", row.get("n_test") or "0")
+        samples = seeds if quantity in SHARES_OF_RUNS else samples
+        unit = _unit(f"tables/{path.name}", quantity, samples, seeds)
+        yield tuple(row[name] for name in labels), Mean(mean, half_width, quantity, int(samples), unit)
+
+
+def _unit(file: str, quantity: str, samples: float, seeds: int) -> float:
+    """Return the change of a quantity when all its samples change; 0 if it is neither share nor count of them."""
+    if any(fnmatchcase(quantity, pattern) for pattern in PARTS):
+        return samples / seeds
+    return {"share": 1.0, "percent": 100.0}.get(kind_of(file, quantity), 0.0)

@@ -1,9 +1,15 @@
-"""The values of a run in place of the printed numbers, from its collected files."""
+"""The run's value beside each printed number: its interval over seeds, and over clusters of samples and seeds.
+
+Seeds share objects, so their interval does not show how much the choice of objects matters; objects of one family or
+scene are alike (:mod:`gpca.objects.splits`). The bootstrap over clusters needs predictions of single samples, which a
+run keeps for shares of samples only.
+"""
 
 from __future__ import annotations
 
 import json
 import math
+from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,15 +18,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpca.active_learning.metrics import CENSORED_BY
-from gpca.attribution.metrics import mean_interval, read_metrics
-from gpca.comparison.clusters import Drawn
+from gpca.attribution.confidence import LEVEL, bounds, pigeonhole_weights
+from gpca.attribution.metrics import ALL, PREDICTED_AS, mean_interval, read_metrics, source_method_seed
+from gpca.attribution.predictions import read_predictions
 from gpca.comparison.published import UNITS, Counterpart, Number
 from gpca.model.runtime_file import read_runtime
+from gpca.seeds import generator
 
 if TYPE_CHECKING:
     import pandas as pd
 
 RUNTIME = "runtime.csv"
+FOLDERS = {"metrics.csv": "predictions", "real_world.csv": "predictions", "diagnostics.csv": "learners"}
+Folder = tuple[str, str, str]  # e.g. ("predictions", "ycb", "gpca_paper")
 
 
 @dataclass(frozen=True)
@@ -28,11 +38,10 @@ class Reproduced:
     """A run's value.
 
     Attributes:
-        low, high: bounds of its 95 % interval over the repeats; NaN where there is none.
+        low, high: 95 % interval over the repeats; NaN where there is none.
         n: repeats.
-        at_least: it is a lower bound only.
-        cluster_low, cluster_high: bounds over objects and seeds (:mod:`gpca.comparison.clusters`); NaN where the run
-            keeps no predictions of single samples.
+        at_least: the value is a lower bound.
+        cluster_low, cluster_high: 95 % interval over clusters and seeds; NaN without predictions of single samples.
     """
 
     value: float
@@ -44,40 +53,45 @@ class Reproduced:
     cluster_high: float = math.nan
 
     def interval(self) -> tuple[float, float]:
-        """Return the bounds farthest out of both intervals, NaN where there is neither."""
-        lows, highs = (self.low, self.cluster_low), (self.high, self.cluster_high)
-        return (
-            min((bound for bound in lows if not math.isnan(bound)), default=math.nan),
-            max((bound for bound in highs if not math.isnan(bound)), default=math.nan),
-        )
+        """Return the outermost bounds of both intervals, NaN where there is neither."""
+        low, high = np.fmin(self.low, self.cluster_low), np.fmax(self.high, self.cluster_high)
+        return float(low), float(high)
 
     def times(self, factor: float) -> Reproduced:
-        """Return the same value in a unit of which it holds `factor` times as many."""
+        """Return the value in a unit that is `factor` times smaller."""
         scaled = ("value", "low", "high", "cluster_low", "cluster_high")
         return replace(self, **{name: factor * getattr(self, name) for name in scaled})
 
 
+def read_results(paths: Iterable[str | Path]) -> dict[str, pd.DataFrame]:
+    """Read a run's collected files, by name; raises the InputError of a malformed one."""
+    return {Path(path).name: (read_runtime if Path(path).name == RUNTIME else read_metrics)(path) for path in paths}
+
+
+def measured_on(paths: Iterable[str | Path]) -> str:
+    """Return the processor that made ``timings.csv``, by its provenance record; empty without one."""
+    records = [Path(f"{path}.provenance.json") for path in paths if Path(path).name == "timings.csv"]
+    return next((json.loads(path.read_text("utf-8"))["device"]["name"] for path in records if path.is_file()), "")
+
+
 def value_of_run(
-    number: Number,
-    results: Mapping[str, pd.DataFrame],
-    clusters: Mapping[Counterpart, Drawn] | None = None,
+    number: Number, results: Mapping[str, pd.DataFrame], clusters: Mapping[Counterpart, ShareDraws] | None = None
 ) -> Reproduced | None:
-    """Return the run's value in place of the number, in its unit; None where it has none.
+    """Return the run's value for a printed number, in its unit; None where the run has none.
 
     Args:
-        number: the printed one.
         results: file name -> its rows, as :func:`read_results` reads them.
-        clusters: counterpart -> its draws of clusters and seeds (:func:`gpca.comparison.clusters.cluster_draws`).
+        clusters: counterpart -> its bootstrap draws (:func:`cluster_draws`).
     """
     counterpart = number.counterpart
     if counterpart is None or counterpart.file not in results:
         return None
-    of_file = _of_runtime if counterpart.file == RUNTIME else _of_tidy
-    reproduced = of_file(results[counterpart.file], counterpart)
+    summary = _runtime_summary if counterpart.file == RUNTIME else _tidy_summary
+    reproduced = summary(results[counterpart.file], counterpart)
     if reproduced is None:
         return None
-    drawn = (clusters or {}).get(counterpart)
-    cluster_low, cluster_high = drawn.bounds() if drawn else (math.nan, math.nan)
+    draws = (clusters or {}).get(counterpart)
+    cluster_low, cluster_high = draws.bounds() if draws else (math.nan, math.nan)
     unit = UNITS[number.unit]
     reproduced = replace(reproduced, cluster_low=cluster_low, cluster_high=cluster_high).times(unit.factor)
     low, high = (
@@ -87,32 +101,11 @@ def value_of_run(
     return replace(reproduced, low=low, high=high)
 
 
-def read_results(paths: Iterable[str | Path]) -> dict[str, pd.DataFrame]:
-    """Read a run's collected files, by name; one that a later step refuses raises its InputError here."""
-    return {Path(path).name: (read_runtime if Path(path).name == RUNTIME else read_metrics)(path) for path in paths}
-
-
-def measured_on(paths: Iterable[str | Path]) -> str:
-    """Return the processor that made ``timings.csv``, by its provenance; empty where that is not beside it."""
-    sidecars = [Path(f"{path}.provenance.json") for path in paths if Path(path).name == "timings.csv"]
-    return next(
-        (json.loads(path.read_text(encoding="utf-8"))["device"]["name"] for path in sidecars if path.is_file()), ""
-    )
-
-
-def deviation_interval(deviation: float, n: int) -> tuple[float, float]:
-    """Return the 95 % chi-square interval of the standard deviation of n normal repeats."""
-    from scipy.stats import chi2
-
-    low, high = (deviation * math.sqrt((n - 1) / chi2.ppf(level, n - 1)) for level in (0.975, 0.025))
-    return low, high
-
-
-def of_seeds(rows: pd.DataFrame, counterpart: Counterpart) -> tuple[pd.Series, bool]:
+def values_by_seed(rows: pd.DataFrame, counterpart: Counterpart) -> tuple[pd.Series, bool]:
     """Return the counterpart's values in a tidy file, by seed, and whether some of them are lower bounds."""
     rows = rows[(rows["table"] == counterpart.table) & (rows["concept"] == counterpart.concept)]
 
-    def of_metric(source: str, method: str, metric: str) -> pd.Series:
+    def by_seed(source: str, method: str, metric: str) -> pd.Series:
         chosen = (rows["source"] == source) & (rows["method"] == method) & (rows["metric"] == metric)
         return rows[chosen].set_index("seed")["value"]
 
@@ -120,10 +113,10 @@ def of_seeds(rows: pd.DataFrame, counterpart: Counterpart) -> tuple[pd.Series, b
     for source in counterpart.sources:
         methods = []
         for method in counterpart.methods:
-            value_R, *divisor_R = (of_metric(source, method, metric) for metric in counterpart.metrics)
+            value_R, *divisor_R = (by_seed(source, method, metric) for metric in counterpart.metrics)
             methods.append(value_R / divisor_R[0] if divisor_R else value_R)
             if (censoring := CENSORED_BY.get(counterpart.metrics[0])) is not None:
-                at_least |= bool((of_metric(source, method, censoring) < 1).any())
+                at_least |= bool((by_seed(source, method, censoring) < 1).any())
         sources.append(sum(methods[1:], methods[0]))
     return sum(sources[1:], sources[0]) / len(sources), at_least
 
@@ -138,13 +131,20 @@ def runtime_mean(rows: pd.DataFrame, counterpart: Counterpart) -> tuple[float, f
     return float(rows["mean_s"].sum()), math.sqrt((rows["deviation_s"] ** 2).sum() / n), n
 
 
-def _of_tidy(rows: pd.DataFrame, counterpart: Counterpart) -> Reproduced | None:
-    """Take the statistic over the seeds; the interval of a deviation is that of its chi-square."""
-    by_seed, at_least = of_seeds(rows, counterpart)
+def deviation_interval(deviation: float, n: int) -> tuple[float, float]:
+    """Return the 95 % chi-square interval of the standard deviation of n normal repeats."""
+    from scipy.stats import chi2
+
+    low, high = (deviation * math.sqrt((n - 1) / chi2.ppf(level, n - 1)) for level in (0.975, 0.025))
+    return low, high
+
+
+def _tidy_summary(rows: pd.DataFrame, counterpart: Counterpart) -> Reproduced | None:
+    by_seed, at_least = values_by_seed(rows, counterpart)
     value_R = by_seed.to_numpy()
-    if not len(value_R) or np.isnan(value_R).any():
-        return None
     n = len(value_R)
+    if not n or np.isnan(value_R).any():
+        return None
     if counterpart.statistic == "deviation":
         if n < 2:
             return None
@@ -154,14 +154,98 @@ def _of_tidy(rows: pd.DataFrame, counterpart: Counterpart) -> Reproduced | None:
     return Reproduced(mean, math.nan, math.nan, n, True) if at_least else Reproduced(mean, low, high, n)
 
 
-def _of_runtime(rows: pd.DataFrame, counterpart: Counterpart) -> Reproduced | None:
-    """Add up the mean seconds of the components on one device, measured apart from one another."""
+def _runtime_summary(rows: pd.DataFrame, counterpart: Counterpart) -> Reproduced | None:
     from scipy.stats import t as student_t
 
     if (measured := runtime_mean(rows, counterpart)) is None:
         return None
     mean, error, n = measured
-    if n < 2:
-        return Reproduced(mean, math.nan, math.nan, n)
-    half_width = float(student_t.ppf(0.975, n - 1) * error)
+    half_width = float(student_t.ppf(0.975, n - 1) * error) if n > 1 else math.nan
     return Reproduced(mean, mean - half_width, mean + half_width, n)
+
+
+def folder_behind(counterpart: Counterpart | None) -> Folder | None:
+    """Return the folder of the predictions that a counterpart is a share of; None if it is no share of samples."""
+    if counterpart is None or counterpart.statistic != "mean" or counterpart.file not in FOLDERS:
+        return None
+    confusion = len(counterpart.metrics) == 2 and counterpart.metrics[0].startswith(PREDICTED_AS)
+    if not (counterpart.metrics == ("accuracy",) or confusion):
+        return None
+    return FOLDERS[counterpart.file], counterpart.sources[0], counterpart.methods[0]
+
+
+def folders_behind(counterparts: Iterable[Counterpart | None]) -> list[Folder]:
+    """Return the folders of all counterparts, each once."""
+    return sorted({folder for counterpart in counterparts if (folder := folder_behind(counterpart))})
+
+
+@dataclass(frozen=True)
+class ShareDraws:
+    """A share of samples in every bootstrap draw of clusters and seeds; shares of one source have common draws.
+
+    Attributes:
+        share_B: in [0, 1], NaN in a draw without any sample.
+        weights_B_N: how often each draw has each sample of the folder.
+        mask_N: the samples that the share counts.
+    """
+
+    share_B: np.ndarray
+    weights_B_N: np.ndarray
+    mask_N: np.ndarray
+
+    def bounds(self, level: float = LEVEL) -> tuple[float, float]:
+        """Return the bounds of the share."""
+        return bounds(self.share_B, self.weights_B_N[:, self.mask_N], level=level)
+
+    def bounds_of_difference(self, other: ShareDraws, level: float = LEVEL) -> tuple[float, float]:
+        """Return the bounds of the share minus another, draw by draw."""
+        weights_B_n = self.weights_B_N[:, self.mask_N]
+        return bounds(self.share_B - other.share_B, weights_B_n, difference=True, level=level)
+
+
+def cluster_draws(
+    counterparts: Iterable[Counterpart | None], prediction_files: Iterable[str | Path]
+) -> dict[Counterpart, ShareDraws]:
+    """Return the shares by the pigeonhole bootstrap over clusters and seeds.
+
+    Args:
+        counterparts: those that are no shares of samples, or whose folder has no file, are left out.
+        prediction_files: named ``…/{predictions or learners}/{source}/{method}/seed{seed}.csv``.
+
+    Raises:
+        InputError: another form of name, or a file that :func:`gpca.attribution.predictions.read_predictions` refuses.
+    """
+    import pandas as pd
+
+    parts: dict[Folder, list[pd.DataFrame]] = defaultdict(list)
+    asked = {each: folder for each in counterparts if each and (folder := folder_behind(each))}
+    for path in prediction_files:
+        source, method, seed = source_method_seed(path)
+        folder = (Path(path).parts[-4], source, method)
+        if folder in asked.values():
+            rows = read_predictions(path, ("set",) if folder[0] == "learners" else ())
+            parts[folder].append(rows[rows["split"] == "test"].assign(seed=seed))
+    samples = {folder: pd.concat(of_seeds, ignore_index=True) for folder, of_seeds in parts.items()}
+    weights = {
+        folder: pigeonhole_weights(generator("printed", folder[1]), rows["seed"], rows["cluster"])
+        for folder, rows in samples.items()
+    }
+    return {
+        counterpart: _share_draws(counterpart, samples[folder], weights[folder])
+        for counterpart, folder in asked.items()
+        if folder in samples
+    }
+
+
+def _share_draws(counterpart: Counterpart, rows: pd.DataFrame, weights_B_N: np.ndarray) -> ShareDraws:
+    mask = (rows["concept_true"] == counterpart.concept) | (counterpart.concept == ALL)
+    if "set" in rows:
+        mask &= rows["set"] == counterpart.table.partition("/")[2]
+    target = rows["concept_true"]
+    if counterpart.metrics[0].startswith(PREDICTED_AS):
+        target = counterpart.metrics[0].removeprefix(PREDICTED_AS)
+    hits_N = ((rows["concept_predicted"] == target) & ~rows["abstained"]).to_numpy(float)
+    mask_N = mask.to_numpy()
+    weights_B_n = weights_B_N[:, mask_N]
+    with np.errstate(invalid="ignore"):  # a draw without any sample of the concept has no share
+        return ShareDraws(weights_B_n @ hits_N[mask_N] / weights_B_n.sum(axis=1), weights_B_N, mask_N)

@@ -1,18 +1,22 @@
-"""The printed numbers beside those of a run, with a verdict on each (docs/comparison.md)."""
+"""A verdict on each printed number beside the run's value, with its reason (docs/comparison.md).
+
+Reasons quote the run: ``{metrics.csv attribution @ gpca accuracy all %}`` names file, table, source, method, metric and
+concept (for ``runtime.csv``: components, model, component, seconds and device), as published.csv does, and the unit.
+An ``@`` stands for the entry of the printed number's counterpart.
+"""
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gpca.comparison.citations import filled
-from gpca.comparison.clusters import Drawn
-from gpca.comparison.published import TIMES, Counterpart, Number, Reason, reason_of
-from gpca.comparison.values import RUNTIME, Reproduced, deviation_interval, value_of_run
+from gpca.comparison.published import TIMES, UNITS, Counterpart, Number, Reason, reason_of
+from gpca.comparison.values import RUNTIME, Reproduced, ShareDraws, deviation_interval, value_of_run
 from gpca.errors import InputError
 from gpca.objects.entry import STAND_IN, title_of
 from gpca.settings import NotNegative
@@ -32,6 +36,10 @@ COMPARISON_COLUMNS = (
     *("paper_low", "paper_high", "deviation", "reproduced", "ci_low", "ci_high", "cluster_low", "cluster_high"),
     *("n", "at_least", "difference", "factor", "verdict", "repeat_of", "reason", "objects", "hardware"),
 )
+CITED = ("file", "table", "source", "method", "metric", "concept", "unit")  # fields of a citation
+SAME = "@"
+_CITATION = re.compile(r"\{([^{}]+)\}")
+_SENTENCES = re.compile(r"(?<=\.) (?=[A-Z])")
 
 
 @dataclass(frozen=True)
@@ -47,6 +55,12 @@ class Tolerance:
             least = "1 <= reproduced <= close" if self.factor else "0 <= reproduced <= close"
             raise InputError("tolerance", f"{self.reproduced:g} and {self.close:g}", f"must satisfy {least}")
 
+    def scale(self, value: float) -> float:
+        """Return the value, or its logarithm for a ratio: -inf for numbers that have none."""
+        if not self.factor:
+            return float(value)
+        return math.log(value) if value > 0 else value if math.isnan(value) else -math.inf
+
 
 @dataclass(frozen=True)
 class Printed:
@@ -54,7 +68,7 @@ class Printed:
 
     Attributes:
         rounding: half of its last digit.
-        low, high: bounds of its 95 % interval; `value` and `upper` where its sampling error cannot be told.
+        low, high: bounds of its 95 % interval; `value` and `upper` where its sampling error is unknown.
     """
 
     value: float
@@ -63,81 +77,28 @@ class Printed:
     low: float
     high: float
 
+    def difference(self, value: float, tolerance: Tolerance) -> float:
+        """Return a value minus the nearest number that is printed alike, both scaled; 0 within the rounding."""
+        least, most = (tolerance.scale(x) for x in (self.value - self.rounding, self.upper + self.rounding))
+        scaled = tolerance.scale(value)
+        return _minus(scaled, min(max(scaled, least), most))
 
-def compare(
-    numbers: Sequence[Number],
-    results: Mapping[str, pd.DataFrame],
-    objects: Mapping[str, Mapping],
-    tolerances: Mapping[str, Tolerance],
-    reasons: Sequence[Reason],
-    hardware: str = "",
-    clusters: Mapping[Counterpart, Drawn] | None = None,
-) -> pd.DataFrame:
-    """Return `COMPARISON_COLUMNS`, a row per printed number, in its unit.
 
-    Args:
-        numbers: the printed numbers.
-        results: file name -> its rows, as :func:`gpca.comparison.values.read_results` reads them; those that reasons
-            cite too.
-        objects: source -> ``{"title": str, "stand_in": bool}``; "model" is what the explained model was trained on.
-        tolerances: one for each unit.
-        reasons: why printed numbers were not reached.
-        hardware: the machine of the measured times, where their file does not say.
-        clusters: counterpart -> its draws of clusters and seeds (:func:`gpca.comparison.clusters.cluster_draws`).
-
-    Raises:
-        InputError: a unit without tolerance.
-    """
-    import pandas as pd
-
-    deviations = {n.key[:2]: n for n in numbers if n.counterpart and n.counterpart.statistic == "deviation"}
-    records: list[dict] = []
-    values: dict[tuple[str, ...], Reproduced | None] = {}
-    for number in numbers:
-        if number.unit not in tolerances:
-            raise InputError("config key comparison.tolerances", f"has no unit '{number.unit}'", "add its tolerance")
-        deviation = _deviation_of(number, deviations)
-        printed = printed_of(number, deviation)
-        reproduced = values[number.key] = value_of_run(number, results, clusters)
-        tolerance = tolerances[number.unit]
-        verdict, reason = _judge(number, printed, reproduced, objects, tolerance, reasons)
-        reason = filled(reason, number, results)
-        first = values.get(number.same_as)
-        repeats = (
-            first is not None and reproduced is not None and (first.value, first.n) == (reproduced.value, reproduced.n)
-        )
-        records.append(
-            {
-                **dict(zip(("table", "row", "column"), number.key, strict=True)),
-                "statistic": number.counterpart.statistic if number.counterpart else "mean",
-                "unit": number.unit,
-                "published": number.value,
-                "upper": number.upper if number.upper > number.value else np.nan,
-                "decimals": number.decimals,
-                **_sampling(printed),
-                "deviation": deviation.value if deviation else np.nan,
-                **_columns(number, reproduced, tolerance),
-                "verdict": verdict,
-                "repeat_of": " / ".join(number.same_as) if repeats else "",
-                "reason": reason,
-                "objects": _objects(number.counterpart, objects),
-                "hardware": _hardware(number, results, hardware),
-            }
-        )
-    return pd.DataFrame(records, columns=list(COMPARISON_COLUMNS)).astype({"n": "Int64"})
+def exactly(number: Number) -> Printed:
+    """Return the number without sampling error."""
+    return Printed(number.value, number.upper, number.rounding, number.value, number.upper)
 
 
 def printed_of(number: Number, deviation: Number | None = None) -> Printed:
-    """Return the number with the interval that its sampling leaves.
+    """Return the number with its sampling interval.
 
-    A share of n samples has Wilson's interval, a standard deviation of n repeats that of its chi-square, a mean whose
-    standard deviation is printed Student's.
+    Wilson's for a share of n samples, chi-square for a standard deviation of n repeats, Student's for a mean beside a
+    printed standard deviation.
 
     Args:
-        number: the printed one.
         deviation: the printed standard deviation of the same repeats.
     """
-    low, high = number.value, number.upper
+    printed = exactly(number)
     if number.counterpart and number.counterpart.statistic == "deviation" and number.paper_n > 1:
         low, high = deviation_interval(number.value, number.paper_n)
     elif deviation and deviation.paper_n > 1:
@@ -150,43 +111,105 @@ def printed_of(number: Number, deviation: Number | None = None) -> Printed:
 
         right = round(number.value / 100 * number.paper_n)
         interval = binomtest(right, number.paper_n).proportion_ci(method="wilson")
-        # What is printed is rounded, and lies in its own interval nevertheless.
+        # The printed share is rounded, and may lie beyond the interval of the count.
         low, high = min(100 * interval.low, number.value), max(100 * interval.high, number.value)
-    return Printed(number.value, number.upper, number.rounding, float(low), float(high))
+    else:
+        return printed
+    return replace(printed, low=float(low), high=float(high))
 
 
 def verdict_of(printed: Printed, reproduced: Reproduced, tolerance: Tolerance) -> str:
     """Return one of `JUDGED`.
 
-    The printed number is a band, half its last digit to either side. The difference of the run's value from the band
-    has an interval, of both samplings (Newcombe's square-and-add). Where that reaches farther from the difference than
-    `tolerance.close`, nothing can be said but that the number is not reproduced, if the whole interval lies beyond
-    `tolerance.close`. Else the number is reproduced where the difference is within `tolerance.reproduced` or its
-    interval holds 0, and close where it is within `tolerance.close`.
+    The difference of the run's value from the printed number, half a digit wide to either side, has an interval that
+    combines both samplings (Newcombe's square-and-add). An interval that reaches farther from the difference than
+    `tolerance.close` only allows "not reproduced", if it lies beyond `tolerance.close` as a whole. Otherwise a number
+    is reproduced where the difference is within `tolerance.reproduced` or its interval holds 0, and close where the
+    difference is within `tolerance.close`.
     """
-    scale = _log if tolerance.factor else float
-    near, far = (scale(bound) for bound in (tolerance.reproduced, tolerance.close))
-    least, most = scale(printed.value - printed.rounding), scale(printed.upper + printed.rounding)
-    value = scale(reproduced.value)
+    scale = tolerance.scale
+    near, far = scale(tolerance.reproduced), scale(tolerance.close)
+    difference = printed.difference(reproduced.value, tolerance)
     if reproduced.at_least:
-        return NOT_REPRODUCED if value - most > far else INCONCLUSIVE
-    apart = _apart(value, min(max(value, least), most))
-    found_low, found_high = (scale(bound) for bound in reproduced.interval())
-    below = math.hypot(_apart(value, found_low), _apart(scale(printed.high), scale(printed.upper)))
-    above = math.hypot(_apart(found_high, value), _apart(scale(printed.value), scale(printed.low)))
-    low, high = apart - below, apart + above
+        return NOT_REPRODUCED if difference > far else INCONCLUSIVE
+    value, (run_low, run_high) = scale(reproduced.value), (scale(bound) for bound in reproduced.interval())
+    below = math.hypot(_minus(value, run_low), _minus(scale(printed.high), scale(printed.upper)))
+    above = math.hypot(_minus(run_high, value), _minus(scale(printed.value), scale(printed.low)))
+    low, high = difference - below, difference + above
     if not max(below, above) <= far:  # NaN too
         return NOT_REPRODUCED if low > far or high < -far else INCONCLUSIVE
-    if abs(apart) <= near or low <= 0 <= high:
+    if abs(difference) <= near or low <= 0 <= high:
         return REPRODUCED
-    return CLOSE if abs(apart) <= far else NOT_REPRODUCED
+    return CLOSE if abs(difference) <= far else NOT_REPRODUCED
 
 
 def distance(printed: Printed, value: float, tolerance: Tolerance) -> float:
     """Return a value's distance from the printed number, in units of the close tolerance; 0 within its rounding."""
-    scale = _log if tolerance.factor else float
-    least, most = scale(printed.value - printed.rounding), scale(printed.upper + printed.rounding)
-    return _apart(scale(value), min(max(scale(value), least), most)) / scale(tolerance.close)
+    return printed.difference(value, tolerance) / tolerance.scale(tolerance.close)
+
+
+def compare(
+    numbers: Sequence[Number],
+    results: Mapping[str, pd.DataFrame],
+    objects: Mapping[str, Mapping],
+    tolerances: Mapping[str, Tolerance],
+    reasons: Sequence[Reason],
+    hardware: str = "",
+    clusters: Mapping[Counterpart, ShareDraws] | None = None,
+) -> pd.DataFrame:
+    """Return `COMPARISON_COLUMNS`, a row per printed number, in its unit.
+
+    Args:
+        results: file name -> its rows, as :func:`gpca.comparison.values.read_results` reads them, with the files that
+            reasons cite.
+        objects: source -> ``{"title": str, "stand_in": bool}``; "model" is what the explained model was trained on.
+        tolerances: by unit.
+        hardware: the machine of the measured times, where their file does not say.
+        clusters: counterpart -> its bootstrap draws (:func:`gpca.comparison.values.cluster_draws`).
+
+    Raises:
+        InputError: a unit without tolerance.
+    """
+    import pandas as pd
+
+    deviations: dict[tuple[str, ...], Number] = {
+        n.key[:2]: n for n in numbers if n.counterpart and n.counterpart.statistic == "deviation"
+    }
+    records: list[dict] = []
+    values: dict[tuple[str, ...], Reproduced | None] = {}  # by the key of the number
+    for number in numbers:
+        if number.unit not in tolerances:
+            raise InputError("config key comparison.tolerances", f"has no unit '{number.unit}'", "add its tolerance")
+        tolerance, counterpart, deviation = tolerances[number.unit], number.counterpart, None
+        if counterpart and counterpart.statistic == "mean":  # its deviation is in its row, or in the equal number's
+            deviation = deviations.get((number.same_as or number.key)[:2])
+        printed = printed_of(number, deviation)
+        has_interval = (printed.low, printed.high) != (printed.value, printed.upper)
+        reproduced = values[number.key] = value_of_run(number, results, clusters)
+        verdict, reason = _judge(number, printed, reproduced, objects, tolerance, reasons)
+        first = values.get(number.same_as)
+        repeats = first and reproduced and (first.value, first.n) == (reproduced.value, reproduced.n)
+        sources = counterpart.sources if counterpart else ()
+        records.append(
+            {
+                **dict(zip(("table", "row", "column"), number.key, strict=True)),
+                "statistic": counterpart.statistic if counterpart else "mean",
+                "unit": number.unit,
+                "published": number.value,
+                "upper": number.upper if number.upper > number.value else np.nan,
+                "decimals": number.decimals,
+                "paper_low": round(printed.low, 6) if has_interval else np.nan,
+                "paper_high": round(printed.high, 6) if has_interval else np.nan,
+                "deviation": deviation.value if deviation else np.nan,
+                **_columns(number, reproduced, tolerance),
+                "verdict": verdict,
+                "repeat_of": " / ".join(number.same_as) if repeats else "",
+                "reason": filled(reason, number, results),
+                "objects": ", ".join(title_of(objects[source]) for source in sources if source in objects),
+                "hardware": _hardware(number, results, hardware),
+            }
+        )
+    return pd.DataFrame(records, columns=list(COMPARISON_COLUMNS)).astype({"n": "Int64"})
 
 
 def judged_once(comparison: pd.DataFrame) -> pd.DataFrame:
@@ -195,11 +218,12 @@ def judged_once(comparison: pd.DataFrame) -> pd.DataFrame:
 
 
 def counts(comparison: pd.DataFrame) -> dict[str, int]:
-    """Return verdict -> how many rows have it."""
+    """Return verdict -> number of rows."""
     return {verdict: int((comparison["verdict"] == verdict).sum()) for verdict in VERDICTS}
 
 
 def _judge(number, printed, reproduced, objects, tolerance, reasons) -> tuple[str, str]:
+    """Return the verdict and its reason."""
     if number.counterpart is None:
         return NOT_COMPARABLE, number.note
     if any(objects[source]["stand_in"] for source in number.counterpart.sources if source in objects):
@@ -213,38 +237,22 @@ def _judge(number, printed, reproduced, objects, tolerance, reasons) -> tuple[st
     return verdict, "" if verdict == REPRODUCED else reason_of(number, reasons)
 
 
-def _sampling(printed: Printed) -> dict[str, float]:
-    """Return the bounds that the paper's sampling leaves; NaN where they are not told."""
-    is_known = (printed.low, printed.high) != (printed.value, printed.upper)
-    return {
-        name: round(bound, 6) if is_known else np.nan
-        for name, bound in (("paper_low", printed.low), ("paper_high", printed.high))
-    }
-
-
 def _columns(number: Number, reproduced: Reproduced | None, tolerance: Tolerance) -> dict[str, object]:
-    """Return the reproduced value, and its distance from the nearest end of the printed number."""
+    """Return the run's value, its intervals, and its distance from the nearest end of the printed number."""
     import pandas as pd
 
     if reproduced is None:
         return {"n": pd.NA, "at_least": False}
     printed = min(max(reproduced.value, number.value), number.upper)
+    bounds = {"ci_low": reproduced.low, "ci_high": reproduced.high}
+    bounds |= {name: getattr(reproduced, name) for name in ("cluster_low", "cluster_high")}
     return {
-        "reproduced": round(reproduced.value, 6),
-        "ci_low": round(reproduced.low, 6),
-        "ci_high": round(reproduced.high, 6),
-        "cluster_low": round(reproduced.cluster_low, 6),
-        "cluster_high": round(reproduced.cluster_high, 6),
+        **{name: round(value, 6) for name, value in {"reproduced": reproduced.value, **bounds}.items()},
         "n": reproduced.n,
         "at_least": reproduced.at_least,
         "difference": round(reproduced.value - printed, 6),
         "factor": round(reproduced.value / printed, 6) if tolerance.factor else np.nan,
     }
-
-
-def _objects(counterpart: Counterpart | None, objects: Mapping[str, Mapping]) -> str:
-    sources = counterpart.sources if counterpart else ()
-    return ", ".join(title_of(objects[source]) for source in sources if source in objects)
 
 
 def _hardware(number: Number, results: Mapping[str, pd.DataFrame], hardware: str) -> str:
@@ -258,18 +266,47 @@ def _hardware(number: Number, results: Mapping[str, pd.DataFrame], hardware: str
     return ", ".join(rows.loc[rows["device"] == counterpart.concept, "hardware"].unique())
 
 
-def _deviation_of(number: Number, deviations: Mapping[tuple[str, str], Number]) -> Number | None:
-    """Return the standard deviation printed beside a mean: in its row, or in that of the same number."""
-    if not number.counterpart or number.counterpart.statistic != "mean":
-        return None
-    table, row, _ = number.same_as or number.key
-    return deviations.get((table, row))
-
-
-def _log(value: float) -> float:
-    return math.log(value) if value > 0 else value if math.isnan(value) else -math.inf
-
-
-def _apart(one: float, other: float) -> float:
-    """Return one minus the other; 0 of equal infinities, as logarithms of 0 are."""
+def _minus(one: float, other: float) -> float:
+    """Return one minus the other; 0 for equal infinities, such as logarithms of 0."""
     return 0.0 if one == other else one - other
+
+
+def citations(text: str) -> list[dict[str, str]]:
+    """Return the values that a reason cites, by `CITED`.
+
+    Raises:
+        ValueError: a citation that lacks a field, or has an unknown unit.
+    """
+    cited = []
+    for words in _CITATION.findall(text):
+        fields = dict(zip(CITED, words.split(), strict=True))
+        if fields["unit"] not in UNITS:
+            raise ValueError(f"unknown unit in {{{words}}}")
+        cited.append(fields)
+    return cited
+
+
+def cited_number(number: Number, fields: Mapping[str, str]) -> Number | None:
+    """Return the number whose value a reason for `number` cites; None where that has no counterpart."""
+    if (counterpart := number.counterpart) is None:
+        return None
+    cited: dict[str, Any] = {name: fields[name] for name in ("file", "table", "concept") if fields[name] != SAME}
+    cited |= {f"{name}s": (fields[name],) for name in ("source", "method", "metric") if fields[name] != SAME}
+    return replace(number, unit=fields["unit"], counterpart=replace(counterpart, **cited))
+
+
+def filled(text: str, number: Number, results: Mapping[str, pd.DataFrame]) -> str:
+    """Return a reason for a number with the run's values; sentences that cite what the run lacks are left out."""
+    sentences = []
+    for sentence in _SENTENCES.split(text):
+        for fields in citations(sentence):
+            cited = cited_number(number, fields)
+            value = value_of_run(cited, results) if cited else None
+            if value is None:
+                break
+            form = {"%": ".1f", "labels": ".0f", "epochs": ".0f"}.get(fields["unit"], ".2g")
+            quoted = f"more than {value.value:{form}}" if value.at_least else f"{value.value:{form}}"
+            sentence = _CITATION.sub(lambda _, quoted=quoted: quoted, sentence, count=1)
+        else:
+            sentences.append(sentence)
+    return " ".join(sentences)

@@ -5,7 +5,7 @@ import pytest
 import yaml
 
 from gpca.code_files import ROOT
-from gpca.comparison.claim_verdicts import read_verdicts
+from gpca.comparison.claims import read_verdicts
 from gpca.comparison.published import NONE_YET, read_published, read_reasons
 from gpca.comparison.readings import READINGS, judge_readings, with_readings
 from gpca.comparison.values import read_results

@@ -6,9 +6,13 @@ from dataclasses import replace
 
 import pandas as pd
 import pytest
+import yaml
+from scipy.stats import chi2
 
-from gpca.comparison.published import NONE_YET, Reason
-from gpca.comparison.values import Reproduced
+from gpca.code_files import ROOT
+from gpca.comparison.published import NONE_YET, Reason, read_published, read_reasons, reason_of
+from gpca.comparison.readings import READINGS
+from gpca.comparison.values import Reproduced, read_results, value_of_run
 from gpca.comparison.verdicts import (
     COMPARISON_COLUMNS,
     ONE_REPEAT,
@@ -16,12 +20,17 @@ from gpca.comparison.verdicts import (
     VERDICTS,
     Printed,
     Tolerance,
+    citations,
+    cited_number,
     compare,
     counts,
+    filled,
     judged_once,
+    printed_of,
     verdict_of,
 )
 from gpca.errors import InputError
+from gpca.experiments.registry import experiments
 from gpca.reporting.tables.comparison import comparison_markdown, summary
 
 from .made_up import ACCURACY, OBJECTS, TIME, TOLERANCES, compared, number, runtime, tidy
@@ -229,3 +238,102 @@ def test_the_page_counts_first_and_gives_each_reason_once():
     assert "## Table VII: Runtime" in page
     assert "Objects here: MODEL. Hardware here: A processor." in page
     assert "Intel i7-12700K and NVIDIA RTX 3090" in page
+
+
+def test_a_share_of_so_many_samples_has_wilsons_interval():
+    printed = printed_of(number(97.8, paper_n=180))
+    centre, half_width = 96.753, 2.360  # of 176 in 180, by the formula of Wilson (1927)
+    assert (printed.low, printed.high) == pytest.approx((centre - half_width, centre + half_width), abs=0.05)
+    assert printed_of(number(100.0, paper_n=300)).high == 100
+    assert printed_of(number(100.0, paper_n=300)).low == pytest.approx(100 * 300 / (300 + 1.959964**2))
+
+
+def test_a_deviation_and_a_mean_beside_one_have_those_of_their_repeats():
+    deviation = number(2.0, counterpart=replace(ACCURACY, statistic="deviation"), paper_n=5)
+    own = printed_of(deviation)
+    assert chi2.cdf(4 * (2.0 / own.low) ** 2, 4) == pytest.approx(0.975)
+    assert chi2.cdf(4 * (2.0 / own.high) ** 2, 4) == pytest.approx(0.025)
+    mean = printed_of(number(85.0), deviation)
+    assert mean.high - 85 == pytest.approx(2.776445 * 2 / 5**0.5)
+    assert 85 - mean.low == pytest.approx(mean.high - 85)
+
+
+def test_what_tells_no_sample_is_exact():
+    printed = printed_of(number(350.0, 550.0, -1, "labels"))
+    assert (printed.low, printed.high, printed.rounding) == (350, 550, 5)
+
+
+REFERENCE = ROOT / "results/reference/full"
+NUMBERS, REASONS = read_published(), read_reasons()
+OF_REASONS = {reason: [n for n in NUMBERS if reason_of(n, [reason]) == reason.text] for reason in REASONS}
+
+
+@pytest.fixture(scope="module")
+def reference():
+    files = {fields["file"] for reason in REASONS for fields in citations(reason.text)}
+    return read_results(path for path in sorted(REFERENCE.glob("*.csv")) if path.name in files)
+
+
+def test_a_reason_is_filled_with_the_mean_over_the_seeds_in_the_unit_that_it_names():
+    text = "Longer training gives {metrics.csv attribution @ gpca accuracy all %} %. The paper is silent."
+    results = {"metrics.csv": pd.concat([tidy([0.9, 0.8], method="gpca"), tidy([0.1, 0.1])])}
+    assert filled(text, number(50.0), results) == "Longer training gives 85.0 %. The paper is silent."
+    own = "Here it is {metrics.csv attribution @ @ @ @ share}."
+    assert filled(own, number(50.0), results) == "Here it is 0.1."
+
+
+def test_a_sentence_about_what_was_not_run_is_left_out():
+    text = "It is {metrics.csv attribution @ gpca accuracy all %} %. The paper is silent."
+    assert filled(text, number(50.0), {"metrics.csv": tidy([0.1])}) == "The paper is silent."
+    assert filled(text, number(50.0), {}) == "The paper is silent."
+
+
+def test_a_lower_bound_says_so():
+    rows = [
+        tidy([value], metric=metric, concept="overlap") for metric, value in (("labels_to_target", 60), ("reached", 0))
+    ]
+    text = "It takes {a.csv attribution @ @ labels_to_target overlap labels} labels."
+    assert filled(text, number(50.0), {"a.csv": pd.concat(rows)}) == "It takes more than 60 labels."
+
+
+@pytest.mark.parametrize("text", ["{metrics.csv attribution}", "{metrics.csv attribution @ @ accuracy all furlongs}"])
+def test_a_citation_is_whole_and_has_a_known_unit(text):
+    with pytest.raises(ValueError, match=r"shorter|longer|unknown unit"):
+        citations(text)
+
+
+@pytest.mark.parametrize("reason", REASONS, ids=lambda reason: f"{reason.table} {reason.row} {reason.column}")
+def test_every_reason_cites_a_run_of_the_suite(reason, reference):
+    cited = citations(reason.text)
+    assert cited
+    assert {fields["file"] for fields in cited} <= {tidy.file for each in experiments() for tidy in each.tidy}
+    kept = [fields for fields in cited if fields["file"] in reference]
+    found = [
+        value_of_run(asked, reference)
+        for fields in kept
+        for of in OF_REASONS[reason]
+        if (asked := cited_number(of, fields)) is not None
+    ]
+    # What the reference does not keep was made by the same steps.
+    assert not kept or any(value is not None for value in found)
+
+
+def test_no_reason_gives_up_and_none_quotes_a_number_that_stands_on_no_page():
+    pages = " ".join(path.read_text() for path in sorted((ROOT / "docs").glob("*.md")))
+    pages += " ".join(path.read_text() for path in sorted((ROOT / "config").glob("*.yaml")))
+    for reason in REASONS:
+        assert not re.search("not known|not measured", reason.text)
+        plain = re.sub(r"\{[^}]*\}|[\w/]+\.\w+|Table [IV]+|1e-\d+|3/2", "", reason.text)
+        for typed in re.findall(r"\d+(?:\.\d+)?", plain):
+            assert re.search(rf"(?<![\d.]){re.escape(typed)}(?![\d])", pages), (reason, typed)
+
+
+def test_readings_that_reasons_cite_are_of_the_grid():
+    grid = yaml.safe_load((ROOT / "config/readings.yaml").read_text())["readings"]["groups"]
+    for reason in REASONS:
+        for fields in citations(reason.text):
+            if fields["file"] == READINGS:
+                group, *values = fields["table"].split("/")
+                assert len(values) == len(grid[group])
+                for value, choice in zip(values, grid[group].values(), strict=True):
+                    assert value in {f"{known:g}" if isinstance(known, float) else str(known) for known in choice}

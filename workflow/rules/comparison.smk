@@ -3,8 +3,8 @@ from os.path import relpath
 
 from gpca.code_files import ROOT
 from gpca.comparison.claims import counterparts_of, read_claims
-from gpca.comparison.clusters import folders_behind
 from gpca.comparison.published import read_published
+from gpca.comparison.values import folders_behind
 from gpca.experiments.registry import experiments
 
 COLLECTED = [
@@ -59,8 +59,7 @@ rule comparison:
         predictions=COMPARED_PREDICTIONS,
         readings="<results>/readings.csv",
         code=code_files(
-            "gpca.comparison.claim_verdicts",
-            "gpca.comparison.clusters",
+            "gpca.comparison.claims",
             "gpca.comparison.readings",
             "gpca.experiments.specification_curve.words",
             "gpca.reporting.tables.comparison",

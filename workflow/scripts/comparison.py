@@ -1,11 +1,9 @@
 """A run's collected numbers beside the printed ones and the paper's sentences -> verdicts on both, and on readings."""
 
-from gpca.comparison.claim_verdicts import judge
-from gpca.comparison.claims import counterparts_of, read_claims
-from gpca.comparison.clusters import cluster_draws
+from gpca.comparison.claims import counterparts_of, judge, read_claims
 from gpca.comparison.published import read_published, read_reasons
 from gpca.comparison.readings import READINGS, judge_readings, with_readings
-from gpca.comparison.values import measured_on, read_results
+from gpca.comparison.values import cluster_draws, measured_on, read_results
 from gpca.comparison.verdicts import Tolerance, compare
 from gpca.experiments.specification_curve.words import ReadingWords
 from gpca.io.csv_file import write_csv

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gpca.comparison.closeness import is_close
+from gpca.comparison.chance import is_close
 from gpca.comparison.published import Number
 from gpca.comparison.verdicts import Tolerance
 from gpca.errors import InputError

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gpca.active_learning.metrics import CENSORED_BY
-from gpca.comparison.closeness import WITHIN, dealt, is_close, weights
+from gpca.comparison.chance import WITHIN, is_close, permuted, weights
 from gpca.comparison.published import UNITS, Number
 from gpca.comparison.verdicts import Tolerance
 from gpca.errors import InputError
@@ -106,7 +106,7 @@ def search(
     ]
     by_chance = {
         within: np.array(
-            [_shares(closes, dealt_P[place_K], weight_K, shape).max() for dealt_P in dealt(printed, within, deals)]
+            [_shares(closes, dealt_P[place_K], weight_K, shape).max() for dealt_P in permuted(printed, within, deals)]
         )
         for within in WITHIN
     }

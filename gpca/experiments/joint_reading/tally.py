@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from gpca.comparison.closeness import WITHIN, dealt, is_close, p_of, weights
+from gpca.comparison.chance import WITHIN, is_close, p_value, permuted, weights
 from gpca.comparison.published import Number
 from gpca.comparison.verdicts import Tolerance
 
@@ -34,7 +34,7 @@ def counted(
     records.append(("all", method, "share", share))
     for within, share_D in by_chance.items():
         records.append(("all", method, f"expected_{within}", share_D.mean()))
-        records.append(("all", method, f"p_{within}", p_of(share, share_D)))
+        records.append(("all", method, f"p_{within}", p_value(share, share_D)))
     return records
 
 
@@ -54,7 +54,7 @@ def scored(
     )
     places_K, weight_K = np.arange(len(numbers)), weights(numbers)
     by_chance = {
-        within: np.array([close_K_K[places_K, dealt_K] @ weight_K for dealt_K in dealt(numbers, within, deals)])
+        within: np.array([close_K_K[places_K, dealt_K] @ weight_K for dealt_K in permuted(numbers, within, deals)])
         for within in WITHIN
     }
     close_K = close_K_K.diagonal()

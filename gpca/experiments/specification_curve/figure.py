@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.comparison.readings import asked_about
+from gpca.comparison.readings import unresolved
 from gpca.errors import InputError
 from gpca.objects.entry import stand_in_clause
 from gpca.reporting.figures.panels import panels
@@ -32,7 +32,7 @@ def draw_readings(judged: pd.DataFrame, groups: Mapping[str, str], sources: Mapp
     Args:
         judged: the rows that :func:`gpca.comparison.readings.read_judged` returned.
     """
-    missed = asked_about(judged)
+    missed = unresolved(judged)
     of_groups = {
         name: dict(list(missed[missed["group"] == name].groupby(NUMBER, sort=False)))
         for name in groups

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from gpca.comparison.claim_verdicts import CLAIM_VERDICTS
+from gpca.comparison.claims import CLAIM_VERDICTS
 from gpca.comparison.verdicts import NOT_RUN
 from gpca.objects.entry import title_of
 from gpca.reporting.tables.builder import TableBuilder
@@ -36,7 +36,7 @@ def claims(verdicts: pd.DataFrame, sources: Mapping[str, Mapping], titles: Mappi
     """Return a row per comparison, below the sentence that it belongs to.
 
     Args:
-        verdicts: as :func:`gpca.comparison.claim_verdicts.read_verdicts` reads them.
+        verdicts: as :func:`gpca.comparison.claims.read_verdicts` reads them.
         titles: method -> what the tables call it.
     """
     table = TableBuilder(

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from gpca.attribution.metrics import TIDY_COLUMNS
-from gpca.comparison.closeness import dealt, is_close, p_of, weights
+from gpca.comparison.chance import is_close, p_value, permuted, weights
 from gpca.comparison.published import Counterpart, Number, read_published
 from gpca.errors import InputError
 from gpca.experiments.joint_reading.choices import CHOICES, PARTS, part_name
@@ -84,12 +84,12 @@ def test_what_was_not_measured_is_refused(rows):
 def test_deals_stay_within_their_group_and_are_the_same_every_time():
     printed = asked(read_published())
     for within, of in (("unit", lambda n: (n.table, n.unit)), ("column", lambda n: (n.table, n.column, n.unit))):
-        dealt_D_K = dealt(printed, within, 50)
+        dealt_D_K = permuted(printed, within, 50)
         np.testing.assert_array_equal(np.sort(dealt_D_K, axis=1), np.tile(np.arange(len(printed)), (50, 1)))
         assert all(
             of(printed[place]) == of(number) for row in dealt_D_K for place, number in zip(row, printed, strict=True)
         )
-        np.testing.assert_array_equal(dealt_D_K, dealt(printed, within, 50))
+        np.testing.assert_array_equal(dealt_D_K, permuted(printed, within, 50))
         assert len(np.unique(dealt_D_K, axis=0)) > 10
 
 
@@ -113,7 +113,7 @@ def test_close_is_within_the_second_tolerance_and_no_lower_bound():
     assert not is_close(SHAP, 30, True, TOLERANCES["%"])
     assert not is_close(SHAP, float("nan"), False, TOLERANCES["%"])
     assert is_close(LABELS, 42, False, TOLERANCES["labels"])
-    assert p_of(0.5, np.array([0.5, 0.4, 0.6])) == 3 / 4
+    assert p_value(0.5, np.array([0.5, 0.4, 0.6])) == 3 / 4
 
 
 def test_fixed_values_are_scored_beside_dealt_ones():

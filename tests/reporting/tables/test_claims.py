@@ -1,7 +1,7 @@
 import pandas as pd
 import pytest
 
-from gpca.comparison.claim_verdicts import CLAIM_COLUMNS
+from gpca.comparison.claims import CLAIM_COLUMNS
 from gpca.errors import InputError
 from gpca.reporting.tables.claims import claims
 
