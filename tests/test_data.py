@@ -12,10 +12,10 @@ import pytest
 import yaml
 
 from gpca.errors import InputError
-from gpca.frames.estimates import read_bop_results
-from gpca.frames.initial_pose import InitialPoseSettings
-from gpca.frames.plausibility import FARTHEST, points_on_model
-from gpca.frames.reading import Dataset, read_instances, read_models
+from gpca.frames.dataset import Dataset, read_models
+from gpca.frames.initial_pose import InitialPoseSettings, read_bop_results
+from gpca.frames.instances import points_on_model, read_instances
+from gpca.frames.plausibility import FARTHEST
 from gpca.io.csv_file import read_csv
 from gpca.objects.bop import read_models_info
 from gpca.objects.canonical import ObjectClouds, sample_objects, write_objects

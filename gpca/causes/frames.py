@@ -30,8 +30,8 @@ from gpca.causes.shapley import ALL, NONE
 from gpca.causes.subjects import Subject, measure_clean_pairs
 from gpca.errors import InputError
 from gpca.frames.camera import MeshScene
-from gpca.frames.clean_view import CleanView, clean_view, rendered_side
 from gpca.frames.instances import Instances
+from gpca.frames.shots import CleanView, clean_view, rendered_side
 from gpca.frames.starts import KINDS, Starts
 from gpca.objects.canonical import ObjectClouds
 from gpca.objects.splits import TRAINING
@@ -79,7 +79,7 @@ def measure_frames(
     clean pairs are off or its mesh is not in sight, are left out and named on stderr.
 
     Args:
-        meshes: of the objects that the instances show, see :func:`gpca.frames.meshes.meshes_of`.
+        meshes: of the objects that the instances show, see :func:`gpca.frames.dataset.meshes_of`.
         points: of what was measured, at most, and of the model.
 
     Returns:

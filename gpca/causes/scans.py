@@ -28,8 +28,7 @@ from gpca.objects.splits import DRAWN
 from gpca.pairs.perturbation import CONCEPTS, SEVERITIES
 from gpca.process.progress import progress
 from gpca.scans.dataset import ScanPairs
-from gpca.scans.pair import ScanPair
-from gpca.scans.success import ScanSuccess
+from gpca.scans.pair import ScanPair, ScanSuccess
 from gpca.seeds import generator
 from gpca.uncertainty.spread import divergence
 

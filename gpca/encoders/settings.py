@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal
 
 from gpca.errors import InputError, with_key
-from gpca.pairs.reading import Reading
+from gpca.pairs.synthesis import Reading
 from gpca.settings import Bounds, Count, PositiveShare, Share, changes_of, read_settings
 
 OF_ANY_SIZE = ("dgcnn",)  # backbones that take clouds of unlike sizes together
@@ -23,7 +23,7 @@ class EncoderSettings:
         fewest_points: each draw from a cloud has a random number of points from this one to `draw_points`, so that
             the density tells nothing; always `draw_points` where it is None. Only DGCNN takes such draws.
         draws: an embedding is the mean over so many draws of N points from the cloud.
-        reading: which cloud the encoder sees (:mod:`gpca.pairs.reading`).
+        reading: which cloud the encoder sees (:mod:`gpca.pairs.synthesis`).
         epochs, batch_size: length of the training, at most.
         validation_share: share of the training data, by groups, that is held out to find the best epoch by its loss.
         patience: epochs without a smaller validation loss after which training ends; None goes on.

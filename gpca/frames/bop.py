@@ -1,21 +1,96 @@
-"""Frames of a dataset in the layout of the BOP benchmark: depth, color, masks, true poses.
+"""Depth frames in the layout of the BOP benchmark, and, as a kind of source, views of objects cut out of them.
 
 Format: https://github.com/thodan/bop_toolkit/blob/master/docs/bop_datasets_format.md. Lengths are millimeters in the
-files and meters here; cameras look along +z with x to the right and y down.
-"""
+files and meters here; cameras look along +z with x to the right and y down. A view is a cloud in the camera's frame,
+named ``obj_000014_48_1002`` by its object, the scene, and the image with the number of the annotation, so that all
+views of an object are one instance."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import sys
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from gpca.alignment.rigid import require_rotation, rigid_motion
 from gpca.errors import InputError
-from gpca.frames.scene_files import REMEDY, read_camera, read_images, read_pose
+from gpca.frames.camera import back_project
 from gpca.io.files import read_image
+from gpca.io.structured_text import finite_numbers, read_json
 from gpca.numerals import whole
+from gpca.objects.mesh_folder import meters_per
+from gpca.objects.surface import Surface, evenly
+
+REMEDY = "the folder may be half unpacked: unpack the dataset again"
+# Wide of every depth camera there is; what lies between is for the measured points to say.
+FOCAL_PX = (1.0, 1e6)
+DEPTH_SCALES = (1e-6, 1e6)  # millimeters per unit: from nanometers to kilometers
+FARTHEST_MM = 1e6
+
+
+def read_images(path: Path) -> dict[int, Any]:
+    """Return what scene_camera.json or scene_gt.json holds, by the number of the image.
+
+    Raises:
+        InputError: what :func:`gpca.io.structured_text.read_json` refuses, a key that is no number, or the same
+            number twice.
+    """
+    images: dict[int, Any] = {}
+    for key, entry in read_json(path, "a scene's JSON file", REMEDY).items():
+        try:
+            image = whole(key)
+        except ValueError as fault:
+            raise InputError(path, f"its key {key[:40]!r} is not an image number", REMEDY) from fault
+        if image in images:
+            raise InputError(path, f"image {image} occurs twice", "keep one of the two")
+        images[image] = entry
+    return images
+
+
+def read_camera(entry: Any, subject: str) -> tuple[np.ndarray, float]:
+    """Return K (3, 3) in pixels and the millimeters per unit of depth; InputError where no camera has such."""
+    camera_3_3 = _numbers(entry, "cam_K", 9, subject).reshape(3, 3)
+    require_camera(camera_3_3, f"{subject}: cam_K")
+    (scale,) = _numbers(entry, "depth_scale", 1, subject)
+    if not DEPTH_SCALES[0] <= scale <= DEPTH_SCALES[1]:
+        raise InputError(subject, f"depth_scale is {scale:.6g}", "give the millimeters per unit of the depth images")
+    return camera_3_3, float(scale)
+
+
+def require_camera(camera_3_3: np.ndarray, subject: str) -> None:
+    """Raise an InputError that names `subject` unless K is upper triangular, with focal lengths that can be."""
+    if abs(camera_3_3[[1, 2, 2], [0, 0, 1]]).max() > 1e-6 or abs(camera_3_3[2, 2] - 1) > 1e-6:
+        raise InputError(subject, "is not a camera matrix", "give fx s cx, 0 fy cy, 0 0 1, row by row")
+    focal_px = np.diag(camera_3_3)[:2]
+    if not ((focal_px >= FOCAL_PX[0]) & (focal_px <= FOCAL_PX[1])).all():
+        lengths = " and ".join(f"{length:.6g}" for length in focal_px)
+        raise InputError(subject, f"has the focal lengths {lengths} px", "they must be positive; check fx and fy")
+    if abs(camera_3_3[:2]).max() > FOCAL_PX[1]:
+        raise InputError(subject, "has a skew or principal point outside any image", "give them in pixels")
+
+
+def read_pose(entry: Any, subject: str) -> tuple[int, np.ndarray]:
+    """Return an annotation's object id and ``T_camera_model`` in meters; InputError where it can be no pose."""
+    R_camera_model = _numbers(entry, "cam_R_m2c", 9, subject).reshape(3, 3)
+    translation_mm = _numbers(entry, "cam_t_m2c", 3, subject)
+    if abs(translation_mm).max() > FARTHEST_MM:
+        raise InputError(subject, f"cam_t_m2c is {abs(translation_mm).max():.3g} mm", "no camera sees that far")
+    T_camera_model = rigid_motion(R_camera_model, translation_mm / 1000)
+    require_rotation(T_camera_model, subject)
+    (object_id,) = _numbers(entry, "obj_id", 1, subject)
+    if object_id < 0 or object_id > 999_999 or object_id != int(object_id):  # files of models have six digits
+        raise InputError(subject, f"obj_id is {object_id:.6g}", "ids are whole numbers of at most six digits")
+    return int(object_id), T_camera_model
+
+
+def _numbers(entry: Any, key: str, count: int, subject: str) -> np.ndarray:
+    if not isinstance(entry, dict) or key not in entry:
+        raise InputError(subject, f"has no {key}", REMEDY)
+    return finite_numbers(entry[key], count, subject, key, REMEDY)
+
 
 FEWEST_POINTS = 64
 
@@ -118,19 +193,6 @@ def read_frames(folders: Iterable[Path], split: str = "test") -> list[Frame]:
     return sorted(frames, key=lambda frame: (frame.scene, frame.image))
 
 
-def back_project(depth_m: np.ndarray, mask: np.ndarray, camera_3_3: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the measured points (P, 3) of a mask in the camera's frame, meters, and their pixels (P, 2) as (u, v).
-
-    Pixel centers have whole coordinates: x = (u - c_x) z / f_x.
-    """
-    v, u = np.nonzero(mask & (depth_m > 0))
-    z = depth_m[v, u].astype(np.float64)
-    (fx, skew, cx), (_, fy, cy), _ = camera_3_3
-    y = (v - cy) / fy
-    x = (u - cx - skew * y) / fx
-    return np.stack([x * z, y * z, z], axis=1), np.stack([u, v], axis=1)
-
-
 def measured_points(frame: Frame, annotation: Annotation, depth_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return what was measured within an object's mask, points (P, 3) and their pixels (P, 2).
 
@@ -192,8 +254,8 @@ def _frames_of_scene(folder: Path) -> list[Frame]:
                 image=image,
                 camera_3_3=camera_3_3,
                 depth_scale=depth_scale,
-                depth=_image(folder / "depth", f"{image:06d}"),
-                color=_image_if_any(colors, f"{image:06d}"),
+                depth=_image_file(folder / "depth", f"{image:06d}"),
+                color=_image_file_if_any(colors, f"{image:06d}"),
                 annotations=tuple(_annotation(folder, image, n, entry) for n, entry in enumerate(truth)),
             )
         )
@@ -203,15 +265,69 @@ def _frames_of_scene(folder: Path) -> list[Frame]:
 def _annotation(folder: Path, image: int, n: int, entry: object) -> Annotation:
     subject = f"{folder / 'scene_gt.json'}: image {image}, object {n}"
     object_id, T_camera_model = read_pose(entry, subject)
-    return Annotation(object_id, T_camera_model, _image(folder / "mask_visib", f"{image:06d}_{n:06d}"), subject)
+    return Annotation(object_id, T_camera_model, _image_file(folder / "mask_visib", f"{image:06d}_{n:06d}"), subject)
 
 
-def _image(folder: Path, stem: str) -> Path:
-    if (path := _image_if_any(folder, stem)) is not None:
+def _image_file(folder: Path, stem: str) -> Path:
+    if (path := _image_file_if_any(folder, stem)) is not None:
         return path
     raise InputError(folder / f"{stem}.png", "no such image", REMEDY)
 
 
-def _image_if_any(folder: Path, stem: str) -> Path | None:
+def _image_file_if_any(folder: Path, stem: str) -> Path | None:
     paths = (folder / f"{stem}{suffix}" for suffix in (".png", ".jpg", ".jpeg", ".tif"))
     return next((path for path in paths if path.is_file()), None)
+
+
+VIEWS = 6  # of an object, as of an instance of UW's
+RIM_FACTOR = 3.0  # times the median distance from the middle: what lies beyond is behind the rim of a mask
+MOST_ANNOTATIONS = 1000  # objects of an image at most
+
+
+def from_entry(entry: dict, folder: Path) -> Iterator[Surface]:
+    """Return surfaces of a configured source: keys `objects` (ids, default all) and `views_per_instance` (default 6).
+
+    Raises:
+        InputError: a unit other than that of the format, and what :func:`cut_out_views` refuses.
+    """
+    if meters_per(entry.get("unit") or "mm") != meters_per("mm"):
+        raise InputError(f"unit '{entry['unit']}'", "is not that of BOP frames", "leave unit out")
+    return cut_out_views(folder, entry.get("objects"), entry.get("views_per_instance", VIEWS))
+
+
+def cut_out_views(folder: Path, objects: Sequence[int] | None = None, views: int = VIEWS) -> Iterator[Surface]:
+    """Yield the views of each object, spread evenly over its frames; those with too few points are named on stderr.
+
+    Args:
+        folder: the dataset's.
+        objects: ids; all that the frames show when None.
+        views: of an object, at most.
+
+    Raises:
+        InputError: faulty files (:mod:`gpca.frames.bop`), or an object that no frame shows.
+    """
+    shown: dict[int, list] = {}
+    for frame in read_frames([folder]):
+        for place, annotation in enumerate(frame.annotations):
+            shown.setdefault(annotation.object_id, []).append((frame, place))
+    wanted = sorted(shown) if not objects else sorted(objects)
+    if missing := [number for number in wanted if number not in shown]:
+        raise InputError(folder, f"no frame shows object {missing[0]}", "check objects in the config")
+    for number in wanted:
+        for frame, place in evenly(shown[number], views):
+            try:
+                points_m, _ = measured_points(frame, frame.annotations[place], frame.depth_m())
+            except TooFewPoints as fault:
+                print(f"skipped: {fault}", file=sys.stderr)
+                continue
+            name = f"obj_{number:06d}_{frame.scene}_{MOST_ANNOTATIONS * frame.image + place}"
+            yield Surface(name, within_rim(points_m), None)
+
+
+def within_rim(points_m: np.ndarray) -> np.ndarray:
+    """Return points (P, 3) without those that a mask's rim has of the background.
+
+    The diameter of the object is not known here, but most points are its own.
+    """
+    distances_P = np.linalg.norm(points_m - np.median(points_m, axis=0), axis=1)
+    return points_m[distances_P <= RIM_FACTOR * np.median(distances_P)]

@@ -1,20 +1,27 @@
-"""A virtual RGB-D camera: ray casting, shading, and the depth noise of a structured-light sensor."""
+"""A virtual RGB-D camera: ray casting, shading, noise of a structured-light sensor; and views of meshes as a source."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 
 from gpca.alignment.rigid import rigid_motion, rotate
+from gpca.errors import InputError
+from gpca.objects import mesh_folder
+from gpca.objects.canonical import bounding_center
+from gpca.objects.surface import Surface
 from gpca.process.environment import require_open3d
+from gpca.seeds import generator
 from gpca.settings import Bounds, Positive
 
 Pixels = Annotated[int, Bounds(minimum=16, maximum=4096)]
 
 NOTHING = -1  # the mesh of a pixel that sees none
+TABLE_M = 1.2  # edge length of the table that scenes stand on
 
 
 @dataclass(frozen=True)
@@ -185,3 +192,61 @@ def look_at(eye_m: np.ndarray, target_m: np.ndarray) -> np.ndarray:
     x = np.cross(z, [0.0, 0.0, 1.0])
     x /= np.linalg.norm(x)
     return rigid_motion(np.stack([x, np.cross(z, x), z], axis=1), eye_m)
+
+
+def table() -> tuple[np.ndarray, np.ndarray]:
+    """Return the table's top, a square at z = 0, as vertices and faces."""
+    half = TABLE_M / 2
+    return np.array([[-half, -half, 0], [half, -half, 0], [half, half, 0], [-half, half, 0]]), np.array(
+        [[0, 1, 2], [0, 2, 3]]
+    )
+
+
+def back_project(depth_m: np.ndarray, mask: np.ndarray, camera_3_3: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the measured points (P, 3) of a mask in the camera's frame, meters, and their pixels (P, 2) as (u, v).
+
+    Pixel centers have whole coordinates: x = (u - c_x) z / f_x.
+    """
+    v, u = np.nonzero(mask & (depth_m > 0))
+    z = depth_m[v, u].astype(np.float64)
+    (fx, skew, cx), (_, fy, cy), _ = camera_3_3
+    y = (v - cy) / fy
+    x = (u - cx - skew * y) / fx
+    return np.stack([x * z, y * z, z], axis=1), np.stack([u, v], axis=1)
+
+
+VIEWS = 6
+ELEVATIONS_DEG = (30, 45, 60)
+VIEW_DISTANCE_M = 0.8
+VIEW_CAMERA, VIEW_NOISE = Camera(), DepthNoise()
+
+
+def from_entry(entry: dict, folder: Path) -> Iterator[Surface]:
+    """Return surfaces of a configured source: keys `files`, `unit` and `views_per_instance` (default 6)."""
+    for surface in mesh_folder.from_entry(entry, folder):
+        yield from rendered_views(surface, entry.get("views_per_instance", VIEWS))
+
+
+def rendered_views(mesh: Surface, count: int) -> Iterator[Surface]:
+    """Yield views of a mesh whose z axis points up, as clouds in the camera's frame, in meters.
+
+    Raises:
+        InputError: a cloud, which cannot be rendered, or a mesh that the camera does not see.
+    """
+    if mesh.faces is None:
+        raise InputError(f"object '{mesh.name}'", "is a cloud, of which there are no views", "use kind: mesh_folder")
+    center_m = bounding_center(mesh)
+    scene = MeshScene([(mesh.vertices_m, mesh.faces)])
+    for number in range(count):
+        level = number % len(ELEVATIONS_DEG)
+        elevation, azimuth = np.deg2rad(ELEVATIONS_DEG[level]), 2 * np.pi * number / count
+        flat = np.cos(elevation) * np.array([np.cos(azimuth), np.sin(azimuth)])
+        T_world_camera = look_at(center_m + VIEW_DISTANCE_M * np.array([*flat, np.sin(elevation)]), center_m)
+        name = f"{mesh.name}_{level + 1}_{number}"
+        depth_m = VIEW_NOISE.measure(scene.look(VIEW_CAMERA, T_world_camera), generator(name, "view"))
+        points_m, _ = back_project(depth_m, depth_m > 0, VIEW_CAMERA.matrix_3_3)
+        if len(points_m) == 0:
+            raise InputError(
+                f"object '{mesh.name}'", f"is not seen from {VIEW_DISTANCE_M} m", "check unit in the config"
+            )
+        yield Surface(name, points_m, None)

@@ -1,33 +1,52 @@
-"""Instances: objects as single depth frames show them, with their true and their initial poses, and their file.
-
-Beside registrations of depth frames lies a CSV that says which instance each sample shows, and its pose errors.
-"""
+"""Instances: objects in single depth frames with their true and initial poses, and how they are read from datasets."""
 
 from __future__ import annotations
 
+import sys
+from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.spatial import cKDTree
 
+from gpca.alignment.rigid import inverse, transform
 from gpca.errors import InputError
-from gpca.frames.sighting import Sighting
+from gpca.frames.bop import Frame, TooFewPoints, measured_points, without_background
+from gpca.frames.dataset import CenteredModel, Dataset
+from gpca.frames.initial_pose import (
+    EstimatorErrors,
+    GlobalRegistration,
+    InitialPoseSettings,
+    displace,
+    error_of,
+    estimates_of,
+    read_pose_errors,
+)
+from gpca.frames.plausibility import (
+    FARTHEST,
+    JUDGED_POINTS,
+    Observation,
+    median_distance,
+    require_plausible,
+    require_shared_form,
+    spread,
+)
+from gpca.frames.shots import Sighting
 from gpca.io.arrays import REGENERATE, TEXT, WHOLE, load_arrays, save_arrays
-from gpca.io.csv_file import numbers, read_csv
+from gpca.objects.bop import find_symmetries
+from gpca.objects.canonical import ObjectClouds
 from gpca.objects.splits import DRAWN, unseen
-from gpca.pairs.dataset import Registrations
-from gpca.seeds import generator
+from gpca.process.progress import progress
+from gpca.seeds import generator, seed_of
 
 if TYPE_CHECKING:
-    import pandas as pd
+    pass
+
 
 NO_COLOR = "none"
-COLUMNS = ("sample", "split", "instance", "dataset", "in_training")
-FRAME_COLUMNS = (  # all that the file may hold
-    *COLUMNS,
-    *("concept", "scene", "image", "object", "symmetric", "init_from", "init_error", "icp_error", "lost_to"),
-)
 
 
 @dataclass(frozen=True)
@@ -133,22 +152,184 @@ class Instances:
         return cls(**{name: arrays[name] for name in shapes})
 
 
-def read_samples_of_frames(path: str | Path) -> pd.DataFrame:
-    """Read the columns that tell samples apart, as text but for `in_training`."""
-    rows = read_csv(path, COLUMNS, others=FRAME_COLUMNS)
-    return rows.assign(in_training=rows["in_training"] == "True")
+def points_on_model(instances: Instances, objects: ObjectClouds, most_points: int | None = None) -> np.ndarray:
+    """Return the median distance (I,) in meters from each instance's points to its model under the true pose.
+
+    Args:
+        most_points: judge by about so many of each instance, where all would take too long.
+    """
+    trees = {index: cKDTree(objects.points(index)) for index in np.unique(instances.object_index)}
+    medians_m = []
+    for i, index in enumerate(instances.object_index):
+        points_m = spread(instances.cloud_m(i), most_points or len(instances.points_m))
+        medians_m.append(median_distance(trees[index], transform(inverse(instances.T_camera_object_true[i]), points_m)))
+    return np.array(medians_m)
 
 
-def read_instances_of(path: str | Path, registrations: Registrations) -> np.ndarray:
-    """Return the instance (S,) that each registration shows.
+def require_of_objects(instances: Instances, objects: ObjectClouds, subject: object) -> None:
+    """Raise an InputError that names `subject` unless the instances show these objects, where their true poses say."""
+    remedy = "regenerate both files in one call"
+    if instances.object_index.min() < 0 or instances.object_index.max() >= len(objects):
+        raise InputError(subject, "shows objects that the object file does not contain", remedy)
+    medians_m = points_on_model(instances, objects, JUDGED_POINTS)
+    distances = medians_m / objects.diameters_m[instances.object_index]
+    if distances.max() > FARTHEST:
+        i = int(distances.argmax())
+        name = objects.names[instances.object_index[i]]
+        raise InputError(subject, f"instance {i} was measured {distances[i]:.2g} diameters from '{name}'", remedy)
+
+
+def read_instances(
+    datasets: Mapping[str, tuple[Dataset, list[Frame], dict[int, CenteredModel]]],
+    objects: ObjectClouds,
+    settings: InitialPoseSettings,
+) -> Instances:
+    """Return every object of the frames of which enough was measured, with its true and its initial pose.
+
+    An object with too few points is left out and named on stderr.
+
+    Args:
+        datasets: name -> dataset, its frames, the models of their objects.
+        objects: the canonical clouds of all these models, by their surfaces' names.
+        settings: how initial poses are found.
 
     Raises:
-        InputError: the file is of other samples.
+        InputError: the files are faulty, an object was measured elsewhere than its pose says, or nothing is left.
     """
-    rows = read_samples_of_frames(path)
-    for name in ("sample", "split"):
-        if rows[name].tolist() != getattr(registrations, name).astype(str).tolist():
-            raise InputError(
-                path, "its samples differ from those of the registrations", "regenerate both from the same config"
-            )
-    return numbers(path, rows, "instance", least=0).to_numpy(int)
+    if settings.form == "results" and not any(of.results or of.errors for of, _, _ in datasets.values()):
+        raise InputError(f"dataset {next(iter(datasets))}", "has no results file", "set results or choose another pose")
+    left_out: list[str] = []
+    seen: list[tuple[_Objects, Frame, int, dict]] = []
+    for dataset, frames, models in datasets.values():
+        catalog = _Objects(dataset, objects, models, settings)
+        of_dataset: list[tuple[_Objects, Frame, int, dict]] = []
+        for frame in progress(frames, f"frames of {dataset.name}"):
+            shown = {"dataset": dataset.name, "scene": frame.scene, "image": frame.image}
+            shown |= {"camera_3_3": frame.camera_3_3, "colour": str(frame.color or NO_COLOR)}
+            shown["fold"] = dataset.fold(frame.scene)
+            of_dataset += [(catalog, frame, n, shown | row) for n, row in catalog.in_frame(frame, left_out)]
+        observations = [catalog.observation(frame, n, row["points_m"]) for _, frame, n, row in of_dataset]
+        require_shared_form(dataset.name, observations)
+        seen += of_dataset
+    if not seen:
+        reasons = f"; the first skipped: {left_out[0]}" if left_out else ""
+        raise InputError(", ".join(datasets), f"no object is left in any frame{reasons}", "check masks and depth")
+    # Results last: they are measured against poses that fit what was seen.
+    find = _from_results(datasets, seen) if settings.form == "results" else None
+    rows = []
+    for own, frame, n, row in progress(seen, "initial poses"):
+        init_from, T_init = find(own, frame, n, row) if find else (settings.form, own.initial_pose(frame, n, row))
+        rows.append(row | {"T_camera_object_init": T_init, "init_from": init_from})
+    for fault in left_out:
+        print(f"skipped: {fault}", file=sys.stderr)
+    columns = {name: np.array([row[name] for row in rows]) for name in rows[0] if name not in ("points_m", "pixels")}
+    ragged = {name: np.concatenate([row[name] for row in rows]) for name in ("points_m", "pixels")}
+    offsets = np.cumsum([0, *(len(row["points_m"]) for row in rows)], dtype=np.int64)
+    return Instances(**columns, **ragged, offsets=offsets)
+
+
+def _from_results(datasets: Mapping[str, tuple[Dataset, list[Frame], dict]], seen: list) -> Any:
+    """Return a function to initial poses: an estimator's if one found the object, else the truth with an error."""
+    estimators = {name: dataset.estimators() for name, (dataset, _, _) in datasets.items()}
+    estimates: dict[int, tuple[str, np.ndarray]] = {}
+    symmetric = {(catalog.name, number) for catalog, _, _, _ in seen for number in catalog.symmetric_ids()}
+    errors = EstimatorErrors(symmetric)
+    for name, (dataset, _, models) in datasets.items():
+        for number, T_error in read_pose_errors(dataset.errors, models) if dataset.errors else ():
+            errors.add((name, number), T_error)
+    for place, (catalog, frame, n, row) in enumerate(seen):
+        annotation = frame.annotations[n]
+        number = annotation.object_id
+        alone = Counter(of.object_id for of in frame.annotations)[number] == 1
+        random = generator(catalog.name, *frame.place, n, "estimator")
+        shown = row | {"diameter_m": catalog.diameter_m(number)}
+        if candidates := estimates_of(estimators[catalog.name], (*frame.place, number), alone, shown):
+            chosen = candidates[int(random.integers(len(candidates)))]
+            estimates[place] = chosen
+            errors.add((catalog.name, number), error_of(annotation.T_camera_model, chosen[1]))
+    places = {(catalog.name, *frame.place, n): place for place, (catalog, frame, n, _) in enumerate(seen)}
+
+    def find(catalog: _Objects, frame: Frame, n: int, row: dict) -> tuple[str, np.ndarray]:
+        number = frame.annotations[n].object_id
+        axes = (catalog.name, *frame.place, n)
+        if chosen := estimates.get(places[axes]):
+            return chosen[0], chosen[1] @ catalog.T_model_object(number)
+        T_error = errors.draw((catalog.name, number), generator(*axes, "error"))
+        return "errors", frame.annotations[n].T_camera_model @ T_error @ catalog.T_model_object(number)
+
+    return find
+
+
+class _Objects:
+    """The objects of one dataset, ready to be found in frames."""
+
+    def __init__(
+        self, dataset: Dataset, objects: ObjectClouds, models: dict[int, CenteredModel], settings: InitialPoseSettings
+    ):
+        self.name = dataset.name
+        self._objects = objects
+        self._models = models
+        self._settings = settings
+        self._index = {number: objects.names.index(model.surface.name) for number, model in models.items()}
+        self._symmetric = {number: self._is_symmetric(number) for number in models}
+        self._trees = {number: cKDTree(objects.points(index)) for number, index in self._index.items()}
+        self._registration: dict[int, GlobalRegistration] = {}
+
+    def in_frame(self, frame: Frame, left_out: list[str]) -> list[tuple[int, dict]]:
+        """Return the objects that were measured, by their place among the annotations."""
+        depth_m = frame.depth_m()
+        rows = []
+        for n, annotation in enumerate(frame.annotations):
+            number = annotation.object_id
+            try:
+                points_m, pixels = measured_points(frame, annotation, depth_m)
+                require_plausible(self.observation(frame, n, points_m))
+                points_m, pixels = without_background(points_m, pixels, annotation, self.diameter_m(number))
+            except TooFewPoints as fault:
+                left_out.append(str(fault))
+                continue
+            T_true = annotation.T_camera_model @ self._models[number].T_model_object
+            seen: dict[str, Any] = {"object_index": self._index[number], "symmetric": self._symmetric[number]}
+            seen |= {"T_camera_object_true": T_true, "points_m": points_m.astype(np.float32)}
+            rows.append((n, {**seen, "pixels": pixels.astype(np.int32)}))
+        return rows
+
+    def observation(self, frame: Frame, n: int, points_m: np.ndarray) -> Observation:
+        """Return the observation of an annotated object, to be judged."""
+        annotation = frame.annotations[n]
+        number = annotation.object_id
+        T_model_object, tree = self._models[number].T_model_object, self._trees[number]
+        return Observation(
+            annotation.subject, annotation.T_camera_model, T_model_object, tree, self.diameter_m(number), points_m
+        )
+
+    def T_model_object(self, number: int) -> np.ndarray:
+        """Return where the centered object lies in the frame of its model."""
+        return self._models[number].T_model_object
+
+    def symmetric_ids(self) -> list[int]:
+        """Return the ids of the objects that a rotation leaves as they are."""
+        return [number for number, symmetric in self._symmetric.items() if symmetric]
+
+    def initial_pose(self, frame: Frame, n: int, row: dict) -> np.ndarray:
+        """Return ``T_camera_object`` that ICP starts from where no estimator is asked."""
+        number = frame.annotations[n].object_id
+        axes = (self.name, frame.scene, frame.image, n, "initial pose")
+        if self._settings.form == "true_pose":
+            return displace(row["T_camera_object_true"], self.diameter_m(number), self._settings, generator(*axes))
+        if number not in self._registration:
+            i = self._index[number]
+            points_m, normals = self._objects.points(i), self._objects.normals(i)
+            self._registration[number] = GlobalRegistration(points_m, normals, self.diameter_m(number), self._settings)
+        return self._registration[number].register(row["points_m"], seed_of(*axes))
+
+    def diameter_m(self, number: int) -> float:
+        """Return an object's diameter in meters."""
+        return float(self._objects.diameters_m[self._index[number]])
+
+    def _is_symmetric(self, number: int) -> bool:
+        listed = self._models[number].listed_symmetries
+        i = self._index[number]
+        return bool(
+            find_symmetries(self._objects.points(i), self._objects.diameters_m[i]) if listed is None else listed
+        )

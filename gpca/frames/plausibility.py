@@ -10,8 +10,6 @@ from scipy.spatial import cKDTree
 
 from gpca.alignment.rigid import inverse, scale_translation, transform
 from gpca.errors import InputError
-from gpca.frames.instances import Instances
-from gpca.objects.canonical import ObjectClouds
 
 # Diameters, from the median measured point to the model. Of 223 annotated objects of five datasets the worst lies at
 # 0.034; turned at random in its place, the worst lies at 0.298. What is farther is not where its pose says.
@@ -98,14 +96,14 @@ class Observation:
 
     def distance(self, undo: Undo | None = None) -> float:
         """Return the median distance from the points to the model in diameters, once a fault is undone."""
-        points_m = _spread(self.points_m, JUDGED_POINTS)
+        points_m = spread(self.points_m, JUDGED_POINTS)
         T_camera_model, points_m = undo(self.T_camera_model, points_m) if undo else (self.T_camera_model, points_m)
         T_object_camera = inverse(T_camera_model @ self.T_model_object)
         return median_distance(self.tree, transform(T_object_camera, points_m)) / self.diameter_m
 
     def size(self, undo: Undo) -> float:
         """Return in diameters how far the points reach, once a fault is undone."""
-        points_m = undo(self.T_camera_model, _spread(self.points_m, JUDGED_POINTS))[1]
+        points_m = undo(self.T_camera_model, spread(self.points_m, JUDGED_POINTS))[1]
         return float(np.linalg.norm(points_m.std(axis=0)) / self.diameter_m) + 1e-9
 
 
@@ -114,34 +112,8 @@ def median_distance(tree: cKDTree, points_m: np.ndarray) -> float:
     return float(np.median(tree.query(points_m)[0]))
 
 
-def points_on_model(instances: Instances, objects: ObjectClouds, most_points: int | None = None) -> np.ndarray:
-    """Return the median distance (I,) in meters from each instance's points to its model under the true pose.
-
-    Args:
-        most_points: judge by about so many of each instance, where all would take too long.
-    """
-    trees = {index: cKDTree(objects.points(index)) for index in np.unique(instances.object_index)}
-    medians_m = []
-    for i, index in enumerate(instances.object_index):
-        points_m = _spread(instances.cloud_m(i), most_points or len(instances.points_m))
-        medians_m.append(median_distance(trees[index], transform(inverse(instances.T_camera_object_true[i]), points_m)))
-    return np.array(medians_m)
-
-
-def require_of_objects(instances: Instances, objects: ObjectClouds, subject: object) -> None:
-    """Raise an InputError that names `subject` unless the instances show these objects, where their true poses say."""
-    remedy = "regenerate both files in one call"
-    if instances.object_index.min() < 0 or instances.object_index.max() >= len(objects):
-        raise InputError(subject, "shows objects that the object file does not contain", remedy)
-    medians_m = points_on_model(instances, objects, JUDGED_POINTS)
-    distances = medians_m / objects.diameters_m[instances.object_index]
-    if distances.max() > FARTHEST:
-        i = int(distances.argmax())
-        name = objects.names[instances.object_index[i]]
-        raise InputError(subject, f"instance {i} was measured {distances[i]:.2g} diameters from '{name}'", remedy)
-
-
-def _spread(points_m: np.ndarray, most: int) -> np.ndarray:
+def spread(points_m: np.ndarray, most: int) -> np.ndarray:
+    """Return about this many of the points, evenly spread over their order."""
     return points_m[:: max(1, len(points_m) // most)]
 
 

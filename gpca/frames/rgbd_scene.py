@@ -1,4 +1,4 @@
-"""Table-top scenes, seen by the virtual camera and written as a BOP dataset."""
+"""Table-top scenes of resting objects, seen by the virtual camera and written as a BOP dataset."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Annotated
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from gpca.alignment.rigid import inverse, transform
+from gpca.alignment.rigid import inverse, rigid_motion, transform
 from gpca.errors import InputError
-from gpca.frames.camera import Camera, DepthNoise, MeshScene, look_at, shade
-from gpca.frames.resting import rest, stable_poses
+from gpca.frames.camera import TABLE_M, Camera, DepthNoise, MeshScene, look_at, shade, table
 from gpca.io.files import whole_folder
 from gpca.objects.bop import find_symmetries
 from gpca.objects.canonical import canonical_cloud, diameter
@@ -22,11 +22,47 @@ from gpca.process.progress import progress
 from gpca.seeds import generator
 from gpca.settings import Bounds, Count, Distinct
 
+FLAT = 1e-9  # volume of the convex hull in diameters cubed; that of a sheet of paper is 1e-4
+
+
+def stable_poses(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
+    """Return the poses (n, 4, 4) in which an object rests on the plane z = 0, and their probabilities (n,).
+
+    Its density is uniform. Of an open surface the center of mass may come out anywhere; outside of the convex hull,
+    where no object has one, the center of the hull takes its place.
+
+    Raises:
+        InputError: a surface that has no volume.
+    """
+    import trimesh
+
+    mesh = trimesh.Trimesh(surface.vertices_m, surface.faces, process=False)
+    with np.errstate(invalid="ignore", divide="ignore"):  # what is flat or open may enclose no volume
+        hull, center_m = mesh.convex_hull, mesh.center_mass
+    if hull.volume < FLAT * diameter(surface.vertices_m, surface.name) ** 3:
+        raise InputError(f"object '{surface.name}'", "is flat and cannot be stood on a table", "leave it out")
+    if not _is_inside(center_m, hull):
+        center_m = hull.center_mass
+    return trimesh.poses.compute_stable_poses(mesh, center_mass=center_m, sigma=0.0, threshold=0.0)
+
+
+def rest(poses_n: np.ndarray, probabilities_n: np.ndarray, random: np.random.Generator) -> np.ndarray:
+    """Draw one of the stable poses and turn it about the vertical."""
+    chosen = poses_n[random.choice(len(poses_n), p=probabilities_n / probabilities_n.sum())]
+    return rigid_motion(Rotation.from_euler("z", random.uniform(0, 2 * np.pi)).as_matrix()) @ chosen
+
+
+def _is_inside(point_m: np.ndarray, hull) -> bool:
+    """Return whether a point is inside of a convex mesh, by the test that trimesh repeats until it is passed."""
+    from trimesh.util import diagonal_dot
+
+    return bool(np.all(diagonal_dot(point_m - hull.triangles_center, hull.face_normals) < 0))
+
+
 DEPTH_SCALE = 0.1  # millimeters per unit of the depth images
 Distance = Annotated[float, Bounds(minimum=0.2, maximum=10)]  # in meters
 Elevation = Annotated[float, Bounds(minimum=0, maximum=89)]  # in degrees
 DESCRIPTION = "dataset_info.json"
-TABLE_M = 1.2  # edge length of the table
 TABLE_COLOR = (0.72, 0.65, 0.55)
 
 
@@ -121,7 +157,7 @@ def lay_table(
     near to the middle as its convex outline on the table allows.
 
     Args:
-        resting: what :func:`gpca.frames.resting.stable_poses` returns for each surface.
+        resting: what :func:`gpca.frames.rgbd_scene.stable_poses` returns for each surface.
     """
     from shapely import MultiPoint
     from shapely.affinity import translate
@@ -162,14 +198,6 @@ def camera_poses(settings: SceneSettings, middle_m: np.ndarray, source: str, sce
         eye_m = target_m + random.uniform(*settings.distance_m) * np.array([*flat, np.sin(elevation)])
         poses.append(look_at(eye_m, target_m))
     return poses
-
-
-def table() -> tuple[np.ndarray, np.ndarray]:
-    """Return the table's top, a square at z = 0, as vertices and faces."""
-    half = TABLE_M / 2
-    return np.array([[-half, -half, 0], [half, -half, 0], [half, half, 0], [-half, half, 0]]), np.array(
-        [[0, 1, 2], [0, 2, 3]]
-    )
 
 
 def center(surface: Surface) -> Surface:

@@ -1,17 +1,145 @@
-"""Shots: a robot's measurements of an object from known viewpoints, and clouds fused from several of them."""
+"""What depth cameras measure of one object: sightings in frames, clean views, a robot's shots, the next viewpoint."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from gpca.alignment.rigid import inverse, rotate, transform
-from gpca.frames.bop import back_project
-from gpca.frames.camera import Camera
+from gpca.frames.camera import Camera, MeshScene, back_project, look_at, table
 from gpca.process.environment import open3d_cloud
+
+
+@dataclass(frozen=True)
+class Sighting:
+    """An object in a depth frame.
+
+    Attributes:
+        points_m: (N, 3) measured points in the camera's frame, all of them or some.
+        pixels: (P, 2) every pixel at which it was measured, (u, v).
+        camera_3_3: K in pixels.
+    """
+
+    points_m: np.ndarray
+    pixels: np.ndarray
+    camera_3_3: np.ndarray
+
+    def measured(self, pixels_V_2: np.ndarray) -> np.ndarray:
+        """Return at which of these pixels (V, 2) the object was measured, (V,) bool."""
+        low_2, mask = self._mask
+        of_box_V_2 = pixels_V_2 - low_2
+        inside_V = ((of_box_V_2 >= 0) & (of_box_V_2 < mask.shape)).all(axis=1)
+        measured_V = np.zeros(len(pixels_V_2), bool)
+        measured_V[inside_V] = mask[tuple(of_box_V_2[inside_V].T)]
+        return measured_V
+
+    @cached_property
+    def _mask(self) -> tuple[np.ndarray, np.ndarray]:
+        """The first pixel of a box around all of them, and which pixels of that box they are."""
+        low_2 = self.pixels.min(axis=0)
+        mask = np.zeros(self.pixels.max(axis=0) - low_2 + 1, bool)
+        mask[tuple((self.pixels - low_2).T)] = True
+        return low_2, mask
+
+
+MOST_PIXELS = 20_000  # of a rendered side, about; of more, every second or third row and column is looked at
+
+
+@dataclass(frozen=True)
+class CleanView:
+    """What was measured of an object, beside a perfect sensor's view of it at some pose; in the object's frame, meters.
+
+    Attributes:
+        measured: (N, 3) points that the sensor measured.
+        clean: (N, 3) where the rays of the same pixels meet the mesh; where one misses it, the nearest rendered point.
+        unmeasured: (V, 3) the other points that the camera would see, had nothing been in front and no pixel failed.
+        share: of the whole visible side that was measured.
+    """
+
+    measured: np.ndarray
+    clean: np.ndarray
+    unmeasured: np.ndarray
+    share: float
+
+
+@dataclass(frozen=True)
+class Side:
+    """The side that an object turns to a camera.
+
+    Attributes:
+        points_m: (V, 3) in the object's frame, one for each pixel.
+        pixels: (V, 2) where the camera sees them, (u, v); also beside the image.
+    """
+
+    points_m: np.ndarray
+    pixels: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.points_m)
+
+
+def clean_view(
+    sighting: Sighting, T_camera_object: np.ndarray, mesh: MeshScene, surface_m: np.ndarray
+) -> CleanView | None:
+    """Return what was seen of an object beside what a perfect sensor would have seen, were this its pose.
+
+    None where no ray of its pixels meets the mesh.
+
+    Args:
+        mesh: of the object alone, in the object's frame.
+        surface_m: (Q, 3) points on it, which tell where in the image it lies.
+    """
+    points_m = sighting.points_m
+    met_m = met(mesh, points_m / points_m[:, 2:], T_camera_object)
+    hit_N = np.isfinite(met_m).all(axis=1)
+    side = rendered_side(mesh, sighting.camera_3_3, T_camera_object, surface_m)
+    if not hit_N.any() or not len(side):
+        return None
+    measured_m = transform(inverse(T_camera_object), points_m)
+    if not hit_N.all():
+        met_m[~hit_N] = met_m[hit_N][cKDTree(met_m[hit_N]).query(measured_m[~hit_N])[1]]
+    seen_V = sighting.measured(side.pixels)
+    return CleanView(measured_m, met_m, side.points_m[~seen_V], float(seen_V.mean()))
+
+
+def rendered_side(
+    mesh: MeshScene,
+    camera_3_3: np.ndarray,
+    T_camera_object: np.ndarray,
+    surface_m: np.ndarray,
+    most_pixels: int = MOST_PIXELS,
+) -> Side:
+    """Return the side of an object that a camera would see at a pose with nothing in front.
+
+    None of it is seen where a part of the object would lie behind the camera.
+
+    Args:
+        most_pixels: that are looked at, about.
+    """
+    shown = rotate(camera_3_3, transform(T_camera_object, surface_m))
+    if shown[:, 2].min() <= 0:
+        return Side(np.empty((0, 3)), np.empty((0, 2), int))
+    at_2 = shown[:, :2] / shown[:, 2:]
+    low_2, high_2 = np.floor(at_2.min(axis=0)).astype(int), np.ceil(at_2.max(axis=0)).astype(int)
+    step = max(1, round(np.sqrt(np.prod((high_2 - low_2 + 1).astype(float)) / most_pixels)))
+    u, v = (np.arange(low, high + 1, step) for low, high in zip(low_2, high_2, strict=True))
+    pixels = np.stack(np.meshgrid(u, v, indexing="ij"), axis=-1).reshape(-1, 2)
+    rays_N_3 = rotate(np.linalg.inv(camera_3_3), np.column_stack([pixels, np.ones(len(pixels))]))
+    side_m = met(mesh, rays_N_3, T_camera_object)
+    hit_N = np.isfinite(side_m).all(axis=1)
+    return Side(side_m[hit_N], pixels[hit_N])
+
+
+def met(mesh: MeshScene, rays_N_3: np.ndarray, T_camera_object: np.ndarray) -> np.ndarray:
+    """Return where rays of a camera, whose z is 1, meet an object, (N, 3) in its own frame; NaN where they miss it."""
+    T_object_camera = inverse(T_camera_object)
+    depth_N = mesh.along(rays_N_3, T_object_camera).depth_m
+    return transform(T_object_camera, rays_N_3 * np.where(np.isfinite(depth_N), depth_N, np.nan)[:, None])
+
 
 NEIGHBORS, OUTLIER_RATIO = 20, 2.0  # Open3D's usual values for the removal of statistical outliers
 NEAR = 0.05  # diameters; a measured point that is so near lies on the model
@@ -114,3 +242,74 @@ def agreement(
         hidden += (compared & ~seen).sum()
         explained += (seen & mine & (np.abs(measured_m - depth_m) < reach_m)).sum()
     return float(on_model), float(explained / max(1, visible)), float(hidden / max(1, visible + hidden))
+
+
+VOXEL_M = 0.012  # whatever else was measured becomes boxes of this size, which hide what is behind them
+ON_TABLE_M = 0.008  # what lies lower is the table
+_CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
+_SIDES = ([0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3])  # around each
+_FACES = np.array([triangle for a, b, c, d in _SIDES for triangle in ([a, b, c], [a, c, d])])
+
+
+def candidates(center_m: np.ndarray, distance_m: float, azimuths: int, elevations_deg: Sequence[float]) -> np.ndarray:
+    """Return camera poses ``T_world_camera`` (n, 4, 4) on a hemisphere about a point, which they look at."""
+    poses = []
+    for elevation in np.deg2rad(elevations_deg):
+        for azimuth in 2 * np.pi * np.arange(azimuths) / azimuths:
+            flat = np.cos(elevation) * np.array([np.cos(azimuth), np.sin(azimuth)])
+            poses.append(look_at(center_m + distance_m * np.array([*flat, np.sin(elevation)]), center_m))
+    return np.array(poses)
+
+
+def occupy(points_m: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+    """Return boxes around measured points above the table as one mesh, or None where there are none."""
+    cells = np.unique(np.floor(points_m[points_m[:, 2] > ON_TABLE_M] / VOXEL_M).astype(int), axis=0)
+    if not len(cells):
+        return None
+    vertices_m = VOXEL_M * (cells[:, None] + _CORNERS).reshape(-1, 3)
+    return vertices_m, (len(_CORNERS) * np.arange(len(cells))[:, None, None] + _FACES).reshape(-1, 3)
+
+
+def expected_surface(
+    shots: Sequence[Shot],
+    vertices_m: np.ndarray,
+    faces: np.ndarray,
+    points_m: np.ndarray,
+    T_world_object: np.ndarray,
+    diameter_m: float,
+    poses_n: np.ndarray,
+    camera: Camera,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return which of the model's points were measured (Q,), and which each viewpoint would show (n, Q).
+
+    The model is ray-cast at the estimated pose, among boxes where something else was measured and over the table. What
+    nobody has seen yet counts as free.
+
+    Args:
+        vertices_m, faces: the model, in its own frame.
+        points_m: (Q, 3) on its surface.
+        T_world_object: the estimate.
+        camera: what the candidates look with; few pixels suffice.
+    """
+    placed_m = transform(T_world_object, points_m)
+    reach_m = NEAR * diameter_m
+    measured_m = np.concatenate([shot.object_points_m(diameter_m) for shot in shots])
+    seen_Q = np.zeros(len(placed_m), bool)
+    if len(measured_m):
+        seen_Q = cKDTree(measured_m).query(placed_m, distance_upper_bound=reach_m)[0] < reach_m
+    around = occupy(np.concatenate([shot.other_points_m() for shot in shots]))
+    meshes = [(transform(T_world_object, vertices_m), faces), table(), *([around] if around else [])]
+    scene = MeshScene(meshes)
+    shown_n_Q = []
+    for T_world_camera in poses_n:
+        view = scene.look(camera, T_world_camera)
+        v, u, depth_m = Shot(camera, T_world_camera, view.depth_m, view.mesh == 0).project(placed_m)
+        shown_n_Q.append((v >= 0) & (view.mesh[v, u] == 0) & (np.abs(view.depth_m[v, u] - depth_m) < reach_m))
+    return seen_Q, np.array(shown_n_Q)
+
+
+def best_viewpoint(seen_Q: np.ndarray, shown_n_Q: np.ndarray) -> int:
+    """Return the viewpoint after which most of the surface was seen; of equals, the one that shows most by itself."""
+    together_n = (seen_Q | shown_n_Q).sum(axis=1)
+    alone_n = shown_n_Q.sum(axis=1)
+    return int(np.lexsort((-alone_n, -together_n))[0])

@@ -18,10 +18,9 @@ from pathlib import Path
 import numpy as np
 
 from gpca.alignment.rigid import inverse, scale_translation
-from gpca.frames.dataset import Dataset
-from gpca.frames.estimates import EstimatorErrors, error_of, estimates_of, read_pose_errors
+from gpca.frames.dataset import CenteredModel, Dataset
+from gpca.frames.initial_pose import EstimatorErrors, error_of, estimates_of, read_pose_errors
 from gpca.frames.instances import Instances
-from gpca.frames.reading import CenteredModel
 from gpca.io.arrays import REAL, TEXT, WHOLE, load_arrays, save_arrays
 from gpca.io.names import Axes
 from gpca.objects import splits

@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from gpca.alignment.canonical_frame import thin
 from gpca.errors import InputError
-from gpca.scans.overlap import MOST_CELLS, voxels
+from gpca.scans.pair import MOST_CELLS, voxels
 
 SPACINGS = 2.0  # of the points, at least, in the edge of a voxel
 MOST_VOXELS = 4000  # that a scan is thinned to; the edge grows until it has no more

@@ -26,7 +26,7 @@ from gpca.objects.surface import Surface
 from gpca.plugins import joined_outside
 
 # Kinds whose modules read depth frames, or render them, and stand there.
-OF_FRAMES = {"bop_views": "gpca.frames.bop_views", "mesh_views": "gpca.frames.mesh_views"}
+OF_FRAMES = {"bop_views": "gpca.frames.bop", "mesh_views": "gpca.frames.camera"}
 SYSTEM = ("/dev", "/proc", "/sys")
 TEXTS = (".md", ".txt")  # beside data, as licenses are
 # Keys of an entry that a procedural source has no use for: a config may lay one over a source of files.

@@ -5,18 +5,27 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from gpca.alignment.rigid import inverse, scale_translation, transform
 from gpca.errors import InputError
 from gpca.io.arrays import REAL, REGENERATE, TEXT, WHOLE, axes_in, load_arrays, save_arrays
+from gpca.io.csv_file import numbers, read_csv
 from gpca.io.names import SPLITS, Axes
 from gpca.objects.canonical import LARGEST_DIAMETER_M, SMALLEST_DIAMETER_M
 from gpca.pairs.perturbation import CONCEPTS
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 FARTHEST = 1e3  # diameters from the target's center; a registration may fail, but nothing lies so far away
+SAMPLE_COLUMNS = ("sample", "split", "instance", "dataset", "in_training")
+FRAME_COLUMNS = (  # all that the file may hold
+    *SAMPLE_COLUMNS,
+    *("concept", "scene", "image", "object", "symmetric", "init_from", "init_error", "icp_error", "lost_to"),
+)
 RIGID_TOLERANCE = 1e-2  # of a rotation's products with itself; datasets round their poses
 
 
@@ -210,6 +219,27 @@ def read_embedding(path: str | Path, registrations: Registrations, logits: bool 
     shapes = {"h": ("S", "d")} | ({"head_logits": ("S", "C")} if logits else {})
     arrays = load_embeddings(path, registrations, shapes)
     return {"embedding": arrays["h"]} | ({"head_logits": arrays["head_logits"]} if logits else {})
+
+
+def read_samples_of_frames(path: str | Path) -> pd.DataFrame:
+    """Read the columns that tell samples apart, as text but for `in_training`."""
+    rows = read_csv(path, SAMPLE_COLUMNS, others=FRAME_COLUMNS)
+    return rows.assign(in_training=rows["in_training"] == "True")
+
+
+def read_instances_of(path: str | Path, registrations: Registrations) -> np.ndarray:
+    """Return the instance (S,) that each registration shows.
+
+    Raises:
+        InputError: the file is of other samples.
+    """
+    rows = read_samples_of_frames(path)
+    for name in ("sample", "split"):
+        if rows[name].tolist() != getattr(registrations, name).astype(str).tolist():
+            raise InputError(
+                path, "its samples differ from those of the registrations", "regenerate both from the same config"
+            )
+    return numbers(path, rows, "instance", least=0).to_numpy(int)
 
 
 CLOUDS = ("points", "offsets", "target_points", "target_offsets")

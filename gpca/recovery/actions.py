@@ -108,7 +108,7 @@ def new_view(
     elevations_deg: tuple[float, ...] = (20.0, 45.0, 70.0),
 ) -> Holding:
     """Move to the viewpoint that should show most of the surface not seen yet, and fuse what it shows."""
-    from gpca.frames.viewpoint import best_viewpoint
+    from gpca.frames.shots import best_viewpoint
 
     poses_n, *surface = look_around(holding, robot, random, azimuths, elevations_deg)
     shot = robot.shoot(poses_n[best_viewpoint(*surface)], holding.frames)
@@ -125,11 +125,11 @@ def look_around(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return viewpoints ``T_world_camera`` (n, 4, 4), and which of the model's points were and would be seen.
 
-    The last two are those of :func:`gpca.frames.viewpoint.expected_surface`. The viewpoints surround what was measured,
+    The last two are those of :func:`gpca.frames.shots.expected_surface`. The viewpoints surround what was measured,
     since the estimated center may be anywhere.
     """
+    from gpca.frames.shots import candidates, expected_surface
     from gpca.frames.situations import coarse
-    from gpca.frames.viewpoint import candidates, expected_surface
 
     center_m = fuse(holding.shots, robot.diameter_m, holding.filtered).mean(axis=0)
     first = holding.shots[0]

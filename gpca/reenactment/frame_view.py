@@ -14,8 +14,7 @@ from gpca.causes.settings import FEWEST_POINTS
 from gpca.causes.subjects import Subject
 from gpca.features.pair import ObservedPair
 from gpca.frames.camera import MeshScene
-from gpca.frames.clean_view import MOST_PIXELS, CleanView, clean_view, rendered_side
-from gpca.frames.sighting import Sighting
+from gpca.frames.shots import MOST_PIXELS, CleanView, Sighting, clean_view, rendered_side
 from gpca.reenactment.surface import ModelSurface
 
 SURFACE_POINTS = 512  # of the whole object, in which the search looks for what was observed
@@ -44,7 +43,7 @@ class FrameView:
     Attributes:
         pair: both clouds; the model is the side that the camera would see at the initial pose.
         known: the object.
-        camera_3_3, pixels: as in :class:`gpca.frames.sighting.Sighting`.
+        camera_3_3, pixels: as in :class:`gpca.frames.shots.Sighting`.
         T_camera_start: 4×4, where the registration began, ``T_camera_object`` in meters.
     """
 

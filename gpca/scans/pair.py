@@ -1,16 +1,19 @@
-"""Two scans of one scene and their true pose: what is registered, and what a result is judged by."""
+"""Two scans of one scene and their true pose: overlap, disturbed starts, and when a registration is correct."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from gpca.alignment.rigid import require_rigid, transform
+from gpca.alignment.rigid import random_direction, require_rigid, rigid_motion, rotate, transform
 from gpca.errors import InputError
+from gpca.seeds import generator
+from gpca.settings import Bounds, NotNegative, Positive, PositiveShare
 
 Kind = Literal["room", "object"]
 ROOM_M = 3.0  # the usual size of a fragment of a room: objects are registered as if they were as large
@@ -25,7 +28,7 @@ class ScanPair:
         source_N_3, target_M_3: points as they were measured; their numbers differ.
         T_target_source: the true pose (4×4).
         overlap: share of the target's points that the source has as well, in (0, 1]: printed by the data set, or else
-            :func:`gpca.scans.overlap.overlap`.
+            :func:`gpca.scans.pair.overlap`.
         scene: its name.
         kind: whether the scene is a room or an object.
         size_m: diagonal of the box around all scans of the scene; of a room it has no use.
@@ -95,3 +98,115 @@ def near(points_N_3: np.ndarray, others_M_3: np.ndarray, distance: float) -> np.
     """Return which points (N,) have one of the others within the distance; both in one frame and unit."""
     nearest_N, _ = cKDTree(others_M_3).query(points_N_3, distance_upper_bound=distance)
     return np.isfinite(nearest_N)
+
+
+VOXEL_M = 0.025  # in a room: the voxels of 3DMatch's benchmark
+MOST_CELLS = 2.0**62
+
+
+def overlap(source_N_3: np.ndarray, target_M_3: np.ndarray, T_target_source: np.ndarray, scale: float = 1.0) -> float:
+    """Return the share of the target's surface in [0, 1] that the source has as well.
+
+    Args:
+        source_N_3, target_M_3: points, each in its own frame (m).
+        T_target_source: the true pose.
+        scale: as of :attr:`gpca.scans.pair.ScanPair.scale`.
+    """
+    edge = VOXEL_M * scale
+    return overlap_of_voxels(voxels(source_N_3, edge), voxels(target_M_3, edge), T_target_source, scale)
+
+
+def overlap_of_voxels(
+    source_n_3: np.ndarray, target_m_3: np.ndarray, T_target_source: np.ndarray, scale: float = 1.0
+) -> float:
+    """Return the same of clouds that were thinned to voxels before."""
+    return float(near(target_m_3, transform(T_target_source, source_n_3), OVERLAP_M * scale).mean())
+
+
+def voxels(points_N_3: np.ndarray, edge: float) -> np.ndarray:
+    """Return the mean (n, 3) of the points in each cube of a grid, sorted by cube; the edge has the points' unit.
+
+    Raises:
+        InputError: the points span more cubes than can be numbered.
+    """
+    points_N_3 = np.asarray(points_N_3, np.float64)
+    cell_N_3 = np.floor((points_N_3 - points_N_3.min(axis=0)) / edge)
+    sizes_3 = cell_N_3.max(axis=0) + 1
+    if sizes_3.prod() > MOST_CELLS:
+        fault = f"spans {np.ptp(points_N_3, axis=0).max():.3g} m, too much for voxels of {edge:.3g} m"
+        raise InputError("scan", fault, "correct its unit, or leave out points that are far away")
+    key_N = np.ravel_multi_index(cell_N_3.astype(np.int64).T, sizes_3.astype(np.int64))
+    _, of_cell_N, count_n = np.unique(key_N, return_inverse=True, return_counts=True)
+    sums = [np.bincount(of_cell_N.ravel(), weights=axis) for axis in points_N_3.T]
+    return np.stack(sums, axis=1) / count_n[:, None]
+
+
+@dataclass(frozen=True)
+class Rung:
+    """A disturbance of a pose.
+
+    Attributes:
+        rotation_deg: about a random axis through the middle of the source.
+        translation_m: in a random direction, in a room; for objects times :attr:`ScanPair.scale`.
+    """
+
+    rotation_deg: Annotated[float, Bounds(minimum=0, maximum=180)]
+    translation_m: NotNegative
+
+    @property
+    def name(self) -> str:
+        """E.g. ``20deg_0.25m``."""
+        return f"{self.rotation_deg:g}deg_{self.translation_m:g}m"
+
+
+def rungs_of(pairs: int, ladder: Sequence[Rung], *axes: object) -> list[Rung]:
+    """Return the rung of each pair: of as many pairs in a row as there are rungs each has another, in a drawn order.
+
+    So every stratum and scene meets all rungs, with no more of one than of another.
+    """
+    random, order = generator(*axes, "rungs"), list[int]()
+    while len(order) < pairs:
+        order += random.permutation(len(ladder)).tolist()
+    return [ladder[i] for i in order[:pairs]]
+
+
+def disturbed(pair: ScanPair, rung: Rung, *axes: object) -> np.ndarray:
+    """Return ``T_target_source`` (4×4) of a start on a rung; the axes, with pair and rung, name the random numbers."""
+    from scipy.spatial.transform import Rotation
+
+    random = generator(*axes, pair.name, rung.name, "start")
+    R = Rotation.from_rotvec(np.deg2rad(rung.rotation_deg) * random_direction(random)).as_matrix()
+    middle_3 = rotate(pair.T_target_source, pair.source_N_3.mean(axis=0)) + pair.T_target_source[:3, 3]
+    shift_3 = rung.translation_m * pair.scale * random_direction(random)
+    return rigid_motion(R, middle_3 - rotate(R, middle_3) + shift_3) @ pair.T_target_source
+
+
+FEWEST_COMMON = 3  # points
+
+
+@dataclass(frozen=True)
+class ScanSuccess:
+    """Limits of the RMSE over the true overlap, from which a registration has failed.
+
+    Attributes:
+        room_m: in rooms, in meters.
+        object_share: of objects, relative to their size.
+    """
+
+    room_m: Positive = 0.2
+    object_share: PositiveShare = 0.02
+
+    def limit_m(self, pair: ScanPair) -> float:
+        """Return the limit of a pair, in meters."""
+        return self.room_m if pair.kind == "room" else self.object_share * pair.size_m
+
+
+def overlap_rmse(pair: ScanPair, T_target_source: np.ndarray) -> float:
+    """Return the root mean square distance (m) of the common points of the source from their true places.
+
+    Common are those of :attr:`ScanPair.source_common_N`; all points count where fewer than three are common.
+    """
+    common_N = pair.source_common_N
+    points_n_3 = pair.source_N_3[common_N] if common_N.sum() >= FEWEST_COMMON else pair.source_N_3
+    moved_n_3 = transform(T_target_source, points_n_3) - transform(pair.T_target_source, points_n_3)
+    return float(np.sqrt(np.square(moved_n_3).sum(axis=1).mean()))

@@ -1,33 +1,316 @@
-"""The scenes of a configured data set: where its files are, and what reads them.
+"""Configured data sets of scans: the entry in the config (docs/scans.md), where its files are, and their readers.
 
-A kind of data set is a module beside this one with ``scenes(entry, place) -> Iterator[Scene]``.
+npz: one scene in each file, ``cloud_<name>`` (N, 3) and ``T_scene_cloud`` or, of an object, ``T_model_cloud``
+(F, 4, 4). The names are in ``name`` or ``index`` (F,), in the order of the poses; a file with neither has clouds 0 to
+F - 1. Beside the files, ``pairs.csv`` may list pairs: scene (file name without suffix), target, source, overlap.
+
+ply_folder: a folder with ``poses.txt`` is one scene, else each folder in it that has one. A line has the name of a PLY
+file without its suffix and the 16 numbers of its pose in the scene, row by row, in the unit of the points.
+
+threedmatch: the benchmark of Zeng et al. 2017, in the layout of Choi et al. 2015. Fragments are
+``<scene>/cloud_bin_<i>.ply``, in ``fragments/`` or in the location itself. ``gt.log`` has five lines for each pair
+(target, source, number of fragments; then T_target_source), in ``<scene>/``, ``<scene>-evaluation/`` or
+``gt_result/<scene>-evaluation/``. ``gt_overlap.log`` beside it has lines ``target,source,overlap``, as Huang et al.
+2021 made them for this benchmark and for 3DLoMatch.
 """
 
 from __future__ import annotations
 
+import zipfile
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 
+from gpca.alignment.rigid import require_rigid, scale_translation
 from gpca.errors import InputError
+from gpca.io.arrays import REAL, load_arrays
+from gpca.io.csv_file import ANY, numbers, read_csv
+from gpca.io.limits import require_file
+from gpca.numerals import decimal, whole
+from gpca.objects.canonical import require_points
+from gpca.objects.entry import Place, Text, Unit
+from gpca.objects.mesh_folder import meters_per, read_surface
 from gpca.objects.source import places_of
-from gpca.scans import npz, ply_folder, threedmatch
-from gpca.scans.entry import ScanEntry
-from gpca.scans.scene import Scan, Scene
+from gpca.scans.pair import Kind
+from gpca.scans.scene import Known, Scan, Scene
 from gpca.seeds import generator
-from gpca.settings import read_settings
+from gpca.settings import Bounds, read_settings
+
+ScanKind = Literal["virtual", "npz", "ply_folder", "threedmatch"]
+Number = Annotated[int, Bounds(minimum=0, maximum=100)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ScanEntry:
+    """A data set of scans: one row of each method in every table.
+
+    Attributes:
+        title: as tables name the rows.
+        kind: how the data is read; ``virtual`` is made by the package.
+        location: a file or a folder, relative to `data_dir` or to the repository's data.
+        scenes: whether its scenes are rooms or objects; npz files may say so themselves.
+        unit: of lengths in the files.
+        optional: where there is no such location, a run does without it.
+        sensor_at_origin: the sensor stood at the origin of each scan's frame, so that normals point there.
+        development: scenes on which settings were chosen; other runs than those of development leave them out.
+        families: family of a scene, by name, where several scenes are alike.
+        benchmark: it is 3DMatch's, whose recalls others have published.
+        address, license: where the data is found, and on which terms.
+        rooms, objects, views: of virtual scenes, how many, and scans of each.
+    """
+
+    title: Text
+    kind: ScanKind
+    location: Place | None = None
+    scenes: Kind | None = None
+    unit: Unit = "m"
+    optional: bool = False
+    sensor_at_origin: bool = False
+    development: tuple[Text, ...] = ()
+    families: Mapping[str, Text] = field(default_factory=dict)
+    benchmark: bool = False
+    address: Text = ""
+    license: Text = ""
+    rooms: Number = 0
+    objects: Number = 0
+    views: Annotated[int, Bounds(minimum=2, maximum=100)] = 8
+
+    def __post_init__(self) -> None:
+        if self.kind == "virtual" and not self.rooms + self.objects:
+            raise InputError("rooms", "there are neither rooms nor objects", "set rooms or objects above 0")
+        if self.kind != "virtual" and not self.location:
+            raise InputError("location", "is missing", "name the file or folder of the scans")
+
+    @property
+    def stand_in(self) -> bool:
+        """Whether no sensor measured it."""
+        return self.kind == "virtual"
+
+
+PAIRS = "pairs.csv"
+NPZ_REMEDY = "make it as docs/scans.md says"
+NPZ_POSES: dict[str, Kind] = {"T_scene_cloud": "room", "T_model_cloud": "object"}
+NAME_ARRAYS = ("name", "index")
+CLOUD = "cloud_"
+
+
+def npz_scenes(entry: ScanEntry, place: Path) -> Iterator[Scene]:
+    """Yield the scene of each npz file of a folder, by name, or of the one file.
+
+    Raises:
+        InputError: no npz file, or one that does not hold what it should.
+    """
+    files = sorted(place.glob("*.npz")) if place.is_dir() else [place]
+    if not files:
+        raise InputError(place, "the folder has no npz file", "correct location")
+    listed = _read_pairs(files[0].parent / PAIRS)
+    for path in files:
+        yield read_scene(path, entry, listed.get(path.stem, ()))
+
+
+def read_scene(path: Path, entry: ScanEntry, printed: tuple[Known, ...] = ()) -> Scene:
+    """Read one file.
+
+    Raises:
+        InputError: unreadable, an array missing or of another shape, NaN, a pose that is not rigid.
+    """
+    members = _members(path)
+    poses = next((name for name in NPZ_POSES if name in members), None)
+    if poses is None:
+        raise InputError(path, f"has neither {' nor '.join(NPZ_POSES)}", NPZ_REMEDY)
+    order = next((name for name in NAME_ARRAYS if name in members), None)
+    head = load_arrays(
+        path, {poses: ("F", 4, 4)} | ({order: ("F",)} if order else {}), {poses: REAL}, remedy=NPZ_REMEDY
+    )
+    names = [str(name) for name in (head[order] if order else range(len(head[poses])))]
+    if len(set(names)) < len(names):
+        raise InputError(path, f"array '{order}' names a cloud twice", NPZ_REMEDY)
+    wanted = {f"{CLOUD}{name}": (f"N{name}", 3) for name in names}
+    if missing := [name for name in wanted if name not in members]:
+        raise InputError(path, f"array '{missing[0]}' is missing", NPZ_REMEDY)
+    if more := [name for name in members if name.startswith(CLOUD) and name not in wanted]:
+        raise InputError(path, f"array '{more[0]}' has no pose", NPZ_REMEDY)
+    clouds = load_arrays(path, wanted, dict.fromkeys(wanted, REAL), remedy=NPZ_REMEDY)
+    scale, scans = meters_per(entry.unit), {}
+    for name, T_scene_scan in zip(names, head[poses].astype(np.float64), strict=True):
+        points_N_3 = clouds[f"{CLOUD}{name}"].astype(np.float64)
+        require_points(points_N_3, f"{path}, {CLOUD}{name}")
+        require_rigid(T_scene_scan, f"{path}, {poses} of {name}")
+        viewpoint_3 = np.zeros(3) if entry.sensor_at_origin else None
+        scans[name] = Scan(points_N_3 * scale, scale_translation(T_scene_scan, scale), viewpoint_3)
+    return Scene(path.stem, entry.scenes or NPZ_POSES[poses], scans, printed)
+
+
+def _members(path: Path) -> list[str]:
+    """Return the names of the arrays of a file."""
+    require_file(path, "no such file", "correct location", np.inf)
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return [name.removesuffix(".npy") for name in archive.namelist()]
+    except Exception as fault:  # zipfile raises errors of many kinds for a damaged archive
+        raise InputError(path, "is not a readable npz archive", "fetch it again") from fault
+
+
+def _read_pairs(path: Path) -> dict[str, tuple[Known, ...]]:
+    """Return the pairs that a file lists, by scene; none where there is no file. A pair may stand in several lists."""
+    if not path.is_file():
+        return {}
+    rows = read_csv(path, ("scene", "target", "source", "overlap"), ANY, "correct it as docs/scans.md says")
+    rows["overlap"] = numbers(path, rows, "overlap", least=0)
+    if (rows["overlap"] > 1).any():
+        raise InputError(path, "column 'overlap' contains numbers above 1", "give shares from 0 to 1")
+    listed: dict[str, dict[tuple[str, str], Known]] = {}
+    for scene, target, source, share in rows[["scene", "target", "source", "overlap"]].itertuples(index=False):
+        listed.setdefault(scene, {})[target, source] = Known(target, source, float(share))
+    return {scene: tuple(pairs.values()) for scene, pairs in listed.items()}
+
+
+POSES_FILE = "poses.txt"
+POSES_REMEDY = "write a name and the 16 numbers of a pose in each line"
+
+
+def ply_scenes(entry: ScanEntry, place: Path) -> Iterator[Scene]:
+    """Yield the scene of the folder, or of each folder in it, by name.
+
+    Raises:
+        InputError: no such folder, no file of poses, or what a file does not hold that it should.
+    """
+    if not entry.scenes:
+        raise InputError(entry.title, "does not say what its scenes are", "set scenes: room, or object")
+    files = [place / POSES_FILE] if (place / POSES_FILE).exists() else sorted(place.glob(f"*/{POSES_FILE}"))
+    if not files:
+        raise InputError(place / POSES_FILE, "no such file", "give the poses of the scans as docs/scans.md says")
+    scale = meters_per(entry.unit)
+    for path in files:
+        scans = {}
+        for name, T_scene_scan in read_poses(path).items():
+            points_N_3 = read_surface(path.with_name(f"{name}.ply"), scale).vertices_m
+            viewpoint_3 = np.zeros(3) if entry.sensor_at_origin else None
+            scans[name] = Scan(points_N_3, scale_translation(T_scene_scan, scale), viewpoint_3)
+        yield Scene(path.absolute().parent.name, entry.scenes, scans)
+
+
+def read_poses(path: Path) -> dict[str, np.ndarray]:
+    """Return the pose (4×4) of each scan by name.
+
+    Raises:
+        InputError: no such file, other than 17 words in a line, no number, no rigid transform, a name twice.
+    """
+    require_file(path, "no such file", POSES_REMEDY)
+    poses: dict[str, np.ndarray] = {}
+    for number, line in enumerate(path.read_text("utf-8", errors="replace").splitlines(), 1):
+        if not (words := line.split("#")[0].split()):
+            continue
+        subject = f"{path}, line {number}"
+        if len(words) != 17:
+            raise InputError(subject, f"has {len(words)} words", POSES_REMEDY)
+        if Path(words[0]).name != words[0] or words[0] in poses:
+            raise InputError(
+                subject, f"'{words[0]}' is no name of a file beside it, or stands there twice", POSES_REMEDY
+            )
+        try:
+            T_scene_scan = np.array([decimal(word) for word in words[1:]]).reshape(4, 4)
+        except ValueError as fault:
+            raise InputError(subject, str(fault), POSES_REMEDY) from fault
+        require_rigid(T_scene_scan, subject)
+        poses[words[0]] = T_scene_scan
+    if not poses:
+        raise InputError(path, "has no poses", POSES_REMEDY)
+    return poses
+
+
+LINES_OF_PAIR = 5  # of a pair in gt.log
+BENCHMARK_REMEDY = "fetch the benchmark again"
+
+
+def benchmark_scenes(entry: ScanEntry, place: Path) -> Iterator[Scene]:
+    """Yield the scene of each folder with fragments, by name.
+
+    Raises:
+        InputError: no such folder, no pairs, or what a file does not hold that it should.
+    """
+    folder = place / "fragments" if (place / "fragments").is_dir() else place
+    found = sorted({path.parent for path in folder.glob("*/cloud_bin_*.ply")})
+    if not found:
+        raise InputError(folder, "has no <scene>/cloud_bin_<number>.ply", "correct location")
+    scale = meters_per(entry.unit)
+    for of_scene in found:
+        log = _log_of(of_scene, place)
+        shares = _read_overlaps(log.with_name("gt_overlap.log"))
+        printed = tuple(
+            Known(target, source, shares.get((target, source)), scale_translation(T, scale))
+            for (target, source), T in read_log(log).items()
+        )
+        named = sorted({name for pair in printed for name in (pair.target, pair.source)}, key=int)
+        viewpoint_3 = np.zeros(3) if entry.sensor_at_origin else None
+        scans = {
+            name: Scan(read_surface(of_scene / f"cloud_bin_{name}.ply", scale).vertices_m, None, viewpoint_3)
+            for name in named
+        }
+        yield Scene(of_scene.name, entry.scenes or "room", scans, printed)
+
+
+def _log_of(of_scene: Path, place: Path) -> Path:
+    evaluation = f"{of_scene.name}-evaluation"
+    folders = (of_scene, of_scene.with_name(evaluation), place / "gt_result" / evaluation)
+    log = next((folder / "gt.log" for folder in folders if (folder / "gt.log").is_file()), None)
+    if log is None:
+        raise InputError(of_scene / "gt.log", "no such file", f"put it there, or into {evaluation} beside it")
+    return log
+
+
+def read_log(path: Path) -> dict[tuple[str, str], np.ndarray]:
+    """Return ``T_target_source`` (4×4) of each pair of a ``gt.log``, by the numbers of target and source.
+
+    Raises:
+        InputError: no such file, other numbers than there should be, no rigid transform, a pair twice.
+    """
+    require_file(path, "no such file", BENCHMARK_REMEDY)
+    lines = [line.split() for line in path.read_text("utf-8", errors="replace").splitlines() if line.strip()]
+    if not lines or len(lines) % LINES_OF_PAIR:
+        raise InputError(path, f"has {len(lines)} lines, not {LINES_OF_PAIR} for each pair", BENCHMARK_REMEDY)
+    poses = {}
+    for start in range(0, len(lines), LINES_OF_PAIR):
+        (head, *rows), subject = lines[start : start + LINES_OF_PAIR], f"{path}, pair {start // LINES_OF_PAIR + 1}"
+        try:
+            if len(head) != 3 or any(len(row) != 4 for row in rows):
+                raise ValueError("it has not 3 numbers and then 4 in each of 4 lines")
+            target, source = (str(whole(word)) for word in head[:2])
+            T_target_source = np.array([[decimal(word) for word in row] for row in rows])
+        except ValueError as fault:
+            raise InputError(subject, str(fault), BENCHMARK_REMEDY) from fault
+        require_rigid(T_target_source, subject)
+        if (target, source) in poses or target == source:
+            raise InputError(subject, f"pairs {target} with {source} once more, or with itself", BENCHMARK_REMEDY)
+        poses[target, source] = T_target_source
+    return poses
+
+
+def _read_overlaps(path: Path) -> dict[tuple[str, str], float]:
+    """Return the overlap of each pair that a file prints; none where there is no file."""
+    if not path.is_file():
+        return {}
+    shares = {}
+    for number, line in enumerate(path.read_text("utf-8", errors="replace").splitlines(), 1):
+        if not (words := line.replace(",", " ").split()):
+            continue
+        try:
+            if len(words) != 3:
+                raise ValueError(f"has {len(words)} numbers instead of target, source and overlap")
+            target, source, share = str(whole(words[0])), str(whole(words[1])), decimal(words[2])
+        except ValueError as fault:
+            raise InputError(f"{path}, line {number}", str(fault), BENCHMARK_REMEDY) from fault
+        if not 0 <= share <= 1:
+            raise InputError(f"{path}, line {number}", f"the overlap {share:g} is no share", BENCHMARK_REMEDY)
+        shares[target, source] = share
+    return shares
+
 
 SUFFIXES = (".npz", ".csv", ".ply", ".txt", ".log")
 DEVELOPMENT = "development"  # of the roles of a run
-Reader = Callable[[ScanEntry, Path], Iterator[Scene]]
-READERS: dict[str, Reader] = {
-    "npz": npz.scenes,
-    "ply_folder": ply_folder.scenes,
-    "threedmatch": threedmatch.scenes,
-}
 
 
 def entry_of(settings: Mapping[str, Any]) -> ScanEntry:
@@ -66,6 +349,13 @@ def data_files(entry: ScanEntry, data_dir: str | None) -> list[Path]:
     return sorted(files)
 
 
+READERS: dict[str, Callable[[ScanEntry, Path], Iterator[Scene]]] = {
+    "npz": npz_scenes,
+    "ply_folder": ply_scenes,
+    "threedmatch": benchmark_scenes,
+}
+
+
 def scenes_of(entry: ScanEntry, place: Path | None, role: str, most_points: int) -> Iterator[Scene]:
     """Yield the scenes of a data set, one by one.
 
@@ -80,7 +370,7 @@ def scenes_of(entry: ScanEntry, place: Path | None, role: str, most_points: int)
     if entry.kind == "virtual":
         from gpca.scans import virtual  # loads trimesh, which nothing needs that plans a run
 
-        found: Iterator[Scene] = virtual.scenes(entry, role == DEVELOPMENT)
+        found: Iterator[Scene] = virtual.scenes(entry.rooms, entry.objects, entry.views, role == DEVELOPMENT)
     elif place is None:
         raise InputError(entry.title, "its data is not there", "set data_dir")
     else:

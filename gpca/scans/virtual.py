@@ -14,7 +14,6 @@ import numpy as np
 
 from gpca.frames.camera import Camera, DepthNoise, MeshScene, look_at
 from gpca.objects.shapes.solids import box, cylinder, ellipsoid
-from gpca.scans.entry import ScanEntry
 from gpca.scans.pair import Kind
 from gpca.scans.scene import Scan, Scene
 from gpca.seeds import generator
@@ -30,13 +29,13 @@ WALL_M = 0.1
 Mesh = tuple[np.ndarray, np.ndarray]
 
 
-def scenes(entry: ScanEntry, development: bool) -> Iterator[Scene]:
-    """Yield the rooms, then the objects."""
+def scenes(rooms: int, objects: int, views: int, development: bool) -> Iterator[Scene]:
+    """Yield this many rooms, then this many objects, each with the same number of scans."""
     first = FIRST_OF_DEVELOPMENT if development else 0
-    for number in range(first, first + entry.rooms):
-        yield room(f"room_{number}", entry.views)
-    for number in range(first, first + entry.objects):
-        yield compound(f"object_{number}", entry.views)
+    for number in range(first, first + rooms):
+        yield room(f"room_{number}", views)
+    for number in range(first, first + objects):
+        yield compound(f"object_{number}", views)
 
 
 def room(name: str, views: int) -> Scene:

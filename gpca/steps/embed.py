@@ -11,7 +11,7 @@ from gpca.encoders.training import embed
 from gpca.encoders.weights import load_model
 from gpca.io.arrays import save_arrays
 from gpca.pairs.dataset import Registrations
-from gpca.pairs.reading import read_as
+from gpca.pairs.synthesis import read_as
 from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from gpca.attribution.predictions import write_timings
-from gpca.frames.instances import Instances
-from gpca.frames.plausibility import require_of_objects
+from gpca.frames.instances import Instances, require_of_objects
 from gpca.frames.synthesis import FrameSettings, make_frame_registrations
 from gpca.io.csv_file import write_csv
 from gpca.objects.canonical import ObjectClouds

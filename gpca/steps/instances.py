@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import sys
 
+from gpca.frames.dataset import datasets_of, distinct_surfaces, files_behind, read_models, with_shared_models
 from gpca.frames.initial_pose import InitialPoseSettings
-from gpca.frames.meshes import datasets_of, files_behind
-from gpca.frames.plausibility import points_on_model
-from gpca.frames.reading import distinct_surfaces, read_instances, read_models, with_shared_models
+from gpca.frames.instances import points_on_model, read_instances
 from gpca.objects.canonical import sample_objects
 from gpca.objects.splits import EVALUATION
 from gpca.process.job import Job

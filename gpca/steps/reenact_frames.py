@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from gpca.causes.dataset import Causes
 from gpca.causes.settings import CauseSettings
-from gpca.frames.instances import Instances
-from gpca.frames.meshes import datasets_of, files_behind, meshes_of, models_of
-from gpca.frames.plausibility import require_of_objects
+from gpca.frames.dataset import datasets_of, files_behind, meshes_of, models_of
+from gpca.frames.instances import Instances, require_of_objects
 from gpca.frames.starts import Starts
 from gpca.objects.canonical import ObjectClouds
 from gpca.objects.splits import EVALUATION

@@ -11,7 +11,7 @@ from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
 from gpca.scans.dataset import ScanPairs
 from gpca.scans.pair import ScanPair
-from gpca.scans.selection import choose_pairs
+from gpca.scans.scene import choose_pairs
 from gpca.scans.source import entry_of, scenes_of
 
 

@@ -6,11 +6,16 @@ import sys
 from dataclasses import replace
 
 from gpca.errors import InputError
-from gpca.frames.dataset import Dataset
-from gpca.frames.meshes import datasets_of, files_behind, models_of, simplified, untested_surfaces
-from gpca.frames.reading import distinct_surfaces
-from gpca.frames.resting import stable_poses
-from gpca.frames.rgbd_scene import SceneSettings, write_scenes
+from gpca.frames.dataset import (
+    Dataset,
+    datasets_of,
+    distinct_surfaces,
+    files_behind,
+    models_of,
+    simplified,
+    untested_surfaces,
+)
+from gpca.frames.rgbd_scene import SceneSettings, stable_poses, write_scenes
 from gpca.objects import procedural
 from gpca.objects.splits import EVALUATION
 from gpca.objects.surface import Surface

@@ -13,10 +13,9 @@ from gpca.encoders.settings import EncoderSettings
 from gpca.encoders.training import train_encoder
 from gpca.encoders.weights import load_model, write_weights
 from gpca.errors import InputError
-from gpca.frames.instances import read_instances_of
 from gpca.io.csv_file import write_csv
-from gpca.pairs.dataset import Registrations, joined
-from gpca.pairs.reading import read_as
+from gpca.pairs.dataset import Registrations, joined, read_instances_of
+from gpca.pairs.synthesis import read_as
 from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
 

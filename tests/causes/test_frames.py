@@ -10,8 +10,8 @@ from gpca.causes.settings import CauseSettings, FrameCauseSettings
 from gpca.causes.shapley import ALL
 from gpca.causes.truth import LARGEST_ERROR
 from gpca.errors import InputError
-from gpca.frames.clean_view import clean_view
-from gpca.frames.meshes import meshes_of
+from gpca.frames.dataset import meshes_of
+from gpca.frames.shots import clean_view
 from gpca.frames.starts import Starts
 from gpca.objects.splits import TRAINING
 from tests.frames.bracket import BRACKET, hidden, misplaced, models_in, most_seen, noisy, own_starts

@@ -14,7 +14,7 @@ from gpca.causes.settings import OBSERVED, CauseSettings
 from gpca.causes.shapley import ALL, NONE
 from gpca.causes.truth import FAILED, GEOMETRY
 from gpca.errors import InputError
-from gpca.scans.success import ScanSuccess, overlap_rmse
+from gpca.scans.pair import ScanSuccess, overlap_rmse
 from tests.scans.corner import corner_pair, start_off
 
 SETTINGS = CauseSettings(moved=OBSERVED, clean_pairs=20)

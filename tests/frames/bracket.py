@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from gpca.frames.reading import Dataset, read_models
+from gpca.frames.dataset import Dataset, read_models
 from gpca.frames.starts import Starts
 
 BRACKET = "bracket"  # no rotation leaves it as it is, so that ADD sees every error

@@ -15,7 +15,7 @@ from gpca.frames.bop import (
     read_frames,
     without_background,
 )
-from gpca.frames.reading import Dataset, read_models
+from gpca.frames.dataset import Dataset, read_models
 
 from .tiny import read
 

@@ -2,15 +2,15 @@ import numpy as np
 import pytest
 
 from gpca.errors import InputError
-from gpca.frames.estimates import (
+from gpca.frames.initial_pose import (
     EstimatorErrors,
+    InitialPoseSettings,
     error_of,
     estimates_of,
     nearest_to,
     read_bop_results,
     read_pose_errors,
 )
-from gpca.frames.initial_pose import InitialPoseSettings
 
 from .tiny import read
 

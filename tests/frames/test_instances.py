@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from gpca.errors import InputError
-from gpca.frames.instances import Instances
-from gpca.frames.plausibility import require_of_objects
+from gpca.frames.instances import Instances, require_of_objects
 from gpca.io.arrays import save_arrays
 
 

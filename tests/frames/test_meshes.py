@@ -3,7 +3,7 @@ import pytest
 import trimesh
 
 from gpca.errors import InputError
-from gpca.frames.meshes import datasets_of, simplified
+from gpca.frames.dataset import datasets_of, simplified
 from gpca.objects.surface import Surface
 
 

@@ -3,7 +3,7 @@ import pytest
 import trimesh
 
 from gpca.errors import InputError
-from gpca.frames.resting import stable_poses
+from gpca.frames.rgbd_scene import stable_poses
 from gpca.objects.surface import Surface
 
 

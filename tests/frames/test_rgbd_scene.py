@@ -6,9 +6,8 @@ import pytest
 from gpca.alignment.rigid import transform
 from gpca.errors import InputError
 from gpca.frames.camera import DepthNoise
-from gpca.frames.plausibility import points_on_model
-from gpca.frames.resting import stable_poses
-from gpca.frames.rgbd_scene import SceneSettings, lay_table, write_scenes
+from gpca.frames.instances import points_on_model
+from gpca.frames.rgbd_scene import SceneSettings, lay_table, stable_poses, write_scenes
 from gpca.io.files import read_image
 
 from .tiny import PERFECT, scene_settings, surfaces

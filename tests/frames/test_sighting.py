@@ -1,6 +1,6 @@
 import numpy as np
 
-from gpca.frames.sighting import Sighting
+from gpca.frames.shots import Sighting
 
 
 def test_pixels_are_found_wherever_they_are_and_no_others():

@@ -7,8 +7,7 @@ import pytest
 
 from gpca.alignment.rigid import inverse, rotation_angle_rad
 from gpca.errors import InputError
-from gpca.frames.dataset import Dataset
-from gpca.frames.reading import read_models
+from gpca.frames.dataset import Dataset, read_models
 from gpca.frames.starts import CARRIED, GLOBAL, LADDER, NATIVE, TRANSPLANTED, Starts, all_starts
 from gpca.objects.splits import CARRIED as IS_CARRIED
 from gpca.objects.splits import Place

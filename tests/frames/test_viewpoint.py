@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 
 from gpca.frames.camera import Camera
-from gpca.frames.shots import Shot
-from gpca.frames.viewpoint import VOXEL_M, best_viewpoint, candidates, expected_surface, occupy
+from gpca.frames.shots import VOXEL_M, Shot, best_viewpoint, candidates, expected_surface, occupy
 
 CAMERA = Camera(192, 144, 180)
 CENTRE = np.array([0.1, -0.05, 0.06])

@@ -11,7 +11,7 @@ from gpca.alignment.rigid import inverse, transform
 from gpca.config.check import check
 from gpca.config.leave_out import without_false
 from gpca.errors import InputError
-from gpca.frames import bop_views, mesh_views
+from gpca.frames import bop, camera
 from gpca.objects.canonical import ObjectClouds, write_objects
 from gpca.objects.source import data_files, resolve, source_modules
 from gpca.objects.source import surfaces as surfaces_of
@@ -23,7 +23,7 @@ from .tiny import surfaces as meshes
 
 def test_a_view_of_a_frame_is_what_was_measured_of_the_object(scenes, tiny):
     instances, objects = tiny
-    found = list(bop_views.surfaces(scenes, views=100))
+    found = list(bop.cut_out_views(scenes, views=100))
     assert len(found) == len(instances)
     assert len({view.name for view in found}) == len(found)
     assert {instance_of(view.name) for view in found} == {f"obj_{number:06d}" for number in range(1, 6)}
@@ -37,13 +37,13 @@ def test_a_view_of_a_frame_is_what_was_measured_of_the_object(scenes, tiny):
 
 
 def test_views_are_few_and_of_the_objects_that_are_wanted(scenes):
-    found = [view.name for view in bop_views.from_entry({"objects": [2], "views_per_instance": 2}, scenes)]
+    found = [view.name for view in bop.from_entry({"objects": [2], "views_per_instance": 2}, scenes)]
     assert len(found) == 2 and all(name.startswith("obj_000002_") for name in found)
     assert evenly([1, 2, 3, 4], 2) == [1, 3] and evenly([1, 2], 9) == [1, 2]
     with pytest.raises(InputError, match="no frame shows object 77; check objects"):
-        list(bop_views.surfaces(scenes, [77]))
+        list(bop.cut_out_views(scenes, [77]))
     with pytest.raises(InputError, match="unit 'm': is not that of BOP frames"):
-        bop_views.from_entry({"unit": "m"}, scenes)
+        bop.from_entry({"unit": "m"}, scenes)
 
 
 def test_a_view_with_next_to_no_points_is_left_out_and_named(scenes, tmp_path, capsys):
@@ -55,7 +55,7 @@ def test_a_view_with_next_to_no_points_is_left_out_and_named(scenes, tmp_path, c
     from PIL import Image
 
     Image.fromarray(np.zeros_like(np.asarray(Image.open(mask)))).save(mask)
-    whole, fewer = (len(list(bop_views.surfaces(folder, views=99))) for folder in (scenes, tmp_path / "tiny"))
+    whole, fewer = (len(list(bop.cut_out_views(folder, views=99))) for folder in (scenes, tmp_path / "tiny"))
     assert fewer == whole - 1
     assert f"skipped: {mask}" in capsys.readouterr().err
 
@@ -64,21 +64,21 @@ def test_what_a_masks_rim_sees_behind_the_object_is_cut_off():
     random = np.random.default_rng(0)
     own_m = random.normal(scale=0.03, size=(500, 3)) * [1, 1, 0.3]
     behind_m = random.normal(scale=0.01, size=(20, 3)) + np.array([0, 0, 0.5])
-    kept_m = bop_views.within_rim(np.concatenate([own_m, behind_m]))
+    kept_m = bop.within_rim(np.concatenate([own_m, behind_m]))
     assert kept_m[:, 2].max() < 0.1 and len(kept_m) > 480
 
 
 def test_rendered_views_show_the_side_of_a_mesh_that_faces_the_camera():
     brick, *_ = meshes()
-    found = list(mesh_views.views(brick, 3))
+    found = list(camera.rendered_views(brick, 3))
     assert [view.name for view in found] == ["brick_1_0", "brick_2_1", "brick_3_2"]
     for view in found:
-        assert np.linalg.norm(np.median(view.vertices_m, axis=0)) == pytest.approx(mesh_views.DISTANCE_M, abs=0.1)
+        assert np.linalg.norm(np.median(view.vertices_m, axis=0)) == pytest.approx(camera.VIEW_DISTANCE_M, abs=0.1)
         assert np.ptp(view.vertices_m[:, 2]) < 0.2 and len(view.vertices_m) > 1000
-    again = list(mesh_views.views(brick, 3))
+    again = list(camera.rendered_views(brick, 3))
     assert np.array_equal(again[1].vertices_m, found[1].vertices_m)
     with pytest.raises(InputError, match="object 'cloud': is a cloud"):
-        list(mesh_views.views(Surface("cloud", brick.vertices_m, None), 1))
+        list(camera.rendered_views(Surface("cloud", brick.vertices_m, None), 1))
 
 
 def test_the_config_of_cups_has_the_real_views_that_there_are():
@@ -97,7 +97,7 @@ def test_views_are_kinds_of_source(scenes, tmp_path):
     shutil.copytree(scenes, tmp_path / "tiny")
     entry = {"title": "Views", "kind": "bop_views", "location": "tiny", "objects": [1], "views_per_instance": 2}
     resolved = resolve(entry, str(tmp_path))
-    assert source_modules(resolved) == ["gpca.frames.bop_views"]
+    assert source_modules(resolved) == ["gpca.frames.bop"]
     write_objects(surfaces_of(resolved, tmp_path), "views", tmp_path / "views.npz")
     objects = ObjectClouds.load(tmp_path / "views.npz")
     assert {objects.family(i) for i in range(len(objects))} == {"obj_000001"}

@@ -3,7 +3,7 @@ import pytest
 
 from gpca.alignment.icp import ICPSettings
 from gpca.errors import InputError
-from gpca.pairs.reading import read_as
+from gpca.pairs.synthesis import read_as
 
 
 def test_readings_are_before_icp_after_it_and_after_icp_from_the_model(registrations):

@@ -12,7 +12,7 @@ from gpca.causes.settings import CauseSettings
 from gpca.causes.shapley import ALL, shapley_values
 from gpca.errors import InputError
 from gpca.features.pair import observed_pair
-from gpca.frames.meshes import meshes_of
+from gpca.frames.dataset import meshes_of
 from gpca.reenactment.dataset import SHAPES
 from gpca.reenactment.frame_enactment import reenact_frames
 from gpca.reenactment.frame_view import FrameView, KnownObject

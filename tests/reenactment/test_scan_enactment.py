@@ -16,7 +16,7 @@ from gpca.reenactment.observation import NoiseScale
 from gpca.reenactment.scan_enactment import cropped, reenact_scans
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface
-from gpca.scans.success import ScanSuccess
+from gpca.scans.pair import ScanSuccess
 from tests.scans.corner import corner_pair, start_off
 
 TRUTH = CauseSettings(moved=OBSERVED, clean_pairs=20)

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from gpca.alignment.rigid import inverse, rotation_angle_rad, transform
-from gpca.scans.ladder import Rung, disturbed, rungs_of
+from gpca.scans.pair import Rung, disturbed, rungs_of
 
 from .tiny import pair
 

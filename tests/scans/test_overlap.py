@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from gpca.errors import InputError
-from gpca.scans.overlap import voxels
-from gpca.scans.scene import Known, Scene
-from gpca.scans.selection import choose_pairs, stratum_of
+from gpca.scans.pair import voxels
+from gpca.scans.scene import Known, Scene, choose_pairs, stratum_of
 
 from .tiny import scene
 

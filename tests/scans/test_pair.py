@@ -7,8 +7,7 @@ import pytest
 
 from gpca.alignment.rigid import rigid_motion, transform
 from gpca.errors import InputError
-from gpca.scans.pair import OVERLAP_M
-from gpca.scans.success import ScanSuccess, overlap_rmse
+from gpca.scans.pair import OVERLAP_M, ScanSuccess, overlap_rmse
 
 from .tiny import floor, pair
 

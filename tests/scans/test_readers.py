@@ -6,8 +6,7 @@ import trimesh
 
 from gpca.alignment.rigid import scale_translation
 from gpca.errors import InputError
-from gpca.scans import npz, ply_folder, threedmatch
-from gpca.scans.entry import ScanEntry
+from gpca.scans.source import ScanEntry, benchmark_scenes, npz_scenes, ply_scenes
 
 from .tiny import scene
 
@@ -68,12 +67,12 @@ def assert_same(read, tolerance=1e-6):
 @pytest.mark.parametrize("order", ["index", "name", ""])
 def test_npz(tmp_path, order):
     write_npz(tmp_path / "floor.npz", order=order)
-    [read] = npz.scenes(entry("npz"), tmp_path)
+    [read] = npz_scenes(entry("npz"), tmp_path)
     assert (read.name, read.kind) == ("floor", "room")
     assert_same(read)
-    [alone] = npz.scenes(entry("npz", scenes="object"), tmp_path / "floor.npz")
+    [alone] = npz_scenes(entry("npz", scenes="object"), tmp_path / "floor.npz")
     assert alone.kind == "object" and alone.scans["0"].viewpoint_3 is None
-    [model] = npz.scenes(entry("npz", sensor_at_origin=True), write_npz(tmp_path / "b/cup.npz", "T_model_cloud"))
+    [model] = npz_scenes(entry("npz", sensor_at_origin=True), write_npz(tmp_path / "b/cup.npz", "T_model_cloud"))
     assert model.kind == "object" and (model.scans["2"].viewpoint_3 == 0).all()
 
 
@@ -82,12 +81,12 @@ def test_pairs_beside_npz_files_are_those_that_count(tmp_path):
     write_npz(tmp_path / "other.npz")
     rows = "list,scene,target,source,overlap\n3DMatch,floor,0,2,0.31\n3DLoMatch,floor,0,2,0.29\n3DMatch,floor,0,1,0.6\n"
     (tmp_path / "pairs.csv").write_text(rows)
-    floor, other = npz.scenes(entry("npz"), tmp_path)
+    floor, other = npz_scenes(entry("npz"), tmp_path)
     assert [(pair.target, pair.source, pair.overlap) for pair in floor.known()] == [("0", "2", 0.29), ("0", "1", 0.6)]
     assert len(list(other.known())) == 3
     (tmp_path / "pairs.csv").write_text(rows.replace("0.31", "31"))
     with pytest.raises(InputError, match=r"pairs.csv: column 'overlap' contains numbers above 1; give shares"):
-        list(npz.scenes(entry("npz"), tmp_path))
+        list(npz_scenes(entry("npz"), tmp_path))
 
 
 def without(name):
@@ -115,24 +114,24 @@ NPZ_FAULTS = [
 def test_faults_of_npz(tmp_path, change, message):
     write_npz(tmp_path / "floor.npz", change=change)
     with pytest.raises(InputError, match=message):
-        list(npz.scenes(entry("npz"), tmp_path))
+        list(npz_scenes(entry("npz"), tmp_path))
 
 
 def test_no_npz_and_no_archive(tmp_path):
     with pytest.raises(InputError, match="the folder has no npz file; correct location"):
-        list(npz.scenes(entry("npz"), tmp_path))
+        list(npz_scenes(entry("npz"), tmp_path))
     (tmp_path / "floor.npz").write_text("not a zip")
     with pytest.raises(InputError, match=r"floor.npz: is not a readable npz archive; fetch it again"):
-        list(npz.scenes(entry("npz"), tmp_path))
+        list(npz_scenes(entry("npz"), tmp_path))
 
 
 def test_ply_folder(tmp_path):
-    [read] = ply_folder.scenes(entry("ply_folder", scenes="room"), write_folder(tmp_path / "floor"))
+    [read] = ply_scenes(entry("ply_folder", scenes="room"), write_folder(tmp_path / "floor"))
     assert (read.name, read.kind) == ("floor", "room")
     assert_same(read)
     write_folder(tmp_path / "more/a", 1000.0)
     write_folder(tmp_path / "more/b", 1000.0)
-    several = list(ply_folder.scenes(entry("ply_folder", scenes="object", unit="mm"), tmp_path / "more"))
+    several = list(ply_scenes(entry("ply_folder", scenes="object", unit="mm"), tmp_path / "more"))
     assert [each.name for each in several] == ["a", "b"]
     assert_same(several[1])
 
@@ -154,19 +153,19 @@ def test_faults_of_ply_folders(tmp_path, change, message):
     poses = write_folder(tmp_path) / "poses.txt"
     poses.write_text(change(poses.read_text()))
     with pytest.raises(InputError, match=message):
-        list(ply_folder.scenes(entry("ply_folder", scenes="room"), tmp_path))
+        list(ply_scenes(entry("ply_folder", scenes="room"), tmp_path))
 
 
 def test_a_ply_folder_says_what_it_is_and_has_poses(tmp_path):
     with pytest.raises(InputError, match="Tiny: does not say what its scenes are; set scenes"):
-        list(ply_folder.scenes(entry("ply_folder"), tmp_path))
+        list(ply_scenes(entry("ply_folder"), tmp_path))
     with pytest.raises(InputError, match=r"poses.txt: no such file; give the poses of the scans"):
-        list(ply_folder.scenes(entry("ply_folder", scenes="room"), tmp_path))
+        list(ply_scenes(entry("ply_folder", scenes="room"), tmp_path))
 
 
 @pytest.mark.parametrize("log", ["floor/gt.log", "floor-evaluation/gt.log"])
 def test_layout_of_3dmatch(tmp_path, log):
-    [read] = threedmatch.scenes(entry("threedmatch"), write_benchmark(tmp_path, log))
+    [read] = benchmark_scenes(entry("threedmatch"), write_benchmark(tmp_path, log))
     assert (read.name, read.kind) == ("floor", "room")
     assert_same(read)
     shares = [pair.overlap for pair in read.known()]
@@ -187,7 +186,7 @@ def test_faults_of_the_benchmark(tmp_path, change, message):
     log = write_benchmark(tmp_path) / "floor-evaluation/gt.log"
     log.write_text(change(log.read_text()))
     with pytest.raises(InputError, match=message):
-        list(threedmatch.scenes(entry("threedmatch"), tmp_path))
+        list(benchmark_scenes(entry("threedmatch"), tmp_path))
 
 
 @pytest.mark.parametrize(
@@ -201,12 +200,12 @@ def test_faults_of_the_benchmark(tmp_path, change, message):
 def test_faults_of_printed_overlaps(tmp_path, text, message):
     write_benchmark(tmp_path, overlaps=text)
     with pytest.raises(InputError, match=message):
-        list(threedmatch.scenes(entry("threedmatch"), tmp_path))
+        list(benchmark_scenes(entry("threedmatch"), tmp_path))
 
 
 def test_a_benchmark_without_fragments_or_pairs_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"has no <scene>/cloud_bin_<number>.ply; correct location"):
-        list(threedmatch.scenes(entry("threedmatch"), tmp_path))
+        list(benchmark_scenes(entry("threedmatch"), tmp_path))
     (write_benchmark(tmp_path) / "floor-evaluation/gt.log").unlink()
     with pytest.raises(InputError, match=r"floor/gt.log: no such file; put it there, or into floor-evaluation"):
-        list(threedmatch.scenes(entry("threedmatch"), tmp_path))
+        list(benchmark_scenes(entry("threedmatch"), tmp_path))

@@ -14,7 +14,7 @@ from gpca.objects.splits import unseen
 from gpca.objects.surface import instance_of
 from gpca.pairs.dataset import Registrations, ragged
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.pairs.reading import registered_backwards
+from gpca.pairs.synthesis import registered_backwards
 from gpca.seeds import generator
 
 FEWEST_OBJECTS = 5  # instances; with fewer, too few objects are left to learn from

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from gpca.causes.frames import chosen_starts, measure_frames
 from gpca.causes.settings import CauseSettings, FrameCauseSettings
-from gpca.frames.instances import Instances
-from gpca.frames.meshes import datasets_of, files_behind, meshes_of, models_of
-from gpca.frames.plausibility import require_of_objects
+from gpca.frames.dataset import datasets_of, files_behind, meshes_of, models_of
+from gpca.frames.instances import Instances, require_of_objects
 from gpca.frames.starts import all_starts
 from gpca.io.csv_file import write_csv
 from gpca.objects.canonical import ObjectClouds

@@ -10,8 +10,8 @@ import numpy as np
 
 from gpca.attribution.predictions import read_predictions
 from gpca.errors import InputError
-from gpca.frames.instances import FRAME_COLUMNS
 from gpca.io.csv_file import numbers, read_csv
+from gpca.pairs.dataset import FRAME_COLUMNS
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.figures.cloud_views import draw_clouds
 from gpca.reporting.figures.style import CONCEPT_COLORS, SMALL_PT

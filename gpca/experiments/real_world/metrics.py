@@ -12,8 +12,8 @@ from gpca.attribution.diagnostics import brier_score, calibration_error, negativ
 from gpca.attribution.metrics import ALL, attribution_metrics, read_metrics, source_method_seed, tidy
 from gpca.attribution.predictions import concepts_of, read_predictions
 from gpca.errors import InputError
-from gpca.frames.instances import read_samples_of_frames
 from gpca.frames.source import REAL_WORLD
+from gpca.pairs.dataset import read_samples_of_frames
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -13,9 +13,8 @@ from gpca.experiments.recovery.cases import Attempt, RobotIn
 from gpca.experiments.recovery.episodes import Episode
 from gpca.frames.camera import MeshScene, shade
 from gpca.frames.rgbd_scene import TABLE_COLOR, model_color
-from gpca.frames.shots import Shot
+from gpca.frames.shots import Shot, best_viewpoint
 from gpca.frames.situations import Situation
-from gpca.frames.viewpoint import best_viewpoint
 from gpca.io.arrays import save_arrays
 from gpca.io.names import Axes
 from gpca.pairs.perturbation import CONCEPTS

@@ -10,8 +10,8 @@ from collections.abc import Iterable, Mapping
 from gpca.errors import InputError
 from gpca.experiments.recovery.cases import FEWEST_POINTS, register_first
 from gpca.experiments.recovery.episodes import Episode
+from gpca.frames.dataset import simplified
 from gpca.frames.initial_pose import InitialPoseSettings
-from gpca.frames.meshes import simplified
 from gpca.frames.situations import REDRAWS, Shelf, Situations
 from gpca.objects.surface import Surface
 from gpca.pairs.dataset import Registrations

@@ -22,7 +22,7 @@ from gpca.experiments.diagnosis.measures import SHARES, SMALLER_IS_BETTER, count
 from gpca.experiments.scan_causes.settings import SCANS
 from gpca.io.csv_file import ANY, numbers, read_csv, read_numbers
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.scans.selection import stratum_of
+from gpca.scans.scene import stratum_of
 from gpca.seeds import generator, seed_of_file
 
 if TYPE_CHECKING:

@@ -10,8 +10,7 @@ from gpca.errors import InputError, require_names, with_key
 from gpca.experiments.experiment import Experiment, LeftOut, Names, Tidy
 from gpca.experiments.scans.settings import ChoiceSettings, ScanSettings, part
 from gpca.objects.entry import title_of
-from gpca.scans.entry import ScanEntry
-from gpca.scans.source import entry_of, place_of
+from gpca.scans.source import ScanEntry, entry_of, place_of
 
 
 def check(config: dict, left_out: LeftOut) -> None:

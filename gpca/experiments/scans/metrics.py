@@ -1,6 +1,6 @@
 """Recalls of registration methods on scans, by overlap and by start, with intervals over scenes.
 
-A registration is correct by the RMSE over the true overlap (:mod:`gpca.scans.success`), whatever the method says of it,
+A registration is correct by the RMSE over the true overlap (:mod:`gpca.scans.pair`), whatever the method says of it,
 as in 3DMatch's benchmark; a method that ends without any correspondence has no pose, so it is not correct.
 """
 
@@ -16,8 +16,8 @@ from gpca.attribution.clustered import Clustered, Estimate, intervals
 from gpca.attribution.metrics import ALL, source_method_seed
 from gpca.experiments.registration_methods.metrics import row_name
 from gpca.io.csv_file import numbers, read_csv
-from gpca.scans.selection import stratum_of
-from gpca.scans.success import ScanSuccess
+from gpca.scans.pair import ScanSuccess
+from gpca.scans.scene import stratum_of
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -10,9 +10,8 @@ from pydantic import Field
 
 from gpca.errors import InputError
 from gpca.objects.entry import Name
-from gpca.scans.entry import ScanEntry
-from gpca.scans.ladder import Rung
-from gpca.scans.success import ScanSuccess
+from gpca.scans.pair import Rung, ScanSuccess
+from gpca.scans.source import ScanEntry
 from gpca.settings import Bounds, Count, Distinct, Share, fields_of, read_settings
 
 

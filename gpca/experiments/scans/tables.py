@@ -18,8 +18,8 @@ from gpca.reporting.tables.builder import TableBuilder, missing_packages, over_c
 from gpca.reporting.tables.cells import cell_of_repeats, clustered_cell, rows_where
 from gpca.reporting.tables.table import Column, Table
 from gpca.reporting.words import plural
-from gpca.scans.ladder import Rung
-from gpca.scans.selection import stratum_name
+from gpca.scans.pair import Rung
+from gpca.scans.scene import stratum_name
 
 if TYPE_CHECKING:
     import pandas as pd

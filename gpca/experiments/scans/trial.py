@@ -16,10 +16,7 @@ from gpca.experiments.scans.settings import TrialSettings
 from gpca.process.environment import open3d_cloud, require_open3d
 from gpca.process.progress import progress
 from gpca.scans.dataset import ScanPairs
-from gpca.scans.ladder import Rung, disturbed, rungs_of
-from gpca.scans.overlap import voxels
-from gpca.scans.pair import ScanPair
-from gpca.scans.success import overlap_rmse
+from gpca.scans.pair import Rung, ScanPair, disturbed, overlap_rmse, rungs_of, voxels
 from gpca.seeds import generator, seed_of
 
 if TYPE_CHECKING:

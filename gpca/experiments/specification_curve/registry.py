@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 from gpca.classifier.settings import Kernel, LearningRate
-from gpca.pairs.reading import Reading as ReadAs
+from gpca.pairs.synthesis import Reading as ReadAs
 from gpca.registry import load
 from gpca.settings import Bounds, Count, Distinct, Keys, OpenShare, Positive
 

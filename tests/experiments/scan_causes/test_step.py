@@ -15,7 +15,7 @@ from gpca.features.dataset import Descriptors
 from gpca.process.job import Job
 from gpca.reenactment.dataset import Reenactments
 from gpca.scans.dataset import ScanPairs
-from gpca.scans.ladder import Rung
+from gpca.scans.pair import Rung
 from tests.scans.corner import corner_pair
 
 LADDER_OF_THREE = (Rung(0, 0), Rung(10, 0.1), Rung(60, 0.9))

@@ -12,7 +12,7 @@ from gpca.errors import InputError
 from gpca.experiments.scans.settings import TrialSettings
 from gpca.experiments.scans.trial import errors_of, pair_to_register, scan_normals, try_methods
 from gpca.scans.dataset import ScanPairs
-from gpca.scans.ladder import Rung, rungs_of
+from gpca.scans.pair import Rung, rungs_of
 from tests.scans.tiny import pair
 
 LADDER = (Rung(0, 0), Rung(20, 0.3))
