@@ -21,7 +21,7 @@ class LearnedPairGPCA(PairDescription, GPCA):
     """GP-CA's classifier on the embedding of an encoder that sees both clouds after ICP and the motion of ICP.
 
     Args:
-        encoder: one of :data:`gpca.encoders.pair.PAIR_ENCODERS`.
+        encoder: one of :data:`gpca.encoders.dgcnn.PAIR_ENCODERS`.
         motion: whether it is told how far ICP moved the cloud.
         source, seed: name what is random.
         points: of each cloud, each described by how it lies to the other cloud.
@@ -50,7 +50,7 @@ class LearnedPairGPCA(PairDescription, GPCA):
 
     def learn_encoder(self, registrations: Registrations) -> Callable[[Registrations], Registrations]:
         """Train the encoder on the labeled pairs, and return a function that attaches its embeddings."""
-        from gpca.encoders.settings import EncoderSettings
+        from gpca.encoders.registry import EncoderSettings
         from gpca.explainers.pair_encoder import PairDraw, learn_pair_encoder
 
         draw = PairDraw(self._prefix + "points", self._prefix + "told")

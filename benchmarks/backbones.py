@@ -134,7 +134,7 @@ def measure(networks: dict, clouds_B_N_3, repeats: int) -> dict[str, dict[str, l
 @contextmanager
 def every_slot():
     """Let group MLPs evaluate every slot of every group meanwhile."""
-    from gpca.encoders.group_mlp import GroupMLP
+    from gpca.encoders.groups import GroupMLP
 
     with patch.object(GroupMLP, "forward", GroupMLP.plain):
         yield

@@ -142,8 +142,7 @@ def embedded(registrations):
 
     import torch
 
-    from gpca.encoders.registry import make_encoder
-    from gpca.encoders.settings import EncoderSettings
+    from gpca.encoders.registry import EncoderSettings, make_encoder
     from gpca.encoders.training import embed
     from gpca.pairs.perturbation import CONCEPTS
 

@@ -139,7 +139,7 @@ def make_explainer(options: argparse.Namespace):
     from gpca.alignment.icp import ICPSettings
     from gpca.classifier.gpc import GPC
     from gpca.classifier.settings import GPCSettings
-    from gpca.encoders.settings import EncoderSettings
+    from gpca.encoders.registry import EncoderSettings
     from gpca.encoders.training import make_model
     from gpca.model.explainer import Explainer
     from gpca.model.file import Model

@@ -97,7 +97,7 @@ def model(registrations, diagnoser):
     from gpca.alignment.icp import ICPSettings
     from gpca.classifier.gpc import GPC
     from gpca.classifier.settings import GPCSettings
-    from gpca.encoders.settings import EncoderSettings
+    from gpca.encoders.registry import EncoderSettings
     from gpca.encoders.training import embed, make_model
     from gpca.model.familiarity import Familiarity
     from gpca.model.file import Model

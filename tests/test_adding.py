@@ -79,7 +79,7 @@ def test_an_explainer(config, added_modules, registrations, tmp_path):
 def test_an_encoder(config, added_modules, registrations, monkeypatch):
 
     from gpca.encoders import registry
-    from gpca.encoders.settings import EncoderSettings
+    from gpca.encoders.registry import EncoderSettings
     from gpca.encoders.training import embed, train_encoder
 
     added_modules("gpca/encoders/pointwise.py")

@@ -9,8 +9,7 @@ from gpca.config.layers import in_order, with_defaults, with_types
 from gpca.config.leave_out import check_left_out, names_left_out, without_false
 from gpca.config.schema import whole_config
 from gpca.config.success import with_success
-from gpca.encoders.registry import require_backbone
-from gpca.encoders.settings import require_draws
+from gpca.encoders.registry import require_backbone, require_draws
 from gpca.errors import InputError, require_names, with_key
 from gpca.experiments.experiment import LeftOut
 from gpca.experiments.registry import experiments

@@ -15,7 +15,7 @@ from gpca.comparison.published import UNITS
 from gpca.comparison.reference import Allowance
 from gpca.comparison.verdicts import Tolerance
 from gpca.encoders.reduction import PCA, UMAP, Autoencoder
-from gpca.encoders.settings import NamedEncoder
+from gpca.encoders.registry import NamedEncoder
 from gpca.experiments.experiment import ByName
 from gpca.experiments.registry import experiments
 from gpca.objects.entry import Name, NamedSource, Place, SurfacePoints

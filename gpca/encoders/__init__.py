@@ -1,1 +1,1 @@
-"""Point-cloud encoders, one file each, and how they are trained."""
+"""Point-cloud encoders and how they are trained."""

@@ -1,31 +1,39 @@
-"""DGCNN (Wang et al. 2019), the encoder of GP-CA."""
+"""DGCNN (Wang et al. 2019), the encoder of GP-CA; its EdgeConv is evaluated per point instead of per edge.
+
+The edge function is one linear layer W on ``[x_j - x_i ; x_i]``. With ``W = [W1 | W2]`` it splits into
+
+    y_ij = W1 x_j + (W2 - W1) x_i = A_j + C_i ,
+
+so the matrix product runs over N points, not N·k edges. Batch normalization is affine and LeakyReLU monotone, hence
+
+    max_j act(γ (y_ij - μ)/σ + β) = act(γ (ext_j y_ij - μ)/σ + β),  ext = max where γ >= 0, min where γ < 0.
+
+In training, μ and σ² are taken over all B·N·k edges, as in a per-edge layer (:mod:`gpca.encoders.edge_kernels`).
+Outputs, running statistics and gradients agree with the per-edge form in ``tests/encoders/per_edge.py``.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
 import torch
 from torch import nn
 
-from gpca.encoders.edge_conv import NEGATIVE_SLOPE, EdgeConv
-from gpca.encoders.layers import PointLinear
+from gpca.encoders import edge_kernels
+from gpca.encoders.layers import BatchNorm, PointLinear, linear, product
+from gpca.errors import InputError
+
+NEGATIVE_SLOPE = 0.2
+CHANNELS, MOTION = 7, 5  # numbers per point of a pair, and of ICP's motion when all of it is given
+SCALE = 0.1  # of all channels but the coordinates, so that neighbors in the first graph are neighbors on the surface
 
 
 class DGCNN(nn.Module):
     """Four EdgeConvs (64, 64, 128, 256) on dynamic graphs, a point-wise layer, max and mean pooling.
 
-    The published widths; the point-wise layer has 256 channels here (1024 in the ModelNet40 network), which keeps
-    it to half of the arithmetic. The cloud is used as it is: no centering, scaling or spatial transformer, which would
-    erase the concepts.
-
-    Args:
-        k: neighbors per point, the point itself included.
-        point_features: width of the point-wise layer.
-        widths: of the EdgeConvs.
-        inputs: numbers of a point; its coordinates, unless there are more.
-
-    Attributes:
-        embedding_size: d = 2 · point_features.
+    The point-wise layer has 256 channels (published: 1024), which halves the arithmetic. The cloud is neither centered
+    nor scaled nor turned, which would erase the concepts. `k` counts the point itself; `inputs` are numbers per point.
     """
 
     def __init__(
@@ -40,11 +48,7 @@ class DGCNN(nn.Module):
         self.embedding_size = 2 * point_features
 
     def forward(self, clouds: torch.Tensor | Sequence[torch.Tensor]) -> torch.Tensor:
-        """Return embeddings (B, d) of clouds in the target's frame, in units of the object's diameter.
-
-        Args:
-            clouds: (B, N, 3), or B of them (N, 3) of unlike sizes.
-        """
+        """Embed clouds (B, N, 3), or B clouds (N, 3) of any sizes, in the target's frame and in diameters: (B, d)."""
         sizes = None if isinstance(clouds, torch.Tensor) else [len(cloud) for cloud in clouds]
         x_B_N_F = clouds if isinstance(clouds, torch.Tensor) else torch.cat(list(clouds))[None]
         batch, n, _ = x_B_N_F.shape
@@ -56,3 +60,131 @@ class DGCNN(nn.Module):
         x_B_N_F = nn.functional.leaky_relu(x_P_F, NEGATIVE_SLOPE).view(batch, n, -1)
         parts = [x_B_N_F] if sizes is None else x_B_N_F.split(sizes, dim=1)
         return torch.cat([torch.cat([part.max(dim=1).values, part.mean(dim=1)], dim=-1) for part in parts])
+
+
+class PairDGCNN(nn.Module):
+    """DGCNN on the points of both clouds of a registered pair, each with its membership (±1) as one more channel.
+
+    The features of the points are those of :func:`gpca.features.distances.describe_points`. The `motion` numbers of
+    ICP's motion are appended to the embedding.
+    """
+
+    def __init__(
+        self, k: int = 10, widths: tuple[int, ...] = (32, 32, 64), point_features: int = 64, motion: int = MOTION
+    ) -> None:
+        super().__init__()
+        self.dgcnn = DGCNN(k, point_features, widths, CHANNELS + 1)
+        self.embedding_size = self.dgcnn.embedding_size + motion
+
+    def forward(self, pairs: tuple[torch.Tensor, torch.Tensor]) -> torch.Tensor:
+        """Embed points (B, 2, T, `CHANNELS`) of the observed cloud and the model, and motions (B, M): (B, d)."""
+        points_B_2_T_F, motion_B_M = pairs
+        batch, _, count, _ = points_B_2_T_F.shape
+        side_2 = points_B_2_T_F.new_tensor([1.0, -1.0])
+        side_B_2_T_1 = side_2[None, :, None, None].expand(batch, 2, count, 1)
+        others_B_2_T_G = SCALE * torch.cat([points_B_2_T_F[..., 3:], side_B_2_T_1], dim=-1)
+        joined_B_2_T_F = torch.cat([points_B_2_T_F[..., :3], others_B_2_T_G], dim=-1)
+        return torch.cat([self.dgcnn(joined_B_2_T_F.flatten(1, 2)), motion_B_M], dim=1)
+
+
+PAIR_ENCODERS = {"pair_dgcnn": PairDGCNN}
+
+
+class EdgeConv(nn.Module):
+    """Linear map on edges, batch norm over edges, LeakyReLU(0.2), maximum over the k neighbors.
+
+    ``weight`` (F_out, 2·F_in) acts on ``[x_j - x_i ; x_i]``, as in the per-edge form.
+    """
+
+    def __init__(self, in_features: int, out_features: int, k: int) -> None:
+        super().__init__()
+        self.k = k
+        self.weight = nn.Parameter(torch.empty(out_features, 2 * in_features))
+        nn.init.kaiming_uniform_(self.weight, a=5**0.5)
+        self.norm = BatchNorm(out_features)
+
+    def forward(self, x_B_N_F: torch.Tensor, sizes: Sequence[int] | None = None) -> torch.Tensor:
+        """Map features (B, N, F_in) to (B, N, F_out) on the graph of the input features.
+
+        With `sizes`, B is 1 and the N points are clouds of these sizes, one after the other.
+        """
+        neighbors_B_N_k = knn_indices(x_B_N_F, self.k) if sizes is None else knn_indices_within(x_B_N_F, self.k, sizes)
+        w1, w2 = self.weight.chunk(2, dim=1)
+        ac_B_N_2F = linear(x_B_N_F, torch.cat([w1, w2 - w1]))
+        wants_gradient = torch.is_grad_enabled() and x_B_N_F.requires_grad
+        if ac_B_N_2F.device.type != "cpu" or (wants_gradient and not self.training):
+            return _edge_max_plain(ac_B_N_2F, neighbors_B_N_k, self.norm)
+        if not self.training:
+            arrays = _numpy(ac_B_N_2F, neighbors_B_N_k, *self.norm.scale_and_shift())
+            return torch.from_numpy(edge_kernels.gather_max_affine(*arrays, NEGATIVE_SLOPE))
+        out_B_N_F, mean_F, variance_F = _EdgeMax.apply(
+            ac_B_N_2F, neighbors_B_N_k, self.norm.weight, self.norm.bias, self.norm.eps
+        )
+        self.norm.track(mean_F, variance_F, neighbors_B_N_k.numel())
+        return out_B_N_F
+
+
+def knn_indices(x_B_N_F: torch.Tensor, k: int) -> torch.Tensor:
+    """Return the indices (B, N, k), in any order, of each point's k nearest points in feature space, itself included.
+
+    Raises:
+        InputError: a cloud has fewer than k points.
+    """
+    x_B_N_F = x_B_N_F.detach()
+    n_points = x_B_N_F.shape[1]
+    if n_points < k:
+        raise InputError(
+            f"cloud of {n_points} points", f"has fewer than {k} neighbors per point", "raise draw_points or lower k"
+        )
+    # |x_j|² - 2 x_i·x_j, as one product of [x_i ; 1] and [-2 x_j ; |x_j|²]: |x_i|² is the same for a whole row and does
+    # not change which points are nearest.
+    ones_B_N_1 = x_B_N_F.new_ones((*x_B_N_F.shape[:2], 1))
+    rows_B_N_G = torch.cat([x_B_N_F, ones_B_N_1], dim=-1)
+    columns_B_N_G = torch.cat([-2 * x_B_N_F, (x_B_N_F * x_B_N_F).sum(-1, keepdim=True)], dim=-1)
+    if x_B_N_F.device.type == "cpu":
+        return torch.from_numpy(edge_kernels.smallest_k(product(rows_B_N_G, columns_B_N_G.mT).numpy(), k))
+    return (rows_B_N_G @ columns_B_N_G.mT).topk(k, dim=-1, largest=False, sorted=False).indices
+
+
+def knn_indices_within(x_1_P_F: torch.Tensor, k: int, sizes: Sequence[int]) -> torch.Tensor:
+    """Return :func:`knn_indices` (1, P, k) of concatenated clouds, each searched within its own points."""
+    starts = np.cumsum([0, *sizes[:-1]])
+    clouds = zip(x_1_P_F.split(list(sizes), 1), starts, strict=True)
+    return torch.cat([knn_indices(x_1_n_F, k) + int(start) for x_1_n_F, start in clouds], dim=1)
+
+
+class _EdgeMax(torch.autograd.Function):
+    """Batch-normalized, activated maximum over neighbors with the exact statistics of all edges (CPU)."""
+
+    @staticmethod
+    def forward(ctx, ac_B_N_2F, neighbors_B_N_k, gamma_F, beta_F, eps):
+        n_edges = neighbors_B_N_k.numel()
+        ac, neighbors, gamma, beta = _numpy(ac_B_N_2F, neighbors_B_N_k, gamma_F, beta_F)
+        extreme, extreme_at, edge_sums, mean, variance = edge_kernels.gather_extreme_and_sums(ac, neighbors, gamma)
+        inverse_std = (1.0 / (variance + eps) ** 0.5).astype(ac.dtype)
+        mean = mean.astype(ac.dtype)
+        out = edge_kernels.normalize_activate(extreme, mean, inverse_std, gamma, beta, NEGATIVE_SLOPE)
+        ctx.numpy_arrays = (ac, neighbors, extreme, extreme_at, edge_sums, mean, inverse_std, gamma, out, n_edges)
+        mean_F, variance_F = torch.from_numpy(mean), torch.from_numpy(variance.astype(ac.dtype))
+        ctx.mark_non_differentiable(mean_F, variance_F)
+        return torch.from_numpy(out), mean_F, variance_F
+
+    @staticmethod
+    def backward(ctx, grad_out_B_N_F, _grad_mean, _grad_variance):
+        (grad_out,) = _numpy(grad_out_B_N_F)
+        grad_ac, grad_gamma, grad_beta = edge_kernels.edge_max_backward(grad_out, *ctx.numpy_arrays, NEGATIVE_SLOPE)
+        return torch.from_numpy(grad_ac), None, torch.from_numpy(grad_gamma), torch.from_numpy(grad_beta), None
+
+
+def _edge_max_plain(ac_B_N_2F: torch.Tensor, neighbors_B_N_k: torch.Tensor, norm: nn.BatchNorm1d) -> torch.Tensor:
+    """Evaluate the layer with torch operations, on a GPU or for the gradient of a trained layer in its inputs."""
+    a_B_N_F, c_B_N_F = ac_B_N_2F.chunk(2, dim=-1)
+    batch, n, k = neighbors_B_N_k.shape
+    rows = (neighbors_B_N_k + n * torch.arange(batch, device=ac_B_N_2F.device)[:, None, None]).reshape(-1)
+    y_E_F = a_B_N_F.reshape(batch * n, -1)[rows] + c_B_N_F.reshape(batch * n, 1, -1).expand(-1, k, -1).flatten(0, 1)
+    activated = nn.functional.leaky_relu(norm(y_E_F), NEGATIVE_SLOPE)
+    return activated.view(batch, n, k, -1).amax(dim=2)
+
+
+def _numpy(*tensors: torch.Tensor):
+    return tuple(tensor.detach().contiguous().numpy() for tensor in tensors)

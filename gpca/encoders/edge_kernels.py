@@ -1,9 +1,8 @@
-"""The passes over neighbors behind :mod:`gpca.encoders.edge_conv`, compiled by numba.
+"""Compiled passes over neighbors behind :class:`gpca.encoders.dgcnn.EdgeConv`.
 
-All arrays are C-contiguous float32 (float64 works too, for gradient checks). ``ac`` (B, N, 2F) holds A in its first F
-and C in its last F channels. The loops over clouds run in parallel on the threads that numba is given; every
-floating-point sum is made within one cloud and the clouds are added in order, so the thread count changes no bit.
-Inner loops run over channels, where they vectorize.
+All arrays are C-contiguous float32 (float64 in gradient checks). ``ac`` (B, N, 2F) holds A in its first F and C in its
+last F channels. Clouds run in parallel; sums are made within one cloud and clouds are added in order, so the number of
+threads changes no bit. Inner loops run over channels, where they vectorize.
 """
 
 from __future__ import annotations
@@ -17,13 +16,12 @@ from gpca.process.compilation import OVER_CLOUDS, njit, prange
 def smallest_k(distances, k):
     """Return for every row of ``distances`` (B, N, M) the columns of its k smallest entries, ties to the lower column.
 
-    Searches for a value that exactly k entries do not exceed. Counting vectorizes, so this is about ten times faster
-    than keeping the k best while scanning, and needs no order within the k. Every row is by itself, so that one cloud
-    is work for several threads.
+    Searches for a value that exactly k entries do not exceed: counting vectorizes, which is about ten times faster than
+    keeping the k best while scanning. Rows are independent, so one cloud occupies several threads.
     """
     batch, n, columns = distances.shape
     rows = distances.reshape(batch * n, columns)
-    # np.empty will not do: a row with NaN fills too few slots, and the rest must still be indices of points.
+    # Not np.empty: a row with NaN fills too few slots, but the rest must still be indices of points.
     chosen = np.zeros((batch * n, k), np.int32)
     for i in prange(batch * n):
         row = rows[i]
@@ -39,9 +37,8 @@ def smallest_k(distances, k):
 def _bracket(row, k):
     """Return (below, above, count): fewer than k entries are <= below, count >= k are <= above.
 
-    Starts at the range of the first k entries and widens it downward, at first a little. Squared distances to
-    points on a surface are about evenly spread, so a straight line between the counts then leads closer than the
-    middle; where it does not, the middle is next.
+    Starts at the range of the first k entries and widens it downward. Squared distances to points on a surface are
+    about evenly spread, so interpolating the counts usually beats bisection; when it does not, bisection is next.
     """
     half = row.dtype.type(0.5)
     above = below = row[0]
@@ -177,7 +174,7 @@ def normalize_activate(extreme, mean, inverse_std, gamma, beta, slope):
 
 @njit(**OVER_CLOUDS)
 def gather_max_affine(ac, neighbors, scale, shift, slope):
-    """Return max_j act(scale · (A_j + C_i) + shift), (B, N, F), for inference: in one pass and without statistics."""
+    """Return max_j act(scale · (A_j + C_i) + shift), (B, N, F), in one pass without statistics, for inference."""
     batch, n, k = neighbors.shape
     features = ac.shape[2] // 2
     out = np.empty((batch, n, features), ac.dtype)

@@ -1,8 +1,7 @@
-"""Layers on many points: linear maps by NumPy's product on the processor, and batch norm without its own statistics.
+"""Layers on many points: linear maps by NumPy's product on the CPU, and batch norm with given statistics.
 
-The product is OpenBLAS's: with its instructions pinned (:mod:`gpca.process.processor`) it gives the same bytes on every
-machine, at the speed of torch's own product, MKL's. MKL gives the same bytes on Intel's and AMD's processors only by
-code that takes twice the time.
+NumPy's OpenBLAS with pinned instructions (:mod:`gpca.process.processor`) gives the same bytes on every machine at the
+speed of torch's MKL, whose vendor-independent code takes twice the time.
 """
 
 from __future__ import annotations
@@ -15,8 +14,8 @@ from torch import nn
 
 
 def product(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
-    """Return the matrix product ``a @ b`` of tensors of the processor, stacked or not, without a gradient."""
-    with np.errstate(over="ignore", invalid="ignore"):  # as torch; a training that diverges is stopped by its loss
+    """Return ``a @ b`` of CPU tensors, stacked or not, without a gradient."""
+    with np.errstate(over="ignore", invalid="ignore"):  # as torch; a diverging training is stopped by its loss
         return torch.from_numpy(np.matmul(a.detach().numpy(), b.detach().numpy()))
 
 
@@ -42,7 +41,7 @@ class PointLinear(nn.Linear):
 
 
 class BatchNorm(nn.BatchNorm1d):
-    """``nn.BatchNorm1d`` over F features, whose caller computes the statistics; running ones are always kept."""
+    """``nn.BatchNorm1d`` over F features with statistics from the caller; the running ones are always kept."""
 
     running_mean: torch.Tensor
     running_var: torch.Tensor
@@ -56,7 +55,7 @@ class BatchNorm(nn.BatchNorm1d):
 
     @torch.no_grad()
     def track(self, mean_F: torch.Tensor, variance_F: torch.Tensor, count: int) -> None:
-        """Take a batch of `count` values with this mean and biased variance into the running statistics."""
+        """Update the running statistics by a batch of `count` values with this mean and biased variance."""
         self.num_batches_tracked += 1
         self.running_mean.lerp_(mean_F, self.momentum)
         self.running_var.lerp_(variance_F * (count / (count - 1)), self.momentum)

@@ -1,7 +1,7 @@
 """Dimensionality reductions of embeddings by name (paper, Table VI): none, PCA, UMAP, autoencoder.
 
-Each is fitted on the training embeddings, standardized on them, and is then one fixed function of an embedding: what it
-makes of a row depends on no other row that it is applied to. A new one is a class here and its line in `REDUCTIONS`.
+Each is fitted on the standardized training embeddings and is then a fixed function of one embedding: other rows do not
+matter. A new one is a class here and a line in `REDUCTIONS`.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class PCA:
     components: Count = 64
 
     def fit(self, z_train_N_d: np.ndarray, *axes: object) -> Transform:
-        """Return the projection on the components; nothing here is random."""
+        """Return the projection on the components."""
         from sklearn.decomposition import PCA as SklearnPCA
 
         return SklearnPCA(self.components, svd_solver="full").fit(z_train_N_d).transform
@@ -38,20 +38,14 @@ class PCA:
 class UMAP:
     """Uniform manifold approximation and projection (McInnes et al. 2018) by umap-learn.
 
-    Attributes:
-        components: two to a hundred by its documentation, which has 10 for a clustering to read. More than a graph of
-            some hundred samples can fill only adds noise, hence fewer than for the others.
-        neighbours: how many a sample has in the graph; 15 is usual.
+    A graph of some hundred samples fills only a few components; more add noise. `neighbours` are those in the graph.
     """
 
     components: Count = 16
     neighbours: Annotated[int, Bounds(minimum=2)] = 15
 
     def fit(self, z_train_N_d: np.ndarray, *axes: object) -> Transform:
-        """Return the transform of new samples, which training samples pass as well.
-
-        The places that the fit gave them are left: a classifier shall meet one function in training and in test.
-        """
+        """Return the transform of new samples; training samples pass it too, so that train and test agree."""
         seed = seed_of(*axes, "umap") % 2**32
         with warnings.catch_warnings(action="ignore"):
             from umap import UMAP as UmapLearn
@@ -60,7 +54,7 @@ class UMAP:
             model = UmapLearn(self.neighbours, self.components, **random).fit(z_train_N_d.astype(np.float32))
 
         def transform(z_S_d: np.ndarray) -> np.ndarray:
-            # One by one: rows that are transformed together share random numbers, and a threshold on their graph.
+            # One by one: rows transformed together share random numbers and a threshold on their graph.
             with warnings.catch_warnings(action="ignore"):
                 rows = [model.transform(z_1_d)[0] for z_1_d in z_S_d.astype(np.float32)[:, None]]
             return np.array(rows).reshape(len(z_S_d), self.components)
@@ -70,24 +64,22 @@ class UMAP:
 
 @dataclass(frozen=True)
 class Autoencoder:
-    """Autoencoder (Hinton & Salakhutdinov 2006) d - 256 - components - 256 - d with GELU; the code itself is linear.
+    """Autoencoder (Hinton & Salakhutdinov 2006) d - 256 - components - 256 - d with GELU and a linear code.
 
-    Adam trains it (learning rate 1e-3, batches of 32) on the mean squared error of the standardized embeddings.
+    Adam (learning rate 1e-3, batches of 32) minimizes the mean squared error of the standardized embeddings.
     """
 
     components: Count = 64
     epochs: Count = 100
 
     def fit(self, z_train_N_d: np.ndarray, *axes: object) -> Transform:
-        """Train for all epochs and return the encoder."""
+        """Train the autoencoder and return its encoder."""
         import torch
         from torch import nn
 
         from gpca.adam import Adam
 
-        d = z_train_N_d.shape[1]
-        hidden = 256
-        batch_size = 32
+        d, hidden, batch_size = z_train_N_d.shape[1], 256, 32
         z_N_d = torch.from_numpy(z_train_N_d.astype(np.float32))
         with _one_thread(torch), torch.random.fork_rng(devices=[]):
             torch.manual_seed(seed_of(*axes, "autoencoder"))
@@ -115,18 +107,15 @@ REDUCTIONS = {"none": None, "pca": PCA, "umap": UMAP, "autoencoder": Autoencoder
 
 
 def reduce(name: str, h_train_N_d: np.ndarray, h_S_d: np.ndarray, settings: dict, *axes: object) -> np.ndarray:
-    """Return the reduced embeddings (S, components), float32; ``none`` returns (S, d) as they are.
+    """Fit a reduction on training embeddings and apply it: (S, components), float32; ``none`` returns (S, d) unchanged.
 
     Args:
-        name: a key of `REDUCTIONS`.
-        h_train_N_d: what the reduction is fitted on.
-        h_S_d: what it is applied to.
         settings: the reduction's fields that differ from their defaults.
         axes: name the random numbers of UMAP and the autoencoder.
 
     Raises:
-        InputError: unknown reduction or setting; embeddings with NaN or infinity; training embeddings that are all
-            alike; more components or neighbors than there are training embeddings or numbers in them.
+        InputError: unknown reduction or setting; embeddings with NaN or infinity; identical training embeddings; more
+            components or neighbors than training embeddings or dimensions.
     """
     reduction = make_reduction(name, settings)
     for h, role in ((h_train_N_d, "training embeddings"), (h_S_d, "embeddings")):
@@ -145,17 +134,16 @@ def reduce(name: str, h_train_N_d: np.ndarray, h_S_d: np.ndarray, settings: dict
 
 
 def require_room(name: str, reduction: PCA | UMAP | Autoencoder, n: int, d: int | None) -> None:
-    """Raise an InputError where a reduction has more components or neighbors than the training embeddings allow.
+    """Raise an InputError if a reduction has too many components or neighbors for n training embeddings (n, d).
 
-    Args:
-        n, d: how many training embeddings there are, and how many numbers each has, where that is known.
+    The config check does not always know d.
     """
     if reduction.components > min(n, d or n):
-        of = f" of {d} numbers" if d else ""
-        fault = f"{reduction.components} components are too many for {n} training embeddings{of}"
+        dimensions = f" of {d} numbers" if d else ""
+        fault = f"{reduction.components} components are too many for {n} training embeddings{dimensions}"
         raise InputError(f"reduction '{name}'", fault, f"set components to at most {min(n, d or n)}")
     if isinstance(reduction, UMAP):
-        # Beyond these umap-learn takes fewer neighbors, or starts at random, with no more than a warning.
+        # Beyond these limits umap-learn takes fewer neighbors, or starts at random, with no more than a warning.
         for key, most in (("neighbours", n - 1), ("components", n - 3)):
             if (value := getattr(reduction, key)) > most:
                 fault = f"{value} {key} are too many for {n} training embeddings"
@@ -163,24 +151,20 @@ def require_room(name: str, reduction: PCA | UMAP | Autoencoder, n: int, d: int 
 
 
 def make_reduction(name: str, settings: dict):
-    """Return the reduction with its settings, None for ``none``.
-
-    Raises:
-        InputError: unknown reduction, or a setting that it does not have.
-    """
+    """Return the reduction with its settings, None for ``none``; an unknown name or setting raises an InputError."""
     require_known("reduction", name, REDUCTIONS)
     reduction = REDUCTIONS[name]
-    known = [field.name for field in fields(reduction)] if reduction else []
-    if unknown := [key for key in settings if key not in known]:
+    names = [field.name for field in fields(reduction)] if reduction else []
+    if unknown := [key for key in settings if key not in names]:
         raise InputError(
-            f"reduction '{name}'", f"has no setting '{unknown[0]}'", f"its settings are {', '.join(known) or 'none'}"
+            f"reduction '{name}'", f"has no setting '{unknown[0]}'", f"its settings are {', '.join(names) or 'none'}"
         )
     return reduction(**settings) if reduction else None
 
 
 @contextmanager
 def _one_thread(torch) -> Iterator[None]:
-    """Let torch use one thread meanwhile: sums over a batch would depend on their number."""
+    """Limit torch to one thread: sums over a batch depend on the number of threads."""
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     try:

@@ -1,31 +1,43 @@
-"""Encoders by name. A new one is a file beside this one and a line here, or comes from outside."""
+"""Backbones by name, their options, and the settings of an encoder and its training; nothing here loads torch."""
 
 from __future__ import annotations
 
-from gpca.errors import InputError, require_known
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Annotated, Any, Literal
+
+from gpca.errors import InputError, require_known, with_key
+from gpca.pairs.synthesis import Reading
 from gpca.plugins import joined_outside
 from gpca.registry import load
+from gpca.settings import Bounds, Count, PositiveShare, Share, changes_of, read_settings
 
 ENCODERS = {
     "dgcnn": "gpca.encoders.dgcnn:DGCNN",
     "pointnet": "gpca.encoders.pointnet:PointNet",
-    "pointnet_tnet": "gpca.encoders.pointnet_tnet:PointNetTNet",
-    "pointnet2": "gpca.encoders.pointnet2:PointNet2",
-    "pointnext": "gpca.encoders.pointnext:PointNeXt",
+    "pointnet_tnet": "gpca.encoders.pointnet:PointNetTNet",
+    "pointnet2": "gpca.encoders.pointnet:PointNet2",
+    "pointnext": "gpca.encoders.pointnet:PointNeXt",
 }
-DIFFERENTIABLE = ("dgcnn", "pointnet")  # those that, once trained, still have a gradient in the points on the processor
+DIFFERENTIABLE = ("dgcnn", "pointnet")  # backbones with a gradient in the points on the CPU, once trained
+OF_ANY_SIZE = ("dgcnn",)  # backbones that take clouds of different sizes in one batch
 
 
 def encoders() -> dict[str, str]:
-    """Return ``module:class`` of every encoder by name, those from outside included."""
+    """Return ``module:class`` of every encoder by name, including those from outside."""
     return joined_outside("ENCODERS", "backbone", str, ENCODERS)
+
+
+def require_backbone(backbone: str) -> None:
+    """Raise an InputError that lists the backbones unless `backbone` is one of them."""
+    require_known("backbone", backbone, encoders())
 
 
 def make_encoder(backbone: str, options: dict):
     """Return a new encoder, a module from clouds (B, N, 3) to embeddings (B, ``embedding_size``).
 
     Raises:
-        InputError: unknown backbone, or an option that it does not have.
+        InputError: unknown backbone or option.
     """
     require_backbone(backbone)
     try:
@@ -34,11 +46,134 @@ def make_encoder(backbone: str, options: dict):
         raise InputError(f"backbone '{backbone}'", str(fault), "see encoder.options in the config") from fault
 
 
-def require_backbone(backbone: str) -> None:
-    """Raise an InputError that names the known backbones unless `backbone` is one of them."""
-    require_known("backbone", backbone, encoders())
-
-
 def parameter_count(module) -> int:
-    """Return how many numbers of a torch module are trained."""
+    """Number of trained values of a torch module."""
     return sum(parameter.numel() for parameter in module.parameters() if parameter.requires_grad)
+
+
+@dataclass(frozen=True)
+class DGCNNOptions:
+    """Options of the backbone ``dgcnn``: neighbors per point, and width of its features before the pooling."""
+
+    k: Annotated[int, Bounds(minimum=2)] = 20
+    point_features: Count = 256
+
+    @property
+    def embedding_size(self) -> int:
+        """Length of an embedding."""
+        return 2 * self.point_features
+
+
+@dataclass(frozen=True)
+class PointNetOptions:
+    """Options of the backbones ``pointnet`` and ``pointnet_tnet``."""
+
+    width: Count = 64
+
+    @property
+    def embedding_size(self) -> int:
+        """Length of an embedding."""
+        return 16 * self.width
+
+
+@dataclass(frozen=True)
+class PointNet2Options(PointNetOptions):
+    """Options of the backbone ``pointnet2``."""
+
+    centroids: Annotated[int, Bounds(minimum=4)] = 256
+    radius: PositiveShare = 0.1
+    neighbours: Count = 32
+    as_published: bool = False
+
+
+@dataclass(frozen=True)
+class PointNeXtOptions(PointNetOptions):
+    """Options of the backbone ``pointnext``."""
+
+    width: Count = 32
+    radius: PositiveShare = 0.075
+    neighbours: Count = 32
+
+
+# Options that the config checks; any other backbone checks its own when it is made.
+OPTIONS = {
+    "dgcnn": DGCNNOptions,
+    "pointnet": PointNetOptions,
+    "pointnet_tnet": PointNetOptions,
+    "pointnet2": PointNet2Options,
+    "pointnext": PointNeXtOptions,
+}
+
+
+@dataclass(frozen=True)
+class EncoderSettings:
+    """Settings of an encoder and of its training.
+
+    Attributes:
+        backbone: one of :func:`encoders`.
+        draw_points: N, points of a cloud that the encoder sees at once.
+        fewest_points: if given, each draw has a random number of points from this one to `draw_points`, so that the
+            density carries no information. Only DGCNN takes such draws.
+        draws: an embedding is the mean over this many draws of N points.
+        reading: the cloud that the encoder sees (:mod:`gpca.pairs.synthesis`).
+        epochs, batch_size: length of the training, at most.
+        validation_share: share of the training groups held out to find the best epoch by its loss.
+        patience: epochs without a smaller validation loss after which training ends; None disables it.
+        learning_rate: peak of AdamW's one-cycle schedule (Smith & Topin 2019).
+        weight_decay: of AdamW.
+        options: further arguments of the backbone.
+        head: trained on the embedding together with the encoder, then dropped: a linear layer, or two with dropout.
+    """
+
+    backbone: str = "dgcnn"
+    draw_points: Annotated[int, Bounds(minimum=32)] = 512
+    draws: Count = 4
+    epochs: Count = 10
+    batch_size: Annotated[int, Bounds(minimum=2)] = 16
+    learning_rate: PositiveShare = 4e-3
+    weight_decay: Share = 1e-2
+    options: dict = field(default_factory=dict)
+    fewest_points: Annotated[int, Bounds(minimum=32)] | None = None
+    head: Literal["linear", "two_layer"] = "linear"
+    reading: Reading = "aligned"
+    validation_share: Annotated[float, Bounds(minimum=0, maximum=0.5)] = 0.0
+    patience: Count | None = None
+
+    def __post_init__(self) -> None:
+        if self.patience and not self.validation_share:
+            raise InputError("encoder setting 'patience'", "needs held-out samples", "set validation_share above 0")
+        neighbors = self.options.get("k", DGCNNOptions.k) if self.backbone == "dgcnn" else 0
+        if (points := self.fewest_points or self.draw_points) < neighbors:
+            fault = f"{neighbors} neighbors are too many for draws of {points} points"
+            raise InputError("encoder option 'k'", fault, "lower it, or draw more points")
+        if self.fewest_points is None:
+            return
+        if self.backbone not in OF_ANY_SIZE:
+            fault = f"backbone '{self.backbone}' accepts clouds of one size only"
+            raise InputError("encoder setting 'fewest_points'", fault, f"leave it out, or use {OF_ANY_SIZE[0]}")
+        if self.fewest_points > self.draw_points:
+            fault = f"{self.fewest_points} exceeds draw_points, {self.draw_points}"
+            raise InputError("encoder setting 'fewest_points'", fault, "lower it")
+
+
+EncoderChanges = Annotated[dict, changes_of(EncoderSettings, without=("backbone", "options"))]
+
+
+@dataclass(frozen=True, kw_only=True)
+class NamedEncoder(EncoderSettings):
+    """Settings of an encoder whose backbone must be given, with checked options."""
+
+    backbone: str = field()
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.backbone in OPTIONS:
+            read_settings(OPTIONS[self.backbone], self.options, "option")
+
+
+def require_draws(key: str, encoder: Mapping[str, Any], points: int, points_key: str) -> None:
+    """Raise an InputError if the encoder at a config key draws more points than clouds have (`points_key`)."""
+    settings = with_key(key, lambda: EncoderSettings(**encoder))
+    if settings.draw_points > points:
+        fault = f"draws {settings.draw_points} points of clouds that have at most {points}"
+        raise InputError(f"config key {key}", fault, f"lower draw_points, or raise {points_key}")

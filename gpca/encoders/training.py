@@ -1,11 +1,12 @@
-"""Training an encoder with a head over the concepts (paper Sec. III-A); GP-CA reads the encoder, a rival the head.
+"""Training an encoder with a head over the concepts (paper Sec. III-A), its files, and the embeddings.
 
-Each epoch sees a fresh random subset of every cloud's points. There is no other augmentation: rotations and shifts
-would erase the pose concept, jitter the noise concept, crops the overlap concept.
+Each epoch draws new points from every cloud. There is no other augmentation: rotations and shifts would erase the pose
+concept, jitter the noise concept, crops the overlap concept.
 """
 
 from __future__ import annotations
 
+import hashlib
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from copy import deepcopy
@@ -17,30 +18,28 @@ import numpy as np
 import torch
 from torch import nn
 
-from gpca.encoders.registry import make_encoder
-from gpca.encoders.settings import EncoderSettings
-from gpca.encoders.tensor_file import fingerprint, fingerprint_of, keep, resume
+from gpca.encoders.registry import EncoderSettings, make_encoder
+from gpca.encoders.tensor_file import read_tensors, write_tensors
 from gpca.errors import InputError
+from gpca.io.limits import require_file
+from gpca.io.names import Axes, require_axes
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.progress import progress
 from gpca.seeds import generator, seed_of
 
 HIDDEN = 256  # units of a head of two layers
-RISING = 0.25  # share of the steps in which the learning rate of the one cycle rises
-Draw = Callable[..., Any]  # as :func:`draw_points`, what an encoder sees of some rows
+RISING = 0.25  # share of the steps in which the one-cycle learning rate rises
+Draw = Callable[..., Any]  # as :func:`draw_points`: the encoder's input for some rows
 
 
 def draw_points(
     registrations: Registrations, rows: np.ndarray, n_points: int, *axes: object, fewest: int | None = None
 ) -> torch.Tensor | list[torch.Tensor]:
-    """Return `n_points` random points of each row's aligned cloud, (B, N, 3) float32.
+    """Draw `n_points` random points of each row's aligned cloud, (B, N, 3) float32; small clouds repeat points.
 
-    The draw of a sample is named by the axes, its split and its number. Clouds of fewer points repeat some.
-
-    Args:
-        fewest: where it is given, each cloud has a random number of points from this one to `n_points`, or all that it
-            has, and what is returned are B clouds (N, 3).
+    Seeds are named by the axes, the split and the sample. With `fewest`, the result is B clouds (N, 3) with a random
+    number of points from `fewest` to `n_points`, or all points of a smaller cloud.
     """
     clouds = []
     for row in rows:
@@ -53,8 +52,29 @@ def draw_points(
     return torch.from_numpy(np.stack(clouds).astype(np.float32))
 
 
-def _on(device: torch.device, clouds: Any) -> Any:
-    return clouds.to(device) if isinstance(clouds, torch.Tensor) else [cloud.to(device) for cloud in clouds]
+class Classifier(nn.Sequential):
+    """An encoder and a head over the classes."""
+
+    encoder: nn.Module
+    head: nn.Module
+
+    def __init__(self, encoder: nn.Module, head: nn.Module) -> None:
+        super().__init__(OrderedDict(encoder=encoder, head=head))
+
+
+def make_model(settings: EncoderSettings, classes: tuple[str, ...] = CONCEPTS) -> Classifier:
+    """Return a new encoder of the registry with a head over the classes."""
+    return with_head(make_encoder(settings.backbone, settings.options), settings, classes)
+
+
+def with_head(encoder: Any, settings: EncoderSettings, classes: tuple[str, ...] = CONCEPTS) -> Classifier:
+    """Return an encoder with a new head; one of two layers is DGCNN's usual kind without its first layer."""
+    d, n_classes = encoder.embedding_size, len(classes)
+    if settings.head == "linear":
+        return Classifier(encoder, nn.Linear(d, n_classes))
+    first, norm = nn.Linear(d, HIDDEN), nn.BatchNorm1d(HIDDEN)
+    head = nn.Sequential(first, norm, nn.LeakyReLU(0.2), nn.Dropout(0.5), nn.Linear(HIDDEN, n_classes))
+    return Classifier(encoder, head)
 
 
 @dataclass(frozen=True)
@@ -62,22 +82,14 @@ class TrainingTask:
     """The task of an encoder: its view of a registration, and the classes of its head.
 
     Attributes:
-        classes: the names that ``concept`` may have.
-        make: makes the encoder, where it is none of the registry.
-        draw: what the encoder sees of a row, anew in every epoch.
+        classes: the possible values of ``concept``.
+        make: makes an encoder that is not in the registry.
+        draw: the encoder's input for some rows, drawn anew in every epoch.
     """
 
     classes: tuple[str, ...] = CONCEPTS
     make: Callable[[], nn.Module] | None = None
     draw: Draw = draw_points
-
-    def model(self, settings: EncoderSettings) -> Classifier:
-        """Return a new encoder with its head."""
-        return with_head(self.make(), settings, self.classes) if self.make else make_model(settings, self.classes)
-
-    def targets(self, registrations: Registrations) -> torch.Tensor:
-        """Return the number of each row's class (S,)."""
-        return torch.from_numpy(np.array([self.classes.index(concept) for concept in registrations.concept]))
 
 
 def train_encoder(
@@ -90,23 +102,23 @@ def train_encoder(
     start: Mapping[str, torch.Tensor] | None = None,
     group_S: np.ndarray | None = None,
 ) -> tuple[Classifier, list[dict[str, float]]]:
-    """Train on the rows of split ``train``, of which a share of the groups can be held out for validation.
+    """Train on the rows of split ``train``; a share of their groups can be held out for validation.
 
     With validation, the weights are those of the epoch with the smallest validation loss, and training may end early.
 
     Args:
-        checkpoint: where the state after every epoch is kept; if it is there, of the same settings and data, training
-            continues from it and ends with the same weights as an unbroken run.
-        start: the weights to start from; random ones where None.
-        group_S: (S,) of each row; rows of one group are held out together. By default rows of one object that were
-            made one after the other.
+        checkpoint: file of the state after every epoch; if it belongs to the same settings and data, training resumes
+            from it and ends with the same weights as an unbroken run.
+        start: initial weights; random by default.
+        group_S: (S,) rows of one group are held out together. By default, consecutive rows of one object.
 
     Returns:
-        the model (``model.encoder``, ``model.head``), and the training curve: epoch, learning_rate, loss, accuracy,
-        and validation_loss and validation_accuracy where samples are held out.
+        the model (``model.encoder``, ``model.head``), and for each epoch: epoch, learning_rate, loss, accuracy, and
+        with validation validation_loss and validation_accuracy.
     """
     torch.manual_seed(seed_of(source, seed, "encoder", settings.backbone))
-    model = task.model(settings).to(best_device())
+    model = with_head(task.make(), settings, task.classes) if task.make else make_model(settings, task.classes)
+    model = model.to(best_device())
     if start is not None:
         model.load_state_dict(start)
     rows, held_out = _held_out(registrations, source, seed, settings.validation_share, group_S)
@@ -115,13 +127,13 @@ def train_encoder(
     training = _Training(model, registrations, rows, task, (source, seed), settings)
     best = deepcopy(model) if len(held_out) else model
     state = training.state | ({"best": best} if len(held_out) else {})
-    data = (fingerprint(registrations), fingerprint_of(start))
-    identity = repr((source, seed, asdict(settings), *data))
-    curve = resume(checkpoint, identity, state)
+    identity = repr((source, seed, asdict(settings), _fingerprint(registrations), _fingerprint_of_weights(start)))
+    curve = _resume(checkpoint, identity, state)
 
     epochs = range(len(curve), settings.epochs)
     for epoch in progress(epochs, training.title, initial=len(curve), total=settings.epochs):
-        if _is_settled(curve, settings.patience):
+        losses = [record["validation_loss"] for record in curve if "validation_loss" in record]
+        if settings.patience and losses and len(losses) - 1 - int(np.argmin(losses)) >= settings.patience:
             break
         curve.append({"epoch": epoch + 1, **training.run_epoch(epoch)})
         if len(held_out):
@@ -133,7 +145,7 @@ def train_encoder(
 
 
 class _Training:
-    """A model with its optimizer and schedule, and the rows on which it is trained."""
+    """A model with its optimizer and schedule, and its training rows."""
 
     def __init__(
         self,
@@ -146,20 +158,20 @@ class _Training:
     ) -> None:
         self._model, self._registrations, self._rows = model, registrations, rows
         self._axes, self._settings, self._draw = axes, settings, task.draw
-        self._targets_S = task.targets(registrations)
+        self._targets_S = torch.from_numpy(np.array([task.classes.index(name) for name in registrations.concept]))
         self._batches = -(-len(rows) // settings.batch_size)
         rate = settings.learning_rate
         steps = max(5, settings.epochs * self._batches)  # a quarter of 4 would be one step, a rise of no length
-        # Fused, since the plain form takes torch.sqrt, whose last bit depends on the processor's vendor.
+        # Fused, because the plain form takes torch.sqrt, whose last bit depends on the processor's vendor.
         self._optimizer = torch.optim.AdamW(model.parameters(), rate, weight_decay=settings.weight_decay, fused=True)
         self._schedule = torch.optim.lr_scheduler.OneCycleLR(self._optimizer, rate, steps, pct_start=RISING)
         self.state = {"model": model, "optimizer": self._optimizer, "schedule": self._schedule}
         self.title = f"{settings.backbone} on {axes[0]}, seed {axes[1]}"
 
     def run_epoch(self, epoch: int) -> dict[str, float]:
-        """Train on every row once, in an order of this epoch; return the last learning rate, loss and accuracy."""
+        """Train on every row once, in the order of this epoch; return the last learning rate, loss and accuracy."""
         self._model.train()
-        torch.manual_seed(seed_of(*self._axes, "dropout", epoch))  # whether or not it is the first epoch of a process
+        torch.manual_seed(seed_of(*self._axes, "dropout", epoch))  # the same in a resumed training
         loss_sum = correct = 0.0
         order = generator(*self._axes, "order", epoch).permutation(self._rows)
         for batch_rows in np.array_split(order, self._batches):
@@ -180,7 +192,7 @@ class _Training:
 
     @torch.inference_mode()
     def validate(self, rows: np.ndarray) -> dict[str, float]:
-        """Return loss and accuracy on rows, of one draw from each cloud that is the same in every epoch."""
+        """Return loss and accuracy on one draw from each cloud, the same in every epoch."""
         self._model.eval()
         batches = np.array_split(rows, -(-len(rows) // self._settings.batch_size))
         parts = [self._predict(batch_rows, "validation") for batch_rows in batches]
@@ -199,11 +211,11 @@ class _Training:
 def _held_out(
     registrations: Registrations, source: str, seed: int, share: float, group_S: np.ndarray | None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the rows to train on and those to validate on, whole groups of the split ``train``."""
+    """Split the rows of ``train`` into those to train on and those to validate on, by whole groups."""
     rows = registrations.rows("train")
     if not share:
         return rows, rows[:0]
-    # Samples 3t, 3t + 1 and 3t + 2 show one object under the concepts in turn.
+    # Samples 3t, 3t + 1 and 3t + 2 show one object under the three concepts.
     group_R = (registrations.sample // len(CONCEPTS) if group_S is None else group_S)[rows]
     groups = generator(source, seed, "validation").permutation(np.unique(group_R))
     is_held_out = np.isin(group_R, groups[: max(1, round(share * len(groups)))])
@@ -211,19 +223,89 @@ def _held_out(
 
 
 def _hits(outputs_B_C: torch.Tensor, targets_B: torch.Tensor) -> float:
-    """Return how many classes are right."""
     return float((outputs_B_C.argmax(dim=1) == targets_B).sum())
 
 
-def _is_settled(curve: list[dict[str, float]], patience: int | None) -> bool:
-    """Return whether the validation loss has had no new minimum for so many epochs."""
-    losses = [record["validation_loss"] for record in curve if "validation_loss" in record]
-    return bool(patience and losses and len(losses) - 1 - int(np.argmin(losses)) >= patience)
+def _on(device: torch.device, clouds: Any) -> Any:
+    return clouds.to(device) if isinstance(clouds, torch.Tensor) else [cloud.to(device) for cloud in clouds]
 
 
 def best_device() -> torch.device:
-    """Return the GPU where torch finds one (results then agree with the CPU's within rounding), else the CPU."""
+    """Return the GPU if torch finds one (its results agree with the CPU's within rounding), else the CPU."""
     return torch.device("cuda" if torch.cuda.is_available() else "cpu")
+
+
+def _fingerprint(registrations: Registrations) -> str:
+    digest = hashlib.sha256(registrations.points.tobytes())
+    for column in (registrations.offsets, registrations.concept, registrations.split, registrations.sample):
+        digest.update(repr(column.tolist()).encode())
+    return digest.hexdigest()
+
+
+def _fingerprint_of_weights(weights: Mapping[str, torch.Tensor] | None) -> str:
+    digest = hashlib.sha256()
+    for name, tensor in (weights or {}).items():
+        digest.update(name.encode() + tensor.numpy().tobytes())
+    return digest.hexdigest()
+
+
+def keep(checkpoint: Path | None, identity: str, state: dict, curve: list[dict]) -> None:
+    """Write the state and the training curve so far, if a checkpoint is wanted."""
+    if checkpoint is not None:
+        content = {name: part.state_dict() for name, part in state.items()}
+        write_tensors(checkpoint, content | {"identity": identity, "curve": curve})
+
+
+def _resume(checkpoint: Path | None, identity: str, state: dict) -> list[dict]:
+    """Load the checkpoint into `state` and return its curve; an unreadable or foreign one is ignored."""
+    if checkpoint is None or not checkpoint.is_file():
+        return []
+    try:
+        content = read_tensors(checkpoint)
+    except Exception:  # whatever a damaged file makes torch raise, training from the start is right
+        return []
+    if not isinstance(content, dict) or content.get("identity") != identity or not set(state) <= set(content):
+        return []
+    for name, part in state.items():
+        part.load_state_dict(content[name])
+    return content["curve"]
+
+
+def write_weights(path: str | Path, model: Classifier, axes: Axes) -> None:
+    """Write a model for :func:`load_model`; `axes` are the source and the seed of the training samples."""
+    source, seed = axes
+    write_tensors(path, {"weights": model.state_dict(), "source": source, "seed": seed})
+
+
+def load_model(
+    path: Path,
+    settings: EncoderSettings,
+    classes: tuple[str, ...] = CONCEPTS,
+    axes: Axes | None = None,
+    unlike: Axes | None = None,
+) -> Classifier:
+    """Load encoder and head, trained with these settings and classes, for inference.
+
+    Args:
+        axes: required source and seed of the training samples, if any.
+        unlike: forbidden source and seed.
+
+    Raises:
+        InputError: missing, damaged, pickled or another encoder's weights, or those of another source or seed.
+    """
+    model = make_model(settings, classes)
+    remedy = "regenerate them with Snakemake"
+    require_file(path, "no such weights", remedy)
+    try:
+        content = read_tensors(path)
+        trained_on = content["source"], content["seed"]
+        model.load_state_dict(content["weights"])
+    except Exception as fault:  # torch raises errors of many kinds for a damaged or foreign file
+        raise InputError(path, f"not the weights of backbone '{settings.backbone}', or damaged", remedy) from fault
+    require_axes(path, trained_on, axes)
+    if trained_on == unlike:
+        raise InputError(path, "was trained on the same samples", "give weights of another source or seed")
+    return model.eval()
 
 
 @torch.inference_mode()
@@ -238,8 +320,8 @@ def embed(
     """Return embeddings h (S, d) of all rows, in their order, and the head's logits (S, C) at them; float32.
 
     h is the mean over ``draws`` draws of N points, each named by sample and draw. One draw uses a quarter of a cloud
-    of 2048 points; averaging several halves the classifier's errors on clouds it was not trained on. The logits of a
-    linear head at h are their mean over the draws too.
+    of 2048 points; averaging several halves the classifier's errors on unseen clouds. The logits of a linear head at h
+    are their mean over the draws too.
     """
     device, n_points = best_device(), settings.draw_points
     model.to(device).eval()
@@ -253,32 +335,3 @@ def embed(
         parts.append(torch.stack([model.encoder(_on(device, clouds)) for clouds in draws]).mean(dim=0))
     h_S_d = torch.cat(parts)
     return h_S_d.cpu().numpy(), model.head(h_S_d).cpu().numpy()
-
-
-class Classifier(nn.Sequential):
-    """An encoder and a head over the classes."""
-
-    encoder: nn.Module
-    head: nn.Module
-
-    def __init__(self, encoder: nn.Module, head: nn.Module) -> None:
-        super().__init__(OrderedDict(encoder=encoder, head=head))
-
-
-def make_model(settings: EncoderSettings, classes: tuple[str, ...] = CONCEPTS) -> Classifier:
-    """Return a new encoder with a head over the classes."""
-    return with_head(make_encoder(settings.backbone, settings.options), settings, classes)
-
-
-def with_head(encoder: Any, settings: EncoderSettings, classes: tuple[str, ...] = CONCEPTS) -> Classifier:
-    """Return an encoder with a new head over the classes."""
-    return Classifier(encoder, _HEADS[settings.head](encoder.embedding_size, len(classes)))
-
-
-def _two_layers(embedding_size: int, classes: int) -> nn.Module:
-    """Return DGCNN's usual kind of head (Wang et al. 2019), of two layers instead of three."""
-    hidden = nn.Linear(embedding_size, HIDDEN)
-    return nn.Sequential(hidden, nn.BatchNorm1d(HIDDEN), nn.LeakyReLU(0.2), nn.Dropout(0.5), nn.Linear(HIDDEN, classes))
-
-
-_HEADS: dict[str, Callable[[int, int], nn.Module]] = {"linear": nn.Linear, "two_layer": _two_layers}

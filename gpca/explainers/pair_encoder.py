@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import torch
 
-from gpca.encoders.pair import PAIR_ENCODERS
-from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.dgcnn import PAIR_ENCODERS
+from gpca.encoders.registry import EncoderSettings
 from gpca.encoders.training import TrainingTask, embed, train_encoder
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
@@ -53,7 +53,7 @@ def learn_pair_encoder(
 
     Args:
         registrations: labeled, with the arrays of `draw` attached; all are learned from, whatever their split.
-        settings: how it is trained; the backbone is one of :data:`gpca.encoders.pair.PAIR_ENCODERS`.
+        settings: how it is trained; the backbone is one of :data:`gpca.encoders.dgcnn.PAIR_ENCODERS`.
         draw: the view of the encoder.
         source, seed: name what is random.
         classes: the labels.

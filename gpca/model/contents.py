@@ -15,8 +15,7 @@ from gpca.causes.settings import Moved
 from gpca.causes.truth import FAILED, NOMINAL
 from gpca.classifier.covariances import make_covariance
 from gpca.classifier.settings import GPCSettings
-from gpca.encoders.registry import make_encoder
-from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.registry import EncoderSettings, make_encoder
 from gpca.encoders.tensor_file import require_like
 from gpca.explainers.boosted_trees import require_trees
 from gpca.explainers.pair_classifier import ABSENT, PRESENT

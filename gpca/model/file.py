@@ -13,8 +13,7 @@ from torch import nn
 
 from gpca.alignment.icp import ICPSettings
 from gpca.classifier.gpc import GPC
-from gpca.encoders.registry import make_encoder
-from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.registry import EncoderSettings, make_encoder
 from gpca.encoders.tensor_file import read_tensors, write_tensors
 from gpca.errors import InputError
 from gpca.model.card import titles_of_diagnosis

@@ -9,7 +9,7 @@ from typing import Annotated
 from gpca.alignment.icp import ICPSettings
 from gpca.alignment.success import SuccessSettings
 from gpca.causes.settings import OBSERVED, CauseSettings, Limits
-from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.registry import EncoderSettings
 from gpca.frames.camera import Camera
 from gpca.frames.rgbd_scene import SceneSettings
 from gpca.frames.situations import SituationSettings

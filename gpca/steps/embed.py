@@ -6,9 +6,8 @@ from time import perf_counter
 
 from gpca.alignment.icp import ICPSettings
 from gpca.attribution.predictions import read_timings, write_timings
-from gpca.encoders.settings import EncoderSettings
-from gpca.encoders.training import embed
-from gpca.encoders.weights import load_model
+from gpca.encoders.registry import EncoderSettings
+from gpca.encoders.training import embed, load_model
 from gpca.io.arrays import save_arrays
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.synthesis import read_as

@@ -9,8 +9,8 @@ from gpca.causes.dataset import Causes
 from gpca.causes.settings import CauseSettings
 from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
-from gpca.encoders.settings import EncoderSettings
-from gpca.encoders.weights import load_model
+from gpca.encoders.registry import EncoderSettings
+from gpca.encoders.training import load_model
 from gpca.model.familiarity import Familiarity
 from gpca.model.file import Model
 from gpca.model.learning import Lessons, joined, learn

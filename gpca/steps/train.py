@@ -9,9 +9,8 @@ import numpy as np
 import pandas as pd
 
 from gpca.alignment.icp import ICPSettings
-from gpca.encoders.settings import EncoderSettings
-from gpca.encoders.training import train_encoder
-from gpca.encoders.weights import load_model, write_weights
+from gpca.encoders.registry import EncoderSettings
+from gpca.encoders.training import load_model, train_encoder, write_weights
 from gpca.errors import InputError
 from gpca.io.csv_file import write_csv
 from gpca.pairs.dataset import Registrations, joined, read_instances_of

@@ -8,9 +8,8 @@ import pandas as pd
 
 from gpca.attribution.predictions import read_timings, write_timings
 from gpca.causes.dataset import LABELS, Causes, with_label
-from gpca.encoders.settings import EncoderSettings
-from gpca.encoders.training import TrainingTask, embed, train_encoder
-from gpca.encoders.weights import write_weights
+from gpca.encoders.registry import EncoderSettings
+from gpca.encoders.training import TrainingTask, embed, train_encoder, write_weights
 from gpca.io.arrays import save_arrays
 from gpca.io.csv_file import write_csv
 from gpca.process.job import Job

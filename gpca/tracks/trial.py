@@ -13,7 +13,7 @@ import numpy as np
 from gpca.alignment.icp import ICPSettings
 from gpca.attribution.scores import Attribution
 from gpca.causes.dataset import Causes, labeled
-from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.registry import EncoderSettings
 from gpca.errors import InputError
 from gpca.experiments.controls.protocol import ControlRun
 from gpca.experiments.controls.rivals import make_rivals

@@ -11,8 +11,7 @@ from gpca.classifier.covariances import COVARIANCES
 from gpca.classifier.settings import Kernel
 from gpca.config.schema import DESIGNS, Reductions, whole_config
 from gpca.encoders.reduction import REDUCTIONS
-from gpca.encoders.registry import ENCODERS
-from gpca.encoders.settings import OPTIONS
+from gpca.encoders.registry import ENCODERS, OPTIONS
 from gpca.uncertainty import designs
 
 from ..documents import ROOT

@@ -5,8 +5,7 @@ import dataclasses
 import pytest
 import torch
 
-from gpca.encoders.registry import ENCODERS, make_encoder, parameter_count
-from gpca.encoders.settings import OPTIONS, EncoderSettings
+from gpca.encoders.registry import ENCODERS, OPTIONS, EncoderSettings, make_encoder, parameter_count
 from gpca.encoders.training import embed, train_encoder
 from gpca.errors import InputError
 from gpca.pairs.perturbation import Severities
@@ -126,12 +125,12 @@ def test_pointnet_with_tnets_has_the_published_widths():
 
 
 def test_the_training_minimizes_the_penalty_of_a_tnet(easy, monkeypatch):
-    from gpca.encoders import pointnet_tnet
+    from gpca.encoders import pointnet
 
     settings = EncoderSettings("pointnet_tnet", draw_points=32, draws=1, epochs=1, batch_size=24, options={"width": 8})
     losses = []
     for penalty in (0.0, 1.0):
-        monkeypatch.setattr(pointnet_tnet, "_from_orthogonal", lambda A, penalty=penalty: 1e3 * penalty + 0 * A.sum())
+        monkeypatch.setattr(pointnet, "_from_orthogonal", lambda A, penalty=penalty: 1e3 * penalty + 0 * A.sum())
         losses.append(train_encoder(easy, "tiny", 0, settings)[1][0]["loss"])
     assert losses[1] == pytest.approx(losses[0] + 1, abs=1e-4)
 

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 import torch
 
-from gpca.encoders import edge_conv, edge_kernels
-from gpca.encoders.edge_conv import EdgeConv, knn_indices
+from gpca.encoders import dgcnn, edge_kernels
+from gpca.encoders.dgcnn import EdgeConv, knn_indices
 from tests.encoders.per_edge import PerEdgeConv
 
 TOLERANCE = {"atol": 1e-4, "rtol": 1e-4}
@@ -67,7 +67,7 @@ def test_plain_torch_path_agrees_with_fused_path():
     x = torch.randn(4, 60, 6)
     neighbours = knn_indices(x, fused.k)
     w1, w2 = plain.weight.chunk(2, dim=1)
-    plain_out = edge_conv._edge_max_plain(x @ torch.cat([w1, w2 - w1]).T, neighbours.long(), plain.norm)
+    plain_out = dgcnn._edge_max_plain(x @ torch.cat([w1, w2 - w1]).T, neighbours.long(), plain.norm)
     fused_out = fused(x)
     torch.testing.assert_close(plain_out, fused_out, **TOLERANCE)
     plain_out.square().sum().backward()

@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 import torch
 
-from gpca.encoders.registry import make_encoder
-from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.registry import EncoderSettings, make_encoder
 from gpca.encoders.training import draw_points, embed
 
 SETTINGS = EncoderSettings(draw_points=64, draws=2, batch_size=12, options={"k": 8, "point_features": 16})

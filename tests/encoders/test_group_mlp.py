@@ -3,9 +3,8 @@ import copy
 import pytest
 import torch
 
-from gpca.encoders import group_mlp_kernels
-from gpca.encoders.group_mlp import GroupMLP
-from gpca.encoders.grouping import Groups, ball_query, farthest_points, take
+from gpca.encoders import group_kernels
+from gpca.encoders.groups import GroupMLP, Groups, ball_query, farthest_points, take
 
 TOLERANCE = {"atol": 1e-4, "rtol": 1e-4}
 
@@ -78,7 +77,7 @@ def test_numba_compiles_every_pass_once():
         in_training(made, made, points, x, grouped(points))
         made.eval()(points, x, grouped(points))
     for compiled in ("distinct_edges", "moments", "normalize", "normalize_backward", "normalize_max_backward"):
-        assert len(getattr(group_mlp_kernels, compiled).signatures) == 1, compiled
+        assert len(getattr(group_kernels, compiled).signatures) == 1, compiled
 
 
 def test_a_repeat_counts_in_the_statistics():

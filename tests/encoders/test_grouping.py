@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import torch
 
-from gpca.encoders import grouping
-from gpca.encoders.grouping import Groups, ball_query, farthest_points, take
+from gpca.encoders import groups
+from gpca.encoders.groups import Groups, ball_query, farthest_points, take
 
 
 def clouds(batch=3, n=80, seed=0):
@@ -27,7 +27,7 @@ def in_ball_by_a_loop(points_N_3, center_3, radius, k):
     return found + found[:1] * (k - len(found)), len(found)
 
 
-@pytest.mark.parametrize("sample", [farthest_points, grouping._farthest_points_plain])
+@pytest.mark.parametrize("sample", [farthest_points, groups._farthest_points_plain])
 def test_farthest_points_are_those_of_a_plain_loop(sample):
     points = clouds()
     expected = [farthest_by_a_loop(cloud.double().numpy(), 20) for cloud in points]
@@ -44,7 +44,7 @@ def test_points_that_coincide_are_chosen_only_when_no_other_is_left():
     assert farthest_points(points, 3).tolist() == [[0, 2, 0]]
 
 
-@pytest.mark.parametrize("query", [ball_query, grouping._ball_query_plain])
+@pytest.mark.parametrize("query", [ball_query, groups._ball_query_plain])
 @pytest.mark.parametrize(("radius", "k"), [(0.05, 4), (0.3, 8), (0.3, 64), (2.0, 8)])
 def test_a_ball_holds_the_first_points_within_its_radius(query, radius, k):
     points = clouds()
@@ -83,8 +83,8 @@ def test_the_number_of_threads_changes_no_bit():
     program = """
 import hashlib, torch
 torch.set_num_threads(1)
-from gpca.encoders.group_mlp import GroupMLP
-from gpca.encoders.grouping import Groups, ball_query, farthest_points, take
+from gpca.encoders.groups import GroupMLP
+from gpca.encoders.groups import Groups, ball_query, farthest_points, take
 torch.manual_seed(0)
 points, layers = torch.rand(6, 90, 3), GroupMLP(3, (16, 32))
 x = points.clone().requires_grad_()

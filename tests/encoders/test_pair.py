@@ -1,8 +1,8 @@
 import pytest
 import torch
 
+from gpca.encoders.dgcnn import CHANNELS, MOTION, PAIR_ENCODERS
 from gpca.encoders.layers import stacked_product
-from gpca.encoders.pair import CHANNELS, MOTION, PAIR_ENCODERS
 
 OPTIONS = {"pair_dgcnn": {"k": 6, "widths": (8, 8), "point_features": 8}}
 

@@ -4,9 +4,8 @@ import pytest
 import torch
 
 from gpca.encoders import training
-from gpca.encoders.settings import EncoderSettings
-from gpca.encoders.training import train_encoder
-from gpca.encoders.weights import load_model, write_weights
+from gpca.encoders.registry import EncoderSettings
+from gpca.encoders.training import load_model, train_encoder, write_weights
 from gpca.errors import InputError
 from gpca.pairs.perturbation import Severities
 from gpca.pairs.synthesis import RegistrationSettings, make_registrations

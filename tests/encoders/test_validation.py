@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from gpca.encoders import training
-from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.registry import EncoderSettings
 from gpca.encoders.training import train_encoder
 from gpca.errors import InputError
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from gpca.encoders.settings import EncoderSettings
-from gpca.encoders.weights import load_model
+from gpca.encoders.registry import EncoderSettings
+from gpca.encoders.training import load_model
 from gpca.errors import InputError
 from gpca.io.arrays import load_arrays
 from gpca.io.csv_file import read_csv

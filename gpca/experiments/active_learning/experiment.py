@@ -8,7 +8,7 @@ from typing import Any
 
 from gpca.active_learning.acquisition import STREAMS, strategies
 from gpca.active_learning.settings import ActiveLearningSettings, RareSettings, StreamSettings
-from gpca.encoders.settings import EncoderChanges, require_draws
+from gpca.encoders.registry import EncoderChanges, require_draws
 from gpca.errors import require_names
 from gpca.experiments.experiment import Experiment, LeftOut, Names, Tidy
 from gpca.pairs.perturbation import Concept

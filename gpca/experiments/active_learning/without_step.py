@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.registry import EncoderSettings
 from gpca.encoders.training import embed, train_encoder
 from gpca.io.arrays import save_arrays
 from gpca.pairs.dataset import Registrations

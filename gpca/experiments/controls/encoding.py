@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.registry import EncoderSettings
 from gpca.encoders.training import embed, train_encoder
 from gpca.experiments.controls.settings import HARD, ControlSettings
 from gpca.experiments.controls.variants import left_out, of_unseen_objects

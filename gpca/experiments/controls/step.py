@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from gpca.alignment.icp import ICPSettings
-from gpca.encoders.settings import EncoderSettings
-from gpca.encoders.training import embed
-from gpca.encoders.weights import load_model
+from gpca.encoders.registry import EncoderSettings
+from gpca.encoders.training import embed, load_model
 from gpca.experiments.controls.protocol import ControlRun
 from gpca.experiments.controls.rivals import make_rivals
 from gpca.experiments.controls.samples import sample_table

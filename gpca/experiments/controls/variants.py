@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from gpca.alignment.icp import ICPSettings
-from gpca.encoders.settings import OF_ANY_SIZE
+from gpca.encoders.registry import OF_ANY_SIZE
 from gpca.experiments.controls.settings import TRAININGS, UNSEEN, WRONG_LABELS, ControlSettings
 from gpca.objects.splits import unseen
 from gpca.objects.surface import instance_of

@@ -6,8 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-from gpca.encoders.registry import require_backbone
-from gpca.encoders.settings import NamedEncoder, require_draws
+from gpca.encoders.registry import NamedEncoder, require_backbone, require_draws
 from gpca.errors import InputError, with_key
 from gpca.experiments.experiment import ByName, Experiment, LeftOut, Names, Tidy
 from gpca.explainers.registry import CAUSES, explainer_entry, explainers, require_settings

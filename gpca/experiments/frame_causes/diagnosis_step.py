@@ -16,7 +16,7 @@ from gpca.alignment.icp import ICPSettings
 from gpca.attribution.predictions import prediction_frame
 from gpca.attribution.scores import Attribution
 from gpca.causes.dataset import LABELS, Causes, labeled
-from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.registry import EncoderSettings
 from gpca.experiments.diagnosis.step import observed_only, training_rows, with_what_it_reads
 from gpca.explainers.interface import REENACTED, ExplainerEntry
 from gpca.explainers.registry import CAUSES, explainer_entry
@@ -123,8 +123,7 @@ class FramesToExplain:
         return observed_only(with_what_it_reads(labeled(self._causes), entry, self._enacted))
 
     def _embedded(self, entry: ExplainerEntry) -> list[tuple[Registrations, Registrations]]:
-        from gpca.encoders.training import embed
-        from gpca.encoders.weights import load_model
+        from gpca.encoders.training import embed, load_model
 
         observed, pairs = observed_only(labeled(self._causes)), []
         for learned, weights in zip(self._learned(entry, EMBEDDED), self._lessons["encoders"], strict=True):

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from gpca.encoders.registry import DIFFERENTIABLE
-from gpca.encoders.settings import DGCNNOptions, EncoderSettings
+from gpca.encoders.registry import DIFFERENTIABLE, DGCNNOptions, EncoderSettings
 from gpca.errors import InputError
 from gpca.experiments.experiment import Experiment, LeftOut, Tidy
 from gpca.experiments.gradients.settings import GradientSettings

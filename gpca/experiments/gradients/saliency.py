@@ -15,7 +15,7 @@ import torch
 
 from gpca.classifier.gpc import GPC
 from gpca.elementary import log_sum_exp
-from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.registry import EncoderSettings
 from gpca.encoders.training import draw_points
 from gpca.experiments.gradients.settings import GradientSettings
 from gpca.pairs.dataset import Registrations

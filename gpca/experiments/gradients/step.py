@@ -6,9 +6,8 @@ from dataclasses import replace
 
 from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
-from gpca.encoders.registry import DIFFERENTIABLE
-from gpca.encoders.settings import EncoderSettings
-from gpca.encoders.weights import load_model
+from gpca.encoders.registry import DIFFERENTIABLE, EncoderSettings
+from gpca.encoders.training import load_model
 from gpca.errors import InputError
 from gpca.experiments.gradients.saliency import deletions
 from gpca.experiments.gradients.settings import GradientSettings

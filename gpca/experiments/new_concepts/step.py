@@ -21,9 +21,8 @@ from gpca.causes.dataset import LABELS, Causes, labels_of
 from gpca.causes.drawing import draw_geometry
 from gpca.causes.settings import CauseSettings
 from gpca.causes.truth import BORDERLINE, GEOMETRY, NOMINAL
-from gpca.encoders.settings import EncoderSettings
-from gpca.encoders.training import embed
-from gpca.encoders.weights import load_model
+from gpca.encoders.registry import EncoderSettings
+from gpca.encoders.training import embed, load_model
 from gpca.explainers.pair_classifier import NormalizedFeatures
 from gpca.features.dataset import Descriptors, describe_all
 from gpca.features.registered import describe_registrations

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any
 
-from gpca.encoders.settings import EncoderChanges, require_draws
+from gpca.encoders.registry import EncoderChanges, require_draws
 from gpca.errors import InputError
 from gpca.experiments.experiment import ByName, Experiment, LeftOut, Names, Tidy
 from gpca.experiments.explained import require_explained

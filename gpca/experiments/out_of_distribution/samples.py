@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.registry import EncoderSettings
 from gpca.encoders.training import Classifier, embed, train_encoder
 from gpca.experiments.out_of_distribution.sets import SPACES, ShiftedSets
 from gpca.experiments.out_of_distribution.settings import ShiftSettings

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.registry import EncoderSettings
 from gpca.pairs.synthesis import RegistrationSettings
 from gpca.settings import Bounds, Count, OpenShare
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from gpca.encoders.settings import EncoderSettings
-from gpca.encoders.weights import load_model
+from gpca.encoders.registry import EncoderSettings
+from gpca.encoders.training import load_model
 from gpca.errors import InputError
 from gpca.experiments.out_of_distribution.samples import make_sets
 from gpca.experiments.out_of_distribution.settings import ShiftSettings

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from gpca.encoders.reduction import make_reduction, require_room
-from gpca.encoders.settings import OPTIONS, EncoderSettings
+from gpca.encoders.registry import OPTIONS, EncoderSettings
 from gpca.errors import InputError, require_names, with_key
 from gpca.experiments.experiment import EXPLAINERS, Experiment, LeftOut, Names, Tidy
 from gpca.experiments.explained import titles

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from gpca.encoders.settings import EncoderChanges
+from gpca.encoders.registry import EncoderChanges
 from gpca.frames.camera import Camera
 from gpca.frames.initial_pose import InitialPoseSettings
 from gpca.objects.entry import SurfacePoints

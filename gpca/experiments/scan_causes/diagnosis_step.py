@@ -20,7 +20,7 @@ from gpca.attribution.predictions import prediction_frame
 from gpca.attribution.scores import Attribution
 from gpca.causes.dataset import LABELS, Causes, labeled
 from gpca.causes.truth import BORDERLINE
-from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.registry import EncoderSettings
 from gpca.errors import InputError
 from gpca.experiments.diagnosis.step import observed_only, training_rows, with_what_it_reads
 from gpca.experiments.scan_causes.settings import OBJECTS, ScanSamples
@@ -176,8 +176,7 @@ class _ScansToExplain:
     @cached_property
     def _embedded(self) -> list[Registrations]:
         """The registrations with the embeddings of each source's encoder."""
-        from gpca.encoders.training import embed
-        from gpca.encoders.weights import load_model
+        from gpca.encoders.training import embed, load_model
 
         observed, embedded = observed_only(self._registrations), []
         for weights in self._lessons["encoders"]:

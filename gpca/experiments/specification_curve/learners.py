@@ -11,7 +11,7 @@ from scipy.special import softmax
 
 from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
-from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.registry import EncoderSettings
 from gpca.encoders.training import embed, train_encoder
 from gpca.experiments.specification_curve.diagnostics import accuracies, table5
 from gpca.experiments.specification_curve.run_files import Row, RunFiles

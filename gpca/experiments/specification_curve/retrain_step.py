@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.registry import EncoderSettings
 from gpca.encoders.training import embed, train_encoder
 from gpca.experiments.out_of_distribution.samples import sets_of_encoder
 from gpca.experiments.out_of_distribution.settings import ShiftSettings

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from functools import partial
 
-from gpca.encoders.settings import EncoderSettings
-from gpca.encoders.training import embed
-from gpca.encoders.weights import load_model
+from gpca.encoders.registry import EncoderSettings
+from gpca.encoders.training import embed, load_model
 from gpca.experiments.controls.rivals import make_rivals
 from gpca.experiments.explained import require_exchangeable
 from gpca.experiments.judge import Judges

@@ -7,7 +7,7 @@ import pytest
 
 from baselines.pair import PairGPCA
 from baselines.residuals import residuals_logistic
-from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.registry import EncoderSettings
 from gpca.experiments.controls.costs import ASKED
 from gpca.experiments.controls.encoding import encode
 from gpca.experiments.controls.rivals import Rival

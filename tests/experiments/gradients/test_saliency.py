@@ -6,7 +6,7 @@ import torch
 
 from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
-from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.registry import EncoderSettings
 from gpca.encoders.training import make_model
 from gpca.experiments.gradients.saliency import (
     CENTER,

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.registry import EncoderSettings
 from gpca.encoders.training import embed, train_encoder
 from gpca.experiments.out_of_distribution.samples import (
     PRINCIPAL_COMPONENTS,

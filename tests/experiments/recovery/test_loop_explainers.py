@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from gpca.encoders.settings import EncoderSettings
+from gpca.encoders.registry import EncoderSettings
 from gpca.experiments.recovery.loop_explainers import learn_explainers
 from gpca.uncertainty.settings import UncertaintySettings
 

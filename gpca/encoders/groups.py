@@ -1,37 +1,64 @@
-"""A PointNet on the points of each group, evaluated once per distinct point instead of once per slot.
+"""PointNets on the points of groups (Qi et al. 2017, 2017b), evaluated once per distinct point instead of per slot.
 
-A group has k slots. Each slot holds a point j and is mapped by layers of linear map, batch norm and ReLU that all slots
-share; the maximum over the slots is the group's feature (Qi et al. 2017, 2017b). Two equalities save most of it:
+A group has k slots. Each slot holds a point j and is mapped by shared layers of linear map, batch norm and ReLU; the
+maximum over the slots is the group's feature. Two equalities save most of the work:
 
 - The first linear map W = [Wx | Wf] acts on ``[(p_j - c_g)/r ; f_j]``, so it splits into A_j + C_g with
   A_j = Wx p_j/r + Wf f_j and C_g = -Wx c_g/r: a matrix product over the points, not over the slots of all groups.
 - A ball with fewer than k points repeats its first one. Repeats do not change the maximum, and batch norm counts them
-  by a weight, so only distinct points are evaluated: of 512 points a quarter of the slots of PointNeXt's balls, two
+  by a weight, so only distinct points are evaluated: with 512 points this saves a quarter of PointNeXt's slots and two
   fifths of PointNet++'s.
 
-Means and variances are those of all B·M·k slots. The plain form is kept in ``GroupMLP.plain``, for CUDA and for the
-tests; outputs, running statistics and all gradients agree with it.
+Means and variances are taken over all B·M·k slots. Outputs, running statistics and gradients agree with
+``GroupMLP.plain``, which also serves CUDA.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import cast
 
 import torch
 from torch import nn
 
-from gpca.encoders import group_mlp_kernels as kernels
-from gpca.encoders.grouping import Groups, take
+from gpca.encoders import group_kernels as kernels
 from gpca.encoders.layers import BatchNorm, linear
+
+
+@dataclass(frozen=True)
+class Groups:
+    """M groups of k points in each of B clouds.
+
+    Attributes:
+        centers_B_M_3: origins of the groups' coordinates.
+        neighbors_B_M_k: indices of the groups' points in the cloud.
+        counts_B_M: numbers of distinct points; the other slots repeat the first one.
+        radius: unit of the relative coordinates.
+        is_whole: each cloud is one group of all its points in their order, around the origin.
+    """
+
+    centers_B_M_3: torch.Tensor
+    neighbors_B_M_k: torch.Tensor
+    counts_B_M: torch.Tensor
+    radius: float = 1.0
+    is_whole: bool = False
+
+    @classmethod
+    def whole(cls, points_B_N_3: torch.Tensor) -> Groups:
+        """Make one group per cloud, of all its points, in absolute coordinates."""
+        batch, n, _ = points_B_N_3.shape
+        everything_N = torch.arange(n, dtype=torch.int32, device=points_B_N_3.device)
+        counts_B_1 = torch.full((batch, 1), n, dtype=torch.int32, device=points_B_N_3.device)
+        return cls(points_B_N_3.new_zeros(batch, 1, 3), everything_N.expand(batch, 1, n), counts_B_1, is_whole=True)
 
 
 class GroupMLP(nn.Module):
     """Layers of linear map, batch norm and ReLU on the slots of each group, then their maximum.
 
     Args:
-        in_features: how many a point has, beside its coordinates relative to the group's center.
-        widths: one for each layer.
-        last_relu: False leaves the ReLU after the last batch norm out, where a residual is to be added first.
+        in_features: features per point, beside its coordinates relative to the group's center.
+        widths: output features of the layers.
+        last_relu: False omits the ReLU after the last batch norm, for a residual to be added first.
     """
 
     def __init__(self, in_features: int, widths: tuple[int, ...], last_relu: bool = True) -> None:
@@ -42,7 +69,7 @@ class GroupMLP(nn.Module):
         self.last_relu = last_relu
 
     def forward(self, points_B_N_3: torch.Tensor, x_B_N_F: torch.Tensor | None, groups: Groups) -> torch.Tensor:
-        """Return the features (B, M, F_out) of the groups from the points' coordinates and features."""
+        """Return the groups' features (B, M, F_out) from the points' coordinates and features."""
         if points_B_N_3.device.type != "cpu":
             return self.plain(points_B_N_3, x_B_N_F, groups)
         batch, n_groups, _ = groups.centers_B_M_3.shape
@@ -56,7 +83,7 @@ class GroupMLP(nn.Module):
         return (z_G_F.relu() if self.last_relu else z_G_F).view(batch, n_groups, -1)
 
     def plain(self, points_B_N_3: torch.Tensor, x_B_N_F: torch.Tensor | None, groups: Groups) -> torch.Tensor:
-        """Return the same with torch operations alone, every slot of every group evaluated."""
+        """Evaluate every slot of every group with torch operations alone."""
         neighbors_B_M_k = groups.neighbors_B_M_k.long()
         slots_B_M_k_F = (take(points_B_N_3, neighbors_B_M_k) - groups.centers_B_M_3[:, :, None]) / groups.radius
         if x_B_N_F is not None:
@@ -69,8 +96,7 @@ class GroupMLP(nn.Module):
         return z_S_F.view(*neighbors_B_M_k.shape, -1).amax(dim=2)
 
     def _layers(self) -> list[tuple[nn.Linear, BatchNorm]]:
-        linears = cast("list[nn.Linear]", list(self.linears))
-        norms = cast("list[BatchNorm]", list(self.norms))
+        linears, norms = cast("list[nn.Linear]", self.linears), cast("list[BatchNorm]", self.norms)
         return list(zip(linears, norms, strict=True))
 
     def _first_layer(self, weight: torch.Tensor, points_B_N_3, x_B_N_F, groups: Groups, edges: _Edges) -> torch.Tensor:
@@ -94,11 +120,11 @@ class GroupMLP(nn.Module):
 
 
 class _Edges:
-    """The distinct pairs of a group and a point of it, as :mod:`gpca.encoders.group_mlp_kernels` describes them."""
+    """The distinct pairs of a group and one of its points, as :mod:`gpca.encoders.group_kernels` takes them."""
 
     def __init__(self, groups: Groups, points_B_N_3: torch.Tensor) -> None:
         self.batch, n_points, _ = points_B_N_3.shape
-        # All must be contiguous, or numba compiles the passes over them a second time.
+        # All must be contiguous, or numba compiles the kernels a second time.
         neighbors, counts = (x.contiguous().numpy() for x in (groups.neighbors_B_M_k, groups.counts_B_M))
         self.slots = neighbors.size
         self.point, self.weight, self.ends = kernels.distinct_edges(neighbors, counts, n_points)
@@ -147,3 +173,63 @@ class _Normalize(torch.autograd.Function):
         backward = kernels.normalize_max_backward if ctx.pool else kernels.normalize_backward
         grads = backward(grad_out.contiguous().numpy(), *ctx.numpy_arrays)
         return *(torch.from_numpy(grad) for grad in grads), None, None, None
+
+
+def farthest_points(points_B_N_3: torch.Tensor, n_centers: int) -> torch.Tensor:
+    """Return the indices (B, M) of farthest-point sampling from point 0 (PointNet++, Sec. 3.2).
+
+    Clouds are random draws, so point 0 is random. M is the smaller of `n_centers` and N.
+    """
+    points_B_N_3 = points_B_N_3.detach()
+    batch, n, _ = points_B_N_3.shape
+    if n <= n_centers:
+        return torch.arange(n, device=points_B_N_3.device).expand(batch, n)
+    if points_B_N_3.device.type == "cpu":
+        return torch.from_numpy(kernels.farthest_points(points_B_N_3.contiguous().numpy(), n_centers)).long()
+    return _farthest_points_plain(points_B_N_3, n_centers)
+
+
+def ball_query(
+    points_B_N_3: torch.Tensor, centers_B_M_3: torch.Tensor, radius: float, k: int
+) -> tuple[torch.Tensor, torch.Tensor]:
+    """Return neighbors (B, M, k) and counts (B, M), int32: the first k points within the radius of each center.
+
+    If there are fewer, the first one fills the remaining slots, and the count is the number of distinct points, at
+    least one. k is at most N.
+    """
+    points_B_N_3, centers_B_M_3 = points_B_N_3.detach(), centers_B_M_3.detach()
+    k = min(k, points_B_N_3.shape[1])
+    if points_B_N_3.device.type == "cpu":
+        points, centers = (x.contiguous().numpy() for x in (points_B_N_3, centers_B_M_3))
+        neighbors, counts = kernels.ball_query(points, centers, radius, k)
+        return torch.from_numpy(neighbors), torch.from_numpy(counts)
+    return _ball_query_plain(points_B_N_3, centers_B_M_3, radius, k)
+
+
+def take(x_B_N_F: torch.Tensor, index_B_M: torch.Tensor) -> torch.Tensor:
+    """Return the rows (B, M, F) of each cloud at the indices."""
+    batch, n, _ = x_B_N_F.shape
+    rows = index_B_M + n * torch.arange(batch, device=x_B_N_F.device).view(-1, *[1] * (index_B_M.ndim - 1))
+    return x_B_N_F.reshape(batch * n, -1).index_select(0, rows.reshape(-1)).view(*index_B_M.shape, -1)
+
+
+def _farthest_points_plain(points_B_N_3: torch.Tensor, n_centers: int) -> torch.Tensor:
+    nearest_B_N = torch.full(points_B_N_3.shape[:2], torch.inf, dtype=points_B_N_3.dtype, device=points_B_N_3.device)
+    chosen = [torch.zeros(len(points_B_N_3), dtype=torch.long, device=points_B_N_3.device)]
+    for _ in range(n_centers - 1):
+        last_B_1_3 = take(points_B_N_3, chosen[-1][:, None])
+        nearest_B_N = torch.minimum(nearest_B_N, (points_B_N_3 - last_B_1_3).square().sum(-1))
+        chosen.append(nearest_B_N.argmax(dim=1))
+    return torch.stack(chosen, dim=1)
+
+
+def _ball_query_plain(points_B_N_3, centers_B_M_3, radius, k):
+    squares_B_M_N = (centers_B_M_3[:, :, None] - points_B_N_3[:, None]).square().sum(-1)
+    within_B_M_N = squares_B_M_N <= radius * radius
+    # Points outside sort behind all points inside; both keep their order.
+    n = points_B_N_3.shape[1]
+    order_B_M_N = torch.arange(n, device=points_B_N_3.device) + n * ~within_B_M_N
+    neighbors_B_M_k = order_B_M_N.topk(k, dim=-1, largest=False).values
+    neighbors_B_M_k = torch.where(neighbors_B_M_k < n, neighbors_B_M_k, neighbors_B_M_k[..., :1]) % n
+    counts_B_M = within_B_M_N.sum(-1).clamp(1, k)
+    return neighbors_B_M_k.int(), counts_B_M.int()

@@ -1,10 +1,9 @@
-"""The passes over the distinct edges of groups behind :mod:`gpca.encoders.group_mlp`, compiled by numba.
+"""Compiled loops behind :mod:`gpca.encoders.groups`: sampling, ball query, and passes over the groups' edges.
 
-Edges e are the distinct pairs of a group and a point of it, group after group and cloud after cloud, so those of cloud
-b are the rows ``cloud_ends[b]`` to ``cloud_ends[b + 1]`` and those of group g the rows ``ends[g]`` to ``ends[g + 1]``.
-All arrays are C-contiguous float32. The loops over clouds run in parallel on the threads that numba is given; every
-floating-point sum is made within one cloud and the clouds are added in order, so the thread count changes no bit.
-Inner loops run over channels, where they vectorize.
+Edges e are the distinct pairs of a group and one of its points, ordered by cloud and group: cloud b has the rows
+``cloud_ends[b]`` to ``cloud_ends[b + 1]``, group g the rows ``ends[g]`` to ``ends[g + 1]``. All arrays are C-contiguous
+float32. Clouds run in parallel; sums are made within one cloud and clouds are added in order, so the number of threads
+changes no bit. Inner loops run over points or channels, where they vectorize.
 """
 
 from __future__ import annotations
@@ -14,6 +13,58 @@ import numpy as np
 from gpca.process.compilation import OVER_CLOUDS, njit, prange
 
 _BLOCK = 64  # rows that are summed in the arrays' own precision before they are added in double
+
+
+@njit(**OVER_CLOUDS)
+def farthest_points(points, n_centers):
+    """Return (B, M): point 0, then always the point farthest from all chosen ones, ties to the lower index."""
+    batch, n, _ = points.shape
+    chosen = np.zeros((batch, n_centers), np.int32)
+    for b in prange(batch):
+        x, y, z = points[b, :, 0].copy(), points[b, :, 1].copy(), points[b, :, 2].copy()
+        nearest = np.full(n, np.inf, points.dtype)  # squared distance to the nearest chosen point
+        last = 0
+        for m in range(1, n_centers):
+            farthest = points.dtype.type(-1)
+            for i in range(n):
+                dx, dy, dz = x[i] - x[last], y[i] - y[last], z[i] - z[last]
+                nearest[i] = min(nearest[i], dx * dx + dy * dy + dz * dz)
+                farthest = max(farthest, nearest[i])
+            last = 0
+            while last < n - 1 and nearest[last] != farthest:
+                last += 1
+            chosen[b, m] = last
+    return chosen
+
+
+@njit(**OVER_CLOUDS)
+def ball_query(points, centers, radius, k):
+    """Return neighbors (B, M, k) and counts (B, M), as :func:`gpca.encoders.groups.ball_query`."""
+    batch, n, _ = points.shape
+    n_centers = centers.shape[1]
+    # Not np.empty: a center of NaN has no neighbor, but the slots must still be indices of points.
+    neighbors = np.zeros((batch, n_centers, k), np.int32)
+    counts = np.zeros((batch, n_centers), np.int32)
+    limit = points.dtype.type(radius) * points.dtype.type(radius)
+    for b in prange(batch):
+        x, y, z = points[b, :, 0].copy(), points[b, :, 1].copy(), points[b, :, 2].copy()
+        squares = np.empty(n, points.dtype)
+        for m in range(n_centers):
+            cx, cy, cz = centers[b, m, 0], centers[b, m, 1], centers[b, m, 2]
+            for i in range(n):
+                dx, dy, dz = x[i] - cx, y[i] - cy, z[i] - cz
+                squares[i] = dx * dx + dy * dy + dz * dz
+            listed = neighbors[b, m]
+            count = 0
+            for i in range(n):
+                # Written always, kept only when within: no branch to mispredict.
+                listed[count] = i
+                count += squares[i] <= limit
+                if count == k:
+                    break
+            listed[count:] = listed[0] if count else 0
+            counts[b, m] = max(count, 1)
+    return neighbors, counts
 
 
 @njit(cache=True)
@@ -27,7 +78,7 @@ def distinct_edges(neighbors, counts, n_points):
     for b in range(batch):
         for m in range(n_groups):
             g = b * n_groups + m
-            weight[ends[g]] += k - counts[b, m]  # the first one fills the slots that were left
+            weight[ends[g]] += k - counts[b, m]  # the first point fills the remaining slots
             for slot in range(counts[b, m]):
                 point[ends[g] + slot] = b * n_points + neighbors[b, m, slot]
     return point, weight, ends
