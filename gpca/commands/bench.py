@@ -13,10 +13,10 @@ from gpca.io.files import require_outputs
 from gpca.plugins import load, named, use
 from gpca.process.arguments import COUNT
 from gpca.process.processor import cpu_name
+from gpca.tracks.leaderboard import as_text_among
 from gpca.tracks.published import Method
 from gpca.tracks.samples import Samples
 from gpca.tracks.submission import Submission
-from gpca.tracks.table import as_text_among
 from gpca.tracks.track import TRACKS, Track, track_of
 from gpca.tracks.trial import try_method
 
@@ -43,13 +43,13 @@ def run(options: Namespace) -> None:
     if options.out and len(names) > 1:
         fault = f"lists {len(names)} methods for this track, and --out holds the predictions of one"
         raise InputError(options.method, fault, "give each a file of its own")
-    lesson = track.lesson(options.learn_from)
+    training = track.training(options.learn_from)
     samples = Samples.of(track, options.samples, options.processes, options.data_dir)
     known = {method.name for method in samples.published.methods}
     mine: dict[str, Method] = {}
     for name in names:
         print(f"{name}: learning and predicting", file=sys.stderr)
-        method, seconds = try_method(samples, name, options.settings, lesson)
+        method, seconds = try_method(samples, name, options.settings, training)
         if method.name in known:
             method = replace(method, name=f"{method.name} (here)", title=f"{method.title} (here)")
         mine[method.name] = method

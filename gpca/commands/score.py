@@ -7,9 +7,9 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from gpca.errors import InputError
+from gpca.tracks.leaderboard import as_text_among
 from gpca.tracks.published import Published
 from gpca.tracks.submission import read_submission
-from gpca.tracks.table import as_text_among
 from gpca.tracks.track import TRACKS, track_of
 
 

@@ -1,24 +1,173 @@
-"""The leaderboard: submitted predictions among the published rows, as one page whose tables can be sorted."""
+"""The table of a track, submitted methods among the published ones, as text and as a page with sortable tables."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from gpca.attribution.confidence import REPEATS
+from gpca.experiments.diagnosis.judged import CEILING, POOLED
+from gpca.experiments.diagnosis.measures import SMALLER_IS_BETTER
+from gpca.experiments.diagnosis.tables import AGAIN, SHOWN
+from gpca.experiments.frame_causes.metrics import STATE
+from gpca.experiments.frame_causes.tables import FEWEST_FAILURES, STARTS
+from gpca.experiments.scan_causes.tables import COLUMNS as SCAN_COLUMNS
+from gpca.experiments.scan_causes.tables import NOT_COMPARED
 from gpca.io.files import whole_file
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.reporting.tables.builder import TableBuilder
+from gpca.reporting.tables.cells import interval_cell, plain_cell, rows_where
+from gpca.reporting.tables.table import Cell, Column, Table
 from gpca.tracks.published import FOLDER as PUBLISHED
-from gpca.tracks.published import Published
-from gpca.tracks.scoring import score
+from gpca.tracks.published import NO_CALLS, Method, Published
+from gpca.tracks.scoring import counts, score
 from gpca.tracks.submission import NO_LINK, Submission, read_submission, track_in_head
-from gpca.tracks.table import table_of
-from gpca.tracks.track import TRACKS
+from gpca.tracks.track import CAUSES_TRACK, FRAMES_TRACK, HARD_TRACK, SCANS_TRACK, TRACKS
 
-FOLDER = PUBLISHED.parent  # in which the submissions are
+if TYPE_CHECKING:
+    import pandas as pd
+
+FOLDER = PUBLISHED.parent  # of the submissions
 TEMPLATE = "leaderboard.html.jinja"
 OURS = {"authors": "this repository"}
-SAID = ("authors", "seconds", "hardware")  # columns that come from the heads of submissions
+HEAD_COLUMNS = ("authors", "seconds", "hardware")  # from the heads of submissions
+MARK = "→ "  # before the title of a submitted method
+POINTS = ("auroc_failed", "auroc_error", "nominal_calibration")  # measures that are not printed in %
+COLUMNS: Mapping[str, Mapping[str, Column]] = {
+    CAUSES_TRACK: {
+        name: SHOWN[name]
+        for name in ("balanced_accuracy", "dominant_accuracy", "tied_accuracy", "regret", "auroc_failed")
+    },
+    HARD_TRACK: {
+        "accuracy": Column("Accuracy (%), chance 33.3"),
+        **{f"recall_{concept}": Column(f"Of {concept} (%)", interval=False) for concept in CONCEPTS},
+        "auroc_error": Column("AUROC of errors", 2, False, (0.0, 1.0)),
+    },
+    FRAMES_TRACK: {
+        STATE: Column("State (%)"),
+        **{name: SHOWN[name] for name in ("tied_accuracy", "regret", "auroc_failed")},
+    },
+    SCANS_TRACK: {name: column for name, column in SCAN_COLUMNS.items() if name not in NOT_COMPARED},
+}
+GROUPS = {**STARTS, POOLED: "All together"}  # titles; data sets keep their names
+
+
+def table_of(
+    published: Published, submitted: Mapping[str, Method], scores: pd.DataFrame, against: pd.DataFrame
+) -> Table:
+    """Return the table of a track.
+
+    Args:
+        submitted: methods by name.
+        scores, against: as :func:`gpca.tracks.scoring.score` returns them.
+    """
+    track, methods = published.track, {method.name: method for method in published.methods} | dict(submitted)
+    columns = dict(COLUMNS[track.name])
+    heads = {"group": track.groups} if track.groups else {}
+    factor = 1 if track.headline in POINTS else 100
+    states_of_group = counts(published)
+    table = TableBuilder(f"bench_{track.name}", {**heads, "method": "Method", "reads": "Reads"})
+    for group in dict.fromkeys(scores["group"]):
+        group_scores = rows_where(scores, group=group)
+        for name in _best_first(group_scores, track.headline):
+            rows = rows_where(group_scores, method=name).set_index("metric")
+            cells: dict[str, Cell | None] = {
+                metric: interval_cell(rows.loc[metric], factor=1 if metric in POINTS else 100)
+                for metric in columns
+                if metric in rows.index
+            }
+            samples, seeds = int(rows["samples"].max()), int(rows["seeds"].max())
+            for pair in rows_where(against, group=group, method=name).to_dict("records"):
+                bounds = (factor * pair["difference_low"], factor * pair["difference_high"])
+                value = factor * pair["difference"]
+                cells[f"minus {pair['against']}"] = Cell(value, bounds[1] - value, seeds, samples, bounds=bounds)
+            method = methods.get(name)
+            if method is not None and method.icp_calls != NO_CALLS:
+                cells["icp_calls"] = plain_cell(method.icp_calls, seeds, samples)
+            cells["samples"] = plain_cell(samples, seeds, samples)
+            title = AGAIN[CEILING] if method is None else (MARK if name in submitted else "") + method.title
+            reads = "truth" if method is None else method.reads or "not said"
+            labels, few = [(name, title), (reads, reads)], ""
+            if heads:
+                states = {state: states_of_group[group][state] for state in track.required_states}
+                few = ": too few" if states and min(states.values()) < FEWEST_FAILURES else ""
+                words = ", ".join(f"{count} {state}" for state, count in states.items())
+                labels.insert(0, (group, f"{GROUPS.get(group, group)} ({words}{few})"))
+            table.add_row(labels, cells, rival=name != CEILING and not few)
+    for name in submitted:
+        title, limits = f"Minus {methods[name].title}", (-float(factor), float(factor))
+        columns[f"minus {name}"] = (
+            Column(title, 3, limits=limits) if factor == 1 else Column(f"{title} (points)", limits=limits)
+        )
+    columns |= {"icp_calls": SHOWN["icp_calls"], "samples": SHOWN["samples"]}
+    table.compare_down(COLUMNS[track.name], same=len(heads))
+    return table.build(
+        caption=f"Track {track.name}, samples {published.version}: {track.title}",
+        column_head="metric",
+        columns=columns,
+        footnotes=_footnotes(published, submitted),
+    )
+
+
+def _best_first(rows: pd.DataFrame, headline: str) -> list[str]:
+    """Return the methods by their headline, those without one after them, the ceiling last."""
+    values = rows_where(rows, metric=headline).set_index("method")["value"].to_dict()
+    sign = 1 if headline in SMALLER_IS_BETTER else -1
+    names = [name for name in dict.fromkeys(rows["method"]) if name != CEILING]
+    names.sort(key=lambda name: sign * values.get(name, sign * float("inf")))
+    return names + ([CEILING] if CEILING in set(rows["method"]) else [])
+
+
+def _footnotes(published: Published, submitted: Mapping[str, Method]) -> tuple[str, ...]:
+    track, source_N = published.track, published.rows.source
+    notes = [f"In brackets: the 95 % interval of {REPEATS} bootstrap draws over {track.clusters}."]
+    if submitted:
+        notes.append(
+            "Minus …: a method's first measure minus that of the new row, on the same draws: the new row is better "
+            "where the interval is below 0."
+        )
+    if track.groups:
+        states = " or ".join(track.required_states)
+        notes.append(f"Nothing is concluded from fewer than {FEWEST_FAILURES} {states} ones.")
+    if track.everywhere:
+        names = list(dict.fromkeys(source_N.tolist()))
+        notes.append(f"The published rows are of {', '.join(names)}, and have learned from the scenes of all of these.")
+        for method in submitted.values():
+            asked = dict.fromkeys(source_N[np.isfinite(method.scores).all(axis=1)].tolist())
+            if len(asked) < len(names):
+                notes.append(f"{method.title} is of {', '.join(asked)} alone.")
+    return (*notes, track.measures)
+
+
+def as_text_among(published: Published, submitted: Mapping[str, Method]) -> str:
+    """Return the table of submitted methods among the published ones as text, of the groups that they predict."""
+    scores, against = score(published, submitted)
+    groups = scores["group"][scores["method"].isin(list(submitted))]
+    scores, against = (rows[rows["group"].isin(groups)] for rows in (scores, against))
+    return as_text(table_of(published, submitted, scores, against))
+
+
+def as_text(table: Table) -> str:
+    """Return a table as lines of aligned columns, for a terminal."""
+    printed = table.printed()
+    rows = [[text for text, _ in row] for row in printed["rows"]]
+    widths = [max(map(len, column)) for column in zip(printed["heads"], *rows, strict=True)]
+    labels = printed["label_columns"]
+
+    def line(cells: Sequence[str]) -> str:
+        aligned = enumerate(zip(cells, widths, strict=True))
+        return "  ".join(
+            cell.ljust(width) if column < labels else cell.rjust(width) for column, (cell, width) in aligned
+        ).rstrip()
+
+    rule = "  ".join("-" * width for width in widths)
+    return "\n".join(
+        [printed["caption"], "", line(printed["heads"]), rule, *map(line, rows), "", *printed["footnotes"]]
+    )
 
 
 @dataclass(frozen=True)
@@ -26,11 +175,9 @@ class Board:
     """The table of a track, as the page shows it.
 
     Attributes:
-        title: of the track.
         heads: of the columns.
-        labels: how many of these are words; the others are sorted as numbers.
-        rows: of cells ``{text, value, link, bold}`` each, and whether the row was submitted.
-        notes: below the table.
+        labels: number of columns of text; the others are sorted as numbers.
+        rows: whether each is submitted, and its cells ``{text, value, link, bold}``.
     """
 
     title: str
@@ -49,15 +196,15 @@ def read_submissions(folder: Path) -> tuple[dict[str, list[Submission]], list[st
         track = track_in_head(path)
         if track not in published:
             published[track] = Published.load(TRACKS[track])
-        submission, own = read_submission(path, published[track])
-        faults += own
+        submission, faults_of_file = read_submission(path, published[track])
+        faults += faults_of_file
         if submission is not None:
             submissions.setdefault(track, []).append(submission)
     return submissions, faults
 
 
 def write_page(submissions: Mapping[str, Sequence[Submission]], path: Path) -> None:
-    """Write the page of all tracks that are published."""
+    """Write the page of all published tracks."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     boards = [
@@ -73,17 +220,17 @@ def write_page(submissions: Mapping[str, Sequence[Submission]], path: Path) -> N
 
 def board_of(published: Published, submissions: Sequence[Submission]) -> Board:
     """Return the table of a track with submissions among the published rows."""
-    heads = {submission.method.name: submission.head for submission in submissions}
-    scores, _ = score(published, {submission.method.name: submission.method for submission in submissions})
-    mine = {submission.method.name: submission.method for submission in submissions}
-    table = table_of(published, mine, scores, scores.iloc[:0])
+    head_of = {submission.method.name: submission.head for submission in submissions}
+    submitted = {submission.method.name: submission.method for submission in submissions}
+    scores, _ = score(published, submitted)
+    table = table_of(published, submitted, scores, scores.iloc[:0])
     printed = table.printed()
     columns = [name for name, column in table.columns.items() if not column.beside]
     labels = printed["label_columns"]
     rows = []
     for row, (keys, cells) in enumerate(zip(table.rows, printed["rows"], strict=True)):
         name = next(key for key, _ in keys[-2:-1])
-        head = heads.get(name, OURS)
+        head = head_of.get(name, OURS)
         link = head.get("link", NO_LINK)
         words = [{"text": text, "value": text, "bold": bold} for text, bold in cells[:labels]]
         words[-2] |= {"link": link} if link != NO_LINK else {}
@@ -91,8 +238,8 @@ def board_of(published: Published, submissions: Sequence[Submission]) -> Board:
             {"text": text, "bold": bold, "value": table.cells[row, column].mean if (row, column) in table.cells else ""}
             for column, (text, bold) in zip(columns, cells[labels:], strict=True)
         ]
-        said = [{"text": head.get(key, "–"), "bold": False, "value": head.get(key, "")} for key in SAID]
-        rows.append((name in heads, [*words, *numbers, *said]))
+        from_head = [{"text": head.get(key, "–"), "bold": False, "value": head.get(key, "")} for key in HEAD_COLUMNS]
+        rows.append((name in head_of, [*words, *numbers, *from_head]))
     title = f"{published.track.name}: {published.track.title}"
     notes = [f"Samples {published.version}.", *table.footnotes]
-    return Board(title, [*printed["heads"], *(key.capitalize() for key in SAID)], labels, rows, notes)
+    return Board(title, [*printed["heads"], *(key.capitalize() for key in HEAD_COLUMNS)], labels, rows, notes)

@@ -1,4 +1,4 @@
-"""The samples of a track as an object: NumPy arrays, a pandas frame, a torch dataset."""
+"""The samples of a track as NumPy arrays, a pandas frame, or a torch dataset."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from gpca.tracks.track import HARD_TRACK, track_of
 if TYPE_CHECKING:
     import pandas as pd
 
-NO_LABEL = -1  # of what is borderline, and in no measure
+NO_LABEL = -1  # of borderline samples, which no measure counts
 
 
 @dataclass(frozen=True)
@@ -27,12 +27,13 @@ class TrackData:
     """S registrations of a track. Lengths are relative to the object's diameter.
 
     Attributes:
-        track, source, split, seed, version: which they are; the split is None where they are of both.
+        split: None for both.
+        version: identifier of the published samples.
         registrations: clouds, poses and ICP's results (:class:`gpca.pairs.dataset.Registrations`).
-        labels: (C,) what there is to be named.
-        label: (S,) the true one; ``borderline`` between nominal and failed, which counts in no measure.
-        error: (S, 8) mean error with each subset of the causes alone, bit i of the number for cause i.
-        phi: (S, 3) what each of noise, pose and overlap adds to the error.
+        labels: (C,) possible labels.
+        label: (S,) true label; ``borderline`` between nominal and failed, which counts in no measure.
+        error: (S, 8) mean error with each subset of the causes alone; bit i of the column number stands for cause i.
+        phi: (S, 3) contributions of noise, pose and overlap to the error.
         causes: (S, 3) whether each is one of the causes.
     """
 
@@ -57,7 +58,7 @@ class TrackData:
 
     @property
     def sources(self) -> list[np.ndarray]:
-        """The observed clouds (P, 3) float32, where ICP put them, in the frame of the targets."""
+        """The observed clouds (P, 3) float32 as aligned by ICP, in the frame of the targets."""
         return [self.registrations.cloud(row) for row in range(len(self))]
 
     @property
@@ -66,15 +67,15 @@ class TrackData:
         return [self.registrations.target(row) for row in range(len(self))]
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """Return one array (S, …) for each quantity that is known of every sample, by name."""
-        own = self.registrations
+        """Return name -> array (S, …) for each quantity of the samples."""
+        registrations = self.registrations
         names = ["sample", "split", "object_name", "cluster", "diameter_m", "fitness", "inlier_rmse"]
-        names += [name for name in vars(own) if name.startswith(("severity_", "T_target_source_"))]
+        names += [name for name in vars(registrations) if name.startswith(("severity_", "T_target_source_"))]
         truth = {name: getattr(self, name) for name in ("label", "error", "phi", "causes")}
-        return {name: getattr(own, name) for name in names} | truth
+        return {name: getattr(registrations, name) for name in names} | truth
 
     def frame(self) -> pd.DataFrame:
-        """Return a row for each sample with all that is one number or word; the true φ of each cause among it."""
+        """Return a row per sample with all scalar quantities, and the true φ of each cause."""
         import pandas as pd
 
         arrays = self.arrays()
@@ -82,24 +83,24 @@ class TrackData:
         columns["points"] = np.diff(self.registrations.offsets)
         columns["target_points"] = np.diff(self.registrations.target_offsets)
         columns["error"] = self.error[:, -1]
-        columns |= {f"phi_{concept}": self.phi[:, place] for place, concept in enumerate(CONCEPTS)}
+        columns |= {f"phi_{concept}": self.phi[:, column] for column, concept in enumerate(CONCEPTS)}
         return pd.DataFrame(columns)
 
     def torch(self, points: int = 512):
-        """Return a torch dataset of (source (points, 3), target (points, 3), number of the label), float32.
+        """Return a torch dataset of (source (points, 3), target (points, 3), label number), float32.
 
-        Clouds are in random order, so their first points are a draw; one of fewer points repeats some. What is
-        borderline has the label `NO_LABEL`.
+        Clouds are in random order, so their first points are a random subset; smaller clouds repeat points. Borderline
+        samples have the label `NO_LABEL`.
         """
         import torch
 
-        place = {label: number for number, label in enumerate(self.labels)}
-        numbers = torch.tensor([place.get(label, NO_LABEL) for label in self.label.tolist()])
+        numbers = {label: number for number, label in enumerate(self.labels)}
+        label = torch.tensor([numbers.get(label, NO_LABEL) for label in self.label.tolist()])
         clouds = [
-            torch.from_numpy(np.stack([np.resize(cloud, (points, 3)) for cloud in of_kind]))
-            for of_kind in (self.sources, self.targets)
+            torch.from_numpy(np.stack([np.resize(cloud, (points, 3)) for cloud in each]))
+            for each in (self.sources, self.targets)
         ]
-        return torch.utils.data.TensorDataset(*clouds, numbers)
+        return torch.utils.data.TensorDataset(*clouds, label)
 
 
 def load(
@@ -110,15 +111,14 @@ def load(
     samples: str | Path | None = None,
     data_dir: str | Path | None = None,
 ) -> TrackData:
-    """Return samples of a track; they are made from the repository's data where the cache lacks them.
+    """Return samples of a track, which are made from the repository's data where the cache lacks them.
 
     Args:
         track: ``causes``, ``hard``, ``frames`` or ``scans``.
-        source: of the samples, such as ``ycb``; the first one by default.
+        source: such as ``ycb``; the first one by default.
         split: ``train``, ``test`` or None for both. Depth frames and scans are all for testing.
-        seed: the repeat.
-        samples: the folder that they are kept in, by default the user's cache.
-        data_dir: the folder of scans that the repository does not have.
+        samples: folder of the samples, by default the user's cache.
+        data_dir: folder of scans that the repository does not have.
 
     Raises:
         InputError: an unknown name, or samples that cannot be made or are not the published ones.
@@ -134,12 +134,11 @@ def load(
         raise InputError(f"seed {seed}", f"has no samples of the track {track}", f"choose one of {known}")
     if split is not None:
         require_known("split", split, SPLITS)
-    if split == "train" and chosen.track.untaught:
-        raise InputError("split 'train'", f"has no samples of the track {track}", chosen.track.untaught)
+    if split == "train" and chosen.track.without_training:
+        raise InputError("split 'train'", f"has no samples of the track {track}", chosen.track.without_training)
     [path] = chosen.files([chosen.track.file(source, seed)])
     causes = Causes.load(path, (source, seed))
     causes = causes.subset(causes.rows(split)) if split else causes
-    of_hard = track == HARD_TRACK
     return TrackData(
         track=track,
         source=source,
@@ -147,8 +146,8 @@ def load(
         seed=seed,
         version=published.version,
         registrations=causes.registrations,
-        labels=CONCEPTS if of_hard else LABELS,
-        label=causes.registrations.concept if of_hard else labels_of(causes.truth),
+        labels=CONCEPTS if track == HARD_TRACK else LABELS,
+        label=causes.registrations.concept if track == HARD_TRACK else labels_of(causes.truth),
         error=causes.truth.error,
         phi=causes.truth.phi,
         causes=causes.truth.causes,

@@ -1,8 +1,9 @@
-"""What is shipped of each track: the truth of its test samples, what the published methods said of them, and hashes."""
+"""What is shipped with each track: the truth of its test samples, predictions of the published methods, and hashes."""
 
 from __future__ import annotations
 
 import hashlib
+import zipfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
 from functools import cached_property
@@ -22,13 +23,13 @@ from gpca.objects.source import DATA
 from gpca.tracks.track import Track
 
 FOLDER = ROOT / "results/leaderboard/published"
-NO_CALLS = -1  # of ICP, where their number is not known
+NO_CALLS = -1  # unknown number of ICP calls
 NOTHING_NAMED = -1  # in the place of a label's number
 LIMITS = ("nominal_limit", "failed_limit", "cause_limit")
 
 
 def require_clone(subject: str) -> None:
-    """Raise an InputError where the package was copied out of its repository, whose data it then lacks."""
+    """Raise an InputError for a package installed without the repository's data."""
     if not DATA.is_dir():
         fault = "needs the data and the published predictions of the repository, which the installed package lacks"
         raise InputError(subject, fault, "install it from a clone with 'pip install -e'")
@@ -39,14 +40,14 @@ class Rows:
     """N test samples of a track, part by part, with their truth.
 
     Attributes:
-        source, seed, sample: (N,) which they are.
+        source, seed, sample: (N,) keys.
         object, cluster, concept, symmetric: (N,) as in the files of samples.
-        start, instance, scene: (N,) of depth frames: kind of start, its instance, dataset and scene; else empty or 0.
-        counted: (N,) whether it measures anything; scenes whose true poses were made by ICP do not, nor do scans to
-            which noise was added.
-        error, uncertainty: (N, 8) of the truth; error_again, uncertainty_again those from other starts.
-        error_shown: (N,) of the registration that is shown.
-        uncertainty_limit: (N,) of a nominal registration, nats.
+        start, instance, scene: (N,) of depth frames: kind of start, its instance, dataset and scene.
+        counted: (N,) whether the sample counts in measures, unlike scenes whose true poses were made by ICP, and scans
+            with added noise.
+        error, uncertainty: (N, 8) true ones; error_again, uncertainty_again from other starts.
+        error_shown: (N,) error of the shown registration.
+        uncertainty_limit: (N,) limit of nominal registrations, nats.
     """
 
     source: np.ndarray
@@ -79,14 +80,13 @@ class Rows:
 
 @dataclass(frozen=True)
 class Method:
-    """A method and what it said of all rows.
+    """A method and its predictions for all rows.
 
     Attributes:
-        name, title: of it.
-        reads: what it sees of a registration, in words; empty where that is not known.
-        icp_calls: runs of ICP beyond the one that it explains; `NO_CALLS` where that is not known.
-        scores: (N, C) of the track's labels; NaN where it was not asked, as somebody lacks the data of a source.
-        named: (N,) number of the label that it names; `NOTHING_NAMED` where it names none.
+        reads: its inputs, in words; empty where unknown.
+        icp_calls: runs of ICP beyond the explained one, or `NO_CALLS`.
+        scores: (N, C) of the track's labels; NaN for sources without data.
+        named: (N,) number of the predicted label, or `NOTHING_NAMED`.
     """
 
     name: str
@@ -97,21 +97,18 @@ class Method:
     named: np.ndarray
 
     def labels_named(self, labels: tuple[str, ...]) -> np.ndarray:
-        """Return the labels named (N,), empty for none."""
+        """Return the predicted labels (N,), empty for none."""
         return np.array([*labels, ""])[self.named]
 
 
 @dataclass(frozen=True)
 class Published:
-    """All that is shipped of a track.
+    """All that is shipped with a track.
 
     Attributes:
-        track: of which.
-        rows: the test samples.
-        limits: of errors, that all samples share (:class:`gpca.causes.truth.Truth`).
-        methods: the published ones.
+        limits: common limits of errors (:class:`gpca.causes.truth.Truth`).
         hashes: SHA-256 of the arrays of every file of samples, by its path below the folder of a run.
-        commit: that the run was made with; empty where it is not known.
+        commit: of the run; empty where unknown.
     """
 
     track: Track
@@ -123,23 +120,23 @@ class Published:
 
     @cached_property
     def version(self) -> str:
-        """Names the samples: other samples have another one."""
-        own = {file: of for file, of in self.hashes.items() if file.split("/")[0] == self.track.samples.split("/")[0]}
-        text = "\n".join(f"{file} {of}" for file, of in sorted(own.items()))
+        """Identifier of the samples, from their hashes."""
+        folder = self.track.samples.split("/")[0]
+        text = "\n".join(f"{file} {of}" for file, of in sorted(self.hashes.items()) if file.split("/")[0] == folder)
         return hashlib.sha256(text.encode()).hexdigest()[:12]
 
     def truth_of(self, rows: np.ndarray) -> SampleTruth:
         """Return the truth of rows of one part, given by their numbers."""
-        own: dict[str, Any] = {**self.limits, "uncertainty_limit": float(self.rows.uncertainty_limit[rows[0]])}
+        limits: dict[str, Any] = {**self.limits, "uncertainty_limit": float(self.rows.uncertainty_limit[rows[0]])}
         truth, again = (
-            Truth(getattr(self.rows, f"error{which}")[rows], getattr(self.rows, f"uncertainty{which}")[rows], **own)
+            Truth(getattr(self.rows, f"error{which}")[rows], getattr(self.rows, f"uncertainty{which}")[rows], **limits)
             for which in ("", "_again")
         )
         cluster, symmetric, shown = (getattr(self.rows, name)[rows] for name in ("cluster", "symmetric", "error_shown"))
         return SampleTruth(truth, again, cluster, symmetric, shown)
 
     def save(self, path: Path) -> None:
-        """Write the npz; the same contents give the same bytes."""
+        """Write the npz; equal contents give equal bytes."""
         arrays = {name: getattr(self.rows, name) for name in _SHAPES}
         arrays |= {name: np.array(self.limits[name]) for name in LIMITS}
         arrays |= {f"method_{name}": np.array([getattr(each, name) for each in self.methods]) for name in _WORDS}
@@ -152,10 +149,10 @@ class Published:
 
     @classmethod
     def load(cls, track: Track, path: Path | None = None) -> Published:
-        """Read what is shipped of a track.
+        """Read what is shipped with a track.
 
         Raises:
-            InputError: it is missing, damaged, or of another track.
+            InputError: missing, damaged, or of another track.
         """
         require_clone(f"track {track.name}")
         path = path or FOLDER / f"{track.name}.npz"
@@ -173,20 +170,38 @@ class Published:
         if not ((arrays["named"] >= NOTHING_NAMED) & (arrays["named"] < labels)).all():
             raise InputError(path, "names labels that the track does not have", "restore it")
         words = [arrays[f"method_{name}"].tolist() for name in _WORDS]
-        said = zip(*words, arrays["scores"], arrays["named"], strict=True)
+        methods = zip(*words, arrays["scores"], arrays["named"], strict=True)
         return cls(
             track=track,
             rows=Rows(**{name: arrays[name] for name in _SHAPES}),
             limits={name: float(arrays[name]) for name in LIMITS},
-            methods=tuple(Method(*each) for each in said),
+            methods=tuple(Method(*each) for each in methods),
             hashes=dict(zip(arrays["files"].tolist(), arrays["sha256"].tolist(), strict=True)),
             commit="" if str(arrays["commit"]) == "unknown" else str(arrays["commit"]),
         )
 
 
 _WORDS = ("name", "title", "reads", "icp_calls")
-_OF_SUBSETS = ("error", "uncertainty", "error_again", "uncertainty_again")
-_REAL = (*_OF_SUBSETS, "error_shown", "uncertainty_limit")
+_BY_SUBSET = ("error", "uncertainty", "error_again", "uncertainty_again")
+_REAL = (*_BY_SUBSET, "error_shown", "uncertainty_limit")
 _SHAPES: Mapping[str, tuple[int | str, ...]] = {
-    field.name: ("N", len(SUBSETS)) if field.name in _OF_SUBSETS else ("N",) for field in fields(Rows)
+    field.name: ("N", len(SUBSETS)) if field.name in _BY_SUBSET else ("N",) for field in fields(Rows)
 }
+
+
+def sha256_of_arrays(path: str | Path) -> str:
+    """Return the hexadecimal SHA-256 of the arrays of an npz, their names, types and shapes, however it is packed.
+
+    Raises:
+        InputError: it cannot be read.
+    """
+    digest = hashlib.sha256()
+    try:
+        with np.load(path, allow_pickle=False) as arrays:
+            for name in sorted(arrays.files):
+                array = np.ascontiguousarray(arrays[name])
+                digest.update(f"{name}|{array.dtype.str}|{array.shape}|".encode())
+                digest.update(array.tobytes())
+    except (OSError, ValueError, zipfile.BadZipFile) as fault:
+        raise InputError(path, "is not a readable npz archive", "remove it; it is made anew") from fault
+    return digest.hexdigest()

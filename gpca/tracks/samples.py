@@ -1,26 +1,39 @@
-"""The fixed samples of the tracks: kept in a cache, made from the repository's data where they are not, and checked."""
+"""The fixed samples of the tracks: cached, checked by hash, and made from the repository's data where missing.
+
+Each file is made in a process of its own, whose libraries are limited to the instructions of a run's jobs: the caller
+may have loaded NumPy with others, which round differently.
+"""
 
 from __future__ import annotations
 
-import hashlib
+import json
 import os
 import shutil
-import zipfile
+import subprocess
+import sys
 from collections.abc import Iterable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 import numpy as np
 
+from gpca.code_files import ROOT
 from gpca.errors import InputError
+from gpca.experiments.controls.settings import HARD
+from gpca.frames.source import REAL_WORLD
 from gpca.plugins import named
-from gpca.tracks.making import make
-from gpca.tracks.published import Published, require_clone
+from gpca.tracks.published import Published, require_clone, sha256_of_arrays
 from gpca.tracks.track import DEFAULT, Track
 
-LEARNED = ("cause_embeddings", "cause_encoders", "control_embeddings")  # by encoders, whose last digits may differ
+LEARNED = ("cause_embeddings", "cause_encoders", "control_embeddings")  # their last digits depend on the processor
+# The process is limited before this module loads NumPy.
+_IN_PROCESS = (
+    "from gpca.process.job import keep_freed_memory; from gpca.process.processor import prepare; "
+    "prepare(1); keep_freed_memory(); from gpca.tracks.samples import run_recipe; run_recipe()"
+)
 
 
 @dataclass(frozen=True)
@@ -28,11 +41,9 @@ class Samples:
     """The samples of a track.
 
     Attributes:
-        track: of which.
-        published: what is known of them, their hashes among it.
-        folder: where they are kept, as in the folder of a run; a finished run's own will do.
-        processes: so many files are made at a time.
-        data_dir: where data is that the repository does not have; None where nothing is.
+        folder: holds them as the folder of a run does, which may serve as well.
+        processes: number of files that are made at a time.
+        data_dir: data that the repository does not have.
     """
 
     track: Track
@@ -51,19 +62,19 @@ class Samples:
 
     @cached_property
     def config(self) -> dict[str, Any]:
-        """The suite's default config, and that of the track's run laid over it, by which samples are made."""
+        """The config of the track's run."""
         from gpca.config.check import read
         from gpca.config.layers import read_file, with_defaults
 
         require_clone(f"track {self.track.name}")
-        own = {"plugins": named(), "data_dir": str(self.data_dir) if self.data_dir else None}
-        return read(with_defaults(*map(read_file, self.track.layers), own), {})[0]
+        local = {"plugins": named(), "data_dir": str(self.data_dir) if self.data_dir else None}
+        return read(with_defaults(*map(read_file, self.track.layers), local), {})[0]
 
     def parts(self) -> list[tuple[str, int, np.ndarray]]:
-        """Return source, seed and row numbers of the published samples that are kept here or whose data is there."""
-        return [part for part in self.published.rows.parts() if self._is_there(*part[:2])]
+        """Return source, seed and row numbers of the published samples that are cached or whose data is available."""
+        return [part for part in self.published.rows.parts() if self._is_available(*part[:2])]
 
-    def _is_there(self, source: str, seed: int) -> bool:
+    def _is_available(self, source: str, seed: int) -> bool:
         if not self.track.may_lack(source) or (self.folder / self.track.file(source, seed)).is_file():
             return True
         from gpca.experiments.scans.experiment import present
@@ -71,10 +82,10 @@ class Samples:
         return source in present(self.config)
 
     def files(self, names: Iterable[str]) -> list[Path]:
-        """Return files by their paths below the folder; what is missing is made, and all are checked.
+        """Return files by their paths below the folder; missing ones are made, and all are checked.
 
         Raises:
-            InputError: a file that is not the one that the published rows were made with, or that cannot be made.
+            InputError: a file that differs from the one behind the published rows, or that cannot be made.
         """
         names = list(names)
         if self.folder == cache_of(self.track) and any(self._fault(name) for name in names):
@@ -89,41 +100,196 @@ class Samples:
         return [self.folder / name for name in names]
 
     def _fault(self, name: str) -> str:
-        """Return in what a file differs from what is expected; empty where it does not, or is not there yet."""
+        """Return how a file differs from the expected one; empty where it does not, or is missing."""
         expected, path = self.published.hashes.get(name), self.folder / name
         if expected is None or name.split("/")[0] in LEARNED or not path.is_file():
             return ""
-        found = sha256_of_arrays(path)
-        if found == expected:
+        actual = sha256_of_arrays(path)
+        if actual == expected:
             return ""
-        return f"differs from what the published rows were made with ({found[:12]} is not {expected[:12]})"
+        return f"differs from what the published rows were made with ({actual[:12]} is not {expected[:12]})"
 
 
 def cache_of(track: Track) -> Path:
-    """Return the folder of the user's in which samples of a track are kept: one for all tracks of the same config."""
+    """Return the user's folder for samples: one for all tracks of the same config."""
     import pooch
 
     return Path(pooch.os_cache("gpca-bench" if track.run == DEFAULT else f"gpca-bench-{track.run}"))
 
 
-def sha256_of_arrays(path: str | Path) -> str:
-    """Return the hexadecimal SHA-256 of the arrays of an npz, their names, types and shapes, however it is packed.
+@dataclass(frozen=True)
+class Recipe:
+    """How a file is made.
+
+    Attributes:
+        step: module of the step.
+        given: its names and settings.
+        inputs, outputs: by name, as paths below the folder of samples; an input that begins with ``/`` is data.
+    """
+
+    step: str
+    given: Mapping[str, Any]
+    inputs: Mapping[str, str]
+    outputs: Mapping[str, str]
+
+
+def make(files: Iterable[str], folder: Path, config: Mapping[str, Any], processes: int) -> None:
+    """Make missing files and their missing inputs, several at a time.
+
+    Args:
+        files: paths below the folder.
 
     Raises:
-        InputError: it cannot be read.
+        InputError: the message of a step that failed.
     """
-    digest = hashlib.sha256()
-    try:
-        with np.load(path, allow_pickle=False) as arrays:
-            for name in sorted(arrays.files):
-                array = np.ascontiguousarray(arrays[name])
-                digest.update(f"{name}|{array.dtype.str}|{array.shape}|".encode())
-                digest.update(array.tobytes())
-    except (OSError, ValueError, zipfile.BadZipFile) as fault:
-        raise InputError(path, "is not a readable npz archive", "remove it; it is made anew") from fault
-    return digest.hexdigest()
+    steps: dict[str, Recipe] = {}  # by the first of their outputs
+    open_files = list(files)
+    while open_files:
+        file = open_files.pop()
+        if file.startswith("/") or (folder / file).is_file():
+            continue
+        recipe = recipe_of(file, config)
+        first = next(iter(recipe.outputs.values()))
+        if first not in steps:
+            steps[first] = recipe
+            open_files += recipe.inputs.values()
+    while steps:
+        waiting = {output for recipe in steps.values() for output in recipe.outputs.values()}
+        ready = [name for name, recipe in steps.items() if not waiting & set(recipe.inputs.values())]
+        with ThreadPoolExecutor(processes) as pool:
+            list(pool.map(lambda name: _run(steps[name], folder), ready))
+        for name in ready:
+            del steps[name]
 
 
-def hashes_of(folder: Path, files: Iterable[str]) -> Mapping[str, str]:
-    """Return the hash of each file below a folder, by its path there."""
-    return {file: sha256_of_arrays(folder / file) for file in files}
+def _run(recipe: Recipe, folder: Path) -> None:
+    sys.stderr.write(f"making {next(iter(recipe.outputs.values()))}\n")  # one write, as several files are made at once
+    files = {name: str(folder / path) for name, path in {**recipe.inputs, **recipe.outputs}.items()}
+    # Sorted as the rules of the workflow give settings: the first of several datasets comes first in the samples.
+    given = json.dumps({"step": recipe.step, "given": dict(recipe.given), "files": files}, sort_keys=True)
+    paths = os.pathsep.join([str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])
+    done = subprocess.run(
+        [sys.executable, "-c", _IN_PROCESS],
+        input=given,
+        env={**os.environ, "PYTHONPATH": paths, "PYTHONSAFEPATH": "1"},
+        text=True,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+    )
+    if done.returncode:
+        words = done.stderr.strip().splitlines() or ["it ended without a message"]
+        raise InputError(f"step {recipe.step}", words[-1].removeprefix(f"{recipe.step}: "), "see the line before")
+
+
+def run_recipe() -> None:
+    """Run the step that standard input describes, and exit as a job of the workflow does."""
+    from gpca.process.job import Job, as_process, call
+
+    described = json.loads(sys.stdin.read())
+    files = {name: Path(path) for name, path in described["files"].items()}
+    given = described["given"]
+    given["downloads"] = Path(given.get("downloads") or "")
+    job = Job(threads=1, **{"data_dir": None} | given, **files)
+    sys.exit(as_process(described["step"], lambda: call(described["step"], job)))
+
+
+def recipe_of(file: str, config: Mapping[str, Any]) -> Recipe:
+    """Return how the rules of the workflow make a file.
+
+    Args:
+        file: path below the folder of a run, such as ``causes/ycb/seed0.npz``.
+        config: as :func:`gpca.config.check.read` returns it.
+    """
+    kind, *rest = PurePosixPath(file).with_suffix("").parts
+    data = {name: config[name] for name in ("data_dir", "downloads")}
+    points = {"surface_points": config["objects"]["surface_points"]}
+    if kind in ("objects", "instances") and rest != [REAL_WORLD]:
+        [source] = rest
+        given = {"source": source, "settings": config["sources"][source], **data, **points}
+        return Recipe("gpca.steps.objects", given, _splits("objects", config), {"out": f"objects/{source}.npz"})
+    if kind in ("objects", "instances"):
+        section = config["real_world"]
+        settings = {"datasets": section["datasets"], "initial_pose": section["initial_pose"]}
+        given = {"source": REAL_WORLD, "settings": settings | {"role": config["splits"]["role"]}, **data, **points}
+        outputs = {name: f"{name}/{REAL_WORLD}.npz" for name in ("instances", "objects")}
+        return Recipe("gpca.steps.instances", given, _splits("scenes", config), outputs)
+    seed = int(rest[-1].removeprefix("seed"))
+    if kind == "timings":  # an output of the same step
+        return recipe_of(f"{rest[1]}/{rest[0]}/{rest[2]}.npz", config)
+    if kind in ("frame_causes", "frame_starts") or (kind == "reenactments" and rest[0] == REAL_WORLD):
+        return _frames_recipe(kind, seed, config, data)
+    source = rest[-2]
+    name_and_seed = {"source": source, "seed": seed}
+    if kind in ("scan_causes", "scan_descriptors", "scan_reenactments"):
+        from gpca.experiments.scan_causes.experiment import measurement_settings
+        from gpca.scans.source import entry_of, place_of
+
+        place = place_of(entry_of(config["scans"]["datasets"][source]), config["data_dir"])
+        given = name_and_seed | {"settings": measurement_settings(config, source), "place": str(place or "")}
+        arguments = {"scan_causes": "scan_causes", "descriptors": "scan_descriptors"}
+        arguments |= {"reenactments": "scan_reenactments"}
+        outputs = {argument: f"{folder}/{source}/seed{seed}.npz" for argument, folder in arguments.items()}
+        outputs |= {"samples": f"scan_causes/{source}/seed{seed}.csv"}
+        return Recipe("gpca.experiments.scan_causes.step", given, {}, outputs)
+    return _objects_recipe(file, kind, name_and_seed, config)
+
+
+def _frames_recipe(kind: str, seed: int, config: Mapping[str, Any], data: Mapping[str, Any]) -> Recipe:
+    section = config["real_world"]
+    settings = {"datasets": section["datasets"], "role": config["splits"]["role"], "causes": config["causes"]}
+    settings |= {"icp": config["registrations"]["icp"]}
+    inputs = _splits("scenes", config) | {name: f"{name}/{REAL_WORLD}.npz" for name in ("instances", "objects")}
+    measured = {"frame_causes": f"frame_causes/seed{seed}.npz", "starts": f"frame_starts/seed{seed}.npz"}
+    given = {"source": REAL_WORLD, "seed": seed, **data}
+    if kind != "reenactments":
+        outputs = measured | {"samples": f"frame_causes/seed{seed}.csv"}
+        settings |= {"frames": section["causes"]}
+        return Recipe("gpca.experiments.frame_causes.step", given | {"settings": settings}, inputs, outputs)
+    settings |= {"reenactment": config["diagnosis"]["reenactment"] | section["reenactment"]}
+    outputs = {"reenactments": f"reenactments/{REAL_WORLD}/seed{seed}.npz"}
+    return Recipe("gpca.steps.reenact_frames", given | {"settings": settings}, inputs | measured, outputs)
+
+
+def _objects_recipe(file: str, kind: str, name_and_seed: dict[str, Any], config: Mapping[str, Any]) -> Recipe:
+    source, seed = name_and_seed.values()
+    icp = {"icp": config["registrations"]["icp"]}
+    diagnosis, causes = config["diagnosis"], config["causes"]
+
+    def path(folder: str, suffix: str = "npz") -> str:
+        return f"{folder}/{source}/seed{seed}.{suffix}"
+
+    def timings(step: str) -> str:
+        return f"timings/{source}/{step}/seed{seed}.csv"
+
+    inputs = {"causes": path("causes"), "causes_timings": timings("causes")}
+    if kind in ("causes", HARD):
+        step, inputs = "causes", {"objects": f"objects/{source}.npz"}
+        settings = causes | (config["controls"]["hard"] if kind == HARD else {}) | icp
+        outputs = {"causes": path(kind), "candidates": path(kind, "csv"), "timings": timings(kind)}
+    elif kind == "descriptors":
+        step, settings = "describe", diagnosis["descriptors"] | icp
+        outputs = {"descriptors": path(kind), "timings": timings(kind)}
+    elif kind == "reenactments":
+        step, settings = "reenact", {"reenactment": diagnosis["reenactment"], "causes": causes} | icp
+        outputs = {"reenactments": path(kind), "timings": timings(kind)}
+    elif kind in ("cause_embeddings", "cause_encoders"):
+        step, settings = "train_on_causes", diagnosis["encoder"]
+        outputs = {"weights": path("cause_encoders", "pt"), "curve": path("cause_encoders", "csv")}
+        outputs |= {"embeddings": path("cause_embeddings"), "timings": timings("cause_embeddings")}
+    elif kind == "control_embeddings":
+        controls = {name: value for name, value in config["controls"].items() if name not in ("explainers", "hard")}
+        settings = {"controls": controls, "encoder": config["encoders"][config["embedding"]["encoder"]]}
+        folder = f"{kind}/{HARD}"
+        given = name_and_seed | {"control": HARD, "settings": settings}
+        outputs = {"embeddings": path(folder), "curve": path(folder, "csv")}
+        return Recipe("gpca.experiments.controls.encoding", given, {"registrations": path(HARD)}, outputs)
+    else:
+        raise InputError(file, "is not a file of samples", "name one of a track")
+    return Recipe(f"gpca.steps.{step}", name_and_seed | {"settings": settings}, inputs, outputs)
+
+
+def _splits(kind: str, config: Mapping[str, Any]) -> dict[str, str]:
+    from gpca.objects.source import find_file
+
+    name = config["splits"][kind]
+    return {"splits": str(find_file(name, config["data_dir"]))} if name else {}

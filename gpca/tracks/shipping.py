@@ -1,9 +1,9 @@
-"""Collects from a finished run what is shipped of a track."""
+"""Collects what is shipped with a track from a finished run."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,53 +19,60 @@ from gpca.experiments.scan_causes.metrics import SAMPLE_COLUMNS as SCAN_COLUMNS
 from gpca.explainers.registry import explainer_entry
 from gpca.io.csv_file import ANY, numbers, read_csv
 from gpca.objects.splits import BY_ICP
-from gpca.tracks.published import LIMITS, NO_CALLS, NOTHING_NAMED, Method, Published, Rows
-from gpca.tracks.recipes import recipe_of
-from gpca.tracks.samples import hashes_of
+from gpca.tracks.published import LIMITS, NO_CALLS, NOTHING_NAMED, Method, Published, Rows, sha256_of_arrays
+from gpca.tracks.samples import recipe_of
 from gpca.tracks.track import FRAMES_TRACK, HARD_TRACK, SCANS_TRACK, Track
 
 if TYPE_CHECKING:
     import pandas as pd
 
-Key = tuple[str, str]  # name of an explainer, and where it learned if there is a choice
+Part = tuple[str, int]  # source and seed
+Key = tuple[str, str]  # name of an explainer, and its training data if there is a choice
 
 
 def collect(track: Track, run: Path, config: Mapping[str, Any]) -> Published:
-    """Return what is shipped of a track, from the folder of a run.
+    """Return what is shipped with a track, from the folder of a run.
 
     Args:
-        config: that the run was made with, as :func:`gpca.config.check.read` returned it.
+        config: of the run, as :func:`gpca.config.check.read` returned it.
 
     Raises:
         InputError: a file that is missing or damaged, samples of another config, predictions of other samples.
     """
     parts = [part for part in track.parts(config) if not track.may_lack(part[0]) or (run / track.file(*part)).is_file()]
-    for source, seed in parts if track.layers else ():
-        _require_config(run, track.file(source, seed), config)
-    tested = {part: _tested(run / track.file(*part), part) for part in parts}
-    rows = _rows(track, run, tested)
+    for part in parts if track.layers else ():  # otherwise nobody could make the samples again
+        settings = _provenance(run / track.file(*part)).get("settings")
+        expected = recipe_of(track.file(*part), config).given["settings"]
+        if settings is not None and settings != json.loads(json.dumps(expected)):
+            fault = f"was not made with the config of run {config['run']}"
+            raise InputError(run / track.file(*part), fault, "give the folder of that run")
+    tested = {}
+    for part in parts:
+        causes = Causes.load(run / track.file(*part), part)
+        tested[part] = causes.subset(causes.rows("test"))
     methods = []
-    for key, of_part in _said(track, run, config, parts).items():
-        methods.append(_method(key, track, config, [_of_part(of_part.get(part), tested[part], run) for part in parts]))
-    also = [pattern.format(source=source, seed=seed) for pattern in track.read for source, seed in parts]
-    lessons = [
+    for key, of_method in _predictions(track, run, config, parts).items():
+        for part in parts:
+            samples = [str(number) for number in tested[part].registrations.sample]
+            if part not in of_method or of_method[part]["sample"].tolist() != samples:
+                raise InputError(run, "has predictions of other test samples than its own", "finish the run")
+        methods.append(_method(key, track, config, [of_method[part] for part in parts]))
+    optional = [pattern.format(source=source, seed=seed) for pattern in track.read for source, seed in parts]
+    optional += [
         f"{folder}/{source}/seed{seed}.npz"
-        for folder in track.lessons
+        for folder in track.training_folders
         for source in config["sources"]
         for seed in dict.fromkeys(seed for _, seed in parts)
     ]
-    files = [track.file(*part) for part in parts] + [file for file in also + lessons if (run / file).is_file()]
-    truth = tested[parts[0]].truth
-    limits = {name: getattr(truth, name) for name in LIMITS}
-    return Published(track, rows, limits, tuple(methods), hashes_of(run, files), _commit(run / track.file(*parts[0])))
+    files = [track.file(*part) for part in parts] + [file for file in optional if (run / file).is_file()]
+    limits = {name: getattr(tested[parts[0]].truth, name) for name in LIMITS}
+    code = _provenance(run / track.file(*parts[0])).get("code")
+    commit = code.get("commit") or "" if isinstance(code, dict) else ""
+    hashes = {file: sha256_of_arrays(run / file) for file in files}
+    return Published(track, _rows(track, run, tested), limits, tuple(methods), hashes, commit)
 
 
-def _tested(path: Path, part: tuple[str, int]) -> Causes:
-    causes = Causes.load(path, part)
-    return causes.subset(causes.rows("test"))
-
-
-def _rows(track: Track, run: Path, tested: Mapping[tuple[str, int], Causes]) -> Rows:
+def _rows(track: Track, run: Path, tested: Mapping[Part, Causes]) -> Rows:
     columns: dict[str, list] = {}
     for (source, seed), causes in tested.items():
         n, registrations = len(causes), causes.registrations
@@ -89,77 +96,52 @@ def _rows(track: Track, run: Path, tested: Mapping[tuple[str, int], Causes]) -> 
             "counted": np.ones(n, bool),
         }
         if track.name == FRAMES_TRACK:
-            of_part |= _of_frames(run / f"frame_causes/seed{seed}.csv", registrations.sample)
+            rows = _sample_rows(run / f"frame_causes/seed{seed}.csv", SAMPLE_COLUMNS, registrations.sample)
+            of_part |= {
+                "start": rows["start"].to_numpy(str),
+                "instance": rows["instance"].to_numpy(int),
+                "scene": (rows["dataset"] + " " + rows["scene"]).to_numpy(str),
+                "counted": (rows["truth"] != BY_ICP).to_numpy(),
+            }
         if track.name == SCANS_TRACK:
-            of_part |= _of_scans(run / f"scan_causes/{source}/seed{seed}.csv", registrations.sample)
+            path = run / f"scan_causes/{source}/seed{seed}.csv"
+            rows = _sample_rows(path, SCAN_COLUMNS, registrations.sample)
+            of_part |= {"start": rows["start"].to_numpy(str), "counted": numbers(path, rows, "times") == 0}
         for name, column in of_part.items():
             columns.setdefault(name, []).append(column)
     return Rows(**{name: np.concatenate(parts) for name, parts in columns.items()})
 
 
-def _of_frames(path: Path, sample_N: np.ndarray) -> dict[str, np.ndarray]:
-    rows = _of_samples(path, SAMPLE_COLUMNS, sample_N)
-    return {
-        "start": rows["start"].to_numpy(str),
-        "instance": rows["instance"].to_numpy(int),
-        "scene": (rows["dataset"] + " " + rows["scene"]).to_numpy(str),
-        "counted": (rows["truth"] != BY_ICP).to_numpy(),
-    }
-
-
-def _of_scans(path: Path, sample_N: np.ndarray) -> dict[str, np.ndarray]:
-    rows = _of_samples(path, SCAN_COLUMNS, sample_N)
-    return {"start": rows["start"].to_numpy(str), "counted": numbers(path, rows, "times") == 0}
-
-
-def _of_samples(path: Path, columns: tuple[str, ...], sample_N: np.ndarray) -> pd.DataFrame:
+def _sample_rows(path: Path, columns: tuple[str, ...], sample_N: np.ndarray) -> pd.DataFrame:
     rows = read_csv(path, columns, others=ANY)
     if rows["sample"].tolist() != [str(number) for number in sample_N]:
         raise InputError(path, "its samples differ from those of the causes", "regenerate both from the same config")
     return rows
 
 
-def _said(
-    track: Track, run: Path, config: Mapping[str, Any], parts: Iterable[tuple[str, int]]
-) -> dict[Key, dict[tuple[str, int], pd.DataFrame]]:
-    """Return the predictions of every method, by part."""
-    said: dict[Key, dict[tuple[str, int], pd.DataFrame]] = {}
+def _predictions(
+    track: Track, run: Path, config: Mapping[str, Any], parts: Sequence[Part]
+) -> dict[Key, dict[Part, pd.DataFrame]]:
+    """Return the predictions of every method for test samples, by part."""
+    predictions: dict[Key, dict[Part, pd.DataFrame]] = {}
     for source, seed in parts:
-        if not track.said:
+        if not track.predictions:
             for name in config["diagnosis"]["explainers"]:
-                path = run / f"diagnoses/{source}/{name}/seed{seed}.csv"
-                said.setdefault((name, ""), {})[source, seed] = read_predictions(path)
+                rows = read_predictions(run / f"diagnoses/{source}/{name}/seed{seed}.csv")
+                predictions.setdefault((name, ""), {})[source, seed] = rows[rows["split"] == "test"]
             continue
-        path = run / track.said.format(source=source, seed=seed)
+        path = run / track.predictions.format(source=source, seed=seed)
         rows = read_predictions(path, labels=track.labeled_by).assign(**{} if track.learn_from else {"learned": ""})
         if "scans" in rows and set(rows["scans"]) != {name for name, of in parts if of == seed}:
             raise InputError(path, "is of other data sets than there are samples of", "finish the run")
         for column, wanted in {"control": HARD, "scans": source}.items():
             rows = rows[rows[column] == wanted] if column in rows else rows
-        for key, of_method in rows.groupby(["explainer", "learned"], sort=False):
-            said.setdefault((str(key[0]), str(key[1])), {})[source, seed] = of_method
-    if not said:
+        for (name, learned), of_method in rows.groupby(["explainer", "learned"], sort=False):
+            test_rows = of_method[of_method["split"] == "test"]
+            predictions.setdefault((str(name), str(learned)), {})[source, seed] = test_rows
+    if not predictions:
         raise InputError(run, f"has no predictions for the track {track.name}", "finish the run")
-    return said
-
-
-def _require_config(run: Path, file: str, config: Mapping[str, Any]) -> None:
-    """Raise an InputError for a file that was made with other settings than the config has, where it says with which.
-
-    Else nobody could make it again.
-    """
-    said = _provenance(run / file).get("settings")
-    if said is not None and said != json.loads(json.dumps(recipe_of(file, config).given["settings"])):
-        raise InputError(
-            run / file, f"was not made with the config of run {config['run']}", "give the folder of that run"
-        )
-
-
-def _of_part(rows: pd.DataFrame | None, causes: Causes, run: Path) -> pd.DataFrame:
-    rows = rows[rows["split"] == "test"] if rows is not None else None
-    if rows is None or rows["sample"].tolist() != [str(number) for number in causes.registrations.sample]:
-        raise InputError(run, "has predictions of other test samples than its own", "finish the run")
-    return rows
+    return predictions
 
 
 def _method(key: Key, track: Track, config: Mapping[str, Any], parts: list[pd.DataFrame]) -> Method:
@@ -167,27 +149,21 @@ def _method(key: Key, track: Track, config: Mapping[str, Any], parts: list[pd.Da
 
     rows = pd.concat(parts)
     scores_N_C = rows[[f"score_{label}" for label in track.labels]].to_numpy(float)
-    number = {label: place for place, label in enumerate(track.labels)}
+    numbers_of = {label: number for number, label in enumerate(track.labels)}
     named = np.where(rows["abstained"], "", rows["concept_predicted"].to_numpy(str))
-    named_N = np.array([number.get(label, NOTHING_NAMED) for label in named])
-    name, lesson = key
+    named_N = np.array([numbers_of.get(label, NOTHING_NAMED) for label in named])
+    name, training = key
     entry = explainer_entry(name, track.kind)
     costs = titles_and_costs(config, {})["cause_costs"]
     calls = costs[name]["icp_calls"] if name in costs else NO_CALLS
-    if track.name in (HARD_TRACK, SCANS_TRACK):  # their files have it
+    if track.name in (HARD_TRACK, SCANS_TRACK):  # their files have a column of calls
         calls = round(rows["icp_calls"].mean())
-    name, title = (track.with_lesson(text, lesson) for text in (name, entry.title))
+    name, title = (track.with_training(text, training) for text in (name, entry.title))
     return Method(name, title, entry.sight, int(calls), np.nan_to_num(scores_N_C), named_N)
 
 
-def _commit(path: Path) -> str:
-    """Return the commit that a file of the run was made with, empty where that is not known."""
-    code = _provenance(path).get("code")
-    return code.get("commit") or "" if isinstance(code, dict) else ""
-
-
 def _provenance(path: Path) -> dict[str, Any]:
-    """Return what is known of how a file of the run was made; nothing where it does not say."""
+    """Return the provenance record of a file of the run, empty where there is none."""
     try:
         record = json.loads(path.with_name(path.name + ".provenance.json").read_text("utf-8"))
     except (OSError, ValueError):

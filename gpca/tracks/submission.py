@@ -1,4 +1,4 @@
-"""A CSV of predictions made anywhere: a head of comments that says what made them, and a row for each test sample.
+"""A submission: a CSV of predictions with a head of comments about the method, and a row per test sample.
 
 ::
 
@@ -15,8 +15,9 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import takewhile
 from pathlib import Path
 
 import numpy as np
@@ -27,9 +28,9 @@ from gpca.io.limits import require_file
 from gpca.io.names import is_name
 from gpca.numerals import decimal, whole
 from gpca.tracks.published import NO_CALLS, NOTHING_NAMED, Method, Published
-from gpca.tracks.track import TRACKS, Track
+from gpca.tracks.track import TRACKS
 
-HEAD = {  # what the head has to say -> what that is
+HEAD = {  # required entry -> its description
     "track": f"one of {', '.join(TRACKS)}",
     "version": "of the samples, as gpca bench and gpca.load print it",
     "method": "its name",
@@ -41,18 +42,17 @@ HEAD = {  # what the head has to say -> what that is
 OPTIONAL = {"reads": "what it sees of a registration", "icp_calls": "runs of ICP beyond the one that it explains"}
 KEYS = ("source", "seed", "sample")
 NO_LINK = "none"
-NAMED = "named"  # optional column: the label named, empty for none; without it, that of the largest score
+NAMED = "named"  # optional column: the predicted label, empty for none; by default that of the largest score
 LARGEST_BYTES = 10**8
-MOST_FAULTS = 20  # that are listed
+MOST_FAULTS = 20  # in the list
 
 
 @dataclass(frozen=True)
 class Submission:
-    """Predictions for all test samples of a track, or of those of its sources whose data somebody has.
+    """Predictions for the test samples of a track, or of some of its sources.
 
     Attributes:
-        head: what made them, by the keys of `HEAD` and `OPTIONAL`.
-        method: what it said.
+        head: entries by the keys of `HEAD` and `OPTIONAL`.
     """
 
     head: Mapping[str, str]
@@ -79,8 +79,8 @@ class _Reader:
     published: Published
     faults: list[str] = field(default_factory=list)
 
-    def fault(self, place: str, what: str, remedy: str) -> None:
-        self.faults.append(f"{self.path}{', ' if place else ''}{place}: {what}; {remedy}")
+    def fault(self, where: str, what: str, remedy: str) -> None:
+        self.faults.append(f"{self.path}{', ' if where else ''}{where}: {what}; {remedy}")
 
     def read(self) -> Submission | None:
         require_file(self.path, "no such file", "give a CSV file of predictions", LARGEST_BYTES)
@@ -91,14 +91,12 @@ class _Reader:
             return None
         length = next((number for number, line in enumerate(lines) if not line.startswith("#")), len(lines))
         head = self._head(lines[:length])
-        said = self._rows(lines[length:], length)
-        if self.faults or said is None:
+        predictions = self._rows(lines[length:], length)
+        if self.faults or predictions is None:
             return None
         calls = int(head["icp_calls"]) if head.get("icp_calls") else NO_CALLS
-        scores_N_C, named_N = said
-        name = f"{self.path.stem} (submitted)"  # apart from the published ones
-        method = Method(name, head["method"], head.get("reads", ""), calls, scores_N_C, named_N)
-        return Submission(head, method)
+        name = f"{self.path.stem} (submitted)"  # differs from the published ones
+        return Submission(head, Method(name, head["method"], head.get("reads", ""), calls, *predictions))
 
     def _head(self, lines: list[str]) -> dict[str, str]:
         head: dict[str, str] = {}
@@ -112,10 +110,6 @@ class _Reader:
         for key, words in HEAD.items():
             if not is_name(head.get(key, "")):
                 self.fault("", f"its head lacks '{key}'", f"add a line '# {key}: …', {words}")
-        self._check_head(head)
-        return head
-
-    def _check_head(self, head: Mapping[str, str]) -> None:
         track, version = self.published.track.name, self.published.version
         if head.get("track", track) != track:
             self.fault("", f"is of the track '{head['track']}', not {track}", "name the track that it is of")
@@ -131,6 +125,7 @@ class _Reader:
                     raise ValueError
             except ValueError:
                 self.fault("", f"'{key}' is '{text[:40]}'", "give a number of 0 or more")
+        return head
 
     def _rows(self, lines: list[str], before: int) -> tuple[np.ndarray, np.ndarray] | None:
         track, rows = self.published.track, self.published.rows
@@ -145,7 +140,8 @@ class _Reader:
             self.fault(f"line {before + 1}", f"column '{name}' is unknown", "remove it")
         if self.faults and any(columns.count(name) != 1 for name in wanted):
             return None
-        place = {key: row for row, key in enumerate(_keys(rows.source, rows.seed, rows.sample))}
+        keys = zip(*(map(str, column.tolist()) for column in (rows.source, rows.seed, rows.sample)), strict=True)
+        row_of_key = {key: row for row, key in enumerate(keys)}
         scores_N_C = np.full((len(rows), len(scores)), np.nan)
         named_N = np.full(len(rows), NOTHING_NAMED)
         seen: dict[int, int] = {}
@@ -157,7 +153,7 @@ class _Reader:
                 self.fault(line, f"has {len(cells)} entries, not {len(columns)}", "give one for each column")
                 continue
             entry = dict(zip(columns, cells, strict=True))
-            row = place.get(tuple(entry[name].strip() for name in KEYS))
+            row = row_of_key.get(tuple(entry[name].strip() for name in KEYS))
             if row is None:
                 words = f"source {entry['source']}, seed {entry['seed']}, sample {entry['sample']}"
                 self.fault(line, f"{words} is no test sample", "give those of gpca.load with split='test'")
@@ -170,24 +166,20 @@ class _Reader:
                     scores_N_C[row, column] = decimal(entry[name].strip())
                 except ValueError:
                     self.fault(line, f"'{name}' is '{entry[name][:40]}', no finite number", "give a number")
-            named_N[row] = self._named(entry, scores_N_C[row], track, line)
-        asked = {str(rows.source[row]) for row in seen}
-        needed = {key: row for key, row in place.items() if key[0] in asked or not track.may_lack(key[0])}
+            label = entry.get(NAMED, "").strip()
+            if NAMED not in entry:
+                named_N[row] = scores_N_C[row].argmax()
+            elif label in track.labels:
+                named_N[row] = track.labels.index(label)
+            elif label:
+                self.fault(line, f"'{label[:40]}' is no label", f"choose one of {', '.join(track.labels)}")
+        sources = {str(rows.source[row]) for row in seen}
+        needed = {key: row for key, row in row_of_key.items() if key[0] in sources or not track.may_lack(key[0])}
         if missing := [key for key, row in needed.items() if row not in seen]:
             source, seed, sample = missing[0]
             words = f"{len(missing)} of {len(needed)} test samples are missing, first source {source}, seed {seed}"
             self.fault("", f"{words}, sample {sample}", "give every sample once")
         return scores_N_C, named_N
-
-    def _named(self, entry: Mapping[str, str], scores_C: np.ndarray, track: Track, line: str) -> int:
-        if NAMED not in entry:
-            return int(scores_C.argmax())
-        if not (label := entry[NAMED].strip()):
-            return NOTHING_NAMED
-        if label not in track.labels:
-            self.fault(line, f"'{label[:40]}' is no label", f"choose one of {', '.join(track.labels)}")
-            return NOTHING_NAMED
-        return track.labels.index(label)
 
 
 def read_submission(path: Path, published: Published) -> tuple[Submission | None, list[str]]:
@@ -212,19 +204,8 @@ def track_in_head(path: Path) -> str:
     """
     require_file(path, "no such file", "give a CSV file of predictions", LARGEST_BYTES)
     with path.open(encoding="utf-8-sig", errors="replace") as file:
-        for line in _comments(file):
+        for line in takewhile(lambda line: line.startswith("#"), file):
             key, _, value = (part.strip() for part in line[1:].partition(":"))
             if key == "track" and value in TRACKS:
                 return value
     raise InputError(path, "its head names no track", f"add a line '# track: …', one of {', '.join(TRACKS)}")
-
-
-def _comments(lines: Iterable[str]) -> Iterator[str]:
-    for line in lines:
-        if not line.startswith("#"):
-            return
-        yield line
-
-
-def _keys(*columns: np.ndarray) -> list[tuple[str, ...]]:
-    return list(zip(*(map(str, column.tolist()) for column in columns), strict=True))

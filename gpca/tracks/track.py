@@ -1,10 +1,12 @@
-"""The tracks: what each asks, of which samples, and which numbers of a method it shows."""
+"""The tracks: question, samples and headline measure of each."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import reduce
 from itertools import product
+from operator import getitem
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +22,8 @@ from gpca.pairs.perturbation import CONCEPTS as PERTURBATIONS
 CAUSES_TRACK, HARD_TRACK, FRAMES_TRACK, SCANS_TRACK = ("causes", "hard", "frames", "scans")
 DEFAULT = "default"  # run
 READS = ("descriptors/{source}/seed{seed}.npz", "reenactments/{source}/seed{seed}.npz")
-LESSONS = ("causes", "descriptors", "reenactments")
-OF_TABLE_9 = "The measures are those of Table IX (docs/causes.md); the last row has counterfactual access."
+TRAINING_FOLDERS = ("causes", "descriptors", "reenactments")
+LIKE_TABLE_9 = "The measures are those of Table IX (docs/causes.md); the last row has counterfactual access."
 
 
 @dataclass(frozen=True)
@@ -29,27 +31,25 @@ class Track:
     """A track.
 
     Attributes:
-        name, title: of it.
-        kind: of the explainers that are asked.
-        labels: what they name, in the order of their scores.
+        kind: of its explainers.
+        labels: in the order of the scores.
         samples: pattern of the files of samples, below the folder of a run.
-        headline: the measure by which methods are ranked, and compared pair by pair.
-        sources: of the samples; none where they are those of the config,
-        listed: at this key.
-        everywhere: sources that everyone has, where others need data that not everyone has; none where all are such.
-        seeds: key of the config that says how many of its seeds there are samples of; none for all.
-        run: that the samples are of: ``default``, or the name of a config that is laid over the default one.
-        said: pattern of the files of predictions in a run, where one holds those of all methods.
-        labeled_by: columns that say of which such a row is.
-        read: patterns of the files that methods may read, beside those of the samples.
-        lessons: folders of what they learn from objects, of every source.
-        learn_from: where a method may learn, if there is a choice; the first is the usual one.
-        untaught: what to learn from, where all samples are for testing.
-        groups: head of the column of the groups of samples that are each scored by themselves; empty for one group.
-        enough_of: states of which a group needs many samples, or nothing is concluded.
-        draws: what names the bootstrap's draws, as in the table of a run that has the same rows.
-        clusters: what these are over.
-        measures: what is said of the measures below a table.
+        headline: the measure that ranks methods and is compared pair by pair.
+        draws: name of the bootstrap's random numbers, as in the table of the run's results.
+        clusters: what the bootstrap resamples, in words.
+        measures: footnote about the measures.
+        sources: of the samples; by default those at the config's key `listed`.
+        everywhere: sources that everyone has, if the others need further data.
+        seeds: key of the config that limits the number of seeds.
+        run: of the samples: ``default``, or the name of a config that overrides the default one.
+        predictions: pattern of a run's files of predictions, where one holds all methods.
+        labeled_by: the identifying columns of such a file.
+        read: patterns of further files that methods may read.
+        training_folders: files of objects that methods learn from.
+        learn_from: choices of the training data, the default first.
+        without_training: what to learn from, where all samples are for testing.
+        groups: column head of the groups of samples that are scored separately; empty for one group.
+        required_states: nothing is concluded from a group with few samples of one of them.
     """
 
     name: str
@@ -66,48 +66,53 @@ class Track:
     everywhere: tuple[str, ...] = ()
     seeds: str = ""
     run: str = DEFAULT
-    said: str = ""
+    predictions: str = ""
     labeled_by: tuple[str, ...] = ()
     read: tuple[str, ...] = ()
-    lessons: tuple[str, ...] = ()
+    training_folders: tuple[str, ...] = ()
     learn_from: tuple[str, ...] = ()
-    untaught: str = ""
+    without_training: str = ""
     groups: str = ""
-    enough_of: tuple[str, ...] = ("failed",)
+    required_states: tuple[str, ...] = ("failed",)
 
     def parts(self, config: Mapping[str, Any]) -> list[tuple[str, int]]:
         """Return the source and the seed of each file of samples, seed by seed."""
-        seeds = list(config["seeds"])[: _at(config, self.seeds) if self.seeds else None]
-        return [(source, seed) for seed, source in product(seeds, self.sources or _at(config, self.listed))]
+
+        def entry(key: str) -> Any:
+            return reduce(getitem, key.split("."), config)
+
+        seeds = list(config["seeds"])[: entry(self.seeds) if self.seeds else None]
+        return [(source, seed) for seed, source in product(seeds, self.sources or entry(self.listed))]
 
     @property
     def layers(self) -> list[Path]:
-        """The configs that are laid over the default one."""
+        """The configs that override the default one."""
         return [] if self.run == DEFAULT else [ROOT / "config" / f"{self.run}.yaml"]
 
     def may_lack(self, source: str) -> bool:
-        """Whether somebody who does not have a source's data can do without its samples."""
+        """Return whether the samples of a source may be left out, as its data has to be obtained."""
         return bool(self.everywhere) and source not in self.everywhere
 
-    def lesson(self, asked: str | None) -> str:
-        """Return where a method is to learn: what was asked for, or the usual; empty where there is no choice.
+    def training(self, asked: str | None) -> str:
+        """Return the choice of training data, by default the first one; empty where there is no choice.
 
         Raises:
-            InputError: the track does not have it.
+            InputError: an unknown choice.
         """
-        if asked is not None and not self.learn_from:
+        if asked is None:
+            return next(iter(self.learn_from), "")
+        if not self.learn_from:
             raise InputError("--learn-from", f"is no choice on the track {self.name}", "leave it out")
-        if asked is not None:
-            require_known("--learn-from", asked, self.learn_from)
-        return asked or next(iter(self.learn_from), "")
+        require_known("--learn-from", asked, self.learn_from)
+        return asked
 
     def file(self, source: str, seed: int) -> str:
-        """Return the path of a file of samples below the folder of a run, or of a cache."""
+        """Return the path of a file of samples below the folder of a run or a cache."""
         return self.samples.format(source=source, seed=seed)
 
-    def with_lesson(self, text: str, lesson: str) -> str:
-        """Return the name or title of a method with where it learned, unless that is the usual."""
-        return text if lesson in ("", *self.learn_from[:1]) else f"{text} (from {lesson})"
+    def with_training(self, text: str, training: str) -> str:
+        """Return the name or title of a method with its training data, unless that is the default."""
+        return text if training in ("", *self.learn_from[:1]) else f"{text} (from {training})"
 
 
 TRACKS = {
@@ -122,7 +127,7 @@ TRACKS = {
             "balanced_accuracy",
             draws="cause intervals",
             clusters="families of objects and seeds",
-            measures=OF_TABLE_9,
+            measures=LIKE_TABLE_9,
             read=READS,
         ),
         Track(
@@ -136,7 +141,7 @@ TRACKS = {
             clusters="families of objects and seeds",
             measures="AUROC of errors: how well the entropy of the scores tells wrong answers from right ones.",
             seeds="controls.seeds",
-            said="controls/{source}/seed{seed}.csv",
+            predictions="controls/{source}/seed{seed}.csv",
             labeled_by=("control", "tested", "explainer"),
         ),
         Track(
@@ -148,14 +153,14 @@ TRACKS = {
             "state_accuracy",
             draws="frame cause intervals",
             clusters="scenes",
-            measures=OF_TABLE_9,
+            measures=LIKE_TABLE_9,
             sources=(REAL_WORLD,),
             seeds="real_world.causes.seeds",
-            said="frame_diagnoses/seed{seed}.csv",
+            predictions="frame_diagnoses/seed{seed}.csv",
             labeled_by=("explainer",),
             read=READS[1:],
-            lessons=LESSONS,
-            untaught="learn from the track causes",
+            training_folders=TRAINING_FOLDERS,
+            without_training="learn from the track causes",
             groups="Starts",
         ),
         Track(
@@ -173,27 +178,24 @@ TRACKS = {
             everywhere=("virtual_scans",),
             seeds="scans.seeds",
             run="full",
-            said="scan_diagnoses/seed{seed}.csv",
+            predictions="scan_diagnoses/seed{seed}.csv",
             labeled_by=("scans", "learned", "explainer"),
             read=("scan_descriptors/{source}/seed{seed}.npz", "scan_reenactments/{source}/seed{seed}.npz"),
-            lessons=LESSONS,
+            training_folders=TRAINING_FOLDERS,
             learn_from=(SCANS, OBJECTS),
-            untaught="learn from the samples of other scenes, which registrations.cluster names",
+            without_training="learn from the samples of other scenes, which registrations.cluster names",
             groups="Scans",
-            enough_of=("failed", NOMINAL),
+            required_states=("failed", NOMINAL),
         ),
     )
 }
 
 
 def track_of(name: str) -> Track:
-    """Return the track of that name; an unknown one raises an InputError that lists the known."""
+    """Return the track of that name.
+
+    Raises:
+        InputError: an unknown one.
+    """
     require_known("track", name, TRACKS)
     return TRACKS[name]
-
-
-def _at(config: Mapping[str, Any], key: str) -> Any:
-    value: Any = config
-    for name in key.split("."):
-        value = value[name]
-    return value

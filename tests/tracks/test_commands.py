@@ -8,7 +8,7 @@ import pytest
 from gpca import plugins
 from gpca.__main__ import main
 from gpca.tracks import leaderboard
-from gpca.tracks.table import MARK
+from gpca.tracks.leaderboard import MARK
 
 from ..documents import block
 from .conftest import SOURCE

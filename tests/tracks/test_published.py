@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from gpca.causes.dataset import Causes, labels_of
+from gpca.commands.ship_predictions import LARGEST_BYTES
 from gpca.config.check import check
 from gpca.config.leave_out import without_false
 from gpca.errors import InputError
 from gpca.frames.source import REAL_WORLD
 from gpca.tracks import published as module
-from gpca.tracks.published import Published, Rows
+from gpca.tracks.published import FOLDER, Published, Rows
 from gpca.tracks.shipping import collect
 from gpca.tracks.track import TRACKS, track_of
 
@@ -91,3 +92,17 @@ def test_the_parts_of_the_tracks_are_those_of_the_default_config():
     assert TRACKS["frames"].parts(config) == [(REAL_WORLD, seeds[0])]
     assert TRACKS["scans"].parts(config) == [(name, seeds[0]) for name in config["scans"]["datasets"]]
     assert set(TRACKS["scans"].everywhere) <= set(config["scans"]["datasets"])
+
+
+def test_shipped_predictions_are_small_whole_and_of_the_config_of_their_track():
+    files = sorted(FOLDER.glob("*.npz"))
+    assert {path.stem for path in files} <= set(TRACKS)
+    assert sum(path.stat().st_size for path in files) <= LARGEST_BYTES
+    for path in files:
+        track = TRACKS[path.stem]
+        config = without_false(load(*(layer.stem for layer in track.layers)))
+        check(config)
+        published = Published.load(track, path)
+        parts = [(source, seed) for source, seed, _ in published.rows.parts()]
+        assert parts == [part for part in track.parts(config) if part in parts or not track.may_lack(part[0])]
+        assert set(published.hashes) >= {track.file(*part) for part in parts}

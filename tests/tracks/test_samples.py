@@ -13,10 +13,9 @@ from gpca.config.success import with_success
 from gpca.errors import InputError
 from gpca.experiments.controls.settings import HARD
 from gpca.frames.source import REAL_WORLD
-from gpca.tracks import making
+from gpca.tracks import samples as module
 from gpca.tracks.loading import NO_LABEL
-from gpca.tracks.recipes import recipe_of
-from gpca.tracks.samples import Samples, sha256_of_arrays
+from gpca.tracks.samples import Samples, recipe_of, sha256_of_arrays
 from gpca.tracks.track import TRACKS
 
 from ..config.configs import load
@@ -80,11 +79,11 @@ def test_what_is_missing_is_made_once_and_after_what_it_is_made_from(default, tm
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             (folder / name).touch()
 
-    monkeypatch.setattr(making, "_run", run)
+    monkeypatch.setattr(module, "_run", run)
     files = ["reenactments/ycb/seed0.npz", "descriptors/ycb/seed0.npz", "causes/ycb/seed0.npz"]
-    making.make(files, tmp_path, default, processes=1)
+    module.make(files, tmp_path, default, processes=1)
     assert made[:2] == ["objects", "causes"] and sorted(made[2:]) == ["describe", "reenact"]
-    making.make(files, tmp_path, default, processes=1)
+    module.make(files, tmp_path, default, processes=1)
     assert len(made) == 4
 
 
@@ -93,7 +92,7 @@ def test_a_step_that_fails_ends_in_its_own_line(default, tmp_path):
     damaged.parent.mkdir()
     damaged.write_bytes(b"PK")
     with pytest.raises(InputError, match=r"step gpca\.steps\.causes: .*ycb\.npz: is not a readable npz archive"):
-        making.make(["causes/ycb/seed0.npz"], tmp_path, default, processes=1)
+        module.make(["causes/ycb/seed0.npz"], tmp_path, default, processes=1)
 
 
 def test_samples_are_arrays_a_frame_and_a_torch_dataset(published, run, causes):

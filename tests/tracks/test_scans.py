@@ -23,11 +23,11 @@ from gpca.io.csv_file import write_csv
 from gpca.process.job import Job
 from gpca.tracks import published as module
 from gpca.tracks import scoring
+from gpca.tracks.leaderboard import MARK
 from gpca.tracks.published import Published
-from gpca.tracks.recipes import recipe_of
+from gpca.tracks.samples import recipe_of
 from gpca.tracks.scoring import score
 from gpca.tracks.shipping import collect
-from gpca.tracks.table import MARK
 from gpca.tracks.track import TRACKS
 
 from ..config.configs import load
@@ -242,4 +242,4 @@ def test_the_virtual_set_is_made_by_its_recipe_and_loaded_as_an_object(full, shi
 
 
 def test_measures_of_scans_are_those_that_an_interval_is_made_for():
-    assert metrics.CAUSES in scoring.SHARED
+    assert metrics.CAUSES in scoring.SHARES_OF_SAMPLES

@@ -8,9 +8,9 @@ import pytest
 from gpca.experiments.diagnosis.judged import CEILING, POOLED
 from gpca.experiments.diagnosis.metrics import collect_intervals
 from gpca.pairs.perturbation import CONCEPTS
+from gpca.tracks.leaderboard import MARK, as_text, table_of
 from gpca.tracks.published import Method
 from gpca.tracks.scoring import groups_of, score
-from gpca.tracks.table import MARK, as_text, table_of
 from gpca.tracks.track import TRACKS
 
 from .conftest import SEED, SOURCE

@@ -10,7 +10,7 @@ import shutil
 import pytest
 
 from gpca.__main__ import main
-from gpca.tracks.table import MARK
+from gpca.tracks.leaderboard import MARK
 
 from ..documents import ROOT, block, command_lines, tasks_beside_a_clone
 from ..page.small_run import Page
