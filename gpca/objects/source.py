@@ -1,36 +1,43 @@
-"""A configured source of objects: the place of its data, and its surfaces.
+"""Configured sources of objects: where their data is, and their surfaces.
 
-A kind of source is a module beside this one with ``from_entry(entry, folder) -> Iterator[Surface]``; a new kind is
-such a file and nothing else; with a ``require_entry(entry, folder)`` it can refuse an entry whose data is at hand, as
-far as names of files tell, when a workflow loads. ``procedural`` needs no data and has ``surfaces(family)`` instead.
-Kinds that read or render depth frames stand among those (`OF_FRAMES`). A module from outside lists kinds by name as
-``SOURCES``, each with the name of such a module."""
+A kind of source is a module with ``from_entry(entry, folder) -> Iterator[Surface]``; with ``require_entry(entry,
+folder)`` it can refuse an entry when a workflow loads, as far as names of files tell. Modules from outside list kinds
+in ``SOURCES``, each name with its module.
+"""
 
 from __future__ import annotations
 
 import errno
 import os
-import pkgutil
 from collections.abc import Iterator
 from functools import cache
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 
-from gpca import objects
 from gpca.code_files import ROOT
 from gpca.errors import InputError
 from gpca.io.files import sha256_of_file
-from gpca.objects import downloads, procedural
+from gpca.objects import downloads
 from gpca.objects.surface import Surface
 from gpca.plugins import joined_outside
 
-# Kinds whose modules read depth frames, or render them, and stand there.
-OF_FRAMES = {"bop_views": "gpca.frames.bop", "mesh_views": "gpca.frames.camera"}
+PROCEDURAL = "procedural"
+KINDS = {
+    PROCEDURAL: "gpca.objects.procedural",
+    "bop": "gpca.objects.bop",
+    "mesh_folder": "gpca.objects.mesh_folder",
+    "uw_rgbd": "gpca.objects.uw_rgbd",
+    "bop_views": "gpca.frames.bop",
+    "mesh_views": "gpca.frames.camera",
+}
 SYSTEM = ("/dev", "/proc", "/sys")
-TEXTS = (".md", ".txt")  # beside data, as licenses are
-# Keys of an entry that a procedural source has no use for: a config may lay one over a source of files.
-OF_FILES = ("location", "files", "objects", "unit", "url", "urls", "sha256", "views_per_instance")
+TEXTS = (".md", ".txt")  # licenses beside data
+# Keys of an entry that a procedural source ignores: a config may lay one over a source of files.
+FILE_KEYS = ("location", "files", "objects", "unit", "url", "urls", "sha256", "views_per_instance")
+DATA = ROOT / "data"  # the data that is part of the repository (data/README.md)
+VERSION = "2"  # of the data that this code reads
+RESTORE = "restore it: git checkout -- data"
 
 
 def resolve(entry: dict, data_dir: str | None) -> dict:
@@ -54,12 +61,12 @@ def resolve(entry: dict, data_dir: str | None) -> dict:
     subject = f"source '{entry.get('title', entry.get('kind'))}'"
     if data_dir is not None and not require_place(data_dir).is_dir():
         raise InputError(data_dir, "no such folder", "correct data_dir in the config")
-    if entry.get("kind") == "procedural":
+    module = _module_of(entry.get("kind"))
+    if entry["kind"] == PROCEDURAL:
         if not entry.get("family"):
             raise InputError(subject, "names no family", "set family in the config")
-        procedural.require_family(entry["family"])
-        return {name: value for name, value in entry.items() if name not in OF_FILES} | {"origin": "procedural"}
-    module = _module_of(entry.get("kind"))
+        module.require_family(entry["family"])
+        return {name: value for name, value in entry.items() if name not in FILE_KEYS} | {"origin": PROCEDURAL}
     if folder := _local_data(entry, data_dir):
         require_whole_if_ours(folder)
         if require_entry := getattr(module, "require_entry", None):
@@ -82,10 +89,10 @@ def surfaces(entry: dict, cache_folder: str | Path) -> Iterator[Surface]:
     Raises:
         InputError: from :mod:`gpca.objects.downloads`, :mod:`gpca.objects.downloads` and the kind's own reader.
     """
-    if entry["origin"] == "procedural":
-        yield from procedural.surfaces(entry["family"])
-        return
     module = _module_of(entry["kind"])
+    if entry["origin"] == PROCEDURAL:
+        yield from module.surfaces(entry["family"])
+        return
     archives = getattr(module, "READS_ARCHIVES", False)
     for folder in folders(entry, cache_folder, unpack=not archives):
         yield from module.from_entry(entry, folder)
@@ -131,9 +138,7 @@ def data_folders(entry: dict, data_dir: str | None, downloads: str) -> dict[str,
 
 
 def source_modules(entry: dict) -> list[str]:
-    """Return the modules that read an entry: they are found by name at run time, so no import tells of them."""
-    if entry["kind"] == "procedural":
-        return ["gpca.objects.procedural", f"gpca.objects.shapes.{procedural.FAMILIES[entry['family']]}"]
+    """Return the module that reads an entry: it is imported by name at run time, so no import statement shows it."""
     return [_kinds()[entry["kind"]]]
 
 
@@ -211,25 +216,17 @@ def _require_pattern(pattern: str) -> None:
 
 def _module_of(kind: object) -> ModuleType:
     kinds = _kinds()
-    if kind in kinds and hasattr(module := import_module(kinds[str(kind)]), "from_entry"):
-        return module
-    known = [name for name, module in kinds.items() if hasattr(import_module(module), "from_entry")]
-    raise InputError(f"kind '{kind}'", "is not a kind of source", f"choose one of procedural, {', '.join(known)}")
+    if kind not in kinds:
+        raise InputError(f"kind '{kind}'", "is not a kind of source", f"choose one of {', '.join(kinds)}")
+    return import_module(kinds[str(kind)])
 
 
 def _kinds() -> dict[str, str]:
-    """Return the module of every kind by name; not each module beside this one is of a kind."""
-    beside = {module.name: f"gpca.objects.{module.name}" for module in pkgutil.iter_modules(objects.__path__)}
-    return joined_outside("SOURCES", "kind of source", str, beside | OF_FRAMES)
+    return joined_outside("SOURCES", "kind of source", str, KINDS)
 
 
 def _as_list(value: str | list | None) -> list:
     return value if isinstance(value, list) else [] if value is None else [value]
-
-
-DATA = ROOT / "data"
-VERSION = "2"  # of the data that this code reads
-REMEDY = "restore it: git checkout -- data"
 
 
 def folders_of_data(data_dir: str | Path | None) -> list[Path]:
@@ -248,13 +245,13 @@ def require_whole(folder: Path) -> None:
     """Raise an InputError for the first file of the data that is missing or changed, and for another version of it."""
     version = folder / "VERSION"
     if (found := version.read_text("utf-8").strip() if version.is_file() else "unknown") != VERSION:
-        raise InputError(folder, f"is version {found} of the data, and this code reads version {VERSION}", REMEDY)
+        raise InputError(folder, f"is version {found} of the data, and this code reads version {VERSION}", RESTORE)
     sums = folder / "SHA256SUMS"
     if not sums.is_file():
-        raise InputError(sums, "no such file", REMEDY)
+        raise InputError(sums, "no such file", RESTORE)
     for line in sums.read_text("utf-8").splitlines():
         sha256, _, name = line.partition("  ")
         if not (path := folder / name).is_file():
-            raise InputError(path, "no such file", REMEDY)
+            raise InputError(path, "no such file", RESTORE)
         if sha256_of_file(path) != sha256:
-            raise InputError(path, "is not the file that SHA256SUMS lists", REMEDY)
+            raise InputError(path, "is not the file that SHA256SUMS lists", RESTORE)

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from gpca.frames.camera import Camera, DepthNoise, MeshScene, look_at
-from gpca.objects.shapes.solids import box, cylinder, ellipsoid
+from gpca.objects.procedural import box, cylinder, ellipsoid, mesh_of
 from gpca.scans.pair import Kind
 from gpca.scans.scene import Scan, Scene
 from gpca.seeds import generator
@@ -66,7 +66,8 @@ def compound(name: str, views: int) -> Scene:
             solid = cylinder(extent_3[0] / 2, extent_3[1] + 0.2, at_3, "xyz"[random.integers(3)])
         else:
             solid = ellipsoid(extent_3 / 2, at_3)
-        meshes.append((np.asarray(solid.vertices) * size_m, np.asarray(solid.faces)))
+        vertices, faces = mesh_of(solid)
+        meshes.append((vertices * size_m, faces))
     places = []
     for i in range(views):
         azimuth = 2 * np.pi * i / views + random.normal(0, 0.05)
@@ -97,7 +98,7 @@ def _furnished(extent_3: np.ndarray, random: np.random.Generator) -> list[Mesh]:
         *(box((WALL_M, y, z), (side * (x + WALL_M) / 2, 0, z / 2)) for side in (-1, 1)),
         *(box((x, WALL_M, z), (0, side * (y + WALL_M) / 2, z / 2)) for side in (-1, 1)),
     ]
-    meshes = [(np.asarray(solid.vertices), np.asarray(solid.faces)) for solid in solids]
+    meshes = [mesh_of(solid) for solid in solids]
     for wall in range(4):
         along, across = (y, x) if wall % 2 else (x, y)
         position = -along / 2 + random.uniform(0.1, 0.4)
@@ -106,7 +107,8 @@ def _furnished(extent_3: np.ndarray, random: np.random.Generator) -> list[Mesh]:
             height = random.uniform(*((0.4, 0.9), (1.2, 2.1))[random.integers(2)])
             at_2 = np.array([position + width / 2, (across - depth) / 2])
             for solid in _furniture(at_2, np.array([width, depth, height]), random):
-                meshes.append((_turned(np.asarray(solid.vertices), wall), np.asarray(solid.faces)))
+                vertices_m, faces = mesh_of(solid)
+                meshes.append((_turned(vertices_m, wall), faces))
             position += width + random.uniform(0.1, 0.8)
     return meshes
 

@@ -35,17 +35,15 @@ def halves(points, diameter_m):
 def shapes(four):
     """Target and source of stand-ins by name, but for the scissors, too thin to have a back."""
     from gpca.objects.canonical import canonical_cloud
-    from gpca.objects.shapes.linemod import OBJECTS
-    from gpca.objects.surface import Surface
 
     made = {
         name: halves(points, diameter_m)
         for name, diameter_m, (points, _) in zip(four.names, four.diameters_m, four.clouds, strict=True)
     }
-    for name in ("cat", "iron", "duck", "can"):
-        mesh = OBJECTS[name]()
-        points, _, diameter_m = canonical_cloud(Surface(name, mesh.vertices, mesh.faces), "linemod", 6000)
-        made[name] = halves(points, diameter_m)
+    for surface in surfaces("linemod"):
+        if surface.name in ("cat", "iron", "duck", "can"):
+            points, _, diameter_m = canonical_cloud(surface, "linemod", 6000)
+            made[surface.name] = halves(points, diameter_m)
     return {name: pair for name, pair in made.items() if "scissors" not in name}
 
 

@@ -105,9 +105,9 @@ EDITS = {  # a module: what is made again where it has changed, and what is not
         "registrations uncertainty/ causes/ descriptors predictions/real_rgbd/gpca_pair residuals_forest methods/",
     ),
     "gpca/objects/uw_rgbd.py": ("", "objects/ tables/ figures/ index.html"),
-    "gpca/objects/shapes/cups.py": (
-        "objects/coffee_cup registrations/coffee_cup predictions/coffee_cup objects_coffee_cup",
-        "objects/ycb registrations/ycb kernels/ scenes instances exchange/ recovery",
+    "gpca/objects/procedural.py": (
+        "objects/coffee_cup objects/ycb registrations/coffee_cup predictions/coffee_cup objects_coffee_cup scenes",
+        "kernels.csv",
     ),
     "gpca/features/entropy.py": (
         "descriptors/ycb diagnoses/ycb/pair_forest estimates/ model.pt exchange/",

@@ -7,7 +7,6 @@ from gpca.explainers.registry import CAUSES, explainer_entry, explainer_module
 from gpca.alignment.methods.registry import method_module
 from gpca.code_files import code_files
 from gpca.encoders.registry import encoders
-from gpca.objects.procedural import FAMILIES
 from gpca.objects.source import find_file
 from gpca.experiments.real_world.experiment import pretraining_of
 from gpca.experiments.run import names_of, settings_of
@@ -79,10 +78,6 @@ def encoder_code(step):
     return lambda wildcards: code_files(
         f"gpca.steps.{step}", encoder_module(wildcards.backbone)
     )
-
-
-def shapes_code(families):
-    return [f"gpca.objects.shapes.{FAMILIES[family]}" for family in families]
 
 
 def collector_code(function):

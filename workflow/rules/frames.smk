@@ -42,10 +42,7 @@ wildcard_constraints:
 
 rule render_scenes:
     input:
-        code=code_files(
-            "gpca.steps.scenes",
-            *shapes_code(REAL_WORLD["scenes"]["families"]),
-        ),
+        code=code_files("gpca.steps.scenes"),
     output:
         out=directory(f"<results>/scenes/{FRAMES}"),
     log:
