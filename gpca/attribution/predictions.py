@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpca.errors import InputError
+from gpca.io.container import require_same_samples
 from gpca.io.csv_file import numbers, read_csv, read_numbers, write_csv
 
 if TYPE_CHECKING:
@@ -107,9 +108,7 @@ def read_timings(path: str | Path, registrations: Registrations) -> tuple[np.nda
         InputError: missing, empty or unreadable file; missing column; other samples; seconds that are not numbers.
     """
     rows = read_numbers(path, TIMING_COLUMNS, ("seconds", "icp_seconds"))
-    for name in ("sample", "split"):
-        if rows[name].tolist() != getattr(registrations, name).astype(str).tolist():
-            raise InputError(path, "does not contain the times of these samples", "regenerate it")
+    require_same_samples(path, rows, registrations.arrays)
     return rows["seconds"].to_numpy(), rows["icp_seconds"].to_numpy()
 
 

@@ -9,16 +9,17 @@ import numpy as np
 
 from gpca.causes.shapley import SUBSETS
 from gpca.causes.truth import BORDERLINE, FAILED, NOMINAL, Truth
-from gpca.io.arrays import REAL, load_arrays, save_arrays
+from gpca.io.arrays import REAL, WHOLE, load_arrays, save_arrays
+from gpca.io.container import FLAG, Container, Shapes, array
 from gpca.io.names import Axes
-from gpca.pairs.dataset import CLOUDS, REGISTRATION_COLUMNS, Registrations
+from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 
 LABELS = (NOMINAL, *CONCEPTS)
 
 
 @dataclass(frozen=True)
-class Causes:
+class Causes(Container):
     """S registrations, of which T are for testing, with their truth.
 
     Attributes:
@@ -39,19 +40,16 @@ class Causes:
     """
 
     registrations: Registrations
-    applied: np.ndarray
-    symmetric: np.ndarray
-    severity_outliers: np.ndarray
-    candidate: np.ndarray
-    T_target_source_runs: np.ndarray
-    fitness_runs: np.ndarray
-    inlier_rmse_runs: np.ndarray
-    error_shown: np.ndarray
     truth: Truth
     truth_again: Truth
-
-    def __len__(self) -> int:
-        return len(self.registrations)
+    applied: np.ndarray = array("S 3", FLAG)
+    symmetric: np.ndarray = array("S", FLAG)
+    severity_outliers: np.ndarray = array("S")
+    candidate: np.ndarray = array("S", WHOLE)
+    T_target_source_runs: np.ndarray = array("S n 4 4")
+    fitness_runs: np.ndarray = array("S n")
+    inlier_rmse_runs: np.ndarray = array("S n")
+    error_shown: np.ndarray = array("S")
 
     def rows(self, split: str) -> np.ndarray:
         """Return the row numbers of a split."""
@@ -62,53 +60,38 @@ class Causes:
         test_row = np.cumsum(self.registrations.split == "test") - 1
         tested = rows[self.registrations.split[rows] == "test"]
         return replace(
-            self,
+            super().subset(rows),
             registrations=self.registrations.subset(rows),
             truth=self.truth.subset(rows),
             truth_again=self.truth_again.subset(test_row[tested]),
-            **{name: getattr(self, name)[rows] for name in COLUMNS},
         )
 
-    def save(self, path: str | Path) -> None:
+    def save(self, path: str | Path, axes: Axes | None = None) -> None:
         """Write the npz described in results/README.md."""
-        arrays = {name: getattr(self.registrations, name) for name in (*REGISTRATION_COLUMNS, *CLOUDS)}
-        arrays |= {name: getattr(self, name) for name in COLUMNS}
+        arrays = self.registrations.arrays | self.arrays
         arrays |= {name: getattr(self.truth, name) for name in MEASURED}
         arrays |= {f"{name}_again": getattr(self.truth_again, name) for name in MEASURED}
         arrays |= {name: np.array(getattr(self.truth, name)) for name in LIMITS}
-        save_arrays(path, arrays, self.registrations.axes)
+        save_arrays(path, arrays, axes or self.registrations.axes)
 
     @classmethod
-    def load(cls, path: str | Path, axes: Axes | None = None) -> Causes:
-        """Read the npz; `axes` are the source and the seed that it has to be of.
-
-        Raises:
-            InputError: the file is missing, damaged, of another source or seed, or holds wrong shapes or NaN.
-        """
-        registrations = Registrations.load(path, axes)
-        n, subsets = len(registrations), len(SUBSETS)
+    def load(cls, path: str | Path, expected: Axes | Container | None = None) -> Causes:
+        """Read the npz; see :meth:`gpca.io.container.Container.load`."""
+        registrations = Registrations.load(path, expected)
         tested = int((registrations.split == "test").sum())
-        shapes: dict[str, tuple[int | str, ...]] = dict.fromkeys(COLUMNS, (n,)) | dict.fromkeys(LIMITS, ())
-        shapes |= {"applied": (n, len(CONCEPTS)), "fitness_runs": (n, "n"), "inlier_rmse_runs": (n, "n")}
-        shapes |= {"T_target_source_runs": (n, "n", 4, 4)} | dict.fromkeys(MEASURED, (n, subsets))
-        shapes |= {f"{name}_again": (tested, subsets) for name in MEASURED}
-        kinds = dict.fromkeys(shapes, REAL) | {"applied": "b", "symmetric": "b", "candidate": "iu"}
-        arrays = load_arrays(path, shapes, kinds)
-        limits = {name: float(arrays[name]) for name in LIMITS}
+        shapes: Shapes = dict.fromkeys(MEASURED, (len(registrations), len(SUBSETS))) | dict.fromkeys(LIMITS, ())
+        shapes |= {f"{name}_again": (tested, len(SUBSETS)) for name in MEASURED}
+        measured = load_arrays(path, shapes, dict.fromkeys(shapes, REAL))
+        limits = {name: float(measured[name]) for name in LIMITS}
         truth, truth_again = (
-            Truth(arrays[f"error{again}"], arrays[f"uncertainty{again}"], **limits) for again in ("", "_again")
+            Truth(measured[f"error{again}"], measured[f"uncertainty{again}"], **limits) for again in ("", "_again")
         )
-        return cls(
-            registrations=registrations,
-            truth=truth,
-            truth_again=truth_again,
-            **{name: arrays[name] for name in COLUMNS},
-        )
+        arrays = cls.read(path, None, S=len(registrations))
+        return cls(**arrays, registrations=registrations, truth=truth, truth_again=truth_again)
 
 
 MEASURED = ("error", "uncertainty")
 LIMITS = tuple(field.name for field in fields(Truth) if field.name not in MEASURED)
-COLUMNS = tuple(field.name for field in fields(Causes) if field.name not in ("registrations", "truth", "truth_again"))
 
 
 def labels_of(truth: Truth) -> np.ndarray:

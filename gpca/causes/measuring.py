@@ -10,7 +10,7 @@ import numpy as np
 
 from gpca.alignment.rigid import inverse, scale_translation, transform
 from gpca.causes.counterfactuals import Counterfactuals, Registrar
-from gpca.causes.dataset import COLUMNS, Causes
+from gpca.causes.dataset import Causes
 from gpca.causes.settings import CauseSettings
 from gpca.causes.shapley import SUBSETS
 from gpca.causes.subjects import Subject
@@ -99,7 +99,7 @@ def as_causes(records: list[dict[str, Any]], axes: Axes) -> tuple[Causes, np.nda
     registrations, icp_seconds_S = as_registrations(
         [record | {"concept": concept} for record, concept in zip(records, concept_S, strict=True)], axes
     )
-    columns = {name: np.array([record[name] for record in records]) for name in COLUMNS}
+    columns: dict[str, Any] = {name: np.array([record[name] for record in records]) for name in Causes.array_fields()}
     tested = [record["again"] for record in records if "again" in record]
     again = joined(tested) if tested else truth.subset(np.array([], int))
-    return Causes(registrations, **columns, truth=truth, truth_again=again), icp_seconds_S
+    return Causes(registrations=registrations, **columns, truth=truth, truth_again=again), icp_seconds_S

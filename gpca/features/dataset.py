@@ -2,70 +2,50 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from time import perf_counter
 
 import numpy as np
 
 from gpca.alignment.icp import ICPSettings
 from gpca.causes.dataset import Causes
-from gpca.errors import InputError
 from gpca.features.distances import describe_distances
 from gpca.features.entropy import ENTROPY, describe_entropy
 from gpca.features.motion import STARTS, describe_motion, describe_starts
 from gpca.features.pair import ObservedPair, observed_pair
 from gpca.features.remedied import describe_remedied
 from gpca.features.settings import DENSITIES, GROUPS, MOTION, QUANTILES, REMEDIED, DescriptorSettings
-from gpca.io.arrays import REAL, REGENERATE, TEXT, WHOLE, load_arrays, save_arrays
-from gpca.io.names import Axes
-from gpca.pairs.dataset import Registrations
+from gpca.io.arrays import TEXT, WHOLE
+from gpca.io.container import Container, array
 from gpca.process.progress import progress
-
-WIDTHS = {  # of the groups
-    "distances": 4 * QUANTILES,
-    "planes": 3 * QUANTILES + len(DENSITIES),
-    "motion": len(MOTION),
-    "starts": len(STARTS),
-    "remedied": len(REMEDIED),
-    "entropy": len(ENTROPY),
-}
 
 
 @dataclass(frozen=True)
-class Descriptors:
+class Descriptors(Container):
     """The descriptors of S registrations.
 
     Attributes:
         sample, split: (S,) as in the registrations.
-        groups: name in `GROUPS` -> (S, F); the modules of this folder say what their numbers are.
-        axes: the source and the seed of the registrations.
+        distances, planes, motion, starts, remedied, entropy: (S, F) groups; the modules of this folder say what their
+            numbers are.
     """
 
-    sample: np.ndarray
-    split: np.ndarray
-    groups: Mapping[str, np.ndarray]
-    axes: Axes | None
+    sample: np.ndarray = array("S", WHOLE)
+    split: np.ndarray = array("S", TEXT)
+    distances: np.ndarray = array(f"S {4 * QUANTILES}")
+    planes: np.ndarray = array(f"S {3 * QUANTILES + len(DENSITIES)}")
+    motion: np.ndarray = array(f"S {len(MOTION)}")
+    starts: np.ndarray = array(f"S {len(STARTS)}")
+    remedied: np.ndarray = array(f"S {len(REMEDIED)}")
+    entropy: np.ndarray = array(f"S {len(ENTROPY)}")
 
-    def save(self, path: str | Path) -> None:
-        """Write an npz with an array for each group."""
-        save_arrays(path, {"sample": self.sample, "split": self.split, **self.groups}, self.axes)
+    @property
+    def groups(self) -> dict[str, np.ndarray]:
+        """The descriptors (S, F) by group."""
+        return {name: getattr(self, name) for name in GROUPS}
 
-    @classmethod
-    def load(cls, path: str | Path, registrations: Registrations) -> Descriptors:
-        """Read the npz of these registrations.
 
-        Raises:
-            InputError: the file is missing, damaged, of other samples, of another source or seed, or holds wrong
-                shapes or NaN.
-        """
-        shapes: dict[str, tuple[int | str, ...]] = {name: ("S", WIDTHS[name]) for name in GROUPS}
-        kinds = dict.fromkeys(GROUPS, REAL) | {"sample": WHOLE, "split": TEXT}
-        arrays = load_arrays(path, shapes | {"sample": ("S",), "split": ("S",)}, kinds, registrations.axes)
-        if not all(np.array_equal(arrays[name], getattr(registrations, name)) for name in ("sample", "split")):
-            raise InputError(path, "its samples differ from those of the registrations", REGENERATE)
-        return cls(arrays["sample"], arrays["split"], {name: arrays[name] for name in GROUPS}, registrations.axes)
+WIDTHS = {name: int(Descriptors.array_fields()[name].shape[1]) for name in GROUPS}
 
 
 def describe_plainly(pair: ObservedPair, icp: ICPSettings) -> dict[str, np.ndarray]:
@@ -100,5 +80,5 @@ def describe_all(
         icp_seconds.append(remedies)
     registrations = causes.registrations
     groups = {name: np.array([described[name] for described in rows]) for name in GROUPS}
-    all_described = Descriptors(registrations.sample, registrations.split, groups, registrations.axes)
+    all_described = Descriptors(registrations.sample, registrations.split, **groups, axes=registrations.axes)
     return all_described, np.array(seconds), np.array(icp_seconds)

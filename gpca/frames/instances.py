@@ -5,9 +5,8 @@ from __future__ import annotations
 import sys
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -35,22 +34,19 @@ from gpca.frames.plausibility import (
     spread,
 )
 from gpca.frames.shots import Sighting
-from gpca.io.arrays import REGENERATE, TEXT, WHOLE, load_arrays, save_arrays
+from gpca.io.arrays import TEXT, WHOLE
+from gpca.io.container import FLAG, FLOAT, Container, array
 from gpca.objects.bop import find_symmetries
 from gpca.objects.canonical import ObjectClouds
 from gpca.objects.splits import DRAWN, unseen
 from gpca.process.progress import progress
 from gpca.seeds import generator, seed_of
 
-if TYPE_CHECKING:
-    pass
-
-
 NO_COLOR = "none"
 
 
 @dataclass(frozen=True)
-class Instances:
+class Instances(Container):
     """I objects in frames. The object frame is that of the canonical cloud, centered on its bounding box.
 
     Attributes:
@@ -67,31 +63,28 @@ class Instances:
         pixels: (ΣP, 2) int32, where each was seen, (u, v).
     """
 
-    dataset: np.ndarray
-    scene: np.ndarray
-    image: np.ndarray
-    object_index: np.ndarray
-    symmetric: np.ndarray
-    T_camera_object_true: np.ndarray
-    T_camera_object_init: np.ndarray
-    init_from: np.ndarray
-    camera_3_3: np.ndarray
-    colour: np.ndarray
-    fold: np.ndarray
-    points_m: np.ndarray
-    pixels: np.ndarray
-    offsets: np.ndarray
-
-    def __len__(self) -> int:
-        return len(self.scene)
+    dataset: np.ndarray = array("I", TEXT)
+    scene: np.ndarray = array("I", WHOLE)
+    image: np.ndarray = array("I", WHOLE)
+    object_index: np.ndarray = array("I", WHOLE)
+    symmetric: np.ndarray = array("I", FLAG)
+    T_camera_object_true: np.ndarray = array("I 4 4", FLOAT)
+    T_camera_object_init: np.ndarray = array("I 4 4", FLOAT)
+    init_from: np.ndarray = array("I", TEXT)
+    camera_3_3: np.ndarray = array("I 3 3", FLOAT)
+    colour: np.ndarray = array("I", TEXT)
+    fold: np.ndarray = array("I", WHOLE)
+    points_m: np.ndarray = array("P 3", FLOAT, offsets="offsets", fewest=3)
+    pixels: np.ndarray = array("P 2", WHOLE, offsets="offsets", fewest=3)
+    offsets: np.ndarray = array("I+1", WHOLE)
 
     def cloud_m(self, i: int) -> np.ndarray:
         """Return the measured points (P, 3) of instance i."""
-        return self.points_m[self.offsets[i] : self.offsets[i + 1]]
+        return self.part("points_m", i)
 
     def pixels_of(self, i: int) -> np.ndarray:
         """Return the pixels (P, 2) of instance i."""
-        return self.pixels[self.offsets[i] : self.offsets[i + 1]]
+        return self.part("pixels", i)
 
     def sighting(self, i: int) -> Sighting:
         """Return what was measured of instance i."""
@@ -130,26 +123,6 @@ class Instances:
         sizes_G = np.bincount(scene_n, minlength=len(scenes))[scenes]
         n_test = 1 + int(np.sum(np.cumsum(sizes_G)[:-1] < test_share * len(scene_n)))
         return np.isin(scene_n, scenes[: min(n_test, len(scenes) - 1)])
-
-    def save(self, path: str | Path, source: str) -> None:
-        """Write the npz described in results/README.md."""
-        save_arrays(path, {field.name: getattr(self, field.name) for field in fields(self)}, (source, None))
-
-    @classmethod
-    def load(cls, path: str | Path, source: str | None = None) -> Instances:
-        """Read the npz; InputError where it is missing, damaged, inconsistent or of another source than this."""
-        shapes: dict[str, tuple[int | str, ...]] = {field.name: ("I",) for field in fields(cls)}
-        shapes |= {name: ("I", 4, 4) for name in shapes if name.startswith("T_")}
-        shapes |= {"camera_3_3": ("I", 3, 3), "points_m": ("P", 3), "pixels": ("P", 2), "offsets": ("O",)}
-        kinds = dict.fromkeys(shapes, WHOLE) | dict.fromkeys(("camera_3_3", "points_m"), "f")
-        kinds |= {name: "f" for name in shapes if name.startswith("T_")}
-        kinds |= dict.fromkeys(("dataset", "colour", "init_from"), TEXT) | {"symmetric": "b"}
-        arrays = load_arrays(path, shapes, kinds, None if source is None else (source, None))
-        offsets = arrays["offsets"]
-        whole = len(offsets) == len(arrays["scene"]) + 1 and offsets[0] == 0 and offsets[-1] == len(arrays["points_m"])
-        if not whole or len(offsets) == 1 or (np.diff(offsets) < 3).any():
-            raise InputError(path, "'offsets' do not match 'points_m' and 'scene'", REGENERATE)
-        return cls(**{name: arrays[name] for name in shapes})
 
 
 def points_on_model(instances: Instances, objects: ObjectClouds, most_points: int | None = None) -> np.ndarray:
@@ -222,10 +195,12 @@ def read_instances(
         rows.append(row | {"T_camera_object_init": T_init, "init_from": init_from})
     for fault in left_out:
         print(f"skipped: {fault}", file=sys.stderr)
-    columns = {name: np.array([row[name] for row in rows]) for name in rows[0] if name not in ("points_m", "pixels")}
-    ragged = {name: np.concatenate([row[name] for row in rows]) for name in ("points_m", "pixels")}
+    columns: dict[str, Any] = {
+        name: np.array([row[name] for row in rows]) for name in rows[0] if name not in ("points_m", "pixels")
+    }
+    columns |= {name: np.concatenate([row[name] for row in rows]) for name in ("points_m", "pixels")}
     offsets = np.cumsum([0, *(len(row["points_m"]) for row in rows)], dtype=np.int64)
-    return Instances(**columns, **ragged, offsets=offsets)
+    return Instances(**columns, offsets=offsets)
 
 
 def _from_results(datasets: Mapping[str, tuple[Dataset, list[Frame], dict]], seen: list) -> Any:

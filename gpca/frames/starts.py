@@ -12,8 +12,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
-from pathlib import Path
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -21,8 +20,8 @@ from gpca.alignment.rigid import inverse, scale_translation
 from gpca.frames.dataset import CenteredModel, Dataset
 from gpca.frames.initial_pose import EstimatorErrors, error_of, estimates_of, read_pose_errors
 from gpca.frames.instances import Instances
-from gpca.io.arrays import REAL, TEXT, WHOLE, load_arrays, save_arrays
-from gpca.io.names import Axes
+from gpca.io.arrays import TEXT, WHOLE
+from gpca.io.container import Container, array
 from gpca.objects import splits
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.perturbation import misplacement
@@ -33,7 +32,7 @@ GLOBAL = "global_registration"  # runs on the very image, as estimators do
 
 
 @dataclass(frozen=True)
-class Starts:
+class Starts(Container):
     """K starts.
 
     Attributes:
@@ -43,30 +42,10 @@ class Starts:
         T_camera_object_init: (K, 4, 4) meters.
     """
 
-    instance: np.ndarray
-    kind: np.ndarray
-    init_from: np.ndarray
-    T_camera_object_init: np.ndarray
-
-    def __len__(self) -> int:
-        return len(self.instance)
-
-    def subset(self, rows: np.ndarray) -> Starts:
-        """Return the given rows."""
-        return Starts(*(getattr(self, field.name)[rows] for field in fields(self)))
-
-    def save(self, path: str | Path, axes: Axes) -> None:
-        """Write the npz described in results/README.md, of this source and seed."""
-        save_arrays(path, {field.name: getattr(self, field.name) for field in fields(self)}, axes)
-
-    @classmethod
-    def load(cls, path: str | Path, axes: Axes) -> Starts:
-        """Read the npz; InputError where it is missing, damaged, or of another source or seed."""
-        shapes: dict[str, tuple[int | str, ...]] = {field.name: ("K",) for field in fields(cls)}
-        shapes |= {"T_camera_object_init": ("K", 4, 4)}
-        kinds = {"instance": WHOLE, "kind": TEXT, "init_from": TEXT, "T_camera_object_init": REAL}
-        arrays = load_arrays(path, shapes, kinds, axes)
-        return cls(**{name: arrays[name] for name in shapes})
+    instance: np.ndarray = array("K", WHOLE)
+    kind: np.ndarray = array("K", TEXT)
+    init_from: np.ndarray = array("K", TEXT)
+    T_camera_object_init: np.ndarray = array("K 4 4")
 
 
 def all_starts(

@@ -51,8 +51,8 @@ def load_arrays(
 
     Args:
         path: the file.
-        shapes: for each needed array its shape; a number must match, a letter (``"S"``) must be the
-            same size wherever it occurs.
+        shapes: for each needed array its shape; a number must match, a name (``"S"``) must be the same size wherever
+            it occurs, and ``"S+1"`` one more.
         kinds: for some of them what they may hold: `TEXT`, `WHOLE` or `REAL`. Any other may hold each of these.
         axes: the source and seed that the file has to be of; it may be of any where this is None.
         optional: arrays that may be missing, as ``source`` in a file that a user's own program wrote.
@@ -83,7 +83,7 @@ def load_arrays(
 
 
 def axes_in(arrays: Mapping[str, np.ndarray]) -> Axes:
-    """Return the source and the seed that arrays are of; those of objects have no seed."""
+    """Return the source and the seed that arrays name; objects of a source have no seed."""
     return str(arrays["source"]), int(arrays["seed"]) if "seed" in arrays else None
 
 
@@ -152,10 +152,14 @@ def _read_array(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> np.ndarray:
 
 
 def _check_shape(path, name, actual, shape, sizes, remedy) -> None:
-    matches = len(actual) == len(shape) and all(
-        sizes.setdefault(size, length) == length if isinstance(size, str) else size == length
-        for size, length in zip(shape, actual, strict=True)
-    )
-    if not matches:
-        expected = "×".join(str(sizes.get(size, size)) for size in shape) or "scalar"
-        raise InputError(path, f"array '{name}' is {'×'.join(map(str, actual)) or 'scalar'}, not {expected}", remedy)
+    expected: list[int | str] = []
+    for number, size in enumerate(shape):
+        if isinstance(size, str):
+            dimension, _, more = size.partition("+")
+            if len(actual) == len(shape):
+                sizes.setdefault(dimension, actual[number] - int(more or 0))
+            size = sizes[dimension] + int(more or 0) if dimension in sizes else size
+        expected.append(size)
+    if list(actual) != expected:
+        wanted = "×".join(map(str, expected)) or "scalar"
+        raise InputError(path, f"array '{name}' is {'×'.join(map(str, actual)) or 'scalar'}, not {wanted}", remedy)

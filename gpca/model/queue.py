@@ -3,24 +3,26 @@
 from __future__ import annotations
 
 import zipfile
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 
 from gpca.errors import InputError
-from gpca.io.arrays import REAL, TEXT, WHOLE, load_arrays, save_arrays
+from gpca.io.arrays import TEXT, WHOLE, save_arrays
+from gpca.io.container import Container, array
+from gpca.io.names import Axes
 from gpca.model.scene import Scene
 from gpca.pairs.dataset import ragged
 
 VERSION = 1  # of the file; also what tells it from registrations of a run
 MARK = "queued"
 LONGEST_NAME = 200  # letters
-OF_ROW = ("cloud", "target")
 
 
 @dataclass(frozen=True)
-class Queue:
+class Queue(Container):
     """S registrations without labels, in the canonical frames and the diameters of their targets.
 
     Attributes:
@@ -30,48 +32,26 @@ class Queue:
             them.
     """
 
-    object_name: np.ndarray
-    h: np.ndarray
-    points: np.ndarray
-    offsets: np.ndarray
-    target_points: np.ndarray
-    target_offsets: np.ndarray
+    remedy: ClassVar[str] = "queue the registrations again"
 
-    def __len__(self) -> int:
-        return len(self.object_name)
+    object_name: np.ndarray = array("S", TEXT)
+    h: np.ndarray = array("S d")
+    points: np.ndarray = array("P 3", offsets="offsets")
+    offsets: np.ndarray = array("S+1", WHOLE)
+    target_points: np.ndarray = array("Q 3", offsets="target_offsets")
+    target_offsets: np.ndarray = array("S+1", WHOLE)
 
     def cloud(self, i: int) -> np.ndarray:
         """Return the aligned source cloud (P, 3) of row i."""
-        return self.points[self.offsets[i] : self.offsets[i + 1]]
+        return self.part("points", i)
 
     def target(self, i: int) -> np.ndarray:
         """Return the target cloud (Q, 3) of row i."""
-        return self.target_points[self.target_offsets[i] : self.target_offsets[i + 1]]
+        return self.part("target_points", i)
 
-    def save(self, path: str | Path) -> None:
-        """Write the npz."""
-        arrays = {each.name: getattr(self, each.name) for each in fields(self)}
-        save_arrays(path, arrays | {MARK: np.array(VERSION)})
-
-    @classmethod
-    def load(cls, path: str | Path) -> Queue:
-        """Read the npz.
-
-        Raises:
-            InputError: missing, damaged, or clouds that do not fit their offsets.
-        """
-        shapes: dict[str, tuple[int | str, ...]] = {"object_name": ("S",), "h": ("S", "d"), "points": ("P", 3)}
-        shapes |= {"target_points": ("Q", 3), "offsets": ("O",), "target_offsets": ("O",), MARK: ()}
-        kinds = dict.fromkeys(shapes, REAL) | {"object_name": TEXT}
-        kinds |= dict.fromkeys(("offsets", "target_offsets", MARK), WHOLE)
-        arrays = load_arrays(path, shapes, kinds)
-        arrays.pop(MARK)
-        for points, ends in (("points", "offsets"), ("target_points", "target_offsets")):
-            offsets = arrays[ends]
-            whole = len(offsets) == len(arrays["h"]) + 1 and offsets[0] == 0 and offsets[-1] == len(arrays[points])
-            if not whole or (np.diff(offsets) < 1).any():
-                raise InputError(path, f"'{ends}' do not match '{points}'", "queue the registrations again")
-        return cls(**arrays)
+    def save(self, path: str | Path, axes: Axes | None = None) -> None:
+        """Write the npz, marked as a queue."""
+        save_arrays(path, self.arrays | {MARK: np.array(VERSION)}, axes)
 
 
 def is_queue(path: str | Path) -> bool:
@@ -107,7 +87,5 @@ def add_to_queue(path: str | Path, scene: Scene, h_1_d: np.ndarray, name: str) -
     before = Queue.load(path)
     if before.h.shape[1] != one.h.shape[1]:
         raise InputError(path, "is a queue of another model", "name another file with --queue")
-    clouds, targets = ([getattr(part, of)(i) for part in (before, one) for i in range(len(part))] for of in OF_ROW)
-    both = {name: np.concatenate([getattr(before, name), getattr(one, name)]) for name in ("object_name", "h")}
-    replace(one, **both, **ragged(clouds, targets)).save(path)
+    Queue.joined([before, one]).save(path)
     return len(before) + 1

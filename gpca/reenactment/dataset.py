@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from time import perf_counter
 
 import numpy as np
@@ -14,11 +13,10 @@ from gpca.alignment.rigid import transform
 from gpca.causes.dataset import LABELS, Causes
 from gpca.causes.settings import CauseSettings
 from gpca.causes.shapley import SUBSETS
-from gpca.errors import InputError
 from gpca.features.dataset import WIDTHS, describe_plainly
 from gpca.features.pair import ObservedPair, observed_pair
-from gpca.io.arrays import REAL, REGENERATE, TEXT, WHOLE, load_arrays, save_arrays
-from gpca.io.names import Axes
+from gpca.io.arrays import TEXT, WHOLE
+from gpca.io.container import Container, array
 from gpca.pairs.dataset import Registrations
 from gpca.process.progress import progress
 from gpca.reenactment.enactment import Enactment, reenact
@@ -28,18 +26,10 @@ from gpca.reenactment.verdict import verdict
 
 MEASURED = ("log_likelihood", "width", "covered", "noise", "outliers", "missing", "to_start", "to_result")
 DESCRIBED = ("distances", "planes", "motion", "starts")  # groups of descriptors, without further registrations
-SHAPES: dict[str, tuple[int | str, ...]] = {
-    "weight": ("S", "K"),
-    "T_model_observed": ("S", "K", 4, 4),
-    "error": ("S", "K", len(SUBSETS)),
-    "uncertainty": ("S", "K", len(SUBSETS)),
-    "measured": ("S", "K", len(MEASURED)),
-    "described": ("S", sum(WIDTHS[group] for group in DESCRIBED)),
-}
 
 
 @dataclass(frozen=True)
-class Reenactments:
+class Reenactments(Container):
     """The re-enactments of S registrations under K hypotheses each, the most probable first.
 
     Where a pair has fewer hypotheses, its first stands in the place of the others, with weight 0.
@@ -55,26 +45,24 @@ class Reenactments:
             points then lie from where the registration began, and from where it ended.
         described: (S, F) the groups `DESCRIBED` of descriptors (:mod:`gpca.features`), side by side.
         verdict: (S, 4) of :func:`gpca.reenactment.verdict.verdict`.
-        axes: the source and the seed of the registrations.
     """
 
-    sample: np.ndarray
-    split: np.ndarray
-    weight: np.ndarray
-    T_model_observed: np.ndarray
-    error: np.ndarray
-    uncertainty: np.ndarray
-    measured: np.ndarray
-    described: np.ndarray
-    verdict: np.ndarray
-    axes: Axes | None
+    sample: np.ndarray = array("S", WHOLE)
+    split: np.ndarray = array("S", TEXT)
+    weight: np.ndarray = array("S K")
+    T_model_observed: np.ndarray = array("S K 4 4")
+    error: np.ndarray = array(f"S K {len(SUBSETS)}")
+    uncertainty: np.ndarray = array(f"S K {len(SUBSETS)}")
+    measured: np.ndarray = array(f"S K {len(MEASURED)}")
+    described: np.ndarray = array(f"S {sum(WIDTHS[group] for group in DESCRIBED)}")
+    verdict: np.ndarray = array(f"S {len(LABELS)}")
 
     @classmethod
     def of_rows(
         cls, rows: Sequence[Mapping[str, np.ndarray]], truth: CauseSettings, registrations: Registrations | None = None
     ) -> Reenactments:
         """Return those of the rows of pairs (:func:`row_of`), which may be of no registrations of a file."""
-        arrays = {name: np.array([row[name] for row in rows]) for name in SHAPES}
+        arrays = {name: np.array([row[name] for row in rows]) for name in rows[0]}
         return cls(
             sample=np.arange(len(rows)) if registrations is None else registrations.sample,
             split=np.full(len(rows), "") if registrations is None else registrations.split,
@@ -82,26 +70,6 @@ class Reenactments:
             verdict=verdict(arrays["error"], arrays["weight"], truth.limits),
             axes=None if registrations is None else registrations.axes,
         )
-
-    def save(self, path: str | Path) -> None:
-        """Write the npz described in results/README.md."""
-        names = ("sample", "split", *SHAPES, "verdict")
-        save_arrays(path, {name: getattr(self, name) for name in names}, self.axes)
-
-    @classmethod
-    def load(cls, path: str | Path, registrations: Registrations) -> Reenactments:
-        """Read the npz of these registrations.
-
-        Raises:
-            InputError: the file is missing, damaged, of other samples, of another source or seed, or holds wrong
-                shapes or NaN.
-        """
-        shapes = SHAPES | {"sample": ("S",), "split": ("S",), "verdict": ("S", len(LABELS))}
-        kinds = dict.fromkeys(shapes, REAL) | {"sample": WHOLE, "split": TEXT}
-        arrays = load_arrays(path, shapes, kinds, registrations.axes)
-        if not all(np.array_equal(arrays[name], getattr(registrations, name)) for name in ("sample", "split")):
-            raise InputError(path, "its samples differ from those of the registrations", REGENERATE)
-        return cls(**{name: arrays[name] for name in shapes}, axes=registrations.axes)
 
 
 def reenact_all(

@@ -9,88 +9,65 @@ from pathlib import Path
 import numpy as np
 
 from gpca.errors import InputError
-from gpca.io.arrays import REAL, TEXT, WHOLE, load_arrays, save_arrays
-from gpca.io.names import Axes
+from gpca.io.arrays import TEXT, WHOLE
+from gpca.io.container import FLAG, Container, array
 from gpca.scans.pair import ScanPair
-
-SHAPES: dict[str, tuple[int | str, ...]] = {
-    "points": ("P", 3),  # of all scans one after another, in meters, each in its own frame
-    "offsets": ("F1",),  # where each scan begins, and where the last one ends
-    "scan": ("F",),  # name of each
-    "viewpoint": ("F", 3),  # of each scan, m; 0 where it is not known
-    "viewpoint_known": ("F",),
-    "target": ("K",),  # of each pair, the number of the scan
-    "source_scan": ("K",),
-    "T_target_source": ("K", 4, 4),
-    "overlap": ("K",),
-    "scene": ("K",),
-    "kind": ("K",),
-    "size_m": ("K",),
-    "cluster": ("K",),
-}
-KINDS = {
-    "points": REAL,
-    "offsets": WHOLE,
-    "scan": TEXT,
-    "viewpoint": REAL,
-    "viewpoint_known": "b",
-    "target": WHOLE,
-    "source_scan": WHOLE,
-    "T_target_source": REAL,
-    "overlap": REAL,
-    "scene": TEXT,
-    "kind": TEXT,
-    "size_m": REAL,
-    "cluster": TEXT,
-}
 
 
 @dataclass(frozen=True)
-class ScanPairs:
+class ScanPairs(Container):
     """Pairs of scans of one data set and seed: ``for pair in ScanPairs.load(path)``, ``pairs[3]``, ``len(pairs)``.
 
     Attributes:
-        arrays: by the names of `SHAPES`.
+        points: (ΣN, 3) of all F scans one after another, in meters, each in its frame.
+        offsets: (F + 1,) where each scan begins, and where the last one ends.
+        scan: (F,) names.
+        viewpoint, viewpoint_known: (F, 3) m, 0 where it is unknown, and (F,) whether it is known.
+        target, source_scan: (K,) numbers of each pair's scans.
+        T_target_source, overlap, scene, kind, size_m: (K, …) as in :class:`gpca.scans.pair.ScanPair`.
+        cluster: (K,) what pairs are clustered and split by: the scene, or its family.
     """
 
-    arrays: dict[str, np.ndarray]
-
-    @property
-    def cluster(self) -> np.ndarray:
-        """What each pair (K,) is clustered and split by: its scene, or the family of that."""
-        return self.arrays["cluster"]
+    points: np.ndarray = array("P 3", offsets="offsets", fewest=3)
+    offsets: np.ndarray = array("F+1", WHOLE)
+    scan: np.ndarray = array("F", TEXT)
+    viewpoint: np.ndarray = array("F 3")
+    viewpoint_known: np.ndarray = array("F", FLAG)
+    target: np.ndarray = array("K", WHOLE, least=0)
+    source_scan: np.ndarray = array("K", WHOLE, least=0)
+    T_target_source: np.ndarray = array("K 4 4")
+    overlap: np.ndarray = array("K")
+    scene: np.ndarray = array("K", TEXT)
+    kind: np.ndarray = array("K", TEXT, choices=("room", "object"))
+    size_m: np.ndarray = array("K")
+    cluster: np.ndarray = array("K", TEXT)
 
     def __len__(self) -> int:
-        return len(self.arrays["overlap"])
+        return len(self.overlap)
 
     def __iter__(self) -> Iterator[ScanPair]:
         return (self[k] for k in range(len(self)))
 
     def __getitem__(self, k: int) -> ScanPair:
         """Return pair number k; its points are float64."""
-        of, (source, target) = self.arrays, (int(self.arrays[name][k]) for name in ("source_scan", "target"))
+        source, target = int(self.source_scan[k]), int(self.target[k])
         return ScanPair(
-            self._points(source),
-            self._points(target),
-            of["T_target_source"][k],
-            overlap=float(of["overlap"][k]),
-            scene=str(of["scene"][k]),
-            kind="object" if of["kind"][k] == "object" else "room",
-            size_m=float(of["size_m"][k]),
-            source_name=str(of["scan"][source]),
-            target_name=str(of["scan"][target]),
+            self.part("points", source).astype(np.float64),
+            self.part("points", target).astype(np.float64),
+            self.T_target_source[k],
+            overlap=float(self.overlap[k]),
+            scene=str(self.scene[k]),
+            kind="object" if self.kind[k] == "object" else "room",
+            size_m=float(self.size_m[k]),
+            source_name=str(self.scan[source]),
+            target_name=str(self.scan[target]),
             source_viewpoint_3=self._viewpoint(source),
             target_viewpoint_3=self._viewpoint(target),
-            family=str(of["cluster"][k]),
+            family=str(self.cluster[k]),
         )
 
-    def _points(self, scan: int) -> np.ndarray:
-        first, last = self.arrays["offsets"][scan : scan + 2]
-        return self.arrays["points"][first:last].astype(np.float64)
-
     def _viewpoint(self, scan: int) -> np.ndarray | None:
-        known = self.arrays["viewpoint_known"][scan]
-        return self.arrays["viewpoint"][scan].astype(np.float64) if known else None
+        return self.viewpoint[scan].astype(np.float64) if self.viewpoint_known[scan] else None
 
     @classmethod
     def of(cls, pairs: Iterable[ScanPair]) -> ScanPairs:
@@ -109,40 +86,23 @@ class ScanPairs:
             rows.append((number[pair.scene, pair.source_name], number[pair.scene, pair.target_name]))
         row_K_2 = np.array(rows, np.int64).reshape(-1, 2)
         return cls(
-            {
-                "points": np.concatenate([points for _, points, _ in scans]).astype(np.float32),
-                "offsets": np.cumsum([0, *(len(points) for _, points, _ in scans)]),
-                "scan": np.array([name for name, _, _ in scans]),
-                "viewpoint": np.array([np.zeros(3) if at is None else at for _, _, at in scans], np.float64),
-                "viewpoint_known": np.array([at is not None for _, _, at in scans]),
-                "target": row_K_2[:, 1],
-                "source_scan": row_K_2[:, 0],
-                "T_target_source": np.array([pair.T_target_source for pair in pairs]),
-                "overlap": np.array([pair.overlap for pair in pairs]),
-                "scene": np.array([pair.scene for pair in pairs]),
-                "kind": np.array([pair.kind for pair in pairs]),
-                "size_m": np.array([pair.size_m for pair in pairs]),
-                "cluster": np.array([pair.cluster for pair in pairs]),
-            }
+            points=np.concatenate([points for _, points, _ in scans]).astype(np.float32),
+            offsets=np.cumsum([0, *(len(points) for _, points, _ in scans)]),
+            scan=np.array([name for name, _, _ in scans]),
+            viewpoint=np.array([np.zeros(3) if at is None else at for _, _, at in scans], np.float64),
+            viewpoint_known=np.array([at is not None for _, _, at in scans]),
+            target=row_K_2[:, 1],
+            source_scan=row_K_2[:, 0],
+            T_target_source=np.array([pair.T_target_source for pair in pairs]),
+            overlap=np.array([pair.overlap for pair in pairs]),
+            scene=np.array([pair.scene for pair in pairs]),
+            kind=np.array([pair.kind for pair in pairs]),
+            size_m=np.array([pair.size_m for pair in pairs]),
+            cluster=np.array([pair.cluster for pair in pairs]),
         )
 
-    def save(self, path: str | Path, axes: Axes | None = None) -> None:
-        """Write the file, of a data set and seed."""
-        save_arrays(path, self.arrays, axes)
-
-    @classmethod
-    def load(cls, path: str | Path, axes: Axes | None = None) -> ScanPairs:
-        """Read the file, and check it.
-
-        Raises:
-            InputError: what :func:`gpca.io.arrays.load_arrays` raises, or arrays that do not belong together.
-        """
-        arrays = load_arrays(path, SHAPES, KINDS, axes)
-        offsets_F1, scans = arrays["offsets"], len(arrays["scan"])
-        rows = np.concatenate([arrays["target"], arrays["source_scan"]])
-        ends = len(offsets_F1) == scans + 1 and offsets_F1[0] == 0 and offsets_F1[-1] == len(arrays["points"])
-        if not ends or (np.diff(offsets_F1) < 3).any() or (rows < 0).any() or (rows >= scans).any():
-            raise InputError(path, "its pairs and scans do not belong together", "regenerate it with Snakemake")
-        if not set(arrays["kind"].tolist()) <= {"room", "object"}:
-            raise InputError(path, "has a scene that is neither a room nor an object", "regenerate it with Snakemake")
-        return cls(arrays)
+    def check(self, path: str | Path) -> None:
+        """Raise an InputError also where a pair names a scan that the file lacks."""
+        super().check(path)
+        if (np.concatenate([self.target, self.source_scan]) >= len(self.scan)).any():
+            raise InputError(path, "its pairs and scans do not belong together", self.remedy)

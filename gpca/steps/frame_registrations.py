@@ -21,7 +21,7 @@ def run(job: Job) -> None:
     settings = FrameSettings(**own, registration=RegistrationSettings.from_dict(of_registrations))
     inputs, name = [job.instances, job.objects], job.get("name", job.source)
     with record_provenance([job.registrations, job.poses, job.timings], inputs, job.settings, seed=job.seed):
-        instances = Instances.load(job.instances, name)
+        instances = Instances.load(job.instances, (name, None))
         objects = ObjectClouds.load(job.objects, name)
         require_of_objects(instances, objects, job.instances)
         made = make_frame_registrations(instances, objects, job.source, job.seed, settings)

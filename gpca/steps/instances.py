@@ -34,7 +34,7 @@ def run(job: Job) -> None:
         instances = read_instances(read, objects, initial_pose)
         named = job.get("name", job.source)
         objects.save(job.objects, named)
-        instances.save(job.instances, named)
+        instances.save(job.instances, (named, None))
     for name in datasets:
         medians_m = points_on_model(instances, objects)[instances.dataset == name]
         print(

@@ -25,7 +25,10 @@ def run(job: Job) -> None:
     with record_provenance([job.reenactments], inputs, job.settings, seed=job.seed):
         axes = (job.source, job.seed)
         causes, starts = Causes.load(job.frame_causes, axes), Starts.load(job.starts, axes)
-        instances, objects = Instances.load(job.instances, job.source), ObjectClouds.load(job.objects, job.source)
+        instances, objects = (
+            Instances.load(job.instances, (job.source, None)),
+            ObjectClouds.load(job.objects, job.source),
+        )
         require_of_objects(instances, objects, job.instances)
         places = job.get("scenes"), job.get("splits"), job.settings.get("role", EVALUATION)
         models = models_of(datasets_of(job.section("datasets"), job.data_dir, job.downloads, *places))

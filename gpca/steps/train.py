@@ -13,7 +13,7 @@ from gpca.encoders.registry import EncoderSettings
 from gpca.encoders.training import load_model, train_encoder, write_weights
 from gpca.errors import InputError
 from gpca.io.csv_file import write_csv
-from gpca.pairs.dataset import Registrations, joined, read_instances_of
+from gpca.pairs.dataset import Registrations, read_instances_of
 from gpca.pairs.synthesis import read_as
 from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
@@ -27,7 +27,7 @@ def run(job: Job) -> None:
     files = job.files("registrations")
     sources = job.get("registrations_of", [job.source])
     parts = [Registrations.load(path, (source, job.seed)) for path, source in zip(files, sources, strict=True)]
-    registrations = joined(parts)
+    registrations = Registrations.joined(parts)
     # Clouds of frames are as small as objects look, so some of their points are drawn twice; others are as configured.
     if poses is None and settings.draw_points > (most := int(np.diff(registrations.offsets).max())):
         fault = f"the largest cloud has {most} points, fewer than draw_points, {settings.draw_points}"

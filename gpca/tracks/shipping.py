@@ -17,6 +17,7 @@ from gpca.experiments.diagnosis.experiment import shown as titles_and_costs
 from gpca.experiments.frame_causes.metrics import SAMPLE_COLUMNS
 from gpca.experiments.scan_causes.metrics import SAMPLE_COLUMNS as SCAN_COLUMNS
 from gpca.explainers.registry import explainer_entry
+from gpca.io.container import require_same_samples
 from gpca.io.csv_file import ANY, numbers, read_csv
 from gpca.objects.splits import BY_ICP
 from gpca.tracks.published import LIMITS, NO_CALLS, NOTHING_NAMED, Method, Published, Rows, sha256_of_arrays
@@ -114,8 +115,7 @@ def _rows(track: Track, run: Path, tested: Mapping[Part, Causes]) -> Rows:
 
 def _sample_rows(path: Path, columns: tuple[str, ...], sample_N: np.ndarray) -> pd.DataFrame:
     rows = read_csv(path, columns, others=ANY)
-    if rows["sample"].tolist() != [str(number) for number in sample_N]:
-        raise InputError(path, "its samples differ from those of the causes", "regenerate both from the same config")
+    require_same_samples(path, rows, {"sample": sample_N}, "causes", ("sample",))
     return rows
 
 

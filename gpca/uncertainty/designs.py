@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, partial
+from typing import Any
 
 import numpy as np
 
@@ -221,7 +222,7 @@ def evaluate_design(
     for i in progress(range(len(observed)), f"uncertainty ({design}) of {source}, seed {seed}"):
         xi_n_6, random = _random_numbers(observed, i, source, seed, settings)
         rows.append(entry.evaluate(RegisteredRow(observed, i), xi_n_6, settings, random))
-    columns = {
+    columns: dict[str, Any] = {
         name: np.array([[getattr(outcome, name) for outcome in row] for row in rows])
         for name in ("covariance", "residual", "degenerate", "icp_calls", "seconds", "icp_seconds")
     }

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from gpca.errors import InputError
-from gpca.io.arrays import REAL, REGENERATE, TEXT, WHOLE, load_arrays, save_arrays
+from gpca.io.arrays import TEXT, WHOLE
+from gpca.io.container import FLAG, Container, array, require_same_samples
 from gpca.io.csv_file import read_numbers, write_csv
-from gpca.io.names import Axes
 from gpca.pairs.dataset import Registrations
 
 
 @dataclass(frozen=True)
-class Outcomes:
+class Outcomes(Container):
     """S registrations under K conditions.
 
     Attributes:
@@ -28,17 +28,13 @@ class Outcomes:
         icp_calls: (S, K) runs of ICP.
     """
 
-    sample: np.ndarray
-    split: np.ndarray
-    covariance: np.ndarray
-    uncertainty: np.ndarray
-    residual: np.ndarray
-    degenerate: np.ndarray
-    icp_calls: np.ndarray
-
-    def save(self, path: str | Path, axes: Axes) -> None:
-        """Write the npz described in results/README.md; `axes` are the source and the seed."""
-        save_arrays(path, {field.name: getattr(self, field.name) for field in fields(self)}, axes)
+    sample: np.ndarray = array("S", WHOLE)
+    split: np.ndarray = array("S", TEXT)
+    covariance: np.ndarray = array("S K 6 6")
+    uncertainty: np.ndarray = array("S K")
+    residual: np.ndarray = array("S K")
+    degenerate: np.ndarray = array("S K", FLAG)
+    icp_calls: np.ndarray = array("S K", WHOLE)
 
     def write_table(self, path: str | Path, conditions: Sequence[str]) -> None:
         """Write the uncertainties as CSV, in nats, a column for each of the K conditions, for readers and metrics."""
@@ -62,19 +58,6 @@ class Outcomes:
         chosen = registrations.subset(np.array(rows))
         return replace(chosen, attached={**chosen.attached, **own, **seconds})
 
-    @classmethod
-    def load(cls, path: str | Path, axes: Axes | None = None) -> Outcomes:
-        """Read the npz; `axes` are the source and the seed that it has to be of.
-
-        Raises:
-            InputError: the file is missing, damaged, of another source or seed, or holds wrong shapes or NaN.
-        """
-        shapes: dict[str, tuple[int | str, ...]] = dict.fromkeys((field.name for field in fields(cls)), ("S", "K"))
-        shapes |= {"sample": ("S",), "split": ("S",), "covariance": ("S", "K", 6, 6)}
-        kinds = dict.fromkeys(shapes, REAL) | {"sample": WHOLE, "split": TEXT, "icp_calls": WHOLE, "degenerate": "b"}
-        arrays = load_arrays(path, shapes, kinds, axes)
-        return cls(**{name: arrays[name] for name in shapes})
-
 
 def write_seconds(path: str | Path, outcomes: Outcomes, seconds_S_K: np.ndarray, icp_seconds_S_K: np.ndarray) -> None:
     """Write the seconds of every sample and condition, apart from the outcomes: they differ from run to run."""
@@ -96,7 +79,6 @@ def read_seconds(path: str | Path, outcomes: Outcomes) -> tuple[np.ndarray, np.n
     columns = ("sample", "split", "condition", "seconds", "icp_seconds")
     rows = read_numbers(path, columns, ("seconds", "icp_seconds"))
     shape = outcomes.uncertainty.shape
-    of = {name: np.repeat(getattr(outcomes, name).astype(str), shape[1]) for name in ("sample", "split")}
-    if not all(np.array_equal(rows[name], values) for name, values in of.items()):
-        raise InputError(path, "its samples differ from those of the outcomes", REGENERATE)
+    repeated = {name: np.repeat(getattr(outcomes, name), shape[1]) for name in ("sample", "split")}
+    require_same_samples(path, rows, repeated, "outcomes")
     return rows["seconds"].to_numpy().reshape(shape), rows["icp_seconds"].to_numpy().reshape(shape)

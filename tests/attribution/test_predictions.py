@@ -1,4 +1,4 @@
-from types import SimpleNamespace
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -65,18 +65,16 @@ def test_the_same_predictions_give_the_same_bytes(tmp_path, registrations):
     assert first == second != other
 
 
-def test_timings_survive_the_file_and_must_be_of_the_same_samples(tmp_path):
+def test_timings_survive_the_file_and_must_be_of_the_same_samples(tmp_path, registrations):
     path = tmp_path / "seed0.csv"
-    sample = SimpleNamespace(sample=np.array([3, 3]), split=np.array(["train", "test"]))
+    first = replace(registrations.subset(np.arange(2)), sample=np.array([3, 3]), split=np.array(["train", "test"]))
     with pytest.raises(InputError, match="no such file"):
-        read_timings(path, sample)
-    write_timings(path, sample, np.array([0.5, 0.25]), np.array([0.125, 0.0]))
-    seconds, icp_seconds = read_timings(path, sample)
+        read_timings(path, first)
+    write_timings(path, first, np.array([0.5, 0.25]), np.array([0.125, 0.0]))
+    seconds, icp_seconds = read_timings(path, first)
     assert (seconds.tolist(), icp_seconds.tolist()) == ([0.5, 0.25], [0.125, 0.0])
-    fewer = SimpleNamespace(sample=sample.sample[:1], split=sample.split[:1])
-    other = SimpleNamespace(sample=sample.sample, split=sample.split[::-1])
-    for wrong in (fewer, other):
-        with pytest.raises(InputError, match="does not contain the times of these samples") as caught:
+    for wrong in (first.subset(np.arange(1)), replace(first, split=first.split[::-1])):
+        with pytest.raises(InputError, match="its samples differ from those of the registrations") as caught:
             read_timings(path, wrong)
         assert str(path) in str(caught.value)
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from gpca.causes.dataset import COLUMNS, Causes
+from gpca.causes.dataset import Causes
 from gpca.errors import InputError
 from gpca.io.arrays import save_arrays
 
@@ -14,7 +14,7 @@ def file(causes, tmp_path):
 
 def test_causes_survive_the_file(causes, file, tmp_path):
     loaded = Causes.load(file)
-    for name in COLUMNS:
+    for name in Causes.array_fields():
         assert np.array_equal(getattr(loaded, name), getattr(causes, name))
     for name in ("truth", "truth_again"):
         assert np.array_equal(getattr(loaded, name).error, getattr(causes, name).error)

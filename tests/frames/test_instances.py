@@ -44,21 +44,21 @@ def test_frames_of_one_scene_cannot_be_split(tiny):
 
 def test_instances_survive_their_file(tiny, tmp_path):
     instances, _ = tiny
-    instances.save(tmp_path / "instances.npz", "tiny")
+    instances.save(tmp_path / "instances.npz", ("tiny", None))
     loaded = Instances.load(tmp_path / "instances.npz")
     for field in fields(Instances):
         assert np.array_equal(getattr(loaded, field.name), getattr(instances, field.name))
 
 
 def save(tiny, path, **changes):
-    arrays = {field.name: getattr(tiny[0], field.name) for field in fields(Instances)}
+    arrays = {field.name: getattr(tiny[0], field.name) for field in fields(Instances) if field.name != "axes"}
     save_arrays(path, arrays | {name: change(arrays[name]) for name, change in changes.items()}, ("tiny", None))
 
 
 @pytest.mark.parametrize(
     ("name", "change", "expected"),
     [
-        ("offsets", lambda a: a[:-1], "'offsets' do not match"),
+        ("offsets", lambda a: a[:-1], r"'offsets' is \d+, not \d+"),
         ("offsets", lambda a: a[::-1], "'offsets' do not match"),
         ("points_m", lambda a: np.full_like(a, np.nan), "'points_m' contains NaN"),
         ("T_camera_object_init", lambda a: a[:, :3], "'T_camera_object_init' is"),

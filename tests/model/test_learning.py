@@ -13,7 +13,7 @@ from gpca.model.contents import WIDTH_READ
 from gpca.model.diagnoser import REENACTED
 from gpca.model.guaranteed import scores_of_states
 from gpca.model.learning import Lessons, fit_error, joined, judged_unseen, learn, threshold_of
-from gpca.reenactment.dataset import SHAPES, Reenactments
+from gpca.reenactment.dataset import Reenactments
 from gpca.reenactment.features import reenactment_features
 from gpca.reenactment.settings import ReenactmentSettings
 
@@ -39,10 +39,11 @@ def lessons(n, seed, shift=3.0):
 def test_lessons_are_those_of_the_truth(causes):
     n, random = len(causes), np.random.default_rng(0)
     arrays = {
-        name: random.random((n, *(2 if size == "K" else size for size in shape[1:]))) for name, shape in SHAPES.items()
+        name: random.random((n, *(2 if size == "K" else size for size in of.shape[1:])))
+        for name, of in Reenactments.array_fields().items()
     }
     registrations = causes.registrations
-    own = Reenactments(registrations.sample, registrations.split, **arrays, verdict=np.zeros((n, 4)), axes=None)
+    own = Reenactments(**arrays)
     found = Lessons.of(causes, own)
     assert found.features_N_F.shape == (n, FEATURES)
     np.testing.assert_array_equal(found.error_N, causes.truth.error[:, ALL])

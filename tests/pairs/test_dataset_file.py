@@ -2,17 +2,13 @@ import numpy as np
 import pytest
 
 from gpca.errors import InputError
-from gpca.pairs.dataset import CLOUDS, REGISTRATION_COLUMNS, Registrations
-
-
-def arrays_of(registrations):
-    return {name: getattr(registrations, name) for name in (*REGISTRATION_COLUMNS, *CLOUDS)}
+from gpca.pairs.dataset import Registrations
 
 
 def test_registrations_survive_the_file(tmp_path, registrations):
     registrations.save(tmp_path / "a.npz")
     loaded = Registrations.load(tmp_path / "a.npz")
-    for name, array in arrays_of(registrations).items():
+    for name, array in registrations.arrays.items():
         assert getattr(loaded, name).dtype == array.dtype
         assert np.array_equal(getattr(loaded, name), array)
     loaded.save(tmp_path / "b.npz")
@@ -34,12 +30,12 @@ def changed(array, index, value):
         ("points", lambda a: a[:, :2], r"'points' is \d+×2, not \d+×3"),
         ("points", lambda a: changed(a, 5, np.nan), "'points' contains NaN"),
         ("points", lambda a: a[:-1], "'offsets' do not match"),
-        ("offsets", lambda a: a[:-1], "'offsets' do not match"),
+        ("offsets", lambda a: a[:-1], "'offsets' is 54, not 55"),
         ("target_points", lambda a: a[:-1], "'target_offsets' do not match"),
-        ("target_offsets", lambda a: a[:-1], "'target_offsets' do not match"),
-        ("offsets", lambda a: a[:0], "'offsets' do not match"),
-        ("offsets", lambda a: changed(a, 1, a[2]), "fewer than 3 points"),
-        ("offsets", lambda a: changed(a, 1, a[3]), "fewer than 3 points"),
+        ("target_offsets", lambda a: a[:-1], "'target_offsets' is 54, not 55"),
+        ("offsets", lambda a: a[:0], "'offsets' is 0, not 55"),
+        ("offsets", lambda a: changed(a, 1, a[2]), "fewer than 3 'points'"),
+        ("offsets", lambda a: changed(a, 1, a[3]), "fewer than 3 'points'"),
         ("fitness", lambda a: a[:-1], r"'fitness' is 53, not 54"),
         ("T_target_source_icp", lambda a: a[:, :3], "54×3×4, not 54×4×4"),
         ("severity_crop", lambda a: None, "'severity_crop' is missing"),
@@ -48,7 +44,7 @@ def changed(array, index, value):
 def test_faulty_files_are_refused_with_their_name(tmp_path, registrations, name, damage, expected):
     path = tmp_path / "seed0.npz"
     arrays = (
-        arrays_of(registrations)
+        registrations.arrays
         | {"source": np.array("tiny"), "seed": np.array(0)}
         | {name: damage(getattr(registrations, name))}
     )

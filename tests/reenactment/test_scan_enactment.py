@@ -10,7 +10,7 @@ from gpca.causes.dataset import LABELS
 from gpca.causes.scans import LADDER, ScanStart, measure_scans
 from gpca.causes.settings import OBSERVED, CauseSettings
 from gpca.causes.shapley import ALL
-from gpca.reenactment.dataset import SHAPES
+from gpca.reenactment.dataset import Reenactments
 from gpca.reenactment.hypotheses import Hypothesis
 from gpca.reenactment.observation import NoiseScale
 from gpca.reenactment.scan_enactment import cropped, reenact_scans
@@ -18,6 +18,8 @@ from gpca.reenactment.settings import ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface
 from gpca.scans.pair import ScanSuccess
 from tests.scans.corner import corner_pair, start_off
+
+NUMBERS = set(Reenactments.array_fields()) - {"sample", "split"}
 
 TRUTH = CauseSettings(moved=OBSERVED, clean_pairs=20)
 SETTINGS = ReenactmentSettings(2)
@@ -63,7 +65,7 @@ def test_nothing_that_only_the_truth_knows_is_read(good_and_bad, enacted):
     registrations = causes.registrations.without_labels()
     without = replace(causes, registrations=registrations, truth=unknown, truth_again=unknown, **blank)
     again = reenact_scans(without, table["error_factor"].to_numpy(), SETTINGS, TRUTH)
-    for name in (*SHAPES, "verdict"):
+    for name in NUMBERS:
         assert np.array_equal(getattr(enacted, name), getattr(again, name)), name
 
 

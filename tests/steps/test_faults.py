@@ -40,7 +40,7 @@ ANOTHER_NAME = r"object(s of tiny: object)? \d is not '\w+'"
 NO_ARCHIVE = "is not a readable npz archive"
 NOT_THE_WEIGHTS = "weights.pt: not the weights of backbone 'dgcnn'"
 OTHER_SAMPLES = "its samples differ from those of the"
-OTHER_TIMES = "causes_timings.csv: does not contain the times of these samples"
+OTHER_TIMES = "causes_timings.csv: its samples differ from those of the registrations"
 FOLDER = {"title": "T", "kind": "ply_folder", "location": "x", "scenes": "room"}
 SHAP = {
     "--explainer": "shap_removal", "--settings": {}, "--embeddings": None, "--uncertainty": "uncertainty.npz",
@@ -78,7 +78,7 @@ FAULTS = {
     ],
     "register_scans": [
         (truncated("scans.npz"), {}, f"scans.npz: {NO_ARCHIVE}"),
-        (arrays_changed("scans.npz", offsets=later), {}, "scans.npz: its pairs and scans do not belong together"),
+        (arrays_changed("scans.npz", offsets=later), {}, "scans.npz: 'offsets' do not match 'points'"),
     ],
     "oracles": [
         (removed("objects.npz"), {}, "objects.npz: no such file"),
@@ -148,7 +148,7 @@ FAULTS = {
         (removed("icp.csv"), {}, "icp.csv: no such file"),
         (written("icp.csv", ""), {}, "icp.csv: is empty"),
         (written("icp.csv", 'sample,"split\n1'), {}, "icp.csv: is not a readable CSV file"),
-        (written("icp.csv", "sample,split,seconds,icp_seconds\n0,train,1,1\n"), {}, "icp.csv: does not contain the t"),
+        (written("icp.csv", "sample,split,seconds,icp_seconds\n0,train,1,1\n"), {}, "icp.csv: its samples differ"),
     ],
     "controls": [
         (arrays_changed("control.npz", sample=later), {}, "control.npz: its samples differ"),

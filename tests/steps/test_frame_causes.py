@@ -31,7 +31,7 @@ SETTINGS = {
 def calls(made, tiny, scenes, tmp_path_factory):
     """A folder with what the steps read, and their command lines there, by name."""
     folder = tmp_path_factory.mktemp("frames")
-    tiny[0].save(folder / "instances.npz", "tiny")
+    tiny[0].save(folder / "instances.npz", ("tiny", None))
     tiny[1].save(folder / "objects.npz", "tiny")
     datasets = {"tiny": {"location": str(scenes)}}
     common = ["--source", "tiny", "--seed", "100", "--settings", json.dumps(SETTINGS | {"datasets": datasets})]

@@ -1,4 +1,4 @@
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -7,7 +7,7 @@ import pytest
 from gpca.errors import InputError
 from gpca.uncertainty.outcomes import Outcomes, read_seconds, write_seconds
 
-COLUMNS = tuple(field.name for field in fields(Outcomes))
+COLUMNS = tuple(Outcomes.array_fields())
 S, K = 6, 4
 
 

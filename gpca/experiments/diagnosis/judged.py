@@ -14,6 +14,7 @@ from gpca.attribution.predictions import read_predictions
 from gpca.causes.dataset import LABELS, Causes, labels_of
 from gpca.causes.truth import NOMINAL, Truth, state_of_errors
 from gpca.errors import InputError
+from gpca.io.container import require_same_samples
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import seed_of_file
 
@@ -114,10 +115,7 @@ def read_judged(
         rows = read_predictions(path)
         rows = rows[rows["split"] == "test"]
         truth = truths[source, seed]
-        if rows["sample"].tolist() != [str(number) for number in truth.registrations.sample]:
-            raise InputError(
-                path, "its test samples differ from those of the causes", "regenerate both from the same config"
-            )
+        require_same_samples(path, rows, truth.registrations.arrays, "causes", ("sample",))
         judged[source, explainer, seed] = judged_by(rows, truth, seed)
     if not judged:
         raise InputError("diagnoses", "no files were given", "name at least one explainer in diagnosis.explainers")

@@ -11,9 +11,9 @@ import numpy as np
 
 from gpca.attribution.metrics import source_method_seed
 from gpca.experiments.estimators.settings import KINDS
-from gpca.io.arrays import REAL, TEXT, WHOLE, load_arrays, save_arrays
+from gpca.io.arrays import TEXT, WHOLE
+from gpca.io.container import Container, array
 from gpca.io.csv_file import numbers, read_csv
-from gpca.io.names import Axes
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -64,7 +64,7 @@ def read_estimate_files(files: Iterable[str | Path]) -> dict[tuple[str, str, int
 
 
 @dataclass(frozen=True)
-class ReferenceSamples:
+class ReferenceSamples(Container):
     """The results of references for registrations, S in all, as twists about the pose, in radians and diameters.
 
     Attributes:
@@ -73,31 +73,13 @@ class ReferenceSamples:
         true_twist: (S, 6) of the true pose.
     """
 
-    sample: np.ndarray
-    method: np.ndarray
-    kind: np.ndarray
-    twists: np.ndarray
-    offsets: np.ndarray
-    true_twist: np.ndarray
+    sample: np.ndarray = array("S", WHOLE)
+    method: np.ndarray = array("S", TEXT)
+    kind: np.ndarray = array("S", TEXT)
+    twists: np.ndarray = array("N 6", offsets="offsets", fewest=0)
+    offsets: np.ndarray = array("S+1", WHOLE)
+    true_twist: np.ndarray = array("S 6")
 
     def twists_of(self, i: int) -> np.ndarray:
         """Return the twists (N, 6) of a row."""
-        return self.twists[self.offsets[i] : self.offsets[i + 1]].astype(np.float64)
-
-    def save(self, path: str | Path, axes: Axes) -> None:
-        """Write the npz described in results/README.md; `axes` are the source and the seed."""
-        save_arrays(path, vars(self), axes)
-
-    @classmethod
-    def load(cls, path: str | Path) -> ReferenceSamples:
-        """Read the npz.
-
-        Raises:
-            InputError: the file is missing, damaged, or holds wrong shapes or NaN.
-        """
-        shapes: dict[str, tuple[int | str, ...]] = {
-            **dict.fromkeys(("sample", "method", "kind"), ("S",)),
-            **{"twists": ("N", 6), "offsets": ("O",), "true_twist": ("S", 6)},
-        }
-        kinds = {"sample": WHOLE, "method": TEXT, "kind": TEXT, "twists": REAL, "offsets": WHOLE, "true_twist": REAL}
-        return cls(**load_arrays(path, shapes, kinds))
+        return self.part("twists", i).astype(np.float64)

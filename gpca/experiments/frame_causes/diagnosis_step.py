@@ -24,7 +24,7 @@ from gpca.explainers.sight import icp_calls
 from gpca.features.dataset import describe_all
 from gpca.features.settings import DescriptorSettings
 from gpca.io.csv_file import write_csv
-from gpca.pairs.dataset import Registrations, joined
+from gpca.pairs.dataset import Registrations
 from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
 from gpca.reenactment.settings import ReenactmentSettings
@@ -102,7 +102,7 @@ class FramesToExplain:
             else:
                 entry = entry if reads == REENACTED else explainer_entry("gpca_pair", CAUSES)
                 explained = self._enacted_frames(entry) if reads == REENACTED else self._described_frames()
-                self._pairs[reads] = [(joined(self._learned(entry, reads)), explained)]
+                self._pairs[reads] = [(Registrations.joined(self._learned(entry, reads)), explained)]
         return self._pairs[reads]
 
     def _learned(self, entry: ExplainerEntry, reads: str) -> list[Registrations]:

@@ -20,6 +20,7 @@ from gpca.experiments.diagnosis.measures import MEASURES, measure
 from gpca.experiments.diagnosis.metrics import COLUMNS, rows_of
 from gpca.frames.source import REAL_WORLD
 from gpca.frames.starts import KINDS
+from gpca.io.container import require_same_samples
 from gpca.io.csv_file import ANY, read_csv
 from gpca.objects.splits import BY_ICP
 from gpca.seeds import generator, seed_of_file
@@ -122,8 +123,7 @@ def _predictions(path: str | Path, causes: Causes) -> pd.DataFrame:
 
 
 def _require_same(path: str | Path, rows: pd.DataFrame, causes: Causes) -> None:
-    if rows["sample"].tolist() != [str(number) for number in causes.registrations.sample]:
-        raise InputError(path, "its samples differ from those of the causes", "regenerate both from the same config")
+    require_same_samples(path, rows, causes.registrations.arrays, "causes", ("sample",))
 
 
 def _measured(samples: Judged, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:

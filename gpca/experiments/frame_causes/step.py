@@ -20,7 +20,10 @@ def run(job: Job) -> None:
     frames = files_behind(job.section("datasets"), job.data_dir, job.get("scenes"))
     inputs, outputs = [job.instances, job.objects, *frames], [job.frame_causes, job.samples, job.starts]
     with record_provenance(outputs, inputs, job.settings, seed=job.seed):
-        instances, objects = Instances.load(job.instances, job.source), ObjectClouds.load(job.objects, job.source)
+        instances, objects = (
+            Instances.load(job.instances, (job.source, None)),
+            ObjectClouds.load(job.objects, job.source),
+        )
         require_of_objects(instances, objects, job.instances)
         own = read_settings(FrameCauseSettings, job.section("frames"))
         places = job.get("scenes"), job.get("splits"), job.settings.get("role", EVALUATION)

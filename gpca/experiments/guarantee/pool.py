@@ -16,7 +16,7 @@ from gpca.features.dataset import Descriptors
 from gpca.guarantee.states import states_of
 from gpca.io.arrays import REGENERATE
 from gpca.io.names import Axes
-from gpca.pairs.dataset import Registrations, joined
+from gpca.pairs.dataset import Registrations
 from gpca.reenactment.dataset import Reenactments
 from gpca.reenactment.features import reenactment_features
 from gpca.seeds import generator
@@ -92,7 +92,7 @@ def read_pool(causes_files: Sequence[Path], descriptors: Sequence[Path], reenact
         parts.append(registrations)
         own = {"split": registrations.split, "sample": registrations.sample, "state": state[rows]}
         columns.append(own | {"source": np.full(len(rows), source), "seed": np.full(len(rows), seed)})
-    registrations = joined(parts)
+    registrations = Registrations.joined(parts)
     whole = {name: np.concatenate([own[name] for own in columns]) for name in columns[0]}
     return Pool(registrations, **whole, part=parts_of(registrations.cluster, registrations.fold))
 

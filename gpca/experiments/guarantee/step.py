@@ -25,6 +25,7 @@ from gpca.experiments.guarantee.scored import SCORES, Scored, joined
 from gpca.explainers.registry import CAUSES, explainer_entry
 from gpca.frames.source import REAL_WORLD
 from gpca.guarantee.states import states_of
+from gpca.io.container import REGENERATE_BOTH, require_same_samples
 from gpca.io.csv_file import ANY, read_csv
 from gpca.objects.splits import BY_ICP
 from gpca.process.job import Job
@@ -104,10 +105,10 @@ def scored_on_frames(frames: Sequence[tuple[Path, Path, Path]], name: str, as_is
         said = dict(_said(predictions[predictions["explainer"] == name]))
         registrations, state = causes.registrations, states_of(causes.truth)
         _, seed = axes_of(registrations, causes_file)
-        numbers = [str(number) for number in registrations.sample]
-        if samples["sample"].tolist() != numbers or (said and set(said) != {("test", number) for number in numbers}):
-            fault = "its samples differ from those of the causes of frames"
-            raise InputError(prediction_file, fault, "regenerate both from the same config")
+        numbers = registrations.sample.astype(str)
+        require_same_samples(sample_file, samples, registrations.arrays, "causes of frames", ("sample",))
+        if said and set(said) != {("test", number) for number in numbers}:
+            raise InputError(prediction_file, "its samples differ from those of the causes of frames", REGENERATE_BOTH)
         rows = np.flatnonzero((state != BORDERLINE) & (samples["truth"] != BY_ICP).to_numpy())
         if not (said and as_is and len(rows)):
             continue
@@ -121,7 +122,7 @@ def scored_on_frames(frames: Sequence[tuple[Path, Path, Path]], name: str, as_is
             model=np.full(len(rows), model),
             source=np.full(len(rows), REAL_WORLD),
             seed=np.full(len(rows), seed),
-            sample=np.array(numbers)[rows],
+            sample=numbers[rows],
             family=registrations.cluster[rows],
             state=state[rows],
             taught=np.zeros(len(rows), bool),

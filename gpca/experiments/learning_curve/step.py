@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from gpca.causes.dataset import LABELS, Causes, labels_of
 from gpca.experiments.learning_curve.curve import learning_curve
-from gpca.experiments.learning_curve.samples import Lessons, joined
+from gpca.experiments.learning_curve.samples import Lessons
 from gpca.experiments.learning_curve.settings import GROUPS, CurveSettings
 from gpca.features.dataset import Descriptors
 from gpca.io.csv_file import write_csv
@@ -22,8 +24,9 @@ def run(job: Job) -> None:
     with record_provenance([job.out], [job.causes, job.descriptors, *job.samples], job.settings, seed=job.seed):
         causes = Causes.load(job.causes, axes)
         described = Descriptors.load(job.descriptors, causes.registrations)
-        own = Lessons({name: described.groups[name] for name in GROUPS}, labels_of(causes.truth))
+        groups: dict[str, Any] = {name: described.groups[name] for name in GROUPS}
+        own = Lessons(**groups, label=labels_of(causes.truth))
         train, test = causes.rows("train"), causes.rows("test")
         labeled = train[np.isin(own.label[train], LABELS)]
-        pool = joined([own.subset(labeled), *(Lessons.load(path, axes) for path in job.samples)])
+        pool = Lessons.joined([own.subset(labeled), *(Lessons.load(path, axes) for path in job.samples)])
         write_csv(job.out, learning_curve(pool, own.subset(test), causes.subset(test), settings, *axes))

@@ -18,6 +18,7 @@ from gpca.causes.truth import BORDERLINE, FAILED, NOMINAL
 from gpca.errors import InputError
 from gpca.experiments.method.concepts import severity_text
 from gpca.experiments.real_world.frame_views import draw_scores
+from gpca.io.container import require_same_samples
 from gpca.io.csv_file import numbers
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.pairs.perturbation import CONCEPTS
@@ -65,11 +66,7 @@ class Stages:
         registrations = Registrations.load(registrations_npz)
         h_S_d = read_embedding(embeddings_npz, registrations)["embedding"]
         predictions = read_predictions(predictions_csv)
-        named = list(zip(registrations.split.tolist(), registrations.sample.astype(str).tolist(), strict=True))
-        if named != list(zip(predictions["split"], predictions["sample"], strict=True)):
-            raise InputError(
-                predictions_csv, f"its samples differ from those of {registrations_npz}", "regenerate both"
-            )
+        require_same_samples(predictions_csv, predictions, registrations.arrays)
         if set(concepts_of(predictions)) != set(CONCEPTS):
             raise InputError(predictions_csv, f"does not score the concepts {', '.join(CONCEPTS)}", "regenerate it")
         for column in ("bald", *(f"variance_{concept}" for concept in CONCEPTS)):

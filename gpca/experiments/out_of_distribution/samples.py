@@ -47,7 +47,7 @@ def make_sets(
     if held_out_S.any():
         parts = _of_unseen_objects(registrations, held_out_S, source, seed, settings)
         measured.append(_measured(parts, source, seed, settings))
-    return ShiftedSets.join(measured)
+    return ShiftedSets.joined(measured)
 
 
 def sets_of_encoder(
@@ -124,7 +124,7 @@ def _measured(parts: dict[str, Registrations], source: str, seed: int, settings:
         columns = {column: getattr(part, column) for column in kept}
         named = np.full(len(part), name)
         joined.append(ShiftedSets(set=named, h=part.embedding, distance=distance_S_K, **columns))
-    return ShiftedSets.join(joined)
+    return ShiftedSets.joined(joined)
 
 
 def knn_distance(train_N_F: np.ndarray, query_S_F: np.ndarray, neighbours: int = 10) -> np.ndarray:

@@ -6,14 +6,13 @@ Learners fitted to the training samples of an encoder explain the test samples o
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-from pathlib import Path
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from gpca.io.arrays import REAL, TEXT, WHOLE, load_arrays, save_arrays
-from gpca.io.names import Axes
+from gpca.io.arrays import TEXT, WHOLE
+from gpca.io.container import Container, array
 from gpca.pairs.dataset import REGISTRATION_COLUMNS, Registrations, ragged
 
 # set -> the set that holds the training samples of its encoder and learners
@@ -29,7 +28,7 @@ DISTANCES = tuple(f"{kind}_{space}" for space in SPACES for kind in KINDS)
 
 
 @dataclass(frozen=True)
-class ShiftedSets:
+class ShiftedSets(Container):
     """S samples of all sets.
 
     Attributes:
@@ -40,14 +39,14 @@ class ShiftedSets:
         distance: (S, 4) `DISTANCES` to the training samples of the set's encoder; 0 for these themselves.
     """
 
-    set: np.ndarray
-    split: np.ndarray
-    sample: np.ndarray
-    concept: np.ndarray
-    object_name: np.ndarray
-    cluster: np.ndarray
-    h: np.ndarray
-    distance: np.ndarray
+    set: np.ndarray = array("S", TEXT)
+    split: np.ndarray = array("S", TEXT)
+    sample: np.ndarray = array("S", WHOLE)
+    concept: np.ndarray = array("S", TEXT)
+    object_name: np.ndarray = array("S", TEXT)
+    cluster: np.ndarray = array("S", TEXT)
+    h: np.ndarray = array("S d")
+    distance: np.ndarray = array(f"S {len(DISTANCES)}")
 
     def rows(self, name: str, split: str) -> np.ndarray:
         """Return the row numbers of a set and split."""
@@ -64,26 +63,3 @@ class ShiftedSets:
         }
         nothing = [np.zeros((0, 3), np.float32)] * len(rows)
         return Registrations(**columns | ragged(nothing, nothing), attached={"embedding": self.h[rows]})
-
-    def save(self, path: str | Path, axes: Axes) -> None:
-        """Write the npz described in results/README.md; `axes` are the source and the seed."""
-        save_arrays(path, {field.name: getattr(self, field.name) for field in fields(self)}, axes)
-
-    @classmethod
-    def load(cls, path: str | Path, axes: Axes | None = None) -> ShiftedSets:
-        """Read the npz; `axes` are the source and the seed that it has to be of.
-
-        Raises:
-            InputError: missing or damaged file, one of another source or seed, wrong shapes, or NaN.
-        """
-        shapes: dict[str, tuple[int | str, ...]] = {field.name: ("S",) for field in fields(cls)}
-        shapes |= {"h": ("S", "d"), "distance": ("S", len(DISTANCES))}
-        kinds = dict.fromkeys(shapes, TEXT) | {"sample": WHOLE, "h": REAL, "distance": REAL}
-        arrays = load_arrays(path, shapes, kinds, axes)
-        return cls(**{name: arrays[name] for name in shapes})
-
-    @classmethod
-    def join(cls, parts: list[ShiftedSets]) -> ShiftedSets:
-        """Return the samples of all parts, in their order."""
-        names = [field.name for field in fields(cls)]
-        return cls(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in names})

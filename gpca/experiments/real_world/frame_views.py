@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpca.attribution.predictions import read_predictions
-from gpca.errors import InputError
+from gpca.io.container import require_same_samples
 from gpca.io.csv_file import numbers, read_csv
 from gpca.pairs.dataset import FRAME_COLUMNS
 from gpca.pairs.perturbation import CONCEPTS
@@ -30,10 +30,7 @@ def read_samples(poses_csv: str | Path, predictions_csv: str | Path) -> pd.DataF
     """
     poses = read_csv(poses_csv, POSE_COLUMNS, others=FRAME_COLUMNS)
     predictions = read_predictions(predictions_csv)
-    if not (poses[["split", "sample"]].to_numpy() == predictions[["split", "sample"]].to_numpy()).all():
-        raise InputError(
-            poses_csv, f"its samples differ from those of {predictions_csv}", "regenerate both from the same config"
-        )
+    require_same_samples(poses_csv, poses, predictions, "predictions")
     for name in ("instance", "init_error", "icp_error"):
         poses[name] = numbers(poses_csv, poses, name)
     added = [name for name in predictions.columns if name not in poses.columns]

@@ -30,7 +30,7 @@ from gpca.explainers.sight import icp_calls
 from gpca.features.dataset import Descriptors
 from gpca.features.settings import DescriptorSettings
 from gpca.io.csv_file import write_csv
-from gpca.pairs.dataset import Registrations, joined
+from gpca.pairs.dataset import Registrations
 from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
 from gpca.reenactment.dataset import Reenactments
@@ -90,7 +90,7 @@ class _ScansToExplain:
         files = zip(job.scan_causes, job.scan_descriptors, job.scan_reenactments, strict=True)
         parts = [_measured(*paths) for paths in files]
         self._names, self._own = [path.parent.name for path in job.scan_causes], [own for own, _ in parts]
-        self._registrations = joined([with_labels for _, with_labels in parts])
+        self._registrations = Registrations.joined([with_labels for _, with_labels in parts])
         self._fold_S = folds_of(self._registrations.cluster, folds)
         starts = job.section("causes")["starts"]
         reenactment = read_settings(ReenactmentSettings, job.section("reenactment")).calls(starts)
@@ -161,7 +161,10 @@ class _ScansToExplain:
             yield from zip(of_objects, self._embedded, strict=True)
             return
         entry = entry if reads == REENACTED else explainer_entry("gpca_pair", CAUSES)
-        yield joined(self._taught_by_objects(entry, reads)) if learned == OBJECTS else None, self._registrations
+        yield (
+            Registrations.joined(self._taught_by_objects(entry, reads)) if learned == OBJECTS else None,
+            self._registrations,
+        )
 
     def _taught_by_objects(self, entry: ExplainerEntry, reads: str) -> list[Registrations]:
         """Return the training rows of each source of objects, with what an explainer reads."""

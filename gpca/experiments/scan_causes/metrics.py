@@ -20,6 +20,7 @@ from gpca.errors import InputError
 from gpca.experiments.diagnosis.judged import CEILING, POOLED, Judged, ceiling_of, joined, judged_by
 from gpca.experiments.diagnosis.measures import SHARES, SMALLER_IS_BETTER, counted, measure
 from gpca.experiments.scan_causes.settings import SCANS
+from gpca.io.container import require_same_samples
 from gpca.io.csv_file import ANY, numbers, read_csv, read_numbers
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.scans.scene import stratum_of
@@ -120,11 +121,8 @@ def _read(causes_files, sample_files, prediction_files) -> tuple[pd.DataFrame, d
         samples = read_csv(sample_file, SAMPLE_COLUMNS, others=ANY)
         samples = samples.assign(**{name: numbers(sample_file, samples, name) for name in ("overlap", "times")})
         said = {key: rows[rows["scans"] == source] for key, rows in said_of.get(seed, {}).items()}
-        named = [str(number) for number in causes.registrations.sample]
         for path, rows in ((sample_file, samples), *((causes_file, rows) for rows in said.values())):
-            if rows["sample"].tolist() != named:
-                fault = "its samples differ from those of the causes or the predictions"
-                raise InputError(path, fault, "regenerate all from the same config")
+            require_same_samples(path, rows, causes.registrations.arrays, "causes or the predictions", ("sample",))
         for key, rows in said.items():
             judged.setdefault(key, []).append(judged_by(rows, causes, seed))
         judged.setdefault(("", CEILING), []).append(ceiling_of(causes, seed))

@@ -59,7 +59,7 @@ def test_predictions_without_their_truth_or_of_other_samples_are_refused(causes,
         read_judged(files, [])
     lines = files[0].read_text().splitlines()
     files[0].write_text("\n".join(lines[:-1]) + "\n")
-    with pytest.raises(InputError, match="its test samples differ from those of the causes"):
+    with pytest.raises(InputError, match="its samples differ from those of the causes"):
         read_judged(files, truth)
     with pytest.raises(InputError, match="no files were given"):
         collect([], [])

@@ -19,7 +19,7 @@ from gpca.features.settings import GROUPS
 from gpca.guarantee.states import states_of
 from gpca.io.csv_file import write_csv
 from gpca.process.job import Job
-from gpca.reenactment.dataset import SHAPES, Reenactments
+from gpca.reenactment.dataset import Reenactments
 
 AXES = [(source, seed) for source in ("cups", "tools") for seed in (100, 101)]
 EXPLAINERS = {"pair_forest": {"trees": 5}, "reenact": None, "gpca": None}
@@ -35,11 +35,12 @@ def write_measurements(folder, causes, axes, random):
     replace(causes, registrations=registrations).save(paths["causes"])
     groups = {name: random.random((n, WIDTHS[name])) for name in GROUPS}
     names = {"sample": registrations.sample, "split": registrations.split}
-    Descriptors(**names, groups=groups, axes=axes).save(paths["descriptors"])
-    shapes = {name: [{"S": n, "K": 2}.get(size, size) for size in shape] for name, shape in SHAPES.items()}
+    Descriptors(**names, **groups, axes=axes).save(paths["descriptors"])
+    declared = Reenactments.array_fields()
+    shapes = {name: [{"S": n, "K": 2}.get(size, size) for size in declared[name].shape] for name in declared}
     arrays = {name: random.random(shape) for name, shape in shapes.items()}
-    verdict = random.dirichlet(np.ones(4), size=n)
-    Reenactments(**names, **arrays, verdict=verdict, axes=axes).save(paths["reenactments"])
+    verdict = {"verdict": random.dirichlet(np.ones(4), size=n)}
+    Reenactments(**arrays | names | verdict, axes=axes).save(paths["reenactments"])
     paths["diagnoses"] = folder / "diagnoses" / source / "gpca" / f"seed{seed}.csv"
     attribution = Attribution.of_scores(LABELS, random.dirichlet(np.ones(4), size=n), seconds=0.0)
     write_predictions(paths["diagnoses"], registrations, attribution)

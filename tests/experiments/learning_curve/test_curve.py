@@ -1,5 +1,7 @@
 """Learning from more and more registrations of four objects."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -14,7 +16,7 @@ from gpca.experiments.diagnosis.judged import CEILING
 from gpca.experiments.learning_curve.curve import CURVE_COLUMNS, collect_curves, learning_curve, read_curves
 from gpca.experiments.learning_curve.figure import draw_learning_curve
 from gpca.experiments.learning_curve.learners import TITLES
-from gpca.experiments.learning_curve.samples import Lessons, describe_cheaply, joined
+from gpca.experiments.learning_curve.samples import Lessons, describe_cheaply
 from gpca.experiments.learning_curve.settings import GROUPS, CurveSettings, labeled_samples
 from gpca.features.dataset import describe_all
 from gpca.features.settings import DescriptorSettings
@@ -37,7 +39,7 @@ def lessons(causes, further):
     own = describe_cheaply(causes, icp)
     labeled = causes.rows("train")[np.isin(own.label[causes.rows("train")], LABELS)]
     more = describe_cheaply(further, icp)
-    pool = joined([own.subset(labeled), more, more])  # enough for the sizes
+    pool = Lessons.joined([own.subset(labeled), more, more])  # enough for the sizes
     return pool, own.subset(causes.rows("test"))
 
 
@@ -68,7 +70,7 @@ def test_cheap_descriptors_are_those_of_the_explainers(causes):
     )
     own = describe_cheaply(causes, ICPSettings())
     for name in GROUPS:
-        assert np.array_equal(own.groups[name], described.groups[name])
+        assert np.array_equal(getattr(own, name), described.groups[name])
 
 
 def test_every_learner_has_a_row_of_each_size_and_order_beside_the_truth(curve):
@@ -91,7 +93,7 @@ def test_lessons_survive_the_file(lessons, tmp_path):
     assert np.array_equal(read.features, pool.features) and read.label.tolist() == pool.label.tolist()
     with pytest.raises(InputError, match="of source 'four'"):
         Lessons.load(tmp_path / "chunk0.npz", ("five", 100))
-    Lessons(pool.groups, np.full(len(pool), "dust")).save(tmp_path / "chunk0.npz", ("four", 100))
+    replace(pool, label=np.full(len(pool), "dust")).save(tmp_path / "chunk0.npz", ("four", 100))
     with pytest.raises(InputError, match="unknown label 'dust'"):
         Lessons.load(tmp_path / "chunk0.npz", ("four", 100))
 

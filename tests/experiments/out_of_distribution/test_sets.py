@@ -22,7 +22,7 @@ def sets(n=12):
 def test_a_file_gives_back_what_was_saved(tmp_path):
     sets().save(tmp_path / "seed0.npz", ("tiny", 0))
     loaded = ShiftedSets.load(tmp_path / "seed0.npz")
-    for name, array in vars(sets()).items():
+    for name, array in sets().arrays.items():
         assert np.array_equal(getattr(loaded, name), array)
 
 
@@ -55,6 +55,6 @@ def test_rows_become_registrations_without_clouds():
 
 
 def test_parts_are_joined_in_order():
-    joined = ShiftedSets.join([sets(), sets(3)])
+    joined = ShiftedSets.joined([sets(), sets(3)])
     assert len(joined.set) == 6 * 12 + 6 * 3
     assert np.array_equal(joined.h[72:], sets(3).h)
