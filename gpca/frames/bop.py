@@ -32,12 +32,7 @@ FARTHEST_MM = 1e6
 
 
 def read_images(path: Path) -> dict[int, Any]:
-    """Return what scene_camera.json or scene_gt.json holds, by the number of the image.
-
-    Raises:
-        InputError: what :func:`gpca.io.structured_text.read_json` refuses, a key that is no number, or the same
-            number twice.
-    """
+    """Return the entries of scene_camera.json or scene_gt.json by image number; InputError for a faulty file."""
     images: dict[int, Any] = {}
     for key, entry in read_json(path, "a scene's JSON file", REMEDY).items():
         try:
@@ -51,7 +46,7 @@ def read_images(path: Path) -> dict[int, Any]:
 
 
 def read_camera(entry: Any, subject: str) -> tuple[np.ndarray, float]:
-    """Return K (3, 3) in pixels and the millimeters per unit of depth; InputError where no camera has such."""
+    """Return K (3, 3) in pixels and the millimeters per unit of depth; InputError for impossible values."""
     camera_3_3 = _numbers(entry, "cam_K", 9, subject).reshape(3, 3)
     require_camera(camera_3_3, f"{subject}: cam_K")
     (scale,) = _numbers(entry, "depth_scale", 1, subject)
@@ -61,7 +56,7 @@ def read_camera(entry: Any, subject: str) -> tuple[np.ndarray, float]:
 
 
 def require_camera(camera_3_3: np.ndarray, subject: str) -> None:
-    """Raise an InputError that names `subject` unless K is upper triangular, with focal lengths that can be."""
+    """Raise an InputError that names `subject` unless K is upper triangular with possible focal lengths."""
     if abs(camera_3_3[[1, 2, 2], [0, 0, 1]]).max() > 1e-6 or abs(camera_3_3[2, 2] - 1) > 1e-6:
         raise InputError(subject, "is not a camera matrix", "give fx s cx, 0 fy cy, 0 0 1, row by row")
     focal_px = np.diag(camera_3_3)[:2]
@@ -73,7 +68,7 @@ def require_camera(camera_3_3: np.ndarray, subject: str) -> None:
 
 
 def read_pose(entry: Any, subject: str) -> tuple[int, np.ndarray]:
-    """Return an annotation's object id and ``T_camera_model`` in meters; InputError where it can be no pose."""
+    """Return an annotation's object id and ``T_camera_model`` in meters; InputError for impossible values."""
     R_camera_model = _numbers(entry, "cam_R_m2c", 9, subject).reshape(3, 3)
     translation_mm = _numbers(entry, "cam_t_m2c", 3, subject)
     if abs(translation_mm).max() > FARTHEST_MM:
@@ -97,7 +92,7 @@ FEWEST_POINTS = 64
 
 @dataclass(frozen=True)
 class Annotation:
-    """One object in a frame: its id, its true pose in meters, the mask of its visible part, and where that stands."""
+    """An object in a frame: id, true pose in meters, mask of the visible part, and where its annotation stands."""
 
     object_id: int
     T_camera_model: np.ndarray
@@ -113,7 +108,7 @@ class Frame:
         scene, image: numbers, as the folder and its files are named.
         camera_3_3: K, in pixels.
         depth_scale: millimeters per unit of the depth image.
-        depth, color: files; a frame need not have colors.
+        depth, color: files; a frame may lack colors.
         annotations: the objects in it.
     """
 
@@ -133,9 +128,8 @@ class Frame:
     def depth_m(self) -> np.ndarray:
         """Return depth (H, W) in meters, 0 where nothing was measured.
 
-        Raises:
-            InputError: missing or unreadable image, colors instead of depth, 8 bits, negative or infinite depth, no
-                measurement at all.
+        InputError for a missing or unreadable image, colors, 8 bits, negative or infinite depth, or no measurement at
+        all.
         """
         depth_H_W = read_image(self.depth, REMEDY)
         if depth_H_W.ndim != 2:
@@ -151,8 +145,7 @@ class Frame:
     def mask(self, annotation: Annotation) -> np.ndarray:
         """Return the visible part (H, W) of an object as booleans.
 
-        Raises:
-            InputError: missing or unreadable image, or one of many values: a picture, or numbers of objects.
+        InputError for a missing or unreadable image, or one of many values: a picture, or numbers of objects.
         """
         mask = read_image(annotation.mask, REMEDY)
         mask = mask if mask.ndim == 2 else mask[..., 0]
@@ -170,11 +163,11 @@ def read_frames(folders: Iterable[Path], split: str = "test") -> list[Frame]:
 
     Args:
         folders: the dataset's folder, or those that its archives were unpacked in.
-        split: its subfolder begins with this.
+        split: the beginning of the subfolder's name.
 
     Raises:
-        InputError: no scenes, missing or damaged JSON file, an image without camera or depth file, a camera or pose
-            that cannot be, an object without a mask, two folders of one scene.
+        InputError: no scenes, missing or damaged JSON file, an image without camera or depth file, an impossible camera
+            or pose, an object without a mask, two folders of one scene.
     """
     folders = list(folders)
     scene_files = [path for folder in folders for path in folder.glob(f"**/{split}*/*/scene_gt.json")]
@@ -194,7 +187,7 @@ def read_frames(folders: Iterable[Path], split: str = "test") -> list[Frame]:
 
 
 def measured_points(frame: Frame, annotation: Annotation, depth_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return what was measured within an object's mask, points (P, 3) and their pixels (P, 2).
+    """Return the points (P, 3) that were measured within an object's mask, and their pixels (P, 2).
 
     Raises:
         InputError: mask and depth of different sizes.
@@ -212,9 +205,9 @@ def measured_points(frame: Frame, annotation: Annotation, depth_m: np.ndarray) -
 def without_background(
     points: np.ndarray, pixels: np.ndarray, annotation: Annotation, diameter_m: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return an object's points (P, 3) and their pixels (P, 2); TooFewPoints where fewer than `FEWEST_POINTS` remain.
+    """Return the points within a diameter of their median, and their pixels: a mask's rim shows some background.
 
-    What is farther than a diameter from the points' median cannot be the object: a mask's rim sees what is behind.
+    TooFewPoints where fewer than `FEWEST_POINTS` remain.
     """
     near = np.linalg.norm(points - np.median(points, axis=0), axis=1) <= diameter_m
     _require_points(points[near], annotation)
@@ -231,7 +224,7 @@ def _require_points(points: np.ndarray, annotation: Annotation) -> None:
 
 
 class TooFewPoints(InputError):
-    """An object of which next to nothing was measured; datasets have such, and a reader may go on without it."""
+    """Hardly any points were measured on an object; a reader may skip it."""
 
 
 def _frames_of_scene(folder: Path) -> list[Frame]:
@@ -287,8 +280,7 @@ MOST_ANNOTATIONS = 1000  # objects of an image at most
 def from_entry(entry: dict, folder: Path) -> Iterator[Surface]:
     """Return surfaces of a configured source: keys `objects` (ids, default all) and `views_per_instance` (default 6).
 
-    Raises:
-        InputError: a unit other than that of the format, and what :func:`cut_out_views` refuses.
+    InputError for a unit other than that of the format, and as in :func:`cut_out_views`.
     """
     if meters_per(entry.get("unit") or "mm") != meters_per("mm"):
         raise InputError(f"unit '{entry['unit']}'", "is not that of BOP frames", "leave unit out")
@@ -299,12 +291,12 @@ def cut_out_views(folder: Path, objects: Sequence[int] | None = None, views: int
     """Yield the views of each object, spread evenly over its frames; those with too few points are named on stderr.
 
     Args:
-        folder: the dataset's.
-        objects: ids; all that the frames show when None.
-        views: of an object, at most.
+        folder: of the dataset.
+        objects: ids; all in the frames when None.
+        views: the largest number of one object.
 
     Raises:
-        InputError: faulty files (:mod:`gpca.frames.bop`), or an object that no frame shows.
+        InputError: faulty files, or an object that no frame shows.
     """
     shown: dict[int, list] = {}
     for frame in read_frames([folder]):
@@ -325,9 +317,6 @@ def cut_out_views(folder: Path, objects: Sequence[int] | None = None, views: int
 
 
 def within_rim(points_m: np.ndarray) -> np.ndarray:
-    """Return points (P, 3) without those that a mask's rim has of the background.
-
-    The diameter of the object is not known here, but most points are its own.
-    """
+    """Return points (P, 3) without the background at a mask's rim, for an object of unknown diameter."""
     distances_P = np.linalg.norm(points_m - np.median(points_m, axis=0), axis=1)
     return points_m[distances_P <= RIM_FACTOR * np.median(distances_P)]

@@ -26,12 +26,7 @@ TABLE_M = 1.2  # edge length of the table that scenes stand on
 
 @dataclass(frozen=True)
 class Camera:
-    """A pinhole camera with whole coordinates at pixel centers, looking along +z, x right and y down.
-
-    Attributes:
-        width, height: in pixels.
-        focal_px: focal length of both axes.
-    """
+    """A pinhole camera with whole coordinates at pixel centers, looking along +z, x right and y down."""
 
     width: Pixels = 640
     height: Pixels = 480
@@ -44,7 +39,7 @@ class Camera:
         return np.array([[self.focal_px, 0, center_u], [0, self.focal_px, center_v], [0, 0, 1.0]])
 
     def rays(self) -> np.ndarray:
-        """Return for every pixel (H, W, 3) the direction whose z is 1, so that a ray's length is its depth."""
+        """Return the direction (H, W, 3) of every pixel whose z is 1, so that a ray's length is its depth."""
         v, u = np.mgrid[: self.height, : self.width]
         return rotate(np.linalg.inv(self.matrix_3_3), np.stack([u, v, np.ones_like(u)], axis=-1))
 
@@ -67,11 +62,7 @@ class View:
 
 
 class MeshScene:
-    """Meshes in one world frame, ready to be rendered.
-
-    Args:
-        meshes: (vertices (V, 3) in meters, faces (F, 3)) of each.
-    """
+    """Meshes, each vertices (V, 3) in meters and faces (F, 3), in one world frame, ready to be rendered."""
 
     def __init__(self, meshes: Sequence[tuple[np.ndarray, np.ndarray]]) -> None:
         o3d = require_open3d()
@@ -97,7 +88,7 @@ class MeshScene:
         return self.along(camera.rays(), T_world_camera)
 
     def along(self, rays_H_W_3: np.ndarray, T_world_camera: np.ndarray) -> View:
-        """Return the view along rays of a camera, of any shape (..., 3), whose z has to be 1."""
+        """Return the view along rays (..., 3) of a camera, whose z has to be 1."""
         hits = self._cast(rays_H_W_3, T_world_camera)
         hit = np.isfinite(hits["t_hit"].numpy())
         mesh = np.where(hit, hits["geometry_ids"].numpy().astype(np.int64), NOTHING)
@@ -121,9 +112,9 @@ class MeshScene:
 
 
 def planes(corners_F_3_3: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return of triangles (F, corner, 3) the unit normals (F, 3) and the planes' offsets (F,), normal · corner.
+    """Return the unit normals (F, 3) of triangles (F, corner, 3) and the planes' offsets (F,), normal · corner.
 
-    A triangle without an area gets the normal 0; no ray meets it.
+    A triangle without area gets the normal 0; no ray meets it.
     """
     a, b, c = np.moveaxis(corners_F_3_3, 1, 0)
     across = np.cross(b - a, c - a)
@@ -145,12 +136,12 @@ class DepthNoise:
         axial deviation  σ_z = 0.0012 + 0.0019 (z - 0.4)²  meters, and beyond 60° more: + 0.0001 θ² / (√z (π/2 - θ)²),
         lateral deviation  σ_L = 0.8 + 0.035 θ / (π/2 - θ)  pixels.
 
-    Lateral noise is a pixel that looks a little beside itself: edges fray. Past `grazing_deg` nothing is measured.
+    Lateral noise shifts the pixel that is looked at, so that edges fray.
 
     Attributes:
         scale: factor of both deviations; 0 is a perfect sensor.
-        grazing_deg: θ of the steepest surface that is measured.
-        dropout: share of pixels that measure nothing anyway.
+        grazing_deg: the steepest surface that is measured.
+        dropout: share of pixels that measure nothing.
     """
 
     scale: Annotated[float, Bounds(minimum=0, maximum=10)] = 1.0
@@ -175,7 +166,7 @@ class DepthNoise:
 
 
 def shade(view: View, colors_M_3: np.ndarray, T_world_camera: np.ndarray) -> np.ndarray:
-    """Return an image (H, W, 3) uint8 of colored meshes under a lamp above and an even light; gray where nothing is.
+    """Return an image (H, W, 3) uint8 of colored meshes under a lamp above and ambient light; gray where nothing is.
 
     Lambert's law; colors are in [0, 1].
     """
@@ -187,7 +178,7 @@ def shade(view: View, colors_M_3: np.ndarray, T_world_camera: np.ndarray) -> np.
 
 
 def look_at(eye_m: np.ndarray, target_m: np.ndarray) -> np.ndarray:
-    """Return ``T_world_camera`` of a camera at `eye_m` that looks at `target_m`, the image upright (world z up)."""
+    """Return ``T_world_camera`` of an upright camera at `eye_m` that looks at `target_m` (world z up)."""
     z = (target_m - eye_m) / np.linalg.norm(target_m - eye_m)
     x = np.cross(z, [0.0, 0.0, 1.0])
     x /= np.linalg.norm(x)
@@ -230,8 +221,9 @@ def from_entry(entry: dict, folder: Path) -> Iterator[Surface]:
 def rendered_views(mesh: Surface, count: int) -> Iterator[Surface]:
     """Yield views of a mesh whose z axis points up, as clouds in the camera's frame, in meters.
 
-    Raises:
-        InputError: a cloud, which cannot be rendered, or a mesh that the camera does not see.
+    As in the UW RGB-D Object Dataset (Lai et al. 2011), the camera is 30, 45 and 60 degrees above a turntable in turn.
+    Views are named ``obj_000007_1_0`` by mesh, elevation and number. InputError for a cloud, or a mesh that the camera
+    does not see.
     """
     if mesh.faces is None:
         raise InputError(f"object '{mesh.name}'", "is a cloud, of which there are no views", "use kind: mesh_folder")

@@ -31,16 +31,15 @@ class Dataset:
     """A BOP dataset on disk.
 
     Attributes:
-        name: seeds its draws and names its objects.
+        name: seeds the draw of frames and prefixes the names of objects.
         folders: the dataset's, or those that its archives were unpacked in.
-        unit: the unit of the models' vertices.
-        split: the split whose frames are read.
+        unit: of the models' vertices.
         results: BOP results files with initial poses, one of each estimator.
         errors: CSV of errors that estimators made elsewhere on its objects, or None.
-        models: the folder of its models where they are not in its own.
-        most_frames: where there are more frames, so many are drawn; None reads all.
+        models: the folder of its models where that is not its own.
+        most_frames: of more frames, this many are drawn; None reads all.
         places: of its scenes, by number; none where no file says so.
-        role: what the frames are for: scenes for development are for training alone, or nothing else is read.
+        role: of the frames: other than for evaluation, only scenes of this role are read.
     """
 
     name: str
@@ -71,11 +70,11 @@ class Dataset:
         return self.role == EVALUATION or self.places[frame.scene].role == self.role
 
     def place(self, scene: int) -> Place:
-        """Return where a scene stands; where no file says so, it may be tested and its poses are good."""
+        """Return the place of a scene; by default it has the role of the frames and annotated poses."""
         return self.places.get(scene, Place(f"{self.name} {scene}", self.role, DRAWN))
 
     def fold(self, scene: int) -> int:
-        """Return the fold that a scene is tested with, `DRAWN` where no file says so, `TRAINING` if it never is."""
+        """Return the fold that a scene is tested with, `DRAWN` by default, `TRAINING` if it is never tested."""
         place = self.place(scene)
         return place.fold if place.role == self.role else TRAINING
 
@@ -103,7 +102,7 @@ class Dataset:
 
 @dataclass(frozen=True)
 class CenteredModel:
-    """An object of a dataset, its surface moved so that the bounding box is centered, and by how much."""
+    """An object with its bounding box moved to the origin, and its pose in the frame of its model."""
 
     surface: Surface
     T_model_object: np.ndarray
@@ -111,11 +110,7 @@ class CenteredModel:
 
 
 def read_models(dataset: Dataset, frames: Iterable[Frame]) -> dict[int, CenteredModel]:
-    """Return the models of the objects that the frames show, by id.
-
-    Raises:
-        InputError: an object id without a model, and what :func:`gpca.objects.bop.surfaces` refuses.
-    """
+    """Return the models of the objects in the frames, by id; InputError where a model is missing or faulty."""
     ids = sorted({annotation.object_id for frame in frames for annotation in frame.annotations})
     if not ids:
         raise InputError(
@@ -125,11 +120,7 @@ def read_models(dataset: Dataset, frames: Iterable[Frame]) -> dict[int, Centered
 
 
 def models_of_ids(dataset: Dataset, ids: Iterable[int] | None = None) -> dict[int, CenteredModel]:
-    """Return the models of these objects of a dataset by id, of all that it lists where none are named.
-
-    Raises:
-        InputError: as :func:`read_models`.
-    """
+    """Return the models of these objects of a dataset, or of all, by id; InputError as in :func:`read_models`."""
     folder = dataset.models_folder()
     info = bop.read_models_info(folder / "models_info.json")
     ids = sorted(info if ids is None else ids)
@@ -146,7 +137,7 @@ def models_of_ids(dataset: Dataset, ids: Iterable[int] | None = None) -> dict[in
 
 
 def with_shared_models(models_of: Mapping[str, dict[int, CenteredModel]]) -> dict[str, dict[int, CenteredModel]]:
-    """Return the models of all datasets, where one that an earlier dataset has too bears the name that it has there.
+    """Return the models of all datasets, each named as in the first dataset that has the same shape.
 
     LINEMOD-Occlusion shows objects of LINEMOD: an object that training saw in one is not unseen in the other.
     """
@@ -161,13 +152,13 @@ def with_shared_models(models_of: Mapping[str, dict[int, CenteredModel]]) -> dic
 
 
 def distinct_surfaces(models_of: Mapping[str, dict[int, CenteredModel]]) -> list[Surface]:
-    """Return the surfaces of all datasets' models, those that datasets share once."""
+    """Return the surfaces of all datasets' models, shared ones once."""
     models = [model for of_dataset in models_of.values() for model in of_dataset.values()]
     return list({(model.surface.name, shape_of(model)): model.surface for model in models}.values())
 
 
 def shape_of(model: CenteredModel) -> bytes:
-    """Return what tells whether two models are the same."""
+    """Return a key that is the same for models of the same shape."""
     return np.asarray(model.surface.vertices_m).tobytes()
 
 
@@ -182,13 +173,13 @@ def datasets_of(
     splits: Path | None = None,
     role: str = EVALUATION,
 ) -> dict[str, Dataset]:
-    """Return the datasets of the config, by name, or the rendered scenes in their place, of which all frames are read.
+    """Return the datasets of the config by name, or in their place the rendered scenes, of which all frames are read.
 
     Args:
-        splits, role: the file of scenes, and what the frames are for (:mod:`gpca.objects.splits`).
+        splits, role: the file of scenes, and the role of the frames (:mod:`gpca.objects.splits`).
 
     Raises:
-        InputError: neither is given, or what :func:`gpca.frames.source.resolve_datasets` refuses.
+        InputError: neither is given, or as in :func:`gpca.frames.source.resolve_datasets`.
     """
     if scenes:
         return {"scenes": Dataset("scenes", (scenes,), most_frames=None)}
@@ -208,12 +199,12 @@ def datasets_of(
 
 
 def models_of(datasets: Mapping[str, Dataset]) -> dict[str, dict[int, CenteredModel]]:
-    """Return the models of the objects that each dataset's frames show; those that datasets share bear one name."""
+    """Return the models of the objects in the frames of each dataset, shared ones under one name."""
     return with_shared_models({name: read_models(dataset, dataset.frames()) for name, dataset in datasets.items()})
 
 
 def untested_surfaces(datasets: Mapping[str, Dataset]) -> list[Surface]:
-    """Return the models of the objects that no frame shows that may be tested, those that datasets share once."""
+    """Return the models, shared ones once, of objects that no frame of a test fold shows."""
     models = with_shared_models({name: models_of_ids(dataset) for name, dataset in datasets.items()})
     tested = {
         shape_of(models[name][annotation.object_id])
@@ -239,11 +230,10 @@ def files_behind(datasets: Mapping[str, dict] | None, data_dir: str | None, scen
 def meshes_of(
     models: Mapping[str, dict[int, CenteredModel]], objects: ObjectClouds, shown: Iterable[int]
 ) -> dict[int, MeshScene]:
-    """Return each object's mesh alone, in the object's frame, by the number that it has among the objects.
+    """Return each object's mesh alone, in the object's frame, by its number among the canonical clouds `objects`.
 
     Args:
-        models: of every dataset, as :func:`gpca.frames.instances.with_shared_models` returns them.
-        objects: their canonical clouds.
+        models: of every dataset, as :func:`with_shared_models` returns them.
         shown: numbers of the objects that are needed.
 
     Raises:
@@ -261,10 +251,9 @@ def meshes_of(
 
 
 def simplified(surface: Surface, most_faces: int = MOST_FACES) -> Surface:
-    """Return a mesh of at most so many faces, by quadric decimation (Garland and Heckbert 1997): scans have more.
+    """Return a mesh of at most this many faces, by quadric decimation (Garland and Heckbert 1997): scans have more.
 
-    Raises:
-        InputError: a cloud of points.
+    InputError for a cloud of points.
     """
     if surface.faces is None:
         fault = "is a point cloud, but the virtual camera needs a mesh"

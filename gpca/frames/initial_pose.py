@@ -40,19 +40,18 @@ FARTHEST_MM = 1e4  # no estimator is off by more
 def read_bop_results(
     path: str | Path, distances_m: Mapping[tuple[int, int], Sequence[float]], known: Collection[int]
 ) -> PosesByObject:
-    """Read a results file, as every method for the benchmark exports it.
+    """Read a results file of the BOP benchmark.
 
     Args:
-        distances_m: (scene, image) of the dataset -> how far its annotated objects are from the camera.
+        distances_m: (scene, image) of the dataset -> distances of its annotated objects from the camera.
         known: ids of the dataset's objects.
 
     Returns:
         (scene, image, object id) -> poses ``T_camera_model`` in meters, the highest score first.
 
     Raises:
-        InputError: missing file or column, R without nine numbers or t without three, R that is no rotation, a number
-            that is none, an image or object that the dataset does not have, a pose behind the camera, translations in
-            another unit than millimeters.
+        InputError: missing file or column, R or t of another length or not finite, R that is no rotation, an unknown
+            image or object, a pose behind the camera, translations in another unit than millimeters.
     """
     rows = read_csv(path, RESULT_COLUMNS, others=ANY, remedy=REMEDY)
     scored_poses: dict[tuple[int, int, int], list[tuple[float, np.ndarray]]] = {}
@@ -76,7 +75,7 @@ def read_bop_results(
 
 
 def nearest_to(poses: list[np.ndarray], pixels_P_2: np.ndarray, camera_3_3: np.ndarray) -> np.ndarray:
-    """Return the pose whose origin is seen nearest to the mask's center, as several equal objects may be in sight."""
+    """Return the pose whose origin is seen nearest to the mask's center: several equal objects may be in sight."""
     center_2 = pixels_P_2.mean(axis=0)
     seen = [camera_3_3 @ pose[:3, 3] for pose in poses]
     return poses[int(np.argmin([np.linalg.norm(p[:2] / p[2] - center_2) for p in seen]))]
@@ -131,13 +130,13 @@ def _require_unit(subject: object, ratio: float, most: float) -> None:
 def estimates_of(
     poses_by_estimator: Mapping[str, PosesByObject], place: tuple[int, int, int], alone: bool, seen: Mapping
 ) -> list[tuple[str, np.ndarray]]:
-    """Return every estimator that found an object, by name, and its pose ``T_camera_model``.
+    """Return the name of each estimator that found an object, and its pose ``T_camera_model``.
 
     Args:
         poses_by_estimator: of one dataset.
         place: scene, image, object id.
-        alone: no other object of this id is in the image. Else an estimate that lies farther than a diameter from what
-            was measured is of another one.
+        alone: whether no other object of this id is in the image. If false, an estimate farther than a diameter from
+            the measured points belongs to another one.
         seen: ``points_m`` (P, 3) in the camera's frame, ``pixels`` (P, 2), ``camera_3_3`` and ``diameter_m``.
     """
     estimates = []
@@ -152,11 +151,11 @@ def estimates_of(
 
 @dataclass
 class EstimatorErrors:
-    """Errors that estimators made, by dataset and object id; objects without any get those of others.
+    """Errors of estimators by dataset and object id; objects without any draw from those of others.
 
     Attributes:
+        symmetric: objects whose errors are not used for others, as they contain turns by a symmetry.
         of_object: (dataset, object id) -> errors ``T_true_estimated`` (4, 4), meters.
-        symmetric: objects whose errors are no measure of another's: a turn that changes nothing about them counts.
     """
 
     symmetric: Collection[tuple[str, int]]
@@ -167,11 +166,7 @@ class EstimatorErrors:
         self.of_object.setdefault(object_, []).append(T_true_estimated)
 
     def draw(self, object_: tuple[str, int], random: np.random.Generator) -> np.ndarray:
-        """Return one error of this object, or, where there is none, of any object without symmetry.
-
-        Raises:
-            InputError: no estimator ever erred on one.
-        """
+        """Return one error of this object, else of any without symmetry; InputError where there is none."""
         errors = self.of_object.get(object_) or self._of_others()
         if not errors:
             fault = "no estimator has a result for an object without symmetry"
@@ -191,11 +186,10 @@ def read_pose_errors(path: Path, known: Iterable[int]) -> list[tuple[int, np.nda
     """Read a CSV of errors: `obj_id`, rotation vector `rx,ry,rz` in radians, translation `tx,ty,tz` in millimeters.
 
     Args:
-        known: ids of the dataset's objects; rows of others are passed over.
+        known: ids of the dataset's objects; rows of others are skipped.
 
     Raises:
-        InputError: missing file or column, an entry that is no finite number, an id that is none, a rotation beyond
-            half a turn, a translation that no estimator is off by.
+        InputError: missing file or column, an entry that is not finite, an impossible id, rotation or translation.
     """
     rows = read_csv(path, ERROR_COLUMNS, others=ANY)
     columns = {name: numbers(path, rows, name).to_numpy() for name in ERROR_COLUMNS}
@@ -223,8 +217,8 @@ class InitialPoseSettings:
 
     Attributes:
         form: ``results`` of an estimator, ``true_pose`` with an error, or ``global_registration``.
-        rotation_deg, translation: largest error of ``true_pose``, the angle and in diameters, drawn uniformly.
-        voxel: the size at which ``global_registration`` computes features, in diameters.
+        rotation_deg, translation: largest error of ``true_pose``, in degrees and diameters, drawn uniformly.
+        voxel: of the features of ``global_registration``, in diameters.
         tries: random starts of RANSAC, of which the best is taken.
     """
 
@@ -249,12 +243,10 @@ def displace(T_camera_object: np.ndarray, diameter_m: float, settings: InitialPo
 class GlobalRegistration:
     """FPFH features and RANSAC (Rusu et al. 2009; Zhou et al. 2018) through Open3D, the best of several runs.
 
-    A run is judged after point-to-plane ICP from its pose by the share of measured points that lie on the model and
-    the share of the model's points facing the camera that were measured: many poses explain the points, but few
-    also what should be seen. Needs no truth; a stand-in for a pose estimator.
-
-    Args:
-        model: canonical points (Q, 3) of the object and their normals, in meters.
+    After point-to-plane ICP, a run is scored by the share of measured points on the model plus the share of the model's
+    points facing the camera that were measured: many poses explain the points, but few also explain what should be
+    seen. It needs no truth; a stand-in for a pose estimator. The model is its canonical points (Q, 3) in meters and
+    their normals.
     """
 
     def __init__(self, points_m: np.ndarray, normals: np.ndarray, diameter_m: float, settings: InitialPoseSettings):
@@ -264,7 +256,7 @@ class GlobalRegistration:
         self._model = self._features(open3d_cloud(points_m, normals))
 
     def register(self, points_m: np.ndarray, seed: int) -> np.ndarray:
-        """Return ``T_camera_object`` of the measured points (P, 3), which are in the camera's frame.
+        """Return ``T_camera_object`` of the measured points (P, 3) in the camera's frame.
 
         The same seed gives the same pose where Open3D runs on one thread (``OMP_NUM_THREADS=1``).
         """

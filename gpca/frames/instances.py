@@ -128,8 +128,7 @@ class Instances(Container):
 def points_on_model(instances: Instances, objects: ObjectClouds, most_points: int | None = None) -> np.ndarray:
     """Return the median distance (I,) in meters from each instance's points to its model under the true pose.
 
-    Args:
-        most_points: judge by about so many of each instance, where all would take too long.
+    With `most_points`, about this many points of each instance are used, for speed.
     """
     trees = {index: cKDTree(objects.points(index)) for index in np.unique(instances.object_index)}
     medians_m = []
@@ -140,7 +139,7 @@ def points_on_model(instances: Instances, objects: ObjectClouds, most_points: in
 
 
 def require_of_objects(instances: Instances, objects: ObjectClouds, subject: object) -> None:
-    """Raise an InputError that names `subject` unless the instances show these objects, where their true poses say."""
+    """Raise an InputError that names `subject` unless the instances show these objects at their true poses."""
     remedy = "regenerate both files in one call"
     if instances.object_index.min() < 0 or instances.object_index.max() >= len(objects):
         raise InputError(subject, "shows objects that the object file does not contain", remedy)
@@ -157,17 +156,17 @@ def read_instances(
     objects: ObjectClouds,
     settings: InitialPoseSettings,
 ) -> Instances:
-    """Return every object of the frames of which enough was measured, with its true and its initial pose.
+    """Return every object of the frames with enough measured points, with its true and its initial pose.
 
-    An object with too few points is left out and named on stderr.
+    Objects with too few points are left out and named on stderr.
 
     Args:
         datasets: name -> dataset, its frames, the models of their objects.
         objects: the canonical clouds of all these models, by their surfaces' names.
-        settings: how initial poses are found.
+        settings: of the initial poses.
 
     Raises:
-        InputError: the files are faulty, an object was measured elsewhere than its pose says, or nothing is left.
+        InputError: faulty files, an object that was measured away from its pose, or nothing left.
     """
     if settings.form == "results" and not any(of.results or of.errors for of, _, _ in datasets.values()):
         raise InputError(f"dataset {next(iter(datasets))}", "has no results file", "set results or choose another pose")
@@ -251,7 +250,7 @@ class _Objects:
         self._registration: dict[int, GlobalRegistration] = {}
 
     def in_frame(self, frame: Frame, left_out: list[str]) -> list[tuple[int, dict]]:
-        """Return the objects that were measured, by their place among the annotations."""
+        """Return the objects that were measured, by their number among the annotations."""
         depth_m = frame.depth_m()
         rows = []
         for n, annotation in enumerate(frame.annotations):
@@ -270,7 +269,6 @@ class _Objects:
         return rows
 
     def observation(self, frame: Frame, n: int, points_m: np.ndarray) -> Observation:
-        """Return the observation of an annotated object, to be judged."""
         annotation = frame.annotations[n]
         number = annotation.object_id
         T_model_object, tree = self._models[number].T_model_object, self._trees[number]
@@ -279,11 +277,9 @@ class _Objects:
         )
 
     def T_model_object(self, number: int) -> np.ndarray:
-        """Return where the centered object lies in the frame of its model."""
         return self._models[number].T_model_object
 
     def symmetric_ids(self) -> list[int]:
-        """Return the ids of the objects that a rotation leaves as they are."""
         return [number for number, symmetric in self._symmetric.items() if symmetric]
 
     def initial_pose(self, frame: Frame, n: int, row: dict) -> np.ndarray:
@@ -299,7 +295,6 @@ class _Objects:
         return self._registration[number].register(row["points_m"], seed_of(*axes))
 
     def diameter_m(self, number: int) -> float:
-        """Return an object's diameter in meters."""
         return float(self._objects.diameters_m[self._index[number]])
 
     def _is_symmetric(self, number: int) -> bool:

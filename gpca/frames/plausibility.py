@@ -1,4 +1,4 @@
-"""Checks that refuse data, with the likeliest reason, where an object was measured elsewhere than annotated."""
+"""Checks that refuse data, with the likeliest reason, where objects were not measured where they are annotated."""
 
 from __future__ import annotations
 
@@ -79,11 +79,10 @@ class Observation:
     """One annotated object and its measured points.
 
     Attributes:
-        subject: where the annotation stands.
+        subject: the annotation's place in its file.
         T_camera_model: the annotated pose, meters, in the frame of the dataset's model.
         T_model_object: the frame of the canonical cloud in that of the model.
         tree: of the canonical cloud.
-        diameter_m: of the object.
         points_m: (P, 3) in the camera's frame.
     """
 
@@ -95,14 +94,14 @@ class Observation:
     points_m: np.ndarray
 
     def distance(self, undo: Undo | None = None) -> float:
-        """Return the median distance from the points to the model in diameters, once a fault is undone."""
+        """Return the median distance from the points to the model in diameters, after undoing a fault."""
         points_m = spread(self.points_m, JUDGED_POINTS)
         T_camera_model, points_m = undo(self.T_camera_model, points_m) if undo else (self.T_camera_model, points_m)
         T_object_camera = inverse(T_camera_model @ self.T_model_object)
         return median_distance(self.tree, transform(T_object_camera, points_m)) / self.diameter_m
 
     def size(self, undo: Undo) -> float:
-        """Return in diameters how far the points reach, once a fault is undone."""
+        """Return the extent of the points in diameters, after undoing a fault."""
         points_m = undo(self.T_camera_model, spread(self.points_m, JUDGED_POINTS))[1]
         return float(np.linalg.norm(points_m.std(axis=0)) / self.diameter_m) + 1e-9
 
@@ -118,7 +117,7 @@ def spread(points_m: np.ndarray, most: int) -> np.ndarray:
 
 
 def require_plausible(observed: Observation) -> None:
-    """Raise an InputError with the likeliest reason where an object was measured elsewhere than its pose says."""
+    """Raise an InputError with the likeliest reason where an object was measured away from its pose."""
     distance = observed.distance()
     if distance <= FARTHEST:
         return
@@ -136,9 +135,7 @@ def require_plausible(observed: Observation) -> None:
 def require_shared_form(dataset: str, observations: Sequence[Observation]) -> None:
     """Raise an InputError where all poses of a dataset are off, or where one mistake explains them far better.
 
-    Args:
-        dataset: its name.
-        observations: all of its objects; the median of some of them counts, so that single bad masks do not.
+    The median over some of the observations counts, so that single bad masks do not matter.
     """
     judged = observations[:: max(1, -(-len(observations) // JUDGED_OBJECTS))]
     if not judged:

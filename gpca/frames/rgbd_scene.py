@@ -28,11 +28,8 @@ FLAT = 1e-9  # volume of the convex hull in diameters cubed; that of a sheet of 
 def stable_poses(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
     """Return the poses (n, 4, 4) in which an object rests on the plane z = 0, and their probabilities (n,).
 
-    Its density is uniform. Of an open surface the center of mass may come out anywhere; outside of the convex hull,
-    where no object has one, the center of the hull takes its place.
-
-    Raises:
-        InputError: a surface that has no volume.
+    Its density is uniform. The center of mass of an open surface may come out anywhere; outside of the convex hull, the
+    center of the hull is used. InputError for a surface without volume.
     """
     import trimesh
 
@@ -53,7 +50,7 @@ def rest(poses_n: np.ndarray, probabilities_n: np.ndarray, random: np.random.Gen
 
 
 def _is_inside(point_m: np.ndarray, hull) -> bool:
-    """Return whether a point is inside of a convex mesh, by the test that trimesh repeats until it is passed."""
+    """Return whether a point is inside a convex mesh, by the test that trimesh repeats until it is passed."""
     from trimesh.util import diagonal_dot
 
     return bool(np.all(diagonal_dot(point_m - hull.triangles_center, hull.face_normals) < 0))
@@ -71,14 +68,12 @@ class SceneSettings:
     """Settings of scenes: the objects on the table, and the cameras.
 
     Attributes:
-        families: of procedural objects; none where the objects are others.
+        families: of procedural objects; none for objects of another kind.
         count, views: scenes, and frames of each.
         objects: range of their number in a scene.
         distance_m: range from the camera to the middle of the objects.
         elevation_deg: range above the table; the azimuth goes all around.
-        gap_m: least distance between the outlines of two objects on the table.
-        camera: intrinsics.
-        noise: of depth.
+        gap_m: smallest distance between the outlines of two objects on the table.
     """
 
     families: Distinct[str] = ("ycb",)
@@ -108,7 +103,7 @@ class SceneSettings:
 
 @dataclass(frozen=True)
 class Placed:
-    """An object on the table: its number among the models, from 0, and where it stands."""
+    """An object on the table: its number among the models, from 0, and its pose."""
 
     model: int
     T_world_object: np.ndarray
@@ -117,10 +112,8 @@ class Placed:
 def write_scenes(surfaces: Iterable[Surface], source: str, settings: SceneSettings, folder: str | Path) -> None:
     """Write models and frames in the layout of BOP: models/, test/{scene}/ with depth, rgb, mask, mask_visib, poses.
 
-    Everything random is named by source, scene and view. The folder appears when it is complete.
-
-    Raises:
-        InputError: the folder is there and holds something other than scenes, or the table is too small.
+    Random numbers are named by source, scene and view. The folder appears when it is complete. InputError where it
+    holds something other than scenes, or the table is too small.
     """
     _require_replaceable(Path(folder))
     surfaces = [center(surface) for surface in surfaces]
@@ -151,13 +144,10 @@ def lay_table(
     scene: int,
     resting: Sequence[tuple[np.ndarray, np.ndarray]],
 ) -> list[Placed]:
-    """Stand different objects on the table z = 0, each as it rests by itself, close together but not touching.
+    """Stand different objects on the table z = 0, each in a stable pose, close together but not touching.
 
-    Each takes one of its stable poses, by their probability, turned at random, and comes from a random direction as
-    near to the middle as its convex outline on the table allows.
-
-    Args:
-        resting: what :func:`gpca.frames.rgbd_scene.stable_poses` returns for each surface.
+    Each pose is drawn by its probability and turned at random; the object comes from a random direction as near to the
+    middle as its convex outline allows. `resting` are the :func:`stable_poses` of each surface.
     """
     from shapely import MultiPoint
     from shapely.affinity import translate
@@ -186,7 +176,7 @@ def lay_table(
 
 
 def camera_poses(settings: SceneSettings, middle_m: np.ndarray, source: str, scene: int) -> list[np.ndarray]:
-    """Return ``T_world_camera`` of each view: on a hemisphere about the middle of the objects, all around them."""
+    """Return ``T_world_camera`` of each view, on a hemisphere about the middle of the objects."""
     random = generator(source, "views", scene)
     turn = random.uniform(0, 2 * np.pi)
     poses = []
@@ -296,7 +286,7 @@ def _box(mask: np.ndarray) -> list[int]:
 
 
 def model_color(model: int, count: int) -> tuple[float, float, float]:
-    """Return the color of a model among so many, in [0, 1]."""
+    """Return the color of one of `count` models, in [0, 1]."""
     from colorsys import hsv_to_rgb
 
     return hsv_to_rgb(model * 0.618034 % 1, 0.55 if model % 2 else 0.75, 0.85)

@@ -16,11 +16,11 @@ from gpca.process.environment import open3d_cloud
 
 @dataclass(frozen=True)
 class Sighting:
-    """An object in a depth frame.
+    """Measurements of an object in a depth frame, without the truth.
 
     Attributes:
-        points_m: (N, 3) measured points in the camera's frame, all of them or some.
-        pixels: (P, 2) every pixel at which it was measured, (u, v).
+        points_m: (N, 3) measured points in the camera's frame, all or some.
+        pixels: (P, 2) all pixels at which the object was measured, (u, v).
         camera_3_3: K in pixels.
     """
 
@@ -39,7 +39,7 @@ class Sighting:
 
     @cached_property
     def _mask(self) -> tuple[np.ndarray, np.ndarray]:
-        """The first pixel of a box around all of them, and which pixels of that box they are."""
+        """The first pixel of the bounding box, and the mask in it."""
         low_2 = self.pixels.min(axis=0)
         mask = np.zeros(self.pixels.max(axis=0) - low_2 + 1, bool)
         mask[tuple((self.pixels - low_2).T)] = True
@@ -51,12 +51,12 @@ MOST_PIXELS = 20_000  # of a rendered side, about; of more, every second or thir
 
 @dataclass(frozen=True)
 class CleanView:
-    """What was measured of an object, beside a perfect sensor's view of it at some pose; in the object's frame, meters.
+    """Measurements of an object and a perfect sensor's view of it at some pose, in the object's frame, meters.
 
     Attributes:
         measured: (N, 3) points that the sensor measured.
         clean: (N, 3) where the rays of the same pixels meet the mesh; where one misses it, the nearest rendered point.
-        unmeasured: (V, 3) the other points that the camera would see, had nothing been in front and no pixel failed.
+        unmeasured: (V, 3) further points that the camera would see with nothing in front and no failed pixel.
         share: of the whole visible side that was measured.
     """
 
@@ -72,7 +72,7 @@ class Side:
 
     Attributes:
         points_m: (V, 3) in the object's frame, one for each pixel.
-        pixels: (V, 2) where the camera sees them, (u, v); also beside the image.
+        pixels: (V, 2) where the camera sees them, (u, v); also outside the image.
     """
 
     points_m: np.ndarray
@@ -85,13 +85,11 @@ class Side:
 def clean_view(
     sighting: Sighting, T_camera_object: np.ndarray, mesh: MeshScene, surface_m: np.ndarray
 ) -> CleanView | None:
-    """Return what was seen of an object beside what a perfect sensor would have seen, were this its pose.
-
-    None where no ray of its pixels meets the mesh.
+    """Return a sighting beside a perfect sensor's view at a pose; None where no ray of its pixels meets the mesh.
 
     Args:
-        mesh: of the object alone, in the object's frame.
-        surface_m: (Q, 3) points on it, which tell where in the image it lies.
+        mesh: of the object alone, in its frame.
+        surface_m: (Q, 3) points on it, which bound its place in the image.
     """
     points_m = sighting.points_m
     met_m = met(mesh, points_m / points_m[:, 2:], T_camera_object)
@@ -115,10 +113,7 @@ def rendered_side(
 ) -> Side:
     """Return the side of an object that a camera would see at a pose with nothing in front.
 
-    None of it is seen where a part of the object would lie behind the camera.
-
-    Args:
-        most_pixels: that are looked at, about.
+    It is empty where a part of the object would lie behind the camera. About `most_pixels` are looked at.
     """
     shown = rotate(camera_3_3, transform(T_camera_object, surface_m))
     if shown[:, 2].min() <= 0:
@@ -135,7 +130,7 @@ def rendered_side(
 
 
 def met(mesh: MeshScene, rays_N_3: np.ndarray, T_camera_object: np.ndarray) -> np.ndarray:
-    """Return where rays of a camera, whose z is 1, meet an object, (N, 3) in its own frame; NaN where they miss it."""
+    """Return where rays of a camera, with z = 1, meet an object, (N, 3) in its frame; NaN where they miss it."""
     T_object_camera = inverse(T_camera_object)
     depth_N = mesh.along(rays_N_3, T_object_camera).depth_m
     return transform(T_object_camera, rays_N_3 * np.where(np.isfinite(depth_N), depth_N, np.nan)[:, None])
@@ -147,10 +142,9 @@ NEAR = 0.05  # diameters; a measured point that is so near lies on the model
 
 @dataclass(frozen=True)
 class Shot:
-    """One viewpoint.
+    """A robot's measurement of an object from one viewpoint.
 
     Attributes:
-        camera: intrinsics.
         T_world_camera: known to the robot.
         depth_m: (H, W), 0 where nothing was measured; of several frames their median.
         mask: (H, W) the visible part of the object, by segmentation.
@@ -162,19 +156,19 @@ class Shot:
     mask: np.ndarray
 
     def object_points_m(self, diameter_m: float) -> np.ndarray:
-        """Return the object's measured points (P, 3) in the world; none farther than a diameter from their median."""
+        """Return the object's points (P, 3) in the world, none farther than a diameter from their median."""
         points_m, _ = back_project(self.depth_m, self.mask, self.camera.matrix_3_3)
         if len(points_m):
             points_m = points_m[np.linalg.norm(points_m - np.median(points_m, axis=0), axis=1) <= diameter_m]
         return transform(self.T_world_camera, points_m)
 
     def other_points_m(self) -> np.ndarray:
-        """Return everything else that was measured (P, 3), in the world."""
+        """Return the measured points (P, 3) that are not the object's, in the world."""
         points_m, _ = back_project(self.depth_m, ~self.mask, self.camera.matrix_3_3)
         return transform(self.T_world_camera, points_m)
 
     def project(self, points_m: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return for points (P, 3) in the world their pixels as v and u, and their depth in meters.
+        """Return the pixels, as v and u, and the depth in meters of points (P, 3) in the world.
 
         Points outside the image get the pixel (-1, -1).
         """
@@ -203,7 +197,7 @@ def fuse(shots: Sequence[Shot], diameter_m: float, filtered: bool) -> np.ndarray
 
 
 def without_outliers(points: np.ndarray) -> np.ndarray:
-    """Remove points that are far from their neighbors by the cloud's own measure (Rusu et al. 2008), by Open3D."""
+    """Remove statistical outliers (Rusu et al. 2008), by Open3D."""
     _, rows = open3d_cloud(points).remove_statistical_outlier(NEIGHBORS, OUTLIER_RATIO)
     return points[np.asarray(rows)]
 
@@ -216,15 +210,16 @@ def agreement(
     T_world_object: np.ndarray,
     diameter_m: float,
 ) -> tuple[float, float, float]:
-    """Return how well a pose explains the shots, and how much of the model something else hides, as shares in [0, 1].
+    """Return how well a pose explains the shots, and how much of the model is hidden, as shares in [0, 1].
 
-    The first is that of the measured points on the model. The second is that of the model's visible surface that was
-    measured where it should be; visible is what faces the camera and is not behind something else that was measured.
-    The first alone is high for many poses of a partial view. The third is that of the surface facing the camera behind
+    First: the share of the measured points on the model; alone, it is high for many poses of a partial view. Second:
+    the share of the model's visible surface that was measured where it should be; visible is what faces the camera and
+    is not behind something else that was measured. Third: the share of the surface facing the camera that is behind
     something else. Needs no truth.
 
     Args:
-        points_m: measured points (P, 3) in the world. model_m, normals: (Q, 3) in the object's frame.
+        points_m: measured points (P, 3) in the world.
+        model_m, normals: (Q, 3) in the object's frame.
     """
     placed_m = transform(T_world_object, model_m)
     facing_out = rotate(T_world_object, normals)
@@ -282,14 +277,14 @@ def expected_surface(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return which of the model's points were measured (Q,), and which each viewpoint would show (n, Q).
 
-    The model is ray-cast at the estimated pose, among boxes where something else was measured and over the table. What
-    nobody has seen yet counts as free.
+    The model is ray-cast at the estimated pose, over the table and among boxes where something else was measured.
+    Unseen space counts as free.
 
     Args:
-        vertices_m, faces: the model, in its own frame.
+        vertices_m, faces: the model, in its frame.
         points_m: (Q, 3) on its surface.
         T_world_object: the estimate.
-        camera: what the candidates look with; few pixels suffice.
+        camera: of the candidates; few pixels suffice.
     """
     placed_m = transform(T_world_object, points_m)
     reach_m = NEAR * diameter_m

@@ -34,10 +34,10 @@ class SituationSettings:
     """Settings of situations: the scenes, and how strongly causes disturb a registration.
 
     Attributes:
-        scenes: tables, cameras and the sensor's usual noise; its camera is the region of interest about the object.
-        noise_scale: range of the factor on the sensor's noise, where noise is the cause.
-        hidden: range of the share of the visible part that an occluder hides, where overlap is the cause.
-        severities: how far off the estimated pose is, where pose is the cause.
+        scenes: tables, cameras and the usual sensor noise; its camera is the region of interest about the object.
+        noise_scale: range of the factor on that noise, for the cause noise.
+        hidden: range of the share of the visible part that an occluder hides, for the cause overlap.
+        severities: of the error of the estimated pose, for the cause pose.
     """
 
     scenes: SceneSettings = field(default_factory=SceneSettings)
@@ -53,7 +53,7 @@ class SituationSettings:
 
 
 class Shelf:
-    """The objects that the tables are laid with, and what is known of each.
+    """The objects that tables are laid with: surfaces, stable poses, canonical clouds and symmetries.
 
     Args:
         points: sampled on each model.
@@ -94,12 +94,11 @@ class Situation:
     """The truth of one case; a robot gets only the model and what :meth:`shoot` and :meth:`estimate` return.
 
     Attributes:
-        shelf: the objects.
-        standing: what is on the table, the object in question first.
-        T_world_camera: where the case is seen from at first.
-        T_object_estimated: how far the pose estimator is off, whatever it is shown: the cause pose.
-        camera, noise: those of every shot.
-        cause: what disturbs the registration; empty for nothing.
+        standing: the objects on the table, the one in question first.
+        T_world_camera: the first viewpoint.
+        T_object_estimated: error of every estimated pose, for the cause pose.
+        camera, noise: of every shot.
+        cause: of a failure; empty for none.
         table: number of the table among those of its part.
         axes: names of its random numbers.
     """
@@ -137,7 +136,7 @@ class Situation:
         return MeshScene([*((vertices_m, surfaces[model].triangles) for vertices_m, model in placed), table()])
 
     def shoot(self, T_world_camera: np.ndarray, frames: int, *axes: object) -> Shot:
-        """Measure from a viewpoint: the median depth of so many frames, whose noise is named by the axes."""
+        """Measure from a viewpoint: the median depth of several frames, whose noise is named by the axes."""
         view = self.meshes.look(self.camera, T_world_camera)
         depth_n_H_W = [self.noise.measure(view, generator(*self.axes, "shot", *axes, n)) for n in range(frames)]
         depth_m = median_depth(np.array(depth_n_H_W)) if frames > 1 else depth_n_H_W[0]
@@ -146,7 +145,7 @@ class Situation:
     def estimate(self, shot: Shot, points_m: np.ndarray, *axes: object) -> np.ndarray:
         """Return ``T_world_object`` by the pose estimator, from the object's points (P, 3) of a shot, in the world.
 
-        Where it finds nothing, far from what was measured, its orientation is taken at the middle of that.
+        An estimate far from the measured points is moved to their middle.
         """
         in_camera_m = transform(inverse(shot.T_world_camera), points_m)
         seed = seed_of(*self.axes, "estimate", *axes)
@@ -166,11 +165,7 @@ def coarse(camera: Camera) -> Camera:
 
 
 class Situations:
-    """Draws situations on the tables of one part of a run, so that no two parts share a table.
-
-    Args:
-        part: names the tables, e.g. ``("recovery", 0, "train")``.
-    """
+    """Draws situations on the tables of one part of a run, e.g. ``("recovery", 0, "train")``; parts share no tables."""
 
     def __init__(self, shelf: Shelf, settings: SituationSettings, part: tuple) -> None:
         self._shelf = shelf
@@ -182,8 +177,7 @@ class Situations:
     def draw(self, cause: str, *axes: object) -> tuple[Situation, Situation]:
         """Return a situation with the cause, and the same one without it.
 
-        Raises:
-            InputError: none of `REDRAWS` draws has the object in sight, or an occluder that hides the wanted share.
+        InputError where none of `REDRAWS` draws has the object in sight, or an occluder that hides the wanted share.
         """
         for redraw in range(REDRAWS):
             axes_now = (*self._part, *axes, redraw)
@@ -194,7 +188,7 @@ class Situations:
         raise InputError(f"recovery: situation {axes}", f"has no room for cause '{cause}'", "widen recovery.hidden")
 
     def misplaced(self, clean: Situation, number: int) -> Situation:
-        """Return one of many like a situation without a cause, each with a pose error of its own."""
+        """Return a variant of a situation without a cause, with its own pose error."""
         return self._misplaced(clean, generator(*clean.axes, "misplaced", number))
 
     def _misplaced(self, clean: Situation, random: np.random.Generator) -> Situation:
@@ -249,7 +243,7 @@ class Situations:
         raise InputError(f"cause '{cause}'", "unknown", "choose one of noise, pose, overlap")
 
     def _occluder(self, clean: Situation, random: np.random.Generator) -> Placed | None:
-        """Return an object in front of the one in question that hides the wanted share, or None where none does."""
+        """Return an object in front of the one in question that hides the wanted share, or None."""
         low, high = self._settings.hidden
         visible = clean.visible()
         outlines = [self._shelf.outline(object_) for object_ in clean.standing]

@@ -1,4 +1,4 @@
-"""Where configured datasets of frames are: in a local folder, or at the addresses that they are downloaded from."""
+"""Configured datasets of frames: in a local folder, or at the addresses that they are downloaded from."""
 
 from __future__ import annotations
 
@@ -16,10 +16,8 @@ ONE_ENCODER = f"{REAL_WORLD}_one_encoder"  # the same, where seeds are those of 
 def resolve_datasets(datasets: Mapping[str, dict] | None, data_dir: str | None) -> dict[str, dict]:
     """Return the resolved entries of the config's section ``real_world.datasets``; reads no data.
 
-    Those that are ``optional`` are left out where they are in no folder: they are not downloaded.
-
-    Raises:
-        InputError: as :func:`gpca.objects.source.resolve` raises it, and for a results file that is not there.
+    Entries marked ``optional`` are left out where no folder has them: they are not downloaded. InputError as in
+    :func:`gpca.objects.source.resolve`, and for a missing results file.
     """
     present = {name: entry for name, entry in (datasets or {}).items() if not _is_absent(entry, data_dir)}
     return {name: _resolved(name, entry, data_dir) for name, entry in present.items()}
@@ -53,7 +51,6 @@ def frame_files(datasets: Mapping[str, dict], data_dir: str | None) -> list[Path
 
 
 def _is_absent(entry: dict, data_dir: str | None) -> bool:
-    """Return whether a dataset that a run can do without is not there."""
     return bool(entry.get("optional")) and not any(path.is_dir() for path in places_of(entry["location"], data_dir))
 
 
@@ -74,7 +71,7 @@ def _resolved(name: str, entry: dict, data_dir: str | None) -> dict:
 
 
 def _matching(data_dir: str | None, name: str) -> list[Path]:
-    """Return the files that a name with an asterisk matches, which may be none, or the one that is named in full."""
+    """Return the files that a name with an asterisk matches, perhaps none, or the one that is named in full."""
     places = places_of(name, data_dir)
     if "*" not in name:
         return [next((path for path in places if path.is_file()), places[0])]

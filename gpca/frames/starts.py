@@ -1,11 +1,11 @@
-"""Starts: where registrations of instances begin, and where these poses are from.
+"""Starts: initial poses of the registrations of instances, by where the poses come from.
 
 Each kind is a condition of its own, since errors of one kind say little about those of another:
 
-- native: a pose that an estimator found in that very image; every estimator's is a start by itself;
-- carried: the same, found in a neighboring image and carried over by its error;
+- native: found by an estimator in the same image; the pose of every estimator is a start;
+- carried: found in a neighboring image and carried over by its error;
 - transplanted: the truth with an error that an estimator made elsewhere, where none found the instance;
-- ladder: the truth with an error of a fixed size in a drawn direction, one start for each rung.
+- ladder: the truth with an error of a fixed size in a random direction, one start for each rung.
 """
 
 from __future__ import annotations
@@ -57,11 +57,11 @@ def all_starts(
 ) -> Starts:
     """Return every start of every instance, by kind.
 
-    Where no dataset has results, an estimate is the frames' own initial pose if global registration found it.
+    Where no dataset has results, an initial pose that global registration found counts as an estimate.
 
     Args:
-        objects: their canonical clouds.
-        datasets, models: those that the instances were read from, by name; the models by id.
+        objects: canonical clouds.
+        datasets, models: from which the instances were read, by name; the models by id.
         rungs: of the ladder: turns in degrees and shifts in diameters.
 
     Raises:
@@ -89,7 +89,7 @@ def _is_global(instances: Instances) -> np.ndarray:
 
 
 def _axes(instances: Instances, i: int) -> tuple:
-    """Return what names the random numbers of an instance, however many others there are."""
+    """Return the names of an instance's random numbers, independent of how many others there are."""
     u, v = instances.pixels_of(i)[0].tolist()  # several of one object may be in an image
     return str(instances.dataset[i]), int(instances.scene[i]), int(instances.image[i]), u, v
 

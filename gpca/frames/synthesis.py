@@ -1,6 +1,6 @@
 """Registrations of instances: partial clouds of depth frames, perturbed, aligned to their models, labeled.
 
-Overlap is lost to an occluder: the silhouette of another object moved over the mask, as if it stood in front.
+Overlap is lost to an occluder: the silhouette of another object is moved over the mask, as if it stood in front.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ class FrameSettings:
     """How instances become registrations.
 
     Attributes:
-        test_share: the share of the instances that is in scenes that training does not see.
-        occluders: share of the overlap samples whose points an occluder takes; a half-space takes the others'.
+        test_share: of the instances, in scenes that training does not see.
+        occluders: share of the overlap samples that lose points to an occluder; the others lose them to a half-space.
         registration: numbers of samples, points, severities, ICP.
     """
 
@@ -53,13 +53,13 @@ def make_frame_registrations(
 
     Samples 3t, 3t + 1 and 3t + 2 of a split show one instance under the three concepts in random order; the instances
     of the split take turns, so that objects are as unequally frequent as in the frames. The source frame is the
-    object's at the initial pose, so that ICP starts at the identity. What is wrong with the initial pose and with the
-    depth itself is in every sample, whatever its label.
+    object's at the initial pose, so that ICP starts at the identity. Errors of the initial pose and of the depth are in
+    every sample, whatever its label.
 
     Returns:
-        the registrations, the seconds (S,) of ICP, and a row per sample: where it comes from, whether any training
-        sample shows its object, and how far the initial and the aligned pose are off, ADD-S for symmetric objects and
-        ADD elsewhere, relative to the diameter.
+        the registrations, the seconds (S,) of ICP, and a row per sample: its instance, whether any training sample
+            shows its object, and the errors of the initial and the aligned pose, ADD-S for symmetric objects and ADD
+            elsewhere, relative to the diameter.
     """
     import pandas as pd
 
@@ -131,14 +131,12 @@ def occlude(
     """Return which of the pixels stay visible (P,) when an occluder covers about the given share of them.
 
     Occluders are the visible silhouettes of the dataset's other objects at their own size, tried in random order. One
-    comes in from a random direction until it covers the share.
+    comes in from a random direction until it covers the share. None where no silhouette covers that share to within
+    `TOLERANCE`.
 
     Args:
-        pixels_P_2: (u, v) of the points of instance i that are in question.
-        share: how much of the pixels is to be covered.
-
-    Returns:
-        None where no silhouette of the dataset can cover that share to within `TOLERANCE`.
+        pixels_P_2: (u, v) of points of instance i.
+        share: of these pixels, to be covered.
     """
     others = np.flatnonzero(
         (instances.dataset == instances.dataset[i]) & (instances.object_index != instances.object_index[i])
@@ -160,7 +158,7 @@ def occlude(
 
 
 def _silhouette(pixels_P_2: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the mask within its bounding box, closed where single pixels were not measured, and the box's corner."""
+    """Return the mask in its bounding box, single unmeasured pixels closed, and the corner of the box."""
     from scipy.ndimage import binary_closing
 
     corner = pixels_P_2.min(axis=0)

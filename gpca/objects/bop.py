@@ -30,12 +30,11 @@ def from_entry(entry: dict, folder: Path) -> Iterator[Surface]:
 
 
 def surfaces(folder: str | Path, unit: str = "mm", objects: Sequence[int] | None = None) -> Iterator[Surface]:
-    """Yield the models `objects` (all when None) in the order of their ids, named ``obj_000001``.
+    """Yield the models `objects` (ids; all when None), sorted and named ``obj_000001``.
 
     Args:
         folder: holds obj_*.ply itself, or models/ with them, as the datasets and their archives do.
-        unit: that of the vertices; the format says mm.
-        objects: ids.
+        unit: of the vertices; the format says mm.
 
     Raises:
         InputError: missing folder, model or models_info.json, or a model whose diameter is not the listed one.
@@ -70,7 +69,7 @@ def _id(path: Path) -> int:
 
 
 def require_entry(entry: dict, folder: Path) -> None:
-    """Raise an InputError unless the folder of a configured source has the objects that it names; reads no model."""
+    """Raise an InputError unless the folder has a model of each object that the entry names; reads no model."""
     if ids := entry.get("objects"):
         require_models(models_folder(folder), ids)
 
@@ -86,7 +85,7 @@ def _model(models: Path, number: int) -> Path:
 
 
 def models_folder(folder: Path) -> Path:
-    """Return the folder that holds the models of a dataset's folder, or of one that holds it."""
+    """Return the folder of the models: `folder` itself, `models` in it, or `models` in one of its folders."""
     if not folder.is_dir():
         raise InputError(folder, "no such folder", "check location and data_dir in the config")
     for candidate in (folder, folder / "models", *sorted(folder.glob("*/models"))):
@@ -96,10 +95,10 @@ def models_folder(folder: Path) -> Path:
 
 
 def read_models_info(path: Path) -> dict[int, dict]:
-    """Return what models_info.json lists by object id.
+    """Return the entries of models_info.json by object id.
 
     Raises:
-        InputError: missing, damaged, an id that is no number or stands twice, a diameter that cannot be, or a symmetry
+        InputError: missing, damaged, an id that is no number or occurs twice, an impossible diameter, or a symmetry
             that is no rigid transform.
     """
     from gpca.objects.bop import require_symmetries  # needs scipy, and the config's checks import this module
@@ -127,23 +126,19 @@ CONTINUOUS_DEG = (25.0, 50.0, 75.0)  # none is a symmetry of a square or hexagon
 
 
 def read_symmetries(models_info: dict[int, dict], object_id: int) -> dict | None:
-    """Return ``symmetries_discrete`` and ``symmetries_continuous`` of an object, or None where the file lists none.
+    """Return ``symmetries_discrete`` and ``symmetries_continuous`` of an object of :func:`read_models_info`.
 
-    The file lists none for an object that has none, and for no object at all where its makers left them out.
-
-    Args:
-        models_info: what :func:`gpca.objects.bop.read_models_info` returns.
+    An object without symmetries has no entries; None means that the file lists no symmetry of any object.
     """
     lists = {n: {k: v for k, v in entry.items() if k.startswith("symmetries_")} for n, entry in models_info.items()}
     return lists.get(object_id, {}) if any(lists.values()) else None
 
 
 def require_symmetries(listed: Mapping[str, Any], subject: str) -> None:
-    """Raise an InputError that names `subject` unless every symmetry that is listed of an object is a rigid transform.
+    """Raise an InputError that names `subject` unless every listed symmetry is a rigid transform.
 
-    Args:
-        listed: what models_info.json says of the object: ``symmetries_discrete``, matrices of 16 numbers, row by row;
-            ``symmetries_continuous``, each an ``axis`` and an ``offset`` of 3 numbers, in millimeters.
+    ``symmetries_discrete`` are matrices of 16 numbers, row by row; ``symmetries_continuous`` have an ``axis`` and an
+    ``offset`` of 3 numbers each, in millimeters.
     """
     for n, matrix in enumerate(_entries(listed, "symmetries_discrete", subject)):
         place = f"{subject}, symmetries_discrete {n}"
@@ -167,19 +162,19 @@ def _entries(listed: Mapping[str, Any], key: str, subject: str) -> list:
 
 
 def find_symmetries(points_N_3: np.ndarray, diameter: float) -> dict[str, list]:
-    """Return the rotations about the axes of the bounding box that leave the shape as it is, as BOP writes them.
+    """Return the rotations about the axes of the bounding box that leave the shape unchanged, as BOP writes them.
 
-    A rotation changes nothing where the mean distance from a turned point to its nearest one is within `TOLERANCE` of
-    the diameter beyond the points' own spacing. That finds LINEMOD's two symmetric objects on their scans. Shape alone
-    counts: a printed can is symmetric, since registration sees no print.
+    A rotation is a symmetry where the mean distance from a turned point to its nearest neighbor exceeds the spacing of
+    the points by at most `TOLERANCE` diameters. On their scans, this finds the two symmetric objects of LINEMOD. Shape
+    alone counts: a printed can is symmetric, since registration does not see the print.
 
     Args:
         points_N_3: a dense cloud of the whole surface, centered on its bounding box.
-        diameter: the object's, in the unit of the points.
+        diameter: of the object, in the unit of the points.
 
     Returns:
-        ``symmetries_discrete``: 4×4 matrices row by row; ``symmetries_continuous``: axes with their offset. Keys only
-        where there are some.
+        ``symmetries_discrete``: 4×4 matrices row by row; ``symmetries_continuous``: axes with offsets. Only keys with
+        entries.
     """
     from scipy.spatial import cKDTree
     from scipy.spatial.transform import Rotation
@@ -210,13 +205,10 @@ def find_symmetries(points_N_3: np.ndarray, diameter: float) -> dict[str, list]:
 
 
 def angle_up_to_symmetry(R_3_3: np.ndarray, symmetries: Mapping[str, list]) -> float:
-    """Return the least angle, in radians, of a rotation that follows one which leaves the shape as it is.
+    """Return the smallest angle, in radians, of a rotation combined with a symmetry from :func:`find_symmetries`.
 
-    With a single axis of revolution a, the least over all turns about it has a closed form: for the unit quaternion
-    (w, v) the cosine of half the angle is √(w² + (v·a)²). With two such axes every rotation leaves the shape as it is.
-
-    Args:
-        symmetries: as :func:`find_symmetries` returns them.
+    For a single axis of revolution a and the unit quaternion (w, v) of the rotation, the cosine of half the smallest
+    angle is √(w² + (v·a)²). With two axes of revolution, every rotation is a symmetry.
     """
     from scipy.spatial.transform import Rotation
 
@@ -231,10 +223,7 @@ def angle_up_to_symmetry(R_3_3: np.ndarray, symmetries: Mapping[str, list]) -> f
 
 
 def symmetric_turn(R_3_3: np.ndarray, symmetries: Mapping[str, list]) -> np.ndarray:
-    """Return the rotation S (3, 3) that leaves the shape as it is and makes R S the least one.
-
-    The angle of R S is that of :func:`angle_up_to_symmetry`.
-    """
+    """Return the symmetry S (3, 3) for which the angle of R S is that of :func:`angle_up_to_symmetry`."""
     from scipy.spatial.transform import Rotation
 
     axes = [np.asarray(entry["axis"], np.float64) for entry in symmetries.get("symmetries_continuous", [])]
@@ -251,7 +240,7 @@ def symmetric_turn(R_3_3: np.ndarray, symmetries: Mapping[str, list]) -> np.ndar
 
 
 def _generated(symmetries: Mapping[str, list]) -> np.ndarray:
-    """Return the rotations (K, 3, 3) that the discrete symmetries make one after the other, the identity first."""
+    """Return the group (K, 3, 3) that the discrete symmetries generate, the identity first."""
     listed = [np.reshape(T, (4, 4))[:3, :3] for T in symmetries.get("symmetries_discrete", [])]
     group = [np.eye(3)]
     for known in group:  # which grows meanwhile

@@ -29,7 +29,7 @@ FEW_POINTS = 600  # up to so many, all distances take less time than the hull
 
 
 def require_points(points: np.ndarray, subject: object) -> None:
-    """Raise InputError unless `points` is (P, 3), P > 0, without NaN or infinity, and finer than they are rounded."""
+    """Raise InputError unless `points` is (P, 3), P > 0, finite, and not rounded away by a large offset."""
     if points.ndim != 2 or points.shape[1] != 3 or len(points) == 0:
         raise InputError(subject, "has no points", "fetch or export it again")
     bad = int((~np.isfinite(points)).any(axis=1).sum())
@@ -39,7 +39,7 @@ def require_points(points: np.ndarray, subject: object) -> None:
 
 
 def _require_resolution(points: np.ndarray, subject: object) -> None:
-    """Raise an InputError where an offset has left float32, or float64, too few digits to tell the points apart."""
+    """Raise an InputError where an offset leaves float32 or float64 too few digits to tell the points apart."""
     extent, largest_3 = np.linalg.norm(np.ptp(points, axis=0)), np.abs(points).max(axis=0)
     for kind in (np.float32, np.float64):
         with np.errstate(all="ignore"):  # float32 does not hold all that float64 does
@@ -59,9 +59,7 @@ def diameter(points: np.ndarray, subject: object) -> float:
     """Return the largest distance between two of the (P, 3) points, in their unit (the diameter of the BOP benchmark).
 
     The two farthest points are vertices of the convex hull, so only those are compared; of few points, all are.
-
-    Raises:
-        InputError: no points, NaN, or all points on one line.
+    InputError for no points, NaN, or points on one line.
     """
     from scipy.spatial import ConvexHull
     from scipy.spatial.distance import cdist, pdist
@@ -89,17 +87,14 @@ def canonical_cloud(
     points, in random order; missing normals are estimated and turned toward the camera at the origin.
 
     Args:
-        surface: vertices in meters.
-        source: the source's name; with the surface's name it seeds the draw.
-        n_points: points drawn from a mesh.
-        say: how the unit is given, for messages.
+        surface: vertices in meters; its name and that of the `source` seed the sampling.
+        say: how the user sets the unit, for messages.
 
     Returns:
-        points_m (P, 3) float32, normals (P, 3) float32 unit, diameter in meters of the vertices.
+        points_m (P, 3) float32, unit normals (P, 3) float32, diameter in meters of the vertices.
 
     Raises:
-        InputError: no points, NaN, zero area, too small a cloud, too few points to draw, or a diameter that no
-            declared unit would give.
+        InputError: no points, NaN, no area, too few points, or a diameter that no declared unit would give.
     """
     subject = f"{source}: object '{surface.name}'"
     vertices_m = np.asarray(surface.vertices_m, dtype=np.float64)
@@ -124,7 +119,7 @@ def canonical_cloud(
 
 
 def bounding_center(surface: Surface) -> np.ndarray:
-    """Return the center (3,) of a surface's upright bounding box, in meters: the origin of its canonical cloud."""
+    """Return the center (3,) of a surface's upright bounding box in meters: the origin of its canonical cloud."""
     used_m = _used_vertices(surface)
     return (used_m.min(axis=0) + used_m.max(axis=0)) / 2
 
@@ -136,7 +131,7 @@ def _used_vertices(surface: Surface) -> np.ndarray:
 
 
 def require_size(diameter_m: float, subject: object, say: str = IN_CONFIG) -> None:
-    """Raise an InputError unless a diameter is 1 mm to 10 m, as in the right unit; `say` tells how that is given."""
+    """Raise an InputError unless a diameter is 1 mm to 10 m; `say` is how the user sets the unit."""
     if SMALLEST_DIAMETER_M <= diameter_m <= LARGEST_DIAMETER_M:
         return
     unit, short = ("millimeters", "mm") if diameter_m > LARGEST_DIAMETER_M else ("meters", "m")
@@ -165,7 +160,7 @@ def _shuffled(surface: Surface, n_points: int, rng: np.random.Generator) -> tupl
 
 
 def normals_towards_camera(points_m: np.ndarray) -> np.ndarray:
-    """Return unit normals (P, 3) by the nearest neighbors of points (P, 3), turned toward a camera at the origin."""
+    """Return unit normals (P, 3) from nearest neighbors, turned toward a camera at the origin."""
     cloud = open3d_cloud(points_m)
     cloud.estimate_normals(require_open3d().geometry.KDTreeSearchParamKNN(NORMAL_NEIGHBORS))
     cloud.orient_normals_towards_camera_location(np.zeros(3))
@@ -177,10 +172,8 @@ def write_objects(
 ) -> None:
     """Write the canonical clouds of a source to an objects npz (read it with :class:`ObjectClouds`).
 
-    A file of `splits` says which objects are alike (:mod:`gpca.objects.splits`).
-
-    Raises:
-        InputError: no object at all, two of one name, or a fault in one of them; nothing is written then.
+    Families and folds are those of the file `splits`, if given. InputError for no object, two of one name, or a fault
+    in one of them; nothing is written then.
     """
     places = read_object_splits(splits, source) if splits else {}
     objects = sample_objects(without_unused(surfaces, places), source, n_points)
@@ -188,7 +181,7 @@ def write_objects(
 
 
 def sample_objects(surfaces: Iterable[Surface], source: str, n_points: int = 16384) -> ObjectClouds:
-    """Return the canonical clouds of a source; InputError as :func:`write_objects` raises it."""
+    """Return the canonical clouds of a source; InputError as in :func:`write_objects`."""
     names, clouds, diameters_m = [], [], []
     for surface in surfaces:
         if not is_name(surface.name):

@@ -37,17 +37,14 @@ LARGEST_DOWNLOAD_BYTES = 10**11
 
 
 def fetch(url: str, sha256: str | None, folder: str | Path, location: str | None = None) -> Path:
-    """Return the file of `url`, downloaded when the cache does not hold it yet.
+    """Return the file of `url`, from the cache `folder` or downloaded to it, under the host and path of the URL.
 
-    Args:
-        url: http or https.
-        sha256: the expected checksum; None accepts any and prints the actual one, so that it can be pinned.
-        folder: the cache; the file lies in it under the host and path of the URL, so that no two URLs share a file.
-        location: of the same data below data_dir, named in the message when the network fails.
+    Without an expected `sha256`, the actual one is printed so that it can be pinned. `location` is that of the same
+    data below data_dir; the message names it when the network fails.
 
     Raises:
-        InputError: no network, an error answer, an interrupted transfer, or another checksum. What was downloaded is
-            removed then; a file that was in the cache before stays.
+        InputError: no network, an error answer, an interrupted transfer, or another checksum. The download is removed
+            then; a file that was in the cache before stays.
     """
     path = cached_path(url, folder)
     if path.is_file():
@@ -97,11 +94,7 @@ def _download(url: str, path: Path, remedy: str) -> None:
 
 
 def _within_limits(download: Callable[[], object], url: str, path: Path, remedy: str) -> None:
-    """Run a download in a thread and watch the file grow; what it raises is raised here.
-
-    Raises:
-        InputError: too slow or too large. The thread is left to itself: it ends with the process.
-    """
+    """Run a download in a daemon thread; InputError where the file grows too slowly or becomes too large."""
     faults = []
 
     def run() -> None:
@@ -136,7 +129,7 @@ _DAMAGE = (tarfile.TarError, zipfile.BadZipFile, gzip.BadGzipFile, EOFError, zli
 
 @dataclass(frozen=True)
 class Member:
-    """A regular file in an archive: its relative path there, its size in bytes, and `open`, which gives a stream."""
+    """A regular file in an archive: its relative path there, its size in bytes, and what opens a stream of it."""
 
     archive: Path
     name: str
@@ -157,8 +150,8 @@ def open_archive(path: str | Path, largest_bytes: int = LARGEST_UNPACKED_BYTES) 
     """Yield the regular files of an archive, readable within the context.
 
     Raises:
-        InputError: missing, truncated or of another format; a member that is a link, a device or encrypted, or
-            whose path leaves the archive's folder; more than `largest_bytes` unpacked.
+        InputError: missing, truncated or of another format; a member that is a link, a device or encrypted, or whose
+            path leaves the archive's folder; more than `largest_bytes` unpacked.
     """
     path = Path(path)
     require_file(path, "no such file", "check url or files in the config", math.inf)
@@ -173,16 +166,13 @@ def open_archive(path: str | Path, largest_bytes: int = LARGEST_UNPACKED_BYTES) 
 
 
 def unpack(path: str | Path, folder: str | Path, largest_bytes: int = LARGEST_UNPACKED_BYTES) -> Path:
-    """Unpack an archive into a folder, whole or not at all; where that was done before, every file is checked.
+    """Unpack an archive into a folder, whole or not at all, with a list of SHA-256 beside it, and return the folder.
 
-    Beside the folder stands a list of its files with their SHA-256.
-
-    Returns:
-        The folder.
+    A folder that was unpacked before is checked against its list.
 
     Raises:
-        InputError: see :func:`open_archive`; too little space on the disk; a file of the folder that is changed,
-            missing or not of the archive.
+        InputError: see :func:`open_archive`; too little space on the disk; a file of the folder that was changed, is
+            missing or is not from the archive.
     """
     folder = Path(folder)
     listed = folder.with_name(f"{folder.name}.sha256.json")
@@ -201,7 +191,7 @@ def unpack(path: str | Path, folder: str | Path, largest_bytes: int = LARGEST_UN
 
 
 def _write(member: Member, target: Path) -> str:
-    """Write a member, piece by piece, and return its SHA-256."""
+    """Write a member piece by piece and return its SHA-256."""
     digest = hashlib.sha256()
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -245,7 +235,7 @@ def _open(path: Path) -> zipfile.ZipFile | tarfile.TarFile:
 
 
 class _TarInfo(tarfile.TarInfo):
-    """A tar member that refuses a long header, since listing the members would read it into memory."""
+    """A tar member that refuses a long header: listing the members would read it into memory."""
 
     @classmethod
     def frombuf(cls, buf: bytes | bytearray, encoding: str, errors: str) -> _TarInfo:
@@ -259,10 +249,10 @@ Entry = tuple[str, int, str, Callable[[], Any] | None]  # name, bytes, fault of 
 
 
 def _checked(path: Path, largest_bytes: int, entries: Iterable[Entry]) -> list[Member]:
-    """Return the members, each checked before the next is looked for: to find it, a bomb may have to be decompressed.
+    """Return the members, each checked before the next is looked for: a bomb may have to be decompressed to find it.
 
-    The filters of the standard library would not do: tarfile's lets links pass and, as zipfile does, strips a leading
-    slash in silence.
+    The filters of the standard library do not suffice: that of tarfile lets links pass, and both tarfile and zipfile
+    strip a leading slash in silence.
     """
     members, total = [], 0
     for name, size, fault, open_it in entries:

@@ -69,19 +69,19 @@ STAND_IN = "procedural stand-in"
 
 
 def title_of(entry: Mapping) -> str:
-    """Return a source's title, with the words that it is a stand-in where it is one."""
+    """Return a source's title; a stand-in always says that it is one."""
     return f"{entry['title']} ({STAND_IN})" if entry["stand_in"] else entry["title"]
 
 
 def dataset_of(entry: Mapping) -> str:
-    """Return the BOP benchmark's name of the dataset that a source's objects are of; empty for other sources."""
+    """Return the BOP benchmark's name of a source's dataset; empty for other kinds of source."""
     return PurePath(entry.get("location") or "").name if entry.get("kind") == "bop" else ""
 
 
 def stand_in_clause(entries: Iterable[Mapping], partly: bool = True) -> str:
-    """Return the clause that ends a caption when any of its sources is a stand-in, and nothing when none is.
+    """Return the clause that ends a caption when a source is a stand-in, or an empty string.
 
-    The clause tells a mixture from stand-ins alone, unless `partly` is false.
+    The clause says "partly" for a mixture, unless `partly` is false.
     """
     stand_ins = [bool(entry["stand_in"]) for entry in entries]
     if not any(stand_ins):

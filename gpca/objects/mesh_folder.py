@@ -42,7 +42,7 @@ def meters_per(unit: str | None) -> float:
 
 
 def files_in(folder: str | Path, patterns: Sequence[str] | None, suffixes: Sequence[str]) -> list[Path]:
-    """Return the files of a folder, sorted: those that the glob patterns name, or else all with one of the suffixes.
+    """Return the files of a folder, sorted: the matches of the patterns, or all with one of the suffixes.
 
     Raises:
         InputError: no such folder, an empty one, a pattern without a match, a match of another format.
@@ -72,8 +72,8 @@ def read_surface(path: Path, scale: float) -> Surface:
     """Read one file, vertices times `scale`. Points without faces are a cloud, which only PLY may hold.
 
     Raises:
-        InputError: unreadable, too large, truncated or longer than it declares, without points or faces, NaN, or faces
-            that name no vertex.
+        InputError: unreadable, too large, truncated or longer than it declares, no points or faces, NaN, or a face that
+            refers to no vertex.
     """
     remedy = "fetch or export it again"
     require_file(path, "no such file", remedy)
@@ -104,7 +104,7 @@ def read_surface(path: Path, scale: float) -> Surface:
 
 
 def _cloud_normals(cloud, path: Path) -> np.ndarray | None:
-    """Return the unit normals that the PLY of a point cloud carries; None when it has none."""
+    """Return the unit normals in the PLY of a point cloud, None where it has none."""
     vertex = cloud.metadata["_ply_raw"]["vertex"]  # the only place where trimesh keeps a cloud's normals
     axes = ("nx", "ny", "nz")
     if not set(axes) <= set(vertex["properties"]):
@@ -117,7 +117,7 @@ def _cloud_normals(cloud, path: Path) -> np.ndarray | None:
 
 
 def _require_equal_lists(loaded) -> None:
-    """Raise a ValueError where a list of a binary PLY differs in length from the first: trimesh reads all like that."""
+    """Raise a ValueError where lists of a binary PLY differ in length: trimesh reads them all like the first."""
     raw = getattr(loaded, "metadata", {}).get("_ply_raw", {})
     for name, element in raw.items():
         data = element.get("data")
@@ -148,11 +148,11 @@ STL_HEAD_BYTES, STL_FACET_BYTES = 84, 50  # of binary STL; the head ends with th
 
 
 def require_whole(path: Path) -> None:
-    """Check that a file of text holds what it declares; of a binary one, only the header of PLY is checked.
+    """Check that a text file holds what it declares; of a binary one, only the header of PLY is checked.
 
     Raises:
         ValueError: it does not.
-        InputError: it has too much text to be parsed, or no faces in a format that is for meshes alone.
+        InputError: too much text to parse, or no faces in a format for meshes alone.
     """
     check = {".ply": _check_ply, ".off": _check_off, ".obj": _check_obj, ".stl": _check_stl}.get(path.suffix.lower())
     if check:
@@ -206,7 +206,7 @@ def _ply_header(file: IO[bytes]) -> tuple[bool, list[tuple[str, int, list[list[b
 
 
 def _fault_of_row(row: list[bytes] | None, lists: list[bool], corners: list[bool]) -> str:
-    """Return why a row has not one word for each property, and for a list as many as it says; empty where it has."""
+    """Return how a row differs from its properties and list lengths; empty where it does not."""
     if row is None:
         return "is missing"
     position = 0
@@ -277,7 +277,7 @@ def _check_obj(path: Path) -> None:
 
 
 def _obj_rows(path: Path) -> Iterator[tuple[int, list[bytes]]]:
-    """Yield number and words of each line; one that ends in a backslash goes on in the next."""
+    """Yield number and words of each line; a backslash at the end continues the line."""
     before = b""
     with path.open("rb") as file:
         for number, line in enumerate(_lines(file), start=1):
@@ -315,11 +315,7 @@ def _check_stl(path: Path) -> None:
 
 
 def _lines(file: IO[bytes]) -> Iterator[bytes]:
-    """Yield the remaining lines of a file of text.
-
-    Raises:
-        InputError: it has too much text to be parsed.
-    """
+    """Yield the remaining lines of a text file; InputError where it has too much text to parse."""
     if (size := os.fstat(file.fileno()).st_size) > LARGEST_TEXT_BYTES:
         fault = f"has {size / 1e6:.0f} MB of text, more than the limit of {LARGEST_TEXT_BYTES / 1e6:.0f} MB"
         raise InputError(file.name, fault, "export it as binary PLY, or with fewer faces")

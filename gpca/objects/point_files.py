@@ -42,18 +42,10 @@ class _Header:
 
 
 def parse_pcd(content: bytes, subject: object) -> np.ndarray:
-    """Return the points of a PCD file.
+    """Return the points (P, 3) float64 of a PCD file's content, in the file's unit; `subject` names it in messages.
 
-    Args:
-        content: the whole file.
-        subject: its name for messages.
-
-    Returns:
-        (P, 3) float64 in the file's unit. An organized cloud (HEIGHT > 1) marks missing depth by NaN, and those
-        points are left out; in any other cloud NaN is a fault.
-
-    Raises:
-        InputError: wrong header, fewer or more data than the header says, no points, NaN.
+    An organized cloud (HEIGHT > 1) marks missing depth by NaN, and those points are left out; elsewhere NaN is a fault.
+    InputError for a wrong header, another amount of data than it says, or no points.
     """
     try:
         header, body = _parse_header(content)
@@ -142,7 +134,7 @@ _DECODERS = {"ascii": _ascii, "binary": _binary, "binary_compressed": _binary_co
 def _lzf_decompress(data: bytes, size: int) -> bytearray:
     """Undo LZF: runs of literal bytes, and copies of up to 264 earlier bytes that may overlap what they write.
 
-    It stops once there are more than `size` bytes.
+    Stops after more than `size` bytes.
     """
     out = bytearray()
     i = 0
@@ -177,7 +169,10 @@ COLUMNS_REMEDY = "export it as three columns x, y, z"
 
 
 def read_table(path: Path) -> np.ndarray:
-    """Return the points (P, 3) of a file of one of the formats in `TABLE_READERS`, by its suffix."""
+    """Return the points (P, 3) float64 of a file of `TABLE_READERS`, in its unit; InputError for anything else.
+
+    They are the first three columns, or those named x, y and z in a csv with a header.
+    """
     require_file(path, "no such file", COLUMNS_REMEDY)
     return TABLE_READERS[path.suffix.lower()](path)
 
@@ -238,7 +233,7 @@ def _points_of(array: np.ndarray, path: Path) -> np.ndarray:
 
 
 def _text(path: Path) -> np.ndarray:
-    """Read columns that are parted by spaces, commas, semicolons or tabs; lines that begin with # are comments."""
+    """Read columns separated by spaces, commas, semicolons or tabs; lines that begin with # or // are comments."""
     require_file(path, "no such file", COLUMNS_REMEDY, LARGEST_TEXT_BYTES)
     lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
     kept = [line for line in lines if line.strip() and not line.lstrip().startswith(("#", "//"))]
@@ -308,9 +303,7 @@ CARTESIAN = ("cartesianX", "cartesianY", "cartesianZ")
 
 
 def read_scanner_file(path: Path) -> np.ndarray:
-    """Return the points (P, 3) float64 of a file of one of the formats in `PACKAGES`, by its suffix.
-
-    All scans of an E57 file are joined in the frame of the file.
+    """Return the points (P, 3) float64 of a file of `PACKAGES`, all scans of an E57 file joined in its frame.
 
     Raises:
         InputError: no such file, a missing package (the line says how to install it), or a file that it cannot read.

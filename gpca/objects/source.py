@@ -41,21 +41,17 @@ RESTORE = "restore it: git checkout -- data"
 
 
 def resolve(entry: dict, data_dir: str | None) -> dict:
-    """Decide where a source's data comes from; reads no data, so it is quick enough for the loading of a workflow.
+    """Decide where a source's data comes from, without reading any, so that it is quick when a workflow loads.
 
-    What lies under `data_dir` comes first, then the repository's own data, then the entry's `url` or `urls`. A
-    `location` counts as soon as it exists; without one, each pattern of `files` must match.
-
-    Args:
-        entry: the source's part of the config.
-        data_dir: folder that relative locations start from, or None.
+    Data under `data_dir` comes first, then the repository's own, then the entry's `url` or `urls`. A `location` counts
+    if it exists; without one, each pattern of `files` must match.
 
     Returns:
-        The entry with `origin` "procedural", "local" or "download" and, when local, with the absolute
-        `location`. A download keeps the declared one: it says what a `data_dir` would have to hold.
+        The entry with `origin` "procedural", "local" or "download" and, when local, with the absolute `location`. A
+        download keeps the declared one, for messages.
 
     Raises:
-        InputError: unknown kind, missing data_dir, location nowhere to be found and no url, checksums unlike the urls,
+        InputError: unknown kind, missing data_dir, location not found and no url, checksums that do not match the urls,
             and what the kind refuses of the entry.
     """
     subject = f"source '{entry.get('title', entry.get('kind'))}'"
@@ -84,11 +80,7 @@ def resolve(entry: dict, data_dir: str | None) -> dict:
 
 
 def surfaces(entry: dict, cache_folder: str | Path) -> Iterator[Surface]:
-    """Yield the surfaces of a resolved entry; what has to be downloaded is kept, and unpacked, in `cache_folder`.
-
-    Raises:
-        InputError: from :mod:`gpca.objects.downloads`, :mod:`gpca.objects.downloads` and the kind's own reader.
-    """
+    """Yield the surfaces of a resolved entry; downloads are kept, and unpacked, in `cache_folder`."""
     module = _module_of(entry["kind"])
     if entry["origin"] == PROCEDURAL:
         yield from module.surfaces(entry["family"])
@@ -99,11 +91,7 @@ def surfaces(entry: dict, cache_folder: str | Path) -> Iterator[Surface]:
 
 
 def folders(entry: dict, cache_folder: str | Path, unpack: bool = True) -> list[Path]:
-    """Return where a resolved entry's data is: its location, or what was downloaded, a folder for each archive.
-
-    Raises:
-        InputError: from :mod:`gpca.objects.downloads`, :mod:`gpca.objects.downloads` and :func:`require_place`.
-    """
+    """Return the folders of a resolved entry's data: its location, or one for each download."""
     if entry["origin"] == "local":
         return [Path(entry["location"])]
     cache = require_place(cache_folder)
@@ -128,10 +116,7 @@ def data_files(entry: dict) -> list[Path]:
 
 
 def data_folders(entry: dict, data_dir: str | None, downloads: str) -> dict[str, str]:
-    """Return the one folder that a resolved entry's data comes from, by the name that steps give it.
-
-    No other folder is named, so that a change of another one does not make the objects anew.
-    """
+    """Return the one folder that a resolved entry's data comes from, so that steps depend on no other."""
     if entry["origin"] == "local":
         return {"data_dir": data_dir} if data_dir else {}
     return {"downloads": downloads} if entry["origin"] == "download" else {}
@@ -164,11 +149,7 @@ def _local_data(entry: dict, data_dir: str | None) -> Path | None:
 
 
 def find_file(place: str, data_dir: str | None) -> Path:
-    """Return a file that a config names relative to `data_dir` or to the repository's data.
-
-    Raises:
-        InputError: neither has it.
-    """
+    """Return a file that a config names, in `data_dir` or the repository's data; InputError where neither has it."""
     paths = places_of(place, data_dir)
     path = next((path for path in paths if path.is_file()), None)
     if path is None:
@@ -178,7 +159,7 @@ def find_file(place: str, data_dir: str | None) -> Path:
 
 
 def places_of(place: str, data_dir: str | None) -> list[Path]:
-    """Return where a place may be that a config names: below `data_dir`, then in the repository's data."""
+    """Return where a place that a config names may be: below `data_dir`, then in the repository's data."""
     return [require_place(base / require_place(place)).absolute() for base in folders_of_data(data_dir)]
 
 
@@ -186,8 +167,8 @@ def require_place(place: str | Path) -> Path:
     """Return a place of data as a path, with the user's home in place of ``~``: for each path that a user names.
 
     Raises:
-        InputError: nobody's home, symbolic links that lead in a circle, or a place of the system's own, where nothing
-            ends that is read.
+        InputError: the home of an unknown user, a circle of symbolic links, or a folder of devices, whose files may
+            never end.
     """
     try:
         path = Path(place).expanduser()
@@ -230,19 +211,19 @@ def _as_list(value: str | list | None) -> list:
 
 
 def folders_of_data(data_dir: str | Path | None) -> list[Path]:
-    """Return the folders that a relative place of data is looked for in: the user's first, then the repository's."""
+    """Return the folders in which a relative place is sought: the user's, then the repository's."""
     return [Path(folder) for folder in (data_dir, DATA) if folder]
 
 
 def require_whole_if_ours(place: Path) -> None:
-    """Raise an InputError where a place lies in the repository's data and this is not as it was published."""
+    """Raise an InputError where a place lies in the repository's data and this differs from what was published."""
     if place.resolve().is_relative_to(DATA.resolve()):
         require_whole(DATA)
 
 
 @cache
 def require_whole(folder: Path) -> None:
-    """Raise an InputError for the first file of the data that is missing or changed, and for another version of it."""
+    """Raise an InputError for another version of the data, or its first file that is missing or changed."""
     version = folder / "VERSION"
     if (found := version.read_text("utf-8").strip() if version.is_file() else "unknown") != VERSION:
         raise InputError(folder, f"is version {found} of the data, and this code reads version {VERSION}", RESTORE)

@@ -1,15 +1,15 @@
-"""Which objects and scenes are alike, and which of them are tested together: read from files, or else drawn.
+"""Which objects and scenes are alike, and which of them are tested together: read from files, or drawn.
 
-Samples that show objects of one family of shapes, or one scene, form a *cluster*: a cluster is never in training and
-test at once where objects or scenes are unseen, and intervals are over clusters. The clusters of a source are dealt
-into *folds*; with a seed, those of one fold are unseen. A file with these columns says how:
+Samples that show objects of one family of shapes, or one scene, form a *cluster*. Clusters are never split between
+training and test where objects or scenes are unseen, and intervals are over clusters. The clusters of a source are
+dealt into *folds*; each seed leaves one fold unseen. Columns of the files:
 
     objects: source, object, name, family, role, fold
     scenes:  dataset, scene, role, fold[, truth, estimates]
 
-The role is ``development`` (what settings are chosen by), ``evaluation`` or, of objects, ``unused``. The true poses of
-a scene were ``annotated`` or made by ``icp``; poses of estimators are those on its very ``image`` or were ``carried``
-over from another one of the sequence.
+The role is ``development`` (settings are chosen on it), ``evaluation`` or, of objects, ``unused``. The true poses of a
+scene were ``annotated`` or made by ``icp``; poses of estimators are from the same ``image`` or were ``carried`` over
+from another one of the sequence.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ WORTH = {"truth": TRUTHS, "estimates": ESTIMATES}  # columns of scenes that may 
 
 
 class Place(NamedTuple):
-    """Where an object or a scene stands: its cluster, its role and its fold; of a scene, what its poses are worth."""
+    """The cluster, role and fold of an object or a scene, and where the poses of a scene are from."""
 
     cluster: str
     role: str
@@ -44,11 +44,11 @@ class Place(NamedTuple):
 
 
 def read_object_splits(path: str | Path, source: str) -> dict[str, Place]:
-    """Return the place of each object of a source by name; none where the file says nothing of the source.
+    """Return the place of each object of a source by name; none where the file does not name the source.
 
     Raises:
         InputError: a damaged file, an object twice, an unknown role, a fold that is no whole number, a family in two
-            folds or in two roles.
+            folds or roles.
     """
     rows = read_csv(path, ("source", "object", "name", "family", "role", "fold"), remedy="restore it")
     of_source = rows[rows["source"] == source]
@@ -56,10 +56,9 @@ def read_object_splits(path: str | Path, source: str) -> dict[str, Place]:
 
 
 def read_scene_splits(path: str | Path, dataset: str) -> dict[int, Place]:
-    """Return the place of each scene of a dataset by number; none where the file says nothing of the dataset.
+    """Return the place of each scene of a dataset by number; none where the file does not name the dataset.
 
-    Raises:
-        InputError: as :func:`read_object_splits`, and an unknown word for the truth or the estimates.
+    InputError as in :func:`read_object_splits`, and for an unknown word for truth or estimates.
     """
     rows = read_csv(path, ("dataset", "scene", "role", "fold"), others=tuple(WORTH), remedy="restore it")
     of_dataset = rows[rows["dataset"] == dataset]
@@ -92,11 +91,7 @@ def _places(path, names, clusters, roles, folds) -> dict[str, Place]:
 
 
 def without_unused(surfaces: Iterable[Surface], places: Mapping[str, Place]) -> Iterator[Surface]:
-    """Yield the surfaces of objects that have a use; all where there are no places.
-
-    Raises:
-        InputError: the file names objects of the source, but not this one.
-    """
+    """Yield the surfaces that are not unused; InputError for an object that the given places lack."""
     for surface in surfaces:
         if places and surface.name not in places:
             remedy = "add it to the file of objects, or set splits.objects: null"
@@ -114,10 +109,7 @@ def families_and_folds(names: Iterable[str], places: Mapping[str, Place]) -> dic
 
 
 def unseen(fold_N: np.ndarray, seed: int) -> np.ndarray | None:
-    """Return which rows (N,) are unseen with a seed, by their folds; None where there are none.
-
-    The seeds take turns with the folds that a source has.
-    """
+    """Return the rows (N,) of the fold that a seed leaves unseen, by turns; None for fewer than two folds."""
     folds = np.unique(fold_N[fold_N >= 0])
     if len(folds) < 2:
         return None
@@ -125,7 +117,7 @@ def unseen(fold_N: np.ndarray, seed: int) -> np.ndarray | None:
 
 
 def drawn(cluster_N: np.ndarray, share: float, *axes: object) -> np.ndarray:
-    """Return which rows (N,) are unseen, a share of the clusters drawn with the seed axes: at least one, never all."""
+    """Return the rows (N,) of a share of the clusters, drawn with the seed axes: at least one cluster, never all."""
     clusters = np.unique(cluster_N)
     count = min(max(1, round(share * len(clusters))), len(clusters) - 1)
     return np.isin(cluster_N, generator(*axes).permutation(clusters)[:count])

@@ -22,7 +22,7 @@ class Surface:
         name: unique within the source.
         vertices_m: (V, 3) float64, meters, in the source's own frame.
         faces: (F, 3) int64 triangles, or None for a point cloud.
-        normals: (V, 3) unit normals of a point cloud; estimated from the points when None. Unused for meshes.
+        normals: (V, 3) unit normals of a point cloud; estimated from the points when None.
     """
 
     name: str
@@ -32,22 +32,19 @@ class Surface:
 
     @property
     def triangles(self) -> np.ndarray:
-        """The faces of a surface that is known to be a mesh."""
+        """The faces of a surface that must be a mesh."""
         if self.faces is None:
             raise ValueError(f"{self.name} is a point cloud")
         return self.faces
 
 
 def evenly(items: Sequence[T], most: int) -> list[T]:
-    """Return at most so many of the items, spread evenly over them.
-
-    The end is left out: the last frame of a turntable is the neighbor of its first.
-    """
+    """Return at most this many items, evenly spread; the last is left out, since a turntable ends where it began."""
     return [items[i] for i in np.linspace(0, len(items), min(most, len(items)), endpoint=False).astype(int)]
 
 
 def instance_of(name: str) -> str:
-    """Return the instance that a view is of, by its name; a name of another form is an instance of its own."""
+    """Return the instance that a view shows, by its name; a name of another form is its own instance."""
     return view_order(name)[0]
 
 
@@ -64,16 +61,10 @@ REMEDY = "give an (N, 3) array or a point cloud of Open3D"
 
 
 def as_points(cloud: Any, role: str) -> np.ndarray:
-    """Return the points of a cloud as (N, 3) float64.
+    """Return the points (N, 3) float64 of an array, a list, a tensor on any device, or a cloud of Open3D, old or new.
 
-    Open3D is not imported: its clouds are known by what they have, ``points`` or ``point.positions``.
-
-    Args:
-        cloud: anything that NumPy makes an array of, a tensor on any device, or a cloud of Open3D.
-        role: what the cloud is, for messages.
-
-    Raises:
-        InputError: something else, or an array of another shape.
+    Open3D is not imported: its clouds are recognized by ``points`` or ``point.positions``. InputError, with `role` as
+    the subject, for anything else.
     """
     values = cloud
     if not isinstance(cloud, np.ndarray):
@@ -102,7 +93,7 @@ def _positions(cloud: Any, role: str) -> Any:
 
 
 def _on_the_cpu(tensor: Any) -> Any:
-    """Return a tensor of torch or of Open3D as an array; anything else as it is."""
+    """Return a tensor of torch or Open3D as an array; anything else unchanged."""
     for name in ("detach", "cpu", "numpy"):
         if (method := getattr(tensor, name, None)) is not None:
             tensor = method()

@@ -30,12 +30,11 @@ def from_entry(entry: dict, place: Path) -> Iterator[Surface]:
 
 
 def surfaces(paths: Iterable[Path], unit: str = "m", views_per_instance: int = 6) -> Iterator[Surface]:
-    """Yield views of each instance, spread evenly over its views in the order of sequence and frame.
+    """Yield views of each instance of PCD files and tars of them, spread evenly in the order of sequence and frame.
 
     Args:
-        paths: .pcd files and tars of them.
-        unit: that of the points.
-        views_per_instance: how many views of one instance are read at most, of one tar or of the single files.
+        unit: of the points.
+        views_per_instance: at most, of one tar or of the single files.
 
     Raises:
         InputError: damaged tar or PCD, a tar without PCD, NaN.
