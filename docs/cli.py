@@ -11,12 +11,11 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Iterable
-from importlib import import_module
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
-from gpca.__main__ import COMMANDS, add_common_arguments  # noqa: E402 (the script runs from a plain checkout)
+from gpca.__main__ import COMMANDS, add_common_arguments, load_command  # noqa: E402 (the script runs from a plain checkout)
 from gpca.io.files import whole_file  # noqa: E402
 
 PAGE = Path(__file__).with_name("cli.md")
@@ -52,7 +51,7 @@ def page() -> str:
     sections = [HEAD, "## Options of every command\n", table(common)]
     for name, summary in COMMANDS.items():
         command = argparse.ArgumentParser(add_help=False)
-        import_module(f"gpca.commands.{name.replace('-', '_')}").add_arguments(command)
+        load_command(name)[0](command)
         sections += [f"## gpca {name}\n", f"{sentence(summary)}\n", f"`{usage(name, command)}`\n", table(command)]
     return "\n".join(sections)
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import sys
-from argparse import ArgumentParser
+from argparse import ArgumentParser, Namespace
+from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 
@@ -25,6 +26,16 @@ COMMANDS = {  # those for a registration of one's own first, then those for a ru
     "check-config": "check whether a run can use these configs",
     "check-reference": "check whether the numbers of a run agree with its reference",
 }
+MODULES = {  # modules of gpca.commands with several commands; others have the name of their command
+    **dict.fromkeys(("bench", "score", "leaderboard", "ship-predictions"), "tracks"),
+    **dict.fromkeys(("compare", "check-config", "check-reference"), "runs"),
+}
+
+
+def load_command(name: str) -> tuple[Callable[[ArgumentParser], None], Callable[[Namespace], int | None]]:
+    """Return the functions that declare the arguments of a command and run it."""
+    module, suffix = import_module(f"gpca.commands.{MODULES.get(name, name)}"), name.replace("-", "_")
+    return getattr(module, f"add_{suffix}_arguments"), getattr(module, f"run_{suffix}")
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -49,9 +60,9 @@ def _run(arguments: list[str], chosen: str | None) -> int:
         if name == chosen:  # the others bring libraries that take seconds to load
             _set_threads(arguments)
             keep_freed_memory()
-            module = import_module(f"gpca.commands.{name.replace('-', '_')}")
-            module.add_arguments(command)
-            command.set_defaults(run=module.run)
+            add_arguments, run = load_command(name)
+            add_arguments(command)
+            command.set_defaults(run=run)
     options = parser.parse_args(arguments)
     options.settings = _mapping(options.settings)
     return options.run(options) or 0

@@ -16,7 +16,7 @@ BESIDE = {  # what a module reads from its own folder
     "gpca.reporting.figures.style": "matplotlibrc",
     "gpca.experiments.scans.published": "published.csv",
     "gpca.page.page": "templates/*",
-    "gpca.model.shown.packing": "assets/*",
+    "gpca.model.scene": "assets/*",
 }
 
 

@@ -69,15 +69,14 @@ def diagnoser():
 
     from gpca.causes.settings import CauseSettings
     from gpca.classifier.settings import GPCSettings
-    from gpca.model.contents import WIDTH_READ
-    from gpca.model.diagnoser import REENACTED
-    from gpca.model.learning import Lessons, learn
+    from gpca.model.diagnoser import REENACTED, TrainingSet, learn
+    from gpca.model.file import FEATURE_COUNTS
     from gpca.reenactment.settings import ReenactmentSettings
 
     random, label_N = np.random.default_rng(0), np.array(["nominal", "noise", "pose"] * 4)
     failed_N = label_N != "nominal"
-    lessons = Lessons(
-        features_N_F=random.normal(size=(12, WIDTH_READ[REENACTED])) + 3 * failed_N[:, None],
+    training = TrainingSet(
+        features_N_F=random.normal(size=(12, FEATURE_COUNTS[REENACTED])) + 3 * failed_N[:, None],
         label_N=label_N,
         state_N=np.where(failed_N, "several", "nominal"),
         causes_N_3=np.repeat(failed_N[:, None], 3, axis=1),
@@ -86,7 +85,7 @@ def diagnoser():
     )
     gpc = GPCSettings(learning_rate=0.1, iterations=20, inducing=4, draws=50)
     reenactment = ReenactmentSettings(hypotheses=2)
-    return learn(lessons, gpc, CauseSettings(points=(64, 128), moved="observed"), reenactment, 0.05, "tiny", 0)[0]
+    return learn(training, gpc, CauseSettings(points=(64, 128), moved="observed"), reenactment, 0.05, "tiny", 0)[0]
 
 
 @pytest.fixture(scope="session")

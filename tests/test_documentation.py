@@ -7,13 +7,12 @@ import sys
 from argparse import ArgumentParser
 from dataclasses import fields
 from functools import cache
-from importlib import import_module
 from importlib.util import find_spec
 
 import pytest
 import yaml
 
-from gpca.__main__ import COMMANDS
+from gpca.__main__ import COMMANDS, load_command
 from gpca.experiments.controls.settings import CONTROLS
 from gpca.experiments.registry import registered
 from gpca.objects.entry import Source
@@ -66,7 +65,7 @@ def options_of(program):
     """The options that a command of `python -m gpca`, or a script, has."""
     if program in COMMANDS:
         parser = ArgumentParser()
-        import_module(f"gpca.commands.{program.replace('-', '_')}").add_arguments(parser)
+        load_command(program)[0](parser)
         return {"--threads", "--settings", *parser._option_string_actions}
     shown = subprocess.run([sys.executable, program, "--help"], cwd=ROOT, capture_output=True, text=True, check=True)
     return set(re.findall(r"--[\w-]+", shown.stdout))

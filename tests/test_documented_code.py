@@ -6,7 +6,7 @@ import runpy
 import numpy as np
 import pytest
 
-from gpca.guarantee.alarm import OUTCOMES
+from gpca.guarantee.conformal import OUTCOMES
 from gpca.guarantee.states import STATES
 
 from .documents import ROOT

@@ -1,11 +1,13 @@
-"""A person as the oracle: the labels that were given so far, the classifier that they make, and what to ask next."""
+"""Labeling by a person: queued registrations, the file of labels, and the session that asks and retrains."""
 
 from __future__ import annotations
 
 import csv
+import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 
@@ -13,27 +15,104 @@ from gpca.active_learning.acquisition import Pool, select
 from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
+from gpca.io.arrays import TEXT, WHOLE, save_arrays
+from gpca.io.container import Container, array
 from gpca.io.csv_file import read_csv
+from gpca.io.names import Axes
 from gpca.numerals import whole
+from gpca.pairs.dataset import ragged
 from gpca.seeds import generator
 
 LABEL_COLUMNS = ("sample", "split", "concept")
 Key = tuple[str, int]  # split and number of a sample
-SKIPPED = ""  # stands in the file for a sample that the person did not want to judge
+SKIPPED = ""  # concept of a sample that the person skipped
+QUEUE_VERSION = 1
+QUEUE_MARK = "queued"  # array that tells a queue from the registrations of a run
+LONGEST_NAME = 200  # characters
+
+
+@dataclass(frozen=True)
+class Queue(Container):
+    """S registrations without labels, in the canonical frames and the diameters of their targets.
+
+    Attributes:
+        object_name: (S,) the files, as ``source to target``.
+        h: (S, d) embedding of each aligned source.
+        points, offsets, target_points, target_offsets: the clouds, as in :class:`gpca.pairs.dataset.Registrations`.
+    """
+
+    remedy: ClassVar[str] = "queue the registrations again"
+
+    object_name: np.ndarray = array("S", TEXT)
+    h: np.ndarray = array("S d")
+    points: np.ndarray = array("P 3", offsets="offsets")
+    offsets: np.ndarray = array("S+1", WHOLE)
+    target_points: np.ndarray = array("Q 3", offsets="target_offsets")
+    target_offsets: np.ndarray = array("S+1", WHOLE)
+
+    def cloud(self, i: int) -> np.ndarray:
+        """Return the aligned source cloud (P, 3) of row i."""
+        return self.part("points", i)
+
+    def target(self, i: int) -> np.ndarray:
+        """Return the target cloud (Q, 3) of row i."""
+        return self.part("target_points", i)
+
+    def save(self, path: str | Path, axes: Axes | None = None) -> None:
+        """Write the npz, marked as a queue."""
+        save_arrays(path, self.arrays | {QUEUE_MARK: np.array(QUEUE_VERSION)}, axes)
+
+
+def is_queue(path: str | Path) -> bool:
+    """Return whether a file is a queue, and not the registrations of a run."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return f"{QUEUE_MARK}.npy" in archive.namelist()
+    except (OSError, zipfile.BadZipFile):
+        return False
+
+
+def add_to_queue(path: str | Path, aligned: np.ndarray, target: np.ndarray, h_1_d: np.ndarray, name: str) -> int:
+    """Append a registration to a file, which need not exist, and return the number of registrations in it.
+
+    Args:
+        aligned, target: (N, 3) and (M, 3), in the target's canonical frame and diameters.
+        h_1_d: (1, d) embedding of the aligned source (:meth:`gpca.model.explainer.Explainer.embed`).
+        name: description in one line.
+
+    Raises:
+        InputError: the file is not a queue, or the queue of another model.
+    """
+    path = Path(path)
+    one = Queue(
+        object_name=np.array([" ".join(name.split())[-LONGEST_NAME:]]),
+        h=h_1_d.astype(np.float32),
+        **ragged([aligned.astype(np.float32)], [target.astype(np.float32)]),
+    )
+    if not path.exists():
+        one.save(path)
+        return 1
+    if not is_queue(path):
+        raise InputError(path, "is not a queue", "name another file with --queue")
+    before = Queue.load(path)
+    if before.h.shape[1] != one.h.shape[1]:
+        raise InputError(path, "is a queue of another model", "name another file with --queue")
+    Queue.joined([before, one]).save(path)
+    return len(before) + 1
 
 
 class LabelFile:
-    """Labels in a CSV that is appended to, answer by answer, so that nothing is lost when labeling is stopped.
+    """Labels in a CSV to which every answer is appended at once, so that interrupted labeling loses nothing.
 
     Args:
-        path: the file; it need not exist yet.
-        known: the samples that there are.
+        path: the file; it need not exist.
+        samples: the samples that may be labeled.
 
     Raises:
-        InputError: a missing column, an unknown sample, one with two different labels, a name that is no word.
+        InputError: missing column, unknown sample, contradicting labels, invalid concept name.
     """
 
-    def __init__(self, path: str | Path, known: Mapping[Key, object]) -> None:
+    def __init__(self, path: str | Path, samples: Mapping[Key, object]) -> None:
         self.path = Path(path)
         self.labels: dict[Key, str] = {}
         written = self.path.read_text(encoding="utf-8", errors="replace").strip() if self.path.is_file() else ""
@@ -46,19 +125,18 @@ class LabelFile:
                 key = (split, whole(sample))
             except ValueError:
                 key = (split, -1)
-            if key not in known:
+            if key not in samples:
                 raise InputError(where, f"no sample '{sample[:40]}' of split '{split}'", "remove the line")
             concept = concept.strip()
             if concept != SKIPPED:
                 require_name(concept, where)
             if self.labels.get(key, concept) != concept:
-                raise InputError(
-                    where, f"'{concept}' contradicts the earlier '{self.labels[key]}'", "remove one of them"
-                )
+                fault = f"'{concept}' contradicts the earlier '{self.labels[key]}'"
+                raise InputError(where, fault, "remove one of them")
             self.labels[key] = concept
 
     def add(self, key: Key, concept: str) -> None:
-        """Append one answer, on the disk before this returns."""
+        """Append one answer and write it to disk."""
         new = not self.path.is_file() or self.path.stat().st_size == 0
         self.path.parent.mkdir(parents=True, exist_ok=True)
         with self.path.open("a", newline="", encoding="utf-8") as file:
@@ -70,7 +148,7 @@ class LabelFile:
 
 
 def require_name(concept: str, subject: object = "concept") -> None:
-    """Raise an InputError unless the concept can be the name of a column: a word of small letters, digits and _."""
+    """Raise an InputError unless the concept can name a column: lowercase letters, digits and _."""
     if not concept:
         raise InputError(subject, "the concept has no name", "give one, e.g. 'occlusion'")
     if not (concept.isascii() and concept.isidentifier() and concept == concept.lower()):
@@ -79,7 +157,7 @@ def require_name(concept: str, subject: object = "concept") -> None:
 
 @dataclass(frozen=True)
 class Question:
-    """A sample to be judged: its row, and the scores and variances (C,) that the classifier gives it."""
+    """A sample to be labeled: its row, and the classifier's scores and variances (C,)."""
 
     row: int
     scores_C: np.ndarray
@@ -88,16 +166,16 @@ class Question:
 
 
 class Session:
-    """Labels that grow and the classifier that learns them; it meets new concepts by growing its label space.
+    """A growing set of labels and the classifier trained on them; new concepts extend its classes.
 
     Args:
         h_S_d: embeddings of all samples.
         keys: split and number of each.
-        start: labels that were known before the first question.
-        labels: the file of answers; those that it holds are learned at once.
-        settings: how the classifier is fitted.
-        strategy: which one of :mod:`gpca.active_learning.acquisition` asks.
-        gpc: a classifier that has learned already, and learns on; then `start` may be empty.
+        start: labels before the first question.
+        labels: the file of answers; the classifier learns those that it contains at once.
+        settings: training of the classifier.
+        strategy: strategy of :mod:`gpca.active_learning.acquisition` that picks the questions.
+        gpc: a trained classifier to continue with; then `start` may be empty.
 
     Raises:
         InputError: fewer than two concepts are labeled.
@@ -120,8 +198,15 @@ class Session:
         self._rows = {key: row for row, key in enumerate(keys)}
         self._random = generator("label", seed)
         self._start = dict(start)
-        self.gpc = _fitted(h_S_d, [self._rows[key] for key in start], start, settings, seed) if gpc is None else gpc
-        self._known = [] if gpc is None else [gpc.learned_N_d]  # standardized, what it learned before
+        self._earlier = [] if gpc is None else [gpc.learned_N_d]  # standardized inputs of earlier training
+        if gpc is None:
+            concepts = tuple(dict.fromkeys(start.values()))
+            if len(concepts) < 2:
+                raise InputError("labeling", "starts with fewer than two labeled concepts", "name two with --known")
+            gpc = GPC(concepts, settings, "label", seed)
+            gpc.fit(h_S_d[[self._rows[key] for key in start]], np.array(list(start.values())), h_S_d)
+            gpc.refine()
+        self.gpc = gpc
         self.h_S_d = h_S_d
         self._learned: set[Key] = set()
         self.retrain()
@@ -132,7 +217,7 @@ class Session:
         return {key: concept for key, concept in self.labels.labels.items() if concept != SKIPPED}
 
     def retrain(self) -> int:
-        """Learn the answers given since the last call, new concepts included, and return their number."""
+        """Learn the answers since the last call, including new concepts, and return their number."""
         fresh = {key: concept for key, concept in self.answered.items() if key not in self._learned}
         for concept in dict.fromkeys(fresh.values()):
             if concept not in self.gpc.classes:
@@ -143,7 +228,7 @@ class Session:
         return len(fresh)
 
     def ask(self, batch: int) -> list[Question]:
-        """Return the training samples that are worth a label now, at most `batch`, none when all are judged."""
+        """Return at most `batch` unlabeled training samples to label next; none if all are labeled."""
         judged = self._start.keys() | self.labels.labels.keys()
         left = [row for row, key in enumerate(self.keys) if key[0] == "train" and key not in judged]
         if not left:
@@ -151,17 +236,7 @@ class Session:
         projection = self.gpc.project(self.h_S_d[left])
         scores_N_C, variances_N_C, bald_N = self.gpc.attribute(projection)
         labeled = self.h_S_d[[self._rows[key] for key in (*self._start, *self.answered)]]
-        inputs_L_d = [*self._known, *([self.gpc.project(labeled).inputs_N_d] if len(labeled) else [])]
+        inputs_L_d = [*self._earlier, *([self.gpc.project(labeled).inputs_N_d] if len(labeled) else [])]
         pool = Pool(projection.inputs_N_d, scores_N_C, bald_N, np.concatenate(inputs_L_d), np.full(len(left), ""))
         chosen = select(self._strategy, pool, batch, self._random)
         return [Question(left[i], scores_N_C[i], variances_N_C[i], float(bald_N[i])) for i in chosen]
-
-
-def _fitted(h_S_d: np.ndarray, rows: list[int], start: Mapping[Key, str], settings: GPCSettings, seed: int) -> GPC:
-    concepts = tuple(dict.fromkeys(start.values()))
-    if len(concepts) < 2:
-        raise InputError("labeling", "starts with fewer than two labeled concepts", "name two with --known")
-    gpc = GPC(concepts, settings, "label", seed)
-    gpc.fit(h_S_d[rows], np.array(list(start.values())), h_S_d)
-    gpc.refine()
-    return gpc

@@ -1,1 +1,1 @@
-"""The commands that people give: explain, label, ship, and the checks of a config and of a run."""
+"""The commands of ``gpca``: each module has ``add_…_arguments`` and ``run_…`` for every command in it."""

@@ -1,4 +1,4 @@
-"""Step ``explain``: registrations of a user's own -> why they are uncertain and what to do, on stdout."""
+"""Command ``explain``: why a user's registrations are uncertain and what to do, on stdout."""
 
 from __future__ import annotations
 
@@ -12,24 +12,25 @@ from typing import TYPE_CHECKING
 
 from gpca.errors import InputError
 from gpca.io.files import require_outputs
+from gpca.model.clouds import read_points, read_pose, read_scan, require_format
 from gpca.model.location import model_path, require_model
-from gpca.model.point_file import read_points, read_pose, read_scan, require_format
 from gpca.objects.mesh_folder import METERS_PER_UNIT
 from gpca.process.arguments import length
 from gpca.uncertainty.settings import MONTE_CARLO, UncertaintySettings
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from gpca.model.explainer import Explainer
-    from gpca.model.explanation import Explanation
-    from gpca.model.scan_explanation import ScanExplanation
+    from gpca.model.explanation import Explanation, ScanExplanation
 
-UNKNOWN_STATUS = 3  # of the process; 1 is a failed check of another step, 2 a fault of the user's
+UNKNOWN_STATUS = 3  # exit code; 1 is a failed check, 2 a user's fault
 FORMATS = "PLY, PCD, OBJ, STL, OFF, npy, npz, xyz, csv, KITTI's bin, LAS, E57"
-FIGURE = "gpca.reporting.figures.explanation"  # by its name, since it needs matplotlib, which nothing else here does
-NOT_OF_SCANS = ("model", "fast", "uncertainty", "estimator", "queue", "png")  # what they say was learned from objects
+FIGURE = "gpca.reporting.figures.explanation"  # by name: only this needs matplotlib
+OBJECT_OPTIONS = ("model", "fast", "uncertainty", "estimator", "queue", "png")  # they need a model of objects
 
 
-def add_arguments(parser: ArgumentParser) -> None:
+def add_explain_arguments(parser: ArgumentParser) -> None:
     """Declare files and options."""
     parser.add_argument("source", type=Path, nargs="+", help=f"observed cloud or mesh ({FORMATS})")
     parser.add_argument("target", type=Path, help="reference to which each source is aligned")
@@ -60,24 +61,39 @@ def add_arguments(parser: ArgumentParser) -> None:
     form.add_argument("--json-lines", action="store_true", help="print one line of JSON per source")
 
 
-def run(options: Namespace) -> int:
+def run_explain(options: Namespace) -> int:
     """Read all files, then explain and print one source after the other; everything but results goes to stderr.
 
-    The clouds are read before any library is loaded that they do not need: most mistakes are found there.
+    Files are read before heavy libraries are loaded, so that most mistakes are reported at once.
 
     Returns:
-        `UNKNOWN_STATUS` where one of the explanations means nothing, otherwise 0.
+        `UNKNOWN_STATUS` if one of the explanations means nothing, otherwise 0.
     """
-    _require_fitting(options)
-    if options.scans:
-        return _explain_scans(options)
-    path = model_path(options.model)
-    require_model(path)
-    _require_formats(options)
+    _require_options(options)
+    path = None
+    if not options.scans:
+        path = model_path(options.model)
+        require_model(path)
+    for cloud in (*options.source, options.target):
+        require_format(cloud)
     T_init = read_pose(options.init) if options.init else None
-    sources = [read_points(source, options.unit)[0] for source in options.source]
-    target, frame = read_points(options.target, options.unit)
-    _require_known(options.method, options.estimator)
+    if options.scans:
+        sources = [read_scan(source) for source in options.source]
+        target, frame = read_scan(options.target), None
+    else:
+        sources = [read_points(source, options.unit)[0] for source in options.source]
+        target, frame = read_points(options.target, options.unit)
+    # Unknown methods and estimators are reported here, so that no message blames a file for them.
+    if options.method is not None:
+        from gpca.alignment.methods.registry import make_method
+
+        make_method(options.method)
+    if options.estimator is not None:
+        from gpca.uncertainty.estimators.registry import make_estimator
+
+        make_estimator(options.estimator, {})
+    if path is None:
+        return _explain_scans(options, sources, target, T_init)
     import torch
 
     from gpca.model.explainer import Explainer
@@ -103,20 +119,19 @@ def run(options: Namespace) -> int:
             raise InputError(name, str(fault)) from fault
         status = UNKNOWN_STATUS if explanation.unknown else status
         names = {"source": str(name), "target": str(options.target), "model": str(path)}
-        _print(options, explanation, names | {"trained_on": trained_on})
-        _write(options, explanation, names)
+        _write(options, explanation, names, {"trained_on": trained_on})
         _queue(options.queue, explainer, explanation, f"{name} to {options.target}")
     print(f"model {path}: {model.learning}", file=sys.stderr)
     return status
 
 
-def _require_fitting(options: Namespace) -> None:
-    """Refuse options that do not go together, and files that cannot be written."""
+def _require_options(options: Namespace) -> None:
+    """Reject options that exclude one another, and outputs that cannot be written."""
     if options.settings:
         raise InputError("--settings", "is not used by explain", "make another model to change its settings")
     if len(options.source) > 1 and not options.json_lines:
         raise InputError("explain", f"{len(options.source)} sources need one line each", "add --json-lines")
-    for name in NOT_OF_SCANS if options.scans else ("voxel",):
+    for name in OBJECT_OPTIONS if options.scans else ("voxel",):
         if (given := getattr(options, name)) is not None and given is not False:
             fault = "is not for scans" if options.scans else "is for scans alone"
             raise InputError(f"--{name}", fault, "leave it out" if options.scans else "add --scans")
@@ -130,33 +145,9 @@ def _require_fitting(options: Namespace) -> None:
     require_outputs(outputs, [path for path in read if path])
 
 
-def _require_formats(options: Namespace) -> None:
-    """Refuse files that are missing or of another format, before the first of them is read."""
-    for cloud in (*options.source, options.target):
-        require_format(cloud)
-
-
-def _require_known(method: str | None, estimator: str | None) -> None:
-    """Refuse an option before anything is explained, so that the line does not blame a file for it."""
-    if method is not None:
-        from gpca.alignment.methods.registry import make_method
-
-        make_method(method)
-    if estimator is not None:
-        from gpca.model.pose_spread import spread_estimator
-
-        spread_estimator(estimator, UncertaintySettings())
-
-
-def _explain_scans(options: Namespace) -> int:
-    """Explain scans without any model; returns 0."""
-    _require_formats(options)
-    T_init = read_pose(options.init) if options.init else None
-    sources = [read_scan(source) for source in options.source]
-    target = read_scan(options.target)
-    _require_known(options.method, None)
+def _explain_scans(options: Namespace, sources: list[np.ndarray], target: np.ndarray, T_init: np.ndarray | None) -> int:
+    from gpca.model.explanation import LEARNED
     from gpca.model.scan_explainer import explain_scans
-    from gpca.model.scan_explanation import LEARNED
     from gpca.process.compilation import say_when_compiling
 
     say_when_compiling()
@@ -165,28 +156,24 @@ def _explain_scans(options: Namespace) -> int:
             explanation = explain_scans(source, target, T_init, options.unit, options.voxel, options.method)
         except InputError as fault:
             raise InputError(name, str(fault)) from fault
-        names = {"source": str(name), "target": str(options.target)}
-        _print(options, explanation, names)
-        _write(options, explanation, names)
+        _write(options, explanation, {"source": str(name), "target": str(options.target)}, {})
     print(LEARNED, file=sys.stderr)
     return 0
 
 
-def _print(options: Namespace, explanation: Explanation | ScanExplanation, told: dict[str, str]) -> None:
-    """Print an explanation; as JSON with what else is told of it."""
+def _write(
+    options: Namespace, explanation: Explanation | ScanExplanation, names: dict[str, str], extra: dict[str, str]
+) -> None:
+    """Print an explanation, in JSON with names and extra fields, and write its page and figure."""
     as_json = options.json or options.json_lines
-    # A text begins with its warnings.
+    # Text contains its warnings.
     warnings = [f"warning: {line}" for line in explanation.warnings] if as_json else []
     for line in (*explanation.notes, *warnings):
-        print(line if len(options.source) == 1 else f"{told['source']}: {line}", file=sys.stderr)
+        print(line if len(options.source) == 1 else f"{names['source']}: {line}", file=sys.stderr)
     if as_json:
-        print(json.dumps(explanation.as_dict() | told), flush=options.json_lines)
+        print(json.dumps(explanation.as_dict() | names | extra), flush=options.json_lines)
     else:
         print(explanation.text(), end="")
-
-
-def _write(options: Namespace, explanation: Explanation | ScanExplanation, names: dict[str, str]) -> None:
-    """Write the page and the figure that were asked for."""
     if options.html:
         explanation.save_html(options.html, names)
         print(f"page {options.html}", file=sys.stderr)
@@ -196,7 +183,7 @@ def _write(options: Namespace, explanation: Explanation | ScanExplanation, names
 
 
 def _queue(path: Path | None, explainer: Explainer, explanation: Explanation, name: str) -> None:
-    """Add a registration to the queue where that is the action; where no file is named, say how."""
+    """Add a registration to the queue if that is the action; without a file, print how to."""
     from gpca.recovery.policy import QUEUE
 
     if explanation.action != QUEUE or explanation.scene is None:
@@ -204,7 +191,8 @@ def _queue(path: Path | None, explainer: Explainer, explanation: Explanation, na
     if path is None:
         print("to label it: explain it with --queue queued.npz, then 'gpca label queued.npz'", file=sys.stderr)
         return
-    from gpca.model.queue import add_to_queue
+    from gpca.active_learning.labeling import add_to_queue
 
-    count = add_to_queue(path, explanation.scene, explainer.embed(explanation.scene.aligned), name)
+    aligned = explanation.scene.aligned
+    count = add_to_queue(path, aligned, explanation.scene.target, explainer.embed(aligned), name)
     print(f"queued in {path}, which holds {count}", file=sys.stderr)

@@ -1,9 +1,7 @@
-"""Step ``label``: a person names the cause of the registrations that the classifier is least sure of.
+"""Command ``label``: a person names the causes of the registrations that the classifier is least sure of.
 
-They are those of a run, or those that ``gpca explain --queue`` has queued: then the model's own classifier asks, and
-learns the answers. Each question shows a picture and the scores; the answer is a concept, known or new, or one of the
-commands below. It is in the labels file before the next question comes; the same command continues where labeling was
-stopped. Answers can come from a file or a pipe.
+They belong to a run, or to the queue of ``gpca explain --queue``, whose questions come from the model's own classifier.
+Answers may come from a file or a pipe. Each is saved before the next question, so that labeling can be continued.
 """
 
 from __future__ import annotations
@@ -17,14 +15,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import torch
 
-from gpca.active_learning.labeling import SKIPPED, LabelFile, Question, Session, require_name
+from gpca.active_learning.labeling import SKIPPED, LabelFile, Question, Queue, Session, is_queue, require_name
 from gpca.attribution.predictions import write_predictions
 from gpca.attribution.scores import Attribution
 from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
 from gpca.io.files import require_outputs
 from gpca.io.limits import require_file
-from gpca.model.queue import Queue, is_queue
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.arguments import COUNT
@@ -38,8 +35,8 @@ if TYPE_CHECKING:
 COMMANDS = {"/retrain": "learn the answers so far", "/skip": "do not judge this one", "/quit": "stop here"}
 
 
-def add_arguments(parser: ArgumentParser) -> None:
-    """Declare files and names; ``--settings`` are those of the classifier, as of the explainer ``gpca``."""
+def add_label_arguments(parser: ArgumentParser) -> None:
+    """Declare files and names; ``--settings`` are those of the classifier."""
     parser.add_argument("registrations", type=Path, help="registrations of a run, or the queue of 'gpca explain'")
     parser.add_argument("--embeddings", type=Path, help="embeddings of the registrations; a queue has its own")
     parser.add_argument("--labels", required=True, type=Path, help="CSV to which the answers are appended")
@@ -59,7 +56,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, help="model file to write, which has learned from a queue")
 
 
-def run(options: Namespace) -> None:
+def run_label(options: Namespace) -> None:
     """Ask, write, retrain, until the questions, the answers or the samples are used up."""
     torch.set_num_threads(options.threads)
     settings = read_settings(GPCSettings, {"learning_rate": 0.2, "iterations": 150} | options.settings)
@@ -96,7 +93,7 @@ def run(options: Namespace) -> None:
 
 
 def _require_fitting(options: Namespace, queued: bool) -> None:
-    """Refuse options that do not go with what is labeled."""
+    """Reject options that do not apply to a queue, or to a run."""
     if queued:
         for name in ("embeddings", "predictions"):
             if getattr(options, name):

@@ -1,14 +1,14 @@
-"""Step ``ship``: a run's model -> the same one as it comes with the package, and its card; for releases.
-
-The card tells the data and their licenses, scores and limits; all of it comes from the files of the run.
-"""
+"""Command ``ship``: the model of the package and its card, from the files of a run; for releases."""
 
 from __future__ import annotations
 
 import hashlib
 import json
+import re
 from argparse import ArgumentParser, Namespace
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from textwrap import fill
@@ -19,19 +19,18 @@ from gpca.experiments.diagnosis.judged import CEILING, POOLED
 from gpca.experiments.diagnosis.measures import RECALL
 from gpca.experiments.diagnosis.metrics import read_intervals
 from gpca.io.files import require_outputs, whole_file
-from gpca.model.card import DIAGNOSED
+from gpca.io.structured_text import load_own_yaml, read_json
 from gpca.model.diagnoser import REENACTED, Diagnoser
-from gpca.model.file import VERSION, Model
-from gpca.model.origin import License, Origin
-from gpca.objects.canonical import LARGEST_DIAMETER_M, SMALLEST_DIAMETER_M
+from gpca.model.file import DIAGNOSED, VERSION, Model
+from gpca.objects.canonical import LARGEST_DIAMETER_M, SMALLEST_DIAMETER_M, ObjectClouds
 from gpca.pairs.perturbation import CONCEPTS
 
 if TYPE_CHECKING:
     import pandas as pd
 
-OWN = "reenact_committee"  # the explainer that reads what the model's diagnosis reads
+COMMITTEE = "reenact_committee"  # explainer with the features of the model's diagnosis
 EXPLAINERS = {
-    OWN: "a committee on what this model reads",
+    COMMITTEE: "a committee on what this model reads",
     "reenact": "the re-enactment without learning",
     CEILING: "the truth, measured again",
 }
@@ -51,21 +50,127 @@ MEASURES = {
     "false_alarm_rate": "false alarms",
     "average_precision": "mean average precision",
 }
-LARGEST_BYTES = 8 * 10**6  # of a file that every installation carries
+LARGEST_BYTES = 8 * 10**6  # of the model file in every installation
+LICENSES = Path(__file__).with_name("licenses.yaml")
+REMEDY = "ship a model from the folder of the run that made it"
+_TRAINING_FILE = re.compile(r"/(model_causes|registrations)/([^/]+)/seed\d+\.npz$")  # among the inputs of a model
+
+
+@dataclass(frozen=True)
+class License:
+    """The license of a dataset, and where it was read."""
+
+    dataset: str
+    license: str
+    known: str
+
+
+@dataclass(frozen=True)
+class Source:
+    """Training objects of a model.
+
+    Attributes:
+        name, title: in the run.
+        diagnosed: whether the diagnosis was trained on them, rather than GP-CA.
+        objects: number of objects.
+        licenses: licenses of their datasets.
+    """
+
+    name: str
+    title: str
+    diagnosed: bool
+    objects: int
+    licenses: tuple[License, ...]
+
+    @classmethod
+    def of(cls, run: Path, name: str, diagnosed: bool, title: str) -> Source:
+        """Read the objects of a run and their provenance; an InputError for generated objects."""
+        objects = run / "objects" / f"{name}.npz"
+        record = _provenance(objects)
+        settings = record["settings"]
+        entry = settings.get("entry", {"title": title, "stand_in": "datasets" not in settings})
+        if entry.get("stand_in"):
+            raise InputError(objects, "contains objects that the package drew", "ship a model of real objects")
+        downloads = settings["datasets"].values() if "datasets" in settings else [settings["entry"]]
+        origins = list(record["inputs_sha256"]) or [
+            url for each in downloads for url in (each.get("urls") or [each["url"]])
+        ]
+        licenses = {license: None for origin in origins for license in licenses_of(origin, objects)}
+        return cls(name, entry["title"], diagnosed, len(ObjectClouds.load(objects)), tuple(licenses))
+
+
+@dataclass(frozen=True)
+class Origin:
+    """The provenance of a model and its training objects, in the order of the record."""
+
+    record: Mapping
+    sources: tuple[Source, ...]
+
+    @classmethod
+    def of(cls, model: Path, title: str) -> Origin:
+        """Return the origin of a model in the folder of its run.
+
+        Args:
+            model: the file, beside its provenance and the run's ``objects/``.
+            title: title of the depth frames, which the provenance of a dataset's objects does not name.
+
+        Raises:
+            InputError: provenance that is missing or incomplete, generated objects, data without a license.
+        """
+        record = _provenance(model)
+        files = [match.groups() for path in record["inputs_sha256"] if (match := _TRAINING_FILE.search(f"/{path}"))]
+        if not files:
+            raise InputError(_record_path(model), "lists nothing that a model learns from", REMEDY)
+        try:
+            sources = [Source.of(model.parent, name, kind == "model_causes", title) for kind, name in files]
+        except (LookupError, TypeError, AttributeError) as fault:
+            raise InputError(model.parent / "objects", f"its provenance is incomplete ({fault})", REMEDY) from fault
+        return cls(record, tuple(sources))
+
+
+def licenses_of(origin: str, objects: Path) -> list[License]:
+    """Return the licenses of the datasets of a file or an address.
+
+    Raises:
+        InputError: none is listed; the message names `objects`, which were made from it.
+    """
+    licenses = [license for words, license in _licenses() if any(word in origin for word in words)]
+    if not licenses:
+        fault = f"was made from '{Path(origin).name}', which is from a dataset without a known license"
+        raise InputError(objects, fault, f"add the dataset to {LICENSES}")
+    return licenses
+
+
+@cache
+def _licenses() -> tuple[tuple[tuple[str, ...], License], ...]:
+    return tuple(
+        (tuple(entry["found"]), License(dataset, entry["license"], entry["known"]))
+        for dataset, entry in load_own_yaml(LICENSES).items()
+    )
+
+
+def _record_path(path: Path) -> Path:
+    return path.with_name(path.name + ".provenance.json")
+
+
+def _provenance(path: Path) -> dict:
+    record = read_json(_record_path(path), "a provenance record", REMEDY)
+    for name in ("inputs_sha256", "settings", "code"):
+        if not isinstance(record.get(name), dict):
+            raise InputError(_record_path(path), f"lacks '{name}'", REMEDY)
+    return record
 
 
 def card(name: str, content: bytes, model: Model, diagnoser: Diagnoser, origin: Origin, scores: pd.DataFrame) -> str:
-    """Return the Markdown of the card; the same inputs give the same text.
+    """Return the card in Markdown; equal inputs give equal text.
 
     Args:
-        name: of the file that is handed on.
-        content: of that file.
-        model, diagnoser: its parts.
-        origin: of the model.
-        scores: what :func:`gpca.experiments.diagnosis.metrics.collect_intervals` returned for its run.
+        name, content: of the shipped file.
+        model, diagnoser, origin: described by the card.
+        scores: :func:`gpca.experiments.diagnosis.metrics.collect_intervals` of the run.
 
     Raises:
-        InputError: no scores of a classifier as in the model, or settings of a run that are incomplete.
+        InputError: no scores of a classifier like the model's, or incomplete settings of the run.
     """
     try:
         limits = _limits(model, diagnoser, origin)
@@ -135,18 +240,18 @@ def _held_out(diagnoser: Diagnoser) -> list[str]:
 
 def _scores(origin: Origin, scores: pd.DataFrame) -> list[str]:
     titles = {source.name: source.title for source in origin.sources if source.diagnosed} | {POOLED: "all together"}
-    rows, own = [], 0
+    rows, committees = [], 0
     for source, title in titles.items():
         for explainer, words in EXPLAINERS.items():
             of = scores[(scores["source"] == source) & (scores["method"] == explainer)].set_index("metric")
             if len(of):
-                own += explainer == OWN
+                committees += explainer == COMMITTEE
                 samples, seeds = of["samples"].reindex(list(MEASURES)).dropna(), of["seeds"].iloc[0]
                 counts = " to ".join(f"{count:.0f}" for count in sorted({samples.min(), samples.max()}))
                 counts = f"{counts} ({seeds:.0f})"
                 rows.append((title, words, *(_interval(of, metric) for metric in MEASURES), counts))
-    if not own:
-        raise InputError("cause_intervals.csv", f"has no scores of {OWN}", "switch it on in diagnosis.explainers")
+    if not committees:
+        raise InputError("cause_intervals.csv", f"has no scores of {COMMITTEE}", "switch it on in diagnosis.explainers")
     changes = origin.record["settings"].get("model", {}).get("causes", {})
     return [
         "These are the scores of other explainers in the run that made this model, on objects held out of their "
@@ -216,8 +321,8 @@ def _table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     return "\n".join("| " + " | ".join(str(cell).replace("|", "\\|") for cell in line) + " |" for line in lines)
 
 
-def add_arguments(parser: ArgumentParser) -> None:
-    """Declare files; there are no settings."""
+def add_ship_arguments(parser: ArgumentParser) -> None:
+    """Declare the files."""
     parser.add_argument(
         "--model", required=True, type=Path, help="model in the folder of its run, such as results/full/model.pt"
     )
@@ -225,8 +330,8 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--card", required=True, type=Path, help="its card, such as gpca/model/shipped.md")
 
 
-def run(options: Namespace) -> None:
-    """Write both, or neither; the same run gives the same bytes."""
+def run_ship(options: Namespace) -> None:
+    """Write both files or neither; the same run gives the same bytes."""
     if options.settings:
         raise InputError("--settings", "is not used by ship", "make another model to change its settings")
     scores = options.model.with_name("cause_intervals.csv")

@@ -1,1 +1,1 @@
-"""Guarantees for what is said of a registration: a set that holds its state, and an alarm that seldom errs."""
+"""Sets of states and alarms with bounded error rates, by conformal prediction."""

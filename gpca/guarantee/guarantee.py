@@ -1,4 +1,4 @@
-"""The guarantee of an explainer of causes: sets of states and an alarm, calibrated on families that it never saw."""
+"""The guarantee of an explainer of causes: sets of states and an alarm, calibrated on unseen families."""
 
 from __future__ import annotations
 
@@ -11,8 +11,14 @@ import numpy as np
 
 from gpca.causes.truth import BORDERLINE
 from gpca.errors import InputError
-from gpca.guarantee.alarm import FailureAlarm, calibrate_alarm
-from gpca.guarantee.sets import PROBABILITY, Nonconformity, StateSets, calibrate_sets
+from gpca.guarantee.conformal import (
+    PROBABILITY,
+    FailureAlarm,
+    Nonconformity,
+    StateSets,
+    calibrate_alarm,
+    calibrate_sets,
+)
 from gpca.guarantee.states import STATES
 
 REMEDY = "calibrate it again"
@@ -20,11 +26,10 @@ REMEDY = "calibrate it again"
 
 @dataclass(frozen=True)
 class Guarantee:
-    """What was calibrated, and on how much.
+    """Calibrated sets of states and alarm.
 
     Attributes:
-        state_sets, failure_alarm: how sets and calls are made, and what they promise.
-        samples, families: that it was calibrated on; 0 families where samples counted one by one.
+        samples, families: size of the calibration set; 0 families if samples were exchangeable one by one.
     """
 
     state_sets: StateSets
@@ -33,15 +38,15 @@ class Guarantee:
     families: int
 
     def sets(self, scores_M_K: np.ndarray) -> np.ndarray:
-        """Return which states (M, K) are in the set of each of M registrations, from their scores."""
+        """Return which states (M, K) are in the set of each of M registrations, by their scores."""
         return self.state_sets.of(scores_M_K)
 
     def alarm(self, failure_M: np.ndarray) -> np.ndarray:
-        """Return what each is called, of :data:`gpca.guarantee.alarm.OUTCOMES`, from its score of failure (M,)."""
+        """Return the call of each registration (M,), one of :data:`gpca.guarantee.conformal.OUTCOMES`."""
         return self.failure_alarm.of(failure_M)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain numbers, words and lists, in which an infinite bound is None."""
+        """Return numbers, words and lists, with None for infinite bounds."""
         sets, alarm = asdict(self.state_sets), asdict(self.failure_alarm)
         sets |= {"states": list(self.state_sets.states), "limits": [_plain(x) for x in self.state_sets.limits]}
         alarm |= {name: _plain(alarm[name]) for name in ("good_below", "failed_from")}
@@ -49,11 +54,7 @@ class Guarantee:
 
     @classmethod
     def from_dict(cls, plain: Mapping[str, Any]) -> Guarantee:
-        """Return what :meth:`to_dict` was called on.
-
-        Raises:
-            InputError: something is missing, or is no such value.
-        """
+        """Invert :meth:`to_dict`; an InputError for missing or wrong values."""
         try:
             sets, alarm = dict(plain["sets"]), dict(plain["alarm"])
             sets |= {"states": tuple(sets["states"])}
@@ -81,36 +82,36 @@ def calibrate(
     by_state: bool = False,
     confidence: float | None = None,
 ) -> Guarantee:
-    """Return the guarantee for a further sample, from samples that nothing was learned from.
+    """Calibrate the guarantee for a new sample on samples that were not used for training.
 
-    With families, the promises hold for a sample of a family that is among neither these nor those that were learned
-    from, if the families are exchangeable: K of them can promise at most K / (K + 1). Without, they hold if single
-    samples are, which those of a new family are only as far as it is like the others.
+    With families, it holds for a sample of a new family, if families are exchangeable: K families allow a level of at
+    most K / (K + 1). Otherwise, it holds if single samples are exchangeable; those of a new family are only as far as
+    it resembles the others.
 
     Args:
-        scores_N_K: of the states, as :func:`gpca.guarantee.states.state_scores` returns them. The score of failure is 1
-            minus that of the first state, nominal.
-        state_N: the true states; ``borderline`` samples, which have none, are left out.
-        family_N: of every sample, or None.
-        level: promised probability that a set holds the true state.
-        missed, false_alarms, confidence: of the alarm, see :func:`gpca.guarantee.alarm.calibrate_alarm`.
-        nonconformity, by_state: of the sets, see :class:`gpca.guarantee.sets.StateSets`.
+        scores_N_K: scores of the states, as :func:`gpca.guarantee.states.state_scores` returns them. The score of
+            failure is 1 minus that of the first state, nominal.
+        state_N: true states; ``borderline`` samples are left out.
+        family_N: family of each sample, or None.
+        level: probability that a set contains the true state.
+        missed, false_alarms, confidence: see :func:`gpca.guarantee.conformal.calibrate_alarm`.
+        nonconformity, by_state: see :class:`gpca.guarantee.conformal.StateSets`.
 
     Raises:
-        InputError: arrays of other lengths, unknown states, scores that are not finite, shares out of range.
+        InputError: arrays of different lengths, unknown states, scores that are not finite, shares out of range.
     """
     state_N = np.asarray(state_N)
     if len(state_N) != len(scores_N_K) or (family_N is not None and len(family_N) != len(state_N)):
         raise InputError(
             "samples to calibrate on", "have other numbers of scores, states and families", "give one each"
         )
-    known_N = state_N != BORDERLINE
-    own = None if family_N is None else np.asarray(family_N)[known_N]
-    scores_n_K, state_n = np.asarray(scores_N_K, float)[known_N], state_N[known_N]
-    sets = calibrate_sets(scores_n_K, state_n, own, states, level, nonconformity, by_state)
+    clear_N = state_N != BORDERLINE
+    family_n = None if family_N is None else np.asarray(family_N)[clear_N]
+    scores_n_K, state_n = np.asarray(scores_N_K, float)[clear_N], state_N[clear_N]
+    sets = calibrate_sets(scores_n_K, state_n, family_n, states, level, nonconformity, by_state)
     failed_n = state_n != states[0]
-    alarm = calibrate_alarm(1 - scores_n_K[:, 0], failed_n, own, missed, false_alarms, confidence)
-    return Guarantee(sets, alarm, len(state_n), 0 if own is None else len(np.unique(own)))
+    alarm = calibrate_alarm(1 - scores_n_K[:, 0], failed_n, family_n, missed, false_alarms, confidence)
+    return Guarantee(sets, alarm, len(state_n), 0 if family_n is None else len(np.unique(family_n)))
 
 
 def _plain(number: float) -> float | None:

@@ -1,4 +1,4 @@
-"""The states that a set is of: nothing is wrong, one cause, or several; and what scores of causes say of them."""
+"""The states of a registration: nominal, one cause, or several; and their scores."""
 
 from __future__ import annotations
 
@@ -6,16 +6,16 @@ import numpy as np
 
 from gpca.causes.dataset import LABELS, labels_of
 from gpca.causes.truth import BORDERLINE, NOMINAL, Truth
-from gpca.errors import InputError
+from gpca.guarantee.conformal import require_scores
 
 SEVERAL = "several"
 STATES = (*LABELS, SEVERAL)
 
 
 def states_of(truth: Truth) -> np.ndarray:
-    """Return (S,) the state of each registration: of `STATES`, or ``borderline`` where it has no label.
+    """Return the state (S,) of each registration: one of `STATES`, or ``borderline`` if it has no label.
 
-    A failed registration with one cause, or none above the limit of a cause, has that of its dominant one.
+    A failure with at most one cause above the limit has the state of its dominant cause.
     """
     label_S = labels_of(truth)
     failed_S = (label_S != NOMINAL) & (label_S != BORDERLINE)
@@ -23,18 +23,13 @@ def states_of(truth: Truth) -> np.ndarray:
 
 
 def state_scores(scores_N_4: np.ndarray) -> np.ndarray:
-    """Return scores (N, 5) of `STATES` that add up to 1, from those of nominal and of the three causes.
+    """Return scores (N, 5) of `STATES` that sum to 1, from the scores of nominal and of the three causes.
 
-    The scores of the causes are taken for shares. Of a failure with shares s, one cause c is as probable as that two
-    draws from them both name c, s_c², and several that they differ, 1 - Σ s_c². No set is wrong because of this rule;
-    a better one would make sets smaller.
-
-    Raises:
-        InputError: scores of another shape, or that are not finite.
+    The scores of the causes are normalized to shares s. A failure has the single cause c with the probability s_c² that
+    two draws from the shares both give c, and several causes with 1 - Σ s_c². Sets are valid with any such rule; a
+    better one would make them smaller.
     """
-    if scores_N_4.ndim != 2 or scores_N_4.shape[1] != len(LABELS) or not np.isfinite(scores_N_4).all():
-        fault = f"have the shape {scores_N_4.shape} or are not finite"
-        raise InputError("scores", fault, f"give a finite number for each of {', '.join(LABELS)}")
+    require_scores(scores_N_4, LABELS)
     nominal_N = np.clip(scores_N_4[:, 0], 0, 1)
     causes_N_3 = np.maximum(scores_N_4[:, 1:], 0)
     sum_N_1 = causes_N_3.sum(axis=1, keepdims=True)

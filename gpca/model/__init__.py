@@ -1,1 +1,1 @@
-"""One registration of a user: the model file, its explanation, and how long it takes."""
+"""The model file and the explanation of a registration by a user."""

@@ -1,8 +1,12 @@
-"""The diagnosis of one registration, by the part of a model that learned from measured causes."""
+"""The trained part of a model that diagnoses a registration, and its training on measured causes.
+
+Threshold and guarantee are calibrated on unseen families of shapes: each fold of the families is judged by a classifier
+trained on the others. The final classifier is trained on all.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from sys import intern
 
@@ -13,16 +17,20 @@ from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.icp import ICPSettings
 from gpca.alignment.rigid import inverse, transform
 from gpca.alignment.twist import exp
+from gpca.causes.dataset import LABELS, Causes, labels_of
 from gpca.causes.settings import OBSERVED, CauseSettings, Moved
-from gpca.causes.truth import LARGEST_ERROR
-from gpca.explainers.pair_classifier import PairClassifier
+from gpca.causes.shapley import ALL
+from gpca.causes.truth import BORDERLINE, LARGEST_ERROR, NOMINAL
+from gpca.classifier.settings import GPCSettings
+from gpca.errors import InputError
+from gpca.explainers.pair_classifier import Judgment, PairClassifier
 from gpca.features.dataset import describe
 from gpca.features.pair import ObservedPair
 from gpca.features.settings import GROUPS, DescriptorSettings
-from gpca.guarantee.guarantee import Guarantee
-from gpca.model.diagnosis import Diagnosis
-from gpca.model.guaranteed import Guaranteed, scores_of_states
-from gpca.model.reenacted import Reenacted
+from gpca.guarantee.conformal import highest_level
+from gpca.guarantee.guarantee import Guarantee, calibrate
+from gpca.guarantee.states import states_of
+from gpca.model.diagnosis import Diagnosis, Guaranteed, Reenacted, state_probabilities
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reenactment.dataset import Reenactments, row_of
 from gpca.reenactment.enactment import Enactment, reenact
@@ -32,28 +40,33 @@ from gpca.reenactment.surface import ModelSurface
 from gpca.seeds import generator
 from gpca.uncertainty.settings import UncertaintySettings
 
-SMALLEST_ERROR = 1e-3  # diameters; below it lies the spacing of the points
-REENACTED, REMEDIED = ("reenacted", "remedied")  # what a diagnoser reads of a pair
-QUICK_POINTS, QUICK_HYPOTHESES = 384, 2  # of a quick diagnosis, at most; with 256, twice as many false alarms
+SMALLEST_ERROR = 1e-3  # diameters; the spacing of the points hides smaller errors
+REENACTED, REMEDIED = ("reenacted", "remedied")  # the features of a diagnoser
+QUICK_POINTS, QUICK_HYPOTHESES = 384, 2  # limits of a quick diagnosis; 256 points give twice as many false alarms
+MOST_REENACTED = 512  # points of a user's cloud; twice as many take twice the time without a gain
+RIDGE = 10.0  # penalty of the regression of the error, in samples
+FOLDS = 3  # of the families
+LEVEL = 0.9  # probability that a set of states contains the true one
+MISSED = 0.05  # largest probability that a failure is called good
 
 
 @dataclass(frozen=True)
 class Diagnoser:
-    """Classifiers on the features of a pair, and the settings by which a pair is measured as in the training.
+    """Classifiers on the features of a pair, and the settings with which these are measured.
 
     Attributes:
         classifier: of failure and of the causes.
         error_weights: (F + 1,) regression of ln error (diameters) on the normalized features, the constant last.
-        threshold: probability of failure from which something is called wrong.
-        points: of each cloud, at most.
-        runs: how ICP runs from other starts.
-        reads: ``reenacted``, the numbers of a re-enactment; or ``remedied``, all groups of descriptors, as models
-            before version 4 do.
+        threshold: probability of failure from which a registration is called failed.
+        points: maximum number of points per cloud.
+        runs: spread of ICP over other starts.
+        reads: features: ``reenacted``, those of a re-enactment; or ``remedied``, all groups of descriptors, as in
+            models before version 4.
         moved: the cloud that ICP moves in a re-enactment.
-        reenactment: how the true pose is sought.
-        descriptors: how pairs are registered with remedies.
-        guarantee: of what is said; None of older models and of a quick diagnosis.
-        held_out: how well classifiers that learned from other families of shapes did, by measure; empty of older ones.
+        reenactment: search for the true pose.
+        descriptors: registrations with remedies.
+        guarantee: sets of states and alarm; None in older models and quick diagnoses.
+        held_out: measures of accuracy on unseen families of shapes; empty in older models.
     """
 
     classifier: PairClassifier
@@ -69,7 +82,7 @@ class Diagnoser:
     held_out: Mapping[str, float] = field(default_factory=dict)
 
     def quick(self) -> Diagnoser:
-        """Return it for a quick diagnosis: with fewer points and hypotheses, and no promise, which needs them all."""
+        """Return a diagnoser with fewer points and hypotheses and therefore without a guarantee."""
         reenactment = replace(self.reenactment, hypotheses=min(self.reenactment.hypotheses, QUICK_HYPOTHESES))
         return replace(self, points=min(self.points, QUICK_POINTS), reenactment=reenactment, guarantee=None)
 
@@ -77,9 +90,9 @@ class Diagnoser:
         """Diagnose a registration; the same clouds give the same numbers.
 
         Args:
-            observed: (N, 3) where ICP started, in diameters and in the model's frame.
+            observed: (N, 3) at the initial pose, in diameters and in the model's frame.
             model: (M, 3).
-            T_icp: 4×4, what ICP found: takes the observed cloud to the model.
+            T_icp: (4, 4) result of ICP, maps the observed cloud to the model.
         """
         features_F, reenacted = self.measured(observed, model, T_icp)
         inputs_1_F = self.classifier.normalized(features_F[None])
@@ -93,38 +106,37 @@ class Diagnoser:
             bald=float(judged.bald_N[0]),
             expected_error=float(np.clip(np.exp(log_error), SMALLEST_ERROR, LARGEST_ERROR)),
             unlikeness=float(self.classifier.unlikeness(inputs_1_F)[0]),
-            guarantee=Guaranteed.of(self.guarantee, scores_of_states(judged)) if self.guarantee else None,
+            guarantee=Guaranteed.of(self.guarantee, state_probabilities(judged)) if self.guarantee else None,
             reenacted=reenacted,
         )
 
     def measured(
         self, observed: np.ndarray, model: np.ndarray, T_icp: np.ndarray
     ) -> tuple[np.ndarray, Reenacted | None]:
-        """Return the features (F,) of the pair, and what its re-enactment says, if it has one."""
+        """Return the features (F,) of the pair, and its re-enactment, if any."""
         pair = self.pair(observed, model, T_icp)
         if self.reads == REMEDIED:
             described, _ = describe(pair, self.descriptors, self.runs.icp)
             return np.concatenate([described[group] for group in GROUPS]), None
         surface = ModelSurface(pair.model)
-        enactments, truth = self.enacted(pair, surface)
+        enactments, truth = self._enacted(pair, surface)
         row = row_of(enactments, pair, self.reenactment, truth)
-        said = Reenacted.of(enactments, row["weight"][: len(enactments)], T_icp, surface)
-        return reenactment_features(Reenactments.of_rows([row], truth))[0], said
-
-    def enacted(self, pair: ObservedPair, surface: ModelSurface) -> tuple[list[Enactment], CauseSettings]:
-        """Return the re-enactments of a :meth:`pair`, the most probable first, and how they were registered."""
-        truth = CauseSettings(**vars(self.runs), moved=self.moved)
-        return reenact(pair, self.reenactment, truth, surface), truth
+        reenacted = Reenacted.of(enactments, row["weight"][: len(enactments)], T_icp, surface)
+        return reenactment_features(Reenactments.of_rows([row], truth))[0], reenacted
 
     def enacted_again(
         self, observed: np.ndarray, model: np.ndarray, T_icp: np.ndarray
     ) -> tuple[list[Enactment], CauseSettings]:
-        """Return what :meth:`diagnose` re-enacts of the same clouds."""
+        """Repeat the re-enactments of :meth:`diagnose`, most probable first; return them and their settings."""
         pair = self.pair(observed, model, T_icp)
-        return self.enacted(pair, ModelSurface(pair.model))
+        return self._enacted(pair, ModelSurface(pair.model))
+
+    def _enacted(self, pair: ObservedPair, surface: ModelSurface) -> tuple[list[Enactment], CauseSettings]:
+        truth = CauseSettings(**vars(self.runs), moved=self.moved)
+        return reenact(pair, self.reenactment, truth, surface), truth
 
     def pair(self, observed: np.ndarray, model: np.ndarray, T_icp: np.ndarray) -> ObservedPair:
-        """Return the pair with runs of ICP from other starts, as the training has them."""
+        """Return the pair with the results of ICP from other starts, as in training."""
         observed, model = _drawn(observed, self.points, "observed"), _drawn(model, self.points, "model")
         starts_n = exp(generator("diagnosis", "starts").normal(size=(self.runs.starts, 6)) * self.runs.deviation_6())
         starts_n[0] = T_icp
@@ -142,7 +154,7 @@ class Diagnoser:
 
     def state(self) -> dict[str, object]:
         """Return tensors, numbers and names for :meth:`from_state`."""
-        own = {REENACTED: "reenactment", REMEDIED: "descriptors"}[self.reads]
+        feature_settings = {REENACTED: "reenactment", REMEDIED: "descriptors"}[self.reads]
         return {
             "reads": self.reads,
             "classifier": self.classifier.state(),
@@ -152,14 +164,14 @@ class Diagnoser:
             "runs": {name: value for name, value in asdict(self.runs).items() if name != "icp"},
             "icp": asdict(self.runs.icp),
             "moved": self.moved,
-            own: asdict(getattr(self, own)),
+            feature_settings: asdict(getattr(self, feature_settings)),
             "guarantee": self.guarantee and self.guarantee.to_dict(),
             "held_out": dict(self.held_out),
         }
 
     @classmethod
     def from_state(cls, state: Mapping) -> Diagnoser:
-        """Return the diagnoser of a :meth:`state`, or of one from before version 4, which read all descriptors."""
+        """Return the diagnoser of a :meth:`state`, also from before version 4, which read all descriptors."""
         return cls(
             classifier=PairClassifier.from_state(state["classifier"]),
             error_weights=state["error_weights"].numpy(),
@@ -171,10 +183,157 @@ class Diagnoser:
             reenactment=ReenactmentSettings(**state.get("reenactment", {})),
             descriptors=DescriptorSettings(**state.get("descriptors", {})),
             guarantee=Guarantee.from_dict(state["guarantee"]) if state.get("guarantee") else None,
-            # As in the code, so that one text is one object: of these a file holds one.
+            # Interned names are shared objects, which pickle writes once: equal models then give equal bytes.
             held_out={intern(name): value for name, value in state.get("held_out", {}).items()},
         )
 
 
 def _drawn(cloud: np.ndarray, most: int, role: str) -> np.ndarray:
     return cloud[generator("diagnosis", role).permutation(len(cloud))[:most]]
+
+
+@dataclass(frozen=True)
+class TrainingSet:
+    """N registrations with measured causes.
+
+    Attributes:
+        features_N_F: :func:`gpca.reenactment.features.reenactment_features`.
+        label_N: nominal, a dominant cause, or borderline.
+        state_N: the label, but ``several`` for failures with several causes.
+        causes_N_3: whether each concept is a cause.
+        error_N: mean over the starts, diameters.
+        family_N: family of the shape.
+    """
+
+    features_N_F: np.ndarray
+    label_N: np.ndarray
+    state_N: np.ndarray
+    causes_N_3: np.ndarray
+    error_N: np.ndarray
+    family_N: np.ndarray
+
+    @classmethod
+    def of(cls, causes: Causes, reenactments: Reenactments) -> TrainingSet:
+        """Return the training set of one source."""
+        return cls(
+            features_N_F=reenactment_features(reenactments),
+            label_N=labels_of(causes.truth),
+            state_N=states_of(causes.truth),
+            causes_N_3=causes.truth.causes,
+            error_N=causes.truth.error[:, ALL],
+            family_N=causes.registrations.cluster,
+        )
+
+    @classmethod
+    def joined(cls, parts: Sequence[TrainingSet]) -> TrainingSet:
+        """Concatenate the training sets of several sources."""
+        return cls(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in vars(parts[0])})
+
+    def subset(self, rows_N: np.ndarray) -> TrainingSet:
+        """Return the given rows."""
+        return TrainingSet(**{name: array[rows_N] for name, array in vars(self).items()})
+
+    def classifier(self, gpc: GPCSettings, *axes: object) -> PairClassifier:
+        """Train a classifier."""
+        classifier = PairClassifier(gpc, *axes, trees=True)
+        return classifier.fit(self.features_N_F, self.label_N != NOMINAL, self.causes_N_3)
+
+
+def learn(
+    training: TrainingSet,
+    gpc: GPCSettings,
+    causes: CauseSettings,
+    reenactment: ReenactmentSettings,
+    false_alarms: float,
+    *axes: object,
+) -> tuple[Diagnoser, np.ndarray]:
+    """Return the trained diagnoser, and the BALD (nats) of failures of unseen families.
+
+    At most the share `false_alarms` of nominal registrations of unseen families reaches the threshold of failure.
+    """
+    clear = training.subset(training.label_N != BORDERLINE)
+    judged = judged_unseen(clear, gpc, *axes)
+    nominal_N = clear.label_N == NOMINAL
+    threshold = threshold_of(judged.failure_N[nominal_N], false_alarms)
+    classifier = clear.classifier(gpc, *axes)
+    diagnoser = Diagnoser(
+        classifier=classifier,
+        error_weights=fit_error(classifier.normalized(training.features_N_F), training.error_N),
+        threshold=threshold,
+        points=min(causes.points[1], MOST_REENACTED),
+        runs=causes.runs(),
+        moved=causes.moved,
+        reenactment=reenactment,
+        guarantee=calibrated(clear, judged, false_alarms),
+        held_out=measured(clear, judged, threshold),
+    )
+    return diagnoser, judged.bald_N[~nominal_N]
+
+
+def judged_unseen(training: TrainingSet, gpc: GPCSettings, *axes: object) -> Judgment:
+    """Judge every registration by a classifier trained on other families; an InputError if there is a single one."""
+    from sklearn.model_selection import GroupKFold
+
+    count = len(training.label_N)
+    if (families := len(np.unique(training.family_N))) < 2:
+        raise InputError("model", "learns from objects of a single family", "add a source of others")
+    shapes = {"failure_N": (), "causes_N_3": (3,), "causes_variances_N_3": (3,), "bald_N": ()}
+    parts = {name: np.full((count, *shape), np.nan) for name, shape in shapes.items()}
+    folds = GroupKFold(min(FOLDS, families)).split(training.label_N, groups=training.family_N)
+    for fold, (seen, unseen) in enumerate(folds):
+        classifier = training.subset(seen).classifier(gpc, *axes, "calibration", fold)
+        judged = classifier.judge(classifier.normalized(training.features_N_F[unseen]))
+        for name, part in parts.items():
+            part[unseen] = getattr(judged, name)
+    return Judgment(**parts)
+
+
+def calibrated(training: TrainingSet, judged: Judgment, false_alarms: float) -> Guarantee:
+    """Calibrate sets of states, for new families if there are enough families, and an alarm.
+
+    The level of the alarm is too high for the number of families, so it is calibrated on single samples and holds as
+    far as registrations of a new family are like the others.
+    """
+    scores_N_5 = state_probabilities(judged)
+    family_N = training.family_N if highest_level(0, training.family_N) >= LEVEL else None
+    options = {"level": LEVEL, "missed": MISSED, "false_alarms": false_alarms}
+    by_family = calibrate(scores_N_5, training.state_N, family_N, **options)
+    single = calibrate(scores_N_5, training.state_N, None, **options)
+    return Guarantee(by_family.state_sets, single.failure_alarm, by_family.samples, by_family.families)
+
+
+def measured(training: TrainingSet, judged: Judgment, threshold: float) -> dict[str, float]:
+    """Return measures of accuracy (docs/causes.md) for the card of the model."""
+    from sklearn.metrics import roc_auc_score
+
+    failed_N = training.label_N != NOMINAL
+    scores_N_4 = np.column_stack([1 - judged.failure_N, judged.failure_N[:, None] * judged.causes_N_3])
+    right_N = np.array(LABELS)[scores_N_4.argmax(axis=1)] == training.label_N
+    present = [label for label in LABELS if (training.label_N == label).any()]
+    first_N = np.array(LABELS[1:])[judged.causes_N_3.argmax(axis=1)]
+    alarm_N = judged.failure_N >= threshold
+    both = failed_N.any() and not failed_N.all()
+    return {
+        "samples": float(len(failed_N)),
+        "families": float(len(np.unique(training.family_N))),
+        "balanced_accuracy": float(np.mean([right_N[training.label_N == label].mean() for label in present])),
+        "dominant_accuracy": float((first_N == training.label_N)[failed_N].mean()) if failed_N.any() else 0.0,
+        "auroc_failed": float(roc_auc_score(failed_N, judged.failure_N)) if both else 0.5,
+        "false_alarms": float(alarm_N[~failed_N].mean()),
+        "missed": float((~alarm_N)[failed_N].mean()) if failed_N.any() else 0.0,
+    }
+
+
+def threshold_of(failure_N: np.ndarray, false_alarms: float) -> float:
+    """Return the smallest probability of failure that at most the share `false_alarms` of nominal samples reaches."""
+    if not len(failure_N):
+        raise InputError("model", "has no nominal registration", "raise causes.train or causes.shares.nominal")
+    return float(np.nextafter(np.quantile(failure_N, 1 - false_alarms, method="inverted_cdf"), 1))
+
+
+def fit_error(inputs_N_F: np.ndarray, error_N: np.ndarray) -> np.ndarray:
+    """Fit a ridge regression of ln error on normalized features: weights (F + 1,), the constant last."""
+    from sklearn.linear_model import Ridge
+
+    fitted = Ridge(alpha=RIDGE).fit(inputs_N_F, np.log(np.maximum(error_N, SMALLEST_ERROR)))
+    return np.append(fitted.coef_, fitted.intercept_)

@@ -1,18 +1,273 @@
-"""What is said of one registration: whether it failed, for which causes, and what that rests on."""
+"""The diagnosis of one registration: its state, the causes of a failure, guarantees and a re-enactment."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gpca.alignment.canonical_frame import CanonicalFrame
+from gpca.alignment.rigid import inverse
+from gpca.alignment.twist import log
+from gpca.causes.shapley import ALL, shapley_values
 from gpca.causes.truth import FAILED, NOMINAL
-from gpca.model.guaranteed import Guaranteed
-from gpca.model.reenacted import Reenacted
+from gpca.guarantee.conformal import ALARM, GOOD
+from gpca.guarantee.guarantee import Guarantee
+from gpca.guarantee.states import SEVERAL
+from gpca.objects.bop import symmetric_turn
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.recovery.policy import NOTHING, QUEUE
+from gpca.reenactment.enactment import Enactment
+from gpca.reenactment.hypotheses import SAME
+from gpca.reenactment.surface import ModelSurface
 
-UNKNOWN = "unknown"  # the state of a diagnosis without meaning
-LIKELY = 0.5  # probability from which a concept is called one of the causes
+if TYPE_CHECKING:
+    from gpca.explainers.pair_classifier import Judgment
+
+UNKNOWN = "unknown"  # state of a pair whose scores mean nothing
+LIKELY = 0.5  # probability from which a concept is named as a cause
+SMALLEST = 1e-9  # least probability of a cause
+IN_WORDS = {SEVERAL: "several causes"}
+AXES = ("x", "y", "z")
+ALONG_DEG = 15.0  # largest angle between a rotation axis and an axis of the target's frame that may name it
+SMALL_TURN_DEG = 3.0  # smaller rotations are not mentioned
+CHECK = "check"  # action for a pair whose scores mean nothing
+ADVICE = {  # per branch of the policy
+    NOTHING: "none",
+    "reinitialize": "reinitialize ICP with a broader search",
+    "new_view": "change the viewpoint",
+    "denoise": "filter and check the sensor",
+    CHECK: "check what was given",
+    QUEUE: "queue for labeling, so that the cause can be learned",
+}
+
+
+@dataclass(frozen=True)
+class Guaranteed:
+    """Guarantees for one registration (:mod:`gpca.guarantee`).
+
+    Attributes:
+        states: possible states of the registration.
+        level: probability that they contain the true one.
+        call: good, not sure or failed.
+        missed, false_alarms: largest probability that a failure is called good, and a good registration failed.
+        families: number of families of shapes used for calibration; 0 if samples were exchangeable one by one.
+    """
+
+    states: tuple[str, ...]
+    level: float
+    call: str
+    missed: float
+    false_alarms: float
+    families: int
+
+    @classmethod
+    def of(cls, guarantee: Guarantee, scores_1_K: np.ndarray) -> Guaranteed:
+        """Apply a guarantee to the state scores of one registration."""
+        names, alarm = guarantee.state_sets.states, guarantee.failure_alarm
+        inside_K = guarantee.sets(scores_1_K)[0]
+        return cls(
+            states=tuple(name for name, inside in zip(names, inside_K, strict=True) if inside),
+            level=guarantee.state_sets.level,
+            call=str(guarantee.alarm(1 - scores_1_K[:, 0])[0]),
+            missed=alarm.missed,
+            false_alarms=alarm.false_alarms,
+            families=guarantee.families,
+        )
+
+    def lines(self) -> list[str]:
+        """Two lines of text."""
+        states = " or ".join(IN_WORDS.get(state, state) for state in self.states)
+        risk = {
+            GOOD: f"at most {self.missed:.0%} of the failures are called so",
+            ALARM: f"at most {self.false_alarms:.0%} of the good ones are called so",
+        }
+        why = risk.get(self.call, "neither call keeps its promise here")
+        return [
+            f"set       {states} ({self.level:.0%} of such sets hold the truth)",
+            f"alarm     {self.call} ({why})",
+        ]
+
+
+def state_probabilities(judged: Judgment) -> np.ndarray:
+    """Return probabilities (N, 5) of :data:`gpca.guarantee.states.STATES` that sum to 1.
+
+    Causes are assumed to be independent, given a failure. The probability that a failure has no cause is distributed
+    over the causes in proportion to their probabilities, since a failure without a cause above the limit is labeled by
+    its dominant cause.
+    """
+    causes_N_3 = np.clip(judged.causes_N_3, SMALLEST, 1)
+    rest_N_3 = 1 - causes_N_3
+    others_N_3 = np.stack([np.delete(rest_N_3, c, axis=1).prod(axis=1) for c in range(rest_N_3.shape[1])], axis=1)
+    alone_N_3, none_N_1 = causes_N_3 * others_N_3, rest_N_3.prod(axis=1, keepdims=True)
+    several_N_1 = np.maximum(1 - none_N_1 - alone_N_3.sum(axis=1, keepdims=True), 0)
+    share_N_3 = causes_N_3 / causes_N_3.sum(axis=1, keepdims=True)
+    if_failed_N_4 = np.hstack([alone_N_3 + none_N_1 * share_N_3, several_N_1])
+    failure_N_1 = judged.failure_N[:, None]
+    return np.hstack([1 - failure_N_1, failure_N_1 * if_failed_N_4])
+
+
+@dataclass(frozen=True)
+class FittingPose:
+    """A hypothesis of the true pose.
+
+    Attributes:
+        probability: among all hypotheses.
+        T_target_source: (4, 4); inside the canonical frame, relative to the initial pose.
+        registered: whether it equals the registration's result, up to the resolution of hypotheses.
+        apart: mean distance between the target's surface at this pose and at the result.
+        turn_deg: smallest rotation from the result, up to the target's symmetry.
+        axis: (3,) unit vector of that rotation in the target's frame.
+        shift: distance of the target's center from its place at the result.
+        error: v̂, mean error of re-enacted registrations if this pose is true.
+    """
+
+    probability: float
+    T_target_source: np.ndarray
+    registered: bool
+    apart: float
+    turn_deg: float
+    axis: tuple[float, float, float]
+    shift: float
+    error: float
+
+    @classmethod
+    def of(cls, enactment: Enactment, probability: float, T_result: np.ndarray, surface: ModelSurface) -> FittingPose:
+        """Compare the hypothesis of a re-enactment with the registration's result."""
+        T = enactment.hypothesis.T
+        from_result = T @ inverse(T_result)
+        # Among the motions from the result to this pose that are equivalent by symmetry, take the smallest rotation.
+        least = from_result.copy()
+        least[:3, :3] = symmetric_turn(from_result[:3, :3].T, surface.symmetries).T @ from_result[:3, :3]
+        turn_3 = log(least[None])[0, :3]
+        angle = float(np.sqrt(np.square(turn_3).sum()))
+        axis = turn_3 / angle if angle > 0 else np.array([0.0, 0.0, 1.0])
+        apart = float(surface.apart(from_result[None])[0])
+        return cls(
+            probability=probability,
+            T_target_source=T,
+            registered=apart <= SAME,
+            apart=apart,
+            turn_deg=float(np.rad2deg(angle)),
+            axis=(float(axis[0]), float(axis[1]), float(axis[2])),
+            shift=float(np.sqrt(np.square(from_result[:3, 3]).sum())),
+            error=float(enactment.error_8[ALL]),
+        )
+
+    def words(self, unit: str, fits: str) -> str:
+        """Describe the pose relative to the result, after the verb `fits`."""
+        if self.registered:
+            return f"{fits} as registered, within {self.apart:.2g} {unit}"
+        if self.turn_deg < SMALL_TURN_DEG:
+            return f"{fits} moved by {self.shift:.2g} {unit}"
+        return f"{fits} turned by {self.turn_deg:.0f}° about {axis_in_words(self.axis)}, {self.shift:.2g} {unit} away"
+
+
+def axis_in_words(axis: Sequence[float]) -> str:
+    """Describe a unit vector (3,) in the target's frame."""
+    along = int(np.argmax(np.abs(axis)))
+    if abs(axis[along]) >= np.cos(np.deg2rad(ALONG_DEG)):
+        return f"the target's {AXES[along]} axis"
+    return f"the axis ({', '.join(f'{part:.2f}' for part in axis)}) of the target's frame"
+
+
+@dataclass(frozen=True)
+class Reenacted:
+    """Counterfactuals of one registration under the hypotheses of its true pose.
+
+    Lengths are in diameters, and poses in the target's canonical frame, until :meth:`outside` converts them.
+
+    Attributes:
+        error: v̂ with all causes, the mean over the hypotheses.
+        effects: φ̂, the contribution of each cause to that error.
+        noise, outliers, missing: standard deviation of the noise per axis, share of outliers, and share of the target
+            that was not observed, under the most probable hypothesis.
+        poses: the hypotheses, most probable first.
+    """
+
+    error: float
+    effects: dict[str, float]
+    noise: float
+    outliers: float
+    missing: float
+    poses: tuple[FittingPose, ...]
+
+    @classmethod
+    def of(
+        cls, enactments: Sequence[Enactment], weight_k: np.ndarray, T_result: np.ndarray, surface: ModelSurface
+    ) -> Reenacted:
+        """Summarize the re-enactments of a pair.
+
+        Args:
+            weight_k: (k,) probabilities of their hypotheses.
+            T_result: (4, 4) the registration's result.
+            surface: the target's.
+        """
+        error_k_8 = np.array([enactment.error_8 for enactment in enactments])
+        mean_8 = (weight_k[:, None] * error_k_8).sum(axis=0)
+        severity = enactments[0].candidate.severity
+        weighted = zip(enactments, weight_k, strict=True)
+        return cls(
+            error=float(mean_8[ALL]),
+            effects=dict(zip(CONCEPTS, shapley_values(mean_8[None])[0].tolist(), strict=True)),
+            noise=severity["noise"],
+            outliers=severity["outliers"],
+            missing=severity["crop"],
+            poses=tuple(FittingPose.of(enactment, float(weight), T_result, surface) for enactment, weight in weighted),
+        )
+
+    def outside(self, frame: CanonicalFrame, T_target_source_init: np.ndarray) -> Reenacted:
+        """Convert to the user's frame and unit of length.
+
+        Args:
+            frame: the target's.
+            T_target_source_init: (4, 4) initial pose, in that unit.
+        """
+        poses = tuple(
+            replace(
+                pose,
+                T_target_source=frame.pose_outside(pose.T_target_source) @ T_target_source_init,
+                **{name: getattr(pose, name) * frame.diameter for name in ("apart", "shift", "error")},
+            )
+            for pose in self.poses
+        )
+        effects = {cause: effect * frame.diameter for cause, effect in self.effects.items()}
+        lengths = {"error": self.error * frame.diameter, "noise": self.noise * frame.diameter}
+        return replace(self, **lengths, effects=effects, poses=poses)
+
+    def as_dict(self) -> dict[str, object]:
+        """Values for JSON."""
+        poses = [
+            asdict(pose) | {"T_target_source": pose.T_target_source.tolist(), "axis": list(pose.axis)}
+            for pose in self.poses
+        ]
+        return asdict(self) | {"poses": poses}
+
+    def words(self, subject: str, unit: str) -> list[str]:
+        """Describe each hypothesis relative to the result, such as ``the object also fits moved by 20 mm``."""
+        verbs = ["fits", *["also fits"] * (len(self.poses) - 1)]
+        return [f"{subject} {pose.words(unit, fits)}" for fits, pose in zip(verbs, self.poses, strict=True)]
+
+    def effects_line(self, unit: str) -> str:
+        """One line of text on the effects of the causes."""
+        effects = ", ".join(f"{cause} {effect:.2g}" for cause, effect in self.effects.items())
+        return f"effects   on the re-enacted error of {self.error:.2g} {unit}: {effects}"
+
+    def pose_lines(self, subject: str, unit: str) -> list[str]:
+        """One line of text per hypothesis."""
+        described = enumerate(zip(self.words(subject, unit), self.poses, strict=True), 1)
+        return [f"pose {k}    {words}: probability {pose.probability:.2f}" for k, (words, pose) in described]
+
+    def lines(self, unit: str) -> list[str]:
+        """Lines of text."""
+        parts = f"{self.outliers:.0%} outliers, {self.missing:.0%} of the surface missing"
+        return [
+            self.effects_line(unit),
+            f"observed  noise of {self.noise:.2g} {unit}, {parts}",
+            *self.pose_lines("the object", unit),
+        ]
 
 
 @dataclass(frozen=True)
@@ -20,17 +275,16 @@ class Diagnosis:
     """The diagnosis of one registration.
 
     Attributes:
-        failure: probability that it failed.
-        threshold: of that probability, from which something is called wrong.
-        causes: probability of each concept that it is one of the causes, if there are any.
-        variances: of these over the posterior draws (Eq. 5).
-        bald: of the least certain of these probabilities, nats (Eq. 7).
-        expected_error: of the pose: ADD, or ADD-S of a symmetric object.
-        unlikeness: how unlike the training samples the pair is: 1 % of these are above 1.
-        void: whether the pair is such that none of these numbers means anything (:mod:`gpca.model.familiarity`).
-        guarantee: the set of states that holds the true one with a promised probability; None of older models.
-        reenacted: the counterfactuals that this rests on, under hypotheses of the true pose; None where nothing was
-            re-enacted.
+        failure: probability of a failure.
+        threshold: probability from which the state is failed.
+        causes: probability of each concept to be a cause, given a failure.
+        variances: their variances over the posterior draws (Eq. 5).
+        bald: largest BALD among the questions, nats (Eq. 7).
+        expected_error: expected error of the pose: ADD, or ADD-S of a symmetric object.
+        unlikeness: distance to the training samples, scaled so that 1 % of them exceed 1.
+        void: whether the pair is such that no number here means anything (:mod:`gpca.model.familiarity`).
+        guarantee: set of states and alarm; None in older models and fast diagnoses.
+        reenacted: the counterfactuals; None if nothing was re-enacted.
     """
 
     failure: float
@@ -53,19 +307,19 @@ class Diagnosis:
 
     @property
     def named(self) -> tuple[str, ...]:
-        """The causes that are more likely than not, the likeliest first, and at least that one; none unless failed."""
+        """Causes more likely than not, likeliest first; at least one if the state is failed, otherwise none."""
         if self.state != FAILED:
             return ()
         first, *rest = sorted(self.causes, key=lambda cause: -self.causes[cause])
         return first, *(cause for cause in rest if self.causes[cause] >= LIKELY)
 
     def outside(self, frame: CanonicalFrame, T_target_source_init: np.ndarray) -> Diagnosis:
-        """Return it in the user's frame and unit of length, where it was in the canonical frame of the target."""
+        """Convert from the target's canonical frame to the user's frame and unit of length."""
         reenacted = self.reenacted and self.reenacted.outside(frame, T_target_source_init)
         return replace(self, expected_error=self.expected_error * frame.diameter, reenacted=reenacted)
 
     def as_dict(self) -> dict[str, object]:
-        """Return it as numbers, lists and names, for JSON."""
+        """Values for JSON."""
         parts = {
             "guarantee": self.guarantee and asdict(self.guarantee),
             "reenacted": self.reenacted and self.reenacted.as_dict(),
@@ -73,7 +327,7 @@ class Diagnosis:
         return vars(self) | parts | {"state": self.state, "named": list(self.named)}
 
     def lines(self, unit: str) -> list[str]:
-        """Return it for a reader, with lengths in this unit."""
+        """Lines of text, with lengths in this unit."""
         named = " and ".join(self.named) or "nothing is wrong"
         return [
             f"state     {self.state}: {named}",

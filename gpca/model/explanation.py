@@ -1,30 +1,45 @@
-"""An explanation of one registration: the pose, whether it is right, the causes if it is not, and the next action."""
+"""Explanations of one registration, of objects by a trained model or of scans without training."""
 
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from html import escape
 from pathlib import Path
 
 import numpy as np
 
+from gpca.causes.truth import FAILED, NOMINAL
 from gpca.io.files import whole_file
-from gpca.model.advice import CHECK, WORDS
-from gpca.model.diagnosis import UNKNOWN, Diagnosis
+from gpca.model import page
+from gpca.model.diagnosis import ADVICE, CHECK, UNKNOWN, Diagnosis, Reenacted
 from gpca.model.scene import Scene
-from gpca.model.shown.page import framed, page
+
+NOT_SURE = "not sure"
+LEARNED = (
+    "nothing was learned from scans: this is the untrained re-enactment, and the model, which learned from objects, "
+    "is not used"
+)
+HEADS = {  # CSS class and title of a state
+    NOMINAL: ("good", "Nothing speaks against this registration"),
+    FAILED: ("bad", "This registration has probably failed"),
+    NOT_SURE: ("doubt", "This registration may have failed"),
+}
+PAPER = "GP-CA as in the paper: it sees the aligned source alone and names a concept even where nothing is wrong"
+SCANS_WITHOUT = {"noise": "smoothed points", "pose": "right start", "overlap": "common parts alone"}
 
 
 @dataclass(frozen=True)
 class PoseSpread:
-    """How uncertain the pose is.
+    """Uncertainty of the pose.
 
     Attributes:
         covariance_6_6: Σ of twists on the left of the pose, in radians and diameters.
-        diameter: of the target, in the unit of the points.
-        estimator: that says so.
-        starts: of Monte-Carlo; None of another estimator.
+        diameter: the target's, in the unit of the points.
+        estimator: name of the estimator.
+        starts: number of starts of Monte-Carlo; None for other estimators.
     """
 
     covariance_6_6: np.ndarray
@@ -43,29 +58,49 @@ class PoseSpread:
         return self.diameter * math.sqrt(np.trace(self.covariance_6_6[3:, 3:]))
 
 
+class Page(ABC):
+    """An explanation that can be shown as a page."""
+
+    @abstractmethod
+    def html(self, names: Mapping[str, str] | None = None) -> str:
+        """Return a page that needs no other file: both clouds in 3-D, causes, poses, counterfactuals.
+
+        Args:
+            names: names of the files and the model, for the page's details.
+        """
+
+    def save_html(self, path: str | Path, names: Mapping[str, str] | None = None) -> None:
+        """Write :meth:`html` to a file."""
+        with whole_file(path) as partial:
+            partial.write_text(self.html(names), encoding="utf-8")
+
+    def _repr_html_(self) -> str:
+        """Return the page for a notebook."""
+        return page.framed(self.html())
+
+
 @dataclass(frozen=True)
-class Explanation:
-    """One registration, whether it is right, and why it is not.
+class Explanation(Page):
+    """One registration of an object, explained by a trained model.
 
     Attributes:
-        T_target_source: the pose (4, 4) that was found, in the unit of the points.
-        fitness, inlier_rmse: share of source points with a correspondence; RMSE over those, in the unit of the points.
-        method: that found it: the model's kind of ICP, or a registration method by its name.
-        diagnosis: of the pair, learned from measured causes, its expected error in the unit of the points; None where
-            it was not asked for.
-        scores, variances: of GP-CA as in the paper, which sees the aligned source alone and always names a concept:
-            mean and variance over the posterior draws (Eqs. 4, 5).
-        bald, entropy: how uncertain these are, in nats: Eq. 7, and the entropy of the scores.
-        concept: the one with the largest score (Eq. 6).
+        T_target_source: (4, 4) the resulting pose, in the unit of the points.
+        fitness, inlier_rmse: share of source points with a correspondence; their RMSE, in the unit of the points.
+        method: kind of the model's ICP, or name of a registration method.
+        diagnosis: state and causes, learned from measured causes; None if not requested.
+        scores, variances: GP-CA as in the paper, which sees only the aligned source and always names a concept: mean
+            and variance over the posterior draws (Eqs. 4, 5).
+        bald, entropy: uncertainty of these in nats: Eq. 7, and the entropy of the scores.
+        concept: concept with the largest score (Eq. 6).
         action: what to do next: a branch of the policy (:mod:`gpca.recovery.policy`), or `CHECK`.
-        reason: why this action, in words.
-        spread: how uncertain the pose is by an estimator, where it was asked for and could tell.
-        unit: that of all lengths.
-        seconds: those of each stage, and ``total``.
-        notes: what was done to the clouds, such as points that were left out.
-        warnings: why this explanation is not to be relied on: what is unlike all that the model learned.
-        learned_from: what the diagnosis learned from, in words.
-        scene: what it is drawn from (:meth:`html`); None where it came as one of many.
+        reason: reason for this action.
+        spread: uncertainty of the pose by an estimator, if requested and available.
+        unit: unit of all lengths.
+        seconds: duration of each stage, and ``total``.
+        notes: changes made to the clouds, such as points that were left out.
+        warnings: how the pair differs from the training data.
+        learned_from: training data of the diagnosis.
+        scene: data of the 3-D view for :meth:`html`; None for explanations made in bulk.
     """
 
     T_target_source: np.ndarray
@@ -90,16 +125,16 @@ class Explanation:
 
     @property
     def unknown(self) -> bool:
-        """Whether the pair is such that neither diagnosis nor scores mean anything."""
+        """Whether neither diagnosis nor scores mean anything for this pair."""
         return self.action == CHECK
 
     @property
     def advice(self) -> str:
         """What to do next, in words."""
-        return WORDS.get(self.action, self.action)
+        return ADVICE.get(self.action, self.action)
 
     def as_dict(self) -> dict[str, object]:
-        """Return it as numbers, lists and names, for JSON."""
+        """Values for JSON."""
         spread = self.spread and {
             "rotation_deg": self.spread.rotation_deg,
             "translation": self.spread.translation,
@@ -107,8 +142,7 @@ class Explanation:
             "estimator": self.spread.estimator,
             "starts": self.spread.starts,
         }
-        told = {name: value for name, value in vars(self).items() if name != "scene"}
-        return told | {
+        return {name: value for name, value in vars(self).items() if name != "scene"} | {
             "T_target_source": self.T_target_source.tolist(),
             "diagnosis": self.diagnosis and self.diagnosis.as_dict(),
             "spread": spread,
@@ -117,49 +151,150 @@ class Explanation:
         }
 
     def html(self, names: Mapping[str, str] | None = None) -> str:
-        """Return it as a page of its own, without any other file: both clouds in 3-D, causes, poses, counterfactuals.
+        """Return a page that needs no other file: both clouds in 3-D, causes, poses, counterfactuals.
 
         Args:
-            names: of the files and the model, which the page lists.
+            names: names of the files and the model, for the page's details.
         """
-        reenacted = self.diagnosis.reenacted if self.diagnosis else None
-        # Poses of a pair without meaning would mean nothing either.
-        scene = replace(self.scene, enact=None) if self.scene is not None and self.unknown else self.scene
-        named = {"training": self.learned_from} | dict(names or {})
-        return page(self.as_dict(), self.advice, reenacted, scene, named)
-
-    def save_html(self, path: str | Path, names: Mapping[str, str] | None = None) -> None:
-        """Write :meth:`html` to a file."""
-        with whole_file(path) as partial:
-            partial.write_text(self.html(names), encoding="utf-8")
-
-    def _repr_html_(self) -> str:
-        """Return the page as a notebook shows it."""
-        return framed(self.html())
+        scene, reenacted = self.scene, self.diagnosis.reenacted if self.diagnosis else None
+        if scene is not None and self.unknown:
+            scene = replace(scene, enact=None)  # hypotheses mean nothing where scores mean nothing
+        explained = self.as_dict()
+        possible = scene is not None and bool(scene.possibilities)
+        body = [
+            page.action(explained, self.advice),
+            *([] if self.unknown else [page.promise(explained), page.causes(explained)]),
+            page.poses(reenacted, "the object", self.unit, observation=True) if possible and reenacted else "",
+            page.counterfactuals(scene.errors(), scene.frame.diameter * scene.limit, self.unit) if scene else "",
+            "" if self.unknown else page.as_in_the_paper(explained),
+            page.details(explained, {"training": self.learned_from} | dict(names or {})),
+        ]
+        head = page.headline(explained) + page.warnings(self.warnings)
+        return page.assembled("Registration explained", head, body, scene, self.unit)
 
     def text(self) -> str:
-        """Return it for a reader."""
+        """Return a report for a reader."""
         action = f"action    {self.advice} ({self.reason})"
-        registered = (
-            f"registration   {self.method}, fitness {self.fitness:.3f}, inlier RMSE {self.inlier_rmse:.4g} {self.unit}"
-        )
-        doubts = [f"warning   {line}" for line in self.warnings]
-        diagnosed = self.diagnosis.lines(self.unit) if self.diagnosis else []
-        body = [*diagnosed, action, "", *self._attributed()]
-        lines = [*doubts, *([f"state     {UNKNOWN}", action] if self.unknown else body), "", registered]
+        if self.unknown:
+            body = [f"state     {UNKNOWN}", action]
+        else:
+            body = [
+                *(self.diagnosis.lines(self.unit) if self.diagnosis else []),
+                action,
+                "",
+                PAPER,
+                f"{'':10}{'score':>8}{'variance':>10}",
+                *(f"{name:10}{self.scores[name]:8.3f}{self.variances[name]:10.4f}" for name in self.scores),
+                f"entropy {self.entropy:.3f} nats, BALD {self.bald:.3f} nats",
+            ]
+        fit = f"fitness {self.fitness:.3f}, inlier RMSE {self.inlier_rmse:.4g} {self.unit}"
+        lines = [*_warning_lines(self.warnings), *body, "", f"registration   {self.method}, {fit}"]
         if self.spread is not None:
             scatter = f"{self.spread.rotation_deg:.2f}°, {self.spread.translation:.4g} {self.unit}"
             by = f"over {self.spread.starts} starts" if self.spread.starts else f"by {self.spread.estimator}"
             lines.append(f"pose spread    {scatter} (root mean square {by})")
-        lines += ["", f"T_target_source, in {self.unit}"]
-        lines += [" ".join(f"{number:12.6g}" for number in row) for row in self.T_target_source]
         stages = ", ".join(f"{stage} {1e3 * seconds:.1f}" for stage, seconds in self.seconds.items())
-        return "\n".join([*lines, "", f"milliseconds   {stages}", ""])
+        lines += ["", *_pose_lines(self.T_target_source, self.unit), "", f"milliseconds   {stages}", ""]
+        return "\n".join(lines)
 
-    def _attributed(self) -> list[str]:
-        return [
-            "GP-CA as in the paper: it sees the aligned source alone and names a concept even where nothing is wrong",
-            f"{'':10}{'score':>8}{'variance':>10}",
-            *(f"{name:10}{self.scores[name]:8.3f}{self.variances[name]:10.4f}" for name in self.scores),
-            f"entropy {self.entropy:.3f} nats, BALD {self.bald:.3f} nats",
+
+@dataclass(frozen=True)
+class ScanExplanation(Page):
+    """One registration of two partial scans of a scene, explained without training.
+
+    Attributes:
+        T_target_source: (4, 4) the resulting pose, in the unit of the points.
+        fitness, inlier_rmse: share of the source's voxels with a partner within two voxels; their RMSE.
+        method: name of the registration method.
+        voxel: edge length of the voxels.
+        state: ``nominal``, ``failed`` or ``not sure``.
+        failure: probability of a failure (:func:`gpca.model.scan_explainer.failure_of`), not calibrated.
+        limit: error above which a registration counts as failed: root mean square over the common surface.
+        overlap: share of the source that lies on the target, and of the target that lies on the source.
+        reenacted: hypotheses of the true pose, and the effect of each cause.
+        action, reason: what to do next, a branch of the policy, and why.
+        unit: unit of all lengths.
+        seconds: duration.
+        notes, warnings: changes made to the clouds, and reasons to doubt the explanation.
+        learned_from: training data: none.
+        scene: data of the 3-D view.
+    """
+
+    T_target_source: np.ndarray
+    fitness: float
+    inlier_rmse: float
+    method: str
+    voxel: float
+    state: str
+    failure: float
+    limit: float
+    overlap: tuple[float, float]
+    reenacted: Reenacted
+    action: str
+    reason: str
+    unit: str
+    seconds: float
+    notes: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+    learned_from: str = LEARNED
+    scene: Scene | None = field(default=None, repr=False, compare=False)
+
+    @property
+    def advice(self) -> str:
+        """What to do next, in words."""
+        return ADVICE[self.action]
+
+    def as_dict(self) -> dict[str, object]:
+        """Values for JSON."""
+        values = {name: value for name, value in vars(self).items() if name != "scene"}
+        lists = {name: list(values[name]) for name in ("overlap", "notes", "warnings")}
+        return (
+            values | lists | {"T_target_source": self.T_target_source.tolist(), "reenacted": self.reenacted.as_dict()}
+        )
+
+    def text(self) -> str:
+        """Return a report for a reader."""
+        rmse, voxel, limit = (page.length(value, self.unit) for value in (self.inlier_rmse, self.voxel, self.limit))
+        lines = [
+            *_warning_lines(self.warnings),
+            f"state     {self.state}",
+            f"failure   probability {self.failure:.2f}, not calibrated, of an error above {limit}",
+            f"overlap   {self._overlap()}",
+            self.reenacted.effects_line(self.unit),
+            *self.reenacted.pose_lines("the source", self.unit),
+            f"action    {self.advice} ({self.reason})",
+            "",
+            f"registration   {self.method}, fitness {self.fitness:.3f}, inlier RMSE {rmse}, voxels of {voxel}",
+            "",
+            *_pose_lines(self.T_target_source, self.unit),
         ]
+        return "\n".join([*lines, ""])
+
+    def html(self, names: Mapping[str, str] | None = None) -> str:
+        """Return a page that needs no other file, as :meth:`Explanation.html` does."""
+        tone, title = HEADS[self.state]
+        doubt = f"Probability of failure {self.failure:.2f}, not calibrated: {self.learned_from}."
+        scene, explained = self.scene, self.as_dict()
+        inputs = {"training": self.learned_from, "voxels": page.length(self.voxel, self.unit)} | dict(names or {})
+        possible = scene is not None and bool(scene.possibilities)
+        body = [
+            page.action(explained, self.advice),
+            page.section("Overlap", f"<p>{escape(self._overlap())}.</p>"),
+            page.poses(self.reenacted, "the source", self.unit) if possible else "",
+            page.counterfactuals(scene.errors(), self.limit, self.unit, SCANS_WITHOUT) if scene else "",
+            page.details(explained, inputs),
+        ]
+        head = f'<h1 class="{tone}">{title}</h1><p>{escape(doubt)}</p>{page.warnings(self.warnings)}'
+        return page.assembled("Scans explained", head, body, scene, self.unit)
+
+    def _overlap(self) -> str:
+        source, target = self.overlap
+        return f"{source:.0%} of the source lies on the target, {target:.0%} of the target on the source"
+
+
+def _warning_lines(warnings: tuple[str, ...]) -> list[str]:
+    return [f"warning   {line}" for line in warnings]
+
+
+def _pose_lines(T: np.ndarray, unit: str) -> list[str]:
+    return [f"T_target_source, in {unit}", *(" ".join(f"{number:12.6g}" for number in row) for row in T)]

@@ -1,47 +1,83 @@
-"""The model file: everything needed to explain a registration, in one file that can be handed on.
+"""The model file, which contains tensors, numbers and names only, so that loading it executes no code.
 
-It holds tensors, numbers and names alone, so that loading one runs nobody's code.
+A model may come from anywhere, so its contents are checked when it is loaded.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import get_args
 
+import torch
 from torch import nn
 
 from gpca.alignment.icp import ICPSettings
+from gpca.causes.settings import Moved
+from gpca.causes.truth import FAILED, NOMINAL
+from gpca.classifier.covariances import make_covariance
 from gpca.classifier.gpc import GPC
+from gpca.classifier.settings import GPCSettings
 from gpca.encoders.registry import EncoderSettings, make_encoder
-from gpca.encoders.tensor_file import read_tensors, write_tensors
+from gpca.encoders.tensor_file import read_tensors, require_like, write_tensors
 from gpca.errors import InputError
-from gpca.model.card import titles_of_diagnosis
-from gpca.model.contents import require_possible
-from gpca.model.diagnoser import Diagnoser
-from gpca.model.familiarity import Familiarity
+from gpca.explainers.boosted_trees import require_trees
+from gpca.explainers.pair_classifier import ABSENT, PRESENT
+from gpca.features.dataset import WIDTHS
+from gpca.features.settings import DescriptorSettings
+from gpca.guarantee.conformal import Nonconformity
+from gpca.guarantee.guarantee import Guarantee
+from gpca.guarantee.states import STATES
+from gpca.model.diagnoser import REENACTED, REMEDIED, Diagnoser
+from gpca.model.familiarity import MEASURES, Familiarity
 from gpca.model.location import REMEDY, require_model
-from gpca.recovery.policy import RecoveryPolicy, Thresholds
+from gpca.objects.canonical import FEWEST_CLOUD_POINTS
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.recovery.policy import TREATMENTS, RecoveryPolicy, Thresholds
+from gpca.reenactment.dataset import DESCRIBED
+from gpca.reenactment.features import FEATURES
+from gpca.reenactment.settings import ReenactmentSettings
+from gpca.settings import read_settings
+from gpca.uncertainty.settings import FEWEST_STARTS, UncertaintySettings
 
 FORMAT, VERSION = "GP-CA model", 4
-WITHOUT_REENACTMENT = 3  # the version whose diagnosis reads registrations with remedies; it says less
+WITHOUT_REENACTMENT = 3  # the version whose diagnosis reads registrations with remedies
+LARGEST_CARD_BYTES = 10**6
+DIAGNOSED = "diagnosis"  # marks the objects of the diagnosis in the card beside a model (``gpca ship``)
+_CARD_ROW = re.compile(rf"^\| (.+?) \| \d+ \| {DIAGNOSED} \|$", re.MULTILINE)
+
+# Upper bounds on the work of one explanation. A score is a mean over the draws of the classifier, so that a million
+# draws leave an error of at most 0.0005.
+MOST_DRAWS = 10**6
+MOST_ENCODED_POINTS = 10**6  # in all draws of the encoder together
+MOST_CLOUD_POINTS = 10**6
+MOST_ITERATIONS = 10**5  # of ICP
+MOST_RUNS = 10**4  # of ICP, for the features of a pair
+MOST_NEIGHBORS = 10**4  # and other counts among a backbone's options
+FEATURE_COUNTS = {  # by what a diagnoser reads
+    REENACTED: len(FEATURES) + sum(WIDTHS[group] for group in DESCRIBED),
+    REMEDIED: sum(WIDTHS.values()),
+}
+ASYMMETRY = 1e-9  # of a covariance, whose prior is the identity
 
 
 @dataclass(frozen=True)
 class Model:
-    """A diagnoser, which says whether a registration is right and why it is not, and the paper's GP-CA.
+    """A diagnoser of registrations and the paper's GP-CA.
 
     Attributes:
-        diagnoser: of the pair after ICP, learned from measured causes of all sources; None where there is GP-CA alone.
-        encoder: from clouds (B, N, 3) to embeddings (B, d), ready for inference.
-        encoder_settings: also how many points it sees and how many draws make an embedding.
+        diagnoser: reads the pair after ICP, trained on measured causes of all sources; None if there is GP-CA alone.
+        encoder: maps clouds (B, N, 3) to embeddings (B, d); in evaluation mode.
+        encoder_settings: number of points per draw and of draws per embedding, among others.
         gpc: the classifier; its classes are the concepts.
-        icp: how ICP ran.
-        cloud_points: of source and of target, at most.
-        policy: the actions for the causes.
-        title, stand_in: of the objects that GP-CA learned, and whether they were drawn by the package.
-        familiar: ranges of simple measures of the clouds that GP-CA learned; None in older files.
-        learned_from: titles of the objects that the diagnosis learned from; empty where nothing says so.
+        icp: settings of ICP.
+        cloud_points: maximum number of points of source and target.
+        policy: maps causes to actions.
+        title, stand_in: training objects of GP-CA, and whether the package generated them.
+        familiar: ranges of simple measures over GP-CA's training clouds; None in older files.
+        learned_from: titles of the training objects of the diagnosis; empty if unknown.
     """
 
     diagnoser: Diagnoser | None
@@ -58,12 +94,12 @@ class Model:
 
     @property
     def concepts(self) -> tuple[str, ...]:
-        """Names of the causes that it tells apart, in the order of the scores."""
+        """Names of the causes, in the order of the scores."""
         return self.gpc.classes
 
     @property
     def learning(self) -> str:
-        """What all of it was learned from, in words."""
+        """The training data, in words."""
         paper = f"{self.title} (procedural stand-in)" if self.stand_in else self.title
         if self.diagnoser is None:
             return f"GP-CA as in the paper learned from {paper}; there is no diagnosis"
@@ -71,7 +107,7 @@ class Model:
         return f"the diagnosis learned from {objects}; GP-CA as in the paper from {paper}"
 
     def save(self, path: str | Path) -> None:
-        """Write the file; the same model gives the same bytes."""
+        """Write the file; equal models give equal bytes."""
         content = {
             "format": FORMAT,
             "version": VERSION,
@@ -99,7 +135,7 @@ class Model:
         """Read the file.
 
         Raises:
-            InputError: missing, damaged, pickled, no model, one of another version, or one with what cannot be.
+            InputError: missing, damaged or pickled file, not a model, another version, or impossible contents.
         """
         require_model(path)
         try:
@@ -127,7 +163,7 @@ class Model:
                 policy=RecoveryPolicy(Thresholds(**content["thresholds"]), dict(content["treatments"])),
                 cloud_points=content["points"],
                 familiar=familiar and Familiarity({name: (low, high) for name, (low, high) in familiar.items()}),
-                learned_from=tuple(content.get("learned_from", ())) or titles_of_diagnosis(Path(path)),
+                learned_from=tuple(content.get("learned_from", ())) or _titles_in_card(Path(path)),
                 **{name: content[name] for name in ("title", "stand_in")},
             )
         except (LookupError, TypeError, ValueError, RuntimeError, AttributeError) as fault:
@@ -135,5 +171,158 @@ class Model:
 
 
 def _renamed(settings: Mapping, old: str, new: str) -> dict:
-    """Rename one setting in its place: files of this version say `points`, whatever the config calls it now."""
+    """Rename a setting without changing the order: files of this version call `draw_points` ``points``."""
     return {new if name == old else name: value for name, value in settings.items()}
+
+
+def _titles_in_card(model: Path) -> tuple[str, ...]:
+    """Return the training objects of the diagnosis by the card beside a model; older model files do not list them."""
+    card = model.with_suffix(".md")
+    if not card.is_file() or card.stat().st_size > LARGEST_CARD_BYTES:
+        return ()
+    return tuple(_CARD_ROW.findall(card.read_text(encoding="utf-8", errors="replace")))
+
+
+def require_possible(content: Mapping, settings: EncoderSettings) -> None:
+    """Raise a ValueError that names any impossible content of a model file with these encoder settings."""
+    read_settings(EncoderSettings, vars(settings))
+    read_settings(GPCSettings, content["gpc"]["settings"])
+    read_settings(ICPSettings, content["icp"])
+    if "familiar" in content:
+        ranges = content["familiar"]
+        if set(ranges) != set(MEASURES):
+            raise ValueError(f"ranges of {', '.join(map(repr, ranges))}, not {', '.join(MEASURES)}")
+        for name, (low, high) in ranges.items():
+            if not (type(low) is type(high) is float and 0 <= low <= high):
+                raise ValueError(f"range of {name}: {low!r} to {high!r} is not a range")
+    if content["diagnoser"] is not None:
+        _require_diagnoser(content["diagnoser"])
+    counts = {
+        "draws of the classifier": (content["gpc"]["settings"]["draws"], 2, MOST_DRAWS),
+        "points": (content["points"], FEWEST_CLOUD_POINTS, MOST_CLOUD_POINTS),
+        "iterations of ICP": (content["icp"]["max_iterations"], 1, MOST_ITERATIONS),
+        "draws of the encoder": (settings.draws, 1, MOST_ENCODED_POINTS // settings.draw_points),
+        "attempts": (content["thresholds"]["attempts"], 1, MOST_ITERATIONS),
+    }
+    _require_counts(counts)
+    for name, value in settings.options.items():  # a user's backbone has options of its own
+        if isinstance(value, int | float) and not 0 <= value <= MOST_NEIGHBORS:
+            raise ValueError(f"option {name}: {value!r} is not from 0 to {MOST_NEIGHBORS}")
+    if not isinstance(content["title"], str) or not content["title"].isprintable():
+        raise ValueError("its title is not a line of text")
+    titles = content.get("learned_from", [])
+    if not isinstance(titles, list) or not all(isinstance(title, str) and title.isprintable() for title in titles):
+        raise ValueError("learned_from is not a list of lines of text")
+    _require_treatments(content["treatments"])
+    if type(content["stand_in"]) is not bool:
+        raise ValueError("stand_in is neither true nor false")
+    with torch.device("meta"):  # the options may ask for more than the memory
+        encoder = make_encoder(settings.backbone, settings.options)
+    require_like(content["encoder"], encoder.state_dict(), "encoder")
+    _require_classifier(content["gpc"], CONCEPTS, encoder.embedding_size)
+
+
+def _require_counts(counts: Mapping[str, tuple[object, int, int]]) -> None:
+    for name, (count, least, most) in counts.items():
+        if type(count) is not int or not least <= count <= most:
+            raise ValueError(f"{name}: {count!r} is not a number from {least} to {most}")
+
+
+def _require_treatments(treatments: Mapping) -> None:
+    if set(treatments) != set(CONCEPTS):
+        raise ValueError(f"treatments: of {str([*treatments])[:80]}, not of {', '.join(CONCEPTS)}")
+    actions = list(TREATMENTS.values())
+    if not set(treatments.values()) <= set(actions):  # only other actions than the paper's need the robot's code
+        from gpca.recovery.actions import ACTIONS
+
+        actions = list(ACTIONS)
+    for action in treatments.values():
+        if action not in actions:
+            raise ValueError(f"treatments: {str(action)[:40]!r} is not one of {', '.join(actions)}")
+    if len(set(treatments.values())) < len(treatments):
+        raise ValueError("treatments: one action treats two concepts")
+
+
+def _require_diagnoser(state: Mapping) -> None:
+    read_settings(UncertaintySettings, state["runs"])
+    read_settings(ICPSettings, state["icp"])
+    classifier, reads = state["classifier"], state.get("reads", REMEDIED)
+    counts = {
+        "points of a description": (state["points"], FEWEST_CLOUD_POINTS, MOST_CLOUD_POINTS),
+        "starts": (state["runs"]["starts"], FEWEST_STARTS, MOST_RUNS),
+        "iterations of ICP": (state["icp"]["max_iterations"], 1, MOST_ITERATIONS),
+        "classifiers of causes": (len(classifier["causes"]), len(CONCEPTS), len(CONCEPTS)),
+    }
+    if reads == REENACTED:
+        settings = read_settings(ReenactmentSettings, state["reenactment"])
+        if state["moved"] not in get_args(Moved):
+            raise ValueError(f"moved: {str(state['moved'])[:40]!r} is not one of {', '.join(get_args(Moved))}")
+        counts["re-enactments"] = (settings.calls(state["runs"]["starts"]), 1, MOST_RUNS)
+    else:
+        remedies = read_settings(DescriptorSettings, state["descriptors"])
+        counts |= {
+            "starts with remedies": (remedies.starts, 1, MOST_RUNS),
+            "restarts": (remedies.restarts, 1, MOST_RUNS),
+        }
+    _require_counts(counts)
+    features = FEATURE_COUNTS[reads]
+    quantiles, weights, threshold = classifier["quantiles"], state["error_weights"], state["threshold"]
+    if quantiles.ndim != 2 or len(quantiles) < 2 or quantiles.shape[1] != features:
+        raise ValueError(f"'quantiles' has shape {tuple(quantiles.shape)}, not {features} descriptors")
+    if (quantiles.diff(dim=0) < 0).any():
+        raise ValueError("'quantiles' decrease")
+    if tuple(weights.shape) != (features + 1,):
+        raise ValueError(f"'error_weights' has shape {tuple(weights.shape)}, not {(features + 1,)}")
+    if type(threshold) is not float or not 0 <= threshold <= 2:
+        raise ValueError(f"threshold: {threshold!r} is not a probability")
+    causes = [(cause, (ABSENT, PRESENT)) for cause in classifier["causes"]]
+    for gpc, classes in [(classifier["failure"], (NOMINAL, FAILED)), *causes]:
+        _require_counts({"draws of a classifier": (gpc["settings"]["draws"], 2, MOST_DRAWS)})
+        read_settings(GPCSettings, gpc["settings"])
+        _require_classifier(gpc, classes, features)
+    if trees := classifier.get("trees"):
+        _require_counts({"questions of trees": (len(trees), 1 + len(CONCEPTS), 1 + len(CONCEPTS))})
+        for question in trees:
+            require_trees(question, features)
+    if state.get("guarantee") is not None:
+        sets = Guarantee.from_dict(state["guarantee"]).state_sets
+        if sets.states != STATES or not 0 < sets.level < 1 or sets.nonconformity not in get_args(Nonconformity):
+            raise ValueError("its guarantee is of different states, or of none")
+    for name, value in state.get("held_out", {}).items():
+        if type(name) is not str or not name.isidentifier() or type(value) is not float or not 0 <= value < MOST_DRAWS:
+            raise ValueError(f"held_out: {str(name)[:40]!r} is not the name of a measure with a value")
+
+
+def _require_classifier(state: Mapping, classes: tuple[str, ...], d: int) -> None:
+    if tuple(state["classes"]) != classes:  # their order is that of the scores
+        raise ValueError(f"its classes are {str(state['classes'])[:80]}, not {', '.join(classes)}")
+    n_classes = len(classes)
+    m, n = len(state["inducing"]), len(state["labelled"])
+    shapes = {
+        "scaler_mean": (d,),
+        "scaler_scale": (d,),
+        "inducing": (m, d),
+        "mean": (n_classes, m),
+        "covariance": (n_classes, m, m),
+        "labelled": (n, d),
+        "targets": (n,),
+    }
+    for name, shape in shapes.items():
+        if tuple(state[name].shape) != shape:
+            raise ValueError(f"'{name}' has shape {tuple(state[name].shape)}, not {shape}")
+        if name != "targets" and not state[name].is_floating_point():
+            raise ValueError(f"'{name}' does not hold real numbers")
+    if not all(isinstance(axis, str | int) for axis in state["axes"]) or isinstance(state["axes"], str):
+        raise ValueError("the names of its seed are neither texts nor numbers")
+    kernel = make_covariance(state["settings"]["kernel"], n_classes, lengthscale=1.0).state_dict()
+    require_like(state["kernel"], kernel, "kernel")
+    if not all(torch.equal(state["kernel"][name], kernel[name]) for name in kernel if name.endswith("_bound")):
+        raise ValueError("its kernel has different bounds")
+    if not (state["scaler_scale"] > 0).all():
+        raise ValueError("'scaler_scale' contains values that are not above 0")
+    covariance = state["covariance"].double()
+    # Cholesky reads one triangle alone.
+    if (covariance - covariance.mT).abs().max() > ASYMMETRY or torch.linalg.cholesky_ex(covariance).info.any():
+        raise ValueError("'covariance' is not symmetric and positive definite")
+    if state["targets"].is_floating_point() or not ((state["targets"] >= 0) & (state["targets"] < n_classes)).all():
+        raise ValueError("'targets' names a missing concept")

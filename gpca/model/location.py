@@ -1,4 +1,4 @@
-"""The path of the model to use. No model is opened here, so no heavy library is needed."""
+"""The path of the model to use; no model is opened, so no heavy library is loaded."""
 
 from __future__ import annotations
 
@@ -8,23 +8,22 @@ from pathlib import Path
 from gpca.errors import InputError
 from gpca.io.limits import require_file
 
-VARIABLE = "GPCA_MODEL"  # this variable of the environment names the file to take where no other is named
-RESULTS = Path("results")  # of the working directory: the package may be installed far from any results
-SHIPPED = Path(__file__).with_name("shipped.pt")  # comes with the package where `python -m gpca ship` has put it
-BEST_FIRST = ("full", "default")  # runs whose model is preferred; that of the smoke run knows next to nothing
+VARIABLE = "GPCA_MODEL"  # environment variable with the path of the model
+RESULTS = Path("results")  # in the working directory
+SHIPPED = Path(__file__).with_name("shipped.pt")  # written by `python -m gpca ship`
+BEST_FIRST = ("full", "default")  # preferred runs; the smoke run comes last, as its model is hardly trained
 REMEDY = "make one with 'make results', or by itself with 'snakemake -j2 results/default/model.pt'"
 
 
 def require_model(path: str | Path) -> None:
-    """Raise an InputError unless there is a file that can be read; whether it is a model, only loading it shows."""
+    """Raise an InputError unless the file exists and can be read."""
     require_file(path, "no such model", REMEDY)
 
 
 def model_path(chosen: str | Path | None = None, results: Path = RESULTS) -> Path:
-    """Return the path to use: the given one, that of the environment, one that the workflow made, or `SHIPPED`.
+    """Return the path to use: the given one, that of the environment, a model of the workflow, or `SHIPPED`.
 
-    Of those in `results`, by default the folder of that name in the working directory, that of the run ``full`` comes
-    first, then ``default``, then the newest of any other, and ``smoke`` last.
+    Among the runs in `results`, ``full`` comes first, then ``default``, then the newest other run, and ``smoke`` last.
 
     Raises:
         InputError: there is none.

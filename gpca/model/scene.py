@@ -1,14 +1,12 @@
-"""What an explanation is drawn from: both clouds, the poses, and the registrations that were re-enacted.
-
-A scene keeps arrays that the explanation had anyway. It re-enacts once more when it is drawn, with the same numbers, so
-that an explanation that nobody looks at costs nothing.
-"""
+"""The data of the 3-D view of one registration: clouds, poses and re-enacted registrations, also packed as JSON."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from base64 import b64decode, b64encode
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 
@@ -16,10 +14,16 @@ from gpca.alignment.canonical_frame import CanonicalFrame
 from gpca.alignment.rigid import transform
 from gpca.causes.counterfactuals import Registrar, Unmeasurable
 from gpca.causes.settings import CauseSettings
-from gpca.causes.shapley import SUBSETS
+from gpca.causes.shapley import BY_SIZE, SUBSETS
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reenactment.enactment import Enactment
 from gpca.reenactment.hypotheses import weights_of
+
+ASSETS = Path(__file__).with_name("assets")  # style and script of the view
+MOST_POINTS = 3000  # per cloud; more points hide one another
+LARGEST_STEP = 2**15 - 1
+FARTHEST = 4.0  # largest radius of the view around the target's center, in diameters
+WITHOUT = {"noise": "clean points", "pose": "right start", "overlap": "whole surface"}  # what removing a cause means
 
 
 @dataclass(frozen=True)
@@ -27,9 +31,9 @@ class WhatIf:
     """One of the eight re-enacted registrations under a hypothesis, in the target's frame and in its diameters.
 
     Attributes:
-        causes: which causes were left in; the others were taken out.
+        causes: the causes that were left in.
         error: v̂, the mean over the starts.
-        points: (P, 3) the cloud where one registration, from the start itself, put it.
+        points: (P, 3) the source after one registration, run from the unperturbed start.
     """
 
     causes: tuple[str, ...]
@@ -39,12 +43,12 @@ class WhatIf:
 
 @dataclass(frozen=True)
 class Possibility:
-    """A pose that may be the true one, and what the registration would have done.
+    """A hypothesis of the true pose.
 
     Attributes:
-        probability: among all such poses.
-        T: 4×4, takes the source from where the registration began to this pose.
-        what_ifs: of all subsets of the causes, in the order of :data:`gpca.causes.shapley.SUBSETS`.
+        probability: among all hypotheses.
+        T: (4, 4) maps the source at its initial pose to the hypothesis.
+        what_ifs: one per subset of the causes, in the order of :data:`gpca.causes.shapley.SUBSETS`.
     """
 
     probability: float
@@ -57,13 +61,14 @@ class Scene:
     """A registration in the target's canonical frame and in its diameters.
 
     Attributes:
-        source: (N, 3) where the registration began.
+        source: (N, 3) at its initial pose.
         target: (M, 3).
-        T_found: 4×4, takes the source from there to where the registration ended.
-        frame: of the target, in the user's unit.
-        reach: how far ICP looked for a partner, in diameters.
-        limit: error above which the registration has failed, in diameters.
-        enact: re-enacts once more, with the same numbers, and says how; None where nothing was re-enacted.
+        T_found: (4, 4) maps the source from the initial pose to the result.
+        frame: the target's, in the user's unit.
+        reach: correspondence distance of ICP, diameters.
+        limit: error above which a registration counts as failed, diameters.
+        enact: repeats the re-enactment with the same random numbers; None if there was none. It runs only when the
+            scene is drawn.
     """
 
     source: np.ndarray
@@ -76,12 +81,12 @@ class Scene:
 
     @property
     def aligned(self) -> np.ndarray:
-        """The source (N, 3) where the registration put it."""
+        """The registered source (N, 3)."""
         return transform(self.T_found, self.source)
 
     @cached_property
     def possibilities(self) -> tuple[Possibility, ...]:
-        """The poses that fit, the most probable first; none where nothing was re-enacted."""
+        """Hypotheses of the true pose, most probable first; empty without a re-enactment."""
         if self.enact is None:
             return ()
         enactments, truth = self.enact()
@@ -91,10 +96,23 @@ class Scene:
             for enactment, weight in zip(enactments, weight_k, strict=True)
         )
 
+    def errors(self) -> list[list[float]]:
+        """Re-enacted error v̂ of each hypothesis and subset of the causes, in the user's unit."""
+        return [[self.frame.diameter * each.error for each in pose.what_ifs] for pose in self.possibilities]
+
+    def packed(self, unit: str) -> dict[str, object]:
+        """JSON values for the page's script, see :func:`packed_pair`."""
+        pair = packed_pair(self.target, self.source, self.T_found, self.reach, self.frame.diameter, unit)
+        poses = [
+            {"T": flat(pose.T), "what_ifs": [packed(pose.what_ifs[subset].points) for subset in BY_SIZE]}
+            for pose in self.possibilities
+        ]
+        return pair | {"poses": poses}
+
 
 def _what_ifs(enactment: Enactment, truth: CauseSettings) -> tuple[WhatIf, ...]:
     candidate, registrar = enactment.candidate, Registrar(enactment.candidate, truth, misses=True)
-    found = []
+    what_ifs = []
     for subset, causes in enumerate(SUBSETS):
         applied = tuple(cause for cause in causes if candidate.applied[cause])
         try:
@@ -102,5 +120,60 @@ def _what_ifs(enactment: Enactment, truth: CauseSettings) -> tuple[WhatIf, ...]:
         except Unmeasurable:
             T = candidate.start(applied)
         names = tuple(CONCEPTS[cause] for cause in causes)
-        found.append(WhatIf(names, float(enactment.error_8[subset]), transform(T, candidate.observed(applied))))
-    return tuple(found)
+        what_ifs.append(WhatIf(names, float(enactment.error_8[subset]), transform(T, candidate.observed(applied))))
+    return tuple(what_ifs)
+
+
+def packed_pair(
+    target: np.ndarray, source: np.ndarray, T_found: np.ndarray, reach: float, diameter: float, unit: str
+) -> dict[str, object]:
+    """Return the two clouds of a registration as JSON values, without hypotheses.
+
+    Lengths are in diameters of the target, except ``diameter`` itself, which is in `unit`.
+
+    Args:
+        target: (M, 3). source: (N, 3) at its initial pose.
+        T_found: (4, 4) maps the source from there to the result.
+        reach: distance from which on all points get the same color.
+    """
+    radii = [np.linalg.norm(points, axis=1) for points in (target, source, transform(T_found, source))]
+    return {
+        "unit": unit,
+        "diameter": diameter,
+        "reach": reach,
+        # A few far points are ignored.
+        "radius": float(np.clip(max(float(np.quantile(radius, 0.98)) for radius in radii), 0.5, FARTHEST)),
+        "target": packed(target),
+        "source": packed(source),
+        "found": flat(T_found),
+    }
+
+
+def packed(points: np.ndarray) -> dict[str, object]:
+    """Return points (N, 3), evenly thinned to `MOST_POINTS`, as 16-bit multiples of a step in base64."""
+    kept = points[np.linspace(0, len(points) - 1, min(len(points), MOST_POINTS)).astype(int)]
+    step = max(float(np.abs(kept).max()), 1e-9) / LARGEST_STEP
+    return {"step": step, "data": b64encode(np.rint(kept / step).astype("<i2").tobytes()).decode("ascii")}
+
+
+def unpacked(cloud: dict) -> np.ndarray:
+    """Return the points (N, 3) of a :func:`packed` cloud, as the page's script does."""
+    return np.frombuffer(b64decode(cloud["data"]), "<i2").reshape(-1, 3) * cloud["step"]
+
+
+def flat(T: np.ndarray) -> list[float]:
+    """Return a matrix row by row, with seven digits."""
+    return [float(f"{value:.7g}") for value in T.ravel()]
+
+
+def distances(points: np.ndarray, target: np.ndarray) -> np.ndarray:
+    """Return the distance (N,) from each point (N, 3) to its nearest neighbor in the target (M, 3)."""
+    from scipy.spatial import cKDTree
+
+    return cKDTree(target).query(points)[0]
+
+
+def taken_out(subset: int, without: Mapping[str, str] = WITHOUT) -> str:
+    """Describe a subset of the causes by the causes that it leaves out."""
+    gone = [without[name] for cause, name in enumerate(CONCEPTS) if cause not in SUBSETS[subset]]
+    return ", ".join(gone).capitalize() or "As it was"

@@ -12,7 +12,7 @@ from gpca.causes.dataset import Causes
 from gpca.causes.settings import CauseSettings
 from gpca.causes.shapley import BY_SIZE
 from gpca.causes.truth import FAILED
-from gpca.model.shown.subsets import taken_out
+from gpca.model.scene import taken_out
 from gpca.objects.canonical import ObjectClouds
 from gpca.page.scenes import packed_registration
 from gpca.pairs.perturbation import CONCEPTS

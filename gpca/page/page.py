@@ -13,7 +13,7 @@ from gpca.alignment.icp import ICPSettings
 from gpca.causes.settings import CauseSettings
 from gpca.errors import InputError
 from gpca.io.files import whole_file
-from gpca.model.shown.packing import ASSETS
+from gpca.model.scene import ASSETS
 from gpca.page import cause_samples, samples
 from gpca.page.comparison import page_comparison
 from gpca.page.findings import Titles, findings_of

@@ -8,8 +8,7 @@ import numpy as np
 
 from gpca.alignment.rigid import inverse, transform
 from gpca.causes.shapley import BY_SIZE
-from gpca.model.shown.packing import flat, packed, packed_pair
-from gpca.model.shown.subsets import taken_out
+from gpca.model.scene import flat, packed, packed_pair, taken_out
 from gpca.pairs.dataset import Registrations
 from gpca.reporting.figures.cloud_views import thinned
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from gpca.errors import InputError
-from gpca.guarantee.quantile import upper_bound
+from gpca.guarantee.conformal import upper_bound
 
 INVERSE_REGULARIZATION = 0.3  # C of scikit-learn; chosen on development seeds
 FOLDS = 8  # of the tables
@@ -72,7 +72,7 @@ def alarm_threshold(failure_M: np.ndarray, false_alarms: float) -> float:
     """Return the threshold that a further good registration exceeds with at most this probability.
 
     That holds over the draws of the M good ones, if they are exchangeable with it
-    (:func:`gpca.guarantee.quantile.upper_bound`). Where M is too small for it, it is the largest of them.
+    (:func:`gpca.guarantee.conformal.upper_bound`). Where M is too small for it, it is the largest of them.
     """
     return min(upper_bound(failure_M, 1 - false_alarms), float(failure_M.max()))
 

@@ -11,9 +11,9 @@ from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
 from gpca.encoders.registry import EncoderSettings
 from gpca.encoders.training import load_model
+from gpca.model.diagnoser import TrainingSet, learn
 from gpca.model.familiarity import Familiarity
 from gpca.model.file import Model
-from gpca.model.learning import Lessons, joined, learn
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.job import Job
@@ -29,7 +29,7 @@ def run(job: Job) -> None:
     with record_provenance([job.out], inputs, job.settings, seed=job.seed):
         icp, own = job.section("registrations").get("icp", {}), job.section("model")
         diagnoser, bald_N = learn(
-            joined([_lessons(*files) for files in zip(job.causes, job.reenactments, strict=True)]),
+            TrainingSet.joined([_training_set(*files) for files in zip(job.causes, job.reenactments, strict=True)]),
             GPCSettings(**own.get("classifier", {})),
             CauseSettings.from_dict(job.section("causes") | own.get("causes", {}), icp),
             ReenactmentSettings(**job.section("reenactment")),
@@ -61,9 +61,9 @@ def run(job: Job) -> None:
         ).save(job.out)
 
 
-def _lessons(causes_file: Path, reenactments_file: Path) -> Lessons:
+def _training_set(causes_file: Path, reenactments_file: Path) -> TrainingSet:
     causes = Causes.load(causes_file)
-    return Lessons.of(causes, Reenactments.load(reenactments_file, causes.registrations))
+    return TrainingSet.of(causes, Reenactments.load(reenactments_file, causes.registrations))
 
 
 def _gpc(job: Job, registrations: Registrations, settings: GPCSettings) -> GPC:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gpca.errors import InputError
-from gpca.guarantee.alarm import ALARM, GOOD, NOT_SURE, FailureAlarm, calibrate_alarm
+from gpca.guarantee.conformal import ALARM, GOOD, NOT_SURE, FailureAlarm, calibrate_alarm
 
 
 def drawn(random, samples, shift):

@@ -8,7 +8,7 @@ import pytest
 from gpca.causes.dataset import labels_of
 from gpca.causes.truth import BORDERLINE, Truth
 from gpca.errors import InputError
-from gpca.guarantee.alarm import OUTCOMES
+from gpca.guarantee.conformal import OUTCOMES
 from gpca.guarantee.guarantee import Guarantee, calibrate
 from gpca.guarantee.states import SEVERAL, STATES, state_scores, states_of
 

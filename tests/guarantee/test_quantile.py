@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import beta
 
 from gpca.errors import InputError
-from gpca.guarantee.quantile import confident_upper_bound, highest_level, require_share, upper_bound
+from gpca.guarantee.conformal import confident_upper_bound, highest_level, require_share, upper_bound
 
 DRAWS = 4000
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gpca.errors import InputError
-from gpca.guarantee.sets import CUMULATIVE, PROBABILITY, calibrate_sets, nonconformity
+from gpca.guarantee.conformal import CUMULATIVE, PROBABILITY, calibrate_sets, nonconformity
 
 STATES = ("good", "poor", "lost")
 

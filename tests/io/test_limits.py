@@ -14,8 +14,8 @@ from gpca.io.csv_file import read_csv
 from gpca.io.files import read_image
 from gpca.io.limits import require_file
 from gpca.io.structured_text import read_json, read_mapping
+from gpca.model.clouds import read_points, read_pose
 from gpca.model.file import Model
-from gpca.model.point_file import read_points, read_pose
 from gpca.objects import uw_rgbd
 from gpca.objects.bop import read_models_info
 from gpca.objects.downloads import open_archive

@@ -9,9 +9,9 @@ import pytest
 from gpca.alignment.rigid import transform
 from gpca.alignment.twist import exp
 from gpca.features.dataset import WIDTHS
-from gpca.model.contents import WIDTH_READ
 from gpca.model.diagnoser import REENACTED, REMEDIED, Diagnoser
 from gpca.model.diagnosis import Diagnosis
+from gpca.model.file import FEATURE_COUNTS
 from gpca.reenactment.features import FEATURES
 from gpca.reenactment.settings import ReenactmentSettings
 
@@ -37,7 +37,7 @@ def test_descriptors_do_not_depend_on_where_icp_was_started_but_for_the_motion(d
 
 def test_what_is_read_is_what_the_reenactment_says(diagnoser, cloud):
     features, said = diagnoser.measured(cloud, cloud[::2], np.eye(4))
-    assert features.shape == (WIDTH_READ[REENACTED],)
+    assert features.shape == (FEATURE_COUNTS[REENACTED],)
     assert said.error == pytest.approx(np.exp(features[FEATURES.index("mean_error_7")]))
     assert said.noise == features[FEATURES.index("first_noise")]
     assert said.poses[0].probability == features[FEATURES.index("first_weight")]

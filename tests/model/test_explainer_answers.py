@@ -13,7 +13,7 @@ from gpca.classifier.settings import GPCSettings
 from gpca.explainers.pair_classifier import PairClassifier
 from gpca.features.dataset import WIDTHS
 from gpca.model.diagnoser import REMEDIED
-from gpca.model.explanation import WORDS
+from gpca.model.diagnosis import ADVICE
 from gpca.recovery.policy import NOTHING, QUEUE, RecoveryPolicy, Thresholds
 from gpca.uncertainty.settings import UncertaintySettings
 
@@ -25,7 +25,7 @@ def test_an_explanation_is_json_and_text(explainer, pair):
     assert np.array(plain["T_target_source"]).shape == (4, 4)
     assert plain["spread"]["starts"] == 13
     text = explanation.text()
-    for word in (explanation.diagnosis.state, WORDS[explanation.action], "variance", "BALD", "over 13 starts"):
+    for word in (explanation.diagnosis.state, ADVICE[explanation.action], "variance", "BALD", "over 13 starts"):
         assert word in text
     assert plain["diagnosis"]["state"] == explanation.diagnosis.state
     stages = ["preparation", "icp", "diagnosis", "embedding", "attribution", "familiarity", "uncertainty"]
@@ -157,11 +157,11 @@ def test_gpca_alone_decides_where_nothing_is_diagnosed(explainer, model, pair):
     decision = model.policy.decide(np.array(list(said.scores.values())), said.bald)
     assert (said.action, said.reason) == (decision.action, decision.reason)
     assert said.action == model.policy.treatments[said.concept]
-    assert f"{WORDS[said.action]} ({said.reason})" in said.text()
+    assert f"{ADVICE[said.action]} ({said.reason})" in said.text()
 
 
 @pytest.mark.parametrize("thresholds", [Thresholds(uncertain=0.0), Thresholds(dominant=0.999)])
 def test_a_policy_of_ones_own_queues_what_it_finds_uncertain(model, pair, thresholds):
     said = with_threshold(model, 0.0, RecoveryPolicy(thresholds)).explain(*pair)
     assert said.action == QUEUE
-    assert WORDS[QUEUE] in said.text()
+    assert ADVICE[QUEUE] in said.text()

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from gpca import Explainer
-from gpca.model.diagnosis import UNKNOWN
-from gpca.model.explanation import CHECK, WORDS
+from gpca.model.diagnosis import ADVICE, CHECK, UNKNOWN
 from gpca.model.familiarity import MEASURES, Familiarity, hidden_share, measure, voids_of
 from gpca.objects.canonical import canonical_cloud
 from gpca.objects.procedural import FAMILIES, surfaces
@@ -147,7 +146,7 @@ def test_nothing_is_said_of_a_pair_without_meaning(name, threshold, model, pair)
     plain = json.loads(json.dumps(said.as_dict()))
     assert (plain["diagnosis"]["state"], plain["action"]) == ("unknown", "check")
     text = said.text()
-    assert f"state     unknown\naction    {WORDS[CHECK]} ({said.reason})\n" in text
+    assert f"state     unknown\naction    {ADVICE[CHECK]} ({said.reason})\n" in text
     for word in ("nominal", "failed", "probability", "variance", "score "):
         assert word not in text
 

@@ -9,24 +9,23 @@ from gpca.causes.shapley import ALL
 from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
 from gpca.explainers.pair_classifier import Judgment, PairClassifier
-from gpca.model.contents import WIDTH_READ
-from gpca.model.diagnoser import REENACTED
-from gpca.model.guaranteed import scores_of_states
-from gpca.model.learning import Lessons, fit_error, joined, judged_unseen, learn, threshold_of
+from gpca.model.diagnoser import REENACTED, TrainingSet, fit_error, judged_unseen, learn, threshold_of
+from gpca.model.diagnosis import state_probabilities
+from gpca.model.file import FEATURE_COUNTS
 from gpca.reenactment.dataset import Reenactments
 from gpca.reenactment.features import reenactment_features
 from gpca.reenactment.settings import ReenactmentSettings
 
 SETTINGS = GPCSettings(learning_rate=0.1, iterations=40, inducing=8, draws=200)
-FEATURES = WIDTH_READ[REENACTED]
+FEATURES = FEATURE_COUNTS[REENACTED]
 
 
-def lessons(n, seed, shift=3.0):
+def training_set(n, seed, shift=3.0):
     random = np.random.default_rng(seed)
     failed_N = np.arange(n) % 3 > 0
     features_N_F = random.normal(size=(n, FEATURES)) + shift * failed_N[:, None]
     label_N = np.where(failed_N, np.where(np.arange(n) % 3 == 1, "noise", "pose"), "nominal")
-    return Lessons(
+    return TrainingSet(
         features_N_F,
         label_N,
         np.where(failed_N, "several", "nominal"),
@@ -36,7 +35,7 @@ def lessons(n, seed, shift=3.0):
     )
 
 
-def test_lessons_are_those_of_the_truth(causes):
+def test_training_sets_are_those_of_the_truth(causes):
     n, random = len(causes), np.random.default_rng(0)
     arrays = {
         name: random.random((n, *(2 if size == "K" else size for size in of.shape[1:])))
@@ -44,14 +43,14 @@ def test_lessons_are_those_of_the_truth(causes):
     }
     registrations = causes.registrations
     own = Reenactments(**arrays)
-    found = Lessons.of(causes, own)
+    found = TrainingSet.of(causes, own)
     assert found.features_N_F.shape == (n, FEATURES)
     np.testing.assert_array_equal(found.error_N, causes.truth.error[:, ALL])
     np.testing.assert_array_equal(found.family_N, registrations.cluster)
     failed_N = np.isin(found.label_N, ("noise", "pose", "overlap"))
     np.testing.assert_array_equal(found.state_N == "several", failed_N & (found.causes_N_3.sum(axis=1) > 1))
     np.testing.assert_array_equal(found.features_N_F, reenactment_features(own))
-    both = joined([found, found.subset(np.arange(2))])
+    both = TrainingSet.joined([found, found.subset(np.arange(2))])
     assert len(both.label_N) == n + 2
 
 
@@ -74,14 +73,14 @@ def test_the_error_is_that_of_scikit_learn_and_rises_with_what_it_comes_from():
 
 @pytest.fixture(scope="module")
 def learned():
-    given = lessons(60, 0)
+    given = training_set(60, 0)
     return given, learn(given, SETTINGS, CauseSettings(moved="observed"), ReenactmentSettings(), 0.05, "tiny", 0)
 
 
 def test_failures_are_told_from_what_is_fine_and_the_uncertainty_is_of_unseen_failures(learned):
     given, (diagnoser, bald_N) = learned
     assert len(bald_N) == (given.label_N != "nominal").sum()
-    new = lessons(30, 1)
+    new = training_set(30, 1)
     classifier = diagnoser.classifier
     alarm_N = classifier.judge(classifier.normalized(new.features_N_F)).failure_N >= diagnoser.threshold
     assert alarm_N[new.label_N != "nominal"].all()
@@ -100,7 +99,7 @@ def test_what_is_promised_and_measured_is_of_families_that_were_not_learned(lear
     assert full.guarantee.families == 0
     assert full.guarantee.samples == 60
     judged = judged_unseen(given, SETTINGS, "tiny", 0)
-    inside = full.guarantee.sets(scores_of_states(judged))
+    inside = full.guarantee.sets(state_probabilities(judged))
     own = [full.guarantee.state_sets.states.index(state) for state in given.state_N]
     assert inside[np.arange(60), own].mean() >= 0.9
     called = full.guarantee.alarm(judged.failure_N)
@@ -109,7 +108,7 @@ def test_what_is_promised_and_measured_is_of_families_that_were_not_learned(lear
 
 
 def test_each_registration_is_judged_by_what_learned_no_other_of_its_family(monkeypatch):
-    given, judged_by = lessons(24, 0), []
+    given, judged_by = training_set(24, 0), []
 
     class Recording(PairClassifier):
         def fit(self, features_N_F, failed_N, causes_N_3):
@@ -120,7 +119,7 @@ def test_each_registration_is_judged_by_what_learned_no_other_of_its_family(monk
             judged_by.append((self.known, len(inputs_N_F)))
             return super().judge(inputs_N_F)
 
-    monkeypatch.setattr("gpca.model.learning.PairClassifier", Recording)
+    monkeypatch.setattr("gpca.model.diagnoser.PairClassifier", Recording)
     judged = judged_unseen(given, SETTINGS, "tiny", 0)
     assert np.isfinite(judged.failure_N).all()
     assert sum(count for _, count in judged_by) == 24
@@ -134,14 +133,14 @@ def test_each_registration_is_judged_by_what_learned_no_other_of_its_family(monk
 def test_states_of_a_failure_are_as_probable_as_its_causes():
     causes_N_3 = np.array([[0.5, 0.5, 0.5], [1, 0, 0], [1, 1, 0], [0, 0, 0]])
     judged = Judgment(np.array([0.0, 1.0, 0.5, 1.0]), causes_N_3, np.zeros((4, 3)), np.zeros(4))
-    scores = scores_of_states(judged)
+    scores = state_probabilities(judged)
     expected = [[1, 0, 0, 0, 0], [0, 1, 0, 0, 0], [0.5, 0, 0, 0, 0.5], [0, 1 / 3, 1 / 3, 1 / 3, 0]]
     np.testing.assert_allclose(scores, expected, atol=1e-6)
     np.testing.assert_allclose(scores.sum(axis=1), 1)
 
 
 def test_what_cannot_be_learned_from_is_refused_in_one_line():
-    given = lessons(30, 0)
+    given = training_set(30, 0)
     failures = given.subset(given.label_N != "nominal")
     options = (SETTINGS, CauseSettings(), ReenactmentSettings(), 0.05, "tiny", 0)
     with pytest.raises(InputError, match=r"model: has no nominal registration; raise causes\.train"):

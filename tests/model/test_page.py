@@ -9,8 +9,7 @@ import pytest
 
 from gpca.alignment.rigid import transform
 from gpca.causes.shapley import ALL, BY_SIZE
-from gpca.model.shown.packing import MOST_POINTS, packed, unpacked
-from gpca.model.shown.subsets import taken_out
+from gpca.model.scene import MOST_POINTS, packed, taken_out, unpacked
 
 from ..page.test_in_a_browser import chromium, in_a_browser, with_script
 

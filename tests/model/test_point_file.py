@@ -3,7 +3,7 @@ import pytest
 
 from gpca.alignment.twist import exp
 from gpca.errors import InputError
-from gpca.model.point_file import read_points, read_pose
+from gpca.model.clouds import read_points, read_pose
 
 trimesh = pytest.importorskip("trimesh")
 POINTS = np.random.default_rng(0).uniform(size=(200, 3)) * [0.1, 0.2, 0.3]

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from gpca.active_learning.labeling import Queue, add_to_queue, is_queue
 from gpca.errors import InputError
-from gpca.model.queue import Queue, add_to_queue, is_queue
 
 
 @pytest.fixture(scope="module")
@@ -15,7 +15,9 @@ def explained(explainer, pair):
 def test_a_queue_grows_by_one_and_keeps_what_it_had(explainer, explained, tmp_path):
     path, scene = tmp_path / "queued.npz", explained.scene
     h_1_d = explainer.embed(scene.aligned)
-    assert [add_to_queue(path, scene, n * h_1_d, f"scan{n}.ply to box.stl") for n in (1, 2, 3)] == [1, 2, 3]
+    assert [
+        add_to_queue(path, scene.aligned, scene.target, n * h_1_d, f"scan{n}.ply to box.stl") for n in (1, 2, 3)
+    ] == [1, 2, 3]
     queue = Queue.load(path)
     assert is_queue(path)
     assert queue.object_name.tolist() == [f"scan{n}.ply to box.stl" for n in (1, 2, 3)]
@@ -30,7 +32,11 @@ def test_what_is_no_queue_or_of_another_model_is_refused(explained, registration
     assert not is_queue(tmp_path / "registrations.npz")
     assert not is_queue(tmp_path / "lost.npz")
     with pytest.raises(InputError, match=r"registrations.npz: is not a queue; name another file with --queue"):
-        add_to_queue(tmp_path / "registrations.npz", explained.scene, np.zeros((1, 4)), "a to b")
-    add_to_queue(tmp_path / "queued.npz", explained.scene, np.zeros((1, 4)), "a to b")
+        add_to_queue(
+            tmp_path / "registrations.npz", explained.scene.aligned, explained.scene.target, np.zeros((1, 4)), "a to b"
+        )
+    add_to_queue(tmp_path / "queued.npz", explained.scene.aligned, explained.scene.target, np.zeros((1, 4)), "a to b")
     with pytest.raises(InputError, match=r"queued.npz: is a queue of another model"):
-        add_to_queue(tmp_path / "queued.npz", explained.scene, np.zeros((1, 5)), "a to b")
+        add_to_queue(
+            tmp_path / "queued.npz", explained.scene.aligned, explained.scene.target, np.zeros((1, 5)), "a to b"
+        )

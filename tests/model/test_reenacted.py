@@ -10,7 +10,7 @@ from gpca.alignment.canonical_frame import CanonicalFrame
 from gpca.alignment.rigid import transform
 from gpca.alignment.twist import exp
 from gpca.causes.shapley import ALL, shapley_values
-from gpca.model.reenacted import Reenacted, axis_in_words
+from gpca.model.diagnosis import Reenacted, axis_in_words
 from gpca.reenactment.enactment import Enactment
 from gpca.reenactment.hypotheses import Hypothesis
 from gpca.reenactment.surface import ModelSurface

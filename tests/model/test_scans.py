@@ -13,9 +13,9 @@ from gpca.__main__ import main
 from gpca.alignment.rigid import inverse, transform
 from gpca.alignment.twist import exp
 from gpca.errors import InputError
-from gpca.model.point_file import read_scan
-from gpca.model.scan_explanation import NOT_SURE
-from gpca.model.voxels import in_voxels, voxel_size
+from gpca.model.clouds import read_scan
+from gpca.model.explanation import NOT_SURE
+from gpca.model.scan_registration import in_voxels, voxel_size
 from gpca.process.environment import open3d_cloud
 
 

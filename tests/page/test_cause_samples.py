@@ -10,7 +10,7 @@ from gpca.alignment.rigid import transform
 from gpca.causes.settings import CauseSettings
 from gpca.causes.shapley import ALL, BY_SIZE
 from gpca.errors import InputError
-from gpca.model.shown.packing import unpacked
+from gpca.model.scene import unpacked
 from gpca.page.cause_samples import cause_samples, first_of_each_cause
 from gpca.pairs.perturbation import CONCEPTS
 from tests.conftest import FEW_CAUSES

@@ -8,7 +8,7 @@ from gpca.alignment.rigid import inverse, transform
 from gpca.causes.settings import Limits
 from gpca.errors import InputError
 from gpca.experiments.method.concepts import source_before_icp
-from gpca.model.shown.packing import unpacked
+from gpca.model.scene import unpacked
 from gpca.page.samples import OF_EACH_CONCEPT, first_of_each_concept, page_samples, severity_words
 from gpca.page.scenes import POINTS
 from gpca.pairs.perturbation import CONCEPTS

@@ -1,18 +1,17 @@
 """Numbers on the command line: each option of each command has its bounds, and what is out of them is one line."""
 
 from argparse import Action, ArgumentParser
-from importlib import import_module
 
 import pytest
 
-from gpca.__main__ import COMMANDS
+from gpca.__main__ import COMMANDS, load_command
 from gpca.process.arguments import whole_number
 from tests.hostile import refusal
 
 
 def options(command) -> list[Action]:
     parser = ArgumentParser()
-    import_module(f"gpca.commands.{command.replace('-', '_')}").add_arguments(parser)
+    load_command(command)[0](parser)
     return parser._actions
 
 

@@ -29,7 +29,7 @@ class Hiding:
 
 sys.meta_path[:] = map(Hiding, sys.meta_path)
 from gpca.__main__ import main
-import gpca.commands.label, gpca.commands.score
+import gpca.commands.label, gpca.commands.tracks
 print(main(sys.argv[2:]), file=sys.stderr)
 print(main([*sys.argv[2:], "--method", "gicp"]), file=sys.stderr)
 print(main([*sys.argv[2:], "--png", "figure.png"]), file=sys.stderr)

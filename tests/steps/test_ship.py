@@ -12,10 +12,10 @@ import yaml
 from gpca.attribution.paired import Difference
 from gpca.code_files import ROOT
 from gpca.commands import ship
+from gpca.commands.ship import licenses_of
 from gpca.experiments.diagnosis.metrics import COLUMNS
 from gpca.model.explainer import Explainer
 from gpca.model.file import Model
-from gpca.model.origin import licenses_of
 from tests.steps.by_words import main
 
 from .spoiling import content, removed, written

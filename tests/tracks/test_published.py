@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gpca.causes.dataset import Causes, labels_of
-from gpca.commands.ship_predictions import LARGEST_BYTES
+from gpca.commands.tracks import LARGEST_BYTES
 from gpca.config.check import check
 from gpca.config.leave_out import without_false
 from gpca.errors import InputError

@@ -11,7 +11,7 @@ from gpca.causes.truth import NOMINAL
 from gpca.experiments.guarantee.scored import Scored
 from gpca.experiments.guarantee.settings import GuaranteeSettings
 from gpca.frames.source import REAL_WORLD
-from gpca.guarantee.alarm import ALARM, GOOD
+from gpca.guarantee.conformal import ALARM, GOOD
 from gpca.guarantee.guarantee import calibrate
 from gpca.guarantee.states import state_scores
 
@@ -52,7 +52,7 @@ class Answers:
     Attributes:
         row: (A,) their rows.
         sets: variant -> (A, 5) which states are in the set.
-        calls: variant -> (A,) of :data:`gpca.guarantee.alarm.OUTCOMES`.
+        calls: variant -> (A,) of :data:`gpca.guarantee.conformal.OUTCOMES`.
         families: the smallest number of families that any was calibrated on.
     """
 

@@ -17,7 +17,7 @@ from gpca.experiments.guarantee.answers import BY_FAMILY, FAMILIES, Answers, ans
 from gpca.experiments.guarantee.experiment import promises
 from gpca.experiments.guarantee.scored import Scored
 from gpca.experiments.guarantee.settings import GuaranteeSettings
-from gpca.guarantee.alarm import ALARM, GOOD, NOT_SURE
+from gpca.guarantee.conformal import ALARM, GOOD, NOT_SURE
 from gpca.guarantee.states import STATES
 from gpca.io.csv_file import read_numbers
 from gpca.seeds import generator

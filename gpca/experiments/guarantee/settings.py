@@ -17,7 +17,7 @@ class GuaranteeSettings:
         missed, false_alarms: largest probabilities that a failed registration is called good, and a good one failed.
         family_risk: both where the promise is for new families, of which there are too few for a smaller one.
         confidence: with which both hold for the very thresholds, in a row of their own.
-        nonconformity: how ill a state fits (:func:`gpca.guarantee.sets.nonconformity`).
+        nonconformity: how ill a state fits (:func:`gpca.guarantee.conformal.nonconformity`).
     """
 
     level: OpenShare = 0.9

@@ -10,9 +10,7 @@ import numpy as np
 from gpca.alignment.rigid import transform
 from gpca.causes.shapley import BY_SIZE
 from gpca.model.explanation import Explanation
-from gpca.model.scene import Scene
-from gpca.model.shown.packing import distances
-from gpca.model.shown.subsets import taken_out
+from gpca.model.scene import Scene, distances, taken_out
 from gpca.reporting.figures.cloud_views import thinned, widest_views
 from gpca.reporting.figures.style import (
     BLUE,

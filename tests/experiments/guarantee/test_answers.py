@@ -19,7 +19,7 @@ from gpca.experiments.guarantee.answers import (
     plain_threshold,
 )
 from gpca.experiments.guarantee.settings import GuaranteeSettings
-from gpca.guarantee.alarm import ALARM, GOOD, NOT_SURE
+from gpca.guarantee.conformal import ALARM, GOOD, NOT_SURE
 from gpca.guarantee.states import STATES
 
 SETTINGS = GuaranteeSettings(level=0.8)

@@ -1,50 +1,136 @@
-"""The parts of the page of an explanation, as HTML; everything that a user gave is escaped."""
+"""The HTML page of an explanation: one file that needs no other and no network; text from users is escaped."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+import json
+from collections.abc import Mapping, Sequence
+from functools import cache
 from html import escape
 from math import sqrt
 
 from gpca.causes.shapley import BY_SIZE
-from gpca.guarantee.alarm import ALARM, GOOD
+from gpca.guarantee.conformal import ALARM, GOOD
 from gpca.guarantee.states import STATES
-from gpca.model.diagnosis import UNKNOWN
-from gpca.model.guaranteed import IN_WORDS
-from gpca.model.reenacted import FittingPose, Reenacted
-from gpca.model.shown.subsets import WITHOUT, taken_out
+from gpca.model.diagnosis import IN_WORDS, UNKNOWN, Reenacted
+from gpca.model.scene import ASSETS, WITHOUT, Scene, taken_out
 from gpca.recovery.policy import NOTHING
 
-CALLS = {GOOD: "good", ALARM: "bad"}  # the look of a call; neither is doubtful
+# This policy makes browsers refuse every network request of the page.
+ALONE = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:"
+FRAME_HEIGHT = 900  # of a notebook's frame, pixels
+SHOW = 'openView().load(JSON.parse(document.getElementById("scene").textContent));\n'
+CALLS = {GOOD: "good", ALARM: "bad"}  # CSS class of a call; others are "doubt"
 TONES = {"nominal": "good", "failed": "bad", UNKNOWN: "doubt"}
 
 
+def assembled(title: str, head: str, body: Sequence[str], scene: Scene | None, unit: str) -> str:
+    """Return the page.
+
+    Args:
+        head: HTML at the top.
+        body: the sections.
+        scene: data of the 3-D view; None leaves it out.
+    """
+    view, script = "", ""
+    if scene is not None:
+        data = scene.packed(unit)
+        view = f"{_view(len(scene.possibilities))}\n"
+        text = json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")
+        script = f'<script type="application/json" id="scene">{text}</script>\n'
+        script += f"<script>\n{_asset('view.js')}{SHOW}</script>\n"
+    return f"""<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta http-equiv="Content-Security-Policy" content="{ALONE}">
+<title>{escape(title)}</title>
+<link rel="icon" href="data:,">
+<style>
+{_asset("page.css")}</style>
+</head>
+<body>
+<header>
+{head}
+</header>
+<main>
+{view}<div class="facts">
+{"".join(body)}</div>
+</main>
+{script}</body>
+</html>
+"""
+
+
+def framed(html: str) -> str:
+    """Wrap a page in a frame for notebooks, so that its style and script stay inside."""
+    style = f"width:100%;height:{FRAME_HEIGHT}px;border:1px solid #ccc"
+    return f'<iframe srcdoc="{escape(html)}" style="{style}" title="Registration explained"></iframe>'
+
+
+def _view(poses: int) -> str:
+    others = "".join(
+        f'<button type="button" data-view="pose:{k}" aria-pressed="false">Pose {k + 1}</button>' for k in range(poses)
+    )
+    return f"""<div class="view">
+<div class="buttons" role="group" aria-label="Pose of the source">
+<button type="button" data-view="start" aria-pressed="false">Before</button>
+<button type="button" data-view="found" aria-pressed="true">After</button>{others}
+</div>
+<canvas id="view" tabindex="0" role="img" aria-label="Both clouds in 3-D; arrow keys turn them"></canvas>
+<div class="buttons">
+<label><input type="checkbox" id="show-source" checked> <span class="key source"></span>source</label>
+<label><input type="checkbox" id="show-target" checked> <span class="key target"></span>target</label>
+<label><input type="checkbox" id="by-distance" checked> distances</label>
+<button type="button" id="reset">Reset view</button>
+</div>
+<div id="scale" class="scale"><span>0</span><i></i><span></span></div>
+<p id="said" class="note" aria-live="polite"></p>
+<noscript><p class="warnings">The view needs JavaScript.</p></noscript>
+</div>"""
+
+
+@cache
+def _asset(name: str) -> str:
+    return (ASSETS / name).read_text(encoding="utf-8")
+
+
 def headline(explained: Mapping) -> str:
-    """Return what was found, in one line."""
+    """State the result in one line.
+
+    Args:
+        explained: :meth:`gpca.model.explanation.Explanation.as_dict`, here and below.
+    """
     diagnosis = explained["diagnosis"]
     if diagnosis is None:
         return f"<h1>The leading concept is {escape(explained['concept'])}</h1>"
-    said = {
+    title = {
         "nominal": "This registration succeeded",
         "failed": f"This registration failed: {' and '.join(diagnosis['named'])}",
         UNKNOWN: "Nothing can be said of this registration",
     }[diagnosis["state"]]
-    line = f'<h1 class="{TONES[diagnosis["state"]]}">{escape(said)}</h1>'
+    line = f'<h1 class="{TONES[diagnosis["state"]]}">{escape(title)}</h1>'
     if diagnosis["state"] == UNKNOWN:
         return line
     chance = f"Probability of failure {diagnosis['failure']:.2f}; called a failure from {diagnosis['threshold']:.2f} on"
     return f"{line}<p>{chance}. Expected error {length(diagnosis['expected_error'], explained['unit'])}.</p>"
 
 
+def warnings(lines: Sequence[str]) -> str:
+    """List the reasons to doubt the explanation."""
+    items = "".join(f"<li>{escape(line)}</li>" for line in lines)
+    return f'<ul class="warnings">{items}</ul>' if items else ""
+
+
 def action(explained: Mapping, advice: str) -> str:
-    """Return what to do, and why."""
+    """State what to do, and why."""
     do = "nothing" if explained["action"] == NOTHING else advice
     why = f"<p>Reason: {escape(explained['reason'])}.</p>"
     return section("What to do", f'<p class="action">{sentence(do)}</p>{why}')
 
 
 def promise(explained: Mapping) -> str:
-    """Return the set of states and the call, with what is promised of them."""
+    """State the guarantee: set of states and alarm."""
     diagnosis = explained["diagnosis"]
     if diagnosis is None or diagnosis["state"] == UNKNOWN:
         return ""
@@ -75,56 +161,50 @@ def promise(explained: Mapping) -> str:
 
 
 def causes(explained: Mapping) -> str:
-    """Return the probability of each cause with its standard deviation, and what the cause adds to the error."""
+    """Draw the probability of each cause with its standard deviation and its effect on the error."""
     diagnosis, unit = explained["diagnosis"], explained["unit"]
     if diagnosis is None:
         return ""
     effects = diagnosis["reenacted"]["effects"] if diagnosis["reenacted"] else {}
-    rows = [
-        (cause, share, sqrt(diagnosis["variances"][cause]), length(effects[cause], unit) if effects else "")
+    bars = [
+        bar(cause, share, sqrt(diagnosis["variances"][cause]), length(effects[cause], unit) if effects else "")
         for cause, share in diagnosis["causes"].items()
     ]
-    bars = [bar(cause, share, spread, said) for cause, share, spread, said in rows]
     note = "Probability that each is a cause, if the registration failed, ± the standard deviation of the posterior"
     adds = "; on the right, what it adds to the re-enacted error." if effects else "."
     return section("Causes", "".join(bars) + f'<p class="note">{note}{adds}</p>')
 
 
-def poses(words: Sequence[str], fitting: Sequence[FittingPose], measured: str = "") -> str:
-    """Return the poses that fit, each a button that shows it.
+def poses(reenacted: Reenacted, subject: str, unit: str, *, observation: bool = False) -> str:
+    """List the hypotheses of the true pose, each with a button that shows it.
 
     Args:
-        words: where each lies.
-        measured: what else is to be said.
+        subject: what fits, such as ``the object``.
+        observation: whether to state noise, outliers and missing surface under the most probable one.
     """
-    if not words:
-        return ""
     items = [
-        f'<li><button type="button" data-view="pose:{k}">Pose {k + 1}</button> <span>{sentence(said)}</span>'
-        f"{share_bar(pose.probability)}</li>"
-        for k, (said, pose) in enumerate(zip(words, fitting, strict=True))
+        f'<li><button type="button" data-view="pose:{k}">Pose {k + 1}</button> <span>{sentence(words)}</span>'
+        f'<span class="share"><span class="bar"><i style="width:{100 * pose.probability:.1f}%"></i></span>'
+        f"<span>{pose.probability:.2f}</span></span></li>"
+        for k, (words, pose) in enumerate(zip(reenacted.words(subject, unit), reenacted.poses, strict=True))
     ]
-    note = f'<p class="note">{escape(measured)}</p>' if measured else ""
-    return section("Poses that fit", f'<ol class="poses">{"".join(items)}</ol>{note}')
-
-
-def measured(found: Reenacted, unit: str) -> str:
-    """Return what the most probable pose says of the observation, in words."""
-    return (
-        f"Under pose 1, the noise is {length(found.noise, unit)} per axis, {found.outliers:.0%} of the points are "
-        f"outliers, and {found.missing:.0%} of the surface was not seen."
+    note = (
+        f'<p class="note">Under pose 1, the noise is {escape(length(reenacted.noise, unit))} per axis, '
+        f"{reenacted.outliers:.0%} of the points are outliers, and {reenacted.missing:.0%} of the surface was not "
+        "seen.</p>"
     )
+    return section("Poses that fit", f'<ol class="poses">{"".join(items)}</ol>{note if observation else ""}')
 
 
 def counterfactuals(
     errors: Sequence[Sequence[float]], limit: float, unit: str, without: Mapping[str, str] = WITHOUT
 ) -> str:
-    """Return the eight re-enacted registrations under each hypothesis, each a button that shows its cloud.
+    """Draw the eight re-enacted registrations under each hypothesis, each as a button that shows its cloud.
 
     Args:
         errors: v̂ of each hypothesis and subset, in `unit`.
-        limit: error from which a registration has failed, in `unit`.
-        without: what it means that each cause is taken out, in words.
+        limit: error above which a registration counts as failed, in `unit`.
+        without: what removing each cause means.
     """
     if not errors:
         return ""
@@ -132,12 +212,12 @@ def counterfactuals(
     groups = []
     for k, error_8 in enumerate(errors):
         rows = [
-            f'<button type="button" class="what-if" data-view="what:{k}:{place}">'
+            f'<button type="button" class="what-if" data-view="what:{k}:{number}">'
             f'<span>{escape(taken_out(subset, without))}</span><span class="bar">'
             f'<i style="width:{100 * error_8[subset] / most:.1f}%"></i>'
             f'<b class="limit" style="left:{100 * limit / most:.1f}%"></b></span>'
             f"<span>{length(error_8[subset], unit)}</span></button>"
-            for place, subset in enumerate(BY_SIZE)
+            for number, subset in enumerate(BY_SIZE)
         ]
         groups.append(f'<div class="what-ifs" data-hypothesis="{k}">{"".join(reversed(rows))}</div>')
     note = (
@@ -149,18 +229,16 @@ def counterfactuals(
 
 
 def as_in_the_paper(explained: Mapping) -> str:
-    """Return GP-CA's scores."""
-    if not explained.get("scores"):
+    """Draw GP-CA's scores."""
+    if not explained["scores"]:
         return ""
-    bars = "".join(
-        bar(name, score, sqrt(explained["variances"][name]), "") for name, score in explained["scores"].items()
-    )
+    bars = (bar(name, score, sqrt(explained["variances"][name]), "") for name, score in explained["scores"].items())
     note = "It sees the aligned source alone and names a concept even where nothing is wrong."
-    return section("GP-CA as in the paper", f'{bars}<p class="note">{note}</p>')
+    return section("GP-CA as in the paper", f'{"".join(bars)}<p class="note">{note}</p>')
 
 
 def details(explained: Mapping, names: Mapping[str, str]) -> str:
-    """Return the pose, how well the clouds fit there, what was used, and the notes."""
+    """List the pose, the fit of the clouds, the inputs and the notes."""
     unit = explained["unit"]
     rows = {
         **{name.capitalize(): value for name, value in names.items() if value},
@@ -177,40 +255,26 @@ def details(explained: Mapping, names: Mapping[str, str]) -> str:
     )
 
 
-def warnings(lines: Iterable[str]) -> str:
-    """Return the reasons to doubt all of this."""
-    items = "".join(f"<li>{escape(line)}</li>" for line in lines)
-    return f'<ul class="warnings">{items}</ul>' if items else ""
-
-
 def section(title: str, body: str) -> str:
     """Return a part of the page with its heading."""
     return f"<section><h2>{escape(title)}</h2>{body}</section>\n"
 
 
-def bar(name: str, share: float, spread: float, said: str) -> str:
-    """Return a probability as a bar with a whisker of one standard deviation."""
+def bar(name: str, share: float, spread: float, note: str) -> str:
+    """Draw a probability as a bar with a whisker of one standard deviation."""
     low, high = max(0.0, share - spread), min(1.0, share + spread)
     return (
         f'<div class="row"><span>{escape(name)}</span><span class="bar"><i style="width:{100 * share:.1f}%"></i>'
         f'<b style="left:{100 * low:.1f}%;width:{100 * (high - low):.1f}%"></b></span>'
-        f"<span>{share:.2f} ± {spread:.2f}</span><span>{escape(said)}</span></div>"
-    )
-
-
-def share_bar(share: float) -> str:
-    """Return a probability as a bar."""
-    return (
-        f'<span class="share"><span class="bar"><i style="width:{100 * share:.1f}%"></i></span>'
-        f"<span>{share:.2f}</span></span>"
+        f"<span>{share:.2f} ± {spread:.2f}</span><span>{escape(note)}</span></div>"
     )
 
 
 def length(value: float, unit: str) -> str:
-    """Return a length in words."""
+    """Format a length."""
     return f"{value:.2g} {unit}"
 
 
 def sentence(text: str) -> str:
-    """Return escaped text that begins with a capital letter."""
+    """Escape text and capitalize its first letter."""
     return escape(text[:1].upper() + text[1:])

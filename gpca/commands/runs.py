@@ -1,0 +1,127 @@
+"""Commands for configs and finished runs: ``check-config``, ``check-reference`` and ``compare``."""
+
+from __future__ import annotations
+
+import sys
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+
+from gpca.errors import InputError
+
+CONFIG = Path("config/config.yaml")  # relative to the folder of the suite
+
+
+def add_check_config_arguments(parser: ArgumentParser) -> None:
+    """Declare the configs."""
+    parser.add_argument("configs", nargs="*", type=Path, help="config files, merged into the default in this order")
+
+
+def run_check_config(options: Namespace) -> None:
+    """Merge the configs into the default and check the result.
+
+    Snakemake reads the files of ``--configfile`` before the suite does, so files that it cannot read end in its own
+    messages. Here, every fault is one line.
+    """
+    from gpca.config.check import read
+    from gpca.config.layers import read_file, with_defaults
+
+    if options.settings:
+        raise InputError("--settings", "is not used by check-config", "name a config file")
+    config, sources = read(with_defaults(*map(read_file, options.configs)), {})
+    print(f"run {config['run']}: valid; sources {', '.join(sources)}; seeds {', '.join(map(str, config['seeds']))}")
+
+
+def add_check_reference_arguments(parser: ArgumentParser) -> None:
+    """Declare the folders; ``--settings`` replaces keys of the config's section ``reference``."""
+    parser.add_argument("folder", type=Path, help="folder of the run, such as results/full")
+    parser.add_argument(
+        "--reference", type=Path, help="its reference (default: reference/ and the same name, beside the run)"
+    )
+    parser.add_argument(
+        "--config",
+        type=Path,
+        default=CONFIG,
+        help=f"config whose section 'reference' sets the tolerances (default: {CONFIG})",
+    )
+
+
+def run_check_reference(options: Namespace) -> int:
+    """Compare a run with its reference file by file; return 1 for different or missing files, otherwise 0."""
+    from gpca.comparison.reference import (
+        DIFFERENT,
+        MISSING,
+        ROUNDING,
+        VERDICTS,
+        Allowance,
+        check_reference,
+        device_of,
+    )
+    from gpca.io.structured_text import read_mapping
+    from gpca.settings import read_settings
+
+    folder, config = options.folder, options.config
+    if not folder.is_dir():
+        raise InputError(folder, "no such folder", f"make it with '{_snakemake(folder, [])}'")
+    reference = options.reference or folder.parent / "reference" / folder.name
+    if not config.exists():
+        raise InputError(config, "no such file", "run this in the folder of the suite, or name the file with --config")
+    section = read_mapping(config).get("reference")
+    if not isinstance(section, dict):
+        raise InputError(config, "has no section 'reference'", f"name another file with --config, such as {CONFIG}")
+    subject = "setting" if options.settings else f"{config}: setting"
+    outcomes = check_reference(folder, reference, read_settings(Allowance, section | options.settings, subject))
+    width = max(len(outcome.file) for outcome in outcomes)
+    for outcome in outcomes:
+        print(f"{outcome.file:<{width}}  {outcome.verdict:<9}  {outcome.detail}".rstrip())
+    files = {verdict: [each.file for each in outcomes if each.verdict == verdict] for verdict in VERDICTS}
+    print(f"{folder} against {reference}: " + ", ".join(f"{len(files[name])} {name}" for name in VERDICTS))
+    if files[ROUNDING] or files[DIFFERENT]:
+        for role, directory in (("reference", reference), ("run", folder)):
+            print(f"{role}: {device_of(directory, outcomes[0].file)}")
+    if files[MISSING]:
+        command = _snakemake(folder, [str(folder / file) for file in files[MISSING]])
+        print(f"{len(files[MISSING])} missing; make them with: {command}", file=sys.stderr)
+    return 1 if files[DIFFERENT] or files[MISSING] else 0
+
+
+def _snakemake(folder: Path, targets: list[str]) -> str:
+    """Return the command that makes targets of a run; a table's CSV comes with its Markdown."""
+    config = Path("config", f"{folder.name}.yaml")
+    option = f" --configfile {config}" if config.is_file() else ""
+    return f"snakemake -j2 {' '.join(targets) or 'all'}{option}"
+
+
+def add_compare_arguments(parser: ArgumentParser) -> None:
+    """Declare the folders and the page."""
+    parser.add_argument("one", type=Path, help="folder of a run or a reference, such as results/default")
+    parser.add_argument("other", type=Path, help="folder of another run")
+    parser.add_argument("--out", type=Path, default=Path("compare.html"), help="the page (default: compare.html)")
+
+
+def run_compare(options: Namespace) -> int:
+    """Write a page with the tables and figures of two runs, and print how many numbers of each table differ."""
+    from gpca.experiments.registry import registered
+    from gpca.io.files import require_outputs
+    from gpca.page.two_runs import ALONE, APART, DIFFERENT, compare_tables, write_comparison
+
+    if options.settings:
+        raise InputError("--settings", "is not used by compare", "leave it out")
+    folders = (options.one, options.other)
+    for folder in folders:
+        if not folder.is_dir():
+            raise InputError(folder, "no such folder", "name the folder of a finished run, such as results/default")
+    require_outputs([options.out])
+    titles = {result.name: result.title for result in registered()}
+    tables, alone = compare_tables(folders, titles)
+    write_comparison(folders, tables, alone, titles, options.out)
+    width = max((len(table.name) for table in tables), default=0)
+    for table in tables:
+        differing = sum(table.counts.get(kind, 0) for kind in (DIFFERENT, APART, ALONE))
+        words = f"{differing} of {sum(table.counts.values())} entries differ" if differing else "the same"
+        words += f", {apart} with intervals apart" if (apart := table.counts.get(APART, 0)) else ""
+        print(f"{table.name:<{width}}  {words}")
+    for folder, names in zip(folders, alone, strict=True):
+        if names:
+            print(f"only in {folder}: {', '.join(names)}")
+    print(options.out)
+    return 0

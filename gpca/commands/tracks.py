@@ -1,0 +1,173 @@
+"""Commands for the tracks: ``bench``, ``score``, ``leaderboard`` and ``ship-predictions``."""
+
+from __future__ import annotations
+
+import sys
+from argparse import ArgumentParser, Namespace
+from dataclasses import replace
+from pathlib import Path
+
+from gpca.errors import InputError, require_known
+from gpca.io.files import require_outputs
+from gpca.process.arguments import COUNT
+from gpca.tracks import leaderboard
+from gpca.tracks.published import FOLDER, Published
+from gpca.tracks.submission import read_submission
+from gpca.tracks.track import DEFAULT, TRACKS, Track, track_of
+
+LARGEST_BYTES = 10**7  # of the published predictions of all tracks, which are kept in git
+
+
+def add_bench_arguments(parser: ArgumentParser) -> None:
+    """Declare the track and the method; ``--settings`` are the method's."""
+    parser.add_argument("track", help=f"one of {', '.join(TRACKS)}")
+    parser.add_argument("method", help="a file such as my_method.py, an installed module, or the name of an explainer")
+    parser.add_argument("--out", type=Path, help="CSV of its predictions, for gpca score and the leaderboard")
+    parser.add_argument("--authors", default="unknown", help="authors, for the head of that file")
+    parser.add_argument("--link", default="none", help="link to code or a paper, for that head")
+    parser.add_argument("--samples", type=Path, help="folder of the samples (default: the user's cache)")
+    parser.add_argument("--data-dir", type=Path, help="folder of data that the repository does not have (track scans)")
+    parser.add_argument("--learn-from", help="what it learns from, where there is a choice: scans (default) or objects")
+    parser.add_argument("--processes", type=COUNT, help="processes that make samples (default: one per core)")
+
+
+def run_bench(options: Namespace) -> None:
+    """Fit a method, predict and score on the samples of a track; missing samples are made first."""
+    from gpca.process.processor import cpu_name
+    from gpca.tracks.published import Method
+    from gpca.tracks.samples import Samples
+    from gpca.tracks.submission import Submission
+    from gpca.tracks.trial import try_method
+
+    track = track_of(options.track)
+    if options.out:
+        require_outputs([options.out])
+    names = _method_names(options.method, track)
+    if options.out and len(names) > 1:
+        fault = f"lists {len(names)} methods for this track, and --out holds the predictions of one"
+        raise InputError(options.method, fault, "give each a file of its own")
+    training = track.training(options.learn_from)
+    samples = Samples.of(track, options.samples, options.processes, options.data_dir)
+    published_names = {method.name for method in samples.published.methods}
+    methods: dict[str, Method] = {}
+    for name in names:
+        print(f"{name}: learning and predicting", file=sys.stderr)
+        method, seconds = try_method(samples, name, options.settings, training)
+        if method.name in published_names:
+            method = replace(method, name=f"{method.name} (here)", title=f"{method.title} (here)")
+        methods[method.name] = method
+        if options.out:
+            head = {"track": track.name, "version": samples.published.version, "method": method.title}
+            head |= {"authors": options.authors, "link": options.link, "seconds": f"{seconds:.4g}"}
+            head |= {"hardware": cpu_name(), "reads": method.reads, "icp_calls": str(method.icp_calls)}
+            Submission(head, method).write(options.out, samples.published)
+    print(leaderboard.as_text_among(samples.published, methods))
+
+
+def _method_names(method: str, track: Track) -> list[str]:
+    """Return the names of the methods for a track that a file or a module lists, and register it as a plugin.
+
+    Raises:
+        InputError: it cannot be imported or lists no method; or there is no explainer with that name.
+    """
+    from importlib.util import find_spec
+
+    from gpca.explainers.registry import CAUSES, explainers
+    from gpca.plugins import load, named, use
+
+    if not method.endswith(".py"):
+        if method in (explainer_names := explainers(track.kind)):
+            return [method]
+        if "." not in method and find_spec(method) is None:
+            require_known("explainer", method, explainer_names)
+    variable = "CAUSE_EXPLAINERS" if track.kind == CAUSES else "EXPLAINERS"
+    entries = getattr(load(method), variable, None)
+    if not entries:
+        fault = f"lists no {variable}, whom the track {track.name} asks"
+        raise InputError(method, fault, f"give it {variable} = {{'my_method': ExplainerEntry(…)}}")
+    use([*named(), method])
+    return list(entries)
+
+
+def add_score_arguments(parser: ArgumentParser) -> None:
+    """Declare the track and the file."""
+    parser.add_argument("track", help=f"one of {', '.join(TRACKS)}")
+    parser.add_argument("predictions", type=Path, help="CSV with a head of comments (docs/outside.md)")
+
+
+def run_score(options: Namespace) -> int:
+    """Check and score predictions; faults are lines on stderr, with status 2."""
+    if options.settings:
+        raise InputError("--settings", "is not used by score", "leave it out")
+    published = Published.load(track_of(options.track))
+    submission, faults = read_submission(options.predictions, published)
+    if submission is None:
+        print(*faults, sep="\n", file=sys.stderr)
+        return 2
+    print(leaderboard.as_text_among(published, {submission.method.name: submission.method}))
+    return 0
+
+
+def add_leaderboard_arguments(parser: ArgumentParser) -> None:
+    """Declare the folder and the page."""
+    folder = leaderboard.FOLDER
+    parser.add_argument(
+        "--submissions", type=Path, default=folder, help="folder of CSV files (default: results/leaderboard)"
+    )
+    parser.add_argument("--out", type=Path, help="the page (default: index.html in that folder)")
+    parser.add_argument("--check", action="store_true", help="only check the files")
+
+
+def run_leaderboard(options: Namespace) -> int:
+    """Check all submissions and write the page; faults are lines on stderr, with status 2."""
+    if options.settings:
+        raise InputError("--settings", "is not used by leaderboard", "leave it out")
+    page = options.out or options.submissions / "index.html"
+    if not options.check:
+        require_outputs([page])
+    submissions, faults = leaderboard.read_submissions(options.submissions)
+    if faults:
+        print(*faults, sep="\n", file=sys.stderr)
+        return 2
+    counts = ", ".join(f"{len(entries)} of the track {track}" for track, entries in submissions.items()) or "none"
+    print(f"submissions: {counts}")
+    if not options.check:
+        leaderboard.write_page(submissions, page)
+        print(page)
+    return 0
+
+
+def add_ship_predictions_arguments(parser: ArgumentParser) -> None:
+    """Declare folders and tracks."""
+    folder = Path("results") / DEFAULT
+    parser.add_argument(
+        "--run", dest="folder", type=Path, default=folder, help=f"folder of the run (default: {folder})"
+    )
+    parser.add_argument("--out", type=Path, default=FOLDER, help="folder to write them to")
+    of_default = [name for name, track in TRACKS.items() if track.run == DEFAULT]
+    words = "; ".join(f"{name} needs the run {track.run}" for name, track in TRACKS.items() if track.run != DEFAULT)
+    parser.add_argument(
+        "--tracks",
+        nargs="+",
+        default=of_default,
+        help=f"tracks to extract (default: those of the default run; {words})",
+    )
+
+
+def run_ship_predictions(options: Namespace) -> None:
+    """Write the published predictions of each track from a finished run; the same run gives the same bytes."""
+    from gpca.config.check import read
+    from gpca.config.layers import read_file, with_defaults
+    from gpca.tracks.shipping import collect
+
+    if options.settings:
+        raise InputError("--settings", "is not used by ship-predictions", "leave it out")
+    total = 0
+    for track in map(track_of, options.tracks):
+        config, _ = read(with_defaults(*map(read_file, track.layers)), {})
+        published = collect(track, options.folder, config)
+        published.save(path := options.out / f"{track.name}.npz")
+        total += path.stat().st_size
+        print(f"{path}: {len(published.methods)} methods, {len(published.rows)} samples, version {published.version}")
+    if total > LARGEST_BYTES:
+        raise InputError(options.out, f"has {total / 1e6:.1f} MB, more than {LARGEST_BYTES / 1e6:g}", "leave rows out")

@@ -1,0 +1,231 @@
+"""Conformal bounds, sets of states that contain the true one, and an alarm with two bounded risks.
+
+No distribution is assumed. Samples have to be exchangeable with a new one: either sample by sample, or family by family
+of similar shapes, where the new sample belongs to a new family.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import ceil, inf
+from typing import Literal
+
+import numpy as np
+
+from gpca.errors import InputError
+
+ROUNDING = 1e-9  # tolerance of a sum of weights
+Nonconformity = Literal["probability", "cumulative"]
+PROBABILITY: Nonconformity = "probability"
+CUMULATIVE: Nonconformity = "cumulative"
+GOOD, NOT_SURE, ALARM = OUTCOMES = ("good", "not sure", "failed")
+
+
+def upper_bound(value_N: np.ndarray, level: float, family_N: np.ndarray | None = None) -> float:
+    """Return a bound that a new sample exceeds with a probability of at most 1 - `level`.
+
+    Sample by sample, it is the value of rank ⌈(N + 1) level⌉ (Vovk et al. 2005). Family by family, each of K families
+    has the weight 1 / (K + 1), distributed equally over its samples; the new sample's family, whose values are
+    arbitrary, has the same weight (hierarchical conformal prediction, Lee, Barber and Willett 2023).
+
+    Args:
+        value_N: calibration values.
+        level: in (0, 1).
+        family_N: family of each sample; None if samples are exchangeable one by one.
+
+    Returns:
+        The bound; infinity if there are too few samples or families.
+    """
+    if family_N is None:
+        rank = ceil((len(value_N) + 1) * level - ROUNDING)
+        return float(np.sort(value_N)[rank - 1]) if rank <= len(value_N) else inf
+    _, number_N, size_K = np.unique(family_N, return_inverse=True, return_counts=True)
+    weight_N = 1 / (size_K[number_N] * (len(size_K) + 1))
+    order = np.argsort(value_N, kind="stable")
+    enough_N = np.cumsum(weight_N[order]) >= level - ROUNDING
+    return float(value_N[order][enough_N.argmax()]) if enough_N.any() else inf
+
+
+def confident_upper_bound(value_N: np.ndarray, level: float, confidence: float) -> float:
+    """Return a bound that at least the share `level` of new samples does not exceed, with this confidence.
+
+    :func:`upper_bound` holds on average over draws of the calibration samples; this bound holds for the given ones,
+    except for the share 1 - `confidence` of draws. It is the smallest of the sorted values above which the upper
+    Clopper-Pearson bound of the share is at most 1 - `level`; samples have to be independent.
+
+    Returns:
+        The bound; infinity if there are too few samples.
+    """
+    from scipy.stats import binom
+
+    above_N = np.arange(len(value_N))  # number of values above the largest, the second largest, ...
+    sure = int((binom.cdf(above_N, len(value_N), 1 - level) <= 1 - confidence + ROUNDING).sum())
+    return float(np.sort(value_N)[-sure]) if sure else inf
+
+
+def highest_level(samples: int, family_N: np.ndarray | None = None) -> float:
+    """Return the largest level with a finite :func:`upper_bound`: N / (N + 1), or K / (K + 1) for K families."""
+    count = samples if family_N is None else len(np.unique(family_N))
+    return count / (count + 1)
+
+
+@dataclass(frozen=True)
+class StateSets:
+    """Sets of states with limits on their nonconformity.
+
+    Attributes:
+        states: names of the K columns of scores.
+        level: probability that a set contains the true state.
+        nonconformity: see :func:`nonconformity`.
+        by_state: whether the level holds for each state separately (Mondrian) instead of on average.
+        limits: (K,) largest nonconformity of each state in a set; infinity if there were too few samples.
+    """
+
+    states: tuple[str, ...]
+    level: float
+    nonconformity: Nonconformity
+    by_state: bool
+    limits: tuple[float, ...]
+
+    def of(self, scores_M_K: np.ndarray) -> np.ndarray:
+        """Return which states (M, K) are in the set of each of M samples; no set is empty."""
+        require_scores(scores_M_K, self.states)
+        inside_M_K = nonconformity(scores_M_K, self.nonconformity) <= np.array(self.limits)
+        empty_M = ~inside_M_K.any(axis=1)
+        inside_M_K[empty_M, scores_M_K[empty_M].argmax(axis=1)] = True
+        return inside_M_K
+
+
+def nonconformity(scores_N_K: np.ndarray, kind: Nonconformity) -> np.ndarray:
+    """Return the nonconformity (N, K) of each state for each sample.
+
+    - ``probability``: 1 minus the score (Sadinle, Lei and Wasserman 2019), which gives the smallest sets;
+    - ``cumulative``: sum of all scores that are at least as large (Romano, Sesia and Candès 2020, without
+      randomization), which covers hard samples more evenly.
+    """
+    if kind == PROBABILITY:
+        return 1 - scores_N_K
+    if kind != CUMULATIVE:
+        raise InputError(f"nonconformity '{kind}'", "unknown", f"choose {PROBABILITY} or {CUMULATIVE}")
+    as_large_N_K_K = scores_N_K[:, None, :] >= scores_N_K[:, :, None]
+    return (as_large_N_K_K * scores_N_K[:, None, :]).sum(axis=2)
+
+
+def calibrate_sets(
+    scores_N_K: np.ndarray,
+    state_N: np.ndarray,
+    family_N: np.ndarray | None,
+    states: Sequence[str],
+    level: float,
+    kind: Nonconformity = PROBABILITY,
+    by_state: bool = False,
+) -> StateSets:
+    """Calibrate sets that contain the true state of a new sample with a probability of at least `level`.
+
+    Args:
+        scores_N_K: scores of samples that were not used for training.
+        state_N: their true states.
+        family_N: see :func:`upper_bound`.
+
+    Raises:
+        InputError: scores of another shape or not finite, unknown state, `level` outside (0, 1).
+    """
+    require_share("level of the sets", level)
+    require_scores(scores_N_K, states)
+    is_state_N_K = np.asarray(state_N)[:, None] == np.array(states)
+    if not (valid_N := is_state_N_K.any(axis=1)).all():
+        raise InputError(f"state '{state_N[~valid_N][0]}'", "unknown", f"choose one of {', '.join(states)}")
+    number_N = is_state_N_K.argmax(axis=1)
+    value_N = nonconformity(scores_N_K, kind)[np.arange(len(number_N)), number_N]
+    masks = [number_N == number if by_state else np.ones(len(value_N), bool) for number in range(len(states))]
+    limits = (upper_bound(value_N[mask_N], level, None if family_N is None else family_N[mask_N]) for mask_N in masks)
+    return StateSets(tuple(states), level, kind, by_state, tuple(limits))
+
+
+@dataclass(frozen=True)
+class FailureAlarm:
+    """An alarm with two thresholds; between them, it is not sure.
+
+    Attributes:
+        missed: largest probability that a failed registration is called good.
+        false_alarms: largest probability that a good one is called failed.
+        good_below: score of failure below which a registration is called good; negative infinity if there were too few
+            failed samples.
+        failed_from: score from which it is called failed; infinity if there were too few good samples.
+        confidence: confidence with which both risks hold for these thresholds; None if they hold on average over draws
+            of the calibration samples.
+    """
+
+    missed: float
+    false_alarms: float
+    good_below: float
+    failed_from: float
+    confidence: float | None = None
+
+    def of(self, failure_M: np.ndarray) -> np.ndarray:
+        """Return the call of each registration, one of `OUTCOMES`, by its score of failure."""
+        require_failures(failure_M)
+        return np.select([failure_M < self.good_below, failure_M >= self.failed_from], [GOOD, ALARM], NOT_SURE)
+
+
+def calibrate_alarm(
+    failure_N: np.ndarray,
+    failed_N: np.ndarray,
+    family_N: np.ndarray | None = None,
+    missed: float = 0.05,
+    false_alarms: float = 0.05,
+    confidence: float | None = None,
+) -> FailureAlarm:
+    """Calibrate an alarm with these largest risks.
+
+    A failure is missed with at most the probability that its score lies below the bound that failures seldom fall below
+    (conformal risk control, Angelopoulos et al. 2024, of a loss of 0 or 1); false alarms likewise. If the bounds leave
+    a gap in which both calls are allowed, its middle becomes the only threshold.
+
+    Args:
+        failure_N: score of failure of samples that were not used for training.
+        failed_N: whether each failed.
+        family_N: see :func:`upper_bound`.
+        confidence: use :func:`confident_upper_bound` instead.
+
+    Raises:
+        InputError: scores that are not finite, risks or confidence outside (0, 1), or both confidence and families.
+    """
+    require_share("risk of missed failures", missed)
+    require_share("risk of false alarms", false_alarms)
+    require_failures(failure_N)
+    if confidence is not None:
+        require_share("confidence of the alarm", confidence)
+        if family_N is not None:
+            raise InputError("confidence of the alarm", "is for single samples", "leave out either it or the families")
+
+    def bound(value_N: np.ndarray, mask_N: np.ndarray, risk: float) -> float:
+        if confidence is not None:
+            return confident_upper_bound(value_N[mask_N], 1 - risk, confidence)
+        return upper_bound(value_N[mask_N], 1 - risk, None if family_N is None else family_N[mask_N])
+
+    good_below = -bound(-failure_N, failed_N, missed)
+    failed_from = float(np.nextafter(bound(failure_N, ~failed_N, false_alarms), inf))
+    if good_below > failed_from:
+        good_below = failed_from = (good_below + failed_from) / 2
+    return FailureAlarm(missed, false_alarms, good_below, failed_from, confidence)
+
+
+def require_share(name: str, share: float) -> None:
+    """Raise an InputError unless the share is strictly between 0 and 1."""
+    if not 0 < share < 1:
+        raise InputError(name, f"{share} is not strictly between 0 and 1", "give a share such as 0.9 or 0.05")
+
+
+def require_scores(scores_N_K: np.ndarray, states: Sequence[str]) -> None:
+    """Raise an InputError unless there is a finite score for each sample and state."""
+    if scores_N_K.ndim != 2 or scores_N_K.shape[1] != len(states) or not np.isfinite(scores_N_K).all():
+        fault = f"have the shape {scores_N_K.shape} or are not finite"
+        raise InputError("scores", fault, f"give a finite number for each of {', '.join(states)}")
+
+
+def require_failures(failure_N: np.ndarray) -> None:
+    """Raise an InputError unless there is one finite score per sample."""
+    if failure_N.ndim != 1 or not np.isfinite(failure_N).all():
+        raise InputError("scores of failure", "are not one finite number for each sample", "leave out the others")
