@@ -10,7 +10,7 @@ from gpca.config.check import check
 from gpca.config.layers import with_defaults
 from gpca.explainers.registry import explainers
 
-OURS = ("gpca.encoders.dgcnn", "gpca.objects.uw_rgbd", "gpca.objects.procedural", "manifold3d")
+OURS = ("gpca.encoders.dgcnn", "gpca.objects.point_files", "gpca.objects.procedural", "manifold3d")
 LIBRARIES = (
     *("pydantic", "open3d", "pandas", "PIL.PngImagePlugin", "sklearn.pipeline", "trimesh"),
     # torch imports these only where a model is first run, and sympy with them

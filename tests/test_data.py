@@ -18,9 +18,15 @@ from gpca.frames.instances import points_on_model, read_instances
 from gpca.frames.plausibility import FARTHEST
 from gpca.io.csv_file import read_csv
 from gpca.objects.bop import read_models_info
-from gpca.objects.canonical import ObjectClouds, sample_objects, write_objects
+from gpca.objects.canonical import (
+    TRAINING,
+    ObjectClouds,
+    read_object_splits,
+    read_scene_splits,
+    sample_objects,
+    write_objects,
+)
 from gpca.objects.source import DATA, VERSION, require_whole, resolve, surfaces
-from gpca.objects.splits import TRAINING, read_object_splits, read_scene_splits
 
 PARTS = ("ycb", "ycbv", "lm", "lmo", "estimates")
 LARGEST_BYTES = 40e6

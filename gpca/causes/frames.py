@@ -33,8 +33,7 @@ from gpca.frames.camera import MeshScene
 from gpca.frames.instances import Instances
 from gpca.frames.shots import CleanView, clean_view, rendered_side
 from gpca.frames.starts import KINDS, Starts
-from gpca.objects.canonical import ObjectClouds
-from gpca.objects.splits import TRAINING
+from gpca.objects.canonical import TRAINING, ObjectClouds
 from gpca.pairs.perturbation import CONCEPTS, SEVERITIES
 from gpca.process.progress import progress
 from gpca.seeds import generator

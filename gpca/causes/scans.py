@@ -24,11 +24,11 @@ from gpca.causes.settings import FEWEST_POINTS, CauseSettings
 from gpca.causes.shapley import ALL, NONE
 from gpca.causes.subjects import Subject
 from gpca.errors import InputError
-from gpca.objects.splits import DRAWN
+from gpca.objects.canonical import DRAWN
 from gpca.pairs.perturbation import CONCEPTS, SEVERITIES
 from gpca.process.progress import progress
-from gpca.scans.dataset import ScanPairs
 from gpca.scans.pair import ScanPair, ScanSuccess
+from gpca.scans.scene import ScanPairs
 from gpca.seeds import generator
 from gpca.uncertainty.spread import divergence
 

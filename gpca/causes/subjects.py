@@ -16,8 +16,7 @@ from gpca.causes.shapley import NONE
 from gpca.errors import InputError
 from gpca.io.names import SPLITS
 from gpca.objects.bop import find_symmetries
-from gpca.objects.canonical import ObjectClouds
-from gpca.objects.splits import drawn, unseen
+from gpca.objects.canonical import ObjectClouds, drawn, unseen
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.progress import progress
 from gpca.seeds import generator

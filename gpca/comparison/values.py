@@ -1,8 +1,8 @@
 """The run's value beside each printed number: its interval over seeds, and over clusters of samples and seeds.
 
 Seeds share objects, so their interval does not show how much the choice of objects matters; objects of one family or
-scene are alike (:mod:`gpca.objects.splits`). The bootstrap over clusters needs predictions of single samples, which a
-run keeps for shares of samples only.
+scene are alike (:mod:`gpca.objects.canonical`). The bootstrap over clusters needs predictions of single samples, which
+a run keeps for shares of samples only.
 """
 
 from __future__ import annotations

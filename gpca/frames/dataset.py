@@ -18,9 +18,8 @@ from gpca.frames.initial_pose import (
 from gpca.frames.source import frame_files, patterns, resolve_datasets
 from gpca.objects import bop
 from gpca.objects.bop import read_symmetries
-from gpca.objects.canonical import ObjectClouds, bounding_center
+from gpca.objects.canonical import DRAWN, EVALUATION, TRAINING, ObjectClouds, Place, bounding_center, read_scene_splits
 from gpca.objects.source import folders
-from gpca.objects.splits import DRAWN, EVALUATION, TRAINING, Place, read_scene_splits
 from gpca.objects.surface import Surface
 from gpca.process.environment import require_open3d
 from gpca.seeds import generator
@@ -176,7 +175,7 @@ def datasets_of(
     """Return the datasets of the config by name, or in their place the rendered scenes, of which all frames are read.
 
     Args:
-        splits, role: the file of scenes, and the role of the frames (:mod:`gpca.objects.splits`).
+        splits, role: the file of scenes, and the role of the frames (:mod:`gpca.objects.canonical`).
 
     Raises:
         InputError: neither is given, or as in :func:`gpca.frames.source.resolve_datasets`.

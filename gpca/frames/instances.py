@@ -37,8 +37,7 @@ from gpca.frames.shots import Sighting
 from gpca.io.arrays import TEXT, WHOLE
 from gpca.io.container import FLAG, FLOAT, Container, array
 from gpca.objects.bop import find_symmetries
-from gpca.objects.canonical import ObjectClouds
-from gpca.objects.splits import DRAWN, unseen
+from gpca.objects.canonical import DRAWN, ObjectClouds, unseen
 from gpca.process.progress import progress
 from gpca.seeds import generator, seed_of
 
@@ -57,7 +56,7 @@ class Instances(Container):
         init_from: (I,) where the initial pose is from: an estimator, ``errors`` of estimators, or another form.
         camera_3_3: (I, 3, 3) K in pixels.
         colour: (I,) path of the color image; `NO_COLOR` where there is none.
-        fold: (I,) that the scene is tested with, `DRAWN` or `TRAINING` (:mod:`gpca.objects.splits`).
+        fold: (I,) that the scene is tested with, `DRAWN` or `TRAINING` (:mod:`gpca.objects.canonical`).
         points_m: (ΣP, 3) float32, measured points in the camera's frame; those of instance i are
             ``points_m[offsets[i]:offsets[i + 1]]``.
         pixels: (ΣP, 2) int32, where each was seen, (u, v).

@@ -22,7 +22,7 @@ from gpca.frames.initial_pose import EstimatorErrors, error_of, estimates_of, re
 from gpca.frames.instances import Instances
 from gpca.io.arrays import TEXT, WHOLE
 from gpca.io.container import Container, array
-from gpca.objects import splits
+from gpca.objects import canonical
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.perturbation import misplacement
 from gpca.seeds import generator
@@ -134,7 +134,7 @@ def _estimated(
             "diameter_m": objects.diameters_m[instances.object_index[i]],
         }
         T_model_object = models[name][number].T_model_object
-        kind = CARRIED if datasets[name].place(place[0]).estimates == splits.CARRIED else NATIVE
+        kind = CARRIED if datasets[name].place(place[0]).estimates == canonical.CARRIED else NATIVE
         for estimator, T_camera_model in estimates_of(estimators[name], place, annotated[name, *place] == 1, seen):
             found.append((i, kind, estimator, T_camera_model @ T_model_object))
             T_camera_model_true = instances.T_camera_object_true[i] @ inverse(T_model_object)

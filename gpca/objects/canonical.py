@@ -1,21 +1,36 @@
-"""Surfaces into canonical clouds: sampled uniformly, centered on the bounding box, measured by diameter, checked."""
+"""Surfaces into canonical clouds: sampled uniformly, centered on the bounding box, measured by diameter, checked.
+
+Which objects and scenes are alike and tested together is read from files, or drawn.
+
+Samples that show objects of one family of shapes, or one scene, form a *cluster*. Clusters are never split between
+training and test where objects or scenes are unseen, and intervals are over clusters. The clusters of a source are
+dealt into *folds*; each seed leaves one fold unseen. Columns of the files:
+
+    objects: source, object, name, family, role, fold
+    scenes:  dataset, scene, role, fold[, truth, estimates]
+
+The role is ``development`` (settings are chosen on it), ``evaluation`` or, of objects, ``unused``. The true poses of a
+scene were ``annotated`` or made by ``icp``; poses of estimators are from the same ``image`` or were ``carried`` over
+from another one of the sequence."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from gpca import seeds
 from gpca.errors import InputError
 from gpca.io.arrays import REAL, REGENERATE, TEXT, WHOLE, load_arrays, save_arrays
+from gpca.io.csv_file import read_csv
 from gpca.io.names import is_name
-from gpca.objects.splits import DRAWN, families_and_folds, read_object_splits, without_unused
 from gpca.objects.surface import IN_CONFIG, Surface, instance_of
 from gpca.process.environment import open3d_cloud, require_open3d
+from gpca.seeds import generator
 
 FEWEST_CLOUD_POINTS = 64
 SMALLEST_DIAMETER_M, LARGEST_DIAMETER_M = 1e-3, 10.0
@@ -23,9 +38,9 @@ NORMAL_NEIGHBORS = 30
 # A cloud spans nearly its object's diameter. Few points miss some of it, but never nine tenths.
 SMALLEST_EXTENT = 0.1  # diameters
 UNIT_TOLERANCE = 1e-3  # of the length of a normal, a hundred times what float32 rounds
-NEARLY = 0.1  # steps; other numbers lie up to half a step off
-COARSEST = 0.01  # of a cloud's extent may lie between two numbers; the least part of a cause in the error is as much
-FEW_POINTS = 600  # up to so many, all distances take less time than the hull
+NEARLY = 0.1  # steps by which rounded numbers may be off; other numbers are up to half a step off
+COARSEST = 0.01  # maximum quantization step, as a share of the extent
+FEW_POINTS = 600  # up to this many, all distances take less time than the hull
 
 
 def require_points(points: np.ndarray, subject: object) -> None:
@@ -35,11 +50,6 @@ def require_points(points: np.ndarray, subject: object) -> None:
     bad = int((~np.isfinite(points)).any(axis=1).sum())
     if bad:
         raise InputError(subject, f"{bad} of {len(points)} points contain NaN or infinity", "fetch or export it again")
-    _require_resolution(points, subject)
-
-
-def _require_resolution(points: np.ndarray, subject: object) -> None:
-    """Raise an InputError where an offset leaves float32 or float64 too few digits to tell the points apart."""
     extent, largest_3 = np.linalg.norm(np.ptp(points, axis=0)), np.abs(points).max(axis=0)
     for kind in (np.float32, np.float64):
         with np.errstate(all="ignore"):  # float32 does not hold all that float64 does
@@ -98,24 +108,32 @@ def canonical_cloud(
     """
     subject = f"{source}: object '{surface.name}'"
     vertices_m = np.asarray(surface.vertices_m, dtype=np.float64)
-    faces = surface.faces
     require_points(vertices_m, subject)
-    if faces is None:
+    random = seeds.generator(source, surface.name, "surface")
+    if surface.faces is None:
         if len(vertices_m) < FEWEST_CLOUD_POINTS:
-            raise InputError(
-                subject, f"the cloud has {len(vertices_m)} point(s)", f"give {FEWEST_CLOUD_POINTS} or more"
-            )
-        hull_m, draw = vertices_m, _shuffled
+            fault = f"the cloud has {len(vertices_m)} point(s)"
+            raise InputError(subject, fault, f"give {FEWEST_CLOUD_POINTS} or more")
+        diameter_m = diameter(vertices_m, subject)
+        require_size(diameter_m, subject, say)
+        order = random.permutation(len(vertices_m))
+        normals = normals_towards_camera(surface.vertices_m) if surface.normals is None else surface.normals
+        points_m, normals = surface.vertices_m[order], normals[order]
     else:
         if n_points < FEWEST_CLOUD_POINTS:
             raise InputError(subject, f"{n_points} surface points", f"ask for {FEWEST_CLOUD_POINTS} or more")
-        if len(faces) == 0 or not np.linalg.norm(_area_vectors(vertices_m, faces), axis=1).sum() > 0:
+        if not np.linalg.norm(_area_vectors(vertices_m, surface.faces), axis=1).sum() > 0:
             raise InputError(subject, "the mesh has no area", "export it again with its faces")
-        hull_m, draw = _used_vertices(surface), _sampled
-    diameter_m = diameter(hull_m, subject)
-    require_size(diameter_m, subject, say)
-    points_m, normals = draw(surface, n_points, seeds.generator(source, surface.name, "surface"))
-    return (points_m - bounding_center(surface)).astype(np.float32), normals.astype(np.float32), diameter_m
+        diameter_m = diameter(_used_vertices(surface), subject)
+        require_size(diameter_m, subject, say)
+        import trimesh
+
+        mesh = trimesh.Trimesh(surface.vertices_m, surface.faces, process=False)
+        points_m, face = trimesh.sample.sample_surface(mesh, n_points, seed=random)
+        normals = _area_vectors(surface.vertices_m, surface.faces[face])
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    centered_m = np.asarray(points_m) - bounding_center(surface)
+    return centered_m.astype(np.float32), normals.astype(np.float32), diameter_m
 
 
 def bounding_center(surface: Surface) -> np.ndarray:
@@ -144,21 +162,6 @@ def _area_vectors(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:
     return np.cross(b - a, c - a)
 
 
-def _sampled(surface: Surface, n_points: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    import trimesh
-
-    mesh = trimesh.Trimesh(surface.vertices_m, surface.faces, process=False)
-    points_m, face = trimesh.sample.sample_surface(mesh, n_points, seed=rng)
-    normals = _area_vectors(surface.vertices_m, surface.triangles[face])
-    return np.asarray(points_m), normals / np.linalg.norm(normals, axis=1, keepdims=True)
-
-
-def _shuffled(surface: Surface, n_points: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    order = rng.permutation(len(surface.vertices_m))
-    normals = normals_towards_camera(surface.vertices_m) if surface.normals is None else surface.normals
-    return surface.vertices_m[order], normals[order]
-
-
 def normals_towards_camera(points_m: np.ndarray) -> np.ndarray:
     """Return unit normals (P, 3) from nearest neighbors, turned toward a camera at the origin."""
     cloud = open3d_cloud(points_m)
@@ -176,8 +179,14 @@ def write_objects(
     in one of them; nothing is written then.
     """
     places = read_object_splits(splits, source) if splits else {}
-    objects = sample_objects(without_unused(surfaces, places), source, n_points)
-    replace(objects, **families_and_folds(objects.names, places)).save(path, source)
+    used = surfaces
+    if places:
+        used = (surface for surface in surfaces if _place_of(surface.name, places).role != UNUSED)
+    objects = sample_objects(used, source, n_points)
+    if places:
+        families, folds = zip(*((places[name].cluster, places[name].fold) for name in objects.names), strict=True)
+        objects = replace(objects, families=families, folds=folds)
+    objects.save(path, source)
 
 
 def sample_objects(surfaces: Iterable[Surface], source: str, n_points: int = 16384) -> ObjectClouds:
@@ -185,9 +194,8 @@ def sample_objects(surfaces: Iterable[Surface], source: str, n_points: int = 163
     names, clouds, diameters_m = [], [], []
     for surface in surfaces:
         if not is_name(surface.name):
-            raise InputError(
-                f"{source}: object {surface.name!r}", "its name is empty or does not fit on one line", "rename it"
-            )
+            fault = "its name is empty or does not fit on one line"
+            raise InputError(f"{source}: object {surface.name!r}", fault, "rename it")
         if surface.name in names:
             raise InputError(f"{source}: object '{surface.name}'", "occurs twice", "give each file its own name")
         points_m, normals, diameter_m = canonical_cloud(surface, source, n_points)
@@ -207,7 +215,7 @@ class ObjectClouds:
         names: those of the O objects.
         diameters_m: (O,) float64.
         clouds: for each object its points (P, 3) in meters and unit normals (P, 3), both float32.
-        families, folds: of each object, where a file of splits says so; else an instance is a family of its own.
+        families, folds: of each object, from a file of splits; without one, each instance is a family.
     """
 
     names: tuple[str, ...]
@@ -218,9 +226,9 @@ class ObjectClouds:
 
     @classmethod
     def load(cls, path: str | Path, source: str | None = None) -> ObjectClouds:
-        """Read an objects npz; InputError when it is missing, unreadable, inconsistent or of another source than this.
+        """Read an objects npz; InputError when it is missing, damaged, inconsistent or of another source.
 
-        A file that does not say of which source it is may be of any: rules of users' own write such files.
+        A file that names no source is accepted for any: users' own rules write such files.
         """
         shapes = {"names": ("O",), "diameters_m": ("O",), "points_m": ("P", 3), "normals": ("P", 3), "offsets": ("E",)}
         shapes |= {"families": ("O",), "folds": ("O",)}
@@ -237,10 +245,10 @@ class ObjectClouds:
         alike = {name: tuple(arrays[name].tolist()) for name in ("families", "folds") if name in arrays}
         objects = cls(tuple(names), arrays["diameters_m"], tuple(zip(*parts, strict=True)), **alike)
         for i, name in enumerate(names):
-            objects._require_object(i, f"{path}, object '{name}'")
+            objects._require_possible(i, f"{path}, object '{name}'")
         return objects
 
-    def _require_object(self, i: int, subject: str) -> None:
+    def _require_possible(self, i: int, subject: str) -> None:
         points_m, diameter_m = self.points(i), self.diameters_m[i]
         if not SMALLEST_DIAMETER_M <= diameter_m <= LARGEST_DIAMETER_M:
             raise InputError(subject, f"its diameter is {diameter_m:.4g} m", REGENERATE)
@@ -265,15 +273,15 @@ class ObjectClouds:
         return self.clouds[i][1]
 
     def family(self, i: int) -> str:
-        """Return the family of shapes that an object belongs to."""
+        """Return the family of an object's shape."""
         return self.families[i] if self.families else instance_of(self.names[i])
 
     def fold(self, i: int) -> int:
-        """Return the fold that an object is unseen with; `DRAWN` where no file says so."""
+        """Return the fold that leaves an object unseen; `DRAWN` where no file has one."""
         return self.folds[i] if self.folds else DRAWN
 
     def save(self, path: str | Path, source: str) -> None:
-        """Write the objects npz, and say on stderr what is in it."""
+        """Write the objects npz, and list the objects on stderr."""
         points_m, normals = zip(*self.clouds, strict=True)
         alike = {"families": np.array(self.families), "folds": np.array(self.folds)} if self.families else {}
         save_arrays(
@@ -290,3 +298,90 @@ class ObjectClouds:
         )
         for name, cloud_m, diameter_m in zip(self.names, points_m, self.diameters_m, strict=True):
             print(f"{source}: {name}: {len(cloud_m)} points, {1e3 * diameter_m:.1f} mm", file=sys.stderr)
+
+
+DRAWN = -1  # the fold of what no file deals into folds
+TRAINING = -2  # the fold of scenes for development, which are never tested but may be trained on
+DEVELOPMENT, EVALUATION, UNUSED = ROLES = ("development", "evaluation", "unused")
+ANNOTATED, BY_ICP = TRUTHS = ("annotated", "icp")
+ON_IMAGE, CARRIED = ESTIMATES = ("image", "carried")
+WORTH = {"truth": TRUTHS, "estimates": ESTIMATES}  # columns of scenes that may be missing
+
+
+class Place(NamedTuple):
+    """The cluster, role and fold of an object or a scene, and where the poses of a scene are from."""
+
+    cluster: str
+    role: str
+    fold: int
+    truth: str = ANNOTATED
+    estimates: str = ON_IMAGE
+
+
+def read_object_splits(path: str | Path, source: str) -> dict[str, Place]:
+    """Return the place of each object of a source by name; none where the file does not name the source.
+
+    Raises:
+        InputError: a damaged file, an object twice, an unknown role, a fold that is no whole number, a family in two
+            folds or roles.
+    """
+    rows = read_csv(path, ("source", "object", "name", "family", "role", "fold"), remedy="restore it")
+    of_source = rows[rows["source"] == source]
+    return _places(path, of_source["object"], of_source["family"], of_source["role"], of_source["fold"])
+
+
+def read_scene_splits(path: str | Path, dataset: str) -> dict[int, Place]:
+    """Return the place of each scene of a dataset by number; none where the file does not name the dataset.
+
+    InputError as in :func:`read_object_splits`, and for an unknown word for truth or estimates.
+    """
+    rows = read_csv(path, ("dataset", "scene", "role", "fold"), others=tuple(WORTH), remedy="restore it")
+    of_dataset = rows[rows["dataset"] == dataset]
+    clusters = [f"{dataset} {scene}" for scene in of_dataset["scene"]]
+    places = _places(path, of_dataset["scene"], clusters, of_dataset["role"], of_dataset["fold"])
+    for column, words in WORTH.items():
+        for scene, word in zip(of_dataset["scene"], of_dataset.get(column, ()), strict=False):
+            if word not in words:
+                fault = f"scene {scene} of {dataset} has '{word}' as {column}"
+                raise InputError(path, fault, f"choose one of {', '.join(words)}")
+            places[scene] = places[scene]._replace(**{column: word})
+    return {int(scene): place for scene, place in places.items()}
+
+
+def _places(path, names, clusters, roles, folds) -> dict[str, Place]:
+    places: dict[str, Place] = {}
+    of_cluster: dict[str, Place] = {}
+    for name, cluster, role, fold in zip(names, clusters, roles, folds, strict=True):
+        if name in places:
+            raise InputError(path, f"'{name}' occurs twice", "keep one of its rows")
+        if role not in ROLES:
+            raise InputError(path, f"'{name}' has the role '{role}'", f"choose one of {', '.join(ROLES)}")
+        if not fold.isdecimal() and role != UNUSED:
+            raise InputError(path, f"'{name}' has the fold '{fold}'", "number the folds from 0")
+        place = Place(cluster, role, int(fold) if role != UNUSED else DRAWN)
+        if place != of_cluster.setdefault(cluster, place):
+            raise InputError(path, f"'{cluster}' has two roles or is in two folds", "give all of it one of each")
+        places[name] = place
+    return places
+
+
+def _place_of(name: str, places: Mapping[str, Place]) -> Place:
+    if name not in places:
+        remedy = "add it to the file of objects, or set splits.objects: null"
+        raise InputError(f"object '{name}'", "is in no split", remedy)
+    return places[name]
+
+
+def unseen(fold_N: np.ndarray, seed: int) -> np.ndarray | None:
+    """Return the rows (N,) of the fold that a seed leaves unseen, by turns; None for fewer than two folds."""
+    folds = np.unique(fold_N[fold_N >= 0])
+    if len(folds) < 2:
+        return None
+    return fold_N == folds[seed % len(folds)]
+
+
+def drawn(cluster_N: np.ndarray, share: float, *axes: object) -> np.ndarray:
+    """Return the rows (N,) of a share of the clusters, drawn with the seed axes: at least one cluster, never all."""
+    clusters = np.unique(cluster_N)
+    count = min(max(1, round(share * len(clusters))), len(clusters) - 1)
+    return np.isin(cluster_N, generator(*axes).permutation(clusters)[:count])

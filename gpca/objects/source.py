@@ -27,7 +27,7 @@ KINDS = {
     PROCEDURAL: "gpca.objects.procedural",
     "bop": "gpca.objects.bop",
     "mesh_folder": "gpca.objects.mesh_folder",
-    "uw_rgbd": "gpca.objects.uw_rgbd",
+    "uw_rgbd": "gpca.objects.point_files",
     "bop_views": "gpca.frames.bop",
     "mesh_views": "gpca.frames.camera",
 }

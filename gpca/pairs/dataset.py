@@ -39,7 +39,7 @@ class Registrations(Container):
         split: (S,) ``train`` or ``test``.
         concept: (S,) what was perturbed: ``noise``, ``pose`` or ``overlap``.
         object_index, object_name, diameter_m: (S,) the object registered.
-        cluster, fold: (S,) samples that are alike: a family of shapes or a scene (:mod:`gpca.objects.splits`).
+        cluster, fold: (S,) samples that are alike: a family of shapes or a scene (:mod:`gpca.objects.canonical`).
         severity_noise, severity_rotation_rad, severity_translation, severity_crop: (S,) as drawn, 0 where not applied.
         T_target_source_true, T_target_source_init, T_target_source_icp: (S, 4, 4), translations in meters.
         fitness, inlier_rmse: (S,) from ICP.

@@ -7,8 +7,7 @@ import sys
 from gpca.frames.dataset import datasets_of, distinct_surfaces, files_behind, read_models, with_shared_models
 from gpca.frames.initial_pose import InitialPoseSettings
 from gpca.frames.instances import points_on_model, read_instances
-from gpca.objects.canonical import sample_objects
-from gpca.objects.splits import EVALUATION
+from gpca.objects.canonical import EVALUATION, sample_objects
 from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
 

@@ -7,8 +7,7 @@ from gpca.causes.settings import CauseSettings
 from gpca.frames.dataset import datasets_of, files_behind, meshes_of, models_of
 from gpca.frames.instances import Instances, require_of_objects
 from gpca.frames.starts import Starts
-from gpca.objects.canonical import ObjectClouds
-from gpca.objects.splits import EVALUATION
+from gpca.objects.canonical import EVALUATION, ObjectClouds
 from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
 from gpca.reenactment.frame_enactment import reenact_frames

@@ -9,9 +9,8 @@ from typing import Any
 from gpca.errors import InputError
 from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
-from gpca.scans.dataset import ScanPairs
 from gpca.scans.pair import ScanPair
-from gpca.scans.scene import choose_pairs
+from gpca.scans.scene import ScanPairs, choose_pairs
 from gpca.scans.source import entry_of, scenes_of
 
 

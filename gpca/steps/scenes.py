@@ -17,7 +17,7 @@ from gpca.frames.dataset import (
 )
 from gpca.frames.rgbd_scene import SceneSettings, stable_poses, write_scenes
 from gpca.objects import procedural
-from gpca.objects.splits import EVALUATION
+from gpca.objects.canonical import EVALUATION
 from gpca.objects.surface import Surface
 from gpca.process.job import Job
 from gpca.process.provenance import record_provenance

@@ -19,7 +19,7 @@ from gpca.experiments.scan_causes.metrics import SAMPLE_COLUMNS as SCAN_COLUMNS
 from gpca.explainers.registry import explainer_entry
 from gpca.io.container import require_same_samples
 from gpca.io.csv_file import ANY, numbers, read_csv
-from gpca.objects.splits import BY_ICP
+from gpca.objects.canonical import BY_ICP
 from gpca.tracks.published import LIMITS, NO_CALLS, NOTHING_NAMED, Method, Published, Rows, sha256_of_arrays
 from gpca.tracks.samples import recipe_of
 from gpca.tracks.track import FRAMES_TRACK, HARD_TRACK, SCANS_TRACK, Track

@@ -13,7 +13,7 @@ from gpca.errors import InputError
 from gpca.frames.dataset import meshes_of
 from gpca.frames.shots import clean_view
 from gpca.frames.starts import Starts
-from gpca.objects.splits import TRAINING
+from gpca.objects.canonical import TRAINING
 from tests.frames.bracket import BRACKET, hidden, misplaced, models_in, most_seen, noisy, own_starts
 
 SETTINGS = CauseSettings(clean_pairs=20, points=(96, 128))

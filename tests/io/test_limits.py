@@ -16,7 +16,7 @@ from gpca.io.limits import require_file
 from gpca.io.structured_text import read_json, read_mapping
 from gpca.model.clouds import read_points, read_pose
 from gpca.model.file import Model
-from gpca.objects import uw_rgbd
+from gpca.objects import point_files
 from gpca.objects.bop import read_models_info
 from gpca.objects.downloads import open_archive
 from gpca.objects.mesh_folder import files_in, surfaces
@@ -33,7 +33,7 @@ READERS = {
     "mine.yaml": read_mapping,
     "pose.txt": read_pose,
     "data.zip": lambda path: next(iter(open_archive(path).__enter__())),
-    "view.pcd": lambda path: next(uw_rgbd.surfaces(files_in(path.parent, None, uw_rgbd.SUFFIXES))),
+    "view.pcd": lambda path: next(point_files.surfaces(files_in(path.parent, None, point_files.SUFFIXES))),
     "part.obj": lambda path: next(surfaces(files_in(path.parent, None, (".obj",)), "m")),
     **{f"cloud.{suffix}": lambda path: read_points(path, "m") for suffix in ("ply", "pcd", "obj", "stl", "off")},
 }

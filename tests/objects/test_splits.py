@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from gpca.errors import InputError
-from gpca.objects.splits import DRAWN, TRAINING, drawn, read_scene_splits, unseen
+from gpca.objects.canonical import DRAWN, TRAINING, drawn, read_scene_splits, unseen
 
 
 def test_a_share_of_the_clusters_at_least_one_and_never_all_is_unseen():

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from gpca.errors import InputError
-from gpca.objects.uw_rgbd import from_entry, surfaces
+from gpca.objects.point_files import from_entry, surfaces
 from tests.objects.test_pcd import ascii_pcd
 
 

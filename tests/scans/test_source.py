@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from gpca.errors import InputError
-from gpca.scans.dataset import ScanPairs
 from gpca.scans.pair import near
+from gpca.scans.scene import ScanPairs
 from gpca.scans.source import data_files, entry_of, place_of, scenes_of
 from gpca.scans.virtual import compound, room
 

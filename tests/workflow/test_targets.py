@@ -104,7 +104,7 @@ EDITS = {  # a module: what is made again where it has changed, and what is not
         "control_embeddings/ saliency/ table2_per_concept",
         "registrations uncertainty/ causes/ descriptors predictions/real_rgbd/gpca_pair residuals_forest methods/",
     ),
-    "gpca/objects/uw_rgbd.py": ("", "objects/ tables/ figures/ index.html"),
+    "gpca/objects/point_files.py": ("runtime.csv", "objects/ predictions embeddings registrations"),
     "gpca/objects/procedural.py": (
         "objects/coffee_cup objects/ycb registrations/coffee_cup predictions/coffee_cup objects_coffee_cup scenes",
         "kernels.csv",
@@ -151,7 +151,7 @@ def test_the_comparison_comes_after_every_number(planned):
 
 
 def test_edits_rerun_what_depends_on_the_modules(finished, planned):
-    modules = ("gpca/classifier/gpc.py", "gpca/encoders/dgcnn.py", "gpca/objects/uw_rgbd.py")
+    modules = ("gpca/classifier/gpc.py", "gpca/encoders/dgcnn.py", "gpca/objects/point_files.py")
     for module in modules:
         finished.append(module, "\n# edited\n")
     assert without_ends(finished.dry_run(*SMOKE).jobs) == without_ends(planned.behind(*modules))

@@ -10,7 +10,7 @@ import numpy as np
 from gpca.alignment.icp import ICPSettings
 from gpca.encoders.registry import OF_ANY_SIZE
 from gpca.experiments.controls.settings import TRAININGS, UNSEEN, WRONG_LABELS, ControlSettings
-from gpca.objects.splits import unseen
+from gpca.objects.canonical import unseen
 from gpca.objects.surface import instance_of
 from gpca.pairs.dataset import Registrations, ragged
 from gpca.pairs.perturbation import CONCEPTS

@@ -22,7 +22,7 @@ from gpca.frames.source import REAL_WORLD
 from gpca.frames.starts import KINDS
 from gpca.io.container import require_same_samples
 from gpca.io.csv_file import ANY, read_csv
-from gpca.objects.splits import BY_ICP
+from gpca.objects.canonical import BY_ICP
 from gpca.seeds import generator, seed_of_file
 
 if TYPE_CHECKING:

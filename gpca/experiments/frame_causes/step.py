@@ -8,8 +8,7 @@ from gpca.frames.dataset import datasets_of, files_behind, meshes_of, models_of
 from gpca.frames.instances import Instances, require_of_objects
 from gpca.frames.starts import all_starts
 from gpca.io.csv_file import write_csv
-from gpca.objects.canonical import ObjectClouds
-from gpca.objects.splits import EVALUATION
+from gpca.objects.canonical import EVALUATION, ObjectClouds
 from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
 from gpca.settings import read_settings

@@ -27,7 +27,7 @@ from gpca.frames.source import REAL_WORLD
 from gpca.guarantee.states import states_of
 from gpca.io.container import REGENERATE_BOTH, require_same_samples
 from gpca.io.csv_file import ANY, read_csv
-from gpca.objects.splits import BY_ICP
+from gpca.objects.canonical import BY_ICP
 from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
 from gpca.seeds import seed_of_file

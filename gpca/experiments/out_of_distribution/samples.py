@@ -15,8 +15,7 @@ from gpca.encoders.training import Classifier, embed, train_encoder
 from gpca.experiments.out_of_distribution.sets import SPACES, ShiftedSets
 from gpca.experiments.out_of_distribution.settings import ShiftSettings
 from gpca.explainers.analytical_features import analytical_features
-from gpca.objects.canonical import ObjectClouds
-from gpca.objects.splits import drawn, unseen
+from gpca.objects.canonical import ObjectClouds, drawn, unseen
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.synthesis import make_registrations
 

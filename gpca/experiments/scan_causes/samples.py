@@ -8,8 +8,8 @@ import numpy as np
 
 from gpca.causes.scans import GLOBAL, LADDER, ScanStart
 from gpca.experiments.scan_causes.settings import ScanSamples
-from gpca.scans.dataset import ScanPairs
 from gpca.scans.pair import Rung, ScanPair, disturbed
+from gpca.scans.scene import ScanPairs
 from gpca.seeds import generator
 
 GlobalMethod = Callable[[ScanPair], np.ndarray | None]  # returns T_target_source (4×4), meters; None where it fails

@@ -22,8 +22,8 @@ from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
 from gpca.reenactment.scan_enactment import reenact_scans
 from gpca.reenactment.settings import ReenactmentSettings
-from gpca.scans.dataset import ScanPairs
 from gpca.scans.pair import ScanPair, ScanSuccess
+from gpca.scans.scene import ScanPairs
 from gpca.seeds import generator
 from gpca.settings import read_settings
 from gpca.steps.scans import drawn_pairs

@@ -7,7 +7,7 @@ from gpca.experiments.scans.trial import try_methods
 from gpca.io.csv_file import write_csv
 from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
-from gpca.scans.dataset import ScanPairs
+from gpca.scans.scene import ScanPairs
 
 
 def run(job: Job) -> None:

@@ -15,8 +15,8 @@ from gpca.experiments.registration_methods.trial import attempts, timed
 from gpca.experiments.scans.settings import TrialSettings
 from gpca.process.environment import open3d_cloud, require_open3d
 from gpca.process.progress import progress
-from gpca.scans.dataset import ScanPairs
 from gpca.scans.pair import Rung, ScanPair, disturbed, overlap_rmse, rungs_of, voxels
+from gpca.scans.scene import ScanPairs
 from gpca.seeds import generator, seed_of
 
 if TYPE_CHECKING:

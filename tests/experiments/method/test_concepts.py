@@ -14,7 +14,7 @@ from gpca.experiments.method.concepts import (
     source_before_icp,
 )
 from gpca.io.arrays import save_arrays
-from gpca.objects.splits import DRAWN
+from gpca.objects.canonical import DRAWN
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS, PERTURBATIONS, SEVERITIES, SEVERITIES_OF, Severities
 

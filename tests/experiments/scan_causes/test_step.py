@@ -14,8 +14,8 @@ from gpca.experiments.scan_causes.settings import ScanSamples
 from gpca.features.dataset import Descriptors
 from gpca.process.job import Job
 from gpca.reenactment.dataset import Reenactments
-from gpca.scans.dataset import ScanPairs
 from gpca.scans.pair import Rung
+from gpca.scans.scene import ScanPairs
 from tests.scans.corner import corner_pair
 
 LADDER_OF_THREE = (Rung(0, 0), Rung(10, 0.1), Rung(60, 0.9))

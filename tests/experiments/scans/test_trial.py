@@ -11,8 +11,8 @@ from gpca.alignment.rigid import rotation_angle_rad
 from gpca.errors import InputError
 from gpca.experiments.scans.settings import TrialSettings
 from gpca.experiments.scans.trial import errors_of, pair_to_register, scan_normals, try_methods
-from gpca.scans.dataset import ScanPairs
 from gpca.scans.pair import Rung, rungs_of
+from gpca.scans.scene import ScanPairs
 from tests.scans.tiny import pair
 
 LADDER = (Rung(0, 0), Rung(20, 0.3))
