@@ -1,8 +1,4 @@
-"""Describes a run as an RO-Crate: one JSON-LD file that names every result, the job that made it, and from what.
-
-It holds what the records of provenance beside the results say, in the form of RO-Crate 1.1 with its profile for runs of
-single programs, so that catalogs and archives of data can read it.
-"""
+"""Describes a run as an RO-Crate 1.1 (process run profile): every result with the job that made it and its inputs."""
 
 from __future__ import annotations
 
@@ -30,47 +26,48 @@ LICENSE = {
     "name": "MIT",
     "description": "The suite is under the MIT license; the datasets that the run read keep their own licenses.",
 }
-FORMS = {".npz": "application/zip", ".pt": "application/zip"}  # beside those that Python knows
+FORMS = {".npz": "application/zip", ".pt": "application/zip"}  # unknown to Python
 
 
 def write_crate(folder: str | Path, run: str, sources: Iterable[str], seeds: Sequence[int]) -> None:
-    """Write ``ro-crate-metadata.json`` of the run in a folder from all records of provenance below it.
+    """Write ``ro-crate-metadata.json`` of a run from all provenance records below its folder ``results/{run}``.
 
     Args:
-        folder: The folder ``results/{run}``.
-        run: The name of the run.
-        sources: The titles of its datasets.
-        seeds: The seeds of its repeats.
+        sources: titles of its datasets.
 
     Raises:
-        InputError: There is no record.
+        InputError: there is no record.
     """
     description = (
         "Explanations of uncertain point cloud registrations: tables, figures and the numbers behind them, on "
         f"{', '.join(sources)}; seeds {', '.join(map(str, seeds))}."
     )
     document = crate(read_jobs(Path(folder)), f"GP-CA Bench: run {run}", description)
-    with whole_file(Path(folder, NAME)) as half:
-        half.write_text(json.dumps(document, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    with whole_file(Path(folder, NAME)) as partial:
+        partial.write_text(json.dumps(document, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
 
 
 def read_jobs(folder: Path) -> list[dict[str, Any]]:
-    """Return the records of a run's jobs, by their first output; a job that wrote several files left one beside each.
+    """Return the records of a run's jobs, each once with all its ``outputs``.
 
-    Paths are relative to the run's folder: the ``outputs``, and of the ``inputs`` those that lie in it. The job that
-    writes the crate is left out: the record of an earlier one says nothing of this one.
+    Paths of outputs, and of inputs in the run's folder, are relative to it. The job that writes the crate is left out,
+    as its record is that of an earlier crate.
     """
-    paths_of = defaultdict(list)
+
+    def relative(path: Path) -> str:
+        return path.relative_to(folder).as_posix() if path.is_relative_to(folder) else str(path)
+
+    paths_of = defaultdict(list)  # a job left the same record beside each of its outputs
     for path in sorted(folder.rglob(f"*{RECORD}")):
         paths_of[path.read_bytes()].append(path)
     if not paths_of:
         raise InputError(folder, f"has no *{RECORD}", "name the folder of a finished run")
-    own, jobs = folder / f"{NAME}{RECORD}", []
+    jobs = []
     for text, paths in paths_of.items():
-        if own not in paths:
+        if folder / f"{NAME}{RECORD}" not in paths:
             record, outputs = json.loads(text), [path.with_name(path.name.removesuffix(RECORD)) for path in paths]
-            record["outputs"] = [_relative(folder, path) + ("/" if path.is_dir() else "") for path in outputs]
-            record["inputs"] = {_relative(folder, Path(path)): sha for path, sha in record["inputs_sha256"].items()}
+            record["outputs"] = [relative(path) + ("/" if path.is_dir() else "") for path in outputs]
+            record["inputs"] = {relative(Path(path)): sha for path, sha in record["inputs_sha256"].items()}
             record["ended"] = datetime.fromtimestamp(int(paths[0].stat().st_mtime), UTC)
             jobs.append(record)
     return jobs
@@ -80,58 +77,45 @@ def crate(jobs: Sequence[Mapping[str, Any]], name: str, description: str) -> dic
     """Return the metadata document: ``@context`` and the flat ``@graph`` of entities that refer to each other."""
     hashes = {path: digest for job in jobs for path, digest in job["inputs"].items()}
     parts = sorted({path for job in jobs for path in job["outputs"]})
-    named = {path: path for path in parts}
-    named |= {path: f"#input-{digest[:16]}" for path, digest in hashes.items() if path not in named}
-    entities = [_part(path, hashes.get(path)) for path in parts]
+    identifiers = {path: f"#input-{digest[:16]}" for path, digest in hashes.items()} | {path: path for path in parts}
+    entities: list[dict[str, Any]] = []
+    for path in parts:
+        form = FORMS.get(Path(path).suffix) or mimetypes.guess_type(path)[0]
+        entity = {"@id": path, "@type": "Dataset" if path.endswith("/") else "File", "name": path}
+        entity |= {"encodingFormat": form} if form else {}
+        entities.append(entity | ({"sha256": hashes[path]} if path in hashes else {}))
     entities += [
-        {"@id": identifier, "@type": "CreativeWork", "name": Path(path).name, "sha256": hashes[path]}
-        for path, identifier in named.items()
-        if identifier.startswith("#")
+        {"@id": identifiers[path], "@type": "CreativeWork", "name": Path(path).name, "sha256": digest}
+        for path, digest in hashes.items()
+        if identifiers[path] != path
     ]
     entities += [_software(job["code"], job["libraries"]) for job in jobs]
     entities += [_library(*library) for job in jobs for library in job["libraries"].items()]
-    actions = [_action(job, named) for job in jobs]
-    root: dict[str, Any] = {
-        "@id": "./",
-        "@type": "Dataset",
-        "name": name,
-        "description": description,
-        "datePublished": max(job["ended"] for job in jobs).date().isoformat(),
-        "license": {"@id": LICENSE["@id"]},
-        "conformsTo": {"@id": PROFILE},
-        "citation": {"@id": PAPER},
-        "hasPart": _references(parts),
-        "mentions": _references(action["@id"] for action in actions),
-    }
+    actions = [_action(job, identifiers) for job in jobs]
     title = "Human-Interpretable Uncertainty Explanations for Point Cloud Registration"
-    about: dict[str, Any] = {
-        "@id": NAME,
-        "@type": "CreativeWork",
-        "about": {"@id": "./"},
-        "conformsTo": {"@id": SPECIFICATION},
-    }
-    known: list[dict[str, Any]] = [
+    described: list[dict[str, Any]] = [
+        {"@id": NAME, "@type": "CreativeWork", "about": {"@id": "./"}, "conformsTo": {"@id": SPECIFICATION}},
+        {
+            "@id": "./",
+            "@type": "Dataset",
+            "name": name,
+            "description": description,
+            "datePublished": max(job["ended"] for job in jobs).date().isoformat(),
+            "license": {"@id": LICENSE["@id"]},
+            "conformsTo": {"@id": PROFILE},
+            "citation": {"@id": PAPER},
+            "hasPart": _references(parts),
+            "mentions": _references(action["@id"] for action in actions),
+        },
         {"@id": PROFILE, "@type": "CreativeWork", "name": "Process Run Crate", "version": "0.5"},
         {"@id": PAPER, "@type": "ScholarlyArticle", "name": title},
         LICENSE,
     ]
-    graph = {entity["@id"]: entity for entity in (about, root, *known, *entities, *actions)}
+    graph = {entity["@id"]: entity for entity in (*described, *entities, *actions)}
     return {"@context": list(CONTEXT), "@graph": list(graph.values())}
 
 
-def _relative(folder: Path, path: Path) -> str:
-    return path.relative_to(folder).as_posix() if path.is_relative_to(folder) else str(path)
-
-
-def _part(path: str, digest: str | None) -> dict[str, Any]:
-    """Return a result of the run; its hash is known where another job read it."""
-    form = FORMS.get(Path(path).suffix) or mimetypes.guess_type(path)[0]
-    entity: dict[str, Any] = {"@id": path, "@type": "Dataset" if path.endswith("/") else "File", "name": path}
-    entity |= {"encodingFormat": form} if form else {}
-    return entity | ({"sha256": digest} if digest else {})
-
-
-def _action(job: Mapping[str, Any], named: Mapping[str, str]) -> dict[str, Any]:
+def _action(job: Mapping[str, Any], identifiers: Mapping[str, str]) -> dict[str, Any]:
     first, *others = outputs = job["outputs"]
     return {
         "@id": f"#job-{sha256(' '.join(outputs).encode()).hexdigest()[:16]}",
@@ -140,7 +124,7 @@ def _action(job: Mapping[str, Any], named: Mapping[str, str]) -> dict[str, Any]:
         "description": f"{float(job['seconds']):g} s; settings and machine are in {first.rstrip('/')}{RECORD}",
         "endTime": job["ended"].isoformat(),
         "instrument": {"@id": _software_id(job["code"])},
-        "object": _references(named[path] for path in job["inputs"]),
+        "object": _references(identifiers[path] for path in job["inputs"]),
         "result": _references(outputs),
     }
 

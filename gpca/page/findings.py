@@ -1,4 +1,4 @@
-"""The findings of a run, in sentences with the numbers of its files, which open the page of the run."""
+"""The findings at the top of a run's page: sentences with the numbers of its files."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ PAPERS_RIVALS = {"shap_additive": "SHAP", "sa_local_additive": "sensitivity anal
 
 @dataclass(frozen=True)
 class Finding:
-    """Holds one finding: the number that it is about, a sentence or two, and the result that has the rest."""
+    """A number, a sentence or two about it, and the table with the details."""
 
     number: str
     text: str
@@ -38,7 +38,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Titles:
-    """Holds what readers call the explainers of concepts (``title`` and ``oracle`` of each) and those of causes."""
+    """Titles of explainers: of concepts with ``title`` and ``oracle``, and of causes."""
 
     explainers: Mapping[str, Mapping]
     cause_explainers: Mapping[str, str]
@@ -46,12 +46,10 @@ class Titles:
 
 
 def findings_of(folder: Path, titles: Titles, shown: Collection[str]) -> list[Finding]:
-    """Return the findings from the collected files of a run, as far as their files and results are there.
+    """Return the findings from the collected files in ``results/{run}``, if their results are shown.
 
     Args:
-        folder: The folder ``results/{run}``.
-        titles: What readers call its explainers.
-        shown: The names of its results.
+        shown: names of the results.
 
     Raises:
         InputError: an unusable file.
@@ -64,10 +62,10 @@ def findings_of(folder: Path, titles: Titles, shown: Collection[str]) -> list[Fi
         "recovery.csv": (read_metrics, [_recovery]),
     }
     findings = []
-    for name, (read, tellers) in readers.items():
+    for name, (read, finders) in readers.items():
         if (folder / name).is_file():
             rows = read(folder / name)
-            findings += [finding for tell in tellers if (finding := tell(rows, titles))]
+            findings += [finding for find in finders if (finding := find(rows, titles))]
     return [finding for finding in findings if finding.result in shown]
 
 
@@ -99,16 +97,16 @@ def _protocol(metrics: pd.DataFrame, titles: Titles) -> Finding | None:
 
 def _rival(metrics: pd.DataFrame, titles: Titles) -> Finding | None:
     means = {name: of_sources.mean() for name, of_sources in _accuracies(metrics).items()}
-    own = {name: mean for name, mean in means.items() if name in GPCA_FORMS}
+    forms = {name: mean for name, mean in means.items() if name in GPCA_FORMS}
     others = {name: means[name] for name, entry in titles.explainers.items() if name in means and not entry["oracle"]}
-    others = {name: mean for name, mean in others.items() if name not in own and name not in UNTRAINED}
-    if not own or not others:
+    others = {name: mean for name, mean in others.items() if name not in forms and name not in UNTRAINED}
+    if not forms or not others:
         return None
-    best, best_own = max(others, key=others.__getitem__), max(own, key=own.__getitem__)
+    best, best_form = max(others, key=others.__getitem__), max(forms, key=forms.__getitem__)
     text = (
         f"{titles.explainers[best]['title']} comes first among the {len(others)} other explainers that are not told "
         f"the truth, with {_percent(others[best], 1)} on average over the datasets, where "
-        f"{titles.explainers[best_own]['title']} has {_percent(own[best_own], 1)}."
+        f"{titles.explainers[best_form]['title']} has {_percent(forms[best_form], 1)}."
     )
     return Finding(_percent(others[best], 1), text, "table1_extended")
 
@@ -128,30 +126,30 @@ def _uncertain(metrics: pd.DataFrame, titles: Titles) -> Finding | None:
 
 
 def _causes(intervals: pd.DataFrame, titles: Titles) -> Finding | None:
-    rows, trained = _of_causes(intervals, titles, "balanced_accuracy")
+    rows, trained = _pooled(intervals, titles, "balanced_accuracy")
     if not trained:
         return None
     best = max(trained, key=lambda name: rows.loc[name, "value"])
-    own = rows.loc[best]
+    row = rows.loc[best]
     text = (
         "Where the truth is measured, on objects that no explainer has seen, the best tells nominal registrations and "
-        f"the dominant causes of failed ones apart with a balanced accuracy of {_percent(own['value'])} "
-        f"(95 % interval {_bounds(own, 'low', 'high')} %): {titles.cause_explainers[best]}."
+        f"the dominant causes of failed ones apart with a balanced accuracy of {_percent(row['value'])} "
+        f"(95 % interval {_bounds(row, 'low', 'high')} %): {titles.cause_explainers[best]}."
     )
-    if own["untrained"] in titles.cause_explainers:
+    if row["untrained"] in titles.cause_explainers:
         text += (
-            f" The best untrained rival, {titles.cause_explainers[own['untrained']]}, is "
-            f"{100 * own['gain']:.0f} points behind ({_bounds(own, 'gain_low', 'gain_high')})."
+            f" The best untrained rival, {titles.cause_explainers[row['untrained']]}, is "
+            f"{100 * row['gain']:.0f} points behind ({_bounds(row, 'gain_low', 'gain_high')})."
         )
     if "gpca" in trained and best != "gpca":
         text += f" {titles.cause_explainers['gpca']} has {_percent(rows.loc['gpca', 'value'])}."
     if CEILING in rows.index:
         text += f" The truth measured from other starts agrees in {_percent(rows.loc[CEILING, 'value'])}."
-    return Finding(_percent(own["value"]), text, "table9_causes")
+    return Finding(_percent(row["value"]), text, "table9_causes")
 
 
 def _regret(intervals: pd.DataFrame, titles: Titles) -> Finding | None:
-    rows, trained = _of_causes(intervals, titles, "regret")
+    rows, trained = _pooled(intervals, titles, "regret")
     if not trained or RULE not in rows.index:
         return None
     best = min(trained, key=lambda name: rows.loc[name, "value"])
@@ -163,8 +161,8 @@ def _regret(intervals: pd.DataFrame, titles: Titles) -> Finding | None:
     return Finding(_percent(rows.loc[best, "value"]), text, "table9_causes")
 
 
-def _of_causes(intervals: pd.DataFrame, titles: Titles, metric: str) -> tuple[pd.DataFrame, list[str]]:
-    """Return the rows of a metric by explainer, of all sources together, and which of these explainers are trained."""
+def _pooled(intervals: pd.DataFrame, titles: Titles, metric: str) -> tuple[pd.DataFrame, list[str]]:
+    """Return the rows of a metric for all sources together, by explainer, and the trained explainers."""
     rows = intervals[intervals["metric"] == metric]
     source = POOLED if (rows["source"] == POOLED).any() else next(iter(rows["source"]), POOLED)
     if source != POOLED and rows["source"].nunique() != 1:
@@ -209,22 +207,23 @@ def _recovery(metrics: pd.DataFrame, titles: Titles) -> Finding | None:
 
 
 def _accuracies(metrics: pd.DataFrame) -> dict[str, np.ndarray]:
-    """Return method -> mean accuracy over the seeds, of every source."""
+    """Return method -> mean accuracy over the seeds, by source."""
     rows = metrics[(metrics["metric"] == "accuracy") & (metrics["concept"] == ALL)]
     means = rows.groupby(["method", "source"])["value"].mean()
     return {str(method): of_method.to_numpy() for method, of_method in means.groupby(level="method")}
 
 
 def _median_labels(metrics: pd.DataFrame, strategy: str) -> str | None:
-    """Return the median number of labels in words, over datasets and seeds; a bound where it is none."""
+    """Return the median number of labels over datasets and seeds, in words; a lower bound if it is censored."""
     rows = metrics[(metrics["table"] == TABLE + rare_setting(JUDGED_SHARE)) & (metrics["method"] == strategy)]
     rows = rows[rows["concept"].isin(CONCEPTS)].set_index(["source", "concept", "seed"])
-    of = {name: rows.loc[rows["metric"] == name, "value"] for name in ("labels_to_target", "reached", "labels")}
-    if of["reached"].empty:
+    to_target, reached, labels = (
+        rows.loc[rows["metric"] == name, "value"] for name in ("labels_to_target", "reached", "labels")
+    )
+    if reached.empty:
         return None
-    median = np.where(of["reached"] == 1, of["labels_to_target"], np.inf)
-    count = float(np.median(median))
-    return f"{count:g} labels" if np.isfinite(count) else f"more than {of['labels'].median():g} labels"
+    median = float(np.median(np.where(reached == 1, to_target, np.inf)))
+    return f"{median:g} labels" if np.isfinite(median) else f"more than {labels.median():g} labels"
 
 
 def _bounds(row: pd.Series, low: str, high: str) -> str:

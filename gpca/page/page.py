@@ -1,12 +1,13 @@
-"""Writes a run as one plain web page that works from disk: findings, comparison, tables, figures, registrations."""
+"""Writes a run as one web page that works from disk: findings, comparison, tables, figures, registrations."""
 
 from __future__ import annotations
 
 import json
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from pathlib import Path
 
 from gpca.alignment.icp import ICPSettings
@@ -14,23 +15,25 @@ from gpca.causes.settings import CauseSettings
 from gpca.errors import InputError
 from gpca.io.files import whole_file
 from gpca.model.scene import ASSETS
-from gpca.page import cause_samples, samples
 from gpca.page.comparison import page_comparison
 from gpca.page.findings import Titles, findings_of
-from gpca.page.links import Links
-from gpca.page.scenes import POINTS
-from gpca.page.tables import in_groups
+from gpca.page.samples import CAUSES_RULE, POINTS, RULE, cause_samples, page_samples
 from gpca.process.provenance import sha256_of_settings
 from gpca.reporting.registry import SUFFIXES, by_section
 
 TEMPLATES = Path(__file__).parent / "templates"
-KEY_FIGURES = ("causes_example", "fig2_overview")  # The page opens with the first of these that the run has.
-_CSS_PIXELS = 170 / 300  # A figure's pixel, of 300 in an inch, takes this many: its letters are as large as the text's.
+KEY_FIGURES = ("causes_example", "fig2_overview")  # the first of these that the run has opens the page
+DOCS = "../../docs"  # from the folder of a run in a checkout, results/{run}
+FEWEST = 2  # mean number of rows with the same first label from which they form a group
+_CSS_PIXELS = 170 / 300  # CSS pixels of a figure's pixel at 300 dpi, so that its letters are as large as the text's
+_NAMES = re.compile(  # links and tags stay as they are
+    r"<a\b.*?</a>|<[^>]*>|docs/(?P<page>[a-z_]+\.md)|(?P<word>\w+(?:\.csv)?)\b", re.DOTALL
+)
 
 
 @dataclass(frozen=True)
 class Shown:
-    """A table or figure as the page shows it; the attributes are those of :class:`gpca.reporting.registry.Result`."""
+    """A table or figure; the attributes are those of :class:`gpca.reporting.registry.Result`."""
 
     name: str
     kind: str
@@ -41,21 +44,18 @@ class Shown:
 
 @dataclass(frozen=True)
 class Run:
-    """Holds what the page says of a run besides its results.
+    """A run with what its page needs besides its results.
 
     Attributes:
-        name: The name of the run.
-        seeds: The seeds of its repeats.
-        sources: The ``{"title": str, "stand_in": bool}`` of each name.
-        results: Its tables and figures, in order.
-        samples: The files of each source whose registrations are shown, by name
-            (:func:`gpca.page.samples.page_samples`).
-        causes: The files of each source whose failures are shown with their causes, by name
-            (:func:`gpca.page.cause_samples.cause_samples`).
-        titles: What readers call the explainers of the run.
-        reference: The ``comparison.csv`` of a run on real objects, shown where nothing of this run is judged.
-        config: The whole configuration.
-        command: The command that makes what is missing.
+        seeds: of its repeats.
+        sources: name -> ``{"title": str, "stand_in": bool}``.
+        results: tables and figures, in order.
+        samples: source -> files of the shown registrations (:func:`gpca.page.samples.page_samples`).
+        causes: source -> files of the shown failures with causes (:func:`gpca.page.samples.cause_samples`).
+        titles: of the explainers.
+        reference: ``comparison.csv`` of a run on real objects, shown where nothing of this run is judged.
+        config: the whole configuration.
+        command: that makes what is missing.
     """
 
     name: str
@@ -69,21 +69,27 @@ class Run:
     config: Mapping
     command: str
 
+    @property
+    def sample_files(self) -> list[Path]:
+        """All files of samples."""
+        return [Path(path) for files in (*self.samples.values(), *self.causes.values()) for path in files.values()]
+
 
 def write_page(folder: str | Path, run: Run) -> None:
-    """Write ``index.html`` of a finished run into its folder; it needs nothing but the tables and figures beside it.
+    """Write ``index.html`` of a finished run into its folder ``results/{run}``.
 
-    Comparison and findings are shown where the folder has the collected files, such as ``comparison.csv``.
-
-    Args:
-        folder: The folder ``results/{run}``.
-        run: The run that is shown.
+    The page needs only the tables and figures beside it. It shows comparison and findings if the folder has the
+    collected files, such as ``comparison.csv``.
 
     Raises:
-        InputError: A file is missing (the line names all that are, and how to make them) or unusable.
+        InputError: missing files (one line names all, and how to make them), or an unusable one.
     """
     folder = Path(folder)
-    require_complete(folder, run)
+    needed = [f"{each.kind}/{each.name}.{suffix}" for each in run.results for suffix in SUFFIXES[each.kind]]
+    missing = [name for name in needed if not (folder / name).is_file()]
+    missing += [str(path) for path in run.sample_files if not path.is_file()]
+    if missing:
+        raise InputError(folder, f"lacks {', '.join(missing)}", f"make them with '{run.command}'")
     shown = {result.name for result in run.results}
     links = Links(folder, shown)
     sections = {
@@ -91,6 +97,8 @@ def write_page(folder: str | Path, run: Run) -> None:
         for section, results in by_section(run.results).items()
     }
     key_figure = next((result for name in KEY_FIGURES for result in run.results if result.name == name), None)
+    suffix = {"tables": "csv", "figures": "pdf"}
+    recorded = [folder / f"{result.kind}/{result.name}.{suffix[result.kind]}" for result in run.results]
     text = render(
         run=run,
         findings=findings_of(folder, run.titles, shown),
@@ -99,7 +107,7 @@ def write_page(folder: str | Path, run: Run) -> None:
         comparison=page_comparison(folder / "comparison.csv", run.reference),
         links=links,
         samples=_samples(run),
-        provenance=read_provenance(_provenance_files(folder, run)),
+        provenance=read_provenance(recorded + run.sample_files),
     )
     with whole_file(folder / "index.html") as partial:
         partial.write_text(text, encoding="utf-8")
@@ -110,6 +118,11 @@ def render(template: str = "index.html.jinja", **content) -> str:
     import yaml
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
+    def short(section: str) -> str:
+        """Return the title of a section for the menu."""
+        words = section.removeprefix("Beyond the paper: ")
+        return words[:1].upper() + words[1:]
+
     environment = Environment(
         loader=FileSystemLoader([TEMPLATES, ASSETS]),
         autoescape=True,
@@ -118,42 +131,30 @@ def render(template: str = "index.html.jinja", **content) -> str:
         lstrip_blocks=True,
     )
     environment.filters["anchor"] = lambda title: re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-")
-    environment.filters["short"] = _short
+    environment.filters["short"] = short
     environment.filters["yaml"] = lambda value: yaml.safe_dump(value, sort_keys=False, allow_unicode=True, width=100)
     environment.policies["json.dumps_kwargs"] = {"separators": (",", ":"), "sort_keys": True}
-    words = {"samples_rule": samples.RULE, "causes_rule": cause_samples.RULE, "samples_points": POINTS}
+    words = {"samples_rule": RULE, "causes_rule": CAUSES_RULE, "samples_points": POINTS}
     return environment.get_template(template).render(**content, **words)
 
 
-def _short(section: str) -> str:
-    """Return the title of a section as the menu has it."""
-    words = section.removeprefix("Beyond the paper: ")
-    return words[:1].upper() + words[1:]
-
-
-def require_complete(folder: Path, run: Run) -> None:
-    """Raise an InputError that names every result of the run that is not there, and the command that makes it."""
-    needed = [f"{each.kind}/{each.name}.{suffix}" for each in run.results for suffix in SUFFIXES[each.kind]]
-    missing = [name for name in needed if not (folder / name).is_file()]
-    missing += [str(path) for path in _files_of_samples(run) if not path.is_file()]
-    if missing:
-        raise InputError(folder, f"lacks {', '.join(missing)}", f"make them with '{run.command}'")
-
-
 def read_provenance(files: Iterable[Path]) -> dict[str, dict[str, int]]:
-    """Return the values that the records beside files give for each kind of fact, with the number of files of each."""
+    """Return the recorded values of each kind of fact about the files, with the number of files of each value."""
     facts: dict[str, Counter] = {}
     for path in files:
         record_path = path.with_name(path.name + ".provenance.json")
         values = {"Code": "not recorded"}
         if record_path.is_file():
             record = json.loads(record_path.read_text(encoding="utf-8"))
+            sections, device = record["config_sha256"], record["device"]
             commit = record["code"]["commit"] or "outside a git checkout"
+            kind = f"{device['vendor']}, family {device['family']}, model {device['model']}, {device['instructions']}"
             values = {
                 "Code": f"{commit} with uncommitted changes" if record["code"]["dirty"] else commit,
-                "Config (SHA-256)": _config(record["config_sha256"]),
+                # One hash for all sections; a step run by hand has none.
+                "Config (SHA-256)": sha256_of_settings(sections) if sections else "none",
                 "Packages, environment.lock (SHA-256)": record["environment_lock_sha256"],
-                "Device": _device(record["device"]),
+                "Device": ", ".join(filter(None, [f"{device['name']} ({kind})", device["gpu"]])),
                 "Python": record["python"],
                 **dict(sorted(record["libraries"].items())),
             }
@@ -162,51 +163,27 @@ def read_provenance(files: Iterable[Path]) -> dict[str, dict[str, int]]:
     return {fact: dict(counts.most_common()) for fact, counts in facts.items()}
 
 
-def _config(sections: dict | None) -> str:
-    """Return one hash for those of all sections, or "none" where the step was run by hand."""
-    return sha256_of_settings(sections) if sections else "none"
-
-
-def _device(device: dict) -> str:
-    """Return the processor in words, with the level of instructions its libraries were held to, and the GPU."""
-    kind = f"{device['vendor']}, family {device['family']}, model {device['model']}, {device['instructions']}"
-    return ", ".join(filter(None, [f"{device['name']} ({kind})", device["gpu"]]))
-
-
-def _provenance_files(folder: Path, run: Run) -> list[Path]:
-    suffix = {"tables": "csv", "figures": "pdf"}
-    files = [folder / f"{result.kind}/{result.name}.{suffix[result.kind]}" for result in run.results]
-    return files + _files_of_samples(run)
-
-
-def _files_of_samples(run: Run) -> list[Path]:
-    of_sources = [*run.samples.values(), *run.causes.values()]
-    return [Path(path) for files in of_sources for path in files.values()]
-
-
 def _samples(run: Run) -> list[dict]:
     """Return the registrations that the page shows in 3-D, those with measured causes last."""
     icp = run.config.get("registrations", {}).get("icp", {})
     settings = CauseSettings.from_dict(dict(run.config["causes"]), icp)
     reach = ICPSettings(**icp).correspondence_distance
-    shown = [
-        sample
-        for source, files in run.samples.items()
-        for sample in samples.page_samples(files, run.sources[source], settings.limits, reach)
-    ]
-    return shown + [
-        sample
-        for source, files in run.causes.items()
-        for sample in cause_samples.cause_samples(files, run.sources[source], settings)
-    ]
+    samples = []
+    for source, files in run.samples.items():
+        samples += page_samples(files, run.sources[source], settings.limits, reach)
+    for source, files in run.causes.items():
+        samples += cause_samples(files, run.sources[source], settings)
+    return samples
 
 
 def _content(folder: Path, result: Shown, run: Run, links: Links) -> dict:
-    """Return one table or figure as the template takes it."""
+    """Return one table or figure for the template."""
     from PIL import Image
 
+    words, _, source = result.title.rpartition(": ")
+    title = f"{words}: {run.sources[source]['title']}" if words and source in run.sources else result.title
     caption = links.in_html(rendered_caption(result.name, result.caption), result.name)
-    common = {"name": result.name, "title": _named(result.title, run.sources), "caption": caption}
+    common = {"name": result.name, "title": title, "caption": caption}
     if result.kind == "tables":
         printed = json.loads((folder / f"tables/{result.name}.json").read_text(encoding="utf-8"))
         return common | {"table": in_groups(printed)}
@@ -215,10 +192,19 @@ def _content(folder: Path, result: Shown, run: Run, links: Links) -> dict:
     return common | {"table": None, "width": round(width * _CSS_PIXELS), "height": round(height * _CSS_PIXELS)}
 
 
-def _named(title: str, sources: Mapping[str, Mapping]) -> str:
-    """Return a title that ends in the name of a source with what readers call it."""
-    words, _, name = title.rpartition(": ")
-    return f"{words}: {sources[name]['title']}" if words and name in sources else title
+def in_groups(printed: Mapping) -> dict:
+    """Return a printed table (:meth:`gpca.reporting.tables.table.Table.printed`) with its rows in groups.
+
+    Consecutive rows with the same first label, such as the dataset, form a group with that label as its ``title``. All
+    rows form one group without a title where groups would be small, labels come back later, or there is one label.
+    """
+    rows, labels = printed["rows"], printed["label_columns"]
+    runs = [(first, list(group)) for first, group in groupby(rows, key=lambda row: row[0][0])]
+    if labels < 2 or len({first for first, _ in runs}) < len(runs) or len(rows) < FEWEST * len(runs):
+        return dict(printed) | {"groups": [{"title": "", "rows": rows}]}
+    head = printed["heads"][0]
+    groups = [{"title": f"{head}: {first}", "rows": [row[1:] for row in group]} for first, group in runs]
+    return dict(printed) | {"heads": printed["heads"][1:], "label_columns": labels - 1, "groups": groups}
 
 
 def rendered_caption(name: str, caption: str):
@@ -231,9 +217,50 @@ def rendered_caption(name: str, caption: str):
     from docutils.utils import SystemMessage
     from markupsafe import Markup
 
-    # Nothing of its own gets into the page, neither files nor raw HTML; a fault stops instead of being printed.
+    # No files and no raw HTML get into the page; a fault stops instead of being printed.
     settings = {"raw_enabled": False, "file_insertion_enabled": False, "halt_level": 2, "report_level": 5}
     try:
         return Markup(publish_parts(caption, writer="html5", settings_overrides=settings)["body"])
     except SystemMessage as fault:
         raise InputError(f"caption of {name}", f"is not valid reStructuredText ({fault})", "correct it") from fault
+
+
+class Links:
+    """Links the names in a text: pages of ``docs/``, CSV files beside the page, tables and figures on it.
+
+    Args:
+        folder: of the run.
+        results: names of its tables and figures.
+    """
+
+    def __init__(self, folder: Path, results: Collection[str]) -> None:
+        docs = folder / DOCS
+        self._pages = {path.name for path in docs.glob("*.md")} if docs.is_dir() else set()
+        self._files = {path.name for path in folder.glob("*.csv")}
+        self._results = {name for name in results if "_" in name}  # the others are ordinary words too
+
+    def in_text(self, text: str, without: str = ""):
+        """Return a text as HTML: escaped, with backticks as code, and with links.
+
+        Args:
+            without: name of the table or figure that the text belongs to, which is not linked.
+        """
+        from markupsafe import Markup, escape
+
+        parts = str(escape(text)).split("`")
+        html = "".join(f"<code>{part}</code>" if k % 2 else part for k, part in enumerate(parts))
+        return self.in_html(Markup(html), without)
+
+    def in_html(self, html, without: str = ""):
+        """Return HTML with links; ``without`` is as in :meth:`in_text`."""
+        from markupsafe import Markup
+
+        def linked(match: re.Match) -> str:
+            page, word = match["page"], match["word"]
+            if page in self._pages:
+                return f'<a href="{DOCS}/{page}">docs/{page}</a>'
+            if word in self._files:
+                return f'<a href="{word}">{word}</a>'
+            return f'<a href="#{word}">{word}</a>' if word in self._results and word != without else match[0]
+
+        return Markup(_NAMES.sub(linked, str(html)))

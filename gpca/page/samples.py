@@ -1,46 +1,57 @@
-"""Picks the registrations that the page shows in 3-D, with the poses of their clouds and GP-CA's predictions."""
+"""The registrations that the page shows in 3-D: with GP-CA's predictions, and with measured causes."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gpca.alignment.rigid import inverse, transform
 from gpca.attribution.predictions import concepts_of, read_predictions
-from gpca.causes.settings import Limits
+from gpca.causes.counterfactuals import replay
+from gpca.causes.dataset import Causes
+from gpca.causes.settings import CauseSettings, Limits
+from gpca.causes.shapley import BY_SIZE
+from gpca.causes.truth import FAILED
 from gpca.errors import InputError
 from gpca.experiments.method.shown_sample import observed_uncertainties, registration_error, state_of_error
-from gpca.page.scenes import packed_registration
+from gpca.model.scene import flat, packed, packed_pair, taken_out
+from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
+from gpca.reporting.figures.cloud_views import thinned
+from gpca.seeds import seed_of_file
 
-if TYPE_CHECKING:
-    import pandas as pd
-
-OF_EACH_CONCEPT = 2  # The page shows this many samples of each concept in every source.
+OF_EACH_CONCEPT = 2  # samples in every source
 RULE = (
     f"Of every source, the first {OF_EACH_CONCEPT} test samples of each concept in the run's first seed, in the order "
     "of their numbers, right or wrong."
 )
+CAUSES_RULE = (
+    "Then follow the failed test registrations whose causes were measured: of every source, the first of each dominant "
+    "cause in the run's first seed."
+)
+POINTS = 600  # of a shown cloud at most
+UNIT, DIAMETER = "% of the diameter", 100  # unit of lengths on the page
+TRUTH = "pose:0"  # the view of the true pose
 
 
 def page_samples(files: Mapping[str, str | Path], source: Mapping, limits: Limits, reach: float) -> list[dict]:
-    """Return the samples of one source that `RULE` names, for the page's 3-D view, as plain JSON values.
+    """Return the samples of one source by `RULE`, as JSON values for the page's 3-D view.
 
-    Each holds its ``scene`` (:func:`gpca.page.scenes.packed_registration`), object, concept, severity, scores with
-    standard deviations, fitness, how far off ICP ends (ADD-S in % of the diameter) and the state that this is called;
-    the uncertainty in nats and that below which 95 % of the clean pairs lie, where they are known.
+    Each holds its ``scene`` (:func:`packed_registration`), object, concept, severity, scores with standard deviations,
+    fitness, ADD-S after ICP in % of the diameter and its state; and the uncertainty in nats with the 95th percentile of
+    clean pairs, where known.
 
     Args:
-        files: The ``registrations`` and ``predictions`` of one source and seed, and perhaps its ``uncertainty``.
-        source: The ``title`` of the source, and whether it is a ``stand_in``.
-        limits: What states are told apart by.
-        reach: How far ICP looks for a partner, in diameters.
+        files: ``registrations`` and ``predictions`` of one source and seed, optionally ``uncertainty``.
+        source: ``title``, and whether it is a ``stand_in``.
+        limits: of the states.
+        reach: correspondence distance of ICP, in diameters.
 
     Raises:
-        InputError: an unusable file, or a sample that was not predicted.
+        InputError: an unusable file, or a sample without prediction.
     """
     registrations, predictions = Registrations.load(files["registrations"]), read_predictions(files["predictions"])
     u_S, clean = np.full(len(registrations), np.nan), np.nan
@@ -53,18 +64,36 @@ def page_samples(files: Mapping[str, str | Path], source: Mapping, limits: Limit
         if number not in test.index:
             fault = f"lacks test sample {number} of {files['registrations']}"
             raise InputError(files["predictions"], fault, "regenerate both")
-        error = registration_error(registrations, row)
+        prediction, error = test.loc[number], registration_error(registrations, row)
         samples.append(
-            _sample(registrations, row, test.loc[number], concepts_of(predictions))
-            | {"error_percent": _number(100 * error), "state": state_of_error(error, limits)}
-            | {"scene": packed_registration(registrations, row, reach)}
-            | {"uncertainty": _number(u_S[row]), "clean_uncertainty": _number(clean), "source": dict(source)}
+            {
+                "object": str(registrations.object_name[row]),
+                "sample": int(registrations.sample[row]),
+                "concept": str(registrations.concept[row]),
+                "severity": severity_words(registrations, row),
+                "fitness": _number(registrations.fitness[row]),
+                "predicted": str(prediction["concept_predicted"]),
+                "scores": [
+                    {
+                        "concept": concept,
+                        "mean": _number(prediction[f"score_{concept}"]),
+                        "deviation": _number(np.sqrt(prediction[f"variance_{concept}"])),
+                    }
+                    for concept in concepts_of(predictions)
+                ],
+                "error_percent": _number(100 * error),
+                "state": state_of_error(error, limits),
+                "scene": packed_registration(registrations, row, reach),
+                "uncertainty": _number(u_S[row]),
+                "clean_uncertainty": _number(clean),
+                "source": dict(source),
+            }
         )
     return samples
 
 
 def first_of_each_concept(registrations: Registrations) -> list[int]:
-    """Return the rows that `RULE` names, concept by concept."""
+    """Return the rows of `RULE`, concept by concept."""
     test = registrations.rows("test")
     in_order = test[np.argsort(registrations.sample[test], kind="stable")]
     return [int(row) for c in CONCEPTS for row in in_order[registrations.concept[in_order] == c][:OF_EACH_CONCEPT]]
@@ -81,25 +110,88 @@ def severity_words(registrations: Registrations, row: int) -> str:
     return f"{100 * registrations.severity_crop[row]:.0f} % of the points cut off"
 
 
-def _sample(registrations: Registrations, row: int, prediction: pd.Series, concepts: list[str]) -> dict:
-    return {
-        "object": str(registrations.object_name[row]),
-        "sample": int(registrations.sample[row]),
-        "concept": str(registrations.concept[row]),
-        "severity": severity_words(registrations, row),
-        "fitness": _number(registrations.fitness[row]),
-        "predicted": str(prediction["concept_predicted"]),
-        "scores": [
+def cause_samples(files: Mapping[str, str | Path], source: Mapping, settings: CauseSettings) -> list[dict]:
+    """Return the samples of one source by `CAUSES_RULE`, as JSON values for the page's 3-D view.
+
+    Each holds its ``scene`` (:func:`packed_registration`), the object, the state and the shown registration's error;
+    in % of the diameter, the ``limit`` of failures, the share φ of each concept, and the mean error without each subset
+    of the causes.
+
+    Args:
+        files: ``objects`` of the source, and ``causes`` of its first seed.
+        source: ``title``, and whether it is a ``stand_in``.
+        settings: of the causes.
+
+    Raises:
+        InputError: an unusable file, or one of other settings.
+    """
+    causes = Causes.load(files["causes"])
+    rows = first_of_each_cause(causes)
+    if not rows:
+        return []
+    objects = ObjectClouds.load(files["objects"])
+    name, seed = Path(files["causes"]).parent.name, seed_of_file(files["causes"])
+    registrations, truth = causes.registrations, causes.truth
+    samples = []
+    for row in rows:
+        observed_8 = replay(objects, causes, row, name, seed, settings).observed
+        phi, errors = truth.phi[row], truth.error[row]
+        samples.append(
             {
-                "concept": concept,
-                "mean": _number(prediction[f"score_{concept}"]),
-                "deviation": _number(np.sqrt(prediction[f"variance_{concept}"])),
+                "object": str(registrations.object_name[row]),
+                "sample": int(registrations.sample[row]),
+                "concept": str(truth.dominant[row]),
+                "state": str(truth.state[row]),
+                "source": dict(source),
+                "error_percent": _percent(causes.error_shown[row]),
+                "limit": _percent(truth.failed_limit),
+                "shares": [{"concept": concept, "percent": _percent(phi[i])} for i, concept in enumerate(CONCEPTS)],
+                "what_ifs": [{"words": taken_out(each), "percent": _percent(errors[each])} for each in BY_SIZE],
+                "scene": packed_registration(registrations, row, settings.icp.correspondence_distance, observed_8),
             }
-            for concept in concepts
-        ],
-    }
+        )
+    return samples
+
+
+def first_of_each_cause(causes: Causes) -> list[int]:
+    """Return the rows of `CAUSES_RULE`, concept by concept."""
+    registrations, truth = causes.registrations, causes.truth
+    failed = np.flatnonzero((registrations.split == "test") & (truth.state == FAILED))
+    in_order = failed[np.argsort(registrations.sample[failed], kind="stable")]
+    return [int(row) for concept in CONCEPTS for row in in_order[truth.dominant[in_order] == concept][:1]]
+
+
+def packed_registration(
+    registrations: Registrations, row: int, reach: float, observed_8: Sequence[np.ndarray] = ()
+) -> dict:
+    """Return a registration for ``view.js``: in its initial, aligned and true pose.
+
+    Args:
+        reach: correspondence distance of ICP, in diameters.
+        observed_8: the observed cloud (P, 3) as aligned by ICP with each subset of the causes, in the order of
+            :data:`gpca.causes.shapley.SUBSETS`; none without measured causes. A repeated registration is packed once,
+            and referred to by its number afterwards.
+    """
+    target = thinned(registrations.target(row).astype(float), POINTS)
+    T_centered = np.eye(4)
+    T_centered[:3, 3] = -(target.min(axis=0) + target.max(axis=0)) / 2
+    T_init, T_icp, T_true = (T_centered @ registrations.T_target_source(name, row) for name in ("init", "icp", "true"))
+    source = transform(T_init, thinned(registrations.source(row), POINTS))
+    pair = packed_pair(transform(T_centered, target), source, T_icp @ inverse(T_init), reach, DIAMETER, UNIT)
+    what_ifs: list[dict | int] = []
+    titles = {TRUTH: "In the true pose"}
+    for number, subset in enumerate(BY_SIZE if observed_8 else ()):
+        cloud = packed(transform(T_centered, thinned(observed_8[subset], POINTS)))
+        what_ifs.append(what_ifs.index(cloud) if cloud in what_ifs else cloud)
+        words = taken_out(subset)
+        titles[f"what:0:{number}"] = f"Registered again, {words[:1].lower()}{words[1:]}"
+    return pair | {"poses": [{"T": flat(T_true @ inverse(T_init)), "what_ifs": what_ifs}], "titles": titles}
+
+
+def _percent(share: float) -> float:
+    return round(100 * float(share), 2)
 
 
 def _number(value: float) -> float | None:
-    """Return a rounded number, or None for NaN, which JSON lacks: it is the score of an explainer that abstains."""
+    """Return a rounded number; None for NaN, which JSON lacks: the score of an explainer that abstains."""
     return round(float(value), 3) if np.isfinite(value) else None

@@ -1,8 +1,9 @@
-"""Sets two runs side by side: what differs in their code and config, their verdicts, tables and figures."""
+"""Compares two runs on a page: differences of code and config, of verdicts, tables and figures."""
 
 from __future__ import annotations
 
 import json
+import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -11,12 +12,96 @@ from pathlib import Path
 
 from gpca.errors import InputError
 from gpca.io.files import whole_file
-from gpca.page.comparison import page_comparison
+from gpca.page.comparison import number_of, page_comparison
 from gpca.page.page import read_provenance, render
-from gpca.page.printed_table import PrintedTable, read_number, read_printed_table
 
-SAME, DIFFERENT, APART, ALONE = "same", "different", "apart", "alone"  # what a cell is called, by how the two differ
-CONFIG = "Config (SHA-256)"  # of all sections; which of them differ says more
+SAME, DIFFERENT, APART, ALONE = "same", "different", "apart", "alone"  # kinds of a cell of both runs
+CONFIG = "Config (SHA-256)"  # of all sections, which are compared one by one instead
+LEFT = ":--"  # alignment of columns of names in Markdown
+_CELLS = re.compile(r"(?<!\\)\|")
+_DIGITS = r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?"
+_NUMBER = re.compile(rf"(?:> )?({_DIGITS})(?: ± ({_DIGITS})| \(({_DIGITS}) to ({_DIGITS})\))?")
+Folders = tuple[Path, Path]  # results/{run} of two runs, or their references
+
+
+@dataclass(frozen=True)
+class PrintedTable:
+    """A table as readers see it.
+
+    Attributes:
+        caption: the line above it.
+        heads: of the columns, those of names first.
+        labels: number of columns of names.
+        rows: of texts, one per head.
+    """
+
+    caption: str
+    heads: Sequence[str]
+    labels: int
+    rows: Sequence[Sequence[str]]
+
+    def by_names(self, labels: int) -> dict[tuple, dict[str, str]]:
+        """Return (names of a row, number of earlier rows with these names) -> head -> text."""
+        seen: Counter = Counter()
+        rows = {}
+        for row in self.rows:
+            key = tuple(row[:labels])
+            rows[*key, seen[key]] = dict(zip(self.heads[labels:], row[labels:], strict=True))
+            seen[key] += 1
+        return rows
+
+
+@dataclass(frozen=True)
+class PrintedNumber:
+    """A number with the bounds of its interval, None where none is printed."""
+
+    value: float
+    low: float | None
+    high: float | None
+    decimals: int
+
+    def is_apart(self, other: PrintedNumber) -> bool:
+        """Return whether both have intervals, which do not overlap."""
+        if self.low is None or self.high is None or other.low is None or other.high is None:
+            return False
+        return self.high < other.low or other.high < self.low
+
+
+def read_printed_table(path: Path) -> PrintedTable:
+    """Read the Markdown that :meth:`gpca.reporting.tables.table.Table.write` wrote.
+
+    Raises:
+        InputError: missing or unreadable file, or no such table in it.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as fault:
+        raise InputError(path, f"is not readable ({fault})", "make the run again") from fault
+    lines = []
+    for line in text.splitlines():
+        if line.startswith("| "):
+            cells = [cell.strip().replace("\\|", "|") for cell in _CELLS.split(line)[1:-1]]
+            lines.append([re.sub(r"\A\*\*(.+)\*\*\Z", r"\1", cell) for cell in cells])
+    if len(lines) < 2 or any(len(line) != len(lines[0]) for line in lines):
+        raise InputError(path, "holds no table, or one with rows of several lengths", "make the run again")
+    heads, rule, *rows = lines
+    caption = text.split("\n", 1)[0].strip("*")
+    return PrintedTable(caption, heads, sum(cell == LEFT for cell in rule), rows)
+
+
+def read_number(text: str) -> PrintedNumber | None:
+    """Return the number at the start of a cell, ``97.7 ± 0.4`` or ``97.7 (96.9 to 98.2)``; None where there is none.
+
+    A bound, as in ``> 52.0``, counts as its value.
+    """
+    match = _NUMBER.match(text)
+    if match is None:
+        return None
+    value = float(match[1])
+    low, high = (float(end) if end else None for end in (match[3], match[4]))
+    if match[2]:
+        low, high = value - float(match[2]), value + float(match[2])
+    return PrintedNumber(value, low, high, len(match[1].partition(".")[2]))
 
 
 @dataclass(frozen=True)
@@ -24,8 +109,7 @@ class TwoTables:
     """A table of both runs, cell by cell.
 
     Attributes:
-        name, title, caption: as one of the runs has them.
-        heads, labels: as in :class:`gpca.page.printed_table.PrintedTable`; those of the second alone come last.
+        heads, labels: as in :class:`PrintedTable`; heads of the second alone come last.
         rows: the names of each row, and its cells ``{one, other, difference, kind}``.
         counts: of the kinds.
     """
@@ -39,166 +123,130 @@ class TwoTables:
     counts: Mapping[str, int]
 
 
-def compare_tables(folders: tuple[Path, Path], titles: Mapping[str, str]) -> tuple[list[TwoTables], list[list[str]]]:
+def compare_tables(folders: Folders, titles: Mapping[str, str]) -> tuple[list[TwoTables], list[list[str]]]:
     """Return the tables that both folders have, and the names of those that only the first or only the second has.
 
     Args:
-        folders: ``results/{run}`` of two runs, or their references.
-        titles: what readers call the tables, in the order of the page.
+        titles: of the tables, in the order of the page.
 
     Raises:
-        InputError: a folder without tables, or a table that is none.
+        InputError: a folder without tables, or an invalid table.
     """
-    names = []
-    for folder in folders:
-        names.append({path.stem for path in folder.glob("tables/*.md")})
-        if not names[-1]:
+    files = [{path.stem: path for path in folder.glob("tables/*.md")} for folder in folders]
+    for folder, paths in zip(folders, files, strict=True):
+        if not paths:
             raise InputError(folder, "has no tables/*.md", "name the folder of a finished run, such as results/default")
-    one, other = names
-    shared = [name for name in titles if name in one & other] + sorted((one & other) - titles.keys())
-    tables = [_two_tables(name, titles.get(name, name), folders) for name in shared]
-    return tables, [sorted(one - other), sorted(other - one)]
+    tables = []
+    for name in _shared(files, titles):
+        one, other = (read_printed_table(paths[name]) for paths in files)
+        labels = min(one.labels, other.labels)
+        heads = list(dict.fromkeys([*one.heads[labels:], *other.heads[labels:]]))
+        first, second = one.by_names(labels), other.by_names(labels)
+        rows = []
+        for key in dict.fromkeys([*first, *second]):
+            cells = [_cell(*(rows_of.get(key, {}).get(head, "") for rows_of in (first, second))) for head in heads]
+            rows.append((key[:-1], cells))
+        counts = Counter(cell["kind"] for _, cells in rows for cell in cells)
+        heads = [*one.heads[:labels], *heads]
+        tables.append(TwoTables(name, titles.get(name, name), one.caption, heads, labels, rows, counts))
+    one_names, other_names = (paths.keys() for paths in files)
+    return tables, [sorted(one_names - other_names), sorted(other_names - one_names)]
 
 
-def write_comparison(
-    folders: tuple[Path, Path],
-    tables: Sequence[TwoTables],
-    alone: Sequence[Sequence[str]],
-    titles: Mapping[str, str],
-    path: Path,
-) -> None:
-    """Write the page of two runs; figures are shown from where they are.
-
-    Args:
-        folders: of the runs.
-        tables, alone: as :func:`compare_tables` returns them.
-        titles: of the tables and figures.
-        path: the page.
-    """
-    text = render(
-        "compare.html.jinja",
-        names=_names(folders),
-        facts=_facts(folders),
-        sections=_differing_sections(folders),
-        verdicts=_verdicts(folders),
-        tables=tables,
-        alone=alone,
-        figures=_figures(folders, titles, path.parent),
-    )
-    with whole_file(path) as partial:
-        partial.write_text(text, encoding="utf-8")
-
-
-def _two_tables(name: str, title: str, folders: tuple[Path, Path]) -> TwoTables:
-    one, other = (read_printed_table(folder / f"tables/{name}.md") for folder in folders)
-    labels = min(one.labels, other.labels)
-    heads = list(dict.fromkeys([*one.heads[labels:], *other.heads[labels:]]))
-    of_one, of_other = _by_row(one, labels), _by_row(other, labels)
-    rows = []
-    for key in dict.fromkeys([*of_one, *of_other]):
-        cells = [_cell(of_one.get(key, {}).get(head, ""), of_other.get(key, {}).get(head, "")) for head in heads]
-        rows.append((key[:-1], cells))
-    counts = Counter(cell["kind"] for _, cells in rows for cell in cells)
-    return TwoTables(name, title, one.caption, [*one.heads[:labels], *heads], labels, rows, counts)
-
-
-def _by_row(table: PrintedTable, labels: int) -> dict[tuple, dict[str, str]]:
-    """Return names of a row, and how often they came before -> head -> text."""
-    seen: Counter = Counter()
-    rows = {}
-    for row in table.rows:
-        key = tuple(row[:labels])
-        rows[*key, seen[key]] = dict(zip(table.heads[labels:], row[labels:], strict=True))
-        seen[key] += 1
-    return rows
+def _shared(files: Sequence[Mapping[str, Path]], titles: Mapping[str, str]) -> list[str]:
+    """Return the names that both have, in the order of the titles."""
+    both = files[0].keys() & files[1].keys()
+    return [name for name in titles if name in both] + sorted(both - titles.keys())
 
 
 def _cell(one: str, other: str) -> dict[str, str]:
     if one == other:
         return {"one": one, "other": "", "difference": "", "kind": SAME}
     cell = {"one": one, "other": other, "difference": "", "kind": DIFFERENT if one and other else ALONE}
-    numbers = [read_number(text) for text in (one, other)]
-    first, second = numbers
+    first, second = read_number(one), read_number(other)
     if first is None or second is None:
         return cell
     difference = f"{second.value - first.value:+z.{max(first.decimals, second.decimals)}f}"
     return cell | {"difference": difference, "kind": APART if first.is_apart(second) else DIFFERENT}
 
 
-def _names(folders: tuple[Path, Path]) -> list[str]:
-    """Return the names of the runs; where these are the same, the paths from where they part."""
+def write_comparison(
+    folders: Folders,
+    tables: Sequence[TwoTables],
+    alone: Sequence[Sequence[str]],
+    titles: Mapping[str, str],
+    path: Path,
+) -> None:
+    """Write the page of two runs, which refers to their figures.
+
+    Args:
+        tables, alone: as :func:`compare_tables` returns them.
+        titles: of the tables and figures.
+    """
     paths = [folder.resolve() for folder in folders]
-    names = [path.name for path in paths]
-    return names if len(set(names)) > 1 else [relpath(path, commonpath(paths)) for path in paths]
+    names = [each.name for each in paths]
+    if names[0] == names[1]:
+        names = [relpath(each, commonpath(paths)) for each in paths]
+    figures = [{figure.stem: figure for figure in folder.glob("figures/*.png")} for folder in folders]
+    one, other = figures
+    text = render(
+        "compare.html.jinja",
+        names=names,
+        facts=_facts(folders),
+        sections=_differing_sections(folders),
+        verdicts=_verdicts(folders),
+        tables=tables,
+        alone=alone,
+        figures=[
+            {
+                "name": name,
+                "title": titles.get(name, name),
+                "same": one[name].read_bytes() == other[name].read_bytes(),
+                "paths": [relpath(figure.resolve(), path.parent.resolve()) for figure in (one[name], other[name])],
+            }
+            for name in _shared(figures, titles)
+        ],
+    )
+    with whole_file(path) as partial:
+        partial.write_text(text, encoding="utf-8")
 
 
-def _tidy(folder: Path) -> list[Path]:
-    """Return the files whose records say what a run was made with."""
+def _recorded(folder: Path) -> list[Path]:
+    """Return the files whose records say how a run was made."""
     return sorted([*folder.glob("tables/*.csv"), *folder.glob("*.csv")])
 
 
-def _facts(folders: tuple[Path, Path]) -> list[tuple[str, str, str]]:
-    """Return what was recorded of either run, a line per kind of fact, where the two differ."""
-    one, other = (read_provenance(_tidy(folder)) for folder in folders)
+def _facts(folders: Folders) -> list[tuple[str, str, str]]:
+    """Return the differing kinds of recorded facts, with the values of either run."""
+    one, other = (read_provenance(_recorded(folder)) for folder in folders)
     kinds = [kind for kind in dict.fromkeys([*one, *other]) if kind != CONFIG]
-    words = [{kind: ", ".join(facts.get(kind, ["–"])) for kind in kinds} for facts in (one, other)]
-    lines = [(kind, words[0][kind], words[1][kind]) for kind in kinds]
+    lines = [(kind, ", ".join(one.get(kind, ["–"])), ", ".join(other.get(kind, ["–"]))) for kind in kinds]
     return [line for line in lines if line[1] != line[2]]
 
 
-def _differing_sections(folders: tuple[Path, Path]) -> list[str]:
-    """Return the sections of the config that are not the same in both runs, as far as files were made from them."""
-    hashes = [_section_hashes(folder) for folder in folders]
-    return sorted(
-        section for section in hashes[0].keys() | hashes[1] if hashes[0].get(section) != hashes[1].get(section)
-    )
-
-
-def _section_hashes(folder: Path) -> dict[str, set[str]]:
-    hashes: dict[str, set[str]] = {}
-    for path in _tidy(folder):
-        record = path.with_name(f"{path.name}.provenance.json")
-        if record.is_file():
-            for section, digest in (json.loads(record.read_text(encoding="utf-8"))["config_sha256"] or {}).items():
+def _differing_sections(folders: Folders) -> list[str]:
+    """Return the sections of the config that differ, among those that files were made from."""
+    one: dict[str, set[str]] = {}
+    other: dict[str, set[str]] = {}
+    for folder, hashes in zip(folders, (one, other), strict=True):
+        for path in _recorded(folder):
+            record = path.with_name(f"{path.name}.provenance.json")
+            sections = json.loads(record.read_text(encoding="utf-8"))["config_sha256"] if record.is_file() else None
+            for section, digest in (sections or {}).items():
                 hashes.setdefault(section, set()).add(digest)
-    return hashes
+    return sorted(section for section in one.keys() | other if one.get(section) != other.get(section))
 
 
-def _verdicts(folders: tuple[Path, Path]) -> list[dict]:
+def _verdicts(folders: Folders) -> list[dict]:
     """Return the printed numbers whose verdicts differ, where both runs were compared with the paper."""
-    compared = [page_comparison(folder / "comparison.csv") for folder in folders]
-    one, other = ({} if each is None else _rows_of(each) for each in compared)
+    one: dict[tuple[str, ...], dict] = {}
+    other: dict[tuple[str, ...], dict] = {}
+    for folder, rows in zip(folders, (one, other), strict=True):
+        compared = page_comparison(folder / "comparison.csv")
+        for table in compared["tables"] if compared else ():
+            rows |= {number_of(row): row for row in table["rows"]}
     return [
-        {
-            "table": key[0],
-            "row": key[1],
-            "column": key[2],
-            "published": row["published"],
-            "one": row,
-            "other": other[key],
-        }
+        {name: row[name] for name in ("table", "row", "column", "published")} | {"one": row, "other": other[key]}
         for key, row in one.items()
         if key in other and row["verdict"] != other[key]["verdict"]
-    ]
-
-
-def _rows_of(comparison: Mapping) -> dict[tuple[str, str, str], dict]:
-    rows = [row for table in comparison["tables"] for row in table["rows"]]
-    return {(row["table"], row["row"], row["column"]): row for row in rows}
-
-
-def _figures(folders: tuple[Path, Path], titles: Mapping[str, str], beside: Path) -> list[dict]:
-    """Return the figures of both runs: their titles, whether they are the same picture, and where each is."""
-    one, other = ({path.stem: path for path in folder.glob("figures/*.png")} for folder in folders)
-    shared = [name for name in titles if name in one.keys() & other] + sorted(
-        name for name in one.keys() & other if name not in titles
-    )
-    return [
-        {
-            "name": name,
-            "title": titles.get(name, name),
-            "same": one[name].read_bytes() == other[name].read_bytes(),
-            "paths": [relpath(path.resolve(), beside.resolve()) for path in (one[name], other[name])],
-        }
-        for name in shared
     ]

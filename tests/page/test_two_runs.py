@@ -6,8 +6,7 @@ import pytest
 
 from gpca.__main__ import main
 from gpca.errors import InputError
-from gpca.page.printed_table import read_number, read_printed_table
-from gpca.page.two_runs import compare_tables
+from gpca.page.two_runs import compare_tables, read_number, read_printed_table
 from gpca.reporting.tables.table import Cell, Column, Table
 from tests.page.small_run import Page
 
