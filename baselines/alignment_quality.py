@@ -14,14 +14,14 @@ import numpy as np
 from baselines.descriptors import CLOUDS, described, entry
 from gpca.attribution.scores import Attribution
 from gpca.causes.dataset import LABELS
+from gpca.causes.descriptors import EVERYTHING, Columns
 from gpca.causes.truth import NOMINAL
 from gpca.explainers.boosted_trees import boosted_trees
 from gpca.explainers.concept_classifier import standardized_regression
 from gpca.explainers.interface import ScoringExplainer
 from gpca.explainers.sight import Sees
-from gpca.features.entropy import ENTROPY
-from gpca.features.parts import EVERYTHING, Columns
 from gpca.pairs.dataset import Registrations
+from gpca.pairs.distances import ENTROPY
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.settings import Count, Positive
 

@@ -14,10 +14,10 @@ import numpy as np
 from baselines.descriptors import CLOUDS, WITH_RUNS, WITHOUT, described, entry
 from baselines.learned_pair import LearnedPairGPCA
 from gpca.causes.dataset import LABELS
+from gpca.causes.descriptors import EVERY, Columns
+from gpca.causes.settings import DescribedPoints
 from gpca.classifier.settings import GPCArguments
 from gpca.explainers.sight import Sees
-from gpca.features.parts import EVERY, Columns
-from gpca.features.settings import DescribedPoints
 from gpca.pairs.dataset import Registrations
 from gpca.settings import Count, PositiveShare
 

@@ -1,4 +1,4 @@
-"""Classifiers of causes on the descriptors of a pair (:mod:`gpca.features`): regressions on a few, trees on many.
+"""Classifiers of causes on descriptors of a pair (:mod:`gpca.causes.descriptors`): regressions or trees.
 
 ``pair_forest`` reads what needs no further registration than the runs that tell the spread: 52 distances, ICP's motion,
 fitness and spread. ``pair_boosting`` reads every descriptor. Names that end in ``_clouds`` see the two clouds alone,
@@ -13,13 +13,13 @@ from functools import partial
 import numpy as np
 
 from gpca.causes.dataset import LABELS
+from gpca.causes.descriptors import EVERY, EVERYTHING, RESIDUALS, Columns, seen
+from gpca.causes.settings import DENSITIES
 from gpca.classifier.settings import LearningRate
 from gpca.explainers.boosted_trees import boosted_trees
 from gpca.explainers.concept_classifier import ClassifierExplainer, standardized_regression
 from gpca.explainers.interface import ConceptExplainer, ExplainerEntry, attached
 from gpca.explainers.sight import Sees
-from gpca.features.parts import EVERY, EVERYTHING, RESIDUALS, Columns, seen
-from gpca.features.settings import DENSITIES
 from gpca.pairs.dataset import Registrations
 from gpca.seeds import seed_of
 from gpca.settings import Count, Positive
@@ -52,7 +52,7 @@ class DescriptorClassifier(ClassifierExplainer):
 
 
 def described(registrations: Registrations, sees: Sees, wanted: Columns = EVERYTHING) -> np.ndarray:
-    """Return the descriptors that are attached to the registrations, see :func:`gpca.features.parts.seen`."""
+    """Return the descriptors that are attached to the registrations, see :func:`gpca.causes.descriptors.seen`."""
     return seen({group: attached(registrations, group) for group in wanted}, sees, wanted)
 
 

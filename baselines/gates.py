@@ -12,9 +12,9 @@ import numpy as np
 
 from gpca.attribution.scores import Attribution
 from gpca.causes.dataset import LABELS
+from gpca.causes.settings import MOTION
 from gpca.causes.truth import NOMINAL
 from gpca.explainers.interface import ExplainerEntry, ScoringExplainer, attached
-from gpca.features.settings import MOTION
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 
@@ -69,7 +69,7 @@ class Gate(ScoringExplainer):
     """An alarm by one of the numbers of the motion.
 
     Args:
-        name: in :data:`gpca.features.settings.MOTION`.
+        name: in :data:`gpca.causes.settings.MOTION`.
         source, seed: not used; nothing is drawn.
     """
 

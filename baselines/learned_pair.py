@@ -9,10 +9,10 @@ from functools import partial
 import numpy as np
 
 from baselines.pair import CLOUDS, WITH_MOTION, WITHOUT, PairDescription
+from gpca.causes.settings import DescribedPoints
 from gpca.classifier.settings import GPCArguments
 from gpca.explainers.gpca import GPCA
 from gpca.explainers.interface import ExplainerEntry
-from gpca.features.settings import DescribedPoints
 from gpca.pairs.dataset import Registrations
 from gpca.settings import Count, PositiveShare
 
@@ -78,7 +78,7 @@ class LearnedPairGPCA(PairDescription, GPCA):
 
     def told(self, registrations: Registrations) -> np.ndarray:
         """Return what the encoder is told of the motion of ICP (N, M), the last of the relations."""
-        from gpca.features.registered import FIT, MOTION
+        from gpca.pairs.description import FIT, MOTION
 
         return self.features(registrations)[:, -(MOTION if self._motion else FIT) :]
 

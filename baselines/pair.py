@@ -1,7 +1,7 @@
 """Explainers that see the pair, both clouds and the motion of ICP or without it, and not the aligned source alone.
 
 `gpca_pair` is the paper's classifier with other eyes: a row of its own, never "GP-CA (paper)". What it reads does not
-depend on which object is registered (:func:`gpca.features.registered.relations`). `gpca_pair_clouds` is the same
+depend on which object is registered (:func:`gpca.pairs.description.relations`). `gpca_pair_clouds` is the same
 without how far ICP moved the cloud, which gives pose errors away where nothing else starts off. Beside them stand the
 plainest form of the same idea, a forest on distances, and a rival that knows only the density of the cloud.
 """
@@ -12,12 +12,12 @@ from functools import partial
 
 import numpy as np
 
+from gpca.causes.settings import DescribedPoints
 from gpca.classifier.settings import GPCArguments
 from gpca.explainers.concept_classifier import ClassifierExplainer, standardized_regression
 from gpca.explainers.gpca import DescriptorGPCA
 from gpca.explainers.interface import ExplainerEntry, measured
 from gpca.explainers.sight import Sees
-from gpca.features.settings import DescribedPoints
 from gpca.pairs.dataset import Registrations
 from gpca.seeds import seed_of
 from gpca.settings import Count, Positive
@@ -32,7 +32,7 @@ class PairDescription:
 
     Args:
         source, seed: name the draws from the clouds.
-        group: one of :data:`gpca.features.registered.WIDTHS`.
+        group: one of :data:`gpca.pairs.description.WIDTHS`.
         points: drawn from each cloud.
         motion: whether the relations tell how far ICP moved the cloud.
     """
@@ -46,7 +46,7 @@ class PairDescription:
 
     def describe(self, registrations: Registrations) -> Registrations:
         """Attach the descriptors, unless they are attached already."""
-        from gpca.features.registered import describe_registrations
+        from gpca.pairs.description import describe_registrations
 
         return measured(
             registrations,
@@ -56,7 +56,7 @@ class PairDescription:
 
     def features(self, registrations: Registrations) -> np.ndarray:
         """Return the group (N, F)."""
-        from gpca.features.registered import MOVED
+        from gpca.pairs.description import MOVED
 
         features_N_F = self.describe(registrations).attached[self._prefix + self._group]
         return features_N_F if self._motion else np.delete(features_N_F, MOVED, axis=1)

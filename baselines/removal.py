@@ -1,6 +1,6 @@
 """SHAP and sensitivity analysis over remedies: the cause whose remedy moves the result most is named.
 
-The worth is v̂, how far the result lies from that with all remedies (:mod:`gpca.features.remedied`). A remedy moves
+The worth is v̂, how far the result lies from that with all remedies (:mod:`gpca.causes.remedied`). A remedy moves
 every result a little, so its values are counted in standard deviations from their mean over the nominal samples. With
 all causes left alone, v̂ is the alarm that tells whether anything is wrong.
 """

@@ -54,8 +54,8 @@ def on_frames(explainer, options: argparse.Namespace) -> dict[str, float]:
 
     from gpca.alignment.canonical_frame import CanonicalFrame
     from gpca.alignment.rigid import inverse, transform
-    from gpca.features.motion import describe_motion
-    from gpca.features.settings import MOTION
+    from gpca.causes.descriptors import describe_motion
+    from gpca.causes.settings import MOTION
     from gpca.pairs.dataset import Registrations
     from gpca.process.progress import progress
 

@@ -103,11 +103,11 @@ STEPS = {  # module -> files that it depends on, and some that it does not
         {"gpca/explainers/interface.py", "gpca/encoders/training.py"},
     ),
     "gpca.experiments.new_concepts.step": (
-        {"gpca/causes/drawing.py", "gpca/features/dataset.py", "gpca/active_learning/new_concepts.py"},
+        {"gpca/causes/drawing.py", "gpca/causes/descriptors.py", "gpca/active_learning/new_concepts.py"},
         {"gpca/explainers/interface.py", "gpca/active_learning/stream.py"},
     ),
     "gpca.experiments.frame_labels.step": (
-        {"gpca/active_learning/retraining.py", "gpca/features/registered.py"},
+        {"gpca/active_learning/retraining.py", "gpca/pairs/description.py"},
         {"gpca/explainers/interface.py", "gpca/active_learning/stream.py", "gpca/frames/synthesis.py"},
     ),
     "gpca.steps.uncertainty": (

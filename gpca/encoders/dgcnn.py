@@ -65,7 +65,7 @@ class DGCNN(nn.Module):
 class PairDGCNN(nn.Module):
     """DGCNN on the points of both clouds of a registered pair, each with its membership (±1) as one more channel.
 
-    The features of the points are those of :func:`gpca.features.distances.describe_points`. The `motion` numbers of
+    The features of the points are those of :func:`gpca.pairs.distances.describe_points`. The `motion` numbers of
     ICP's motion are appended to the embedding.
     """
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal, get_args
 from gpca.errors import InputError
 
 if TYPE_CHECKING:
-    from gpca.features.settings import DescriptorSettings
+    from gpca.causes.settings import DescriptorSettings
 
 Part = Literal["source", "pair", "motion", "runs", "quick_remedies", "remedies", "reenactment", "truth"]
 PARTS: tuple[str, ...] = get_args(Part)

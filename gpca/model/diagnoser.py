@@ -18,19 +18,18 @@ from gpca.alignment.icp import ICPSettings
 from gpca.alignment.rigid import inverse, transform
 from gpca.alignment.twist import exp
 from gpca.causes.dataset import LABELS, Causes, labels_of
-from gpca.causes.settings import OBSERVED, CauseSettings, Moved
+from gpca.causes.descriptors import describe
+from gpca.causes.settings import GROUPS, OBSERVED, CauseSettings, DescriptorSettings, Moved
 from gpca.causes.shapley import ALL
 from gpca.causes.truth import BORDERLINE, LARGEST_ERROR, NOMINAL
 from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
 from gpca.explainers.pair_classifier import Judgment, PairClassifier
-from gpca.features.dataset import describe
-from gpca.features.pair import ObservedPair
-from gpca.features.settings import GROUPS, DescriptorSettings
 from gpca.guarantee.conformal import highest_level
 from gpca.guarantee.guarantee import Guarantee, calibrate
 from gpca.guarantee.states import states_of
 from gpca.model.diagnosis import Diagnosis, Guaranteed, Reenacted, state_probabilities
+from gpca.pairs.distances import ObservedPair
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reenactment.dataset import Reenactments, row_of
 from gpca.reenactment.enactment import Enactment, reenact

@@ -15,7 +15,8 @@ import torch
 from torch import nn
 
 from gpca.alignment.icp import ICPSettings
-from gpca.causes.settings import Moved
+from gpca.causes.descriptors import WIDTHS
+from gpca.causes.settings import DescriptorSettings, Moved
 from gpca.causes.truth import FAILED, NOMINAL
 from gpca.classifier.covariances import make_covariance
 from gpca.classifier.gpc import GPC
@@ -25,8 +26,6 @@ from gpca.encoders.tensor_file import read_tensors, require_like, write_tensors
 from gpca.errors import InputError
 from gpca.explainers.boosted_trees import require_trees
 from gpca.explainers.pair_classifier import ABSENT, PRESENT
-from gpca.features.dataset import WIDTHS
-from gpca.features.settings import DescriptorSettings
 from gpca.guarantee.conformal import Nonconformity
 from gpca.guarantee.guarantee import Guarantee
 from gpca.guarantee.states import STATES

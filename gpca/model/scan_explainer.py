@@ -24,7 +24,6 @@ from gpca.alignment.rigid import inverse, require_rigid, transform
 from gpca.causes.settings import OBSERVED, CauseSettings
 from gpca.causes.truth import FAILED, NOMINAL
 from gpca.errors import InputError
-from gpca.features.pair import ObservedPair
 from gpca.model.diagnosis import CHECK, Reenacted
 from gpca.model.explanation import NOT_SURE, ScanExplanation
 from gpca.model.scan_registration import Scans, in_voxels, voxel_size
@@ -32,6 +31,7 @@ from gpca.model.scene import Scene
 from gpca.objects.canonical import diameter
 from gpca.objects.mesh_folder import meters_per
 from gpca.objects.surface import as_points
+from gpca.pairs.distances import ObservedPair
 from gpca.recovery.policy import NOTHING, TREATMENTS
 from gpca.reenactment.enactment import Enactment
 from gpca.reenactment.hypotheses import INDEPENDENT, weights_of

@@ -18,7 +18,7 @@ from gpca.alignment.methods.registry import make_method
 from gpca.alignment.rigid import inverse, scale_translation, transform
 from gpca.alignment.twist import exp
 from gpca.errors import InputError
-from gpca.features.pair import ObservedPair
+from gpca.pairs.distances import ObservedPair
 from gpca.scans.pair import MOST_CELLS, voxels
 from gpca.seeds import generator, seed_of
 from gpca.uncertainty.settings import start_deviation

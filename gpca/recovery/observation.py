@@ -8,8 +8,8 @@ import numpy as np
 
 from gpca.alignment.pose_error import adds_error
 from gpca.alignment.rigid import inverse, rotation_angle_rad
-from gpca.features.distances import LocalPlanes
 from gpca.frames.shots import agreement, fuse
+from gpca.pairs.distances import LocalPlanes
 from gpca.recovery.actions import CLOUD_POINTS, MODEL_POINTS, Holding, Robot, search
 
 OBSERVED = (

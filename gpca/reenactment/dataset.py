@@ -11,13 +11,13 @@ import numpy as np
 from gpca.alignment.pose_error import displacements
 from gpca.alignment.rigid import transform
 from gpca.causes.dataset import LABELS, Causes
+from gpca.causes.descriptors import WIDTHS, describe_plainly, observed_pair
 from gpca.causes.settings import CauseSettings
 from gpca.causes.shapley import SUBSETS
-from gpca.features.dataset import WIDTHS, describe_plainly
-from gpca.features.pair import ObservedPair, observed_pair
 from gpca.io.arrays import TEXT, WHOLE
 from gpca.io.container import Container, array
 from gpca.pairs.dataset import Registrations
+from gpca.pairs.distances import ObservedPair
 from gpca.process.progress import progress
 from gpca.reenactment.enactment import Enactment, reenact
 from gpca.reenactment.hypotheses import weights_of
@@ -43,7 +43,7 @@ class Reenactments(Container):
         measured: (S, K, 8) the numbers of `MEASURED`: those of :class:`gpca.reenactment.hypotheses.Hypothesis`; the
             severities of noise, outliers and crop under it; and how far (root mean square, diameters) the observed
             points then lie from where the registration began, and from where it ended.
-        described: (S, F) the groups `DESCRIBED` of descriptors (:mod:`gpca.features`), side by side.
+        described: (S, F) the groups `DESCRIBED` of descriptors (:mod:`gpca.causes.descriptors`), side by side.
         verdict: (S, 4) of :func:`gpca.reenactment.verdict.verdict`.
     """
 

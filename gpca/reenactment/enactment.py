@@ -15,7 +15,7 @@ from gpca.causes.counterfactuals import Counterfactuals, Registrar, Unmeasurable
 from gpca.causes.settings import CauseSettings
 from gpca.causes.shapley import SUBSETS, shapley_values
 from gpca.causes.truth import LARGEST_ERROR
-from gpca.features.pair import ObservedPair
+from gpca.pairs.distances import ObservedPair
 from gpca.reenactment.hypotheses import Hypothesis, find_hypotheses
 from gpca.reenactment.observation import NoiseScale, observe
 from gpca.reenactment.rebuilding import rebuild

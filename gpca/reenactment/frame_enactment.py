@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from gpca.causes.dataset import Causes
+from gpca.causes.descriptors import observed_pair
 from gpca.causes.frames import subjects_of
 from gpca.causes.settings import CauseSettings
 from gpca.errors import InputError
-from gpca.features.pair import observed_pair
 from gpca.frames.camera import MeshScene
 from gpca.frames.instances import Instances
 from gpca.frames.starts import Starts

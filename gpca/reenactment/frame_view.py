@@ -12,9 +12,9 @@ from gpca.causes.candidate import Candidate
 from gpca.causes.frames import candidate_of_view, outline
 from gpca.causes.settings import FEWEST_POINTS
 from gpca.causes.subjects import Subject
-from gpca.features.pair import ObservedPair
 from gpca.frames.camera import MeshScene
 from gpca.frames.shots import MOST_PIXELS, CleanView, Sighting, clean_view, rendered_side
+from gpca.pairs.distances import ObservedPair
 from gpca.reenactment.surface import ModelSurface
 
 SURFACE_POINTS = 512  # of the whole object, in which the search looks for what was observed

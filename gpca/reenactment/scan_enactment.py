@@ -13,9 +13,10 @@ import numpy as np
 
 from gpca.alignment.rigid import inverse, transform
 from gpca.causes.dataset import Causes
+from gpca.causes.descriptors import observed_pair
 from gpca.causes.scan_candidate import OverlapErrors, ScanCandidate
 from gpca.causes.settings import FEWEST_POINTS, CauseSettings
-from gpca.features.pair import ObservedPair, observed_pair
+from gpca.pairs.distances import ObservedPair
 from gpca.pairs.perturbation import CONCEPTS, NOISE, OVERLAP, POSE
 from gpca.process.progress import progress
 from gpca.reenactment.dataset import Reenactments, row_of

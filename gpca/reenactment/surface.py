@@ -12,8 +12,8 @@ from scipy.spatial import cKDTree
 
 from gpca.alignment.icp_target import make_target
 from gpca.causes.truth import LARGEST_ERROR
-from gpca.features.distances import second_moments
 from gpca.objects.bop import find_symmetries
+from gpca.pairs.distances import second_moments
 from gpca.reenactment.surface_kernels import nearest_rows, surface_distances
 
 JUDGED = 256  # points over which an error is the mean

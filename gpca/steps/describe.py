@@ -5,8 +5,8 @@ from __future__ import annotations
 from gpca.alignment.icp import ICPSettings
 from gpca.attribution.predictions import read_timings, write_timings
 from gpca.causes.dataset import Causes
-from gpca.features.dataset import describe_all
-from gpca.features.settings import DescriptorSettings
+from gpca.causes.descriptors import describe_all
+from gpca.causes.settings import DescriptorSettings
 from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
 

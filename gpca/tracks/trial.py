@@ -15,6 +15,7 @@ from gpca.alignment.icp import ICPSettings
 from gpca.attribution.predictions import read_predictions
 from gpca.attribution.scores import Attribution
 from gpca.causes.dataset import Causes, labeled
+from gpca.causes.settings import DescriptorSettings
 from gpca.encoders.registry import EncoderSettings
 from gpca.errors import InputError
 from gpca.experiments.controls.protocol import ControlRun
@@ -28,7 +29,6 @@ from gpca.experiments.scan_causes.experiment import diagnosis_settings
 from gpca.experiments.scan_causes.settings import OBJECTS
 from gpca.explainers.interface import BARE, REENACTED, ExplainerEntry
 from gpca.explainers.registry import explainer_entry, require_settings
-from gpca.features.settings import DescriptorSettings
 from gpca.frames.source import REAL_WORLD
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.process.job import Job

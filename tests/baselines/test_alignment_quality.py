@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from gpca.causes.dataset import labeled
+from gpca.causes.descriptors import WIDTHS
+from gpca.causes.settings import GROUPS
 from gpca.causes.truth import BORDERLINE, NOMINAL
 from gpca.explainers.registry import CAUSES, explainer_entry
-from gpca.features.dataset import WIDTHS
-from gpca.features.settings import GROUPS
 
 
 @pytest.fixture(scope="module")

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from gpca.causes.dataset import LABELS, labeled
+from gpca.causes.descriptors import WIDTHS
+from gpca.causes.settings import DescriptorSettings
 from gpca.causes.truth import BORDERLINE
 from gpca.explainers.registry import CAUSES, explainer_entry
 from gpca.explainers.sight import icp_calls
-from gpca.features.dataset import WIDTHS
-from gpca.features.settings import DescriptorSettings
 
 NAMES = ("gpca_pair_dgcnn", "gpca_pair_dgcnn_clouds")
 TINY = {"points": 48, "draw_points": 24, "epochs": 6, "learning_rate": 0.1, "iterations": 100, "inducing": 16}

@@ -8,12 +8,11 @@ import pytest
 from baselines.gates import NominalThreshold
 from gpca.alignment.icp import ICPSettings
 from gpca.causes.dataset import LABELS, labeled
+from gpca.causes.descriptors import COLUMNS, describe_all
+from gpca.causes.settings import DescriptorSettings
 from gpca.causes.truth import BORDERLINE, NOMINAL
 from gpca.errors import InputError
 from gpca.explainers.registry import CAUSES, explainer_entry, explainer_module, explainers
-from gpca.features.dataset import describe_all
-from gpca.features.parts import COLUMNS
-from gpca.features.settings import DescriptorSettings
 
 FAST = {
     "gpca": {"learning_rate": 0.1, "iterations": 60, "inducing": 8, "draws": 50},

@@ -7,7 +7,7 @@ from baselines.gates import GATES, NominalThreshold, alarm
 from baselines.untrained import CAUSE_EXPLAINERS, EXPLAINERS
 from gpca.alignment.rigid import rigid_motion
 from gpca.causes.dataset import LABELS
-from gpca.features.settings import MOTION
+from gpca.causes.settings import MOTION
 from gpca.pairs.dataset import ragged
 from gpca.pairs.perturbation import CONCEPTS
 

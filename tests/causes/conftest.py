@@ -3,6 +3,7 @@
 import pytest
 
 from gpca.causes.subjects import read_subjects
+from tests.pairs.conftest import pair  # noqa: F401
 
 
 @pytest.fixture(scope="session")

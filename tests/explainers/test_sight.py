@@ -1,7 +1,7 @@
 import pytest
 
+from gpca.causes.settings import DescriptorSettings
 from gpca.explainers.sight import WORDS, icp_calls, in_words
-from gpca.features.settings import DescriptorSettings
 
 SETTINGS = DescriptorSettings(starts=3, restarts=8)
 

@@ -8,7 +8,7 @@ import pytest
 
 from gpca.alignment.rigid import transform
 from gpca.alignment.twist import exp
-from gpca.features.dataset import WIDTHS
+from gpca.causes.descriptors import WIDTHS
 from gpca.model.diagnoser import REENACTED, REMEDIED, Diagnoser
 from gpca.model.diagnosis import Diagnosis
 from gpca.model.file import FEATURE_COUNTS

@@ -9,9 +9,9 @@ import pytest
 from gpca import Explainer
 from gpca.alignment.rigid import inverse, transform
 from gpca.alignment.twist import exp
+from gpca.causes.descriptors import WIDTHS
 from gpca.classifier.settings import GPCSettings
 from gpca.explainers.pair_classifier import PairClassifier
-from gpca.features.dataset import WIDTHS
 from gpca.model.diagnoser import REMEDIED
 from gpca.model.diagnosis import ADVICE
 from gpca.recovery.policy import NOTHING, QUEUE, RecoveryPolicy, Thresholds

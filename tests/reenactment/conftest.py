@@ -7,7 +7,7 @@ from gpca.alignment.rigid import inverse, transform
 from gpca.causes.candidate import draw_candidate
 from gpca.causes.counterfactuals import Registrar
 from gpca.causes.settings import CauseSettings, CauseSeverities
-from gpca.features.pair import ObservedPair
+from gpca.pairs.distances import ObservedPair
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reenactment.surface import ModelSurface
 

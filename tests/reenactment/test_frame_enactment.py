@@ -7,11 +7,11 @@ import pytest
 
 from gpca.alignment.rigid import inverse, rotation_angle_rad, scale_translation
 from gpca.causes.dataset import LABELS
+from gpca.causes.descriptors import observed_pair
 from gpca.causes.frames import measure_frames, subjects_of
 from gpca.causes.settings import CauseSettings
 from gpca.causes.shapley import ALL, shapley_values
 from gpca.errors import InputError
-from gpca.features.pair import observed_pair
 from gpca.frames.dataset import meshes_of
 from gpca.reenactment.dataset import Reenactments
 from gpca.reenactment.frame_enactment import reenact_frames

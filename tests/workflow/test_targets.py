@@ -109,7 +109,7 @@ EDITS = {  # a module: what is made again where it has changed, and what is not
         "objects/coffee_cup objects/ycb registrations/coffee_cup predictions/coffee_cup objects_coffee_cup scenes",
         "kernels.csv",
     ),
-    "gpca/features/entropy.py": (
+    "gpca/causes/remedied.py": (
         "descriptors/ycb diagnoses/ycb/pair_forest estimates/ model.pt exchange/",
         "predictions causes/ recovery methods/",
     ),

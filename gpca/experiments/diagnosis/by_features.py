@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from gpca.attribution.predictions import write_predictions
 from gpca.causes.dataset import Causes, labeled
+from gpca.causes.settings import DescriptorSettings
 from gpca.experiments.diagnosis.step import explained, with_what_it_reads
 from gpca.explainers.registry import CAUSES, explainer_entry
-from gpca.features.settings import DescriptorSettings
 from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
 from gpca.seeds import seed_of_file

@@ -11,13 +11,13 @@ import numpy as np
 from gpca.attribution.predictions import read_timings, write_predictions, write_timings
 from gpca.attribution.scores import Attribution
 from gpca.causes.dataset import Causes, labeled
+from gpca.causes.descriptors import Descriptors
+from gpca.causes.settings import DescriptorSettings
 from gpca.causes.truth import BORDERLINE
 from gpca.errors import InputError
 from gpca.explainers.interface import BARE, REENACTED, ConceptExplainer, ExplainerEntry
 from gpca.explainers.registry import CAUSES, explainer_entry
 from gpca.explainers.sight import icp_calls
-from gpca.features.dataset import Descriptors
-from gpca.features.settings import DescriptorSettings
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.process.job import Job
 from gpca.process.provenance import record_provenance

@@ -11,10 +11,8 @@ from gpca.alignment.methods.interface import Outcome, Pair
 from gpca.alignment.rigid import inverse, rigid_motion, transform
 from gpca.alignment.twist import log
 from gpca.experiments.judge import Judge
-from gpca.features.distances import describe_distances
-from gpca.features.entropy import describe_entropy
-from gpca.features.pair import ObservedPair
 from gpca.objects.bop import symmetric_turn
+from gpca.pairs.distances import ObservedPair, describe_distances, describe_entropy
 from gpca.uncertainty.estimators.interface import Example, FailedEstimate, RegisteredPair, intrinsic_frame
 
 Moved = Literal["model", "observed"]  # which cloud the source is

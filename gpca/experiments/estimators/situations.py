@@ -14,13 +14,13 @@ from gpca.alignment.methods.registry import make_method
 from gpca.alignment.rigid import inverse, transform
 from gpca.causes.counterfactuals import candidate_of, surface_of
 from gpca.causes.dataset import Causes
+from gpca.causes.descriptors import observed_pair
 from gpca.causes.settings import CauseSettings
 from gpca.errors import InputError
 from gpca.experiments.estimators.examples import Moved, describe, example, true_twist, twists_or_none
 from gpca.experiments.estimators.references import Redraws, Reference, draw_twists
 from gpca.experiments.estimators.settings import KINDS, EstimatorPairSettings, Kind
 from gpca.experiments.judge import Judges
-from gpca.features.pair import observed_pair
 from gpca.objects.canonical import ObjectClouds
 from gpca.seeds import generator, seed_of
 from gpca.uncertainty.estimators.interface import Example, FailedEstimate, RegisteredPair

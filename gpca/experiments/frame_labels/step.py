@@ -12,8 +12,8 @@ from gpca.active_learning.rounds import Embedded, make_task
 from gpca.active_learning.settings import ALL_LABELS, ActiveLearningSettings
 from gpca.experiments.frame_labels.settings import PAIR, FrameLabelSettings, rounds_of
 from gpca.explainers.pair_classifier import NormalizedFeatures
-from gpca.features.registered import describe_registrations
 from gpca.pairs.dataset import Registrations, load_embeddings
+from gpca.pairs.description import describe_registrations
 from gpca.process.job import Job
 from gpca.process.progress import progress
 from gpca.process.provenance import record_provenance

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from gpca.causes.dataset import Causes, labeled
+from gpca.causes.descriptors import Descriptors
 from gpca.causes.truth import BORDERLINE
 from gpca.errors import InputError
 from gpca.experiments.guarantee.scored import Scored
-from gpca.features.dataset import Descriptors
 from gpca.guarantee.states import states_of
 from gpca.io.arrays import REGENERATE
 from gpca.io.names import Axes

@@ -9,13 +9,11 @@ import numpy as np
 
 from gpca.alignment.icp import ICPSettings
 from gpca.causes.dataset import LABELS, Causes, labels_of
+from gpca.causes.descriptors import WIDTHS, describe_motion, describe_starts, observed_pair
 from gpca.experiments.learning_curve.settings import GROUPS
-from gpca.features.dataset import WIDTHS
-from gpca.features.distances import describe_distances
-from gpca.features.motion import describe_motion, describe_starts
-from gpca.features.pair import observed_pair
 from gpca.io.arrays import TEXT
 from gpca.io.container import Container, array
+from gpca.pairs.distances import describe_distances
 from gpca.process.progress import progress
 
 

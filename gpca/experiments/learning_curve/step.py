@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from gpca.causes.dataset import LABELS, Causes, labels_of
+from gpca.causes.descriptors import Descriptors
 from gpca.experiments.learning_curve.curve import learning_curve
 from gpca.experiments.learning_curve.samples import Lessons
 from gpca.experiments.learning_curve.settings import GROUPS, CurveSettings
-from gpca.features.dataset import Descriptors
 from gpca.io.csv_file import write_csv
 from gpca.process.job import Job
 from gpca.process.provenance import record_provenance

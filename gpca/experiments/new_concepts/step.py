@@ -18,17 +18,16 @@ from gpca.active_learning.settings import (
 )
 from gpca.alignment.icp import ICPSettings
 from gpca.causes.dataset import LABELS, Causes, labels_of
+from gpca.causes.descriptors import Descriptors, describe_all
 from gpca.causes.drawing import draw_geometry
-from gpca.causes.settings import CauseSettings
+from gpca.causes.settings import GROUPS, CauseSettings, DescriptorSettings
 from gpca.causes.truth import BORDERLINE, GEOMETRY, NOMINAL
 from gpca.encoders.registry import EncoderSettings
 from gpca.encoders.training import embed, load_model
 from gpca.explainers.pair_classifier import NormalizedFeatures
-from gpca.features.dataset import Descriptors, describe_all
-from gpca.features.registered import describe_registrations
-from gpca.features.settings import GROUPS, DescriptorSettings
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations, read_embedding
+from gpca.pairs.description import describe_registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.job import Job
 from gpca.process.progress import progress

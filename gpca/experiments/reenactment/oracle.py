@@ -12,11 +12,12 @@ from gpca.attribution.scores import Attribution
 from gpca.causes.candidate import Candidate
 from gpca.causes.counterfactuals import candidate_of, surface_of
 from gpca.causes.dataset import LABELS, Causes
+from gpca.causes.descriptors import observed_pair
 from gpca.causes.settings import CauseSettings
 from gpca.errors import InputError
 from gpca.experiments.reenactment.knowledge import KNOWN
-from gpca.features.pair import ObservedPair, observed_pair
 from gpca.objects.canonical import ObjectClouds
+from gpca.pairs.distances import ObservedPair
 from gpca.pairs.perturbation import NOISE, OVERLAP, POSE
 from gpca.process.progress import progress
 from gpca.reenactment.enactment import Enactment, enact, reenact, register, start_twists

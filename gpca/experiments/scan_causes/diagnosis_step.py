@@ -19,6 +19,8 @@ import numpy as np
 from gpca.attribution.predictions import prediction_frame
 from gpca.attribution.scores import Attribution
 from gpca.causes.dataset import LABELS, Causes, labeled
+from gpca.causes.descriptors import Descriptors
+from gpca.causes.settings import DescriptorSettings
 from gpca.causes.truth import BORDERLINE
 from gpca.encoders.registry import EncoderSettings
 from gpca.errors import InputError
@@ -27,8 +29,6 @@ from gpca.experiments.scan_causes.settings import OBJECTS, ScanSamples
 from gpca.explainers.interface import REENACTED, ExplainerEntry
 from gpca.explainers.registry import CAUSES, explainer_entry
 from gpca.explainers.sight import icp_calls
-from gpca.features.dataset import Descriptors
-from gpca.features.settings import DescriptorSettings
 from gpca.io.csv_file import write_csv
 from gpca.pairs.dataset import Registrations
 from gpca.process.job import Job

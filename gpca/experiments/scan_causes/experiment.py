@@ -8,13 +8,13 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
+from gpca.causes.settings import DescriptorSettings
 from gpca.errors import with_key
 from gpca.experiments.experiment import Experiment, LeftOut, Names, Tidy
 from gpca.experiments.scan_causes.settings import ScanSamples
 from gpca.experiments.scans.settings import ChoiceSettings, TrialSettings
 from gpca.explainers.registry import CAUSES, explainer_entry, explainers, require_settings
 from gpca.explainers.sight import icp_calls
-from gpca.features.settings import DescriptorSettings
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.settings import Distinct, changes_of, fields_of
 

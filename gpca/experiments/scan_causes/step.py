@@ -8,15 +8,14 @@ import numpy as np
 
 from gpca.alignment.methods.registry import make_method
 from gpca.alignment.rigid import scale_translation
+from gpca.causes.descriptors import describe_all
 from gpca.causes.scan_candidate import motion_between
 from gpca.causes.scans import ScanStart, measure_scans
-from gpca.causes.settings import OBSERVED, CauseSettings
+from gpca.causes.settings import OBSERVED, CauseSettings, DescriptorSettings
 from gpca.experiments.scan_causes.samples import GlobalMethod, starts_of
 from gpca.experiments.scan_causes.settings import ScanSamples
 from gpca.experiments.scans.settings import TrialSettings, part
 from gpca.experiments.scans.trial import pair_to_register
-from gpca.features.dataset import describe_all
-from gpca.features.settings import DescriptorSettings
 from gpca.io.csv_file import write_csv
 from gpca.process.job import Job
 from gpca.process.provenance import record_provenance

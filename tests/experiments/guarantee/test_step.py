@@ -9,13 +9,13 @@ import pytest
 from gpca.attribution.predictions import prediction_frame, write_predictions
 from gpca.attribution.scores import Attribution
 from gpca.causes.dataset import LABELS
+from gpca.causes.descriptors import WIDTHS, Descriptors
+from gpca.causes.settings import GROUPS
 from gpca.causes.truth import BORDERLINE
 from gpca.errors import InputError
 from gpca.experiments.guarantee import step
 from gpca.experiments.guarantee.pool import parts_of, read_pool
 from gpca.experiments.guarantee.scored import Scored
-from gpca.features.dataset import WIDTHS, Descriptors
-from gpca.features.settings import GROUPS
 from gpca.guarantee.states import states_of
 from gpca.io.csv_file import write_csv
 from gpca.process.job import Job

@@ -8,8 +8,9 @@ import pytest
 from gpca.alignment.icp import ICPSettings
 from gpca.attribution.metrics import TIDY_COLUMNS
 from gpca.causes.dataset import LABELS
+from gpca.causes.descriptors import describe_all
 from gpca.causes.drawing import draw_further
-from gpca.causes.settings import CauseSettings
+from gpca.causes.settings import CauseSettings, DescriptorSettings
 from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
 from gpca.experiments.diagnosis.judged import CEILING
@@ -18,8 +19,6 @@ from gpca.experiments.learning_curve.figure import draw_learning_curve
 from gpca.experiments.learning_curve.learners import TITLES
 from gpca.experiments.learning_curve.samples import Lessons, describe_cheaply
 from gpca.experiments.learning_curve.settings import GROUPS, CurveSettings, labeled_samples
-from gpca.features.dataset import describe_all
-from gpca.features.settings import DescriptorSettings
 from gpca.io.csv_file import write_csv
 from tests.conftest import FEW_CAUSES
 

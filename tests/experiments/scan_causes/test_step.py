@@ -7,11 +7,11 @@ import pandas as pd
 import pytest
 
 from gpca.causes.dataset import Causes
+from gpca.causes.descriptors import Descriptors
 from gpca.causes.scans import GLOBAL, LADDER
 from gpca.experiments.scan_causes import step
 from gpca.experiments.scan_causes.samples import starts_of
 from gpca.experiments.scan_causes.settings import ScanSamples
-from gpca.features.dataset import Descriptors
 from gpca.process.job import Job
 from gpca.reenactment.dataset import Reenactments
 from gpca.scans.pair import Rung

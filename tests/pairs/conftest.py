@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from gpca.alignment.icp import ICPSettings
-from gpca.features.pair import ObservedPair
-from gpca.features.settings import DescriptorSettings
+from gpca.causes.settings import DescriptorSettings
+from gpca.pairs.distances import ObservedPair
 
 FEW = DescriptorSettings(starts=2, restarts=4, icp_points=128)
 ICP = ICPSettings()

@@ -7,13 +7,21 @@ import numpy as np
 from gpca.alignment.pose_error import displacements
 from gpca.alignment.rigid import inverse
 from gpca.alignment.twist import log
-from gpca.features.distances import CHANNELS, MatchedPair, describe_distances, describe_points, log_of_ratio
-from gpca.features.pair import ObservedPair
-from gpca.features.settings import QUANTILES
 from gpca.pairs.dataset import Registrations
+from gpca.pairs.distances import (
+    CHANNELS,
+    LEVELS,
+    MatchedPair,
+    ObservedPair,
+    describe_distances,
+    describe_points,
+    log_of_ratio,
+    observed_once,
+)
 from gpca.process.progress import progress
 from gpca.seeds import generator
 
+QUANTILES = len(LEVELS)
 SMALLEST = 1e-5  # diameters; nothing is nearer that could be told from zero
 COARSE = slice(0, QUANTILES, 3)  # five of the thirteen quantiles say as much of a relation
 WIDTHS = {"distances": 4 * QUANTILES, "relations": 35, "densities": 2}
@@ -26,10 +34,10 @@ MOVED = slice(-MOTION, -FIT)
 def describe_registrations(registrations: Registrations, *axes: object, points: int) -> dict[str, np.ndarray]:
     """Return the groups of `WIDTHS`, each (N, F), of N registrations, and the features of their points.
 
-    - distances: the 52 of :func:`gpca.features.distances.describe_distances`, in diameters.
+    - distances: the 52 of :func:`gpca.pairs.distances.describe_distances`, in diameters.
     - relations: what of a pair does not depend on which object it is (:func:`relations`).
     - densities: logarithms of spacing and extent of the observed cloud relative to the model's.
-    - points: (N, 2, points, 7) of :func:`gpca.features.distances.describe_points`.
+    - points: (N, 2, points, 7) of :func:`gpca.pairs.distances.describe_points`.
 
     Args:
         registrations: N of them.
@@ -43,23 +51,6 @@ def describe_registrations(registrations: Registrations, *axes: object, points: 
     groups = {name: np.array([row[name] for row in rows]).reshape(len(rows), width) for name, width in WIDTHS.items()}
     of_points = [row[POINTS] for row in rows]
     return groups | {POINTS: np.array(of_points, np.float32).reshape(len(rows), 2, points, CHANNELS)}
-
-
-def observed_once(registrations: Registrations, row: int, points: int, random: np.random.Generator) -> ObservedPair:
-    """Return the observed pair of a row, each cloud thinned to `points` points, with its one run of ICP."""
-    observed, model = (
-        cloud[np.sort(random.permutation(len(cloud))[:points])].astype(np.float64)
-        for cloud in (registrations.cloud(row), registrations.target(row))
-    )
-    return ObservedPair(
-        observed=observed,
-        model=model,
-        T_init=registrations.T_target_source("init", row) @ inverse(registrations.T_target_source("icp", row)),
-        T_runs=np.eye(4)[None],
-        fitness_n=registrations.fitness[[row]],
-        inlier_rmse_n=registrations.inlier_rmse[[row]],
-        axes=(),
-    )
 
 
 def _describe(pair: ObservedPair, points: int) -> dict[str, np.ndarray]:
@@ -85,7 +76,7 @@ def relations(pair: ObservedPair, distances: np.ndarray, planes: np.ndarray) -> 
 
     Args:
         pair: what was observed and its model.
-        distances, planes: what :func:`gpca.features.distances.describe_distances` says of it.
+        distances, planes: what :func:`gpca.pairs.distances.describe_distances` says of it.
     """
     to_model, to_observed, from_plane, thickness = distances.reshape(4, QUANTILES)[:, COARSE]
     from_observed_plane, cosine, model_thickness = planes[: 3 * QUANTILES].reshape(3, QUANTILES)[:, COARSE]

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gpca.features.registered import WIDTHS, describe_registrations
+from gpca.pairs.description import WIDTHS, describe_registrations
 
 
 @pytest.fixture(scope="module")

@@ -1,27 +1,72 @@
-"""Distances within a pair after ICP, and the local shape of its clouds: quantiles over the points.
+"""What two aligned clouds alone tell of their registration: distances, local planes, and entropies of the joint cloud.
 
-The first four groups of thirteen are the plainest that tell a registration's faults apart: how far the observed cloud
-lies from the model, the model from the observed cloud, the observed cloud from the model's local planes, and how thick
-the observed cloud is.
+The first four groups of thirteen distances are the plainest that tell a registration's faults apart: how far the
+observed cloud lies from the model, the model from the observed cloud, the observed cloud from the model's local planes,
+and how thick the observed cloud is.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from gpca.features.pair import ObservedPair
+from gpca.alignment.icp import ICPSettings, clipped_cost
+from gpca.alignment.rigid import inverse
+from gpca.pairs.dataset import Registrations
 
-if TYPE_CHECKING:
-    from gpca.features.pair import ObservedPair
-
-QUANTILES = np.array([0.01, *np.arange(1, 12) / 12, 0.99])  # the very ends belong to single points
-NEIGHBORS = 12  # so many span a local plane
+LEVELS = np.array([0.01, *np.arange(1, 12) / 12, 0.99])  # of quantiles; the very ends belong to single points
+NEIGHBORS = 12  # that span a local plane
 CHANNELS = 7
 LEAST = 0.02  # of the model's spacing, to which lengths are raised: a flat face is not infinitely thin
+RADII = (0.06, 0.12)  # diameters, of entropies: about the spacing of the sparsest clouds, and twice that
+FEWEST_NEIGHBORS = 4  # below this a covariance in space is singular
+ENTROPY_FLOOR = 1e-6  # squared diameters; a plane has no entropy otherwise
+ENTROPY = tuple(f"{what}_{radius:g}" for radius in RADII for what in ("joint", "apart", "difference", "measured"))
+
+
+@dataclass(frozen=True)
+class ObservedPair:
+    """The observed cloud and the model, both in the model's frame and in diameters.
+
+    Attributes:
+        observed: (N, 3) points, where ICP put them.
+        model: (M, 3).
+        T_init: 4×4, takes the observed cloud from where ICP put it back to where ICP started.
+        T_runs: (n, 4, 4), takes it from there to what ICP found from other starts; the first is the identity.
+        fitness_n, inlier_rmse_n: (n,) of these runs.
+        axes: name what is random in describing it.
+    """
+
+    observed: np.ndarray
+    model: np.ndarray
+    T_init: np.ndarray
+    T_runs: np.ndarray
+    fitness_n: np.ndarray
+    inlier_rmse_n: np.ndarray
+    axes: tuple
+
+    def cost_n(self, icp: ICPSettings) -> np.ndarray:
+        """Return the mean squared distance of each run (n,), cut off at the correspondence distance."""
+        return clipped_cost(self.fitness_n, self.inlier_rmse_n, icp.correspondence_distance)
+
+
+def observed_once(registrations: Registrations, row: int, points: int, random: np.random.Generator) -> ObservedPair:
+    """Return the observed pair of a row, each cloud thinned to `points` points, with its one run of ICP."""
+    observed, model = (
+        cloud[np.sort(random.permutation(len(cloud))[:points])].astype(np.float64)
+        for cloud in (registrations.cloud(row), registrations.target(row))
+    )
+    return ObservedPair(
+        observed=observed,
+        model=model,
+        T_init=registrations.T_target_source("init", row) @ inverse(registrations.T_target_source("icp", row)),
+        T_runs=np.eye(4)[None],
+        fitness_n=registrations.fitness[[row]],
+        inlier_rmse_n=registrations.inlier_rmse[[row]],
+        axes=(),
+    )
 
 
 @dataclass(frozen=True)
@@ -121,8 +166,8 @@ def describe_distances(pair: ObservedPair, matched: MatchedPair | None = None) -
     distances = [matched.to_model_N, matched.to_observed_M, matched.plane_N, observed.thickness]
     shapes = [matched.plane_M, matched.cosine_N, model.thickness]
     return (
-        np.concatenate([np.quantile(values, QUANTILES) for values in distances]),
-        np.concatenate([*(np.quantile(values, QUANTILES) for values in shapes), spacings, extents, counts]),
+        np.concatenate([np.quantile(values, LEVELS) for values in distances]),
+        np.concatenate([*(np.quantile(values, LEVELS) for values in shapes), spacings, extents, counts]),
     )
 
 
@@ -159,3 +204,41 @@ def describe_points(pair: ObservedPair, matched: MatchedPair, points: int) -> np
 def log_of_ratio(lengths: np.ndarray, to: np.ndarray | float, spacing: float) -> np.ndarray:
     """Return the logarithm of a ratio of lengths, none of which counts as less than `LEAST` of the model's spacing."""
     return np.log(np.maximum(lengths, LEAST * spacing)) - np.log(np.maximum(to, LEAST * spacing))
+
+
+def describe_entropy(pair: ObservedPair) -> np.ndarray:
+    """Return `ENTROPY`.
+
+    At each radius the mean entropy (nats) of the points joint and apart, their difference, and the share of the points
+    that have enough neighbors for it.
+    """
+    joint = np.concatenate([pair.observed, pair.model])
+    described: list[float] = []
+    for radius in RADII:
+        own_N = np.concatenate([_entropies(cloud, radius) for cloud in (pair.observed, pair.model)])
+        joint_N = _entropies(joint, radius)
+        measured_N = np.isfinite(own_N)
+        if not measured_N.any():
+            described += [0.0, 0.0, 0.0, 0.0]
+            continue
+        means = joint_N[measured_N].mean(), own_N[measured_N].mean()
+        described += [*means, means[0] - means[1], measured_N.mean()]
+    return np.array(described)
+
+
+def _entropies(points: np.ndarray, radius: float) -> np.ndarray:
+    """Return ½ ln |2πe (Σ + εI)| (N,) of the points within a radius of each; NaN where there are too few."""
+    pairs = cKDTree(points).query_pairs(radius, output_type="ndarray")
+    itself = np.arange(len(points))
+    rows, columns = (np.concatenate([pairs[:, i], pairs[:, 1 - i], itself]) for i in (0, 1))
+    count_N = np.bincount(rows, minlength=len(points)).astype(float)
+    sums_N_3 = [np.bincount(rows, points[columns, i], len(points)) for i in range(3)]
+    offset_P_3 = points[columns] - (np.column_stack(sums_N_3) / count_N[:, None])[rows]
+    moments_N_3_3 = np.empty((len(points), 3, 3))
+    for i, j in np.ndindex(3, 3):
+        moments_N_3_3[:, i, j] = np.bincount(rows, offset_P_3[:, i] * offset_P_3[:, j], len(points)) / count_N
+    enough_N = count_N >= FEWEST_NEIGHBORS
+    entropy_N = np.full(len(points), np.nan)
+    determinants = np.linalg.slogdet(2 * np.pi * np.e * (moments_N_3_3[enough_N] + ENTROPY_FLOOR * np.eye(3)))[1]
+    entropy_N[enough_N] = 0.5 * determinants
+    return entropy_N

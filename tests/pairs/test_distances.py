@@ -3,22 +3,35 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gpca.features.distances import CHANNELS, QUANTILES, LocalPlanes, MatchedPair, describe_distances, describe_points
-from gpca.features.registered import observed_once
-from gpca.features.settings import QUANTILES as COUNT
+from gpca.causes.settings import QUANTILES
+from gpca.pairs.distances import (
+    CHANNELS,
+    ENTROPY,
+    ENTROPY_FLOOR,
+    FEWEST_NEIGHBORS,
+    LEVELS,
+    RADII,
+    LocalPlanes,
+    MatchedPair,
+    _entropies,
+    describe_distances,
+    describe_entropy,
+    describe_points,
+    observed_once,
+)
 from gpca.seeds import generator
-from tests.features.conftest import moved
+from tests.pairs.conftest import moved
 
-MIDDLE = COUNT // 2
+MIDDLE = QUANTILES // 2
 
 
 def groups(pair):
     """The four distances, each by its quantiles."""
-    return describe_distances(pair)[0].reshape(4, COUNT)
+    return describe_distances(pair)[0].reshape(4, QUANTILES)
 
 
 def test_there_are_52_distances_in_rising_quantiles(pair):
-    assert len(QUANTILES) == COUNT
+    assert len(LEVELS) == QUANTILES
     assert (np.diff(groups(pair), axis=1) >= 0).all()
 
 
@@ -42,7 +55,7 @@ def test_a_shift_along_a_plane_leaves_the_distance_from_it():
     planes = LocalPlanes.of(grid)
     assert np.abs(planes.normals) == pytest.approx(np.tile([0, 0, 1], (400, 1)), abs=1e-6)
     assert planes.thickness == pytest.approx(0, abs=1e-7)
-    from gpca.features.pair import ObservedPair
+    from gpca.pairs.distances import ObservedPair
 
     flat = ObservedPair(grid, grid, np.eye(4), np.eye(4)[None], np.ones(1), np.zeros(1), ())
     along, across = groups(moved(flat, [0.02, 0, 0])), groups(moved(flat, [0, 0, 0.02]))
@@ -93,3 +106,29 @@ def test_a_cloud_of_fewer_points_repeats_some(sparse_pair):
     few = told(replace(sparse_pair, observed=sparse_pair.observed[:40]))
     assert np.array_equal(few[0, 40:80], few[0, :40])
     assert len(np.unique(few[1, :, :3], axis=0)) == 96
+
+
+def entropy(pair):
+    return dict(zip(ENTROPY, describe_entropy(pair), strict=True))
+
+
+def test_the_entropy_of_a_point_is_that_of_its_neighbors_covariance():
+    points = np.random.default_rng(0).uniform(size=(200, 3))
+    found = _entropies(points, 0.2)
+    for i in range(0, 200, 17):
+        near = points[np.linalg.norm(points - points[i], axis=1) <= 0.2]
+        if len(near) < FEWEST_NEIGHBORS:
+            assert np.isnan(found[i])
+        else:
+            covariance = np.cov(near, rowvar=False, bias=True) + ENTROPY_FLOOR * np.eye(3)
+            assert found[i] == pytest.approx(0.5 * np.log(np.linalg.det(2 * np.pi * np.e * covariance)))
+
+
+def test_clouds_that_do_not_lie_on_each_other_blur_when_joined(pair):
+    name = f"difference_{RADII[-1]:g}"
+    assert entropy(moved(pair, [0.04, 0, 0]))[name] > entropy(pair)[name]
+
+
+def test_points_without_neighbors_have_none(pair):
+    far = replace(pair, observed=100 * pair.observed, model=100 * pair.model)
+    assert set(describe_entropy(far)) == {0.0}

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-import gpca.features.remedied as module
+import gpca.causes.remedied as module
 from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.rigid import inverse, transform
+from gpca.causes.remedied import NOISE, OVERLAP, POSE, describe_remedied
+from gpca.causes.settings import REMEDIED, DescriptorSettings
 from gpca.causes.shapley import ALL
-from gpca.features.remedied import NOISE, OVERLAP, POSE, describe_remedied
-from gpca.features.settings import REMEDIED, DescriptorSettings
-from tests.features.conftest import FEW, ICP
+from tests.pairs.conftest import FEW, ICP
 
 
 def remedied(pair):

@@ -18,17 +18,17 @@ from gpca.alignment.icp import ICPSettings, clipped_cost
 from gpca.alignment.pose_error import displacements
 from gpca.alignment.rigid import inverse, inverses
 from gpca.alignment.twist import exp
+from gpca.causes.settings import DescriptorSettings
 from gpca.causes.shapley import SUBSETS, shapley_values
 from gpca.causes.truth import LARGEST_ERROR
-from gpca.features.pair import ObservedPair
-from gpca.features.settings import DescriptorSettings
+from gpca.pairs.distances import ObservedPair
 from gpca.pairs.perturbation import NOISE, OVERLAP, POSE
 from gpca.seeds import generator
 from gpca.uncertainty.remedies import denoise
 
 
 def describe_remedied(pair: ObservedPair, settings: DescriptorSettings, icp: ICPSettings) -> np.ndarray:
-    """Return the numbers of :data:`gpca.features.settings.REMEDIED`.
+    """Return the numbers of :data:`gpca.causes.settings.REMEDIED`.
 
     For each subset of the causes that are left alone: v̂ in diameters; after the Shapley values of v̂, how far the best
     result moves the observed cloud from where it lies, and the best result's cost (squared diameters) and fitness.

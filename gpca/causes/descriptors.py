@@ -1,0 +1,200 @@
+"""Descriptors of registered pairs in groups, the file that holds them, and what has to be seen for each."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from time import perf_counter
+
+import numpy as np
+
+from gpca.alignment.icp import ICPSettings
+from gpca.alignment.pose_error import displacements
+from gpca.alignment.rigid import inverse, scale_translation
+from gpca.alignment.twist import log
+from gpca.causes.dataset import Causes
+from gpca.causes.remedied import describe_remedied
+from gpca.causes.settings import DENSITIES, GROUPS, MOTION, QUANTILES, REMEDIED, DescriptorSettings
+from gpca.causes.shapley import SUBSETS
+from gpca.io.arrays import TEXT, WHOLE
+from gpca.io.container import Container, array
+from gpca.pairs.distances import ENTROPY, ObservedPair, describe_distances, describe_entropy
+from gpca.pairs.perturbation import POSE
+from gpca.process.progress import progress
+
+SPREAD_FLOOR = 1e-4  # of the spread's variances, as in the truth (docs/causes.md)
+SMALLEST_COST = 1e-9  # squared diameters
+QUARTERS = (0.25, 0.5, 0.75, 1.0)
+ENDS = (0.0, 0.5, 1.0)
+STARTS = (
+    *("cost", "best_cost", "gain", "log_gain", "to_best", "mean_displacement"),
+    *(f"displacement_{quantile:g}" for quantile in QUARTERS),
+    "cost_deviation",
+    *(f"fitness_{quantile:g}" for quantile in ENDS),
+    *(f"inlier_rmse_{quantile:g}" for quantile in ENDS),
+)
+
+Columns = Mapping[str, slice | list[int]]  # group -> those of its columns
+EVERY = slice(None)
+EVERYTHING: Columns = dict.fromkeys(GROUPS, EVERY)
+# Every other quantile of the three distances, and all of the motion.
+RESIDUALS: Columns = {"distances": slice(0, 3 * QUANTILES, 2), "motion": EVERY}
+
+_MOVED, _FIT, _SPREAD = MOTION[:3], MOTION[3:5], MOTION[5:]
+_QUICK = [
+    name
+    for name in REMEDIED
+    if name in ("outliers", "smoothed")
+    # The errors of the others are relative to the result with all remedies, a restart among them.
+    or name in [f"{what}_{i}" for what in ("moved", "cost", "fitness") for i, of in enumerate(SUBSETS) if POSE in of]
+]
+COLUMNS: Mapping[str, Columns] = {
+    # The observed cloud's thickness, spacing, extent and number of points.
+    "source": {"distances": slice(3 * QUANTILES, None), "planes": DENSITIES[::2]},
+    "pair": {"distances": EVERY, "planes": EVERY, "entropy": EVERY, "motion": [MOTION.index(name) for name in _FIT]},
+    "motion": {"motion": [MOTION.index(name) for name in _MOVED]},
+    "runs": {"motion": [MOTION.index(name) for name in _SPREAD], "starts": EVERY},
+    "quick_remedies": {"remedied": [REMEDIED.index(name) for name in _QUICK]},
+    "remedies": {"remedied": EVERY},
+}
+
+
+@dataclass(frozen=True)
+class Descriptors(Container):
+    """The descriptors of S registrations.
+
+    Attributes:
+        sample, split: (S,) as in the registrations.
+        distances, planes, motion, starts, remedied, entropy: (S, F) groups; see the functions that
+            describe them.
+    """
+
+    sample: np.ndarray = array("S", WHOLE)
+    split: np.ndarray = array("S", TEXT)
+    distances: np.ndarray = array(f"S {4 * QUANTILES}")
+    planes: np.ndarray = array(f"S {3 * QUANTILES + len(DENSITIES)}")
+    motion: np.ndarray = array(f"S {len(MOTION)}")
+    starts: np.ndarray = array(f"S {len(STARTS)}")
+    remedied: np.ndarray = array(f"S {len(REMEDIED)}")
+    entropy: np.ndarray = array(f"S {len(ENTROPY)}")
+
+    @property
+    def groups(self) -> dict[str, np.ndarray]:
+        """The descriptors (S, F) by group."""
+        return {name: getattr(self, name) for name in GROUPS}
+
+
+WIDTHS = {name: int(Descriptors.array_fields()[name].shape[1]) for name in GROUPS}
+
+
+def observed_pair(causes: Causes, row: int, *axes: object) -> ObservedPair:
+    """Return what may be seen of a row; its draws are named by the axes, its split and its number."""
+    registrations, diameter_m = causes.registrations, causes.registrations.diameter_m[row]
+    T_back = inverse(registrations.T_target_source("icp", row))
+    runs_n = [scale_translation(T, 1 / diameter_m) @ T_back for T in causes.T_target_source_runs[row]]
+    return ObservedPair(
+        observed=registrations.cloud(row).astype(np.float64),
+        model=registrations.target(row).astype(np.float64),
+        T_init=registrations.T_target_source("init", row) @ T_back,
+        T_runs=np.array(runs_n),
+        fitness_n=causes.fitness_runs[row],
+        inlier_rmse_n=causes.inlier_rmse_runs[row],
+        axes=(*axes, registrations.split[row], registrations.sample[row]),
+    )
+
+
+def describe_motion(pair: ObservedPair) -> np.ndarray:
+    """Return the numbers of :data:`gpca.causes.settings.MOTION`, in radians and diameters.
+
+    Angle, length and displacement from the initial pose; the fit; and the spread of the runs from other starts.
+    """
+    moved = log(inverse(pair.T_init)[None])[0]
+    covariance = np.cov(log(pair.T_runs), rowvar=False)
+    variance_6 = np.diag(covariance)
+    return np.array(
+        [
+            np.sqrt(np.square(moved[:3]).sum()),
+            np.sqrt(np.square(moved[3:]).sum()),
+            displacements(pair.T_init[None], pair.observed)[0],
+            pair.fitness_n[0],
+            pair.inlier_rmse_n[0],
+            np.sqrt(variance_6[:3].sum()),
+            np.sqrt(variance_6[3:].sum()),
+            np.linalg.slogdet(covariance + SPREAD_FLOOR * np.eye(6))[1],
+        ]
+    )
+
+
+def describe_starts(pair: ObservedPair, icp: ICPSettings) -> np.ndarray:
+    """Return `STARTS`: whether another start ends elsewhere, and fits better there."""
+    cost_n = pair.cost_n(icp)
+    best = cost_n.argmin()
+    moved_n = displacements(pair.T_runs, pair.observed)
+    return np.array(
+        [
+            cost_n[0],
+            cost_n[best],
+            cost_n[0] - cost_n[best],
+            np.log(max(cost_n[0], SMALLEST_COST) / max(cost_n[best], SMALLEST_COST)),
+            moved_n[best],
+            moved_n.mean(),
+            *np.quantile(moved_n, QUARTERS),
+            cost_n.std(),
+            *np.quantile(pair.fitness_n, ENDS),
+            *np.quantile(pair.inlier_rmse_n, ENDS),
+        ]
+    )
+
+
+def describe_plainly(pair: ObservedPair, icp: ICPSettings) -> dict[str, np.ndarray]:
+    """Return the groups of a pair that are quick to measure: distances, planes, motion and starts."""
+    distances, planes = describe_distances(pair)
+    return {
+        "distances": distances,
+        "planes": planes,
+        "motion": describe_motion(pair),
+        "starts": describe_starts(pair, icp),
+    }
+
+
+def describe(pair: ObservedPair, settings: DescriptorSettings, icp: ICPSettings) -> tuple[dict[str, np.ndarray], float]:
+    """Return every group of a pair, and the seconds that its registrations with remedies took."""
+    described = describe_plainly(pair, icp) | {"entropy": describe_entropy(pair)}
+    started = perf_counter()
+    described["remedied"] = describe_remedied(pair, settings, icp)
+    return described, perf_counter() - started
+
+
+def describe_all(
+    causes: Causes, source: str, seed: int, settings: DescriptorSettings, icp: ICPSettings
+) -> tuple[Descriptors, np.ndarray, np.ndarray]:
+    """Return the descriptors of every row, the seconds (S,) that each took, and those of its registrations."""
+    rows, seconds, icp_seconds = [], [], []
+    for row in progress(range(len(causes)), f"descriptors of {source}, seed {seed}"):
+        started = perf_counter()
+        described, remedies = describe(observed_pair(causes, row, source, seed, "descriptors"), settings, icp)
+        rows.append(described)
+        seconds.append(perf_counter() - started)
+        icp_seconds.append(remedies)
+    registrations = causes.registrations
+    groups = {name: np.array([described[name] for described in rows]) for name in GROUPS}
+    all_described = Descriptors(registrations.sample, registrations.split, **groups, axes=registrations.axes)
+    return all_described, np.array(seconds), np.array(icp_seconds)
+
+
+def seen(arrays: Mapping[str, np.ndarray], sees: Collection[str], wanted: Columns = EVERYTHING) -> np.ndarray:
+    """Return the wanted descriptors that these parts show, side by side (N, F) in the order of `GROUPS`.
+
+    Args:
+        arrays: group -> (N, F).
+        sees: keys of `COLUMNS`.
+        wanted: the columns of each group in question.
+    """
+    chosen = []
+    for group in (name for name in GROUPS if name in wanted):
+        array_N_F = arrays[group]
+        numbers_F = np.arange(array_N_F.shape[1])
+        shown = [numbers_F[COLUMNS[part][group]] for part in sees if group in COLUMNS[part]]
+        if shown:
+            chosen.append(array_N_F[:, np.intersect1d(numbers_F[wanted[group]], np.concatenate(shown))])
+    return np.hstack(chosen)
