@@ -30,10 +30,14 @@ from gpca.io.limits import LARGEST_FILE_BYTES, is_bounded, require_file
 from gpca.io.structured_text import read_json
 
 TIMEOUT_S = 30
-# A server that sends a byte now and then would keep a run waiting for ever. After a minute a download has to have come
-# at 10 kB/s on average, a fifth of what a modem did; the largest that the suite knows of has 15 GB.
+# A server that sends a byte now and then would keep a run waiting forever. After a minute, the average rate has to be
+# 10 kB/s, a fifth of a modem's; the largest known download has 15 GB.
 GRACE_S, SLOWEST_BYTES_PER_S = 60, 10_000
 LARGEST_DOWNLOAD_BYTES = 10**11
+LARGEST_UNPACKED_BYTES = 20 * 10**9  # the largest archive of the BOP benchmark unpacks to somewhat less
+LONGEST_HEADER = 2**20  # bytes before a member, such as its long name; tarfile reads them as a whole
+REMEDY = "delete it and fetch it again, or check the url"
+_DAMAGE = (tarfile.TarError, zipfile.BadZipFile, gzip.BadGzipFile, EOFError, zlib.error, NotImplementedError)
 
 
 def fetch(url: str, sha256: str | None, folder: str | Path, location: str | None = None) -> Path:
@@ -52,7 +56,8 @@ def fetch(url: str, sha256: str | None, folder: str | Path, location: str | None
         return path
     print(f"downloading {url} to {path}", file=sys.stderr)
     with whole_file(path) as partial:
-        _download(url, partial, _remedy(path, location))
+        remedy = f"set data_dir to a folder that contains {location or 'the data'}, or download it by hand to {path}"
+        _download(url, partial, remedy)
         actual = _check(partial, sha256, url, "the download was removed; try again, or correct sha256 in the config")
     if sha256 is None:
         print(f"sha256 of {url}: {actual} (pin it in the config)", file=sys.stderr)
@@ -82,27 +87,15 @@ def _download(url: str, path: Path, remedy: str) -> None:
     import requests
 
     download = pooch.HTTPDownloader(progressbar=True, chunk_size=1 << 16, timeout=TIMEOUT_S)
-    try:
-        _within_limits(lambda: download(url, str(path), None), url, path, remedy)
-    except requests.exceptions.HTTPError as fault:
-        answer = str(fault) if fault.response is None else f"{fault.response.status_code} {fault.response.reason}"
-        raise InputError(url, f"cannot be fetched: the server answered {answer}", remedy) from fault
-    except (requests.exceptions.ConnectionError, requests.exceptions.Timeout) as fault:
-        raise InputError(url, "cannot be reached", remedy) from fault
-    except requests.exceptions.RequestException as fault:
-        raise InputError(url, f"the transfer was interrupted ({type(fault).__name__})", remedy) from fault
-
-
-def _within_limits(download: Callable[[], object], url: str, path: Path, remedy: str) -> None:
-    """Run a download in a daemon thread; InputError where the file grows too slowly or becomes too large."""
-    faults = []
+    faults: list[BaseException] = []
 
     def run() -> None:
         try:
-            download()
+            download(url, str(path), None)
         except BaseException as fault:
             faults.append(fault)
 
+    # In a thread that ends with the process, so that a download that is too slow or too large can be left to itself.
     thread = Thread(target=run, daemon=True)
     started = monotonic()
     thread.start()
@@ -113,18 +106,16 @@ def _within_limits(download: Callable[[], object], url: str, path: Path, remedy:
             raise InputError(url, f"sent {size} bytes in {monotonic() - started:.0f} s, which is too slow", remedy)
         if size > LARGEST_DOWNLOAD_BYTES:
             raise InputError(url, f"sends more than {LARGEST_DOWNLOAD_BYTES} bytes", remedy)
-    if faults:
-        raise faults[0]
-
-
-def _remedy(path: Path, location: str | None) -> str:
-    return f"set data_dir to a folder that contains {location or 'the data'}, or download it by hand to {path}"
-
-
-LARGEST_UNPACKED_BYTES = 20 * 10**9  # the largest archive of the BOP benchmark unpacks to somewhat less
-LONGEST_HEADER = 2**20  # bytes of what comes before a member, such as its long name; tarfile reads it as a whole
-REMEDY = "delete it and fetch it again, or check the url"
-_DAMAGE = (tarfile.TarError, zipfile.BadZipFile, gzip.BadGzipFile, EOFError, zlib.error, NotImplementedError)
+    try:
+        if faults:
+            raise faults[0]
+    except requests.exceptions.HTTPError as fault:
+        answer = str(fault) if fault.response is None else f"{fault.response.status_code} {fault.response.reason}"
+        raise InputError(url, f"cannot be fetched: the server answered {answer}", remedy) from fault
+    except (requests.exceptions.ConnectionError, requests.exceptions.Timeout) as fault:
+        raise InputError(url, "cannot be reached", remedy) from fault
+    except requests.exceptions.RequestException as fault:
+        raise InputError(url, f"the transfer was interrupted ({type(fault).__name__})", remedy) from fault
 
 
 @dataclass(frozen=True)
@@ -207,7 +198,7 @@ def _write(member: Member, target: Path) -> str:
 def _require_listed(folder: Path, listed: Path) -> None:
     remedy = f"remove {folder} and {listed.name} beside it, and the archive will be unpacked again"
     expected = read_json(listed, "a list of files", remedy)
-    # What a desktop leaves in a folder that somebody looked at begins with a dot; no reader takes it for data.
+    # Desktops leave files that begin with a dot; no reader takes them for data.
     present = {str(file.relative_to(folder)) for file in folder.rglob("*") if file.is_file() or file.is_symlink()}
     for name in sorted({*expected, *(name for name in present if not Path(name).name.startswith("."))}):
         if name not in present:
@@ -281,7 +272,7 @@ def _tarred(archive: tarfile.TarFile) -> Iterator[Entry]:
     for info in archive:
         fault = "" if info.isreg() or info.isdir() else "a link or a device"
         yield info.name, info.size, fault, partial(archive.extractfile, info) if info.isreg() else None
-    # tarfile takes a tar that is cut between two members, or a damaged header, for the end: a whole one ends in zeros.
+    # tarfile takes a cut between two members, or a damaged header, for the end; a whole tar ends in zeros.
     archive.fileobj.seek(archive.offset)
     if archive.fileobj.read(tarfile.BLOCKSIZE) != bytes(tarfile.BLOCKSIZE):
         raise tarfile.ReadError("no end marker")

@@ -79,10 +79,10 @@ def read_surface(path: Path, scale: float) -> Surface:
     require_file(path, "no such file", remedy)
     try:
         require_whole(path)
-        import trimesh  # here, since a file that is refused above needs none of it
+        import trimesh
 
         # Unprocessed: processing would drop NaN vertices and merge others in silence.
-        with np.errstate(all="ignore"):  # numbers that overflow are found below
+        with np.errstate(all="ignore"):  # overflows are found below
             loaded = trimesh.load(path, process=False, skip_materials=True, fix_texture=False)
         if isinstance(loaded, trimesh.Scene) and loaded.geometry:  # an OBJ with several materials
             loaded = loaded.to_mesh()
@@ -134,13 +134,13 @@ def _require_equal_lists(loaded) -> None:
 OFF_VERTEX_COLUMNS = (3, 6, 7)  # coordinates, alone or with a color
 OFF_COLOR_COLUMNS = (0, 1, 3, 4)  # of a face
 OBJ_VERTEX_COLUMNS = (3, 4, 6, 7)  # coordinates, alone, with a weight, with a color, with both
-# An exporter writes the vertices that its faces use. Of a file that ends early, more are left over than a modeler
-# leaves behind; an OBJ says in no other way how many faces it should have.
+# Exporters write the vertices that their faces use. A file that ends early leaves more unused than a modeler does; an
+# OBJ states its number of faces in no other way.
 LARGEST_UNUSED_SHARE = 0.1
 # Text takes a hundred times as long to parse as numbers in binary. A scan of a million triangles has 80 MB of text.
 LARGEST_TEXT_BYTES = 250 * 10**6
-LONGEST_LINE = 2**20  # bytes; what has longer ones is no text
-CORNERS = (b"vertex_index", b"vertex_indices")  # what the corners of a face are called in PLY
+LONGEST_LINE = 2**20  # bytes; a file with longer ones is not text
+CORNERS = (b"vertex_index", b"vertex_indices")  # names of the corners of a face in PLY
 PLY_FORMATS = (b"ascii", b"binary_little_endian", b"binary_big_endian")
 STL_FACET = (b"facet normal", b"outer loop", b"vertex", b"vertex", b"vertex", b"endloop", b"endfacet")
 STL_NUMBERS = {b"facet normal": 3, b"vertex": 3}
@@ -240,9 +240,8 @@ def _check_off(path: Path) -> None:
             corners = _count(row[0])
             whole = len(row) - 1 - corners in OFF_COLOR_COLUMNS and all(word.isdigit() for word in row[1 : 1 + corners])
             if corners < 3 or not whole:
-                defect = (
-                    f"has {corners} corners" if 0 < corners < 3 else "is missing or does not have its stated length"
-                )
+                short = 0 < corners < 3
+                defect = f"has {corners} corners" if short else "is missing or does not have its stated length"
                 raise ValueError(f"face {i + 1} of {faces} {defect}")
         if next(rows, None) is not None:
             raise ValueError("more rows than it declares")

@@ -13,8 +13,8 @@ from __future__ import annotations
 import io
 import struct
 import warnings
+import zipfile
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
 from importlib import import_module
 from itertools import groupby
 from pathlib import Path, PurePosixPath
@@ -35,19 +35,6 @@ SCALARS = {
 }
 
 
-@dataclass(frozen=True)
-class _Header:
-    dtype: np.dtype  # one field per column of FIELDS, named by its position, since PCD repeats the name "_"
-    xyz: tuple[int, ...]  # positions of x, y, z
-    points: int
-    organized: bool
-    encoding: str
-
-    @property
-    def columns(self) -> list[np.dtype]:
-        return [self.dtype[name] for name in self.dtype.names or ()]
-
-
 def parse_pcd(content: bytes, subject: object) -> np.ndarray:
     """Return the points (P, 3) float64 of a PCD file's content, in the file's unit; `subject` names it in messages.
 
@@ -55,17 +42,17 @@ def parse_pcd(content: bytes, subject: object) -> np.ndarray:
     InputError for a wrong header, another amount of data than it says, or no points.
     """
     try:
-        header, body = _parse_header(content)
-        points = _DECODERS[header.encoding](body, header)
+        points, organized = _parse_pcd(content)
     except (ValueError, KeyError, IndexError, TypeError, struct.error) as fault:
         raise InputError(subject, f"is not a readable PCD file ({fault})", "fetch or export it again") from fault
-    if header.organized:
+    if organized:
         points = points[~np.isnan(points).any(axis=1)]
     require_points(points, subject)
     return points
 
 
-def _parse_header(content: bytes) -> tuple[_Header, bytes]:
+def _parse_pcd(content: bytes) -> tuple[np.ndarray, bool]:
+    """Return the points, and whether they are organized as an image."""
     values: dict[str, list[str]] = {}
     position = 0
     while "DATA" not in values:
@@ -79,9 +66,7 @@ def _parse_header(content: bytes) -> tuple[_Header, bytes]:
     for key in ("FIELDS", "SIZE", "TYPE", "WIDTH", "HEIGHT", "POINTS"):
         if not values.get(key):
             raise ValueError(f"wrong header: no {key} line")
-    fields = values["FIELDS"]
-    sizes = values["SIZE"]
-    types = values["TYPE"]
+    fields, sizes, types = values["FIELDS"], values["SIZE"], values["TYPE"]
     counts = values.get("COUNT", ["1"] * len(fields))
     if not len(fields) == len(sizes) == len(types) == len(counts):
         raise ValueError("wrong header: FIELDS, SIZE, TYPE and COUNT differ in length")
@@ -90,52 +75,42 @@ def _parse_header(content: bytes) -> tuple[_Header, bytes]:
         raise ValueError("wrong header: unknown SIZE or TYPE")
     if not {"x", "y", "z"} <= set(fields) or any(counts[fields.index(axis)] != "1" for axis in "xyz"):
         raise ValueError("wrong header: FIELDS lacks x, y or z")
-    width, height, points = (whole(values[key][0], most=10**18) for key in ("WIDTH", "HEIGHT", "POINTS"))
-    if width * height != points:
+    width, height, count = (whole(values[key][0], most=10**18) for key in ("WIDTH", "HEIGHT", "POINTS"))
+    if width * height != count:
         raise ValueError("wrong header: POINTS is not WIDTH times HEIGHT")
-    encoding = " ".join(values["DATA"])
-    if encoding not in _DECODERS:
-        raise ValueError(f"wrong header: unknown DATA {encoding}")
-    dtype = np.dtype(
-        [(str(i), f"<{scalar}", (whole(count),)) for i, (scalar, count) in enumerate(zip(scalars, counts, strict=True))]
-    )
-    return _Header(dtype, tuple(fields.index(axis) for axis in "xyz"), points, height > 1, encoding), content[position:]
-
-
-def _ascii(body: bytes, header: _Header) -> np.ndarray:
-    columns = [field.shape[0] for field in header.columns]
-    starts = np.cumsum([0, *columns])
-    if header.points == 0:
-        return np.zeros((0, 3))
-    table = np.loadtxt(io.BytesIO(body), dtype=np.float64, ndmin=2, comments=None)
-    if table.shape != (header.points, starts[-1]):
-        raise ValueError(f"the header states {header.points}×{starts[-1]} values, but the file has {table.shape}")
-    return table[:, starts[list(header.xyz)]]
-
-
-def _binary(body: bytes, header: _Header) -> np.ndarray:
-    if len(body) != header.points * header.dtype.itemsize:
-        raise ValueError(
-            f"the header states {header.points * header.dtype.itemsize} bytes of data, but the file has {len(body)}"
-        )
-    table = np.frombuffer(body, header.dtype)
-    return np.column_stack([table[str(i)][:, 0] for i in header.xyz]).astype(np.float64)
-
-
-def _binary_compressed(body: bytes, header: _Header) -> np.ndarray:
-    compressed, size = struct.unpack_from("<II", body)
-    if len(body) < 8 + compressed:
-        raise ValueError("the file ends within its compressed data")
-    require_memory(size, compressed, "its compressed data", "")
-    columns = _lzf_decompress(body[8 : 8 + compressed], size)
-    if not len(columns) == size == header.points * header.dtype.itemsize:
-        raise ValueError("its compressed data does not have the size that the header states")
-    starts = header.points * np.cumsum([0, *(field.itemsize for field in header.columns)])
-    arrays = [np.frombuffer(columns, header.dtype[i].base, header.points, int(starts[i])) for i in header.xyz]
-    return np.column_stack(arrays).astype(np.float64)
-
-
-_DECODERS = {"ascii": _ascii, "binary": _binary, "binary_compressed": _binary_compressed}
+    # Fields are named by their position, since PCD repeats the name "_".
+    lengths = [whole(length) for length in counts]
+    columns = [np.dtype((f"<{scalar}", (length,))) for scalar, length in zip(scalars, lengths, strict=True)]
+    dtype = np.dtype([(str(i), column) for i, column in enumerate(columns)])
+    body, xyz, size = content[position:], [fields.index(axis) for axis in "xyz"], count * dtype.itemsize
+    match " ".join(values["DATA"]):
+        case "ascii":
+            starts = np.cumsum([0, *lengths])
+            table = np.zeros((0, starts[-1]))
+            if count:
+                table = np.loadtxt(io.BytesIO(body), dtype=np.float64, ndmin=2, comments=None)
+            if table.shape != (count, starts[-1]):
+                raise ValueError(f"the header states {count}×{starts[-1]} values, but the file has {table.shape}")
+            points = table[:, starts[xyz]]
+        case "binary":
+            if len(body) != size:
+                raise ValueError(f"the header states {size} bytes of data, but the file has {len(body)}")
+            rows = np.frombuffer(body, dtype)
+            points = np.column_stack([rows[str(i)][:, 0] for i in xyz])
+        case "binary_compressed":
+            packed, unpacked = struct.unpack_from("<II", body)
+            if len(body) < 8 + packed:
+                raise ValueError("the file ends within its compressed data")
+            require_memory(unpacked, packed, "its compressed data", "")
+            data = _lzf_decompress(body[8 : 8 + packed], unpacked)
+            if not len(data) == unpacked == size:
+                raise ValueError("its compressed data does not have the size that the header states")
+            starts = count * np.cumsum([0, *(column.itemsize for column in columns)])
+            arrays = [np.frombuffer(data, columns[i].base, count, int(starts[i])) for i in xyz]
+            points = np.column_stack(arrays)
+        case encoding:
+            raise ValueError(f"wrong header: unknown DATA {encoding}")
+    return points.astype(np.float64), height > 1
 
 
 def _lzf_decompress(data: bytes, size: int) -> bytearray:
@@ -184,43 +159,32 @@ def read_table(path: Path) -> np.ndarray:
     return TABLE_READERS[path.suffix.lower()](path)
 
 
-def _npy(path: Path) -> np.ndarray:
-    return _points_of(_loaded(path), path)
-
-
-def _npz(path: Path) -> np.ndarray:
-    archive = _loaded(path)
-    with archive:
+def _numpy_file(path: Path) -> np.ndarray:
+    """Read an npy, or the array of points of an npz: by its name, or the only one."""
+    try:
+        if path.suffix.lower() == ".npz":
+            with zipfile.ZipFile(path) as members:
+                size = sum(info.file_size for info in members.infolist())
+            require_memory(size, path.stat().st_size, path, "save it again")
+        loaded = np.load(path, allow_pickle=False)
+    except InputError:
+        raise
+    except Exception as fault:  # numpy and zipfile raise errors of many kinds for a damaged file
+        raise InputError(path, f"is not a readable {path.suffix} file ({fault})", "save it again") from fault
+    if isinstance(loaded, np.ndarray):
+        return _points_of(loaded, path)
+    with loaded as archive:
         names = [name for name in NAMES if name in archive.files] or archive.files
         if not names:
             raise InputError(path, "holds no array", COLUMNS_REMEDY)
         if len(names) > 1 and names == archive.files:
-            known = ", ".join(archive.files[:8])
-            raise InputError(path, f"holds several arrays ({known}), none of them named 'points'", "rename one")
+            several = ", ".join(archive.files[:8])
+            raise InputError(path, f"holds several arrays ({several}), none of them named 'points'", "rename one")
         try:
             array = archive[names[0]]
-        except Exception as fault:  # numpy and zipfile raise errors of many kinds for a damaged archive
+        except Exception as fault:
             raise InputError(path, f"array '{names[0]}' cannot be read ({fault})", "save it again") from fault
     return _points_of(array, path)
-
-
-def _loaded(path: Path):
-    try:
-        if path.suffix.lower() == ".npz":
-            _require_small(path)
-        return np.load(path, allow_pickle=False)
-    except InputError:
-        raise
-    except Exception as fault:
-        raise InputError(path, f"is not a readable {path.suffix} file ({fault})", "save it again") from fault
-
-
-def _require_small(path: Path) -> None:
-    import zipfile
-
-    with zipfile.ZipFile(path) as archive:
-        size = sum(info.file_size for info in archive.infolist())
-    require_memory(size, path.stat().st_size, path, "save it again")
 
 
 def _points_of(array: np.ndarray, path: Path) -> np.ndarray:
@@ -296,8 +260,8 @@ def _kitti(path: Path) -> np.ndarray:
 
 
 TABLE_READERS: dict[str, Callable[[Path], np.ndarray]] = {
-    ".npy": _npy,
-    ".npz": _npz,
+    ".npy": _numpy_file,
+    ".npz": _numpy_file,
     ".xyz": _text,
     ".csv": _text,
     ".bin": _kitti,
@@ -317,25 +281,17 @@ def read_scanner_file(path: Path) -> np.ndarray:
     """
     require_file(path, "no such file", "give a LAS, LAZ or E57 file")
     name = PACKAGES[path.suffix.lower()]
-    module = _package(name, path)
     try:
-        return np.asarray(SCANNER_READERS[name](module, path), np.float64)
+        module = import_module(name)
+    except ImportError as fault:
+        raise InputError(path, f"needs the package {name}, which is not installed", INSTALL[name]) from fault
+    try:
+        return np.asarray(module.read(path).xyz if name == "laspy" else _e57(module, path), np.float64)
     except InputError:
         raise
     except Exception as fault:  # of many kinds, some from C++
         remedy = INSTALL[name] if "LazBackend" in str(fault) else "export it again, or as PLY"
         raise InputError(path, f"cannot be read ({fault})", remedy) from fault
-
-
-def _package(name: str, path: Path) -> ModuleType:
-    try:
-        return import_module(name)
-    except ImportError as fault:
-        raise InputError(path, f"needs the package {name}, which is not installed", INSTALL[name]) from fault
-
-
-def _las(laspy: ModuleType, path: Path) -> np.ndarray:
-    return laspy.read(path).xyz
 
 
 def _e57(pye57: ModuleType, path: Path) -> np.ndarray:
@@ -349,12 +305,8 @@ def _e57(pye57: ModuleType, path: Path) -> np.ndarray:
     return np.concatenate([np.stack([scan[axis] for axis in CARTESIAN], axis=1) for scan in scans])
 
 
-SCANNER_READERS: dict[str, Callable[[ModuleType, Path], np.ndarray]] = {"laspy": _las, "pye57": _e57}
-
-
 SUFFIXES = (".pcd", ".tar", ".tar.gz", ".tgz")
-READS_ARCHIVES = True  # only a few of the 600 views in a tar are wanted, so nothing is unpacked
-
+READS_ARCHIVES = True  # only a few of the 600 views in a tar are read, so nothing is unpacked
 _View = tuple[str, Callable[[], bytes], str]  # name, reader of its bytes, subject for messages
 
 
