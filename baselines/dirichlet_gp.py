@@ -128,7 +128,7 @@ class DirichletGP(DrawingExplainer):
 def _squared_distances(a_A_d: np.ndarray, b_B_d: np.ndarray) -> np.ndarray:
     import torch
 
-    from gpca.classifier.covariances import squared_distances
+    from gpca.classifier.sparse_gp import squared_distances
 
     return squared_distances(torch.from_numpy(a_A_d), torch.from_numpy(b_B_d)).numpy()
 

@@ -1,9 +1,8 @@
 """Multi-class Gaussian process classification by sparse variational inference (paper Sec. III-B).
 
-One latent GP per concept, inducing inputs shared by all, Cholesky variational posterior, softmax likelihood
-(Hensman et al. 2015). A class of the label space without a label yet has its GP already. A fit learns covariance,
-inducing inputs and posterior (:mod:`gpca.classifier.sparse_gp`); further labels then move the posterior alone
-(:mod:`gpca.classifier.latents`).
+One latent GP per concept, shared inducing inputs, Cholesky variational posterior, softmax likelihood (Hensman et al.
+2015). A fit learns covariance, inducing inputs and posterior (:mod:`gpca.classifier.sparse_gp`); further labels then
+move the posterior alone (:mod:`gpca.classifier.latents`).
 """
 
 from __future__ import annotations
@@ -16,24 +15,20 @@ import torch
 
 from gpca.adam import Adam
 from gpca.attribution.scores import score_marginals, summarize_marginals
-from gpca.classifier.covariances import make_covariance
 from gpca.classifier.latents import Latents, Projection, Sites, elbo, refine
-from gpca.classifier.prior import Prior
 from gpca.classifier.settings import GPCSettings
-from gpca.classifier.sparse_gp import SparseGPs
-from gpca.classifier.start import Standardization, Start
+from gpca.classifier.sparse_gp import Prior, SparseGPs, Standardization, Start, make_covariance
 from gpca.errors import InputError
 from gpca.process.progress import progress
 from gpca.seeds import generator
 
 
 class GPC:
-    """Gaussian process classifier over embeddings.
+    """Gaussian process classifier over embeddings; classes may still have no labels.
 
     Args:
         classes: (C,) the label space, in the order of the score columns.
-        settings: see :class:`GPCSettings`.
-        axes: names of the seed (source, seed, …).
+        axes: name the random numbers (source, seed, …).
     """
 
     _scaler: Standardization
@@ -44,18 +39,15 @@ class GPC:
         self.classes = classes
         self.settings = settings
         self._axes = axes
-        self._sites: Sites | None = None  # what the labels say of the latents, once they were refined
+        self._sites: Sites | None = None  # None before the first refinement
 
     def fit(self, h_N_d: np.ndarray, labels_N: np.ndarray, around_R_d: np.ndarray | None = None) -> GPC:
         """Maximize the ELBO (variational parameters, inducing inputs, covariance parameters).
 
-        Inputs are standardized, inducing inputs start at k-means centers and the lengthscale at the median distance:
-        with gpytorch's default lengthscale an RBF kernel on some hundred dimensions stays at chance.
-
         Args:
             h_N_d, labels_N: labeled embeddings.
-            around_R_d: embeddings by which the inputs are standardized and the inducing inputs and the lengthscale
-                initialized, where those to come lie elsewhere than the labeled ones; by default the labeled ones.
+            around_R_d: embeddings that determine the standardization and the start of inducing inputs and lengthscale;
+                by default the labeled ones.
         """
         for _ in self.fit_up_to([self.settings.iterations], h_N_d, labels_N, around_R_d):
             pass
@@ -69,13 +61,10 @@ class GPC:
         around_R_d: np.ndarray | None = None,
         before: GPC | None = None,
     ) -> Iterator[int]:
-        """Yield each of these counts in rising order, the classifier then as :meth:`fit` leaves it after so many.
+        """Yield each number of iterations in rising order; the classifier is then as :meth:`fit` would leave it.
 
-        Args:
-            iterations: the counts.
-            h_N_d, labels_N, around_R_d: as for :meth:`fit`.
-            before: a classifier of the same classes from whose scale of the inputs, covariance, inducing inputs and
-                posterior the fit starts instead; it is not changed.
+        With `before`, a classifier of the same classes, the fit starts from its standardization, covariance, inducing
+        inputs and posterior.
         """
         if before is None:
             around_R_d = h_N_d if around_R_d is None else around_R_d
@@ -105,17 +94,17 @@ class GPC:
                 yield done
 
     def scaling(self, around_R_d: np.ndarray) -> Standardization:
-        """Return how inputs are scaled, given those around which a fit starts; a reading of the paper has another."""
+        """Return the scaling of the inputs; overridden by a reading of the paper."""
         return Standardization.of(around_R_d)
 
     def start(self, inputs_R_d: torch.Tensor) -> Start:
-        """Return where a fit starts, given scaled inputs around it; a reading of the paper has another."""
+        """Return the start of a fit around scaled inputs; overridden by a reading of the paper."""
         return Start.of(inputs_R_d, len(self.classes), self.settings, self._axes)
 
     def objective(
         self, model: SparseGPs, inputs_N_d: torch.Tensor, targets_N: torch.Tensor, _random: torch.Generator
     ) -> torch.Tensor:
-        """Return what an iteration climbs: the ELBO of all samples; a reading of the paper has another."""
+        """Return the maximized objective, the ELBO of all samples; overridden by a reading of the paper."""
         return model.elbo(inputs_N_d, targets_N)
 
     def elbo(self) -> float:
@@ -125,25 +114,17 @@ class GPC:
     def update(
         self, h_L_d: np.ndarray | Projection, labels_L: np.ndarray, iterations: int = 100, tolerance: float = 1e-3
     ) -> int:
-        """Learn further labels at fixed covariance and inducing inputs; those of before count as much as ever.
+        """Learn further labels at fixed covariance and inducing inputs, jointly with the earlier ones.
 
-        Args:
-            h_L_d: their embeddings, or what :meth:`project` returned for them.
-            labels_L: classes of the label space.
-            iterations, tolerance: see :func:`gpca.classifier.latents.refine`.
-
-        Returns:
-            the number of iterations, each a pass over all labels.
+        `h_L_d` are embeddings or their :meth:`project`-ion. Returns the number of passes over all labels; for
+        `iterations` and `tolerance` see :func:`gpca.classifier.latents.refine`.
         """
         self._labeled = self._labeled.followed_by(self.project(h_L_d))
         self._targets_N = np.concatenate([self._targets_N, self._targets(labels_L)])
         return self.refine(iterations, tolerance)
 
     def refine(self, iterations: int = 100, tolerance: float = 1e-3) -> int:
-        """Move the posterior to the best one for the labels, covariance and inducing inputs; see :meth:`update`.
-
-        It starts from the posterior of the call before, or from the prior where there was none.
-        """
+        """Optimize the posterior at fixed covariance and inducing inputs, from the last posterior or the prior."""
         sites = Sites.silent(0, 0) if self._sites is None else self._sites
         sites = sites.extend(len(self._targets_N), len(self.classes))
         self._sites, self._latents, done = refine(self._labeled, self._targets_N, sites, iterations, tolerance)
@@ -151,14 +132,10 @@ class GPC:
 
     def level(self) -> None:
         """Give classes without a label the mean covariance of the others, and refit the posterior."""
-        known_C = np.isin(np.arange(len(self.classes)), self._targets_N)
-        self._set_prior(self._prior.level(known_C))
+        self._set_prior(self._prior.level(np.isin(np.arange(len(self.classes)), self._targets_N)))
 
     def grow(self, name: str) -> None:
-        """Add a class that the label space never had; its covariance is the geometric mean of the others'.
-
-        The other classes keep covariances, labels and posterior; the new one learns what it is not.
-        """
+        """Add a class whose covariance is the geometric mean of the others', and refit the posterior."""
         if not name or name in self.classes:
             raise InputError(
                 f"concept '{name}'", "is empty or already known", f"the known ones are {', '.join(self.classes)}"
@@ -172,16 +149,16 @@ class GPC:
         self.refine()
 
     def project(self, h_N_d: np.ndarray | Projection) -> Projection:
-        """Return the embeddings as the covariance sees them, to be computed once where they are used often."""
+        """Project embeddings on the inducing inputs, once for several uses."""
         return h_N_d if isinstance(h_N_d, Projection) else self._prior.project(self._scaled(h_N_d))
 
     @property
     def learned_N_d(self) -> np.ndarray:
-        """The standardized inputs of the labels that it learned, (N, d)."""
+        """The standardized inputs (N, d) of its labels."""
         return self._labeled.inputs_N_d
 
     def posterior(self, h_N_d: np.ndarray | Projection) -> tuple[np.ndarray, np.ndarray]:
-        """Return mean and standard deviation (N, C) of the latent logits q(f(h)); the latents are independent."""
+        """Return mean and standard deviation (N, C) of the independent latent logits q(f(h))."""
         return self._latents.marginals(self.project(h_N_d))
 
     def mean_logits(self, h_N_d: torch.Tensor) -> torch.Tensor:
@@ -192,8 +169,8 @@ class GPC:
     def attribute(self, h_N_d: np.ndarray | Projection) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return scores_N_C, variances_N_C and bald_N from M posterior draws (Eqs. 4, 5, 7).
 
-        All points share the same M·C standard normal numbers, so a point's result does not depend on the others;
-        per-point marginals suffice, because none of the three uses correlations between points.
+        All points share the same M·C standard normal numbers, so a point's result does not depend on the others. None
+        of the three uses correlations between points, so marginals suffice.
         """
         return summarize_marginals(*self.posterior(h_N_d), self._draws())
 
@@ -205,7 +182,7 @@ class GPC:
         return generator(*self._axes, "draws").normal(size=(self.settings.draws, len(self.classes)))
 
     def state(self) -> dict[str, object]:
-        """Return all that was learned as tensors, numbers and names, for :meth:`from_state`."""
+        """Return tensors, numbers and names for :meth:`from_state`."""
         return {
             "classes": list(self.classes),
             "settings": asdict(self.settings),
@@ -222,7 +199,7 @@ class GPC:
 
     @classmethod
     def from_state(cls, state: dict) -> GPC:
-        """Return the classifier of a :meth:`state`: it attributes alike, and learns further labels."""
+        """Return the classifier of a :meth:`state`: it gives the same attributions and can be trained further."""
         gpc = cls(tuple(state["classes"]), GPCSettings(**state["settings"]), *state["axes"])
         gpc._scaler = Standardization(state["scaler_mean"].numpy(), state["scaler_scale"].numpy())
         covariance = make_covariance(gpc.settings.kernel, len(gpc.classes), lengthscale=1.0).requires_grad_(False)

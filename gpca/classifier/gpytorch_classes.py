@@ -1,10 +1,7 @@
-"""The classifier in gpytorch's own classes, as its tutorials write one: what the suite's form is compared with.
+"""The classifier in gpytorch's own classes, as in its tutorials, for comparison with :mod:`gpca.classifier.gpc`.
 
-An ``ApproximateGP`` with ``VariationalStrategy`` under ``IndependentMultitaskVariationalStrategy`` and a
-``CholeskyVariationalDistribution`` is trained by ``VariationalELBO`` with a ``SoftmaxLikelihood``. It starts where
-:class:`gpca.classifier.gpc.GPC` does and draws the same random numbers in the same order, so both give the same numbers
-but for rounding: how much that is, stands in docs/baselines.md, and ``tests/classifier/test_gpytorch_classes.py`` holds
-it.
+Both start at the same place and draw the same random numbers in the same order, so their results agree within rounding
+(docs/baselines.md, ``tests/classifier/test_gpytorch_classes.py``).
 """
 
 from __future__ import annotations
@@ -21,7 +18,7 @@ from gpca.adam import Adam
 from gpca.attribution.scores import summarize_marginals
 from gpca.classifier.latents import expected_log_likelihood
 from gpca.classifier.settings import GPCSettings
-from gpca.classifier.start import Standardization, Start
+from gpca.classifier.sparse_gp import Standardization, Start
 from gpca.elementary import square_root
 from gpca.errors import InputError
 from gpca.process.progress import progress
@@ -29,12 +26,7 @@ from gpca.seeds import generator
 
 
 class LatentGPs(gpytorch.models.ApproximateGP):
-    """C independent latent GPs on shared inducing inputs, which are learned.
-
-    Args:
-        covariance: of batch shape (C,).
-        inducing_M_d: where the inducing inputs start.
-    """
+    """C independent latent GPs, one per batch entry of the covariance, on shared, learned inducing inputs."""
 
     def __init__(self, covariance: gpytorch.kernels.ScaleKernel, inducing_M_d: Tensor) -> None:
         batch = covariance.batch_shape
@@ -52,14 +44,14 @@ class LatentGPs(gpytorch.models.ApproximateGP):
 
     @property
     def strategy(self) -> gpytorch.variational.VariationalStrategy:
-        """The strategy below that of the classes."""
+        """The strategy inside that of the classes."""
         return self.variational_strategy.base_variational_strategy
 
 
 def ascend(model: LatentGPs, inputs_N_d: Tensor, targets_N: Tensor, learning_rate: float) -> Iterator[float]:
-    """Take a step of Adam up the ELBO at each turn, without end, and yield the loss before it, in nats per sample.
+    """Yield, without end, the loss before each step of Adam on the ELBO of all samples, in nats per sample.
 
-    All samples are one batch. The random numbers come from torch's global generator, as gpytorch offers no other way.
+    Random numbers come from torch's global generator, which gpytorch requires.
 
     Raises:
         InputError: as many samples as classes, which ``SoftmaxLikelihood`` takes for an old, transposed layout.
@@ -82,7 +74,7 @@ def ascend(model: LatentGPs, inputs_N_d: Tensor, targets_N: Tensor, learning_rat
 
 
 class GpytorchGPC:
-    """:class:`gpca.classifier.gpc.GPC` by gpytorch: the same arguments, seeds and results, without later labels."""
+    """:class:`gpca.classifier.gpc.GPC` by gpytorch: same arguments, seeds and results, but no later labels."""
 
     def __init__(self, classes: tuple[str, ...], settings: GPCSettings, *axes: object) -> None:
         self.classes = classes
@@ -96,11 +88,7 @@ class GpytorchGPC:
         return self
 
     def fit_up_to(self, iterations: Iterable[int], h_N_d: np.ndarray, labels_N: np.ndarray) -> Iterator[int]:
-        """Yield each of these counts in rising order, the classifier then as :meth:`fit` leaves it after so many.
-
-        Raises:
-            InputError: as many samples as classes.
-        """
+        """Yield each number of iterations in rising order; the classifier is then as :meth:`fit` would leave it."""
         self._scaler = Standardization.of(h_N_d)
         self._inputs_N_d = self._scaler.tensor(h_N_d)
         self._targets_N = np.array([self.classes.index(label) for label in labels_N], dtype=np.int64)
@@ -140,10 +128,10 @@ class GpytorchGPC:
 
 
 class SameRoots(TorchFunctionMode):
-    """Within it torch's roots and distances, and so gpytorch's, have the same bits on every vendor's processors."""
+    """Inside this context, torch's roots and distances have the same bits on processors of every vendor."""
 
     def __torch_function__(self, function, types, arguments=(), keywords=None):
-        """Call the function; a root or a distance in its own way."""
+        """Call the function, with replacements for roots and distances."""
         if function is torch.cdist:
             return _Root.apply(_squared_distances(*arguments[:2]))
         if function in (torch.sqrt, Tensor.sqrt):
@@ -154,7 +142,7 @@ class SameRoots(TorchFunctionMode):
 
 
 def _squared_distances(a_A_d: Tensor, b_B_d: Tensor) -> Tensor:
-    """Return |a - b|², (…, A, B), of coinciding points a little more than 0, where the root has no derivative."""
+    """Return |a - b|², (…, A, B), at least 1e-30, because the root has no derivative at 0."""
     squares_A_B = a_A_d.square().sum(dim=-1)[..., :, None] + b_B_d.square().sum(dim=-1)[..., None, :]
     return (squares_A_B - 2 * a_A_d @ b_B_d.mT).clamp_min(1e-30)
 

@@ -1,8 +1,8 @@
-"""The posterior over a sparse GP classifier's latents in whitened form, and how labels move it; numpy alone.
+"""The whitened posterior over a sparse GP classifier's latents, and its update by labels, in numpy.
 
-Kernel and inducing inputs Z are fixed here. With K_ZZ = L Lᵀ and u = L v, the prior of v is N(0, I) and each latent is
-f(x) = w(x)ᵀ v + r with w(x) = L⁻¹ k(Z, x) and r ~ N(0, k(x, x) - |w(x)|²) (Hensman et al. 2015). Everything that the
-inputs contribute is then in w and the variance of r, computed once however often labels arrive.
+Kernel and inducing inputs Z are fixed. With K_ZZ = L Lᵀ and u = L v, the prior of v is N(0, I) and each latent is
+f(x) = w(x)ᵀ v + r with w(x) = L⁻¹ k(Z, x) and r ~ N(0, k(x, x) - |w(x)|²) (Hensman et al. 2015). Inputs enter only
+through w and the variance of r, computed once.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from scipy.special import softmax
 
 @dataclass(frozen=True)
 class Projection:
-    """N inputs, and how C latent GPs see them: weights w on the inducing values, variance of the residual r."""
+    """N inputs as seen by C latent GPs: weights w on the inducing values, variance of the residual r."""
 
     inputs_N_d: np.ndarray
     weights_C_N_M: np.ndarray
@@ -29,7 +29,7 @@ class Projection:
         return Projection(self.inputs_N_d[rows], self.weights_C_N_M[:, rows], self.residual_C_N[:, rows])
 
     def followed_by(self, other: Projection) -> Projection:
-        """Return the inputs of this one and then those of the other."""
+        """Concatenate two projections."""
         return Projection(
             np.concatenate([self.inputs_N_d, other.inputs_N_d]),
             np.concatenate([self.weights_C_N_M, other.weights_C_N_M], axis=1),
@@ -45,14 +45,14 @@ class Latents:
     covariance_C_M_M: np.ndarray
 
     def marginals(self, projection: Projection) -> tuple[np.ndarray, np.ndarray]:
-        """Return mean and standard deviation (N, C) of the latents at N inputs; the C latents are independent."""
+        """Return mean and standard deviation (N, C) of the independent latents at N inputs."""
         weights_C_N_M = projection.weights_C_N_M
         mean_C_N = np.einsum("cnm,cm->cn", weights_C_N_M, self.mean_C_M)
         spread_C_N = np.einsum("cnm,cnm->cn", weights_C_N_M @ self.covariance_C_M_M, weights_C_N_M)
         return mean_C_N.T, np.sqrt(np.maximum(spread_C_N + projection.residual_C_N, 0)).T
 
     def divergence(self) -> float:
-        """Return KL(q(v) ‖ N(0, I)) in nats, the ELBO's second term."""
+        """Return KL(q(v) ‖ N(0, I)) in nats."""
         _, log_determinants = np.linalg.slogdet(self.covariance_C_M_M)
         traces = np.trace(self.covariance_C_M_M, axis1=1, axis2=2)
         return 0.5 * float(
@@ -62,9 +62,9 @@ class Latents:
 
 @dataclass(frozen=True)
 class Sites:
-    """One Gaussian factor per labeled input and latent, in natural parameters: its label's evidence about the latent.
+    """One Gaussian factor per labeled input and latent, in natural parameters; zeros carry no evidence.
 
-    The posterior is q(v) ∝ N(0, I) Π_n exp(linear_n f_n - precision_n f_n² / 2). A site of zeros says nothing.
+    The posterior is q(v) ∝ N(0, I) Π_n exp(linear_n f_n - precision_n f_n² / 2).
     """
 
     linear_N_C: np.ndarray
@@ -72,16 +72,16 @@ class Sites:
 
     @classmethod
     def silent(cls, n: int, n_classes: int) -> Sites:
-        """Return sites that say nothing: the posterior is the prior."""
+        """Return sites of zeros: the posterior is the prior."""
         return cls(np.zeros((n, n_classes)), np.zeros((n, n_classes)))
 
     def extend(self, n: int, n_classes: int) -> Sites:
-        """Return these sites, with silent ones for inputs and classes that they do not cover yet."""
+        """Append silent sites for new inputs and classes."""
         grown = ((0, n - len(self.linear_N_C)), (0, n_classes - self.linear_N_C.shape[1]))
         return Sites(np.pad(self.linear_N_C, grown), np.pad(self.precision_N_C, grown))
 
     def posterior(self, projection: Projection) -> Latents:
-        """Return q(v): Gaussian factors on a Gaussian prior, so it is exact."""
+        """Return q(v), exact for Gaussian factors on a Gaussian prior."""
         weights_C_N_M = projection.weights_C_N_M
         weighted_C_M_N = np.swapaxes(weights_C_N_M * self.precision_N_C.T[:, :, None], 1, 2)
         covariance_C_M_M = np.linalg.inv(np.eye(weights_C_N_M.shape[2]) + weighted_C_M_N @ weights_C_N_M)
@@ -92,16 +92,15 @@ class Sites:
 def refine(
     projection: Projection, targets_N: np.ndarray, sites: Sites, iterations: int, tolerance: float, step: float = 0.5
 ) -> tuple[Sites, Latents, int]:
-    """Ascend the ELBO of the softmax likelihood by natural gradients; each iteration passes once over all labels.
+    """Maximize the ELBO of the softmax likelihood by natural gradients; each iteration passes once over all labels.
 
     Conjugate-computation variational inference (Khan & Lin 2017): a step toward the sites with precision
-    E_q[p_c (1 - p_c)] and mean gradient E_q[1{y = c} - p_c], the ELBO's natural gradient. Unlike a gradient on mean
-    and covariance, it needs no learning rate to be tuned and ends after some ten steps.
+    E_q[p_c (1 - p_c)] and mean gradient E_q[1{y = c} - p_c]. It converges in some ten steps without a tuned rate.
 
     Args:
-        projection, targets_N: the N labeled inputs and the numbers of their classes.
-        sites: where to start; those of an earlier call, extended, continue from what was learned.
-        iterations, tolerance: the most steps, and the largest change of a probability at which they end.
+        projection, targets_N: the N labeled inputs and the indices of their classes.
+        sites: the start; those of an earlier call, extended, continue from its result.
+        iterations, tolerance: maximum number of steps, and change of a probability at which they end.
 
     Returns:
         the sites, their posterior, and the number of iterations.
@@ -128,7 +127,7 @@ def elbo(projection: Projection, targets_N: np.ndarray, latents: Latents) -> flo
 
 
 def expected_log_likelihood(mean_N_C: np.ndarray, deviation_N_C: np.ndarray, targets_N: np.ndarray) -> float:
-    """Return Σ E_q[log softmax(f)_y] in nats, of independent latents with these marginals."""
+    """Return Σ E_q[log softmax(f)_y] in nats for independent latents with these marginals."""
     logits_Q_N_C = mean_N_C + deviation_N_C * _normal_points(mean_N_C.shape[1])[:, None]
     largest_Q_N_1 = logits_Q_N_C.max(axis=2, keepdims=True)
     log_p_Q_N_C = logits_Q_N_C - largest_Q_N_1
@@ -145,7 +144,7 @@ def _expected_softmax(mean_N_C: np.ndarray, deviation_N_C: np.ndarray) -> tuple[
 
 @cache
 def _normal_points(n_classes: int, log2_points: int = 6) -> np.ndarray:
-    """Return 64 points (Q, C) of a scrambled Sobol sequence as standard normal numbers, the same at every call."""
+    """64 standard normal points (Q, C) from a fixed scrambled Sobol sequence."""
     from scipy.stats import norm, qmc
 
     return norm.ppf(qmc.Sobol(n_classes, rng=0).random_base2(log2_points))

@@ -1,4 +1,4 @@
-"""Settings of the Gaussian process classifier, kept apart from its code: nothing here needs torch."""
+"""Settings of the Gaussian process classifier, without loading torch."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ Draws = Annotated[int, Bounds(minimum=2)]
 
 @dataclass(frozen=True)
 class GPCSettings:
-    """How the classifier is built and fitted; the defaults are the paper's.
+    """Settings of the classifier and its fit; the defaults are the paper's.
 
     Attributes:
         kernel: ``rbf``, ``matern32`` or ``polynomial`` (of degree 2).
-        learning_rate, iterations: of Adam on the ELBO of the whole training set.
+        learning_rate, iterations: of Adam, on the ELBO of the whole training set.
         inducing: number of shared inducing inputs N_Z.
         draws: M, posterior draws per explanation.
     """
@@ -30,4 +30,4 @@ class GPCSettings:
     draws: Draws = 1000
 
 
-GPCArguments = Annotated[Any, ArgumentsOf(GPCSettings)]  # of a function that hands them on
+GPCArguments = Annotated[Any, ArgumentsOf(GPCSettings)]  # keyword arguments passed on to it

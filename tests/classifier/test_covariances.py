@@ -4,7 +4,7 @@ import gpytorch
 import pytest
 import torch
 
-from gpca.classifier.covariances import COVARIANCES, cross_covariance, make_covariance, variance
+from gpca.classifier.sparse_gp import COVARIANCES, cross_covariance, make_covariance, variance
 
 RANDOM = torch.Generator().manual_seed(0)
 A, B = torch.randn(7, 12, generator=RANDOM), torch.randn(5, 12, generator=RANDOM)

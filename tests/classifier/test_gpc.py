@@ -6,10 +6,9 @@ import pytest
 import torch
 from sklearn.preprocessing import StandardScaler
 
-from gpca.classifier.covariances import COVARIANCES
 from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
-from gpca.classifier.start import Standardization
+from gpca.classifier.sparse_gp import COVARIANCES, Standardization
 from gpca.errors import InputError
 
 CLASSES = ("noise", "pose", "overlap")

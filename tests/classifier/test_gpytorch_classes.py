@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 import torch
 
-from gpca.classifier.covariances import COVARIANCES
 from gpca.classifier.gpc import GPC
 from gpca.classifier.gpytorch_classes import GpytorchGPC, SameRoots
 from gpca.classifier.settings import GPCSettings
+from gpca.classifier.sparse_gp import COVARIANCES
 from gpca.elementary import square_root
 from gpca.errors import InputError
 from tests.vendor_guard import VendorGuard

@@ -10,8 +10,8 @@ from torch.distributions import MultivariateNormal, kl_divergence
 from gpca.classifier.gpc import GPC
 from gpca.classifier.gpytorch_classes import LatentGPs
 from gpca.classifier.latents import Latents, Projection, Sites, elbo, refine
-from gpca.classifier.prior import Prior
 from gpca.classifier.settings import GPCSettings
+from gpca.classifier.sparse_gp import Prior
 
 CLASSES = ("noise", "pose", "overlap")
 QUICK = GPCSettings(learning_rate=0.05, iterations=40, inducing=12, draws=200)

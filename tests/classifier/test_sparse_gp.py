@@ -3,10 +3,8 @@ from itertools import islice
 import pytest
 import torch
 
-from gpca.classifier.covariances import COVARIANCES, make_covariance
 from gpca.classifier.gpytorch_classes import LatentGPs, ascend
-from gpca.classifier.prior import Prior
-from gpca.classifier.sparse_gp import SparseGPs
+from gpca.classifier.sparse_gp import COVARIANCES, Prior, SparseGPs, make_covariance
 
 CENTERS = torch.randn(3, 16, generator=torch.Generator().manual_seed(0))
 TARGETS = torch.arange(90) % 3

@@ -12,11 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
-from gpca.classifier.covariances import make_covariance
 from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
-from gpca.classifier.sparse_gp import SparseGPs
-from gpca.classifier.start import Standardization, Start
+from gpca.classifier.sparse_gp import SparseGPs, Standardization, Start, make_covariance
 from gpca.experiments.specification_curve.diagnostics import accuracies, table5
 from gpca.experiments.specification_curve.run_files import Row, RunFiles
 from gpca.experiments.specification_curve.settings import Reading, ReadingSizes
