@@ -1,15 +1,96 @@
-"""Explainers of causes that read the embedding of the aligned source alone, as the paper lets GP-CA do.
+"""Explainers that read the embedding of the aligned source alone, as GP-CA does in the paper.
 
-They are those of concepts, with the class "nominal" beside these.
+The same explainers name causes, with "nominal" as a further class.
 """
 
 from __future__ import annotations
 
-from baselines.concept_vectors import ConceptVectors
-from baselines.softmax_head import SoftmaxHead
+import numpy as np
+
 from gpca.causes.dataset import LABELS
+from gpca.classifier.settings import GPCArguments
+from gpca.errors import InputError
+from gpca.explainers.classifiers import known_concepts
 from gpca.explainers.gpca import GPCA
-from gpca.explainers.interface import ExplainerEntry
+from gpca.explainers.interface import DrawingExplainer, ExplainerEntry, ScoringExplainer, attached
+from gpca.pairs.dataset import Registrations
+from gpca.settings import Positive
+
+
+class ConceptVectors(ScoringExplainer):
+    """Concept activation vectors (CAV; Kim et al. 2018, TCAV), read per sample.
+
+    TCAV's score describes a dataset; its basis can score a sample. A CAV is the normal of a linear probe between one
+    concept and the others (TCAV's relative CAV) in the standardized embedding. The scores are the softmax over concepts
+    of the projections on the CAVs, standardized on the training rows; a concept without training rows has score 0.
+    `inverse_regularisation` is scikit-learn's C of the probes. The probes are a convex problem without random numbers.
+    """
+
+    def __init__(self, source: str, seed: int, inverse_regularisation: Positive = 1.0) -> None:
+        self._inverse_regularization = inverse_regularisation
+
+    def fit(self, registrations: Registrations) -> None:
+        """Fit one probe for each concept among the labels.
+
+        Raises:
+            InputError: fewer than two concepts, or an embedding that is the same for all registrations.
+        """
+        from sklearn.linear_model import LogisticRegression
+        from sklearn.preprocessing import StandardScaler
+
+        embedding_N_d = attached(registrations, "embedding")
+        self._present = known_concepts(registrations.concept, self.labels)
+        if (embedding_N_d == embedding_N_d[0]).all():
+            raise InputError("array 'embedding'", "is the same for all training registrations", "train the encoder")
+        self._embedding_scaler = StandardScaler().fit(embedding_N_d)
+        scaled_N_d = self._embedding_scaler.transform(embedding_N_d)
+        probe = LogisticRegression(C=self._inverse_regularization, max_iter=1000)
+        normals = [probe.fit(scaled_N_d, registrations.concept == concept).coef_[0] for concept in self._present]
+        self.vectors_K_d = np.array([normal / np.linalg.norm(normal) for normal in normals])
+        self._projection_scaler = StandardScaler().fit(scaled_N_d @ self.vectors_K_d.T)
+
+    def scores(self, registrations: Registrations) -> np.ndarray:
+        """Score every registration by its position along the CAVs."""
+        from scipy.special import softmax
+
+        scaled_N_d = self._embedding_scaler.transform(attached(registrations, "embedding"))
+        positions_N_C = np.full((len(registrations), len(self.labels)), -np.inf)
+        columns = [self.labels.index(concept) for concept in self._present]
+        positions_N_C[:, columns] = self._projection_scaler.transform(scaled_N_d @ self.vectors_K_d.T)
+        return softmax(positions_N_C, axis=1)
+
+
+class SoftmaxHead(ScoringExplainer):
+    """The encoder's own head, which GP-CA drops: softmax of its logits, averaged over the draws from a cloud.
+
+    It was trained with the encoder, so labels given to ``fit`` have no effect.
+    """
+
+    trained_with_encoder = True
+
+    def scores(self, registrations: Registrations) -> np.ndarray:
+        """Return the softmax of the logits."""
+        from scipy.special import softmax
+
+        return softmax(attached(registrations, "head_logits"), axis=1)
+
+
+class GpytorchGPCA(DrawingExplainer):
+    """GP-CA in gpytorch's own classes, a check: it agrees with ``gpca_paper`` within rounding."""
+
+    def __init__(self, source: str, seed: int, **settings: GPCArguments) -> None:
+        from gpca.classifier.gpytorch_classes import GpytorchGPC
+        from gpca.classifier.settings import GPCSettings
+
+        self._gpc = GpytorchGPC(self.labels, GPCSettings(**settings), source, seed)
+
+    def fit(self, registrations: Registrations) -> None:
+        """Fit to the labeled embeddings; as many samples as concepts raise an InputError."""
+        self._gpc.fit(registrations.embedding, registrations.concept)
+
+    def summary(self, registrations: Registrations) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Summarize draws from the posterior at every embedding."""
+        return self._gpc.attribute(registrations.embedding)
 
 
 class CauseGPCA(GPCA):
@@ -25,11 +106,16 @@ class CauseVectors(ConceptVectors):
 
 
 class CauseHead(SoftmaxHead):
-    """The encoder's own head, trained with it on the same labels."""
+    """The head of an encoder that was trained on the causes."""
 
     labels = LABELS
 
 
+EXPLAINERS = {
+    "concept_vectors": ExplainerEntry("Concept activation vectors", ConceptVectors, ("source",), reads="embeddings"),
+    "softmax_head": ExplainerEntry("Softmax head", SoftmaxHead, ("source",), reads="embeddings"),
+    "gpca_gpytorch": ExplainerEntry("GP-CA (gpytorch's classes)", GpytorchGPCA, ("source",), reads="embeddings"),
+}
 CAUSE_EXPLAINERS = {
     "gpca": ExplainerEntry("GP-CA (aligned source)", CauseGPCA, ("source",), reads="embeddings"),
     "softmax_head": ExplainerEntry("Softmax head (aligned source)", CauseHead, ("source",), reads="embeddings"),

@@ -1,25 +1,20 @@
-"""Learned classifiers of alignment: whether two clouds lie on each other as they should. They name no cause.
+"""Learned classifiers of alignment: whether two clouds are aligned. They name no cause.
 
 ``alarm_entropies`` is CorAl (Adolfsson et al. 2021): a regression on the mean entropy of the clouds, joint and apart.
-``alarm_features`` reads what FACT (Dillén, Forssén & Edstedt 2025) does: local features of both aligned clouds, how far
-each lies from the other, and how much of them is seen in both; boosted trees stand in the place of its network.
+``alarm_features`` reads features like FACT's (Dillén, Forssén & Edstedt 2025): local features of both aligned clouds,
+their distances, and the share seen in both; boosted trees replace its network.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from baselines.descriptors import CLOUDS, described, entry
-from gpca.attribution.scores import Attribution
-from gpca.causes.dataset import LABELS
+from baselines.gates import Alarm
 from gpca.causes.descriptors import EVERYTHING, Columns
 from gpca.causes.truth import NOMINAL
-from gpca.explainers.boosted_trees import boosted_trees
-from gpca.explainers.concept_classifier import standardized_regression
-from gpca.explainers.interface import ScoringExplainer
-from gpca.explainers.sight import Sees
+from gpca.explainers.classifiers import boosted_trees, standardized_regression
+from gpca.explainers.interface import Sees
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.distances import ENTROPY
 from gpca.pairs.perturbation import CONCEPTS
@@ -28,36 +23,22 @@ from gpca.settings import Count, Positive
 JOINT_AND_APART = [row for row, name in enumerate(ENTROPY) if name.startswith(("joint", "apart"))]
 
 
-class AlignmentClassifier(ScoringExplainer):
-    """The probability of a failure, by a scikit-learn classifier that learned the nominal from the failed.
-
-    Args:
-        classifier: an unfitted classifier with ``predict_proba``.
-        sees: the parts that it reads descriptors of.
-        wanted: of these, its columns.
-    """
-
-    labels = LABELS
+class AlignmentClassifier(Alarm):
+    """Probability of a failure by an unfitted scikit-learn classifier on the `wanted` columns of the parts it sees."""
 
     def __init__(self, classifier, sees: Sees, wanted: Columns = EVERYTHING) -> None:
-        self._classifier = classifier
-        self._sees = sees
-        self._wanted = wanted
+        self._classifier, self._sees, self._wanted = classifier, sees, wanted
         self._constant: float | None = None
 
     def fit(self, registrations: Registrations) -> None:
-        """Learn from labeled registrations; where all are nominal, or all failed, that is the answer for all."""
+        """Learn from labeled registrations; if all are nominal, or all failed, predict the same for all."""
         failed_N = registrations.concept != NOMINAL
         self._constant = float(failed_N.mean()) if failed_N.all() or not failed_N.any() else None
         if self._constant is None:
             self._classifier.fit(described(registrations, self._sees, self._wanted), failed_N)
 
-    def explain(self, registrations: Registrations) -> Attribution:
-        """Score every registration, and name no cause of any."""
-        return replace(super().explain(registrations), abstained_N=np.ones(len(registrations), bool))
-
     def scores(self, registrations: Registrations) -> np.ndarray:
-        """Return scores (N, 4) that add up to one; a failure as probable as not has that of nominal for each cause."""
+        """Return scores (N, 4) with sum one; at a failure probability of 0.5, each cause equals nominal."""
         if self._constant is None:
             features_N_F = described(registrations, self._sees, self._wanted)
             failure_N = self._classifier.predict_proba(features_N_F)[:, 1]
@@ -68,12 +49,10 @@ class AlignmentClassifier(ScoringExplainer):
 
 
 def alarm_entropies(sees: Sees, source: str, seed: int, inverse_regularisation: Positive = 1.0) -> AlignmentClassifier:
-    """Make CorAl's classifier."""
     return AlignmentClassifier(standardized_regression(inverse_regularisation), sees, {"entropy": JOINT_AND_APART})
 
 
 def alarm_features(sees: Sees, source: str, seed: int, iterations: Count = 150) -> AlignmentClassifier:
-    """Make the classifier on FACT's kind of features."""
     return AlignmentClassifier(boosted_trees(source, seed, "alignment", iterations=iterations), sees)
 
 

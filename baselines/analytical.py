@@ -1,8 +1,7 @@
-"""Analytical features and the same GPC as GP-CA: the measure of what the learned embedding adds (the paper's ablation).
+"""Analytical features with GP-CA's classifier: what the learned embedding adds (the paper's ablation).
 
-In this dataset a cropped cloud has fewer points than the others, so the point-count ratio alone gives the concept
-overlap away, which no sensor does. Hence two rows: `analytical_gpc` with the paper's list, and
-`analytical_gpc_no_counts` without the ratio.
+Here a cropped cloud has fewer points than the others, so the point-count ratio gives the concept overlap away, unlike
+with a sensor. Hence two rows: `analytical_gpc` with the paper's list, `analytical_gpc_no_counts` without the ratio.
 """
 
 from __future__ import annotations
@@ -24,12 +23,9 @@ class AnalyticalGPC(GPCA):
     """GP-CA with analytical features in place of the embedding.
 
     Args:
-        source, seed: name the draws.
         point_count: whether the point-count ratio is among the features.
-        shape_points: source points at which local shape is measured, drawn by split and sample; all where there are
-            fewer.
-        neighbours: how many points, itself included, make a point's local shape.
-        settings: those of the GPC, as for GP-CA.
+        shape_points: source points at which local shape is measured, at most.
+        neighbours: points, itself included, that determine a point's local shape.
     """
 
     def __init__(
@@ -43,10 +39,8 @@ class AnalyticalGPC(GPCA):
         **settings: GPCArguments,
     ) -> None:
         super().__init__(source, seed, **settings)
-        self._axes = (source, seed, "analytical")
-        self._point_count = point_count
-        self._shape_points = shape_points
-        self._neighbors = neighbours
+        self._axes, self._point_count = (source, seed, "analytical"), point_count
+        self._shape_points, self._neighbors = shape_points, neighbours
 
     def describe(self, registrations: Registrations) -> Registrations:
         """Attach the features, the point-count ratio last, unless they are attached already."""
@@ -54,7 +48,7 @@ class AnalyticalGPC(GPCA):
         return measured(registrations, self._prefix, lambda: {"features": measure(registrations, *self._axes)})
 
     def features(self, registrations: Registrations) -> np.ndarray:
-        """Return the features (N, F) of :func:`gpca.explainers.analytical_features.analytical_features`."""
+        """Return the features (N, F)."""
         features_N_F = self.describe(registrations).attached[f"{self._prefix}features"]
         return features_N_F if self._point_count else features_N_F[:, :-1]
 

@@ -1,8 +1,7 @@
 """Dirichlet-based exact GP classification on the embeddings (Milios et al. 2018; paper, Table V): a GP on all samples.
 
-A label becomes a Dirichlet distribution with α = α_ε + 1{y = c}, its log-normal approximation a regression target
-with a noise of its own. One exact GP per concept is then fitted by its marginal
-likelihood, and the softmax of its draws are the probabilities.
+A label becomes a Dirichlet distribution with α = α_ε + 1{y = c}, approximated by log-normals: regression targets with
+known noise. One exact GP per concept is fitted by its marginal likelihood; probabilities are the softmax of its draws.
 """
 
 from __future__ import annotations
@@ -10,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from gpca.attribution.scores import summarize_marginals
-from gpca.explainers.concept_classifier import known_concepts
+from gpca.explainers.classifiers import known_concepts
 from gpca.explainers.interface import DrawingExplainer, ExplainerEntry, attached
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
@@ -20,13 +19,7 @@ JITTER = 1e-6
 
 
 class DirichletGP(DrawingExplainer):
-    """Exact GPs with RBF kernels of one scale and lengthscale per concept.
-
-    Args:
-        alpha: α_ε; small is confident.
-        iterations, learning_rate: how Adam climbs the marginal likelihood.
-        draws: M.
-    """
+    """Exact GPs with RBF kernels, one scale and lengthscale per concept; a small `alpha` α_ε is confident."""
 
     def __init__(
         self,
@@ -37,11 +30,8 @@ class DirichletGP(DrawingExplainer):
         learning_rate: float = 0.1,
         draws: int = 1000,
     ) -> None:
-        self._axes = (source, seed, "dirichlet")
-        self._alpha = alpha
-        self._iterations = iterations
-        self._learning_rate = learning_rate
-        self._draws = draws
+        self._axes, self._alpha, self._draws = (source, seed, "dirichlet"), alpha, draws
+        self._iterations, self._learning_rate = iterations, learning_rate
 
     def fit(self, registrations: Registrations) -> None:
         """Fit to the labeled embeddings; fewer than two concepts among the labels raise an InputError."""
@@ -66,24 +56,24 @@ class DirichletGP(DrawingExplainer):
         optimizer = Adam(parameters, self._learning_rate)
         data = [(c, squared_N_N, values_C_N[c], noise_C_N[c]) for c in range(len(CONCEPTS))]
         for _ in range(self._iterations):
-            gradient_C_3 = np.array([self._gradient(*of_concept) for of_concept in data]) / len(h_N_d)
+            gradient_C_3 = np.array([self._gradient(*concept) for concept in data]) / len(h_N_d)
             for parameter, gradient_C in zip(parameters, gradient_C_3.T, strict=True):
                 parameter.grad = torch.from_numpy(gradient_C.copy())
             optimizer.step()
-        self._factors = [self._factor(*of_concept)[1:] for of_concept in data]
+        self._factors = [self._factor(*concept)[1:] for concept in data]
 
     def summary(self, registrations: Registrations) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Summarize draws from the posterior at every embedding, as GP-CA does."""
+        """Summarize draws from the posterior at every embedding."""
         normal_M_C = generator(*self._axes, "draws").normal(size=(self._draws, len(CONCEPTS)))
         return summarize_marginals(*self._posterior(registrations), normal_M_C)
 
     def _gradient(
         self, c: int, squared_N_N: np.ndarray, values_N: np.ndarray, noise_N: np.ndarray
     ) -> tuple[float, float, float]:
-        """Return the slope of the negative log marginal likelihood in log lengthscale, log scale and mean.
+        """Return the gradient of the negative log marginal likelihood in log lengthscale, log scale and mean.
 
-        By a parameter of the covariance it is Σ (K⁻¹ - ααᵀ) ∂K / 2 with α = K⁻¹ (y - m) (Rasmussen & Williams 2006,
-        Eq. 5.9): a third of the work of following it back through the Cholesky factor.
+        For a parameter of the covariance, Σ (K⁻¹ - ααᵀ) ∂K / 2 with α = K⁻¹ (y - m) (Rasmussen & Williams 2006,
+        Eq. 5.9): a third of the cost of backpropagation through the Cholesky factor.
         """
         from scipy.linalg import solve_triangular
         from scipy.linalg.lapack import dpotri

@@ -1,6 +1,6 @@
-"""Gates: one number that the registration itself gives, read as "is it fine?". They name no cause.
+"""Gates: one number of the registration itself decides whether it is fine. They name no cause.
 
-Below the best threshold of an alarm nothing is wrong: so a method that has no class "nominal" gets one.
+Below the best threshold of an alarm, nothing is wrong: this gives a method without a class "nominal" one.
 """
 
 from __future__ import annotations
@@ -17,21 +17,25 @@ from gpca.causes.truth import NOMINAL
 from gpca.explainers.interface import ExplainerEntry, ScoringExplainer, attached
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
+from gpca.settings import Positive
+from gpca.uncertainty.settings import UncertaintySettings
+
+assert LABELS[0] == NOMINAL  # scores have its column first
 
 
 class NominalThreshold:
     """Turns an alarm (larger is worse) and the scores of the causes into scores over `LABELS`.
 
     Attributes:
-        accuracy: balanced, of the threshold on the labeled samples; a half where it cannot be told.
+        accuracy: balanced accuracy of the threshold on the labeled samples; 0.5 if undefined.
     """
 
     accuracy = 0.5
 
     def fit(self, alarm_N: np.ndarray, label_N: np.ndarray) -> NominalThreshold:
-        """Find the threshold of the best balanced accuracy on labeled samples, and the scale of the alarm.
+        """Find the threshold with the best balanced accuracy, and the scale of the alarm.
 
-        Where one of the two is missing among the labels, the threshold is the median.
+        Without nominal or without failed samples, the threshold is the median.
         """
         nominal_N = label_N == NOMINAL
         order = np.argsort(alarm_N, kind="stable")
@@ -48,9 +52,9 @@ class NominalThreshold:
         return self
 
     def scores(self, alarm_N: np.ndarray, shares_N_3: np.ndarray) -> np.ndarray:
-        """Return scores (N, 4) that add up to one: of nominal, and of the causes in these shares of the rest.
+        """Return scores (N, 4) with sum one: of nominal, and of the causes in proportion to their shares.
 
-        At the threshold nominal has as much as the largest cause, so the label named is the threshold's.
+        At the threshold, nominal equals the largest cause, so the label follows the threshold.
         """
         from scipy.special import expit
 
@@ -62,47 +66,88 @@ class NominalThreshold:
         return scores_N_4 / scores_N_4.sum(axis=1, keepdims=True)
 
 
-assert LABELS[0] == NOMINAL  # scores have its column first
-
-
-class Gate(ScoringExplainer):
-    """An alarm by one of the numbers of the motion.
-
-    Args:
-        name: in :data:`gpca.causes.settings.MOTION`.
-        source, seed: not used; nothing is drawn.
-    """
+class Alarm(ScoringExplainer):
+    """Base of explainers that raise an alarm and name no cause."""
 
     labels = LABELS
+
+    def fit(self, registrations: Registrations) -> None:
+        """Learn the threshold."""
+        self._threshold = NominalThreshold().fit(self.alarm(registrations), registrations.concept)
+
+    def explain(self, registrations: Registrations) -> Attribution:
+        """Score every registration, and abstain from naming causes."""
+        return replace(super().explain(registrations), abstained_N=np.ones(len(registrations), bool))
+
+    def scores(self, registrations: Registrations) -> np.ndarray:
+        """Score nominal by the alarm, and all causes equally."""
+        even_N_3 = np.full((len(registrations), len(CONCEPTS)), 1 / len(CONCEPTS))
+        return self._threshold.scores(self.alarm(registrations), even_N_3)
+
+    def alarm(self, registrations: Registrations) -> np.ndarray:
+        """Return the alarm (N,)."""
+        raise NotImplementedError
+
+
+class Gate(Alarm):
+    """An alarm by one of the numbers of :data:`gpca.causes.settings.MOTION`."""
 
     def __init__(self, name: str, source: str, seed: int) -> None:
         self._name = name
 
-    def fit(self, registrations: Registrations) -> None:
-        """Learn the threshold."""
-        self._threshold = NominalThreshold().fit(alarm(registrations, self._name), registrations.concept)
-
-    def explain(self, registrations: Registrations) -> Attribution:
-        """Score every registration, and name no cause of any."""
-        return replace(super().explain(registrations), abstained_N=np.ones(len(registrations), bool))
-
-    def scores(self, registrations: Registrations) -> np.ndarray:
-        """Score nominal by the alarm, and all causes alike."""
-        even_N_3 = np.full((len(registrations), len(CONCEPTS)), 1 / len(CONCEPTS))
-        return self._threshold.scores(alarm(registrations, self._name), even_N_3)
+    def alarm(self, registrations: Registrations) -> np.ndarray:
+        """Return the number (N,), large if bad."""
+        return motion_alarm(registrations, self._name)
 
 
-def alarm(registrations: Registrations, name: str) -> np.ndarray:
+def motion_alarm(registrations: Registrations, name: str) -> np.ndarray:
     """Return one of the numbers of the motion (N,), with the sign by which large values are bad."""
     return (-1 if name == "fitness" else 1) * attached(registrations, "motion")[:, MOTION.index(name)]
 
 
+class CovarianceGate(Alarm):
+    """The alarm is ln |Σ + εI| of the covariance that an estimator gives at the result of ICP.
+
+    A registration without an estimate, as nothing holds it, counts as one of covariance I.
+
+    Args:
+        estimator: the name of one that needs no training.
+        floor: ε, of the variances.
+    """
+
+    def __init__(self, estimator: str, source: str, seed: int, floor: Positive = 1e-12) -> None:
+        self._estimator, self._floor = estimator, floor
+
+    def alarm(self, registrations: Registrations) -> np.ndarray:
+        """Return the log-determinant (N,)."""
+        from gpca.alignment.methods.interface import Outcome, Pair
+        from gpca.uncertainty.estimators.interface import POINT_TO_POINT, RegisteredPair
+        from gpca.uncertainty.estimators.registry import make_estimator
+        from gpca.uncertainty.spread import log_determinant
+
+        estimate, deviation_6 = make_estimator(self._estimator), UncertaintySettings().deviation_6()
+        covariances = []
+        for row in range(len(registrations)):
+            # The source is already moved to ICP's result, so the pose is the identity.
+            source, target = registrations.cloud(row), registrations.target(row)
+            pair = Pair(source.astype(np.float64), target.astype(np.float64)).with_normals()
+            outcome = Outcome(np.eye(4), float(registrations.fitness[row]), float(registrations.inlier_rmse[row]))
+            estimated = estimate(RegisteredPair(pair, outcome, POINT_TO_POINT, deviation_6)).covariance_6_6
+            covariances.append(np.eye(6) if estimated is None else estimated)
+        return log_determinant(np.array(covariances).reshape(-1, 6, 6), self._floor)
+
+
 # The determinant of the covariance over other starts needs no clean run.
 GATES = ("inlier_rmse", "fitness", "log_determinant")
+_by_motion = partial(ExplainerEntry, reads="descriptors")
 CAUSE_EXPLAINERS = {
-    "gate_rmse": ExplainerEntry("Inlier RMSE (gate)", partial(Gate, "inlier_rmse"), ("pair",), reads="descriptors"),
-    "gate_fitness": ExplainerEntry("Fitness (gate)", partial(Gate, "fitness"), ("pair",), reads="descriptors"),
-    "gate_spread": ExplainerEntry(
-        "Spread of the runs (gate)", partial(Gate, "log_determinant"), ("runs",), reads="descriptors"
+    "gate_rmse": _by_motion("Inlier RMSE (gate)", partial(Gate, "inlier_rmse"), ("pair",)),
+    "gate_fitness": _by_motion("Fitness (gate)", partial(Gate, "fitness"), ("pair",)),
+    "gate_spread": _by_motion("Spread of the runs (gate)", partial(Gate, "log_determinant"), ("runs",)),
+    # In closed form (Censi 2007).
+    "gate_censi": ExplainerEntry("Covariance by Censi (gate)", partial(CovarianceGate, "censi"), ("pair",)),
+    # Its sigma points are 12 further runs.
+    "gate_brossard": ExplainerEntry(
+        "Covariance by Brossard (gate)", partial(CovarianceGate, "brossard"), ("pair", "runs")
     ),
 }

@@ -1,8 +1,8 @@
-"""Heads of a neural network on the embeddings, with what deep learning offers for uncertainty (paper, Table V).
+"""Heads of a neural network on the embeddings, with deep learning's measures of uncertainty (paper, Table V).
 
-The encoder stays as it is; a head of one hidden layer is trained on it with the labeled embeddings. From each
-follow draws of the logits, and from those scores, variances and BALD as GP-CA's: the members of a deep ensemble
-(Lakshminarayanan et al. 2017), the passes of Monte-Carlo dropout (Gal & Ghahramani 2016).
+The encoder is fixed; a head with one hidden layer is trained on the labeled embeddings. Draws of the logits give
+scores, variances and BALD like GP-CA's: members of a deep ensemble (Lakshminarayanan et al. 2017), passes of
+Monte-Carlo dropout (Gal & Ghahramani 2016), or Laplace's approximation over the last layer (Daxberger et al. 2021).
 """
 
 from __future__ import annotations
@@ -12,8 +12,9 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from gpca.attribution.diagnostics import negative_log_likelihood
 from gpca.attribution.scores import summarize_draws
-from gpca.explainers.concept_classifier import known_concepts
+from gpca.explainers.classifiers import known_concepts
 from gpca.explainers.interface import DrawingExplainer, ExplainerEntry, attached
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
@@ -25,15 +26,14 @@ DropoutRate = Annotated[float, Bounds(minimum=0, exclusiveMaximum=1)]
 
 
 class Heads:
-    """E heads d -> hidden -> C, ReLU between, trained side by side from starts and on batches of their own.
+    """E heads d -> hidden -> C with ReLU, trained side by side from different starts and on different batches.
 
     Args:
         axes: name the random numbers.
         heads: E.
-        rate: that of the dropout before the last layer.
-        hidden: units.
-        steps, learning_rate, weight_decay: how AdamW lowers the cross-entropy of random batches; the rate falls as a
-            cosine.
+        rate: dropout before the last layer.
+        hidden: hidden units.
+        steps, learning_rate, weight_decay: of AdamW on the cross-entropy of random batches, with a cosine schedule.
     """
 
     def __init__(
@@ -46,16 +46,11 @@ class Heads:
         learning_rate: float = 2e-3,
         weight_decay: float = 1e-2,
     ) -> None:
-        self._axes = axes
-        self._heads = heads
-        self._rate = rate
-        self._hidden = hidden
-        self._steps = steps
-        self._learning_rate = learning_rate
-        self._weight_decay = weight_decay
+        self._axes, self._heads, self._rate, self._hidden = axes, heads, rate, hidden
+        self._steps, self._learning_rate, self._weight_decay = steps, learning_rate, weight_decay
 
     def fit(self, h_N_d: np.ndarray, target_N: np.ndarray) -> None:
-        """Train on standardized embeddings and the numbers of their concepts."""
+        """Train on standardized embeddings and the indices of their concepts."""
         import torch
         from sklearn.preprocessing import StandardScaler
 
@@ -68,7 +63,7 @@ class Heads:
         for width, outputs in pairwise(widths):
             weight = torch.randn((self._heads, width, outputs), generator=random) * (2 / width) ** 0.5
             self._layers += [weight.requires_grad_(), torch.zeros((self._heads, 1, outputs), requires_grad=True)]
-        # Fused, since the plain form takes torch.sqrt, whose last bit depends on the processor's vendor.
+        # Fused, because the plain form takes torch.sqrt, whose last bit depends on the processor's vendor.
         optimizer = torch.optim.AdamW(self._layers, self._learning_rate, weight_decay=self._weight_decay, fused=True)
         schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, self._steps)
         for _ in range(self._steps):
@@ -80,7 +75,7 @@ class Heads:
             logits_E_B_C = self._last_layer(hidden_E_B_H)
             loss = torch.nn.functional.cross_entropy(logits_E_B_C.flatten(0, 1), targets_N[rows_E_B].flatten())
             optimizer.zero_grad()
-            # A head's gradient is that of its own loss, however many are trained beside it.
+            # Scaled so that a head's gradient is that of its loss, however many are trained beside it.
             (loss * self._heads).backward()
             optimizer.step()
             schedule.step()
@@ -113,11 +108,11 @@ class Heads:
         return hidden @ weight + bias
 
 
-HeadArguments = Annotated[Any, ArgumentsOf(Heads)]  # of a function that hands them on
+HeadArguments = Annotated[Any, ArgumentsOf(Heads)]  # keyword arguments passed on to it
 
 
 class HeadLearner(DrawingExplainer):
-    """The base of learners with heads, from which logits are drawn; `training` holds the settings of the heads."""
+    """Base of learners that draw logits from heads; `training` holds the settings of the heads."""
 
     def __init__(self, source: str, seed: int, **training: HeadArguments) -> None:
         self._axes = (source, seed, type(self).__name__)
@@ -126,12 +121,11 @@ class HeadLearner(DrawingExplainer):
     def fit(self, registrations: Registrations) -> None:
         """Train on the labeled embeddings; fewer than two concepts among the labels raise an InputError."""
         known_concepts(registrations.concept)
-        h_N_d = attached(registrations, "embedding")
         target_N = np.array([CONCEPTS.index(concept) for concept in registrations.concept])
-        self._train(h_N_d, target_N)
+        self._train(attached(registrations, "embedding"), target_N)
 
     def summary(self, registrations: Registrations) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Summarize draws of the logits of every registration, as GP-CA does."""
+        """Summarize draws of the logits of every registration."""
         return summarize_draws(self._draw_logits(attached(registrations, "embedding")))
 
     def _train(self, h_N_d: np.ndarray, target_N: np.ndarray) -> None:
@@ -152,14 +146,13 @@ class Ensemble(HeadLearner):
 
 
 class Dropout(HeadLearner):
-    """Monte-Carlo dropout: every pass is a draw, its mask shared by all samples, as one network is."""
+    """Monte-Carlo dropout: every pass is a draw, its mask shared by all samples, like one network."""
 
     def __init__(
         self, source: str, seed: int, rate: DropoutRate = 0.5, passes: Count = 100, **training: HeadArguments
     ) -> None:
         super().__init__(source, seed, rate=rate, **training)
-        self._rate = rate
-        self._passes = passes
+        self._rate, self._passes = rate, passes
 
     def _draw_logits(self, h_N_d: np.ndarray) -> np.ndarray:
         hidden_1_N_H = self._heads.hidden(h_N_d)
@@ -167,7 +160,94 @@ class Dropout(HeadLearner):
         return self._heads.logits((hidden_1_N_H * kept_M_1_H / (1 - self._rate)).astype(np.float32))
 
 
+class LastLayerLaplace(HeadLearner):
+    """Laplace's approximation over the last layer, with the full generalized Gauss-Newton matrix.
+
+    The last layer is refitted to the hidden units under a Gaussian prior, because the approximation needs a maximum of
+    the posterior. The prior's precision is the one with the least NLL on a fifth of the training samples after training
+    on the others. The evidence would choose far too timid scores, as the hidden units learned from the same labels.
+    """
+
+    PRECISIONS = tuple(10.0 ** (exponent / 2) for exponent in range(6, -5, -1))
+
+    def __init__(self, source: str, seed: int, draws: Count = 1000, **training: HeadArguments) -> None:
+        super().__init__(source, seed, **training)
+        self._draws = draws
+
+    def _train(self, h_N_d: np.ndarray, target_N: np.ndarray) -> None:
+        order_N = generator(*self._axes, "validation").permutation(len(target_N))
+        validation = order_N[::5]
+        rest = np.delete(order_N, np.s_[::5])
+        precision = self.PRECISIONS[0]
+        if len(rest):
+            super()._train(h_N_d[rest], target_N[rest])
+            losses = []
+            for candidate in self.PRECISIONS:
+                self._approximate(h_N_d[rest], target_N[rest], candidate)
+                scores_N_C, _, _ = summarize_draws(self._draw_logits(h_N_d[validation]))
+                losses.append(negative_log_likelihood(scores_N_C, target_N[validation]))
+            precision = self.PRECISIONS[int(np.argmin(losses))]
+        super()._train(h_N_d, target_N)
+        self._approximate(h_N_d, target_N, precision)
+
+    def _approximate(self, h_N_d: np.ndarray, target_N: np.ndarray, precision: float) -> None:
+        features_N_F = self._features(h_N_d)
+        wanted_N_C = np.eye(len(CONCEPTS))[target_N]
+        self._weights_F_C = _regularized_weights(features_N_F, wanted_N_C, precision)
+        p_N_C = np.exp(_log_softmax(features_N_F @ self._weights_F_C))
+        eigenvalues, self._vectors = np.linalg.eigh(_gauss_newton(features_N_F, p_N_C))
+        self._deviations = 1 / np.sqrt(np.maximum(eigenvalues, 0) + precision)
+
+    def _draw_logits(self, h_N_d: np.ndarray) -> np.ndarray:
+        features_N_F = self._features(h_N_d)
+        n_classes = len(CONCEPTS)
+        # The weights have the covariance W Wᵀ with W (C·F, K), a sample's logits R Rᵀ with R (C, K).
+        roots_C_F_K = (self._vectors * self._deviations).reshape(n_classes, features_N_F.shape[1], -1)
+        roots_C_N_K = features_N_F @ roots_C_F_K
+        covariance_N_C_C = np.einsum("cnk,dnk->ncd", roots_C_N_K, roots_C_N_K)
+        cholesky_N_C_C = np.linalg.cholesky(covariance_N_C_C + 1e-9 * np.eye(n_classes))
+        normal_M_C = generator(*self._axes, "draws").normal(size=(self._draws, n_classes))
+        return features_N_F @ self._weights_F_C + np.einsum("ncd,md->mnc", cholesky_N_C_C, normal_M_C)
+
+    def _features(self, h_N_d: np.ndarray) -> np.ndarray:
+        hidden_N_H = self._heads.hidden(h_N_d)[0].astype(float)
+        return np.column_stack([hidden_N_H, np.ones(len(hidden_N_H))])
+
+
+def _regularized_weights(features_N_F: np.ndarray, wanted_N_C: np.ndarray, precision: float) -> np.ndarray:
+    """Return the weights (F, C) that minimize cross-entropy + precision / 2 · |weights|²."""
+    from scipy.optimize import minimize
+
+    shape = (features_N_F.shape[1], wanted_N_C.shape[1])
+
+    def loss(flat):
+        weights_F_C = flat.reshape(shape)
+        log_p_N_C = _log_softmax(features_N_F @ weights_F_C)
+        gradient_F_C = features_N_F.T @ (np.exp(log_p_N_C) - wanted_N_C) + precision * weights_F_C
+        return -np.sum(wanted_N_C * log_p_N_C) + 0.5 * precision * flat @ flat, gradient_F_C.ravel()
+
+    return minimize(loss, np.zeros(shape).ravel(), jac=True, method="L-BFGS-B").x.reshape(shape)
+
+
+def _gauss_newton(features_N_F: np.ndarray, p_N_C: np.ndarray) -> np.ndarray:
+    """Return the curvature (C·F, C·F) of the cross-entropy in the weights, classes first."""
+    rows = []
+    for c, p_N in enumerate(p_N_C.T):
+        curvature_N_C = p_N[:, None] * (np.eye(p_N_C.shape[1])[c] - p_N_C)
+        rows.append([(features_N_F * curvature_N[:, None]).T @ features_N_F for curvature_N in curvature_N_C.T])
+    return np.block(rows)
+
+
+def _log_softmax(logits_N_C: np.ndarray) -> np.ndarray:
+    from scipy.special import log_softmax
+
+    return log_softmax(logits_N_C, axis=1)
+
+
 EXPLAINERS = {
     "learner_ensemble": ExplainerEntry("Deep ensemble of heads", Ensemble, ("source",), reads="embeddings"),
     "learner_dropout": ExplainerEntry("MC dropout of the head", Dropout, ("source",), reads="embeddings"),
+    "learner_laplace_head": ExplainerEntry(
+        "Last-layer Laplace of the head", LastLayerLaplace, ("source",), reads="embeddings"
+    ),
 }

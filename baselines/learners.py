@@ -1,15 +1,16 @@
-"""Other learners on the embeddings that GP-CA reads: the comparison for its Gaussian process (paper, Table V).
+"""Other learners on GP-CA's embeddings, standardized on the training samples (paper, Table V).
 
-All learn from the same labeled embeddings, standardized on them, and give probabilities of every concept. The forest
-and the linear SVM are the paper's: scikit-learn's defaults, 50 trees, random_state 42.
+The forest and the linear SVM are the paper's: scikit-learn's defaults, 50 trees, random_state 42.
 """
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from gpca.errors import InputError
-from gpca.explainers.concept_classifier import (
+from gpca.explainers.classifiers import (
     PAPERS_RANDOM_STATE,
     ClassifierExplainer,
     ConceptClassifier,
@@ -29,20 +30,19 @@ class Learner(ClassifierExplainer):
 
 
 def forest(source: str, seed: int, trees: Count = 50) -> Learner:
-    """Make a random forest."""
     from sklearn.ensemble import RandomForestClassifier
 
     return Learner(_standardized(RandomForestClassifier(n_estimators=trees, random_state=PAPERS_RANDOM_STATE)))
 
 
 class ProbableSVM(Learner):
-    """A support vector machine; Platt's sigmoids over up to five folds turn its decision values into probabilities."""
+    """A support vector machine with scikit-learn's defaults, and Platt's sigmoids over up to five folds."""
 
-    def __init__(self, kernel: str) -> None:
+    def __init__(self, kernel: str, source: str, seed: int) -> None:
         self._kernel = kernel
 
     def fit(self, registrations: Registrations) -> None:
-        """Fit to the labeled embeddings; a concept of which there is a single sample raises an InputError."""
+        """Fit to the labeled embeddings; a concept with a single sample raises an InputError."""
         from sklearn.calibration import CalibratedClassifierCV
         from sklearn.svm import SVC
 
@@ -55,48 +55,31 @@ class ProbableSVM(Learner):
 
 
 class Nearest(Learner):
-    """A k-nearest-neighbor classifier."""
+    """A k-nearest-neighbor classifier; a probability is a share of the neighbors."""
 
-    def __init__(self, neighbours: int) -> None:
+    def __init__(self, source: str, seed: int, neighbours: Count = 5) -> None:
         from sklearn.neighbors import KNeighborsClassifier
 
         self._neighbors = neighbours
         super().__init__(_standardized(KNeighborsClassifier(neighbours)))
 
     def fit(self, registrations: Registrations) -> None:
-        """Fit to the labeled embeddings; fewer of them than neighbors raise an InputError."""
+        """Fit to the labeled embeddings; fewer samples than neighbors raise an InputError."""
         if self._neighbors > len(registrations):
             fault = f"{self._neighbors} neighbors are too many for {len(registrations)} training samples"
             raise InputError("learner_nearest", fault, "lower neighbours")
         super().fit(registrations)
 
 
-def linear_svm(source: str, seed: int) -> Learner:
-    """Make a linear support vector machine."""
-    return ProbableSVM("linear")
-
-
-def rbf_svm(source: str, seed: int) -> Learner:
-    """Make a support vector machine with scikit-learn's default RBF kernel."""
-    return ProbableSVM("rbf")
-
-
 def logistic(source: str, seed: int, inverse_regularisation: Positive = 1.0) -> Learner:
-    """Make a multinomial logistic regression."""
     return Learner(standardized_regression(inverse_regularisation))
 
 
-def nearest(source: str, seed: int, neighbours: Count = 5) -> Learner:
-    """Make a k-nearest-neighbor classifier; a probability is a share of the neighbors."""
-    return Nearest(neighbours)
-
-
 def laplace_gpc(source: str, seed: int, lengthscale: Positive = 1.0) -> Learner:
-    """Make scikit-learn's Gaussian process classifier: one against the rest, Laplace's approximation, RBF kernel.
+    """Make scikit-learn's GP classifier: one against the rest, Laplace's approximation, RBF kernel.
 
-    Args:
-        lengthscale: in units of √(2 d), the expected distance of two standardized embeddings. It stays fixed,
-            since scikit-learn's optimizer takes minutes.
+    The lengthscale is in units of √(2 d), the expected distance of two standardized embeddings. It is fixed, because
+    scikit-learn's optimizer takes minutes.
     """
     from sklearn.gaussian_process import GaussianProcessClassifier
     from sklearn.gaussian_process.kernels import RBF, ConstantKernel
@@ -119,13 +102,12 @@ def _standardized(*steps):
     return make_pipeline(StandardScaler(), *steps)
 
 
+_entry = partial(ExplainerEntry, sees=("source",), reads="embeddings")
 EXPLAINERS = {
-    "learner_forest": ExplainerEntry("Random forest on the embedding", forest, ("source",), reads="embeddings"),
-    "learner_linear_svm": ExplainerEntry("Linear SVM on the embedding", linear_svm, ("source",), reads="embeddings"),
-    "learner_rbf_svm": ExplainerEntry("RBF SVM on the embedding", rbf_svm, ("source",), reads="embeddings"),
-    "learner_logistic": ExplainerEntry(
-        "Logistic regression on the embedding", logistic, ("source",), reads="embeddings"
-    ),
-    "learner_nearest": ExplainerEntry("k nearest embeddings", nearest, ("source",), reads="embeddings"),
-    "learner_laplace_gpc": ExplainerEntry("Laplace GPC on the embedding", laplace_gpc, ("source",), reads="embeddings"),
+    "learner_forest": _entry("Random forest on the embedding", forest),
+    "learner_linear_svm": _entry("Linear SVM on the embedding", partial(ProbableSVM, "linear")),
+    "learner_rbf_svm": _entry("RBF SVM on the embedding", partial(ProbableSVM, "rbf")),
+    "learner_logistic": _entry("Logistic regression on the embedding", logistic),
+    "learner_nearest": _entry("k nearest embeddings", Nearest),
+    "learner_laplace_gpc": _entry("Laplace GPC on the embedding", laplace_gpc),
 }

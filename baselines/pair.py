@@ -1,9 +1,8 @@
-"""Explainers that see the pair, both clouds and the motion of ICP or without it, and not the aligned source alone.
+"""Explainers that see the pair, both clouds and perhaps the motion of ICP, instead of the aligned source alone.
 
-`gpca_pair` is the paper's classifier with other eyes: a row of its own, never "GP-CA (paper)". What it reads does not
-depend on which object is registered (:func:`gpca.pairs.description.relations`). `gpca_pair_clouds` is the same
-without how far ICP moved the cloud, which gives pose errors away where nothing else starts off. Beside them stand the
-plainest form of the same idea, a forest on distances, and a rival that knows only the density of the cloud.
+`gpca_pair` is the paper's classifier on relations that do not depend on the object
+(:func:`gpca.pairs.description.relations`). `gpca_pair_clouds` does not read how far ICP moved the cloud, which gives
+pose errors away in the paper's protocol. `pair_forest` is the plainest form of the same idea; `density` is a control.
 """
 
 from __future__ import annotations
@@ -14,10 +13,9 @@ import numpy as np
 
 from gpca.causes.settings import DescribedPoints
 from gpca.classifier.settings import GPCArguments
-from gpca.explainers.concept_classifier import ClassifierExplainer, standardized_regression
+from gpca.explainers.classifiers import ClassifierExplainer, standardized_regression
 from gpca.explainers.gpca import DescriptorGPCA
-from gpca.explainers.interface import ExplainerEntry, measured
-from gpca.explainers.sight import Sees
+from gpca.explainers.interface import ExplainerEntry, Sees, measured
 from gpca.pairs.dataset import Registrations
 from gpca.seeds import seed_of
 from gpca.settings import Count, Positive
@@ -28,31 +26,25 @@ WITHOUT = "without ICP's motion"  # in titles
 
 
 class PairDescription:
-    """The base of these explainers: each reads one group of descriptors of every pair.
+    """Base of these explainers: each reads one group of descriptors of every pair.
 
     Args:
         source, seed: name the draws from the clouds.
         group: one of :data:`gpca.pairs.description.WIDTHS`.
         points: drawn from each cloud.
-        motion: whether the relations tell how far ICP moved the cloud.
+        motion: whether the relations include how far ICP moved the cloud.
     """
 
     def __init__(self, source: str, seed: int, group: str, points: int, motion: bool = True) -> None:
-        self._axes = (source, seed)
-        self._group = group
-        self._motion = motion
-        self._points = points
+        self._axes, self._group, self._motion, self._points = (source, seed), group, motion, points
         self._prefix = f"pair_{source}_{seed}_{points}_"
 
     def describe(self, registrations: Registrations) -> Registrations:
         """Attach the descriptors, unless they are attached already."""
         from gpca.pairs.description import describe_registrations
 
-        return measured(
-            registrations,
-            self._prefix,
-            lambda: describe_registrations(registrations, *self._axes, points=self._points),
-        )
+        describe = partial(describe_registrations, registrations, *self._axes, points=self._points)
+        return measured(registrations, self._prefix, describe)
 
     def features(self, registrations: Registrations) -> np.ndarray:
         """Return the group (N, F)."""
@@ -63,14 +55,7 @@ class PairDescription:
 
 
 class PairGPCA(PairDescription, DescriptorGPCA):
-    """GP-CA on the relations of the pair.
-
-    Args:
-        motion: whether they tell how far ICP moved the cloud.
-        source, seed: name the draws.
-        points: drawn from each cloud.
-        settings: those of the GPC, as for GP-CA.
-    """
+    """GP-CA on the relations of the pair, with or without the motion of ICP."""
 
     def __init__(
         self, motion: bool, source: str, seed: int, points: DescribedPoints = 512, **settings: GPCArguments
@@ -88,7 +73,7 @@ class PairLearner(PairDescription, ClassifierExplainer):
 
 
 def pair_forest(source: str, seed: int, trees: Count = 200, points: DescribedPoints = 512) -> PairLearner:
-    """Make a random forest on the 52 distances of the pair."""
+    """Make a forest on the 52 distances of the pair."""
     from sklearn.ensemble import RandomForestClassifier
 
     random_state = seed_of(source, seed, "pair_forest") % 2**32
@@ -100,7 +85,7 @@ def pair_forest(source: str, seed: int, trees: Count = 200, points: DescribedPoi
 def density(
     source: str, seed: int, inverse_regularisation: Positive = 1.0, points: DescribedPoints = 512
 ) -> PairLearner:
-    """Make the logistic regression that knows spacing and extent of the observed cloud, and nothing else."""
+    """Make a logistic regression on spacing and extent of the observed cloud."""
     return PairLearner(standardized_regression(inverse_regularisation), source, seed, "densities", points)
 
 

@@ -4,36 +4,24 @@ from __future__ import annotations
 
 import numpy as np
 
-from baselines.descriptor_gpca import Committee
-from baselines.descriptors import boosted_trees, randomized_trees
+from baselines.descriptors import Committee, randomized_trees
 from gpca.causes.dataset import LABELS
-from gpca.explainers.concept_classifier import ClassifierExplainer
+from gpca.explainers.classifiers import ClassifierExplainer, boosted_trees
 from gpca.explainers.gpca import DescriptorGPCA
-from gpca.explainers.interface import REENACTED, ExplainerEntry, ScoringExplainer, attached
-from gpca.explainers.sight import Sees
+from gpca.explainers.interface import REENACTED, ExplainerEntry, ScoringExplainer, Sees, attached
 from gpca.pairs.dataset import Registrations
 
 SEES: Sees = ("pair", "motion", "runs", "reenactment")
-VERDICT, NUMBERS = "verdict", "reenactment"  # names of what is attached
+VERDICT, NUMBERS = "verdict", "reenactment"  # attached arrays
 
 
 class Reenact(ScoringExplainer):
-    """Scores are the probabilities that the re-enactment itself gives (:mod:`gpca.reenactment.verdict`).
-
-    Args:
-        source, seed: not used; nothing is drawn.
-    """
+    """Scores are the probabilities of the re-enactment itself (:mod:`gpca.reenactment.verdict`)."""
 
     labels = LABELS
 
-    def __init__(self, source: str, seed: int) -> None:
-        pass
-
-    def fit(self, registrations: Registrations) -> None:
-        """Do nothing, since nothing is learned."""
-
     def scores(self, registrations: Registrations) -> np.ndarray:
-        """Return the probabilities of nominal and of each cause to be the dominant one."""
+        """Return the probabilities of nominal and of each cause being dominant."""
         return attached(registrations, VERDICT)
 
 
@@ -43,7 +31,7 @@ class ReenactmentClassifier(ClassifierExplainer):
     labels = LABELS
 
     def features(self, registrations: Registrations) -> np.ndarray:
-        """Return those numbers."""
+        """Return the numbers."""
         return attached(registrations, NUMBERS)
 
 
@@ -56,12 +44,12 @@ class ReenactmentGPCA(DescriptorGPCA):
         super().__init__((source, seed, "reenactment"), source, seed, learning_rate=0.1, iterations=200)
 
     def features(self, registrations: Registrations) -> np.ndarray:
-        """Return those numbers."""
+        """Return the numbers."""
         return attached(registrations, NUMBERS)
 
 
 class ReenactmentCommittee(Committee):
-    """The committee of three unlike kinds, on the numbers of the re-enactment and the pair's descriptors."""
+    """The committee of three, on the numbers of the re-enactment, which include the pair's descriptors."""
 
     def __init__(self, source: str, seed: int) -> None:
         self._members = [

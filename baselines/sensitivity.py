@@ -1,8 +1,8 @@
 """Sensitivity analysis of the registration's uncertainty: local derivatives, PRCC and Sobol indices.
 
-Local: one knob at a time, as the paper describes it. Global: partial rank correlation over a Latin hypercube (Marino
-et al. 2008, whom the paper cites) and total indices by Saltelli's scheme (Saltelli et al. 2010, through SALib).
-Over remedies, one at a time is switched on (docs/baselines.md).
+Local: one knob at a time, as in the paper. Global: partial rank correlation over a Latin hypercube (Marino et al. 2008,
+cited by the paper) and total indices by Saltelli's scheme (Saltelli et al. 2010, through SALib). Remedies are switched
+on one at a time (docs/baselines.md).
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ from functools import partial
 
 import numpy as np
 
-from baselines.values import KnobValues, LearnedValues, ScaledValues
+from baselines.values import KnobValues, LearnedValues, RemovalValues, ScaledValues
 from gpca.explainers.interface import ExplainerEntry
 
-ONE_AT_A_TIME = [0, 1, 2, 4]  # the corners with none or one of the three features present
-STEPS = [0, 8, 9, 10]  # the conditions of design ``additive`` that are untouched or a small step of one knob
+ONE_AT_A_TIME = [0, 1, 2, 4]  # corners with none or one of the three features present
+STEPS = [0, 8, 9, 10]  # conditions of design ``additive``: untouched, or a small step of one knob
 
 
 def local_derivatives(uncertainty_N_K: np.ndarray) -> np.ndarray:
@@ -29,8 +29,8 @@ def local_derivatives(uncertainty_N_K: np.ndarray) -> np.ndarray:
 def partial_rank_correlations(inputs_K_3: np.ndarray, outputs_N_K: np.ndarray) -> np.ndarray:
     """Return the PRCC (N, 3) of each input with each of N outputs over K settings (Marino et al. 2008, Sec. 2.3).
 
-    The correlation of what a regression on the ranks of the other inputs leaves of the ranks of the input and of the
-    output; zero where it leaves nothing of the output's, as of a constant.
+    The correlation of the residuals of the input's and the output's ranks after regression on the other inputs' ranks;
+    zero where the output has no residual.
     """
     from scipy.stats import rankdata
 
@@ -49,17 +49,14 @@ def partial_rank_correlations(inputs_K_3: np.ndarray, outputs_N_K: np.ndarray) -
 
 
 def total_indices(inputs_K_3: np.ndarray, outputs_N_K: np.ndarray) -> np.ndarray:
-    """Return Sobol's total index (N, 3) of each input for each of N outputs at Saltelli's K settings.
-
-    Where an output is constant they are zero.
-    """
+    """Return Sobol's total index (N, 3) of each input for N outputs at Saltelli's K settings; zero if constant."""
     from SALib.analyze import sobol
 
     problem = {"num_vars": 3, "names": ["noise", "spread", "overlap"], "bounds": [[0, 1]] * 3}
     values_N_3 = np.zeros((len(outputs_N_K), 3))
     for values_3, output_K in zip(values_N_3, outputs_N_K, strict=True):
         if np.ptp(output_K) > 0:
-            # The resamples only give confidence bounds, which are not used; two are the fewest.
+            # Resamples only give confidence bounds, which are not used; two is the minimum.
             indices = sobol.analyze(problem, output_K, calc_second_order=False, num_resamples=2, seed=0)
             values_3[:] = indices["ST"]
     return values_N_3
@@ -68,7 +65,7 @@ def total_indices(inputs_K_3: np.ndarray, outputs_N_K: np.ndarray) -> np.ndarray
 def _over_settings(sensitivities: Callable, kind: str, uncertainty_N_K: np.ndarray) -> np.ndarray:
     from gpca.uncertainty.designs import sample_knobs
 
-    # The first condition is the untouched pair, against which the uncertainty is measured.
+    # The first condition is the untouched pair.
     return sensitivities(sample_knobs(kind), uncertainty_N_K[:, 1:])
 
 
@@ -77,19 +74,28 @@ def single_drops(worth_N_8: np.ndarray) -> np.ndarray:
     return worth_N_8[:, ONE_AT_A_TIME[1:]] - worth_N_8[:, :1]
 
 
-# The paper's are local derivatives at the observed pair.
+def _single_remedies(errors_N_8: np.ndarray) -> np.ndarray:
+    """Return the change that each remedy makes alone (N, 3)."""
+    return single_drops(-errors_N_8[:, ::-1])
+
+
+# The paper uses local derivatives at the observed pair.
 sa_local_additive = partial(KnobValues, local_derivatives, STEPS)
 sa_prcc_additive = partial(KnobValues, partial(_over_settings, partial_rank_correlations, "latin"), None)
 sa_sobol_additive = partial(KnobValues, partial(_over_settings, total_indices, "saltelli"), None)
 sa_local_removal = partial(ScaledValues, single_drops, ONE_AT_A_TIME)
 sa_supervised = partial(LearnedValues, single_drops, ONE_AT_A_TIME)
+_removal = partial(ExplainerEntry, sees=("remedies",), reads="uncertainty/removal")
 EXPLAINERS = {
     "sa_local_additive": ExplainerEntry("SA", sa_local_additive, ("runs",), reads="uncertainty/additive"),
     "sa_prcc_additive": ExplainerEntry("SA, PRCC", sa_prcc_additive, ("runs",), reads="uncertainty/latin"),
     "sa_sobol_additive": ExplainerEntry("SA, Sobol", sa_sobol_additive, ("runs",), reads="uncertainty/saltelli"),
-    "sa_local_removal": ExplainerEntry("SA, remedies", sa_local_removal, ("remedies",), reads="uncertainty/removal"),
-    "sa_local_removal_residual": ExplainerEntry(
-        "SA, remedies, residual", sa_local_removal, ("remedies",), reads="uncertainty/removal"
-    ),
-    "sa_supervised": ExplainerEntry("SA, remedies, learned", sa_supervised, ("remedies",), reads="uncertainty/removal"),
+    "sa_local_removal": _removal("SA, remedies", sa_local_removal),
+    "sa_local_removal_residual": _removal("SA, remedies, residual", sa_local_removal),
+    "sa_supervised": _removal("SA, remedies, learned", sa_supervised),
+}
+CAUSE_EXPLAINERS = {
+    "sa_removal": ExplainerEntry(
+        "SA, remedies", partial(RemovalValues, _single_remedies), ("remedies",), reads="descriptors"
+    )
 }

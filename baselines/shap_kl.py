@@ -1,9 +1,9 @@
 """SHAP over the registration's uncertainty (Lundberg & Lee 2017; Qin et al. 2024), under four protocols.
 
-The three features are the concepts: noise, pose, overlap. A coalition's worth is the uncertainty with those features
-present, and the concept with the largest Shapley value is named. The protocols differ in what a feature is
-(docs/baselines.md): a knob turned on top of the observed pair (additive, the paper's), the true perturbation of a
-clean pair (oracle), or a remedy applied to the observed pair (removal; supervised: with labels).
+The three features are the concepts: noise, pose, overlap. The worth of a coalition is the uncertainty with those
+features present; the concept with the largest Shapley value is named. The protocols differ in what a feature is
+(docs/baselines.md): a knob turned on the observed pair (additive, the paper's), the true perturbation of a clean pair
+(oracle), or a remedy applied to the observed pair (removal; supervised: with labels).
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from functools import partial
 
 import numpy as np
 
-from baselines.values import KnobValues, LearnedValues, ScaledValues
+from baselines.values import KnobValues, LearnedValues, RemovalValues, ScaledValues
 from gpca.explainers.interface import ExplainerEntry
 
 ALL_CORNERS = list(range(8))
@@ -22,8 +22,7 @@ def shapley_values(worth_N_8: np.ndarray) -> np.ndarray:
     """Return the Shapley values (N, 3) of N games, given the worth of all 8 coalitions of each.
 
     With three features ``shap.KernelExplainer`` enumerates the coalitions, so these are the exact values
-    φ_i = Σ_S |S|! (2 − |S|)! / 3! (v(S ∪ i) − v(S)). The N games are one model of N outputs: the coalitions are the
-    same for all, and their regression is solved once.
+    φ_i = Σ_S |S|! (2 − |S|)! / 3! (v(S ∪ i) − v(S)). As one model with N outputs, the N games share one regression.
     """
     import shap
 
@@ -35,24 +34,24 @@ def shapley_values(worth_N_8: np.ndarray) -> np.ndarray:
 
 
 def _of_corners(uncertainty_N_K: np.ndarray) -> np.ndarray:
-    """Return the Shapley values (N, 3) of the knobs, whose eight corners come first in their designs."""
-    return shapley_values(uncertainty_N_K[:, :8])
+    return shapley_values(uncertainty_N_K[:, :8])  # the designs of knobs begin with the eight corners
 
 
 shap_over_knobs = partial(KnobValues, _of_corners, ALL_CORNERS)
 shap_removal = partial(ScaledValues, shapley_values, ALL_CORNERS)
 shap_supervised = partial(LearnedValues, shapley_values, ALL_CORNERS)
-
+_removal = partial(ExplainerEntry, sees=("remedies",), reads="uncertainty/removal")
 EXPLAINERS = {
     "shap_additive": ExplainerEntry("SHAP", shap_over_knobs, ("runs",), reads="uncertainty/additive"),
     "shap_oracle": ExplainerEntry(
         "SHAP (oracle)", shap_over_knobs, ("runs", "truth"), reads="uncertainty/oracle", oracle=True
     ),
-    "shap_removal": ExplainerEntry("SHAP, remedies", shap_removal, ("remedies",), reads="uncertainty/removal"),
-    "shap_removal_residual": ExplainerEntry(
-        "SHAP, remedies, residual", shap_removal, ("remedies",), reads="uncertainty/removal"
-    ),
-    "shap_supervised": ExplainerEntry(
-        "SHAP, remedies, learned", shap_supervised, ("remedies",), reads="uncertainty/removal"
-    ),
+    "shap_removal": _removal("SHAP, remedies", shap_removal),
+    "shap_removal_residual": _removal("SHAP, remedies, residual", shap_removal),
+    "shap_supervised": _removal("SHAP, remedies, learned", shap_supervised),
+}
+CAUSE_EXPLAINERS = {
+    "shap_removal": ExplainerEntry(
+        "SHAP, remedies", partial(RemovalValues, shapley_values), ("remedies",), reads="descriptors"
+    )
 }

@@ -1,8 +1,7 @@
-"""What needs no training: guessing, the most frequent label, and a rule of three lines.
+"""Explainers without training: guessing, the most frequent label, and a rule of three lines.
 
-What a method adds is its lead over the best of these. The rule was written down after a look at the paper's protocol:
-only pose samples start away from the truth, and only overlap samples have fewer points. So it says how much of an
-accuracy the protocol itself gives away.
+A method's gain is its lead over the best of these. The rule uses the paper's protocol: only pose samples start away
+from the truth, and only overlap samples have fewer points. Its accuracy is what the protocol itself gives away.
 """
 
 from __future__ import annotations
@@ -11,7 +10,7 @@ import math
 
 import numpy as np
 
-from baselines.gates import GATES, NominalThreshold, alarm
+from baselines.gates import GATES, NominalThreshold, motion_alarm
 from gpca.causes.dataset import LABELS
 from gpca.explainers.interface import ExplainerEntry, ScoringExplainer
 from gpca.pairs.dataset import Registrations
@@ -19,35 +18,25 @@ from gpca.pairs.perturbation import CONCEPTS, HalfTurn
 from gpca.seeds import generator
 from gpca.settings import PositiveShare
 
-TILT = 1e-3  # of a score; so little tells the label that was drawn
+TILT = 1e-3  # of a score, by which the drawn order differs from a tie
 
 
 class Chance(ScoringExplainer):
-    """Scores are the same for all labels, but for a `TILT` that orders them at random, sample by sample.
-
-    Args:
-        source, seed: name the draws.
-    """
+    """Equal scores for all labels, but for a `TILT` that orders them at random, sample by sample."""
 
     def __init__(self, source: str, seed: int) -> None:
         self._axes = (source, seed, "chance")
 
-    def fit(self, registrations: Registrations) -> None:
-        """Do nothing, since nothing is learned."""
-
     def scores(self, registrations: Registrations) -> np.ndarray:
         """Draw an order of the labels for each sample, by its split and number."""
         samples = zip(registrations.split, registrations.sample, strict=True)
-        places_N_C = [generator(*self._axes, *sample).permutation(len(self.labels)) for sample in samples]
-        scores_N_C = 1 + TILT * np.array(places_N_C).reshape(len(registrations), len(self.labels))
+        ranks_N_C = [generator(*self._axes, *sample).permutation(len(self.labels)) for sample in samples]
+        scores_N_C = 1 + TILT * np.array(ranks_N_C).reshape(len(registrations), len(self.labels))
         return scores_N_C / scores_N_C.sum(axis=1, keepdims=True)
 
 
 class MostFrequent(ScoringExplainer):
-    """Scores are the shares of the labels in training; of equals, the first is named."""
-
-    def __init__(self, source: str, seed: int) -> None:
-        pass
+    """Scores are the shares of the labels in training; of equal ones, the first is named."""
 
     def fit(self, registrations: Registrations) -> None:
         """Count the labels."""
@@ -59,32 +48,19 @@ class MostFrequent(ScoringExplainer):
 
 
 class Rule(ScoringExplainer):
-    """ICP turned what was observed by more than an angle: pose; it has too few points: overlap; else noise.
+    """ICP turned the observed cloud by more than an angle: pose; it has too few points: overlap; else noise.
 
     Args:
-        source, seed: not used; nothing is drawn.
         turned_deg: the angle between the initial pose and that of ICP.
-        complete: share of the model's points that the observed cloud has where nothing is missing, at least.
+        complete: minimum share of the model's points in an observed cloud without missing parts.
     """
 
-    def __init__(
-        self,
-        source: str,
-        seed: int,
-        turned_deg: HalfTurn = 5.0,
-        complete: PositiveShare = 0.95,
-    ) -> None:
+    def __init__(self, source: str, seed: int, turned_deg: HalfTurn = 5.0, complete: PositiveShare = 0.95) -> None:
         self._cosine = math.cos(math.radians(turned_deg))
         self._complete = complete
 
-    def fit(self, registrations: Registrations) -> None:
-        """Do nothing, since nothing is learned."""
-
     def scores(self, registrations: Registrations) -> np.ndarray:
         """Return 1 for the concept that the rule names."""
-        return self._named(registrations)
-
-    def _named(self, registrations: Registrations) -> np.ndarray:
         R_init_N_3_3, R_icp_N_3_3 = (
             getattr(registrations, f"T_target_source_{name}")[:, :3, :3] for name in ("init", "icp")
         )
@@ -107,23 +83,20 @@ class CauseMostFrequent(MostFrequent):
 
 
 class CauseRule(Rule):
-    """The rule where a gate says that something is wrong.
-
-    It has no "nominal" of its own, and gets the strongest fair one: of the three gates (:mod:`baselines.gates`) the one
-    that tells nominal from failed best in training, with its threshold.
-    """
+    """The rule, with "nominal" by the one of three gates (:mod:`baselines.gates`) that is best in training."""
 
     labels = LABELS
 
     def fit(self, registrations: Registrations) -> None:
         """Choose the gate and its threshold."""
-        fitted = {name: NominalThreshold().fit(alarm(registrations, name), registrations.concept) for name in GATES}
+        label_N = registrations.concept
+        fitted = {name: NominalThreshold().fit(motion_alarm(registrations, name), label_N) for name in GATES}
         self._gate = max(fitted, key=lambda name: fitted[name].accuracy)
         self._threshold = fitted[self._gate]
 
     def scores(self, registrations: Registrations) -> np.ndarray:
-        """Return the score of nominal by the gate; the concept that the rule names has all of the rest."""
-        return self._threshold.scores(alarm(registrations, self._gate), self._named(registrations))
+        """Return the score of nominal by the gate; the concept that the rule names has the rest."""
+        return self._threshold.scores(motion_alarm(registrations, self._gate), super().scores(registrations))
 
 
 EXPLAINERS = {

@@ -1,7 +1,7 @@
-"""The part common to SHAP and sensitivity analysis: it turns values per concept and registration into an attribution.
+"""What SHAP and sensitivity analysis share: turning values per concept and registration into an attribution.
 
-Values of knobs are taken as they are. A remedy may lower the uncertainty of every pair a little, so without labels its
-values are counted from their mean over the training split, in standard deviations; with labels a classifier reads them.
+Values of knobs are used directly. A remedy may lower the uncertainty of every pair a little, so without labels its
+values are standardized over the training split; with labels a classifier reads them.
 """
 
 from __future__ import annotations
@@ -12,20 +12,26 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from baselines.gates import NominalThreshold
 from gpca.attribution.scores import Attribution
+from gpca.causes.dataset import LABELS
+from gpca.causes.shapley import ALL, SUBSETS
+from gpca.causes.truth import NOMINAL
 from gpca.errors import InputError
-from gpca.explainers.concept_classifier import ClassifierExplainer, standardized_regression
+from gpca.explainers.classifiers import ClassifierExplainer, standardized_regression
 from gpca.explainers.interface import ScoringExplainer, attached
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.settings import Positive
 
+Values = Callable[[np.ndarray], np.ndarray]  # from the worth (S, K) of the conditions to values (S, 3)
 Worth = Literal["uncertainty", "residual"]  # of a condition: KL in nats, or log distance from target to source
 WORTHS: tuple[str, ...] = get_args(Worth)
+SMALLEST = 1e-4  # diameters: smaller changes are rounding and chance
 
 
 class ChargedValues(ScoringExplainer):
-    """The base of these explainers, which charges the conditions that they need; None stands for all."""
+    """Base of explainers that are charged with the conditions of a design that they need; None stands for all."""
 
     def __init__(self, conditions: list[int] | None) -> None:
         self._conditions = conditions
@@ -33,56 +39,50 @@ class ChargedValues(ScoringExplainer):
     def explain(self, registrations: Registrations) -> Attribution:
         """Score every registration by its values."""
         started = perf_counter()
-        scores_N_3 = self.scores(registrations)
-        return charged(registrations, scores_N_3, self._conditions, started)
+        return charged(registrations, self.scores(registrations), self._conditions, started)
+
+
+def charged(
+    registrations: Registrations, scores_N_3: np.ndarray, conditions: list[int] | None, started: float
+) -> Attribution:
+    """Make an attribution charged with the conditions and the time since `started`; equal scores name no concept."""
+    own_seconds = (perf_counter() - started) / len(registrations)
+    columns = slice(None) if conditions is None else conditions
+    cost = {
+        name: attached(registrations, name)[:, columns].sum(axis=1) for name in ("seconds", "icp_seconds", "icp_calls")
+    }
+    return Attribution.of_scores(
+        CONCEPTS,
+        scores_N_3,
+        seconds=cost["seconds"] + own_seconds,
+        icp_seconds=cost["icp_seconds"],
+        icp_calls=cost["icp_calls"],
+        abstained_N=np.ptp(scores_N_3, axis=1) == 0,
+    )
 
 
 class KnobValues(ChargedValues):
-    """The knob with the largest value names the concept; nothing is learned.
+    """The knob with the largest value of the uncertainty names the concept; nothing is learned."""
 
-    Args:
-        values: uncertainty (S, K) under the conditions of a design -> the values (S, 3) of the knobs.
-        conditions: those that it needs, and is charged with; None for all.
-        source, seed: not used; nothing is drawn.
-    """
-
-    def __init__(
-        self, values: Callable[[np.ndarray], np.ndarray], conditions: list[int] | None, source: str, seed: int
-    ) -> None:
+    def __init__(self, values: Values, conditions: list[int] | None, source: str, seed: int) -> None:
         super().__init__(conditions)
         self._values = values
 
-    def fit(self, registrations: Registrations) -> None:
-        """Do nothing, since nothing is learned."""
-
     def scores(self, registrations: Registrations) -> np.ndarray:
-        """Return the values of the uncertainty."""
+        """Return the values."""
         return self._values(attached(registrations, "uncertainty"))
 
 
 class ScaledValues(ChargedValues):
-    """The remedy with the largest scaled value names the concept; no labels are used.
-
-    Args:
-        values: worth (S, 8) of the corners of design ``removal`` -> the values (S, 3) of the remedies.
-        conditions: the corners that it needs, and is charged with.
-        source, seed: not used; nothing is drawn.
-        worth: of both, a drop is counted.
-    """
+    """The remedy with the largest standardized drop of the worth names the concept; no labels are used."""
 
     def __init__(
-        self,
-        values: Callable[[np.ndarray], np.ndarray],
-        conditions: list[int],
-        source: str,
-        seed: int,
-        worth: Worth = "uncertainty",
+        self, values: Values, conditions: list[int], source: str, seed: int, worth: Worth = "uncertainty"
     ) -> None:
         if worth not in WORTHS:
             raise InputError("setting 'worth'", f"unknown '{worth}'", f"choose one of {', '.join(WORTHS)}")
         super().__init__(conditions)
-        self._values = values
-        self._worth = worth
+        self._values, self._worth = values, worth
 
     def fit(self, registrations: Registrations) -> None:
         """Learn mean and standard deviation of each value."""
@@ -100,7 +100,7 @@ class LearnedValues(ChargedValues, ClassifierExplainer):
 
     def __init__(
         self,
-        values: Callable[[np.ndarray], np.ndarray],
+        values: Values,
         conditions: list[int],
         source: str,
         seed: int,
@@ -120,23 +120,38 @@ def corners(registrations: Registrations, worth: str) -> np.ndarray:
     return attached(registrations, worth)[:, :8]
 
 
-def charged(
-    registrations: Registrations, scores_N_3: np.ndarray, conditions: list[int] | None, started: float
-) -> Attribution:
-    """Make an attribution charged with these conditions, None for all, and with the time since `started`.
+class RemovalValues(ScoringExplainer):
+    """Causes by remedies: the cause whose remedy moves the result most is named.
 
-    Where all three scores are equal, no concept is named.
+    The worth of a subset of remedies is v̂, the distance of the result from that with all remedies
+    (:mod:`gpca.causes.remedied`). A remedy moves every result a little, so `values`, from v̂ (N, 8), are standardized
+    over the nominal samples. v̂ with all causes left alone is the alarm for the label nominal.
     """
-    own_seconds = (perf_counter() - started) / len(registrations)
-    cost = {
-        name: attached(registrations, name)[:, slice(None) if conditions is None else conditions].sum(axis=1)
-        for name in ("seconds", "icp_seconds", "icp_calls")
-    }
-    return Attribution.of_scores(
-        CONCEPTS,
-        scores_N_3,
-        seconds=cost["seconds"] + own_seconds,
-        icp_seconds=cost["icp_seconds"],
-        icp_calls=cost["icp_calls"],
-        abstained_N=np.ptp(scores_N_3, axis=1) == 0,
-    )
+
+    labels = LABELS
+
+    def __init__(self, values: Values, source: str, seed: int) -> None:
+        self._values = values
+
+    def fit(self, registrations: Registrations) -> None:
+        """Learn the scatter of each value in nominal samples, and the threshold of the alarm."""
+        errors_N_8 = self._errors(registrations)
+        nominal_N = registrations.concept == NOMINAL
+        scatter_N_3 = self._values(errors_N_8[nominal_N] if nominal_N.any() else errors_N_8)
+        self._mean_3 = scatter_N_3.mean(axis=0)
+        self._deviation_3 = np.maximum(scatter_N_3.std(axis=0), SMALLEST)
+        self._threshold = NominalThreshold().fit(self._alarm(errors_N_8), registrations.concept)
+
+    def scores(self, registrations: Registrations) -> np.ndarray:
+        """Score every registration by its scaled values."""
+        from scipy.special import softmax
+
+        errors_N_8 = self._errors(registrations)
+        shares_N_3 = softmax((self._values(errors_N_8) - self._mean_3) / self._deviation_3, axis=1)
+        return self._threshold.scores(self._alarm(errors_N_8), shares_N_3)
+
+    def _errors(self, registrations: Registrations) -> np.ndarray:
+        return attached(registrations, "remedied")[:, : len(SUBSETS)]
+
+    def _alarm(self, errors_N_8: np.ndarray) -> np.ndarray:
+        return np.log(np.maximum(errors_N_8[:, ALL], SMALLEST))

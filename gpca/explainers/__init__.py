@@ -1,1 +1,1 @@
-"""The interface of explainers, GP-CA behind it, and the features that it can read."""
+"""The interface of explainers, GP-CA behind it, and their classifiers."""

@@ -1,7 +1,6 @@
-"""Analytical features of a registration: how well source and target agree, without anything learned.
+"""Analytical features of how well source and target agree.
 
-The paper names "RMSE, normal consistency, planarity, linearity, and point-count ratios" and no more; how each is
-computed is chosen here.
+The paper only names "RMSE, normal consistency, planarity, linearity, and point-count ratios"; the formulas are ours.
 """
 
 from __future__ import annotations
@@ -15,15 +14,10 @@ from gpca.seeds import generator
 def analytical_features(
     registrations: Registrations, *axes: object, shape_points: int = 256, neighbors: int = 16, point_count: bool = True
 ) -> np.ndarray:
-    """Return (N, F): inlier RMSE (of diameters), then those of :func:`compare`, the point-count ratio last.
+    """Return (N, F): inlier RMSE (of diameters), the features of :func:`compare`, and perhaps the point-count ratio.
 
-    Args:
-        registrations: N of them.
-        axes: name the draws.
-        shape_points: source points at which local shape is measured, drawn by split and sample; all where there are
-            fewer.
-        neighbors: how many points, itself included, make a point's local shape.
-        point_count: whether the point-count ratio is among the features.
+    Local shape is measured at no more than `shape_points` source points, drawn by axes, split and sample, from
+    `neighbors` points each.
     """
     rows = []
     for i in range(len(registrations)):
@@ -39,8 +33,8 @@ def compare(source_P_3: np.ndarray, target_Q_3: np.ndarray, drawn: np.ndarray, n
     """Compare the local shape of the aligned source at the drawn points with that of the nearest target points.
 
     Returns:
-        mean |cosine| between the normals; mean planarity and mean linearity of the source; both less those of the
-        target.
+        mean |cosine| between the normals; mean planarity and linearity of the source; mean differences of both from
+        the target's.
     """
     from scipy.spatial import cKDTree
 
@@ -61,11 +55,10 @@ def compare(source_P_3: np.ndarray, target_Q_3: np.ndarray, drawn: np.ndarray, n
 
 
 def local_shape(tree, query_D_3: np.ndarray, neighbors: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return normals (D, 3) without a sign, planarity (D,) and linearity (D,) of a cloud at the query points.
+    """Return unsigned normals (D, 3), planarity (D,) and linearity (D,) of a cloud at the query points.
 
-    From the eigenvalues λ1 ≥ λ2 ≥ λ3 of the covariance of the nearest `neighbors` points of `tree` (all where it has
-    fewer): planarity (λ2 - λ3)/λ1 and linearity (λ1 - λ2)/λ1 (Weinmann et al. 2015); the normal is the eigenvector
-    of λ3. Points that coincide have neither.
+    With the eigenvalues λ1 ≥ λ2 ≥ λ3 of the covariance of the nearest `neighbors` points, planarity is (λ2 - λ3)/λ1,
+    linearity (λ1 - λ2)/λ1 (Weinmann et al. 2015), and the normal the eigenvector of λ3; coincident points have zeros.
     """
     _, rows_D_K = tree.query(query_D_3, k=min(neighbors, tree.n))
     points_D_K_3 = tree.data[rows_D_K]

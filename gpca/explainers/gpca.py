@@ -13,10 +13,8 @@ class GPCA(DrawingExplainer):
     """Gaussian Process Concept Attribution (the paper): a GPC on the embeddings of the ICP-aligned clouds."""
 
     def __init__(self, source: str, seed: int, **settings: GPCArguments) -> None:
-        from gpca.classifier.gpc import (  # here, because the workflow imports this file only to know its entries
-            GPC,
-            GPCSettings,
-        )
+        # Imported here, because the workflow imports this file only for its entries.
+        from gpca.classifier.gpc import GPC, GPCSettings
 
         self._gpc = GPC(self.labels, GPCSettings(**settings), source, seed)
 
@@ -25,7 +23,7 @@ class GPCA(DrawingExplainer):
         self._gpc.fit(self._inputs(registrations), registrations.concept)
 
     def learn(self, registrations: Registrations) -> None:
-        """Learn further labels, see :meth:`gpca.classifier.gpc.GPC.update`."""
+        """Learn further labels (:meth:`gpca.classifier.gpc.GPC.update`)."""
         self._gpc.update(self._inputs(registrations), registrations.concept)
 
     def summary(self, registrations: Registrations) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -33,16 +31,13 @@ class GPCA(DrawingExplainer):
         return self._gpc.attribute(self._inputs(registrations))
 
     def _inputs(self, registrations: Registrations) -> np.ndarray:
-        """Return the inputs (N, d) of the GPC."""
         return registrations.embedding
 
 
 class DescriptorGPCA(GPCA):
-    """GP-CA on descriptors in the place of the embedding, normalized by their ranks among the training samples.
+    """GP-CA on descriptors instead of the embedding, normalized by their ranks among the training samples.
 
-    Args:
-        axes: name the draws of the normalization.
-        source, seed, settings: as for GP-CA.
+    `axes` name the random numbers of the normalization.
     """
 
     def __init__(self, axes: tuple, source: str, seed: int, **settings: GPCArguments) -> None:
@@ -52,7 +47,7 @@ class DescriptorGPCA(GPCA):
         self._normalized = NormalizedFeatures(*axes)
 
     def fit(self, registrations: Registrations) -> None:
-        """Learn the scales of the descriptors, and fit the GPC to the labeled registrations."""
+        """Learn the ranks of the descriptors, and fit the GPC to the labeled registrations."""
         features_N_F = self.features(registrations)
         self._normalized.fit(features_N_F)
         self._gpc.fit(self._normalized(features_N_F), registrations.concept)

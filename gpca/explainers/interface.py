@@ -1,4 +1,4 @@
-"""The interface of every explainer; :mod:`gpca.explainers.registry` finds them by name.
+"""The interface of explainers; :mod:`gpca.explainers.registry` finds them by name.
 
 An explainer is a class with ``fit`` and ``explain`` in a file of ``baselines/``, listed in that file's
 ``EXPLAINERS`` by the name under which the config switches it on::
@@ -8,18 +8,37 @@ An explainer is a class with ``fit`` and ``explain`` in a file of ``baselines/``
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 from time import perf_counter
-from typing import Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Literal, Protocol, get_args, runtime_checkable
 
 import numpy as np
 
 from gpca.attribution.scores import Attribution
 from gpca.errors import InputError
-from gpca.explainers.sight import Sees, in_words, require_parts
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
+
+if TYPE_CHECKING:
+    from gpca.causes.settings import DescriptorSettings
+
+Part = Literal["source", "pair", "motion", "runs", "quick_remedies", "remedies", "reenactment", "truth"]
+PARTS: tuple[str, ...] = get_args(Part)
+Sees = tuple[Part, ...]  # all parts of a registration that an explainer's answer depends on
+WORDS = {  # in tables
+    "source": "aligned source",  # where ICP put it
+    "pair": "pair",  # both clouds after ICP, and what follows from them: numbers of points, ICP's fitness and RMSE
+    "motion": "motion",  # of ICP: how far it moved the cloud
+    "runs": "further runs",  # of the same registration, from other starts or with knobs turned
+    "quick_remedies": "remedies",  # those without restarts
+    "remedies": "remedies",  # the registration again, with each combination of them
+    "reenactment": "re-enactment",  # the registration again under hypotheses of the true pose
+    "truth": "truth",
+}
+NOTHING = "nothing"
+BARE = "registrations"  # `reads` of an explainer that needs nothing attached
+REENACTED = "reenactments"  # `reads` of an explainer that needs the re-enactments of each pair
 
 
 class ConceptExplainer(Protocol):
@@ -29,12 +48,12 @@ class ConceptExplainer(Protocol):
         """Learn from labeled registrations (the rows of split ``train``)."""
 
     def explain(self, registrations: Registrations) -> Attribution:
-        """Attribute every registration. What was perturbed is hidden from it, unless it is an oracle."""
+        """Attribute every registration. The perturbation is hidden from all explainers but oracles."""
 
 
 @runtime_checkable
 class Describing(Protocol):
-    """An explainer that measures each registration by itself before it learns, so that once is enough."""
+    """An explainer whose measurements of a registration do not depend on training."""
 
     def describe(self, registrations: Registrations) -> Registrations:
         """Attach the measurements by :func:`measured`, so that ``fit`` and ``explain`` need not repeat them."""
@@ -42,23 +61,22 @@ class Describing(Protocol):
 
 @runtime_checkable
 class Encoding(Protocol):
-    """An explainer with an encoder of its own, learned once for all labels on its embeddings."""
+    """An explainer that trains an encoder, once for several sets of labels."""
 
     def learn_encoder(self, registrations: Registrations) -> Callable[[Registrations], Registrations]:
-        """Train the encoder on labeled registrations, and return a function that attaches its embeddings.
-
-        Where they are attached, ``fit`` and ``explain`` read them.
-        """
+        """Train the encoder on labeled registrations; return a function that attaches its embeddings."""
 
 
 class ScoringExplainer:
-    """The base of explainers that give scores alone; it measures the time that they take.
-
-    Attributes:
-        labels: what it names.
-    """
+    """Base of explainers that only give scores for their `labels`; it measures the time."""
 
     labels: tuple[str, ...] = CONCEPTS
+
+    def __init__(self, source: str, seed: int) -> None:
+        """Ignore source and seed; explainers with random numbers or settings override this."""
+
+    def fit(self, registrations: Registrations) -> None:
+        """Learn nothing; explainers that learn override this."""
 
     def explain(self, registrations: Registrations) -> Attribution:
         """Score every registration."""
@@ -67,16 +85,12 @@ class ScoringExplainer:
         return Attribution.of_scores(self.labels, scores_N_C, seconds=(perf_counter() - started) / len(registrations))
 
     def scores(self, registrations: Registrations) -> np.ndarray:
-        """Return the scores (N, C) of the labels."""
+        """Return the scores (N, C)."""
         raise NotImplementedError
 
 
 class DrawingExplainer:
-    """The base of explainers that draw from a posterior: scores with variances and BALD, and the time that they take.
-
-    Attributes:
-        labels: what it names.
-    """
+    """Base of explainers that draw from a posterior: scores with variances and BALD; it measures the time."""
 
     labels: tuple[str, ...] = CONCEPTS
 
@@ -89,32 +103,28 @@ class DrawingExplainer:
         return Attribution.of_scores(self.labels, scores_N_C, seconds=seconds, **more)
 
     def summary(self, registrations: Registrations) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return scores and variances (N, C) of the labels, and BALD (N,)."""
+        """Return scores and variances (N, C), and BALD (N,)."""
         raise NotImplementedError
 
 
 def measured(
     registrations: Registrations, prefix: str, measure: Callable[[], Mapping[str, np.ndarray]]
 ) -> Registrations:
-    """Return the registrations with arrays attached whose names begin with the prefix, measured unless they are there.
+    """Attach measured arrays under prefixed names, unless some are attached already.
 
     The prefix has to name everything that the numbers depend on.
     """
     if any(name.startswith(prefix) for name in registrations.attached):
         return registrations
-    own = {prefix + name: array for name, array in measure().items()}
-    return replace(registrations, attached={**registrations.attached, **own})
+    arrays = {prefix + name: array for name, array in measure().items()}
+    return replace(registrations, attached={**registrations.attached, **arrays})
 
 
 def attached(registrations: Registrations, name: str) -> np.ndarray:
-    """Return an array (S, …) that an earlier step made for the registrations, as float64; InputError without it."""
+    """Return an attached array (S, …) as float64; InputError if it is missing."""
     if name not in registrations.attached:
         raise InputError(f"array '{name}'", "is not attached to the registrations", "see Registrations.attached")
     return np.asarray(registrations.attached[name], float)
-
-
-BARE = "registrations"  # `reads` of an explainer that needs nothing attached
-REENACTED = "reenactments"  # `reads` of one that needs those of each pair
 
 
 @dataclass(frozen=True)
@@ -122,13 +132,13 @@ class ExplainerEntry:
     """An explainer by name.
 
     Attributes:
-        title: what tables call it.
-        make: what makes it from source, seed and the settings of the config.
-        sees: all that its answer depends on, parts of :data:`gpca.explainers.sight.PARTS`; empty where it is nothing.
-        reads: what it needs attached: ``embeddings`` those of the encoder, ``uncertainty/<design>`` the outcomes of
-            that design (:mod:`gpca.uncertainty.designs`); ``registrations`` nothing.
-        observed_only: of a design's outcomes it reads those of the observed pair alone, the first.
-        oracle: whether it is told the truth about what it explains: an upper bound, which its title has to say.
+        title: its name in tables.
+        make: makes it from source, seed and the settings of the config.
+        sees: all that its answer depends on, of :data:`PARTS`; may be empty.
+        reads: what it needs attached: ``embeddings`` of the encoder, ``uncertainty/<design>`` outcomes of a design
+            (:mod:`gpca.uncertainty.designs`), or ``registrations``: nothing.
+        observed_only: of a design's outcomes it reads the first alone, that of the observed pair.
+        oracle: whether it knows the truth about what it explains: an upper bound, which its title has to say.
     """
 
     title: str
@@ -139,7 +149,9 @@ class ExplainerEntry:
     observed_only: bool = False
 
     def __post_init__(self) -> None:
-        require_parts(f"explainer '{self.title}'", self.sees)
+        if not isinstance(self.sees, tuple) or not set(self.sees) <= set(PARTS):
+            remedy = f"give a tuple of {', '.join(PARTS)}, or () for {NOTHING}"
+            raise InputError(f"explainer '{self.title}'", f"sees {self.sees!r}", remedy)
 
     @property
     def sight(self) -> str:
@@ -150,3 +162,23 @@ class ExplainerEntry:
     def design(self) -> str | None:
         """The design whose outcomes it reads, if any."""
         return self.reads.removeprefix("uncertainty/") if self.reads.startswith("uncertainty/") else None
+
+
+def in_words(sees: Collection[str]) -> str:
+    """Return what a table prints, such as ``pair + motion``."""
+    return " + ".join(WORDS[part] for part in PARTS if part in sees) or NOTHING
+
+
+def icp_calls(sees: Collection[str], starts: int, descriptors: DescriptorSettings, reenactment: int = 0) -> int:
+    """Return the number of ICP runs that an explainer of causes needs beyond the explained one.
+
+    Args:
+        starts: of each registration, including the observed one.
+        descriptors: settings of the registrations with remedies.
+        reenactment: maximum number of runs of a re-enactment.
+    """
+    further = starts - 1 if "runs" in sees else 0
+    further += reenactment if "reenactment" in sees else 0
+    if "remedies" in sees:
+        return further + descriptors.remedy_calls
+    return further + (descriptors.quick_remedy_calls if "quick_remedies" in sees else 0)

@@ -1,7 +1,7 @@
-"""GP-CA's classifiers on the descriptors of a pair: whether anything is wrong, and which causes it has.
+"""GP-CA's classifiers on the descriptors of a pair: whether it failed, and which causes it has.
 
-Beside the Gaussian processes may stand boosted trees. The two err in different ways, so that the mean of their
-probabilities is better than either; variances and BALD are those of the processes.
+Boosted trees can be averaged with the Gaussian processes: they err differently, so the mean of their probabilities is
+better than either. Variances and BALD are the processes'.
 """
 
 from __future__ import annotations
@@ -16,22 +16,22 @@ from scipy.special import ndtri
 from gpca.causes.truth import FAILED, NOMINAL
 from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
-from gpca.explainers.boosted_trees import BoostedQuestion
+from gpca.explainers.classifiers import BoostedQuestion
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import seed_of
 
 QUANTILES = 100  # of each descriptor, at most
-FARTHEST = 3.0  # standard deviations; what lies beyond all training samples lies there
-AT_THE_END = 1e-7  # of a descriptor; what comes as near to its last quantile has reached it
-NEIGHBORS = 3  # among the training samples, by which a pair is told to be like them
-USUAL = 0.99  # share of the training samples that are no farther from their neighbors than is usual
+FARTHEST = 3.0  # standard deviations, to which normalized descriptors are clipped
+AT_THE_END = 1e-7  # a descriptor this close to its last quantile has reached it
+NEIGHBORS = 3  # training samples to which the distance is averaged
+USUAL = 0.99  # quantile of the training samples' distances that is the unit of unlikeness
 ABSENT, PRESENT = "absent", "present"
 
 
 class NormalizedFeatures:
     """Every descriptor mapped to a normal distribution by its ranks among the training samples.
 
-    Distances, angles, costs and counts have tails of all kinds, in which one lengthscale would see little else.
+    Distances, angles, costs and counts have heavy tails, which would dominate a kernel with one lengthscale.
     """
 
     def __init__(self, *axes: object) -> None:
@@ -55,26 +55,26 @@ class NormalizedFeatures:
         return ndtri(np.column_stack([_ranks(*column) for column in columns])).clip(-FARTHEST, FARTHEST)
 
     def state(self) -> torch.Tensor:
-        """Return the quantiles (Q, F), for :meth:`from_state`."""
+        """Return the quantiles (Q, F) for :meth:`from_state`."""
         return torch.from_numpy(self._quantiles_Q_F)
 
     @classmethod
     def from_state(cls, quantiles_Q_F: torch.Tensor) -> NormalizedFeatures:
-        """Return the normalization of that state."""
-        made = cls()
-        made._quantiles_Q_F = quantiles_Q_F.numpy()
-        return made
+        """Return the normalization of a :meth:`state`."""
+        normalized = cls()
+        normalized._quantiles_Q_F = quantiles_Q_F.numpy()
+        return normalized
 
 
 @dataclass(frozen=True)
 class Judgment:
-    """The verdict of the classifiers on N pairs.
+    """The probabilities of N pairs.
 
     Attributes:
-        failure_N: probability that it failed.
-        causes_N_3: of each concept, that it is one of the causes.
-        causes_variances_N_3: over the posterior draws (Eq. 5).
-        bald_N: of the least certain of the four, nats (Eq. 7).
+        failure_N: probability that the registration failed.
+        causes_N_3: probability that each concept is one of the causes.
+        causes_variances_N_3: their variances over the posterior draws (Eq. 5).
+        bald_N: the largest BALD of the four classifiers, nats (Eq. 7).
     """
 
     failure_N: np.ndarray
@@ -87,9 +87,9 @@ class PairClassifier:
     """Independent binary Gaussian processes: one for failure, and one for each cause.
 
     Args:
-        settings: of each.
-        axes: names of the seed.
-        trees: whether boosted trees answer the same four questions beside them.
+        settings: of each classifier.
+        axes: name the random numbers.
+        trees: whether boosted trees are averaged with them.
     """
 
     def __init__(self, settings: GPCSettings, *axes: object, trees: bool = False) -> None:
@@ -101,13 +101,7 @@ class PairClassifier:
         self._causes = [GPC((ABSENT, PRESENT), settings, *axes, concept) for concept in CONCEPTS]
 
     def fit(self, features_N_F: np.ndarray, failed_N: np.ndarray, causes_N_3: np.ndarray) -> PairClassifier:
-        """Learn from samples that are nominal or failed.
-
-        Args:
-            features_N_F: their descriptors.
-            failed_N: whether each failed.
-            causes_N_3: whether each concept is one of its causes.
-        """
+        """Learn from the descriptors, failures and causes of samples that are nominal or failed."""
         inputs_N_F = self.normalized.fit(features_N_F)(features_N_F)
         self._failure.fit(inputs_N_F, np.where(failed_N, FAILED, NOMINAL))
         for gpc, present_N in zip(self._causes, causes_N_3.T, strict=True):
@@ -118,7 +112,7 @@ class PairClassifier:
         return self
 
     def judge(self, inputs_N_F: np.ndarray) -> Judgment:
-        """Return the verdict of the classifiers on descriptors that `normalized` has mapped."""
+        """Return the probabilities for descriptors that `normalized` has mapped."""
         judged = [gpc.attribute(inputs_N_F) for gpc in (self._failure, *self._causes)]
         yes_N_4 = np.column_stack([scores_N_2[:, 1] for scores_N_2, _, _ in judged])
         if self._trees:
@@ -131,28 +125,27 @@ class PairClassifier:
         )
 
     def unlikeness(self, inputs_N_F: np.ndarray) -> np.ndarray:
-        """Return how unlike the training samples each (N,) is; above 1 are 1 % of these themselves.
+        """Return the mean distance (N,) to the nearest `NEIGHBORS` training samples.
 
-        The mean distance to the nearest `NEIGHBORS` training samples, in units of that which the share `USUAL` of
-        these have among one another.
+        The unit is the quantile `USUAL` of the same distance among the training samples, so 1 % of these exceed 1.
         """
-        known = self._failure.learned_N_d
-        return _to_nearest(self._failure.project(inputs_N_F).inputs_N_d, known, 0) / self._usual_distance
+        learned = self._failure.learned_N_d
+        return _to_nearest(self._failure.project(inputs_N_F).inputs_N_d, learned, 0) / self._usual_distance
 
     @cached_property
     def _usual_distance(self) -> float:
-        known = self._failure.learned_N_d
-        return float(np.quantile(_to_nearest(known, known, 1), USUAL))
+        learned = self._failure.learned_N_d
+        return float(np.quantile(_to_nearest(learned, learned, 1), USUAL))
 
     @property
     def samples(self) -> int:
-        """The number of samples that it learned."""
+        """The number of training samples."""
         return len(self._failure.learned_N_d)
 
     def state(self) -> dict[str, object]:
-        """Return all that was learned, for :meth:`from_state`.
+        """Return tensors, numbers and names for :meth:`from_state`.
 
-        All four learned the same inputs, two thirds of all numbers here: as one tensor, a file holds them once.
+        All four learned the same inputs, two thirds of all numbers: as one tensor, a file stores them once.
         """
         failure, *causes = (gpc.state() for gpc in (self._failure, *self._causes))
         for gpc, state in zip(self._causes, causes, strict=True):
@@ -173,10 +166,7 @@ class PairClassifier:
 
 
 def _ranks(values_N: np.ndarray, quantiles_Q: np.ndarray) -> np.ndarray:
-    """Return the ranks of values in [0, 1], as scikit-learn's QuantileTransformer has them to the last digit.
-
-    Where quantiles are equal, that is the mean of the lowest and the highest rank.
-    """
+    """Return ranks in [0, 1], as scikit-learn's QuantileTransformer to the last digit; ties get their mean rank."""
     ranks_Q = np.linspace(0, 1, len(quantiles_Q))
     from_above_N = -np.interp(-values_N, -quantiles_Q[::-1], -ranks_Q[::-1])
     ranks_N = 0.5 * (np.interp(values_N, quantiles_Q, ranks_Q) + from_above_N)
@@ -185,9 +175,9 @@ def _ranks(values_N: np.ndarray, quantiles_Q: np.ndarray) -> np.ndarray:
     return ranks_N
 
 
-def _to_nearest(of_N_F: np.ndarray, known_M_F: np.ndarray, skipped: int) -> np.ndarray:
-    """Return the mean distance (N,) to the nearest known samples, of which the first ones can be skipped: itself."""
+def _to_nearest(inputs_N_F: np.ndarray, learned_M_F: np.ndarray, skipped: int) -> np.ndarray:
+    """Mean distance (N,) to the nearest `NEIGHBORS` samples after the skipped ones (a sample itself)."""
     from scipy.spatial.distance import cdist
 
-    nearest_N_M = np.sort(cdist(of_N_F, known_M_F), axis=1)
+    nearest_N_M = np.sort(cdist(inputs_N_F, learned_M_F), axis=1)
     return nearest_N_M[:, skipped : skipped + NEIGHBORS].mean(axis=1)

@@ -1,7 +1,6 @@
-"""Every explainer by name: GP-CA itself, the rivals, one per file of ``baselines/``, and those from outside.
+"""Every explainer by name: GP-CA itself, the rivals in ``baselines/``, and those from outside.
 
-A file lists those of concepts as ``EXPLAINERS`` and those of causes as ``CAUSE_EXPLAINERS``, which have names of their
-own. The folder is found by its name, as the rivals import this package and not the other way round.
+A file lists its explainers of concepts as ``EXPLAINERS`` and those of causes as ``CAUSE_EXPLAINERS``, separately named.
 """
 
 from __future__ import annotations
@@ -12,7 +11,7 @@ from gpca.explainers.interface import ExplainerEntry
 from gpca.registry import Registry
 from gpca.settings import require_arguments
 
-CONCEPTS, CAUSES = "concepts", "causes"  # what explainers name: what was perturbed, or what is wrong
+CONCEPTS, CAUSES = "concepts", "causes"  # explainers name what was perturbed, or what is wrong
 REGISTRIES: dict[str, Registry[ExplainerEntry]] = {
     CONCEPTS: Registry("explainer", "baselines", "EXPLAINERS", first=("gpca.explainers.gpca",), outside=ExplainerEntry),
     CAUSES: Registry("explainer", "baselines", "CAUSE_EXPLAINERS", outside=ExplainerEntry),
@@ -20,12 +19,12 @@ REGISTRIES: dict[str, Registry[ExplainerEntry]] = {
 
 
 def explainers(kind: str = CONCEPTS) -> dict[str, ExplainerEntry]:
-    """Return all explainers of a kind by name: GP-CA itself and those of every file of rivals."""
+    """Return all explainers of a kind by name."""
     return REGISTRIES[kind].entries()
 
 
 def explainer_entry(name: str, kind: str = CONCEPTS) -> ExplainerEntry:
-    """Return the explainer of that name; an unknown one raises an InputError that lists the known."""
+    """Return an explainer; an unknown name raises an InputError that lists the known ones."""
     return REGISTRIES[kind].entry(name)
 
 

@@ -18,13 +18,13 @@ from gpca.alignment.icp import ICPSettings
 from gpca.causes.descriptors import WIDTHS
 from gpca.causes.settings import DescriptorSettings, Moved
 from gpca.causes.truth import FAILED, NOMINAL
-from gpca.classifier.covariances import make_covariance
 from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
+from gpca.classifier.sparse_gp import make_covariance
 from gpca.encoders.registry import EncoderSettings, make_encoder
 from gpca.encoders.tensor_file import read_tensors, require_like, write_tensors
 from gpca.errors import InputError
-from gpca.explainers.boosted_trees import require_trees
+from gpca.explainers.classifiers import require_trees
 from gpca.explainers.pair_classifier import ABSENT, PRESENT
 from gpca.guarantee.conformal import Nonconformity
 from gpca.guarantee.guarantee import Guarantee

@@ -60,7 +60,7 @@ def learn_utility(
 
 
 def _fitted(trials: Sequence[Trial], inverse_regularisation: float) -> Any:
-    from gpca.explainers.concept_classifier import standardized_regression
+    from gpca.explainers.classifiers import standardized_regression
 
     right_N = np.array([trial.right for trial in trials], bool)
     if right_N.all() or not right_N.any():

@@ -78,6 +78,6 @@ def alarm_threshold(failure_M: np.ndarray, false_alarms: float) -> float:
 
 
 def _fitted(observed_N_F: np.ndarray, failed_N: np.ndarray) -> FailureGate:
-    from gpca.explainers.concept_classifier import standardized_regression
+    from gpca.explainers.classifiers import standardized_regression
 
     return FailureGate(standardized_regression(INVERSE_REGULARIZATION).fit(observed_N_F, failed_N))

@@ -84,7 +84,7 @@ def test_scores_depend_on_nothing_but_what_the_entry_says_it_sees(name, seen):
 
 
 def test_a_committee_says_the_mean_of_what_its_members_say(seen):
-    from baselines.descriptor_gpca import Committee
+    from baselines.descriptors import Committee
 
     committee = Committee(("pair", "motion", "runs", "remedies"), "four", 100)
     committee.fit(seen)

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from baselines.heads import Dropout, Ensemble, Heads
+from baselines.heads import Dropout, Ensemble, Heads, LastLayerLaplace
 
 RANDOM = np.random.default_rng(0)
 TARGETS = np.arange(60) % 3
@@ -41,3 +41,24 @@ def test_an_ensemble_has_a_draw_per_member_and_dropout_one_per_pass():
 
 def test_without_dropout_all_passes_agree():
     assert DirectDropout("a", 0, rate=0.0, passes=7, hidden=8).drawn(H).std(axis=0).max() < 1e-6
+
+
+class DirectLaplace(_Direct, LastLayerLaplace):
+    pass
+
+
+def test_laplace_draws_have_the_covariance_of_the_linearised_last_layer():
+    laplace = DirectLaplace("a", 0, draws=5000, hidden=6)
+    drawn_M_N_C = laplace.drawn(H[:4])
+    covariance = (laplace._vectors * laplace._deviations**2) @ laplace._vectors.T
+    features = laplace._features(H[:4])
+    for n in range(4):
+        jacobian_C_P = np.kron(np.eye(3), features[n])
+        expected = jacobian_C_P @ covariance @ jacobian_C_P.T
+        assert np.cov(drawn_M_N_C[:, n].T) == pytest.approx(expected, rel=0.1, abs=0.05 * expected.max())
+    assert drawn_M_N_C.mean(axis=0) == pytest.approx(features @ laplace._weights_F_C, abs=0.1)
+
+
+def test_laplace_is_less_certain_far_from_the_training_samples():
+    drawn = DirectLaplace("a", 0, hidden=16).drawn(np.concatenate([H, 20 * H]))
+    assert drawn[:, 60:].std(axis=0).min() > drawn[:, :60].std(axis=0).mean()

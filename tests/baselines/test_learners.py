@@ -3,12 +3,12 @@ import dataclasses
 import numpy as np
 import pytest
 
-from baselines import dirichlet_gp, heads, laplace_head, learners
+from baselines import dirichlet_gp, heads, learners
 from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS
 
 # With a class for every concept, variances and BALD.
-DRAWING = {**heads.EXPLAINERS, **laplace_head.EXPLAINERS, **dirichlet_gp.EXPLAINERS}
+DRAWING = {**heads.EXPLAINERS, **dirichlet_gp.EXPLAINERS}
 EXPLAINERS = {**learners.EXPLAINERS, **DRAWING}
 FEW_STEPS = {  # for what is true of a head however long it was trained
     "learner_ensemble": {"members": 2, "steps": 30},
@@ -50,7 +50,7 @@ def test_a_concept_absent_from_training_keeps_its_column(name, embedded):
 
 
 def test_more_neighbors_than_training_samples_are_refused(embedded):
-    learner = learners.nearest("tiny", 0, neighbours=len(embedded.rows("train")) + 1)
+    learner = learners.Nearest("tiny", 0, neighbours=len(embedded.rows("train")) + 1)
     with pytest.raises(InputError, match="learner_nearest: 37 neighbors are too many for 36 training samples"):
         learner.fit(embedded.subset(embedded.rows("train")))
 

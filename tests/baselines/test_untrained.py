@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from baselines.gates import GATES, NominalThreshold, alarm
+from baselines.gates import GATES, NominalThreshold, motion_alarm
 from baselines.untrained import CAUSE_EXPLAINERS, EXPLAINERS
 from gpca.alignment.rigid import rigid_motion
 from gpca.causes.dataset import LABELS
@@ -82,4 +82,4 @@ def test_the_rule_for_causes_takes_the_gate_that_tells_nominal_best_in_training(
         assert ((found.predicted_N == "nominal") == ~failed).all()
         plain = explained(registrations, "rule").predicted_N
         assert (found.predicted_N == plain)[failed].all()
-        assert NominalThreshold().fit(alarm(seen, best), label).accuracy == 1
+        assert NominalThreshold().fit(motion_alarm(seen, best), label).accuracy == 1

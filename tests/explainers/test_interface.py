@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 import baselines
+from gpca.causes.settings import DescriptorSettings
 from gpca.errors import InputError
 from gpca.explainers.gpca import GPCA
-from gpca.explainers.interface import ExplainerEntry
+from gpca.explainers.interface import WORDS, ExplainerEntry, icp_calls, in_words
 from gpca.explainers.registry import CAUSES, explainer_entry, explainers
 from gpca.explainers.registry import CONCEPTS as CONCEPTS_KIND
 from gpca.pairs.perturbation import CONCEPTS
@@ -103,3 +104,27 @@ def test_gpca_does_not_look_at_what_it_is_to_explain(embedded):
         assert np.array_equal(attribution.scores_N_C, expected.scores_N_C)
         assert np.array_equal(attribution.variances_N_C, expected.variances_N_C)
         assert np.array_equal(attribution.bald_N, expected.bald_N)
+
+
+SETTINGS = DescriptorSettings(starts=3, restarts=8)
+
+
+def test_words_stand_in_one_order_and_nothing_is_a_word():
+    assert in_words(("motion", "pair")) == in_words(("pair", "motion")) == "pair + motion"
+    assert in_words(()) == "nothing"
+    assert all(in_words((part,)) == words for part, words in WORDS.items())
+
+
+@pytest.mark.parametrize(
+    ("sees", "calls"),
+    [
+        ((), 0),
+        (("pair", "motion"), 0),
+        (("pair", "runs"), 12),
+        (("remedies",), 44),
+        (("pair", "quick_remedies"), 12),
+        (("pair", "motion", "runs", "remedies"), 56),
+    ],
+)
+def test_calls_are_those_beyond_the_observed_run(sees, calls):
+    assert icp_calls(sees, 13, SETTINGS) == calls

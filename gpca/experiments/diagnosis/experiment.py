@@ -10,8 +10,8 @@ from gpca.causes.settings import DescriptorSettings
 from gpca.encoders.registry import NamedEncoder, require_backbone, require_draws
 from gpca.errors import InputError, with_key
 from gpca.experiments.experiment import ByName, Experiment, LeftOut, Names, Tidy
+from gpca.explainers.interface import icp_calls
 from gpca.explainers.registry import CAUSES, explainer_entry, explainers, require_settings
-from gpca.explainers.sight import icp_calls
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.settings import part_of
 

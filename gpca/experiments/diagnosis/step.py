@@ -15,9 +15,8 @@ from gpca.causes.descriptors import Descriptors
 from gpca.causes.settings import DescriptorSettings
 from gpca.causes.truth import BORDERLINE
 from gpca.errors import InputError
-from gpca.explainers.interface import BARE, REENACTED, ConceptExplainer, ExplainerEntry
+from gpca.explainers.interface import BARE, REENACTED, ConceptExplainer, ExplainerEntry, icp_calls
 from gpca.explainers.registry import CAUSES, explainer_entry
-from gpca.explainers.sight import icp_calls
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.process.job import Job
 from gpca.process.provenance import record_provenance

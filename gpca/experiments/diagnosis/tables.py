@@ -10,7 +10,7 @@ from gpca.attribution.confidence import REPEATS
 from gpca.experiments.diagnosis.judged import CEILING, POOLED
 from gpca.experiments.diagnosis.near_chance import rule_near_chance
 from gpca.experiments.frame_causes.metrics import STATE
-from gpca.explainers.sight import WORDS
+from gpca.explainers.interface import WORDS
 from gpca.reporting.tables.builder import Label, TableBuilder, crossed, titles_of
 from gpca.reporting.tables.cells import interval_cell, plain_cell, rows_where
 from gpca.reporting.tables.table import Cell, Column, Table

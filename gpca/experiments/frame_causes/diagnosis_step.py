@@ -20,9 +20,8 @@ from gpca.causes.descriptors import describe_all
 from gpca.causes.settings import DescriptorSettings
 from gpca.encoders.registry import EncoderSettings
 from gpca.experiments.diagnosis.step import observed_only, training_rows, with_what_it_reads
-from gpca.explainers.interface import REENACTED, ExplainerEntry
+from gpca.explainers.interface import REENACTED, ExplainerEntry, icp_calls
 from gpca.explainers.registry import CAUSES, explainer_entry
-from gpca.explainers.sight import icp_calls
 from gpca.io.csv_file import write_csv
 from gpca.pairs.dataset import Registrations
 from gpca.process.job import Job

@@ -25,7 +25,7 @@ def _trees(lessons: Lessons, _classifier: GPCSettings, source: str, seed: int, *
     """Fit extremely randomized trees (Geurts et al. 2006), as the explainers on descriptors are."""
     from sklearn.ensemble import ExtraTreesClassifier
 
-    from gpca.explainers.concept_classifier import ConceptClassifier
+    from gpca.explainers.classifiers import ConceptClassifier
 
     state = seed_of(source, seed, "learning curve", *axes) % 2**32
     forest = ExtraTreesClassifier(TREES, min_samples_leaf=2, max_features=0.3, random_state=state)

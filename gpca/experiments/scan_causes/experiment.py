@@ -13,8 +13,8 @@ from gpca.errors import with_key
 from gpca.experiments.experiment import Experiment, LeftOut, Names, Tidy
 from gpca.experiments.scan_causes.settings import ScanSamples
 from gpca.experiments.scans.settings import ChoiceSettings, TrialSettings
+from gpca.explainers.interface import icp_calls
 from gpca.explainers.registry import CAUSES, explainer_entry, explainers, require_settings
-from gpca.explainers.sight import icp_calls
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.settings import Distinct, changes_of, fields_of
 

@@ -17,7 +17,7 @@ from gpca.experiments.specification_curve.diagnostics import accuracies, table5
 from gpca.experiments.specification_curve.run_files import Row, RunFiles
 from gpca.experiments.specification_curve.settings import Reading, ReadingSizes
 from gpca.explainers.analytical_features import analytical_features
-from gpca.explainers.concept_classifier import PAPERS_RANDOM_STATE
+from gpca.explainers.classifiers import PAPERS_RANDOM_STATE
 from gpca.explainers.registry import explainer_entry
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
