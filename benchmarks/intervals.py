@@ -8,13 +8,21 @@ table, and as its last line one JSON object of numbers.
 from __future__ import annotations
 
 import json
+import sys
+from pathlib import Path
 
 import numpy as np
 
-from gpca.evaluation.intervals import interval, pigeonhole_weights, quantile_bounds, wilson_interval
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from gpca.evaluation.intervals import (
+    interval,
+    pigeonhole_weights,
+    quantile_bounds,
+    wilson_interval,
+)
 from gpca.seeds import generator
 
-REPEATS = 200
+REPEATS = 100
 DESIGNS = ((6, 3, 10), (12, 3, 10), (25, 3, 8))  # families, seeds, samples of each in a seed
 RATES, CORRELATIONS = (0.5, 0.9, 0.98), (0.0, 0.1, 0.3)
 NAMES = ("bootstrap", "wilson", "farther")

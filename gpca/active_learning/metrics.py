@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gpca.active_learning.curves import read_curves
-from gpca.attribution.metrics import source_method_seed, tidy
+from gpca.evaluation.measures import source_method_seed, tidy
 
 if TYPE_CHECKING:
     import pandas as pd

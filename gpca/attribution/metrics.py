@@ -13,14 +13,12 @@ import numpy as np
 
 from gpca.attribution.predictions import TIMING_COLUMNS, concepts_of, read_predictions, require_samples
 from gpca.errors import InputError
-from gpca.io.csv_file import numbers, read_csv, write_csv
-from gpca.seeds import seed_of_file
+from gpca.evaluation.measures import ALL, source_method_seed, tidy
+from gpca.io.csv_file import numbers, read_csv
 
 if TYPE_CHECKING:
     import pandas as pd
 
-ALL = "all"  # stands for every concept together in the column `concept`
-TIDY_COLUMNS = ("table", "source", "method", "metric", "concept", "seed", "value")
 PREDICTED_AS, ABSTAINED = "predicted_as_", "abstained"  # metrics of the confusion: predicted_as_<concept or abstained>
 CAUSAL_QUANTILE = 0.95  # above this quantile of the clean uncertainties begins what is not their scatter
 _CAUSAL_COLUMNS = ("sample", "split", "uncertainty_observed", "uncertainty_clean")
@@ -68,25 +66,6 @@ def permuted_accuracy(confusion_C_C1: np.ndarray) -> float:
 
     named_C_C = confusion_C_C1[:, :-1]
     return float(named_C_C[linear_sum_assignment(named_C_C, maximize=True)].sum() / confusion_C_C1.sum())
-
-
-def mean_interval(values_R: Iterable[float], level: float = 0.95) -> tuple[float, float, float]:
-    """Return the mean of R repeats and the bounds of its Student t-interval, mean ± t_{R-1} s / √R.
-
-    The bounds are symmetric about the mean and not clipped, as the function does not know the range of the values.
-    One repeat has NaN bounds; none raises ValueError. No repeat is ever dropped: a NaN makes all three NaN.
-    """
-    from scipy.stats import t as student_t
-
-    values_R = np.asarray(list(values_R), dtype=float)
-    if values_R.size == 0:
-        raise ValueError("interval of no repeats")
-    mean = float(values_R.mean())
-    if values_R.size == 1:
-        return mean, np.nan, np.nan
-    standard_error = values_R.std(ddof=1) / np.sqrt(values_R.size)
-    half_width = float(student_t.ppf((1 + level) / 2, values_R.size - 1) * standard_error)
-    return mean, mean - half_width, mean + half_width
 
 
 def read_uncertainties(path: str | Path) -> tuple[pd.Series, float]:
@@ -206,42 +185,3 @@ def collect_timings(timing_files: Iterable[str | Path]) -> pd.DataFrame:
             mean = float(numbers(path, test, column).mean())
             records.append(("runtime", source, method, f"{column}_per_sample", ALL, seed, mean))
     return tidy(records, "timings")
-
-
-def read_metrics(path: str | Path) -> pd.DataFrame:
-    """Read a tidy file that :func:`collect` or :func:`collect_timings` made.
-
-    Raises:
-        InputError: missing, empty or unreadable file, missing column, a seed or value that is not a finite number.
-    """
-    rows = read_csv(path, TIDY_COLUMNS)
-    rows["seed"] = numbers(path, rows, "seed").astype(int)
-    rows["value"] = numbers(path, rows, "value")
-    return rows
-
-
-def write_metrics(metrics: pd.DataFrame, path: str | Path) -> None:
-    """Write tidy metrics as CSV; floats keep every digit, so that equal metrics give equal bytes."""
-    write_csv(path, metrics, form=None)
-
-
-def source_method_seed(path: str | Path) -> tuple[str, str, int]:
-    seed, parts = seed_of_file(path), Path(path).parts
-    if len(parts) < 3:
-        raise InputError(path, "is not named …/{source}/{explainer}/seed{number}.csv", "rename it")
-    return parts[-3], parts[-2], seed
-
-
-def read_all_metrics(paths: Iterable[str | Path]) -> pd.DataFrame:
-    """Read several files as :func:`read_metrics` reads one, one after the other."""
-    import pandas as pd
-
-    return pd.concat([read_metrics(path) for path in paths])
-
-
-def tidy(records: list[tuple], name: str) -> pd.DataFrame:
-    import pandas as pd
-
-    if not records:
-        raise InputError(name, "no files were given", "name at least one explainer in the config")
-    return pd.DataFrame(records, columns=list(TIDY_COLUMNS))

@@ -18,13 +18,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gpca.attribution.confidence import NO_WIDTH
 from gpca.attribution.diagnostics import calibration_error
-from gpca.attribution.metrics import ALL, TIDY_COLUMNS, mean_interval, source_method_seed
 from gpca.attribution.predictions import concepts_of, read_predictions
 from gpca.comparison.published import UNITS, Counterpart
 from gpca.comparison.values import RUNTIME, ShareDraws, runtime_mean, values_by_seed
 from gpca.comparison.verdicts import INCONCLUSIVE, NOT_COMPARABLE, NOT_RUN
+from gpca.evaluation.intervals import NO_WIDTH, mean_interval
+from gpca.evaluation.measures import ALL, TIDY_COLUMNS, source_method_seed
 from gpca.io.csv_file import read_numbers
 from gpca.io.structured_text import load_own_yaml
 

@@ -18,8 +18,9 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated
 
-from gpca.attribution.metrics import TIDY_COLUMNS, mean_interval
 from gpca.errors import InputError
+from gpca.evaluation.intervals import mean_interval
+from gpca.evaluation.measures import TIDY_COLUMNS
 from gpca.io.csv_file import ANY, finite_number, read_csv
 from gpca.settings import Keys, NotNegative, Share
 

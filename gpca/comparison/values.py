@@ -18,10 +18,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpca.active_learning.metrics import CENSORED_BY
-from gpca.attribution.confidence import LEVEL, bounds, pigeonhole_weights
-from gpca.attribution.metrics import ALL, PREDICTED_AS, mean_interval, read_metrics, source_method_seed
+from gpca.attribution.metrics import PREDICTED_AS
 from gpca.attribution.predictions import read_predictions
 from gpca.comparison.published import UNITS, Counterpart, Number
+from gpca.evaluation.intervals import LEVEL, interval, mean_interval, pigeonhole_weights
+from gpca.evaluation.measures import ALL, read_metrics, source_method_seed
 from gpca.model.runtime_file import read_runtime
 from gpca.seeds import generator
 
@@ -184,7 +185,7 @@ class ShareDraws:
     """A share of samples in every bootstrap draw of clusters and seeds; shares of one source have common draws.
 
     Attributes:
-        share_B: in [0, 1], NaN in a draw without any sample.
+        share_B: (1 + B,) in [0, 1], of the samples themselves first; NaN in a draw without any sample.
         weights_B_N: how often each draw has each sample of the folder.
         mask_N: the samples that the share counts.
     """
@@ -195,12 +196,12 @@ class ShareDraws:
 
     def bounds(self, level: float = LEVEL) -> tuple[float, float]:
         """Return the bounds of the share."""
-        return bounds(self.share_B, self.weights_B_N[:, self.mask_N], level=level)
+        return interval(self.share_B, self.weights_B_N[:, self.mask_N], level=level)[1:]
 
     def bounds_of_difference(self, other: ShareDraws, level: float = LEVEL) -> tuple[float, float]:
         """Return the bounds of the share minus another, draw by draw."""
         weights_B_n = self.weights_B_N[:, self.mask_N]
-        return bounds(self.share_B - other.share_B, weights_B_n, difference=True, level=level)
+        return interval(self.share_B - other.share_B, weights_B_n, difference=True, level=level)[1:]
 
 
 def cluster_draws(
@@ -248,4 +249,6 @@ def _share_draws(counterpart: Counterpart, rows: pd.DataFrame, weights_B_N: np.n
     mask_N = mask.to_numpy()
     weights_B_n = weights_B_N[:, mask_N]
     with np.errstate(invalid="ignore"):  # a draw without any sample of the concept has no share
-        return ShareDraws(weights_B_n @ hits_N[mask_N] / weights_B_n.sum(axis=1), weights_B_N, mask_N)
+        drawn_B = weights_B_n @ hits_N[mask_N] / weights_B_n.sum(axis=1)
+    share = hits_N[mask_N].mean() if mask_N.any() else math.nan
+    return ShareDraws(np.append(share, drawn_B), weights_B_N, mask_N)

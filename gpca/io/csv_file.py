@@ -95,14 +95,19 @@ def numbers(path: str | Path, rows: pd.DataFrame, column: str, needed=True, leas
 
 
 def read_numbers(
-    path: str | Path, columns: Iterable[str], numeric: Iterable[str], optional: Iterable[str] = (), least=-np.inf
+    path: str | Path,
+    columns: Iterable[str],
+    numeric: Iterable[str],
+    optional: Iterable[str] = (),
+    least: float = -np.inf,
+    others: Iterable[str] = (),
 ) -> pd.DataFrame:
     """Read a CSV file as :func:`read_csv` does, its numeric columns as numbers; only optional ones may be empty, NaN.
 
     Raises:
         InputError: as of :func:`read_csv` and :func:`numbers`.
     """
-    rows, may_be_empty = read_csv(path, columns), set(optional)
+    rows, may_be_empty = read_csv(path, columns, others), set(optional)
     for column in numeric:
         needed = rows[column] != "" if column in may_be_empty else True
         rows[column] = numbers(path, rows, column, needed, least)

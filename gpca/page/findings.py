@@ -11,8 +11,8 @@ import numpy as np
 
 from gpca.active_learning.metrics import TABLE
 from gpca.active_learning.settings import JUDGED_SHARE, rare_setting
-from gpca.attribution.metrics import ALL, read_metrics
-from gpca.attribution.paired import UNTRAINED
+from gpca.evaluation.intervals import UNTRAINED
+from gpca.evaluation.measures import ALL, read_metrics
 from gpca.experiments.diagnosis.judged import CEILING, POOLED
 from gpca.experiments.diagnosis.metrics import read_intervals
 from gpca.experiments.real_world.metrics import read_together

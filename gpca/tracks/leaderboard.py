@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gpca.attribution.confidence import REPEATS
+from gpca.evaluation.intervals import REPEATS
 from gpca.experiments.diagnosis.judged import CEILING, POOLED
 from gpca.experiments.diagnosis.measures import SMALLER_IS_BETTER
 from gpca.experiments.diagnosis.tables import AGAIN, SHOWN

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.attribution.confidence import bounds, pigeonhole_weights
 from gpca.attribution.scores import Attribution
 from gpca.causes.dataset import LABELS
 from gpca.causes.truth import BORDERLINE, NOMINAL
+from gpca.evaluation.intervals import interval, pigeonhole_weights
 from gpca.experiments.diagnosis.judged import CEILING, POOLED, Judged, ceiling_of, joined, judged_of
 from gpca.experiments.diagnosis.measures import SHARES, counted, measure, ranking
 from gpca.experiments.scan_causes.metrics import CAUSES as SCAN_MEASURE
@@ -63,14 +63,14 @@ def score(published: Published, submitted: Mapping[str, Method]) -> tuple[pd.Dat
                 if np.isfinite(value_B[0]):
                     samples = drawn_B_N[:, counts[metric]] if metric in SHARES_OF_SAMPLES else None
                     keys = (group, name, metric, int(counts[metric].sum()), seeds)
-                    rows.append((*keys, value_B[0], *bounds(value_B[1:], samples)))
+                    rows.append((*keys, *interval(value_B, samples)))
         ranked = [name for name, (values, _) in measured.items() if headline in values]
         for against in (name for name in submitted if name in ranked):
             for name in (name for name in ranked if name not in (against, CEILING)):
                 values, counts = measured[name]
                 difference_B = values[headline] - measured[against][0][headline]
-                interval = bounds(difference_B[1:], drawn_B_N[:, counts[headline]], difference=True)
-                differences.append((group, name, against, difference_B[0], *interval))
+                estimate = interval(difference_B, drawn_B_N[:, counts[headline]], difference=True)
+                differences.append((group, name, against, *estimate))
     return (
         pd.DataFrame(rows, columns=list(COLUMNS)),
         pd.DataFrame(differences, columns=["group", "method", *AGAINST]),

@@ -11,13 +11,11 @@ from gpca.attribution.metrics import (
     collect_timings,
     concept_accuracy,
     confusion,
-    mean_interval,
     permuted_accuracy,
     read_causal,
-    read_metrics,
-    write_metrics,
 )
 from gpca.errors import InputError
+from gpca.evaluation.measures import read_metrics, write_metrics
 
 CONCEPTS = ("noise", "pose", "overlap")
 TRUE = np.array(["noise", "noise", "pose", "pose", "pose"])
@@ -53,29 +51,6 @@ def test_accuracy_counts_abstained_samples_as_wrong():
 
 def test_concept_accuracy_is_recall_and_leaves_out_absent_concepts():
     assert concept_accuracy(TRUE, PREDICTED, SURE, CONCEPTS) == {"noise": 1 / 2, "pose": 2 / 3}
-
-
-def test_mean_interval_against_a_worked_example():
-    # Three repeats 1, 2, 3: s = 1, t_2(0.975) = 4.302653, half-width 4.302653 / sqrt(3).
-    mean, low, high = mean_interval([1, 2, 3])
-    assert mean == 2
-    assert high - mean == pytest.approx(2.484138, abs=1e-6)
-    assert mean - low == pytest.approx(high - mean)
-
-
-def test_mean_interval_covers_the_true_mean_as_often_as_it_says():
-    draws = np.random.default_rng(0).normal(size=(2000, 5))
-    covered = [low <= 0 <= high for _, low, high in map(mean_interval, draws)]
-    assert np.mean(covered) == pytest.approx(0.95, abs=0.02)
-
-
-def test_mean_interval_of_one_none_and_unfinished_repeats():
-    mean, low, high = mean_interval([0.7])
-    assert mean == 0.7
-    assert np.isnan([low, high]).all()
-    assert np.isnan(mean_interval([0.7, np.nan])).all()
-    with pytest.raises(ValueError, match="no repeats"):
-        mean_interval([])
 
 
 def test_collect_is_tidy_and_looks_at_test_rows_only(tmp_path):

@@ -3,10 +3,10 @@
 import pandas as pd
 import yaml
 
-from gpca.attribution.metrics import TIDY_COLUMNS as TIDY
 from gpca.code_files import ROOT
 from gpca.comparison.published import Counterpart, Number
 from gpca.comparison.verdicts import Tolerance, compare
+from gpca.evaluation.measures import TIDY_COLUMNS as TIDY
 from gpca.model.runtime_file import RUNTIME_COLUMNS
 
 SETTINGS = yaml.safe_load((ROOT / "config/config.yaml").read_text())["comparison"]["tolerances"]

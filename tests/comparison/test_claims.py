@@ -216,7 +216,7 @@ def test_both_at_the_first_batch_of_labels_say_nothing():
 
 def test_shares_have_the_farther_bounds_of_seeds_and_clusters():
     draws = {place: ShareDraws(share_B, np.ones((4, 1)), np.array([True])) for place, share_B in
-             ((ACCURACY, np.array([0.9, 0.8, 0.7, 0.6])), (OTHER, np.full(4, 0.7)))}  # fmt: skip
+             ((ACCURACY, np.array([0.75, 0.9, 0.8, 0.7, 0.6])), (OTHER, np.full(5, 0.7)))}  # fmt: skip
     alike = {"metrics.csv": pd.concat(rows_of(5.0, 5.0, 5.0))}
     [row] = judge([CLAIM], alike, OBJECTS, clusters=draws).itertuples()
     assert (row.value, row.verdict) == (pytest.approx(5), "inconclusive")

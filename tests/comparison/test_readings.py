@@ -3,9 +3,9 @@
 import pandas as pd
 import pytest
 
-from gpca.attribution.metrics import TIDY_COLUMNS
 from gpca.comparison.readings import chance_of, judge_readings, read_judged, summarize, with_readings
 from gpca.errors import InputError
+from gpca.evaluation.measures import TIDY_COLUMNS
 from gpca.experiments.specification_curve.words import ReadingWords
 
 from .made_up import ACCURACY, LABELS, TOLERANCES, compared, number, tidy

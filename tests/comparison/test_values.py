@@ -8,10 +8,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from gpca.attribution.confidence import wilson_interval
 from gpca.attribution.predictions import PREDICTION_COLUMNS
 from gpca.comparison.values import cluster_draws, folder_behind, folders_behind, measured_on, read_results, value_of_run
 from gpca.errors import InputError
+from gpca.evaluation.intervals import wilson_interval
 
 from .conftest import write
 from .made_up import ACCURACY, LABELS, TIME, compared, number, runtime, tidy
@@ -158,7 +158,7 @@ def test_of_learners_the_set_that_is_named_counts(tmp_path):
     beyond = replace(within, table="learners/severity")
     found = cluster_draws([within, beyond], files)
     assert found[within].bounds() == (0.5, 1.0)
-    assert found[beyond].bounds() == wilson_interval(0, 10)
+    assert found[beyond].bounds() == pytest.approx(wilson_interval(0, 10))
 
 
 def test_views_of_one_instance_are_one_object(tmp_path):

@@ -6,10 +6,10 @@ import pandas as pd
 import pytest
 import yaml
 
-from gpca.attribution.metrics import TIDY_COLUMNS, read_metrics
 from gpca.code_files import ROOT
 from gpca.comparison.published import read_published
 from gpca.comparison.readings import READING_COLUMNS
+from gpca.evaluation.measures import TIDY_COLUMNS, read_metrics
 from gpca.experiments.joint_reading.choices import CHOICES
 from gpca.experiments.joint_reading.judgement import read_choices, read_verdicts
 from gpca.experiments.joint_reading.search import asked

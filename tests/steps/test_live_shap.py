@@ -3,7 +3,7 @@
 import pandas as pd
 import pytest
 
-from gpca.attribution.metrics import read_metrics
+from gpca.evaluation.measures import read_metrics
 from tests.steps.by_words import main
 
 from .command_lines import arguments

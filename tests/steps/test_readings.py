@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from gpca.attribution.metrics import read_metrics
+from gpca.evaluation.measures import read_metrics
 from gpca.experiments.specification_curve.registry import GROUPS
 from tests.steps.by_words import main
 

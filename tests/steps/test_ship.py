@@ -9,10 +9,10 @@ import pandas as pd
 import pytest
 import yaml
 
-from gpca.attribution.paired import Difference
 from gpca.code_files import ROOT
 from gpca.commands import ship
 from gpca.commands.ship import licenses_of
+from gpca.evaluation.intervals import Difference
 from gpca.experiments.diagnosis.metrics import COLUMNS
 from gpca.model.explainer import Explainer
 from gpca.model.file import Model

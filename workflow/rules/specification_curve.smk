@@ -117,7 +117,7 @@ rule join_repeats:
             repeats=READINGS["groups"].get(FRAME_REPEATS, {}).get("repeats", []),
             backbone=REAL_WORLD["backbones"],
         ),
-        code=collector_code("gpca.attribution.metrics:read_all_metrics"),
+        code=collector_code("gpca.evaluation.measures:read_all_metrics"),
     output:
         f"<results>/readings/{FRAME_REPEATS}.csv",
     log:
@@ -128,7 +128,7 @@ rule join_repeats:
     conda:
         "../envs/gpca.yaml"
     params:
-        collector="gpca.attribution.metrics:read_all_metrics",
+        collector="gpca.evaluation.measures:read_all_metrics",
     script:
         "../scripts/collect.py"
 

@@ -1,6 +1,6 @@
 """Files of all sources, methods and seeds -> one tidy CSV, by the collector that the rule names."""
 
-from gpca.attribution.metrics import write_metrics
+from gpca.evaluation.measures import write_metrics
 from gpca.process.job import files_by_name, workflow_script
 from gpca.registry import load
 

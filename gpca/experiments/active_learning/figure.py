@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpca.active_learning.curves import read_curves
-from gpca.attribution.metrics import mean_interval, source_method_seed
 from gpca.errors import InputError
+from gpca.evaluation.intervals import mean_interval
+from gpca.evaluation.measures import source_method_seed
 from gpca.reporting.figures.panels import fitting_columns, legend_below, panels
 from gpca.reporting.figures.style import (
     BLACK,

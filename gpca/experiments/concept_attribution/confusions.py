@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.attribution.metrics import ABSTAINED, PREDICTED_AS, read_metrics
+from gpca.attribution.metrics import ABSTAINED, PREDICTED_AS
 from gpca.causes.truth import NOMINAL
 from gpca.errors import InputError
+from gpca.evaluation.measures import read_metrics
 from gpca.reporting.figures.panels import draw_percentages
 from gpca.reporting.figures.style import CONCEPT_COLORS, GRAY, LIGHT_GRAY, SMALL_PT, TEXT_WIDTH_IN, use_style
 

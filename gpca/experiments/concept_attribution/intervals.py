@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.attribution.clustered import Clustered, Estimate, intervals
-from gpca.attribution.metrics import ALL, read_causal, source_method_seed
+from gpca.attribution.metrics import read_causal
 from gpca.attribution.predictions import concepts_of, read_predictions
 from gpca.errors import InputError
+from gpca.evaluation.intervals import Clustered, Estimate
+from gpca.evaluation.measures import ALL, intervals, source_method_seed
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -21,7 +22,7 @@ TABLE = "attribution"
 
 
 def collect_intervals(prediction_files: Iterable[str | Path], causal_files: Iterable[str | Path] = ()) -> pd.DataFrame:
-    """Return accuracies of `metrics.csv` over all seeds, with 95 % intervals (:mod:`gpca.attribution.clustered`).
+    """Return accuracies of `metrics.csv` over all seeds, with 95 % intervals (:mod:`gpca.evaluation.measures`).
 
     - accuracy: of all test samples and of each concept; an abstained sample is wrong.
     - permuted_accuracy: mean over the seeds of each one's accuracy under its best renaming of the concepts.

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping
 from math import inf
 from typing import TYPE_CHECKING
 
-from gpca.attribution.metrics import ALL
+from gpca.evaluation.measures import ALL
 from gpca.explainers.gpca import GPCA_FORMS
 from gpca.reporting.tables.builder import TableBuilder, crossed, over_clusters, titles_of
 from gpca.reporting.tables.cells import cell_of_repeats, clustered_cell, rows_where

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.attribution.metrics import ALL, source_method_seed, tidy
+from gpca.evaluation.measures import ALL, source_method_seed, tidy
 from gpca.experiments.controls.settings import PAPER
 from gpca.io.csv_file import numbers, read_csv
 

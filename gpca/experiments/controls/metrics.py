@@ -1,6 +1,6 @@
 """Turns the explainers' predictions under the controls into tidy metrics, and into intervals of these.
 
-Intervals are by the bootstrap over objects and seeds of :mod:`gpca.attribution.confidence`. A draw of objects and seeds
+Intervals are by the bootstrap over objects and seeds of :mod:`gpca.evaluation.intervals`. A draw of objects and seeds
 is the same for all explainers and controls of a source, so that differences are paired, also where a control has other
 samples.
 """
@@ -13,11 +13,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.attribution.confidence import bounds, pigeonhole_weights
-from gpca.attribution.metrics import ALL, source_method_seed, tidy
-from gpca.attribution.paired import Difference, from_rival, from_untrained
 from gpca.attribution.predictions import read_predictions
 from gpca.errors import InputError
+from gpca.evaluation.intervals import Difference, from_rival, from_untrained, interval, pigeonhole_weights
+from gpca.evaluation.measures import ALL, source_method_seed, tidy
 from gpca.experiments.controls.protocol import LABELS
 from gpca.experiments.controls.settings import PAPER, TRANSFER, plain_of
 from gpca.experiments.diagnosis.judged import POOLED
@@ -186,14 +185,14 @@ def _records(source: str, measured: Sequence[tuple[str, Group, Measured, Mapping
                 continue
             change_B = value_B - against[metric]
             own = (control, source, trained_on, explainer, metric, *counts)
-            of_value = bounds(value_B[1:], None if metric == CALLS else drawn_B_N)
+            estimate = interval(value_B, None if metric == CALLS else drawn_B_N)
             is_itself = control == PAPER and not plain_of(explainer)  # of which there is nothing to doubt
-            of_change = bounds(change_B[1:], None if is_itself else drawn_B_N, difference=True)
+            change = interval(change_B, None if is_itself else drawn_B_N, difference=True)
             lead = gain = Difference()
             if metric == "accuracy":
                 lead = from_rival(accuracies[group], explainer, rivals, drawn_B_N=drawn_B_N)
                 gain = from_untrained(accuracies[group], explainer, drawn_B_N=drawn_B_N)
-            yield (*own, value_B[0], *of_value, change_B[0], *of_change, *lead.cells, *gain.cells)
+            yield (*own, *estimate, *change, *lead.cells, *gain.cells)
 
 
 def _groups(rows: pd.DataFrame, source: str) -> dict[Group, np.ndarray]:

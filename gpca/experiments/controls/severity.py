@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.attribution.metrics import source_method_seed
 from gpca.errors import InputError
+from gpca.evaluation.measures import source_method_seed
 from gpca.experiments.controls.metrics import read_controls
 from gpca.experiments.controls.samples import OF_CONCEPT, SEVERITIES, read_samples
 from gpca.experiments.controls.settings import PAPER

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import inf, isfinite
 from typing import TYPE_CHECKING
 
-from gpca.attribution.confidence import REPEATS
+from gpca.evaluation.intervals import REPEATS
 from gpca.experiments.controls.metrics import CALLS
 from gpca.experiments.controls.settings import HARD, PAPER, TRANSFER, UNSEEN, WRONG_LABELS
 from gpca.experiments.diagnosis.judged import POOLED

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.attribution.metrics import source_method_seed
 from gpca.attribution.predictions import read_predictions
 from gpca.causes.counterfactuals import replay
 from gpca.causes.dataset import LABELS, Causes
@@ -16,6 +15,7 @@ from gpca.causes.settings import CauseSettings
 from gpca.causes.shapley import ALL, BY_SIZE, SUBSETS
 from gpca.causes.truth import FAILED
 from gpca.errors import InputError
+from gpca.evaluation.measures import source_method_seed
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.figures.cloud_views import draw_clouds, legend_of_clouds, widest_views

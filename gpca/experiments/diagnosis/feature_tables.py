@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from gpca.attribution.confidence import REPEATS
+from gpca.evaluation.intervals import REPEATS
 from gpca.experiments.diagnosis.judged import POOLED
 from gpca.experiments.diagnosis.tables import NOT_COMPARED, SHOWN, cells_of
 from gpca.objects.entry import stand_in_clause

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.attribution.metrics import source_method_seed
 from gpca.attribution.predictions import read_predictions
 from gpca.causes.dataset import LABELS, Causes, labels_of
 from gpca.causes.truth import NOMINAL, Truth, state_of_errors
 from gpca.errors import InputError
+from gpca.evaluation.measures import source_method_seed
 from gpca.io.container import require_same_samples
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import seed_of_file

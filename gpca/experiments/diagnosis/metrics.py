@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.attribution.confidence import bounds, pigeonhole_weights
-from gpca.attribution.metrics import ABSTAINED, ALL, PREDICTED_AS, confusion, tidy
-from gpca.attribution.paired import Difference, from_rival, from_untrained
+from gpca.attribution.metrics import ABSTAINED, PREDICTED_AS, confusion
 from gpca.causes.dataset import LABELS
 from gpca.causes.truth import BORDERLINE
+from gpca.evaluation.intervals import Difference, from_rival, from_untrained, interval, pigeonhole_weights
+from gpca.evaluation.measures import ALL, tidy
 from gpca.experiments.diagnosis.judged import CEILING, POOLED, Judged, joined, read_judged
 from gpca.experiments.diagnosis.measures import MEASURES, SHARES, SMALLER_IS_BETTER, counted, measure
 from gpca.io.csv_file import read_numbers
@@ -161,5 +161,5 @@ def rows_of(
                 lead = from_rival(of_metric, explainer, rivals, smaller, drawn_B_n)
                 gain = from_untrained(of_metric, explainer, smaller, drawn_B_n)
             own = (source, explainer, metric, int(counted_N.sum()), seeds)
-            rows.append((*own, value_B[0], *bounds(value_B[1:], drawn_B_n), *lead.cells, *gain.cells))
+            rows.append((*own, *interval(value_B, drawn_B_n), *lead.cells, *gain.cells))
     return rows

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.attribution.confidence import wilson_interval
 from gpca.causes.truth import BORDERLINE, NOMINAL
 from gpca.errors import InputError
+from gpca.evaluation.intervals import wilson_interval
 from gpca.experiments.diagnosis.judged import Judged
 from gpca.experiments.diagnosis.measures import BINS as BINS_OF_NOMINAL
 from gpca.reporting.figures.panels import MOST_PER_ROW, label_outer, legend_below, panels_in_lines

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.attribution.confidence import pigeonhole_weights
 from gpca.causes.shapley import ALL
 from gpca.causes.truth import BORDERLINE, FAILED, NOMINAL
+from gpca.evaluation.intervals import pigeonhole_weights
 from gpca.experiments.diagnosis.judged import POOLED, Judged
 from gpca.experiments.diagnosis.measures import of_decisions
 from gpca.experiments.diagnosis.metrics import COLUMNS, NUMBERS, by_source, rows_of

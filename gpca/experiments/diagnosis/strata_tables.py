@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from math import inf
 from typing import TYPE_CHECKING
 
-from gpca.attribution.confidence import REPEATS
+from gpca.evaluation.intervals import REPEATS
 from gpca.experiments.diagnosis.judged import CEILING, POOLED
 from gpca.experiments.diagnosis.strata import LARGE_ERROR, LARGE_MARGIN, SMALL_ERROR, SMALL_MARGIN
 from gpca.experiments.diagnosis.tables import AGAIN

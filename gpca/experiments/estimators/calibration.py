@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.attribution.confidence import bounds, pigeonhole_weights
-from gpca.attribution.metrics import source_method_seed, tidy
+from gpca.evaluation.intervals import interval, pigeonhole_weights
+from gpca.evaluation.measures import source_method_seed, tidy
 from gpca.experiments.diagnosis.measures import ranking
 from gpca.experiments.estimators.covariances import read_estimate_files, reference_name
 from gpca.experiments.estimators.settings import KINDS
@@ -198,8 +198,8 @@ def _of_method(method: str, rows_of: Mapping[str, pd.DataFrame]) -> list[tuple]:
                     compared = _lead(name, value_B, rows_of, any_rows, weights_B_N * has_N)
                 enough = len(set(cluster_N[has_N])) >= FEWEST_FAMILIES
                 own_n = drawn_B_N[:, has_N] if metric.startswith("coverage_") else None
-                interval = bounds(value_B[1:], own_n) if enough else (np.nan, np.nan)
-                own = (method, state, name, metric, counted, seeds, value_B[0], *interval)
+                estimate = interval(value_B, own_n) if enough else (value_B[0], np.nan, np.nan)
+                own = (method, state, name, metric, counted, seeds, *estimate)
                 records.append((*own, *compared))
     return [record for record in records if record[2] not in GATES or record[3] in OF_BOTH]
 
@@ -216,7 +216,7 @@ def _lead(
         areas[gate] = ranking(score_N, failed_N, weights_B_N)["area"]
     best = max((gate for gate in areas if gate != name), key=lambda gate: areas[gate][0])
     apart_B = area_B - areas[best]
-    return best, float(apart_B[0]), *bounds(apart_B[1:])
+    return best, *interval(apart_B)
 
 
 def _gates(rows: pd.DataFrame) -> dict[str, pd.DataFrame]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.attribution.metrics import source_method_seed
+from gpca.evaluation.measures import source_method_seed
 from gpca.experiments.estimators.settings import KINDS
 from gpca.io.arrays import TEXT, WHOLE
 from gpca.io.container import Container, array

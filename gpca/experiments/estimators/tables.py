@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from math import inf
 from typing import TYPE_CHECKING
 
-from gpca.attribution.confidence import REPEATS
+from gpca.evaluation.intervals import REPEATS
 from gpca.experiments.estimators.calibration import BOTH, FAILED, GATES, SUCCEEDED, TRUTH
 from gpca.experiments.estimators.settings import KINDS, REFERENCE_OF
 from gpca.objects.entry import stand_in_clause

@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.attribution.confidence import pigeonhole_weights
-from gpca.attribution.paired import Difference
 from gpca.attribution.predictions import read_predictions
 from gpca.causes.dataset import LABELS, Causes, labels_of
 from gpca.causes.truth import BORDERLINE, FAILED, GEOMETRY
 from gpca.errors import InputError
+from gpca.evaluation.intervals import Difference, pigeonhole_weights
 from gpca.experiments.diagnosis.judged import CEILING, Judged, ceiling_of, joined, judged_by
 from gpca.experiments.diagnosis.measures import MEASURES, measure
 from gpca.experiments.diagnosis.metrics import COLUMNS, rows_of

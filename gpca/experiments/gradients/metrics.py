@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gpca.attribution.metrics import ALL, source_method_seed, tidy
+from gpca.evaluation.measures import ALL, source_method_seed, tidy
 from gpca.io.csv_file import numbers, read_csv
 
 if TYPE_CHECKING:

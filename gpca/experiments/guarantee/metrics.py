@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gpca.attribution.confidence import bounds, pigeonhole_weights
-from gpca.attribution.metrics import ALL
 from gpca.causes.truth import NOMINAL
 from gpca.errors import InputError
+from gpca.evaluation.intervals import interval, pigeonhole_weights
+from gpca.evaluation.measures import ALL
 from gpca.experiments.diagnosis.judged import POOLED
 from gpca.experiments.guarantee.answers import BY_FAMILY, FAMILIES, Answers, answers_of, conditions
 from gpca.experiments.guarantee.experiment import promises
@@ -96,11 +96,12 @@ def _of_condition(
             sum_C = np.bincount(group_A[of_A], asked.weight[of_A] * value_A[of_A], len(first_C))
             with np.errstate(invalid="ignore"):
                 values_B = (drawn_B_C * sum_C).sum(axis=1) / (drawn_B_C * weight_C).sum(axis=1)
-            interval = bounds(values_B, drawn_B_C[:, weight_C > 0] if metric in SHARES else None)
+            value_B = np.append(float(sum_C.sum() / weight_C.sum()), values_B)
+            samples, drawn_B_c = _different(asked, of_A), drawn_B_C[:, weight_C > 0] if metric in SHARES else None
             counts = (len(set(column[of_A].tolist())) for column in (asked.family, asked.seed))
             yield (
                 *(TABLE, name, place, explainer, variant, metric, concept, promised, answers.families),
-                *(_different(asked, of_A), *counts, float(sum_C.sum() / weight_C.sum()), *interval),
+                *(samples, *counts, *interval(value_B, drawn_B_c, samples=samples)),
             )
 
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 from math import inf
 from typing import TYPE_CHECKING, Any
 
-from gpca.attribution.confidence import REPEATS
-from gpca.attribution.metrics import ALL
+from gpca.evaluation.intervals import REPEATS
+from gpca.evaluation.measures import ALL
 from gpca.experiments.diagnosis.judged import POOLED
 from gpca.experiments.frame_causes.tables import FEWEST_FAILURES
 from gpca.experiments.guarantee.answers import BY_FAMILY, BY_SAMPLE, BY_STATE, CONFIDENT, FAMILIES, PLAIN

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from gpca.attribution.metrics import tidy, write_metrics
 from gpca.errors import InputError
+from gpca.evaluation.measures import tidy, write_metrics
 from gpca.experiments.joint_reading.choices import PROTOCOL, SEVERITIES
 from gpca.experiments.joint_reading.joint_values import values
 from gpca.experiments.joint_reading.judgement import read_choices

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pandas as pd
 
-from gpca.attribution.metrics import read_all_metrics, tidy, write_metrics
 from gpca.comparison.published import read_published
 from gpca.comparison.verdicts import Tolerance
+from gpca.evaluation.measures import read_all_metrics, tidy, write_metrics
 from gpca.experiments.joint_reading.choices import CHOICES, text_of
 from gpca.experiments.joint_reading.search import asked, search
 from gpca.experiments.joint_reading.tally import DEVELOPMENT, EVALUATED, counted

@@ -16,9 +16,9 @@ import numpy as np
 from gpca.active_learning.rounds import LabelingTask, make_task, rounds
 from gpca.active_learning.settings import LOOK_EVERY, ActiveLearningSettings
 from gpca.attribution import diagnostics
-from gpca.attribution.metrics import ALL
 from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
+from gpca.evaluation.measures import ALL
 from gpca.experiments.joint_reading.choices import SCHEDULES, SEVERITIES, START, Joint, part_name
 from gpca.experiments.joint_reading.measured_samples import MeasureSettings, Subjects
 from gpca.experiments.out_of_distribution.sets import DISTANCES, ShiftedSets

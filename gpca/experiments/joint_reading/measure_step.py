@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gpca.attribution.metrics import tidy, write_metrics
+from gpca.evaluation.measures import tidy, write_metrics
 from gpca.experiments.joint_reading.joint_values import values
 from gpca.experiments.joint_reading.measured_samples import MeasureSettings, Subjects
 from gpca.objects.canonical import ObjectClouds

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pandas as pd
 
-from gpca.attribution.metrics import read_all_metrics, read_metrics, tidy, write_metrics
 from gpca.comparison.published import read_published
 from gpca.comparison.readings import read_judged
 from gpca.comparison.verdicts import Tolerance
+from gpca.evaluation.measures import read_all_metrics, read_metrics, tidy, write_metrics
 from gpca.experiments.joint_reading.judgement import VERDICT_COLUMNS, judge
 from gpca.experiments.joint_reading.search import asked
 from gpca.experiments.joint_reading.tally import EVALUATION

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 
 from gpca.attribution.diagnostics import calibration_error, negative_log_likelihood
-from gpca.attribution.metrics import ALL, source_method_seed, tidy
 from gpca.attribution.predictions import prediction_frame
 from gpca.attribution.scores import Attribution
 from gpca.classifier.settings import Draws, Kernel, LearningRate
 from gpca.errors import InputError
+from gpca.evaluation.measures import ALL, source_method_seed, tidy
 from gpca.io.csv_file import numbers, read_csv, write_csv
 from gpca.settings import Count, Different, Distinct
 

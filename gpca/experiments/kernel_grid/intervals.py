@@ -6,9 +6,9 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gpca.attribution.clustered import Clustered, intervals
-from gpca.attribution.metrics import ALL, source_method_seed
 from gpca.attribution.predictions import read_predictions
+from gpca.evaluation.intervals import Clustered
+from gpca.evaluation.measures import ALL, intervals, source_method_seed
 from gpca.experiments.kernel_grid.grid import MEASURES, SETTING, TABLE, setting_name
 from gpca.experiments.out_of_distribution.intervals import estimates_of_scores
 from gpca.io.csv_file import numbers
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def collect_intervals(prediction_files: Iterable[str | Path]) -> pd.DataFrame:
-    """Return the measures of the grid but the ELBO, with 95 % intervals (:mod:`gpca.attribution.clustered`).
+    """Return the measures of the grid but the ELBO, with 95 % intervals (:mod:`gpca.evaluation.measures`).
 
     The `method` is as :func:`gpca.experiments.kernel_grid.grid.setting_name` has it. The draws of a source are the same
     for all settings.

@@ -40,7 +40,7 @@ EXPERIMENT = Experiment(
     tidy=(
         Tidy(
             "live_shap.csv",
-            "gpca.attribution.metrics:read_all_metrics",
+            "gpca.evaluation.measures:read_all_metrics",
             {"paths": "live_shap/{live_source}/seed{live_seed}.csv"},
             rule="live_shap_metrics",
         ),

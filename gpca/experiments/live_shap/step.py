@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gpca.alignment.icp import ICPSettings
-from gpca.attribution.metrics import ALL, tidy, write_metrics
+from gpca.evaluation.measures import ALL, tidy, write_metrics
 from gpca.experiments.live_shap.comparison import compared, live_values
 from gpca.experiments.live_shap.experiment import LOOKUP
 from gpca.explainers.registry import explainer_entry

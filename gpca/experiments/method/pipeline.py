@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpca.active_learning.settings import ActiveLearningSettings
-from gpca.attribution.metrics import source_method_seed
 from gpca.errors import InputError
+from gpca.evaluation.measures import source_method_seed
 from gpca.experiments.active_learning.figure import STYLES, mean_curves
 from gpca.experiments.method.label_round import SETTING, Round, first_round
 from gpca.experiments.method.shown_sample import Stages, draw_embedding, draw_scores_with_numbers

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 
 from gpca.active_learning.metrics import TABLE
 from gpca.active_learning.settings import ALL_LABELS
-from gpca.attribution.metrics import ALL
 from gpca.causes.quotas import apportion
 from gpca.causes.truth import BORDERLINE, GEOMETRY, NOMINAL
+from gpca.evaluation.measures import ALL
 from gpca.experiments.active_learning.clusters import Clusters
 from gpca.experiments.active_learning.tables import COUNT, Quantity, cell_of
 from gpca.pairs.perturbation import CONCEPTS

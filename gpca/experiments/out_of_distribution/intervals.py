@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpca.attribution import weighted
-from gpca.attribution.clustered import Clustered, Estimate, intervals
-from gpca.attribution.metrics import ALL
+from gpca.evaluation.intervals import Clustered, Estimate
+from gpca.evaluation.measures import ALL, intervals
 from gpca.experiments.out_of_distribution.metrics import (
     TABLE,
     probabilities,
@@ -30,7 +30,7 @@ LEAST_PROBABILITY = 1e-12  # of a true class, as in gpca.attribution.diagnostics
 
 
 def collect_intervals(prediction_files: Iterable[str | Path], set_files: Iterable[str | Path]) -> pd.DataFrame:
-    """Return the diagnostics of Table V over all seeds, with 95 % intervals (:mod:`gpca.attribution.clustered`).
+    """Return the diagnostics of Table V over all seeds, with 95 % intervals (:mod:`gpca.evaluation.measures`).
 
     Of every set: accuracy, ece, nll, brier and the areas by the largest score. Of it, and of every shifted set together
     with the samples like the training's: the rank correlation of the largest score with the distance. Means are over

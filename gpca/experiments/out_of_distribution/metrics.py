@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpca.attribution import diagnostics
-from gpca.attribution.metrics import ALL, source_method_seed, tidy
 from gpca.attribution.predictions import concepts_of, read_predictions
 from gpca.errors import InputError
+from gpca.evaluation.measures import ALL, source_method_seed, tidy
 from gpca.experiments.out_of_distribution.sets import DISTANCES, TRAINED_ON, ShiftedSets
 from gpca.io.csv_file import numbers
 from gpca.seeds import generator

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import pandas as pd
 
-from gpca.attribution.metrics import source_method_seed
 from gpca.errors import InputError
+from gpca.evaluation.measures import source_method_seed
 from gpca.experiments.real_world.frame_views import draw_over_model, draw_scores, read_samples
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations

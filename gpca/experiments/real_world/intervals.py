@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.attribution.clustered import Clustered, Estimate, intervals
-from gpca.attribution.metrics import ALL, source_method_seed
 from gpca.attribution.predictions import read_predictions
 from gpca.errors import InputError
+from gpca.evaluation.intervals import Clustered, Estimate
+from gpca.evaluation.measures import ALL, intervals, source_method_seed
 from gpca.experiments.real_world.metrics import TOGETHER, parts_of_frames
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ SAMPLE = ["seed", "sample"]
 def collect_intervals(
     prediction_files: Iterable[str | Path], pose_files: Iterable[str | Path], first: str
 ) -> pd.DataFrame:
-    """Return accuracies of `real_world.csv` over all seeds, with 95 % intervals (:mod:`gpca.attribution.clustered`).
+    """Return accuracies of `real_world.csv` over all seeds, with 95 % intervals (:mod:`gpca.evaluation.measures`).
 
     - accuracy: of every part of the test samples that the column `table` names; of all of them by concept as well.
     - difference: of that of all from the first method's in the same seeds, on the same draws, where both have the same

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpca.attribution.diagnostics import brier_score, calibration_error, negative_log_likelihood
-from gpca.attribution.metrics import ALL, attribution_metrics, read_metrics, source_method_seed, tidy
+from gpca.attribution.metrics import attribution_metrics
 from gpca.attribution.predictions import concepts_of, read_predictions
 from gpca.errors import InputError
+from gpca.evaluation.measures import ALL, read_metrics, source_method_seed, tidy
 from gpca.frames.source import REAL_WORLD
 from gpca.pairs.dataset import read_samples_of_frames
 
@@ -66,7 +67,7 @@ def read_together(path: str | Path) -> pd.DataFrame:
     """Read of a file that :func:`collect` made the rows of Table VI: all test samples of the frames, a seed for each.
 
     Raises:
-        InputError: as :func:`gpca.attribution.metrics.read_metrics` raises it.
+        InputError: as :func:`gpca.evaluation.measures.read_metrics` raises it.
     """
     metrics = read_metrics(path)
     return metrics[(metrics["table"] == TOGETHER) & (metrics["source"] == REAL_WORLD)]

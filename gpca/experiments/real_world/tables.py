@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.attribution.metrics import ALL
-from gpca.attribution.paired import UNTRAINED
 from gpca.encoders.registry import make_encoder, parameter_count
+from gpca.evaluation.intervals import UNTRAINED
+from gpca.evaluation.measures import ALL
 from gpca.experiments.real_world.metrics import DATASET, SEEN, TOGETHER, UNSEEN
 from gpca.frames.source import ONE_ENCODER, REAL_WORLD
 from gpca.pairs.perturbation import CONCEPTS

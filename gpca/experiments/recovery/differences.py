@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.attribution.confidence import bounds, pigeonhole_weights
+from gpca.evaluation.intervals import interval, pigeonhole_weights
 from gpca.experiments.recovery.metrics import read_recovery
 from gpca.io.csv_file import read_numbers
 from gpca.recovery.policies import ERROR_ONLY, is_fixed, policy_entry
@@ -79,4 +79,4 @@ def read_differences(path: str | Path) -> pd.DataFrame:
 def _difference(difference_N: np.ndarray, weights_B_N: np.ndarray) -> tuple[float, float, float]:
     with np.errstate(invalid="ignore"):  # a draw of tables without failures has no share
         differences_B = weights_B_N @ difference_N / weights_B_N.sum(axis=1)
-    return float(difference_N.mean()), *bounds(differences_B, weights_B_N, difference=True)
+    return interval(np.append(difference_N.mean(), differences_B), weights_B_N, difference=True)

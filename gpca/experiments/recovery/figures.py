@@ -8,8 +8,8 @@ from math import nan
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gpca.attribution.confidence import wilson_interval
 from gpca.errors import InputError
+from gpca.evaluation.intervals import wilson_interval
 from gpca.experiments.recovery.metrics import DOUBTED, DRAWN, pool_share
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.figures.diagram import Canvas

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.attribution.clustered import Clustered, intervals
-from gpca.attribution.metrics import ALL
+from gpca.evaluation.intervals import Clustered
+from gpca.evaluation.measures import ALL, intervals
 from gpca.experiments.recovery.metrics import TABLE, is_action, read_recovery
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.recovery.policy import NOTHING, QUEUE
@@ -22,7 +22,7 @@ CASE = ["seed", "table", "episode"]
 
 
 def collect_intervals(files: Iterable[str | Path], budget: int) -> pd.DataFrame:
-    """Return shares of `recovery.csv` over all seeds with 95 % intervals (:mod:`gpca.attribution.clustered`).
+    """Return shares of `recovery.csv` over all seeds with 95 % intervals (:mod:`gpca.evaluation.measures`).
 
     - recovered_within_1 …, queued, left_alone: shares of the failures, of all and by cause.
     - acted_nominal: share of the registrations that did not fail, of all.

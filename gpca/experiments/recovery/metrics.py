@@ -6,9 +6,9 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gpca.attribution.confidence import wilson_interval
-from gpca.attribution.metrics import ALL, tidy
 from gpca.errors import InputError
+from gpca.evaluation.intervals import wilson_interval
+from gpca.evaluation.measures import ALL, tidy
 from gpca.io.csv_file import numbers, read_csv, read_numbers
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.recovery.policy import NOTHING, QUEUE

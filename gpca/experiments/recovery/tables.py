@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from math import inf
 from typing import TYPE_CHECKING
 
-from gpca.attribution.metrics import ALL
+from gpca.evaluation.measures import ALL
 from gpca.experiments.recovery.differences import ERROR, SEQUENCE
 from gpca.experiments.recovery.metrics import pool_share
 from gpca.pairs.perturbation import CONCEPTS

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.attribution.confidence import bounds, pigeonhole_weights
-from gpca.attribution.paired import Difference, difference
+from gpca.evaluation.intervals import Difference, difference, interval, pigeonhole_weights
 from gpca.experiments.diagnosis.judged import Judged
 from gpca.experiments.diagnosis.measures import SHARES, counted, measure
 from gpca.experiments.diagnosis.metrics import by_source
@@ -64,6 +63,6 @@ def _of_source(source: str, samples_of: dict[str, Judged]) -> list[tuple]:
         values = {name: of_name[metric] for name, of_name in measures.items() if np.isfinite(of_name[metric][0])}
         for name, value_B in values.items():
             gain = Difference() if name == NOTHING else difference(values, name, NOTHING, drawn_B_n)
-            own = (source, name, metric, int(counted_N.sum()), seeds, value_B[0], *bounds(value_B[1:], drawn_B_n))
+            own = (source, name, metric, int(counted_N.sum()), seeds, *interval(value_B, drawn_B_n))
             rows.append((*own, *gain.cells[1:]))
     return rows

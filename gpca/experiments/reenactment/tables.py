@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from math import inf, isfinite
 from typing import TYPE_CHECKING
 
-from gpca.attribution.confidence import REPEATS
+from gpca.evaluation.intervals import REPEATS
 from gpca.experiments.diagnosis.judged import POOLED
 from gpca.experiments.diagnosis.tables import AGAIN, SHOWN
 from gpca.experiments.reenactment.knowledge import KNOWN, in_words

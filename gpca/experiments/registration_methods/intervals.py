@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gpca.alignment.success import SuccessSettings, success_within
-from gpca.attribution.clustered import Clustered, Estimate, intervals
-from gpca.attribution.metrics import ALL, source_method_seed
 from gpca.errors import InputError
+from gpca.evaluation.intervals import Clustered, Estimate
+from gpca.evaluation.measures import ALL, intervals, source_method_seed
 from gpca.experiments.diagnosis.judged import POOLED
 from gpca.experiments.registration_methods.metrics import BINS, TABLE, bin_name, read_trials, row_name, share_of_milder
 from gpca.objects.canonical import ObjectClouds
@@ -35,7 +35,7 @@ def collect_intervals(
 ) -> pd.DataFrame:
     """Return the metrics of `registration_methods.csv` over all sources and seeds, with 95 % intervals.
 
-    They are those of :mod:`gpca.attribution.clustered`; a cluster is a family of objects of one source, and its draws
+    They are those of :mod:`gpca.evaluation.measures`; a cluster is a family of objects of one source, and its draws
     are the same for all methods.
 
     Args:

@@ -11,7 +11,7 @@ from math import inf
 from typing import TYPE_CHECKING
 
 from gpca.alignment.success import success_within
-from gpca.attribution.metrics import ALL
+from gpca.evaluation.measures import ALL
 from gpca.experiments.registration_methods.metrics import BINS, INITIAL, NO_START, POINTS, bin_name, row_name
 from gpca.objects.entry import stand_in_clause
 from gpca.pairs.perturbation import CONCEPTS

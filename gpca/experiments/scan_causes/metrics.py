@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.attribution.confidence import bounds, pigeonhole_weights
-from gpca.attribution.paired import Difference, best_of, difference
 from gpca.attribution.predictions import read_predictions
 from gpca.causes.dataset import LABELS, Causes, labels_of
 from gpca.causes.scans import KINDS
 from gpca.causes.truth import BORDERLINE, FAILED, GEOMETRY
 from gpca.errors import InputError
+from gpca.evaluation.intervals import Difference, best_of, difference, interval, pigeonhole_weights
 from gpca.experiments.diagnosis.judged import CEILING, POOLED, Judged, ceiling_of, joined, judged_by
 from gpca.experiments.diagnosis.measures import SHARES, SMALLER_IS_BETTER, counted, measure
 from gpca.experiments.scan_causes.settings import SCANS
@@ -165,8 +164,7 @@ def _measures(
             lead = difference(of_metric, names[key], gate, drawn_B_n)
         value_B = of_metric[names[key]]
         counts = int(counted_N.sum()), len(set(cluster_N[counted_N])), len(set(any_samples.seed[counted_N].tolist()))
-        interval = bounds(value_B[1:], drawn_B_n)
-        yield (*place, *key, metric, *counts, value_B[0], *interval, *lead.cells)
+        yield (*place, *key, metric, *counts, *interval(value_B, drawn_B_n), *lead.cells)
 
 
 def scan_measures(samples: Judged, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:

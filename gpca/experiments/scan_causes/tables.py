@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from math import inf, isfinite
 from typing import TYPE_CHECKING
 
-from gpca.attribution.confidence import REPEATS
 from gpca.causes.scans import GLOBAL, LADDER
 from gpca.causes.truth import BORDERLINE, GEOMETRY, NOMINAL
+from gpca.evaluation.intervals import REPEATS
 from gpca.experiments.diagnosis.judged import CEILING, POOLED
 from gpca.experiments.diagnosis.tables import AGAIN, COST_NOTE, COSTS, SHOWN, reads
 from gpca.experiments.frame_causes.tables import FEWEST_FAILURES

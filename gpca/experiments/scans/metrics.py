@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gpca.attribution.clustered import Clustered, Estimate, intervals
-from gpca.attribution.metrics import ALL, source_method_seed
+from gpca.evaluation.intervals import Clustered, Estimate
+from gpca.evaluation.measures import ALL, intervals, source_method_seed
 from gpca.experiments.registration_methods.metrics import row_name
 from gpca.io.csv_file import numbers, read_csv
 from gpca.scans.pair import ScanSuccess
@@ -45,7 +45,7 @@ def read_trials(path: str | Path) -> pd.DataFrame:
 def collect_scans(files: Iterable[str | Path], strata: Sequence[float], success: Mapping[str, Any]) -> pd.DataFrame:
     """Return recalls and failures of every data set, method and start, with 95 % intervals over its scenes.
 
-    The rows are those of :mod:`gpca.attribution.clustered`; ``concept`` is ``all``, a stratum, a rung of the ladder, or
+    The rows are those of :mod:`gpca.evaluation.measures`; ``concept`` is ``all``, a stratum, a rung of the ladder, or
     one of the benchmark's lists.
 
     Args:

@@ -11,7 +11,7 @@ from itertools import pairwise
 from math import inf
 from typing import TYPE_CHECKING, Any
 
-from gpca.attribution.metrics import ALL
+from gpca.evaluation.measures import ALL
 from gpca.experiments.registration_methods.metrics import INITIAL, NO_START, row_name
 from gpca.experiments.scans.metrics import FAILED, RECALL
 from gpca.reporting.tables.builder import TableBuilder, missing_packages, over_clusters

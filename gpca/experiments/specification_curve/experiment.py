@@ -71,7 +71,7 @@ EXPERIMENT = Experiment(
     tidy=(
         Tidy(
             "readings.csv",
-            "gpca.attribution.metrics:read_all_metrics",
+            "gpca.evaluation.measures:read_all_metrics",
             {"paths": "readings/{reading_group}.csv"},
             rule="reading_values",
         ),

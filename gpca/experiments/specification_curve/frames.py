@@ -6,10 +6,10 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from gpca.attribution.metrics import ALL
 from gpca.attribution.predictions import read_predictions
 from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
+from gpca.evaluation.measures import ALL
 from gpca.experiments.specification_curve.diagnostics import Values, accuracies_of_named
 from gpca.experiments.specification_curve.run_files import Row, RunFiles
 from gpca.experiments.specification_curve.settings import Reading, ReadingSizes

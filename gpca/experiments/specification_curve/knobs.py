@@ -8,8 +8,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from gpca.alignment.rigid import inverse, transform
-from gpca.attribution.metrics import ALL
 from gpca.causes.shapley import shapley_values
+from gpca.evaluation.measures import ALL
 from gpca.experiments.specification_curve.run_files import Row, RunFiles
 from gpca.experiments.specification_curve.settings import Reading, ReadingSizes
 from gpca.pairs.dataset import Registrations

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from gpca.alignment.icp import ICPSettings
-from gpca.attribution.metrics import source_method_seed
 from gpca.errors import InputError
+from gpca.evaluation.measures import source_method_seed
 from gpca.experiments.out_of_distribution.sets import ShiftedSets
 from gpca.experiments.specification_curve.settings import Reading
 from gpca.pairs.dataset import Registrations, read_embedding

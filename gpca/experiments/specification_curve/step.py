@@ -8,8 +8,8 @@ from typing import Any
 
 import pandas as pd
 
-from gpca.attribution.metrics import TIDY_COLUMNS, write_metrics
 from gpca.errors import InputError
+from gpca.evaluation.measures import TIDY_COLUMNS, write_metrics
 from gpca.experiments.specification_curve.registry import GROUPS
 from gpca.experiments.specification_curve.run_files import RunFiles, by_backbone, by_method, by_source_and_seed
 from gpca.experiments.specification_curve.settings import ReadingSizes, name_of, readings_of

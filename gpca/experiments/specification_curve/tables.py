@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.attribution.metrics import ALL
 from gpca.comparison.readings import summarize
+from gpca.evaluation.measures import ALL
 from gpca.experiments.real_world.tables import encoder_title
 from gpca.experiments.specification_curve.registry import FRAME_INPUT
 from gpca.experiments.specification_curve.words import reading_in_words

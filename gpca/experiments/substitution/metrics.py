@@ -6,10 +6,10 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from gpca.attribution.clustered import Clustered, intervals
-from gpca.attribution.metrics import ALL, source_method_seed, tidy
 from gpca.attribution.predictions import read_predictions
 from gpca.errors import InputError
+from gpca.evaluation.intervals import Clustered
+from gpca.evaluation.measures import ALL, intervals, source_method_seed, tidy
 from gpca.experiments.diagnosis.judged import POOLED
 from gpca.experiments.substitution.settings import ESTIMATOR, FAILURE, LABELS, METHOD
 
@@ -67,7 +67,7 @@ def collect(prediction_files: Iterable[str | Path]) -> pd.DataFrame:
 
 
 def collect_intervals(prediction_files: Iterable[str | Path]) -> pd.DataFrame:
-    """Return the same shares over all sources and seeds, with 95 % intervals (:mod:`gpca.attribution.clustered`).
+    """Return the same shares over all sources and seeds, with 95 % intervals (:mod:`gpca.evaluation.measures`).
 
     A cluster is a family of objects of one source, and has the same draws in all rows.
     """

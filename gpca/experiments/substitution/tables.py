@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from gpca.attribution.metrics import ALL
+from gpca.evaluation.measures import ALL
 from gpca.experiments.substitution.metrics import ANOTHER, MONTE_CARLO
 from gpca.objects.entry import stand_in_clause
 from gpca.pairs.perturbation import CONCEPTS

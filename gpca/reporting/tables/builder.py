@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import product
 
-from gpca.attribution.confidence import REPEATS
 from gpca.errors import InputError
+from gpca.evaluation.intervals import REPEATS
 from gpca.objects.entry import stand_in_clause, title_of
 from gpca.reporting.tables.cells import share_within_limits
 from gpca.reporting.tables.table import LEAST_SEEDS, Cell, Column, Table
@@ -142,7 +142,7 @@ def interval_over(seeds: int | str) -> str:
 
 
 def over_clusters(seeds: int | str, samples: int | str = "", clusters: tuple[str, str] = FAMILIES) -> str:
-    """Return the same of values with intervals over clusters (:mod:`gpca.attribution.clustered`), without a full stop.
+    """Return the same of values with intervals over clusters (:mod:`gpca.evaluation.measures`), without a full stop.
 
     Args:
         seeds, samples: how many, the latter of each seed; empty where the note says it elsewhere.

@@ -7,8 +7,7 @@ from dataclasses import replace
 from math import isfinite, isnan, nan
 from typing import TYPE_CHECKING
 
-from gpca.attribution.confidence import wilson_interval
-from gpca.attribution.metrics import mean_interval
+from gpca.evaluation.intervals import mean_interval, wilson_interval
 from gpca.reporting.tables.table import LEAST_SEEDS, SHARE, Cell, Column
 
 if TYPE_CHECKING:
@@ -105,7 +104,7 @@ def cell_over_sources(
 
 
 def clustered_cell(intervals: pd.DataFrame, factor: float = 100, **wanted: object) -> Cell | None:
-    """Return the cell of the one row of intervals (:mod:`gpca.attribution.clustered`) with these entries, if any."""
+    """Return the cell of the one row of intervals (:mod:`gpca.evaluation.measures`) with these entries, if any."""
     rows = rows_where(intervals, **wanted)
     return interval_cell(rows.iloc[0], factor=factor) if len(rows) else None
 

@@ -1,9 +1,9 @@
 import pandas as pd
 import pytest
 
-from gpca.attribution.confidence import wilson_interval
-from gpca.attribution.metrics import TIDY_COLUMNS
 from gpca.errors import InputError
+from gpca.evaluation.intervals import wilson_interval
+from gpca.evaluation.measures import TIDY_COLUMNS
 from gpca.experiments.active_learning.tables import table3_active_learning, table3_extended, table3_stream
 
 REAL = {"linemod": {"title": "LINEMOD", "stand_in": False}, "ycb": {"title": "YCB", "stand_in": False}}

@@ -2,8 +2,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from gpca.attribution.metrics import TIDY_COLUMNS, write_metrics
 from gpca.errors import InputError
+from gpca.evaluation.measures import TIDY_COLUMNS, write_metrics
 from gpca.experiments.concept_attribution import confusions as confusions_figure
 from gpca.experiments.concept_attribution.confusions import draw_confusions_figure, letters, pooled_confusions
 

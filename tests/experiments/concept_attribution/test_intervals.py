@@ -4,10 +4,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from gpca.attribution.clustered import read_clustered
-from gpca.attribution.confidence import wilson_interval
 from gpca.attribution.metrics import collect
 from gpca.errors import InputError
+from gpca.evaluation.intervals import wilson_interval
+from gpca.evaluation.measures import read_clustered
 from gpca.experiments.concept_attribution.intervals import collect_intervals
 from gpca.io.csv_file import write_csv
 

@@ -6,9 +6,8 @@ from dataclasses import replace
 import pandas as pd
 import pytest
 
-from gpca.attribution.clustered import COLUMNS
-from gpca.attribution.metrics import TIDY_COLUMNS
 from gpca.errors import InputError
+from gpca.evaluation.measures import COLUMNS, TIDY_COLUMNS
 from gpca.experiments.concept_attribution.tables import table1_extended, table1_single_baselines, table2_per_concept
 from gpca.reporting.tables.table import Cell, Column, Table
 

@@ -1,9 +1,9 @@
 import pandas as pd
 import pytest
 
-from gpca.attribution.metrics import TIDY_COLUMNS
-from gpca.attribution.paired import Difference
 from gpca.errors import InputError
+from gpca.evaluation.intervals import Difference
+from gpca.evaluation.measures import TIDY_COLUMNS
 from gpca.experiments.controls.encoder_tables import table10_costs, table10_encoders
 from gpca.experiments.controls.metrics import COLUMNS
 from gpca.experiments.diagnosis.judged import POOLED

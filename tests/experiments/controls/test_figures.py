@@ -4,8 +4,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from gpca.attribution.paired import Difference
 from gpca.errors import InputError
+from gpca.evaluation.intervals import Difference
 from gpca.experiments.controls.figures import SAMPLES, SUCCEEDS, draw_severity_curves, draw_transfer
 from gpca.experiments.controls.metrics import COLUMNS as INTERVALS
 from gpca.experiments.controls.severity import COLUMNS as SEVERITIES

@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from gpca.attribution.metrics import write_metrics
 from gpca.errors import InputError
+from gpca.evaluation.measures import write_metrics
 from gpca.experiments.controls.costs import collect_costs
 from gpca.experiments.controls.metrics import collect, collect_intervals, read_controls, read_intervals
 from gpca.experiments.controls.protocol import LABELS

@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from gpca.attribution.metrics import write_metrics
 from gpca.causes.dataset import LABELS, labels_of
 from gpca.causes.truth import BORDERLINE, NOMINAL
 from gpca.errors import InputError
+from gpca.evaluation.measures import write_metrics
 from gpca.experiments.diagnosis import metrics
 from gpca.experiments.diagnosis.judged import CEILING, POOLED, Judged, ceiling_of, read_judged
 from gpca.experiments.diagnosis.metrics import collect, collect_intervals, read_intervals

@@ -2,8 +2,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
-from gpca.attribution.confidence import wilson_interval
 from gpca.errors import InputError
+from gpca.evaluation.intervals import wilson_interval
 from gpca.experiments.diagnosis.measures import measure
 from gpca.experiments.diagnosis.reliability import draw_nominal_reliability, draw_reliability_panel
 from tests.experiments.diagnosis.conftest import random_judged

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from gpca.attribution.metrics import write_metrics
 from gpca.causes.truth import BORDERLINE, FAILED, NOMINAL
+from gpca.evaluation.measures import write_metrics
 from gpca.experiments.diagnosis.judged import CEILING
 from gpca.experiments.diagnosis.metrics import collect_intervals
 from gpca.experiments.diagnosis.strata import collect_strata, read_strata, strata_of

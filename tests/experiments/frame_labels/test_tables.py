@@ -1,8 +1,8 @@
 import pandas as pd
 import pytest
 
-from gpca.attribution.metrics import TIDY_COLUMNS
 from gpca.errors import InputError
+from gpca.evaluation.measures import TIDY_COLUMNS
 from gpca.experiments.frame_labels.tables import table6_labels
 
 CONDITIONS = {"targets": [0.65, 0.7], "held_out": ["overlap"], "initial": 10, "share": 0.05, "labels": 300}

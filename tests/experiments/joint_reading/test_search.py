@@ -4,10 +4,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from gpca.attribution.metrics import TIDY_COLUMNS
 from gpca.comparison.chance import is_close, p_value, permuted, weights
 from gpca.comparison.published import Counterpart, Number, read_published
 from gpca.errors import InputError
+from gpca.evaluation.measures import TIDY_COLUMNS
 from gpca.experiments.joint_reading.choices import CHOICES, PARTS, part_name
 from gpca.experiments.joint_reading.experiment import names
 from gpca.experiments.joint_reading.search import asked, search, values_of

@@ -4,13 +4,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from gpca.attribution.clustered import read_clustered
 from gpca.attribution.diagnostics import calibration_error, negative_log_likelihood
-from gpca.attribution.metrics import TIDY_COLUMNS as TIDY
-from gpca.attribution.metrics import read_metrics, write_metrics
 from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
+from gpca.evaluation.measures import TIDY_COLUMNS as TIDY
+from gpca.evaluation.measures import read_clustered, read_metrics, write_metrics
 from gpca.experiments.kernel_grid import grid as kernel_grid
 from gpca.experiments.kernel_grid.grid import (
     GRID_COLUMNS,

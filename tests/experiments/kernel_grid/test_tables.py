@@ -1,9 +1,9 @@
 import pandas as pd
 import pytest
 
-from gpca.attribution.clustered import COLUMNS
 from gpca.comparison.published import read_published
 from gpca.errors import InputError
+from gpca.evaluation.measures import COLUMNS
 from gpca.experiments.kernel_grid.figure import COLORS, PRINTED_MARKERS, draw_kernel_curves, printed_accuracies
 from gpca.experiments.kernel_grid.grid import GRID_COLUMNS, PRINTED, setting_name
 from gpca.experiments.kernel_grid.tables import table4_grid, table4_kernels

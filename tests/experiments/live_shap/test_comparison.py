@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from baselines.shap_kl import shapley_values
-from gpca.attribution.metrics import TIDY_COLUMNS
 from gpca.attribution.scores import Attribution
+from gpca.evaluation.measures import TIDY_COLUMNS
 from gpca.experiments.live_shap.comparison import compared, live_values
 from gpca.experiments.live_shap.experiment import names
 from gpca.experiments.live_shap.tables import live_shap

@@ -1,10 +1,10 @@
 import pandas as pd
 import pytest
 
-from gpca.attribution.clustered import COLUMNS as INTERVALS
-from gpca.attribution.confidence import wilson_interval
-from gpca.attribution.metrics import TIDY_COLUMNS
 from gpca.errors import InputError
+from gpca.evaluation.intervals import wilson_interval
+from gpca.evaluation.measures import COLUMNS as INTERVALS
+from gpca.evaluation.measures import TIDY_COLUMNS
 from gpca.experiments.new_concepts.tables import table15_new_concepts, table15_oracle
 
 SOURCES = {"ycb": {"title": "YCB", "stand_in": True}}

@@ -3,7 +3,7 @@
 import pandas as pd
 import pytest
 
-from gpca.attribution.clustered import COLUMNS
+from gpca.evaluation.measures import COLUMNS
 from gpca.experiments.out_of_distribution.intervals import RHO
 from gpca.experiments.out_of_distribution.tables import SHIFTED
 

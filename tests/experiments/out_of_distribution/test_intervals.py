@@ -4,8 +4,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from gpca.attribution.clustered import read_clustered
 from gpca.errors import InputError
+from gpca.evaluation.measures import read_clustered
 from gpca.experiments.out_of_distribution.intervals import RHO, clusters_of, collect_intervals
 from gpca.experiments.out_of_distribution.learners import predict_sets
 from gpca.experiments.out_of_distribution.metrics import collect_diagnostics

@@ -4,9 +4,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from gpca.attribution.clustered import read_clustered
-from gpca.attribution.confidence import wilson_interval
 from gpca.errors import InputError
+from gpca.evaluation.intervals import wilson_interval
+from gpca.evaluation.measures import read_clustered
 from gpca.experiments.real_world.intervals import collect_intervals
 from gpca.experiments.real_world.metrics import collect
 from gpca.frames.source import REAL_WORLD

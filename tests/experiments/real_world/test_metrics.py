@@ -2,8 +2,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from gpca.attribution.metrics import ALL, write_metrics
 from gpca.errors import InputError
+from gpca.evaluation.measures import ALL, write_metrics
 from gpca.experiments.real_world.metrics import collect, read_together
 from gpca.frames.source import ONE_ENCODER, REAL_WORLD
 

@@ -4,10 +4,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from gpca.attribution.metrics import collect, write_metrics
+from gpca.attribution.metrics import collect
 from gpca.attribution.predictions import write_predictions
 from gpca.attribution.scores import Attribution
 from gpca.errors import InputError
+from gpca.evaluation.measures import write_metrics
 from gpca.experiments.real_world.example import choose_sample, covered, draw_real_world_example, title_of_frame
 from gpca.experiments.real_world.failures import _mistakes, draw_real_world_failures
 from gpca.experiments.real_world.figures import draw_frame_reliability, draw_real_world_confusions

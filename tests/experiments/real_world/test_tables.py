@@ -1,9 +1,8 @@
 import pandas as pd
 import pytest
 
-from gpca.attribution.clustered import COLUMNS
-from gpca.attribution.metrics import ALL, TIDY_COLUMNS
 from gpca.errors import InputError
+from gpca.evaluation.measures import ALL, COLUMNS, TIDY_COLUMNS
 from gpca.experiments.real_world.tables import table6_backbones, table6_seen_unseen
 
 BACKBONES = {"dgcnn": 600_000, "pointnet": 150_000}

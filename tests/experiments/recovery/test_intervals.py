@@ -3,9 +3,9 @@
 import pandas as pd
 import pytest
 
-from gpca.attribution.clustered import read_clustered
-from gpca.attribution.confidence import wilson_interval
 from gpca.errors import InputError
+from gpca.evaluation.intervals import wilson_interval
+from gpca.evaluation.measures import read_clustered
 from gpca.experiments.recovery.intervals import collect_intervals
 from gpca.experiments.recovery.metrics import collect_recovery, pool_share
 from gpca.io.csv_file import write_csv

@@ -6,9 +6,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from gpca.attribution.clustered import COLUMNS as INTERVALS
-from gpca.attribution.metrics import tidy
 from gpca.errors import InputError
+from gpca.evaluation.measures import COLUMNS as INTERVALS
+from gpca.evaluation.measures import tidy
 from gpca.experiments.recovery.curves import draw_recovery_costs, draw_recovery_thresholds, losses
 from gpca.experiments.recovery.differences import COLUMNS
 from gpca.experiments.recovery.example_figure import draw_recovery_example

@@ -6,9 +6,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from gpca.attribution.clustered import read_clustered
-from gpca.attribution.confidence import wilson_interval
 from gpca.errors import InputError
+from gpca.evaluation.intervals import wilson_interval
+from gpca.evaluation.measures import read_clustered
 from gpca.experiments.registration_methods.intervals import collect_intervals
 from gpca.experiments.registration_methods.metrics import MEASURED, SEVERITY_COLUMNS, collect_trials
 from gpca.io.csv_file import write_csv

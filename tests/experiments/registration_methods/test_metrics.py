@@ -4,8 +4,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from gpca.attribution.metrics import TIDY_COLUMNS as TIDY
 from gpca.errors import InputError
+from gpca.evaluation.measures import TIDY_COLUMNS as TIDY
 from gpca.experiments.registration_methods.metrics import (
     MEASURED,
     SEVERITY_COLUMNS,

@@ -3,9 +3,8 @@
 import pandas as pd
 import pytest
 
-from gpca.attribution.clustered import COLUMNS
-from gpca.attribution.metrics import tidy
 from gpca.errors import InputError
+from gpca.evaluation.measures import COLUMNS, tidy
 from gpca.experiments.registration_methods.tables import table11_limits, table11_registration, table11_severity
 from gpca.pairs.perturbation import CONCEPTS
 

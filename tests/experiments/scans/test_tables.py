@@ -3,8 +3,8 @@
 import pandas as pd
 import pytest
 
-from gpca.attribution.metrics import tidy
 from gpca.errors import InputError
+from gpca.evaluation.measures import tidy
 from gpca.experiments.registration_methods.metrics import collect_seconds
 from gpca.experiments.scans.metrics import collect_scans, read_trials
 from gpca.experiments.scans.published import table17_published

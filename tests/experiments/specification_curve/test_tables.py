@@ -3,9 +3,9 @@
 import pandas as pd
 import pytest
 
-from gpca.attribution.metrics import ALL, TIDY_COLUMNS
 from gpca.comparison.readings import READING_COLUMNS
 from gpca.errors import InputError
+from gpca.evaluation.measures import ALL, TIDY_COLUMNS
 from gpca.experiments.specification_curve.figure import draw_readings
 from gpca.experiments.specification_curve.tables import table6_inputs, table13_readings
 

@@ -3,8 +3,8 @@
 import pandas as pd
 import pytest
 
-from gpca.attribution.clustered import COLUMNS
 from gpca.errors import InputError
+from gpca.evaluation.measures import COLUMNS
 from gpca.experiments.substitution.tables import table14_estimator_explanations, table14_method_matrix
 
 SOURCES = {"ycb": {"title": "YCB", "stand_in": False}, "cups": {"title": "Cups", "stand_in": True}}

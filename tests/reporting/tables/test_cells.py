@@ -5,9 +5,8 @@ import math
 import pandas as pd
 import pytest
 
-from gpca.attribution.clustered import COLUMNS
-from gpca.attribution.confidence import wilson_interval
-from gpca.attribution.metrics import mean_interval
+from gpca.evaluation.intervals import mean_interval, wilson_interval
+from gpca.evaluation.measures import COLUMNS
 from gpca.reporting.tables.cells import cautious_cell, cell_of_repeats, clustered_cell, share_within_limits
 from gpca.reporting.tables.table import Column
 

@@ -1,8 +1,17 @@
 import numpy as np
 import pytest
 
-from gpca.attribution.confidence import REPEATS, pigeonhole_weights
-from gpca.attribution.paired import UNTRAINED, Difference, best_of, difference, from_rival, from_untrained, shares
+from gpca.evaluation.intervals import (
+    REPEATS,
+    UNTRAINED,
+    Difference,
+    best_of,
+    difference,
+    from_rival,
+    from_untrained,
+    pigeonhole_weights,
+    weighted_mean,
+)
 
 N = 300
 RIGHT = {
@@ -10,10 +19,10 @@ RIGHT = {
     for seed, (name, share) in enumerate({"rule": 0.5, "chance": 0.3, "good": 0.8, "poor": 0.1}.items())
 }
 WEIGHTS = np.vstack([np.ones(N), pigeonhole_weights(np.random.default_rng(9), np.arange(N) // 3)])
-VALUES = shares(RIGHT, WEIGHTS)
+VALUES = {name: weighted_mean(right_N, WEIGHTS) for name, right_N in RIGHT.items()}
 
 
-def test_shares_are_those_of_the_samples_and_then_of_every_draw():
+def test_weighted_means_are_those_of_the_samples_and_then_of_every_draw():
     assert VALUES["good"].shape == (1 + REPEATS,)
     assert VALUES["good"][0] == RIGHT["good"].mean()
     assert VALUES["good"][1:].std() > 0
@@ -25,7 +34,7 @@ def test_the_best_untrained_one_is_beaten_by_a_paired_difference():
     assert found.value == pytest.approx(RIGHT["good"].mean() - RIGHT["rule"].mean())
     assert 0 < found.low < found.value < found.high
     assert from_untrained(VALUES, "rule").other == "chance"
-    assert from_untrained(VALUES, "poor", smaller_is_better=True).other == "chance"
+    assert from_untrained(VALUES, "poor", least_is_best=True).other == "chance"
 
 
 def test_an_interval_is_that_of_the_differences_and_not_of_the_two():

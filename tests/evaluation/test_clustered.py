@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from gpca.attribution.clustered import COLUMNS, Clustered, intervals, read_clustered
-from gpca.attribution.confidence import bounds, pigeonhole_weights, wilson_interval
 from gpca.errors import InputError
+from gpca.evaluation.intervals import Clustered, interval, pigeonhole_weights, quantile_bounds, wilson_interval
+from gpca.evaluation.measures import AGAINST, COLUMNS, intervals, read_clustered
 from gpca.io.csv_file import write_csv
 from gpca.seeds import generator
 
@@ -25,13 +25,13 @@ def test_a_share_has_the_interval_of_the_bootstrap_that_the_comparison_uses(samp
     assert (samples.weights[1:] == weights).all() and (samples.weights[0] == 1).all()
     with np.errstate(invalid="ignore"):
         drawn = (weights * RIGHT).sum(axis=1) / weights.sum(axis=1)
-    assert samples.share(RIGHT) == (pytest.approx(2 / 3), *bounds(drawn, weights))
+    assert samples.share(RIGHT) == interval(np.append((RIGHT * 1.0).mean(), drawn), weights)
 
 
 def test_two_families_that_are_alike_by_chance_do_not_make_it_narrow():
     alike = Clustered.drawn(np.zeros(6), np.repeat(["cup", "can"], 3), "tiny")
     right = np.array([1, 0, 0, 0, 1, 1])
-    assert bounds((alike.weights[1:] * right).sum(axis=1) / 6) == pytest.approx((1 / 3, 2 / 3))
+    assert quantile_bounds((alike.weights[1:] * right).sum(axis=1) / 6) == pytest.approx((1 / 3, 2 / 3))
     assert alike.share(right) == (0.5, *wilson_interval(3, 6))
 
 
@@ -93,7 +93,7 @@ def test_rows_are_written_and_read_back(samples, tmp_path):
     records.append(lonely.record(KEYS, lonely.mean([1.0, 2.0])))
     write_csv(tmp_path / "intervals.csv", intervals(records, "tiny"), form=None)
     read = read_clustered(tmp_path / "intervals.csv")
-    assert list(read.columns) == list(COLUMNS)
+    assert list(read.columns) == [*COLUMNS, *AGAINST]
     assert read.loc[0, ["seeds", "clusters", "samples"]].tolist() == [2, 3, 24]
     assert read.loc[0, ["value", "low", "high"]].tolist() == list(records[0][-3:])
     assert read.loc[1, "value"] == 1.5 and read.loc[1, ["low", "high"]].isna().all()

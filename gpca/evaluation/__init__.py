@@ -1,0 +1,1 @@
+"""From test samples to numbers: measures, their intervals and differences, in one form of rows."""

@@ -1,0 +1,281 @@
+"""95 % intervals: by the pigeonhole bootstrap over clusters and seeds, Wilson's, and Student's over seeds.
+
+Clusters (families of objects, scenes, rendered tables) and seeds are crossed. The pigeonhole bootstrap (Owen 2007)
+draws both with replacement and weights a sample by the product of the two counts.
+
+A share has the farther bounds of the bootstrap and of Wilson's interval for independent samples, because few clusters
+may agree by chance. Where all draws agree, the bootstrap has no width, and Wilson's interval counts a cluster once in
+each seed. docs/comparison.md states this rule for readers, benchmarks/intervals.py checks its coverage.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Mapping
+from dataclasses import dataclass
+from math import sqrt
+from statistics import NormalDist
+from typing import NamedTuple
+
+import numpy as np
+
+from gpca.seeds import generator
+
+REPEATS = 500
+LEVEL = 0.95
+NO_WIDTH = 1e-9  # an interval this narrow differs from a point by rounding alone
+ANYTHING = (-np.inf, np.inf)  # limits of a value that has none
+UNTRAINED = ("chance", "most_frequent", "rule")  # explainers of baselines/untrained.py
+
+
+class Estimate(NamedTuple):
+    """A value and the bounds of its 95 % interval, NaN where there is none."""
+
+    value: float
+    low: float
+    high: float
+
+
+def pigeonhole_weights(random: np.random.Generator, *factors: np.ndarray) -> np.ndarray:
+    """Number of times that each of N samples is drawn, (`REPEATS`, N).
+
+    Args:
+        random: draws the levels of the factors, one factor after the other.
+        factors: (N,) each, the level of every sample, such as its seed or its object.
+    """
+    weights_B_N = np.ones((REPEATS, len(factors[0])))
+    for factor_N in factors:
+        names, number_N = np.unique(factor_N, return_inverse=True)
+        drawn_B_K = random.multinomial(len(names), np.full(len(names), 1 / len(names)), size=REPEATS)
+        weights_B_N *= drawn_B_K[:, number_N]
+    return weights_B_N
+
+
+def interval(
+    value_B: np.ndarray,
+    drawn_B_N: np.ndarray | None = None,
+    difference: bool = False,
+    level: float = LEVEL,
+    samples: int | None = None,
+) -> Estimate:
+    """Value and interval of a statistic.
+
+    Args:
+        value_B: (1 + B,) the statistic of the samples themselves, then of every draw; NaN where it is undefined.
+        drawn_B_N: (B, N) for a share: how often each draw contains each of its N samples. Without it, the interval is
+            that of the bootstrap alone.
+        difference: the statistic is a difference of two shares of the same samples.
+        samples: number of samples where a column of `drawn_B_N` stands for several.
+    """
+    value, (low, high) = float(value_B[0]), quantile_bounds(value_B[1:], level)
+    if drawn_B_N is None or np.isnan(low):
+        return Estimate(value, low, high)
+    trials = independent(drawn_B_N) if high - low <= NO_WIDTH else 0
+    middle = (low + high) / 2
+    if difference:
+        if not trials:
+            return Estimate(value, low, high)
+        # The difference is the share of the samples that only one of the two gets right; it may be up to that bound.
+        least, most = wilson_interval(min(abs(middle), 1.0) * trials, trials, level)
+        if abs(middle) <= NO_WIDTH:
+            return Estimate(value, -most, most)
+        return Estimate(value, least, most) if middle > 0 else Estimate(value, -most, -least)
+    if trials:
+        low, high = wilson_interval(min(max(middle, 0.0), 1.0) * trials, trials, level)
+    samples = drawn_B_N.shape[1] if samples is None else samples
+    if samples and np.isfinite(value):
+        least, most = wilson_interval(min(max(value, 0.0), 1.0) * samples, samples, level)
+        low, high = min(low, least), max(high, most)
+    return Estimate(value, low, high)
+
+
+def quantile_bounds(values_B: np.ndarray, level: float = LEVEL) -> tuple[float, float]:
+    """Quantiles that enclose the middle `level` of the finite draws; NaN where there is none."""
+    finite_B = values_B[np.isfinite(values_B)]
+    if not len(finite_B):
+        return np.nan, np.nan
+    low, high = np.quantile(finite_B, [(1 - level) / 2, (1 + level) / 2])
+    return float(low), float(high)
+
+
+def independent(drawn_B_N: np.ndarray) -> int:
+    """Number of combinations of levels, such as a seed and a cluster, among the N samples.
+
+    Samples of one combination appear equally often in every draw.
+    """
+    return len({column.tobytes() for column in np.ascontiguousarray(drawn_B_N.T)})
+
+
+def wilson_interval(successes: float, trials: int, level: float = LEVEL) -> tuple[float, float]:
+    """Score interval of a share (Wilson 1927), in [0, 1]; successes may be fractional, unlike SciPy's.
+
+    Raises:
+        ValueError: no trials.
+    """
+    if trials < 1:
+        raise ValueError("interval of no trials")
+    z = NormalDist().inv_cdf((1 + level) / 2)
+    share = successes / trials
+    center = share + z**2 / (2 * trials)
+    half_width = z * sqrt(share * (1 - share) / trials + z**2 / (4 * trials**2))
+    low, high = ((center + sign * half_width) / (1 + z**2 / trials) for sign in (-1, 1))
+    return max(0.0, low), min(1.0, high)
+
+
+def mean_interval(values_R: Iterable[float], level: float = LEVEL) -> Estimate:
+    """Mean of R repeats and the bounds of its Student t-interval, mean ± t_{R-1} s / √R, not clipped.
+
+    One repeat has NaN bounds; a NaN repeat makes all three NaN.
+
+    Raises:
+        ValueError: no repeats.
+    """
+    from scipy.stats import t as student_t
+
+    values_R = np.asarray(list(values_R), dtype=float)
+    if values_R.size == 0:
+        raise ValueError("interval of no repeats")
+    mean = float(values_R.mean())
+    if values_R.size == 1:
+        return Estimate(mean, np.nan, np.nan)
+    standard_error = values_R.std(ddof=1) / np.sqrt(values_R.size)
+    half_width = float(student_t.ppf((1 + level) / 2, values_R.size - 1) * standard_error)
+    return Estimate(mean, mean - half_width, mean + half_width)
+
+
+def weighted_mean(value_N: np.ndarray, weights_B_N: np.ndarray) -> np.ndarray:
+    """Mean of a value by weights of its samples (B,); NaN where no sample has weight."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return (weights_B_N * value_N).sum(axis=1) / weights_B_N.sum(axis=1)
+
+
+@dataclass(frozen=True)
+class Clustered:
+    """N test samples of several seeds, and how often each draw of a bootstrap over clusters and seeds contains them.
+
+    Attributes:
+        seed: (N,). cluster: (N,) cluster id of each sample.
+        weights: (1 + B, N): ones for the samples themselves, then the counts of each draw.
+    """
+
+    seed: np.ndarray
+    cluster: np.ndarray
+    weights: np.ndarray
+
+    @classmethod
+    def drawn(cls, seed_N: Iterable, cluster_N: Iterable, *axes: object) -> Clustered:
+        """Draw clusters and seeds; the axes name the random numbers, so the same axes and samples repeat the draws."""
+        seed_N, cluster_N = np.asarray(seed_N), np.asarray(cluster_N, str)
+        drawn_B_N = pigeonhole_weights(generator(*axes), seed_N, cluster_N)
+        return cls(seed_N, cluster_N, np.vstack([np.ones(len(seed_N)), drawn_B_N]))
+
+    def __len__(self) -> int:
+        return len(self.seed)
+
+    def subset(self, rows: np.ndarray) -> Clustered:
+        """The given rows, or those of a mask, with their draws."""
+        return Clustered(self.seed[rows], self.cluster[rows], self.weights[:, rows])
+
+    @property
+    def counts(self) -> tuple[int, int, int]:
+        """Numbers of seeds, clusters and samples."""
+        return len(np.unique(self.seed)), len(np.unique(self.cluster)), len(self)
+
+    def share(self, right_N: np.ndarray) -> Estimate:
+        """Share of the samples that are right."""
+        return interval(weighted_mean(np.asarray(right_N, float), self.weights), self.weights[1:])
+
+    def difference(self, right_N: np.ndarray, other_N: np.ndarray) -> Estimate:
+        """Share that is right minus another share of the same samples, paired by draw."""
+        value_B = weighted_mean(np.asarray(right_N, float), self.weights)
+        value_B = value_B - weighted_mean(np.asarray(other_N, float), self.weights)
+        return interval(value_B, self.weights[1:], difference=True)
+
+    def mean(self, value_N: np.ndarray, limits: tuple[float, float] = ANYTHING) -> Estimate:
+        """Mean of a value that is no share, with bounds within its limits."""
+        return self.estimate(weighted_mean(np.asarray(value_N, float), self.weights), limits)
+
+    def over_seeds(
+        self, measure: Callable[[np.ndarray, np.ndarray], np.ndarray], limits: tuple[float, float] = ANYTHING
+    ) -> Estimate:
+        """Mean over the seeds, weighted by their samples, of a measure that is no mean over samples.
+
+        Repeated samples can inflate such a measure, for example a calibration error, so its draws are shifted until
+        their mean equals the value.
+
+        Args:
+            measure: values (1 + B,) of some samples, given their rows (n,) and weights (1 + B, n).
+            limits: of the measure, and so of the bounds.
+        """
+        total_B, drawn_B = (np.zeros(len(self.weights)) for _ in range(2))
+        for seed in np.unique(self.seed):
+            rows = np.flatnonzero(self.seed == seed)
+            weights_B_n = self.weights[:, rows]
+            count_B = weights_B_n.sum(axis=1)
+            total_B += np.where(count_B > 0, count_B * measure(rows, weights_B_n), 0.0)
+            drawn_B += count_B
+        with np.errstate(divide="ignore", invalid="ignore"):  # a draw without samples has no value
+            value_B = total_B / drawn_B
+        finite_B = value_B[1:][np.isfinite(value_B[1:])]
+        return self.estimate(np.append(value_B[:1], finite_B - finite_B.mean() + value_B[0]), limits)
+
+    def record(self, keys: tuple, estimate: Estimate) -> tuple:
+        """Row of keys, numbers of seeds, clusters and samples, value and bounds."""
+        return (*keys, *self.counts, *estimate)
+
+    def estimate(self, value_B: np.ndarray, limits: tuple[float, float]) -> Estimate:
+        """Interval of a statistic that is no share; one cluster in one seed gives none."""
+        if independent(self.weights[1:]) < 2:
+            return Estimate(float(value_B[0]), np.nan, np.nan)
+        value, *bounds = interval(value_B)
+        low, high = np.clip(bounds, *limits)
+        return Estimate(value, float(low), float(high))
+
+
+@dataclass(frozen=True)
+class Difference:
+    """Value of a method minus that of another; NaN where there is no other."""
+
+    other: str = ""
+    value: float = np.nan
+    low: float = np.nan
+    high: float = np.nan
+
+    @property
+    def cells(self) -> tuple[str, float, float, float]:
+        """The four entries of a row."""
+        return self.other, self.value, self.low, self.high
+
+
+def best_of(values: Mapping[str, np.ndarray], names: Collection[str], least_is_best: bool = False) -> str:
+    """Name with the best value on the samples themselves; empty where none has a value."""
+    finite = [name for name in names if name in values and np.isfinite(values[name][0])]
+    sign = -1 if least_is_best else 1
+    return max(finite, key=lambda name: sign * values[name][0], default="")
+
+
+def difference(
+    values: Mapping[str, np.ndarray], name: str, other: str, drawn_B_N: np.ndarray | None = None
+) -> Difference:
+    """Paired difference of two methods; `values` and `drawn_B_N` as in :func:`interval`."""
+    if not other:
+        return Difference()
+    return Difference(other, *interval(values[name] - values[other], drawn_B_N, difference=True))
+
+
+def from_rival(
+    values: Mapping[str, np.ndarray],
+    name: str,
+    rivals: Collection[str],
+    least_is_best: bool = False,
+    drawn_B_N: np.ndarray | None = None,
+) -> Difference:
+    """Paired difference from the best of the other rivals; of equals, the first by name."""
+    others = sorted(other for other in rivals if other != name)
+    return difference(values, name, best_of(values, others, least_is_best), drawn_B_N)
+
+
+def from_untrained(
+    values: Mapping[str, np.ndarray], name: str, least_is_best: bool = False, drawn_B_N: np.ndarray | None = None
+) -> Difference:
+    """Paired difference from the best of the other untrained explainers."""
+    return from_rival(values, name, UNTRAINED, least_is_best, drawn_B_N)

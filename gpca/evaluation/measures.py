@@ -1,0 +1,239 @@
+"""Measures of test samples by seed, and over all seeds with intervals and paired differences: one form of rows.
+
+Samples are a frame with one row each; ``seed`` is the repeat and ``cluster`` the family, scene or table. A file of
+numbers holds either one value per seed (`TIDY_COLUMNS`) or one row over all seeds with its interval (`COLUMNS`). A
+difference is a row of the latter kind: ``against`` says what kind of rival it is measured from, ``other`` which one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gpca.errors import InputError
+from gpca.evaluation.intervals import ANYTHING, Clustered, best_of, interval, weighted_mean
+from gpca.io.csv_file import numbers, read_csv, read_numbers, write_csv
+from gpca.seeds import seed_of_file
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+ALL = "all"  # the part of the samples, or the concept, that comprises all of them
+POOLED = "pooled"  # the source that comprises all of them
+GROUPS = ("table", "source", "method")
+KEYS = (*GROUPS, "metric", "concept")
+TIDY_COLUMNS = (*KEYS, "seed", "value")
+AGAINST = ("against", "other")
+NUMBERS = ("seeds", "clusters", "samples", "value", "low", "high")
+COLUMNS = (*KEYS, *NUMBERS)
+SHARE = None  # limits of a share of samples
+Parts = Mapping[str, np.ndarray]  # name -> mask of the samples (N,)
+Rivals = Callable[[str, Collection[str]], Collection[str]]  # of a method, among the methods with a value
+
+
+@dataclass(frozen=True)
+class Measure:
+    """A statistic of samples, by default the mean of a column or of a function of the samples.
+
+    Attributes:
+        of: column, or function that returns a value per sample (N,).
+        limits: least and greatest possible value; `SHARE` for a share of samples, which has its own interval.
+        only: parts of the samples that it is taken over; all if empty.
+        statistic: function of samples and weights (1 + B, N) that returns values (1 + B,), instead of a mean.
+        counted: mask of the samples that it depends on (N,); all if None.
+        least_is_best: of two values, the smaller one is better.
+    """
+
+    of: str | Callable[[pd.DataFrame], np.ndarray] = ""
+    limits: tuple[float, float] | None = SHARE
+    only: tuple[str, ...] = ()
+    statistic: Callable[[pd.DataFrame, np.ndarray], np.ndarray] | None = None
+    counted: Callable[[pd.DataFrame], np.ndarray] | None = None
+    least_is_best: bool = False
+
+    def values(self, samples: pd.DataFrame, weights_B_N: np.ndarray) -> np.ndarray:
+        """Values (B,) by weights of the samples."""
+        if self.statistic is not None:
+            return self.statistic(samples, weights_B_N)
+        return weighted_mean(self.per_sample(samples), weights_B_N)
+
+    def per_sample(self, samples: pd.DataFrame) -> np.ndarray:
+        """Value of each sample (N,)."""
+        return np.asarray(samples[self.of] if isinstance(self.of, str) else self.of(samples), float)
+
+
+def read_samples(files: Iterable[str | Path], read: Callable[[Path], pd.DataFrame]) -> pd.DataFrame:
+    """Rows of files named ``…/{source}/{method}/seed{seed}.csv``, with these three as columns.
+
+    Raises:
+        InputError: no files, a name of another form, or a file that the reader refuses.
+    """
+    import pandas as pd
+
+    frames = []
+    for path in files:
+        source, method, seed = source_method_seed(path)
+        frames.append(read(Path(path)).assign(source=source, method=method, seed=seed))
+    if not frames:
+        raise InputError("samples", "no files were given", "run their step first")
+    return pd.concat(frames, ignore_index=True)
+
+
+def per_seed(
+    samples: pd.DataFrame, parts: Callable[[pd.DataFrame], Parts], measures: Mapping[str, Measure]
+) -> pd.DataFrame:
+    """`TIDY_COLUMNS` of each measure by table, source, method, seed and part, and the number of ``test_samples``."""
+    records = []
+    for (*keys, seed), rows in samples.groupby([*GROUPS, "seed"], sort=False):
+        for part, mask_N in parts(rows).items():
+            if not mask_N.any():
+                continue
+            subset = rows[mask_N]
+            once_1_n = np.ones((1, len(subset)))
+            for name, measure in _taken(part, measures):
+                mean = measure.statistic is None
+                value = measure.per_sample(subset).mean() if mean else measure.values(subset, once_1_n)[0]
+                if np.isfinite(value):
+                    records.append((*keys, name, part, seed, float(value)))
+            records.append((*keys, "test_samples", part, seed, float(len(subset))))
+    return tidy(records, "samples")
+
+
+def over_seeds(
+    samples: pd.DataFrame,
+    parts: Callable[[pd.DataFrame], Parts],
+    measures: Mapping[str, Measure],
+    draws: Clustered,
+) -> pd.DataFrame:
+    """`COLUMNS` of each measure by table, source, method and part, over all seeds.
+
+    Args:
+        draws: rows of the samples' index select their draws, so all methods of the same samples share them.
+    """
+    import pandas as pd
+
+    records = []
+    for keys, rows in samples.groupby(list(GROUPS), sort=False):
+        for part, mask_N in parts(rows).items():
+            subset, drawn = rows[mask_N], draws.subset(rows.index.to_numpy()[mask_N])
+            for name, measure in _taken(part, measures) if len(subset) else ():
+                if measure.limits is SHARE:
+                    estimate = interval(measure.values(subset, drawn.weights), drawn.weights[1:])
+                else:
+                    estimate = drawn.estimate(measure.values(subset, drawn.weights), measure.limits)
+                records.append(drawn.record((*keys, name, part), estimate))
+    return pd.DataFrame(records, columns=list(COLUMNS))
+
+
+def compared(
+    keys: tuple[str, str],
+    metric: str,
+    part: str,
+    values: Mapping[str, np.ndarray],
+    draws: Clustered,
+    limits: tuple[float, float] | None = ANYTHING,
+    against: Mapping[str, Rivals] | None = None,
+    least_is_best: bool = False,
+) -> list[tuple]:
+    """Rows of `KEYS`, `AGAINST` and `NUMBERS`: a measure of several methods on the same samples, and differences.
+
+    Args:
+        keys: table and source.
+        values: method -> the measure (1 + B,) of the samples and of every draw; methods without a value are left out.
+        draws: of the samples that the measure depends on.
+        limits: as of :class:`Measure`.
+        against: kind of rival -> function of a method and all methods that returns its rivals; the difference is from
+            the best of them.
+    """
+    values = {method: value_B for method, value_B in values.items() if np.isfinite(value_B[0])}
+    drawn_B_N = draws.weights[1:] if limits is SHARE else None
+    rows = []
+    for method, value_B in values.items():
+        own = (*keys, method, metric, part)
+        value, *bounds = interval(value_B, drawn_B_N)
+        if limits is not SHARE:
+            bounds = np.clip(bounds, *limits).tolist()
+        rows.append((*own, "", "", *draws.counts, value, *bounds))
+        for kind, rivals in (against or {}).items():
+            others = sorted(other for other in rivals(method, values) if other != method)
+            if other := best_of(values, others, least_is_best):
+                apart = interval(value_B - values[other], drawn_B_N, difference=True)
+                rows.append((*own, kind, other, *draws.counts, *apart))
+    return rows
+
+
+def intervals(records: list[tuple], name: str) -> pd.DataFrame:
+    """Frame of `COLUMNS`, or of `KEYS`, `AGAINST` and `NUMBERS`.
+
+    Raises:
+        InputError: no records; `name` says of what.
+    """
+    import pandas as pd
+
+    if not records:
+        raise InputError(name, "no files were given", "run its step first")
+    with_rivals = len(records[0]) > len(COLUMNS)
+    return pd.DataFrame(records, columns=[*KEYS, *AGAINST, *NUMBERS] if with_rivals else list(COLUMNS))
+
+
+def read_clustered(path: str | Path) -> pd.DataFrame:
+    """Read a file of intervals; a value without an interval has NaN bounds, a row that is no difference no ``against``.
+
+    Raises:
+        InputError: missing, empty or unreadable file, missing column, a value that is no finite number.
+    """
+    rows = read_numbers(path, COLUMNS, NUMBERS, optional=("low", "high"), others=AGAINST)
+    return rows.assign(**{name: "" for name in AGAINST if name not in rows})
+
+
+def read_metrics(path: str | Path) -> pd.DataFrame:
+    """Read a file of values by seed.
+
+    Raises:
+        InputError: missing, empty or unreadable file, missing column, a seed or value that is not a finite number.
+    """
+    rows = read_csv(path, TIDY_COLUMNS)
+    rows["seed"] = numbers(path, rows, "seed").astype(int)
+    rows["value"] = numbers(path, rows, "value")
+    return rows
+
+
+def read_all_metrics(paths: Iterable[str | Path]) -> pd.DataFrame:
+    """Read several files as :func:`read_metrics` reads one, one after the other."""
+    import pandas as pd
+
+    return pd.concat([read_metrics(path) for path in paths])
+
+
+def write_metrics(metrics: pd.DataFrame, path: str | Path) -> None:
+    """Write numbers as CSV; floats keep every digit, so equal numbers give equal bytes."""
+    write_csv(path, metrics, form=None)
+
+
+def tidy(records: list[tuple], name: str) -> pd.DataFrame:
+    """Frame of `TIDY_COLUMNS`.
+
+    Raises:
+        InputError: no records; `name` says of what.
+    """
+    import pandas as pd
+
+    if not records:
+        raise InputError(name, "no files were given", "name at least one explainer in the config")
+    return pd.DataFrame(records, columns=list(TIDY_COLUMNS))
+
+
+def source_method_seed(path: str | Path) -> tuple[str, str, int]:
+    """Source, method and seed of a file named ``…/{source}/{method}/seed{seed}.csv``."""
+    seed, parts = seed_of_file(path), Path(path).parts
+    if len(parts) < 3:
+        raise InputError(path, "is not named …/{source}/{explainer}/seed{number}.csv", "rename it")
+    return parts[-3], parts[-2], seed
+
+
+def _taken(part: str, measures: Mapping[str, Measure]) -> list[tuple[str, Measure]]:
+    return [(name, measure) for name, measure in measures.items() if not measure.only or part in measure.only]

@@ -1,0 +1,106 @@
+import numpy as np
+import pytest
+
+from gpca.evaluation.intervals import (
+    independent,
+    interval,
+    mean_interval,
+    pigeonhole_weights,
+    quantile_bounds,
+    wilson_interval,
+)
+from gpca.seeds import generator
+
+SEED = np.repeat([100, 101], 6)
+OBJECT = np.tile(["cup", "can", "drill"], 4)
+
+
+def draws(*axes):
+    return pigeonhole_weights(generator(*axes), SEED, OBJECT)
+
+
+def test_a_draw_of_objects_and_seeds_weighs_a_sample_by_both():
+    weights = draws("tiny")
+    assert np.array_equal(weights, draws("tiny"))
+    assert not np.array_equal(weights, draws("other"))
+    for seed, name in ((100, "cup"), (101, "drill")):
+        same = weights[:, (seed == SEED) & (name == OBJECT)]
+        assert (same == same[:, :1]).all()
+    assert (weights[:, [0, 1, 2, 6, 7, 8]].sum(axis=1) == 2 * 3).all()  # as many of both are drawn as there are
+
+
+def bounds(value_B, *args, **options):
+    """Return the bounds of draws whose statistic on the samples themselves is their median."""
+    return interval(np.append(np.nanmedian(value_B), value_B), *args, **options)[1:]
+
+
+def test_bounds_are_the_quantiles_of_the_draws_that_have_a_value():
+    values = np.append(np.arange(101.0), np.nan)
+    assert quantile_bounds(values) == pytest.approx((2.5, 97.5))
+    assert interval(np.append(3.0, values)) == (3.0, *quantile_bounds(values))
+    assert np.isnan(quantile_bounds(np.array([np.nan]))).all()
+    assert np.isnan(interval(np.full(4, np.nan), np.ones((3, 2)))).all()
+
+
+def test_a_share_on_which_all_draws_agree_has_wilsons_interval_of_its_clusters():
+    weights = draws("tiny")
+    assert independent(weights) == 2 * 3  # an object counts once in each seed, with two samples of each
+    assert independent(weights[:, OBJECT == "cup"]) == 2
+    ones = np.ones(len(weights))
+    assert bounds(ones) == (1, 1)
+    assert bounds(ones, weights) == wilson_interval(6, 6)
+    assert bounds(0 * ones, weights) == wilson_interval(0, 6)
+    assert bounds(0.5 * ones, weights) == wilson_interval(3, 6)
+
+
+def test_a_share_is_never_surer_than_as_many_independent_samples():
+    weights = draws("tiny")
+    narrow, wide = np.linspace(0.7, 0.8, len(weights)), np.linspace(0, 1, len(weights))
+    assert interval(np.append(0.75, narrow), weights) == (0.75, *wilson_interval(9, 12))
+    assert bounds(wide, weights) == quantile_bounds(wide)
+    skewed = np.append(0.75, np.linspace(0.7, 1, len(weights)))
+    assert interval(skewed, weights)[1:] == (wilson_interval(9, 12)[0], quantile_bounds(skewed[1:])[1])
+    assert interval(skewed, weights, samples=1000)[1:] == quantile_bounds(skewed[1:])  # a column may stand for many
+
+
+def test_a_difference_on_which_all_draws_agree_has_a_width_too():
+    weights = draws("tiny")
+    ones, most = np.ones(len(weights)), wilson_interval(0, 6)[1]
+    assert bounds(0 * ones, weights, difference=True) == (-most, most)
+    low, high = wilson_interval(3, 6)
+    assert bounds(0.5 * ones, weights, difference=True) == (low, high)
+    assert bounds(-0.5 * ones, weights, difference=True) == (-high, -low)
+    narrow = np.linspace(0.1, 0.2, len(weights))
+    assert bounds(narrow, weights, difference=True) == quantile_bounds(narrow)
+
+
+def test_the_wilson_interval_is_that_of_the_literature():
+    assert wilson_interval(8, 10) == pytest.approx((0.4902, 0.9433), abs=1e-4)
+    assert wilson_interval(0, 10) == pytest.approx((0.0, 0.2775), abs=1e-4)
+    low, high = wilson_interval(10, 10)
+    assert (low, high) == (pytest.approx(0.7225, abs=1e-4), 1.0)
+    with pytest.raises(ValueError, match="no trials"):
+        wilson_interval(0, 0)
+
+
+def test_mean_interval_against_a_worked_example():
+    # Three repeats 1, 2, 3: s = 1, t_2(0.975) = 4.302653, half-width 4.302653 / sqrt(3).
+    mean, low, high = mean_interval([1, 2, 3])
+    assert mean == 2
+    assert high - mean == pytest.approx(2.484138, abs=1e-6)
+    assert mean - low == pytest.approx(high - mean)
+
+
+def test_mean_interval_covers_the_true_mean_as_often_as_it_says():
+    draws = np.random.default_rng(0).normal(size=(2000, 5))
+    covered = [low <= 0 <= high for _, low, high in map(mean_interval, draws)]
+    assert np.mean(covered) == pytest.approx(0.95, abs=0.02)
+
+
+def test_mean_interval_of_one_none_and_unfinished_repeats():
+    mean, low, high = mean_interval([0.7])
+    assert mean == 0.7
+    assert np.isnan([low, high]).all()
+    assert np.isnan(mean_interval([0.7, np.nan])).all()
+    with pytest.raises(ValueError, match="no repeats"):
+        mean_interval([])
