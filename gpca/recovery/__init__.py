@@ -1,1 +1,1 @@
-"""Policies and actions for uncertain registrations, and the settings of the closed loop that measures them."""
+"""Actions of a robot on uncertain registrations, policies that choose them, and their settings."""

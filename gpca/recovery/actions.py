@@ -1,7 +1,6 @@
-"""Actions of a robot on a failed registration, by name: search more broadly, look again, measure better.
+"""Actions of a robot on a failed registration, by name, and what it can observe without the true pose.
 
-An action takes what the robot has (:class:`Holding`) and what it can do with its camera, and
-returns what it has then; the registration is made anew from that. No action is told the true pose.
+An action maps the robot's state (:class:`Holding`) to a new one, from which the registration is repeated.
 """
 
 from __future__ import annotations
@@ -13,19 +12,26 @@ from typing import Protocol
 import numpy as np
 
 from gpca.alignment.icp import clipped_cost
-from gpca.alignment.rigid import inverse, rigid_motion, scale_translation
+from gpca.alignment.rigid import inverse, rigid_motion, rotation_angle_rad, scale_translation
 from gpca.errors import require_known
 from gpca.frames.shots import Shot, agreement, fuse
 from gpca.settings import require_arguments
 
-LOOSER = 2.0  # the broader search has so many times ICP's correspondence distance
-JUDGED = 8  # so many results of the search are compared with the shots
+LOOSER = 2.0  # correspondence distance of the broader search, relative to ICP's
+JUDGED = 8  # number of results of the search that are compared with the shots
 MODEL_POINTS, CLOUD_POINTS = 512, 256
-BEHIND = (0.1, 0.25)  # the center is tried so many diameters behind the middle of the measured side
+BEHIND = (0.1, 0.25)  # tried distances of the object's center behind the middle of the measured side, in diameters
+OBSERVED = (
+    *("fitness", "inlier_rmse", "to_model_median", "to_model_high", "to_observed_median", "to_observed_high"),
+    *("thickness", "on_model", "explained", "hidden", "log_points", "rotation_rad", "translation", "shots", "filtered"),
+    *("rival_gain", "rival_distance", "rivals"),
+)
+ELSEWHERE = 0.1  # distance between different poses, in diameters
+PROBED = 16  # number of orientations tried to find rivals of a pose
 
 
 class Robot(Protocol):
-    """The means of an action: the camera, and the known shape of the object."""
+    """The camera and the known shape of the object."""
 
     points_m: np.ndarray
     normals: np.ndarray
@@ -37,18 +43,18 @@ class Robot(Protocol):
         """Measure from a viewpoint."""
 
     def estimate(self, shot: Shot, filtered: bool) -> np.ndarray | None:
-        """Estimate the pose from one shot; None where it shows too little."""
+        """Estimate the pose from one shot; None if it shows too little."""
 
 
 @dataclass(frozen=True)
 class Holding:
-    """A robot's state in a case: its shots, its poses and how it measures.
+    """A robot's state in a case.
 
     Attributes:
         shots: one per viewpoint.
-        T_world_object_init: the pose that ICP starts from.
-        T_world_object: the pose that ICP ended at.
-        frames: how many are taken at a viewpoint.
+        T_world_object_init: initial pose of ICP.
+        T_world_object: result of ICP.
+        frames: number of frames per viewpoint.
         filtered: whether statistical outliers are removed.
     """
 
@@ -63,17 +69,14 @@ Action = Callable[..., Holding]
 
 
 def reinitialize(holding: Holding, robot: Robot, random: np.random.Generator, starts: int = 64) -> Holding:
-    """Search all orientations by ICP with a larger reach, and start from the pose that explains the shots best.
-
-    The results of least cost are judged, see :func:`best_start`.
-    """
+    """Search all orientations by ICP with a larger reach, and start from the best of the results."""
     return best_start(holding, robot, search(holding, robot, random, starts))
 
 
 def search(holding: Holding, robot: Robot, random: np.random.Generator, starts: int) -> list[np.ndarray]:
-    """Return the `JUDGED` poses ``T_world_object`` of least cost that ICP with a larger reach ends at.
+    """Return the `JUDGED` results ``T_world_object`` of least cost of ICP with a larger reach; none for few points.
 
-    It starts from the pose held and from random orientations; none is found where there are too few points.
+    It starts from the current pose and from random orientations.
     """
     from scipy.spatial.transform import Rotation
 
@@ -107,7 +110,7 @@ def new_view(
     azimuths: int = 8,
     elevations_deg: tuple[float, ...] = (20.0, 45.0, 70.0),
 ) -> Holding:
-    """Move to the viewpoint that should show most of the surface not seen yet, and fuse what it shows."""
+    """Move to the viewpoint that should show most of the unseen surface, and fuse its shot."""
     from gpca.frames.shots import best_viewpoint
 
     poses_n, *surface = look_around(holding, robot, random, azimuths, elevations_deg)
@@ -123,9 +126,9 @@ def look_around(
     azimuths: int = 8,
     elevations_deg: Sequence[float] = (20.0, 45.0, 70.0),
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return viewpoints ``T_world_camera`` (n, 4, 4), and which of the model's points were and would be seen.
+    """Return viewpoints ``T_world_camera`` (n, 4, 4), and which model points were and would be seen.
 
-    The last two are those of :func:`gpca.frames.shots.expected_surface`. The viewpoints surround what was measured,
+    The last two are those of :func:`gpca.frames.shots.expected_surface`. The viewpoints surround the measured points,
     since the estimated center may be anywhere.
     """
     from gpca.frames.shots import candidates, expected_surface
@@ -136,22 +139,14 @@ def look_around(
     distance_m = float(np.linalg.norm(center_m - first.T_world_camera[:3, 3]))
     poses_n = candidates(center_m, distance_m, azimuths, elevations_deg)
     points_m = robot.points_m[random.permutation(len(robot.points_m))[:MODEL_POINTS]]
-    seen_Q, shown_n_Q = expected_surface(
-        holding.shots,
-        robot.vertices_m,
-        robot.faces,
-        points_m,
-        holding.T_world_object,
-        robot.diameter_m,
-        poses_n,
-        coarse(first.camera),
-    )
-    return poses_n, seen_Q, shown_n_Q
+    shape = (robot.vertices_m, robot.faces, points_m)
+    pose = (holding.T_world_object, robot.diameter_m)
+    return poses_n, *expected_surface(holding.shots, *shape, *pose, poses_n, coarse(first.camera))
 
 
 def denoise(holding: Holding, robot: Robot, random: np.random.Generator, frames: int = 10) -> Holding:
-    """Take several frames at every viewpoint and take their median, and remove statistical outliers, from now on."""
-    if holding.filtered:  # it was taken before, and its frames count too
+    """From now on, take the median of several frames at every viewpoint and remove statistical outliers."""
+    if holding.filtered:  # a repeated action adds frames to the earlier ones
         frames += holding.frames
     shots = tuple(robot.shoot(shot.T_world_camera, frames) for shot in holding.shots)
     measured = replace(holding, shots=shots, frames=frames, filtered=True)
@@ -159,10 +154,7 @@ def denoise(holding: Holding, robot: Robot, random: np.random.Generator, frames:
 
 
 def best_start(holding: Holding, robot: Robot, poses: Sequence[np.ndarray | None]) -> Holding:
-    """Start from the pose that explains the shots best: one of these, or the estimate so far.
-
-    Poses are compared by :func:`gpca.frames.shots.agreement`, which needs no truth.
-    """
+    """Start from the pose with the best agreement with the shots: one of these, or the current estimate."""
     d = robot.diameter_m
     step = max(1, len(robot.points_m) // MODEL_POINTS)
     cloud_m = fuse(holding.shots, d, holding.filtered)
@@ -171,18 +163,68 @@ def best_start(holding: Holding, robot: Robot, poses: Sequence[np.ndarray | None
         return holding
     model_m = robot.points_m[::step].astype(np.float64)
     normals = robot.normals[::step]
-    known = [holding.T_world_object, *(pose for pose in poses if pose is not None)]
-    shares = [sum(agreement(holding.shots, cloud_m, model_m, normals, T, d)[:2]) for T in known]
-    return replace(holding, T_world_object_init=known[int(np.argmax(shares))])
+    candidates = [holding.T_world_object, *(pose for pose in poses if pose is not None)]
+    shares = [sum(agreement(holding.shots, cloud_m, model_m, normals, T, d)[:2]) for T in candidates]
+    return replace(holding, T_world_object_init=candidates[int(np.argmax(shares))])
 
 
 ACTIONS: dict[str, Action] = {"reinitialize": reinitialize, "new_view": new_view, "denoise": denoise}
 
 
 def action_of(name: str, settings: Mapping[str, object]) -> Action:
-    """Return the action of that name with its settings; InputError for an unknown name or setting."""
+    """Return an action with its settings; an InputError for an unknown name or setting."""
     from functools import partial
 
     require_known("recovery action", name, ACTIONS)
     require_arguments(f"recovery action '{name}'", ACTIONS[name], 3, settings)
     return partial(ACTIONS[name], **settings)
+
+
+def observe(holding: Holding, record: dict, robot: Robot, random: np.random.Generator) -> np.ndarray:
+    """Return the numbers `OBSERVED` of a registration; lengths are in diameters.
+
+    Distances are those of the pair after ICP, in both directions: median and 90th percentile. Thickness is the measured
+    cloud's, by local planes; on_model, explained and hidden are the values of :func:`gpca.frames.shots.agreement`.
+    Rotation and translation are the motion of the model by ICP. Rivals are other poses, found by a short search: the
+    gain in agreement of the best one, its distance, and the share of results elsewhere. A right pose is found again
+    from other orientations; a wrong one loses to its rivals.
+
+    Args:
+        record: the registration's row, see :func:`gpca.pairs.synthesis.align_pair`.
+        random: draws the orientations of the search.
+    """
+    from gpca.alignment.pose_error import adds_error
+    from gpca.pairs.distances import LocalPlanes
+
+    d = robot.diameter_m
+    cloud, target = (_thinned(record[name].astype(np.float64), MODEL_POINTS) for name in ("cloud", "target"))
+    observed, model = LocalPlanes.of(cloud), LocalPlanes.of(target)
+    to_model_N, to_observed_M = model.tree.query(cloud)[0], observed.tree.query(target)[0]
+    cloud_m = fuse(holding.shots, d, holding.filtered)
+    model_m, normals = (_thinned(each, MODEL_POINTS).astype(np.float64) for each in (robot.points_m, robot.normals))
+    shots_m = (holding.shots, _thinned(cloud_m, CLOUD_POINTS), model_m, normals)
+    shares = agreement(*shots_m, holding.T_world_object, d)
+    T_moved = inverse(holding.T_world_object_init) @ holding.T_world_object
+    rivals = (0.0, 0.0, 0.0)
+    if poses := search(holding, robot, random, PROBED):
+        points_m = _thinned(robot.points_m, CLOUD_POINTS)
+        distances = [adds_error(points_m, T, holding.T_world_object) / d for T in poses]
+        explained = [sum(agreement(*shots_m, T, d)[:2]) for T in poses]
+        best = int(np.argmax(explained))
+        elsewhere = float(np.mean([distance > ELSEWHERE for distance in distances]))
+        rivals = explained[best] - sum(shares[:2]), distances[best], elsewhere
+    return np.array(
+        [
+            *(record["fitness"], record["inlier_rmse"]),
+            *np.quantile(to_model_N, (0.5, 0.9)),
+            *np.quantile(to_observed_M, (0.5, 0.9)),
+            *(np.median(observed.thickness), *shares, np.log(len(cloud_m))),
+            *(rotation_angle_rad(T_moved), np.linalg.norm(T_moved[:3, 3]) / d),
+            *(float(len(holding.shots)), float(holding.filtered)),
+            *rivals,
+        ]
+    )
+
+
+def _thinned(points: np.ndarray, count: int) -> np.ndarray:
+    return points[:: max(1, len(points) // count)]

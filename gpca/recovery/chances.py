@@ -1,25 +1,91 @@
-"""Chances, learned on the training tables: that a pose is right as it is, and that an action mends a wrong one."""
+"""Probabilities learned on the training tables: of a failure, and that an action makes a wrong pose right."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from gpca.errors import InputError
+from gpca.guarantee.conformal import upper_bound
 from gpca.recovery.policy import NOTHING, QUEUE, Decision
 
-INVERSE_REGULARizATION = 0.3  # chosen on failures of development seeds
+INVERSE_REGULARIZATION = 0.3  # C of scikit-learn, chosen on development seeds; smaller is closer to the mean rate
+FOLDS = 8  # of the tables
+
+
+@dataclass(frozen=True)
+class FailureGate:
+    """A classifier of failures, without causes, and the probability above which it raises an alarm."""
+
+    classifier: Any
+    threshold: float = 0.5
+
+    def failure(self, observed_N_F: np.ndarray) -> np.ndarray:
+        """Return the probability (N,) that each registration failed."""
+        return self.classifier.predict_proba(observed_N_F)[:, 1]
+
+    def alarms(self, observed_F: np.ndarray) -> bool:
+        """Return whether the registration counts as failed."""
+        return bool(self.failure(observed_F[None])[0] > self.threshold)
+
+
+def learn_gate(
+    observed_N_F: np.ndarray, failed_N: np.ndarray, table_N: Sequence[object], false_alarms: float
+) -> FailureGate:
+    """Train a gate; its threshold is set on good registrations, each judged by a classifier without their table.
+
+    Args:
+        observed_N_F: see :data:`gpca.recovery.actions.OBSERVED`.
+        table_N: table of each registration.
+        false_alarms: see :func:`alarm_threshold`.
+
+    Raises:
+        InputError: failed, or good, registrations from fewer than two tables.
+    """
+    good_N = ~failed_N
+    _, group_N = np.unique([str(table) for table in table_N], return_inverse=True)
+    for kind, mask_N in (("failed", failed_N), ("good", good_N)):
+        if (tables := len(set(group_N[mask_N]))) < 2:
+            fault = (
+                f"training registrations that are {kind} stand on {tables} of the two tables that a gate needs at least"
+            )
+            raise InputError("recovery", fault, "raise recovery.train, recovery.rehearsals or recovery.tables")
+
+    def fitted(rows_N: np.ndarray) -> FailureGate:
+        from gpca.explainers.classifiers import standardized_regression
+
+        regression = standardized_regression(INVERSE_REGULARIZATION)
+        return FailureGate(regression.fit(observed_N_F[rows_N], failed_N[rows_N]))
+
+    fold_N = group_N % FOLDS
+    failure_N = np.full(len(failed_N), np.nan)
+    for fold in np.unique(fold_N[good_N]):
+        held_out_N = fold_N == fold
+        failure_N[held_out_N] = fitted(~held_out_N).failure(observed_N_F[held_out_N])
+    threshold = alarm_threshold(failure_N[good_N], false_alarms)
+    return replace(fitted(np.ones(len(failed_N), bool)), threshold=threshold)
+
+
+def alarm_threshold(failure_M: np.ndarray, false_alarms: float) -> float:
+    """Return the threshold that a new good registration exceeds with at most this probability.
+
+    It is conformal over the M good registrations (:func:`gpca.guarantee.conformal.upper_bound`), or the largest
+    of their scores if M is too small.
+    """
+    return min(upper_bound(failure_M, 1 - false_alarms), float(failure_M.max()))
 
 
 @dataclass(frozen=True)
 class Trial:
-    """One try of an action: what was known of the registration, and whether its pose was right afterward.
+    """A rehearsed action.
 
     Attributes:
         known_F: see :func:`gpca.experiments.recovery.rehearsal.known`.
-        action: its name; `NOTHING` where the registration was left as it was.
+        action: its name; `NOTHING` if the registration was left as it was.
+        right: whether the pose was right afterwards.
     """
 
     known_F: np.ndarray
@@ -28,22 +94,25 @@ class Trial:
 
 
 class Chances:
-    """A logistic regression for each action, and one for doing nothing, on standardized numbers.
+    """A logistic regression per action, and one for doing nothing, on standardized features.
 
-    An action that always or never helped in the trials gets the rate of Laplace's rule of succession.
-
-    Args:
-        trials: of the training tables.
-        inverse_regularisation: of the weights (C of scikit-learn); the smaller, the nearer to each action's own rate.
+    An action that always or never succeeded gets the rate of Laplace's rule of succession.
     """
 
     def __init__(
-        self, trials: Sequence[Trial], actions: Sequence[str], inverse_regularisation: float = INVERSE_REGULARizATION
+        self, trials: Sequence[Trial], actions: Sequence[str], inverse_regularization: float = INVERSE_REGULARIZATION
     ) -> None:
-        self._models = {
-            name: _fitted([trial for trial in trials if trial.action == name], inverse_regularisation)
-            for name in (NOTHING, *actions)
-        }
+        from gpca.explainers.classifiers import standardized_regression
+
+        self._models: dict[str, Any] = {}
+        for name in (NOTHING, *actions):
+            rows = [trial for trial in trials if trial.action == name]
+            right_N = np.array([trial.right for trial in rows], bool)
+            if right_N.all() or not right_N.any():
+                self._models[name] = float((right_N.sum() + 1) / (len(right_N) + 2))
+            else:
+                regression = standardized_regression(inverse_regularization)
+                self._models[name] = regression.fit(np.array([trial.known_F for trial in rows]), right_N)
 
     def of(self, name: str, known_F: np.ndarray) -> float:
         """Return the probability that the pose is right after the action, or as it is for `NOTHING`."""
@@ -54,33 +123,23 @@ class Chances:
 def learn_utility(
     trials: Iterable[Sequence[Trial]], costs: Mapping[str, float], actions: Sequence[str], needless: float = 0.0
 ) -> ExpectedUtility:
-    """Return the policy learned from the trials of these episodes."""
-    together = [trial for of_episode in trials for trial in of_episode]
-    return ExpectedUtility(Chances(together, actions), {action: costs[action] for action in actions}, needless)
-
-
-def _fitted(trials: Sequence[Trial], inverse_regularisation: float) -> Any:
-    from gpca.explainers.classifiers import standardized_regression
-
-    right_N = np.array([trial.right for trial in trials], bool)
-    if right_N.all() or not right_N.any():
-        return float((right_N.sum() + 1) / (len(right_N) + 2))
-    return standardized_regression(inverse_regularisation).fit(np.array([trial.known_F for trial in trials]), right_N)
+    """Train the policy on the trials of several episodes."""
+    joined = [trial for episode in trials for trial in episode]
+    return ExpectedUtility(Chances(joined, actions), {action: costs[action] for action in actions}, needless)
 
 
 @dataclass(frozen=True)
 class ExpectedUtility:
-    """Takes the action whose success is worth most by what it costs, and none that is not worth it.
+    """Takes the action with the largest expected gain, if it is positive.
 
-    A right pose is worth 1. With the chance p that the pose is right as it is and the chance p_a that action a makes a
-    wrong one right, the action gains (1 - p) p_a - p b - c_a over doing nothing, where b is what it costs to act
-    needlessly. The k actions of the largest p_a also have the largest chance that any of k helps (if they help
-    independently of each other, given what is known), so that one order is best for every budget k where costs are
-    alike.
+    A right pose is worth 1. If the pose is right with probability p, and action a makes a wrong one right with
+    probability p_a, the action gains (1 - p) p_a - p b - c_a over doing nothing, where b is the cost of acting
+    needlessly. The k actions with the largest p_a also have the largest chance that any of them helps (if they are
+    independent given the features), so that for equal costs one order is best for every budget.
 
     Attributes:
         chances: learned on the training tables.
-        costs: action -> c_a, in right poses.
+        costs: c_a of each action, in right poses.
         needless: b, in right poses.
     """
 
@@ -89,10 +148,9 @@ class ExpectedUtility:
     needless: float = 0.0
 
     def decide(self, known_F: np.ndarray, before: Iterable[str], alarmed: bool = False) -> Decision:
-        """Choose the next action.
+        """Choose the next action; each action repeats only after all others.
 
-        An action that was taken without success comes again only after all others. A robot that is asked again knows
-        that its pose is wrong yet, as one does that was alarmed.
+        After an action or an alarm, the pose is taken to be wrong.
         """
         before = list(before)
         wrong = alarmed or bool(before)
@@ -104,6 +162,10 @@ class ExpectedUtility:
         return Decision(QUEUE if wrong else NOTHING, "", f"no action is worth its cost: {best} {gains[best]:.2f}")
 
     def gains(self, known_F: np.ndarray, right: float) -> dict[str, float]:
-        """Return what each action gains over doing nothing, where the pose is right with this chance."""
+        """Return the gain of each action over doing nothing.
+
+        Args:
+            right: probability that the pose is right.
+        """
         certain = right * self.needless
         return {a: (1 - right) * self.chances.of(a, known_F) - certain - cost for a, cost in self.costs.items()}

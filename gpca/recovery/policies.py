@@ -1,52 +1,287 @@
-"""Policies of recovery by name: how they decide about a failed registration, and what they need for it.
+"""Recovery policies by name: functions that choose the next action for a failed registration.
 
-A policy is told that the pose is wrong unless it finds that out itself or asks the gate. ``oracle``, which is told the
-cause, is there as a bound.
+A policy is given that the pose is wrong unless it recognizes failures itself or asks a gate. Only ``oracle``, an upper
+bound, is given the cause.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import permutations
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from gpca.errors import require_known
+from gpca.pairs.perturbation import CONCEPTS
 from gpca.plugins import joined_outside, module_outside
-from gpca.recovery.deciders import (
-    Decide,
-    Means,
-    act_at_random,
-    act_in_turn,
-    always_act,
-    follow_reenactment,
-    follow_rehearsed,
-    follow_scores,
-    follow_sequence,
-    follow_truth,
-    gated,
-    gated_by_reenactment,
-    never_queue,
-    weigh_alarmed,
-    weigh_chances,
-)
-from gpca.recovery.sequences import sequences, title_of_sequence
+from gpca.recovery.chances import ExpectedUtility, FailureGate
+from gpca.recovery.policy import NOTHING, Decision, RecoveryPolicy, Thresholds, Treated
+
+if TYPE_CHECKING:
+    from gpca.recovery.reenactment import Reenacted
+
+Order = tuple[str, ...]  # a sequence of actions
+SEQUENCE = "sequence"  # prefix of the names of fixed sequences, such as sequence_reinitialize_new_view
+ALWAYS = "always_"  # prefix of the names of policies that always take one action
+ERROR_ONLY = {True: "error_only_acting", False: "error_only"}  # by whether it is given that the pose is wrong
+
+
+@dataclass(frozen=True)
+class Case:
+    """The inputs of a decision.
+
+    Attributes:
+        actions: actions taken so far.
+        scores_T_C, bald_T: output of the explainer at the start and after each action; None without an explainer.
+        observed_F: observation at the start (:data:`gpca.recovery.actions.OBSERVED`), for the gate.
+        known_F: all features of the registration (:func:`gpca.experiments.recovery.rehearsal.known`), for trained
+            policies.
+        cause: cause of the failure, for the oracle only; otherwise empty.
+        random: random numbers of the case, restarted for every decision.
+        reenacted: re-enactment of the current registration, for policies that read it.
+    """
+
+    actions: tuple[str, ...]
+    scores_T_C: np.ndarray | None
+    bald_T: np.ndarray | None
+    observed_F: np.ndarray | None
+    known_F: np.ndarray | None
+    cause: str
+    random: np.random.Generator
+    reenacted: Reenacted | None = None
+
+
+Decide = Callable[[Case], Decision]
+
+
+@dataclass(frozen=True)
+class Means:
+    """The ingredients of policies.
+
+    Attributes:
+        policy: thresholds and treatments of the robot.
+        actions: available actions.
+        utility, order: expected utility and best fixed order of actions on the rehearsals.
+        gate: separates failures from good registrations.
+        alarm: probability of a failure by the re-enactment above which a registration counts as failed.
+    """
+
+    policy: RecoveryPolicy
+    actions: Sequence[str]
+    utility: ExpectedUtility | None = None
+    order: Order = ()
+    gate: FailureGate | None = None
+    alarm: float | None = None
+
+
+def follow_scores(means: Means) -> Decide:
+    """Follow an explainer's scores and queue uncertain cases (:class:`gpca.recovery.policy.RecoveryPolicy`)."""
+    policy = means.policy
+    concept_of = {action: concept for concept, action in policy.treatments.items()}
+
+    def decide(case: Case) -> Decision:
+        scores_T_C, bald_T = case.scores_T_C, case.bald_T
+        assert scores_T_C is not None and bald_T is not None
+        bald_T = np.zeros(len(scores_T_C)) if np.isnan(bald_T).any() else bald_T
+        before = []
+        for step, action in enumerate(case.actions):
+            column = CONCEPTS.index(concept_of[action])
+            fall = scores_T_C[step, column] - scores_T_C[step + 1, column]
+            before.append(Treated(concept_of[action], float(fall)))
+        return policy.decide(scores_T_C[-1], float(bald_T[-1]), before)
+
+    return decide
+
+
+def never_queue(means: Means) -> Decide:
+    """Follow the scores without queueing, so that explainers are compared by their actions alone."""
+    limits = means.policy.thresholds
+    sure = Thresholds(uncertain=np.inf, dominant=0.0, improvement=limits.improvement, attempts=1_000_000)
+    return follow_scores(replace(means, policy=replace(means.policy, thresholds=sure)))
+
+
+def weigh_chances(means: Means, alarmed: bool = False) -> Decide:
+    """Maximize the expected utility (:class:`gpca.recovery.chances.ExpectedUtility`).
+
+    Args:
+        alarmed: whether it is given that the pose is wrong.
+    """
+    utility = means.utility
+    assert utility is not None
+
+    def decide(case: Case) -> Decision:
+        assert case.known_F is not None
+        return utility.decide(case.known_F, case.actions, alarmed)
+
+    return decide
+
+
+def weigh_alarmed(means: Means) -> Decide:
+    """Maximize the expected utility, given that the pose is wrong: compares actions apart from detecting failures."""
+    return weigh_chances(means, alarmed=True)
+
+
+def act_at_random(means: Means) -> Decide:
+    """Take a random action, possibly repeatedly."""
+
+    def decide(case: Case) -> Decision:
+        # The random numbers restart at every decision, so earlier draws are repeated.
+        drawn = case.random.integers(len(means.actions), size=len(case.actions) + 1)[-1]
+        return Decision(means.actions[int(drawn)], "", "at random")
+
+    return decide
+
+
+def act_in_turn(means: Means) -> Decide:
+    """Take all actions in turn, in a random order for each case."""
+
+    def decide(case: Case) -> Decision:
+        order = case.random.permutation(len(means.actions))
+        return Decision(means.actions[order[len(case.actions) % len(means.actions)]], "", "in turn")
+
+    return decide
+
+
+def follow_rehearsed(means: Means) -> Decide:
+    """Take the actions in the best order on the rehearsals, whatever the cause."""
+    return follow_sequence(means.order)(means)
+
+
+def follow_reenactment(means: Means) -> Decide:
+    """Treat the cause with the largest effect in the re-enactment; each action repeats only after all others."""
+    treatments = means.policy.treatments
+
+    def decide(case: Case) -> Decision:
+        assert case.reenacted is not None
+        gains = dict(zip(CONCEPTS, case.reenacted.phi_3.tolist(), strict=True))
+        fewest = min(case.actions.count(action) for action in treatments.values())
+        untried = [concept for concept in gains if case.actions.count(treatments[concept]) == fewest]
+        best = max(untried, key=gains.__getitem__)
+        return Decision(treatments[best], best, f"{best} adds {gains[best]:.3f} of the diameter to the error")
+
+    return decide
+
+
+def gated(make: Callable[[Means], Decide]) -> Callable[[Means], Decide]:
+    """Let a policy act only if the gate raises an alarm at the start."""
+
+    def make_gated(means: Means) -> Decide:
+        gate = means.gate
+        assert gate is not None
+
+        def alarms(case: Case) -> bool:
+            assert case.observed_F is not None
+            return gate.alarms(case.observed_F)
+
+        return _unless_good(make(means), alarms)
+
+    return make_gated
+
+
+def gated_by_reenactment(make: Callable[[Means], Decide]) -> Callable[[Means], Decide]:
+    """Let a policy act only if the re-enactment raises an alarm at the start."""
+
+    def make_gated(means: Means) -> Decide:
+        threshold = means.alarm
+        assert threshold is not None
+
+        def alarms(case: Case) -> bool:
+            assert case.reenacted is not None
+            return case.reenacted.belief.failure > threshold
+
+        return _unless_good(make(means), alarms)
+
+    return make_gated
+
+
+def _unless_good(decide: Decide, alarms: Callable[[Case], bool]) -> Decide:
+    """Ask for the alarm at the start only: a later decision means that the pose is still wrong."""
+
+    def decide_gated(case: Case) -> Decision:
+        if case.actions or alarms(case):
+            return decide(case)
+        return Decision(NOTHING, "", "it is taken for good")
+
+    return decide_gated
+
+
+def follow_truth(means: Means) -> Decide:
+    """Repeat the action that treats the true cause; do nothing without a cause."""
+    treatments = means.policy.treatments
+    return lambda case: Decision(treatments.get(case.cause, NOTHING), case.cause, "told the cause")
+
+
+def always_act(action: str) -> Callable[[Means], Decide]:
+    """Make the policy that always takes this action."""
+    return lambda means: lambda case: Decision(action, "", "always")
+
+
+def follow_sequence(order: Order) -> Callable[[Means], Decide]:
+    """Make the policy that takes these actions in turn, from the start again after the last."""
+    return lambda means: lambda case: Decision(next_of(order, case.actions), "", "next of a fixed sequence")
+
+
+def next_of(order: Order, taken: Sequence[str]) -> str:
+    """Return the next action of a sequence, which repeats."""
+    return order[len(taken) % len(order)]
+
+
+def sequences(actions: Sequence[str]) -> dict[str, Order]:
+    """Return all sequences of at least two different actions, by the policy's name."""
+    lengths = range(2, len(actions) + 1)
+    orders = [order for length in lengths for order in permutations(actions, length)]
+    return {"_".join((SEQUENCE, *order)): order for order in orders}
+
+
+def title_of_sequence(order: Order) -> str:
+    """Return the title in tables, such as ``Reinitialize, then new view``."""
+    return ", then ".join(action.replace("_", " ") for action in order).capitalize()
+
+
+def best_order(
+    actions: Sequence[str], costs: Mapping[str, float], solved: Sequence[Callable[[Order], bool]], budget: int
+) -> Order:
+    """Return the greedy order of all actions: each solves the most of the remaining failures.
+
+    Ties go to the cheaper action, then to the first.
+
+    Args:
+        costs: cost of each action.
+        solved: one function per rehearsed failure: whether a sequence solves it whose earlier actions did not.
+        budget: number of actions per failure; later actions are not compared.
+    """
+    order: Order = ()
+    left, remaining = list(solved), list(actions)
+    while remaining:
+        counts = dict.fromkeys(remaining, 0)
+        if len(remaining) > 1 and len(order) < budget:
+            counts = {action: sum(solves((*order, action)) for solves in left) for action in remaining}
+        best = max(remaining, key=lambda action: (counts[action], -costs[action]))
+        order = (*order, best)
+        remaining.remove(best)
+        if len(remaining) > 1 and len(order) < budget:
+            left = [solves for solves in left if not solves(order)]
+    return order
 
 
 @dataclass(frozen=True)
 class PolicyEntry:
-    """A policy by name.
+    """A registered policy.
 
     Attributes:
-        title: what tables call it.
-        make: function that makes it.
-        explainer: the one that it reads (:mod:`gpca.explainers.registry`), empty for none.
+        title: title in tables.
+        make: makes the policy.
+        explainer: name of its explainer (:mod:`gpca.explainers.registry`), or empty.
         queues: whether it leaves cases to a person, whose labels its explainer can learn.
-        learns: whether it weighs chances that the rehearsals taught.
-        rehearsed: whether it takes the best order of the rehearsals.
+        learns: whether it uses the chances learned on the rehearsals.
+        rehearsed: whether it uses the best order on the rehearsals.
         gated: whether it asks the gate first.
         reenacts: whether it reads the re-enactment of the registration.
         alarmed: whether it asks the re-enactment for an alarm first.
-        told: whether it is told that the pose is wrong, so that it would act on every good registration too.
-        oracle: whether it is told the cause.
+        told: whether it is given that the pose is wrong, and so would act on every good registration too.
+        oracle: whether it is given the cause.
     """
 
     title: str
@@ -62,8 +297,6 @@ class PolicyEntry:
     oracle: bool = False
 
 
-ALWAYS = "always_"  # with an action's name behind it, the policy that always takes this action
-ERROR_ONLY = {True: "error_only_acting", False: "error_only"}  # whether it is told that the pose is wrong -> policy
 POLICIES = {
     "gpca": PolicyEntry("GP-CA", follow_scores, explainer="gpca", queues=True, told=False),
     "gpca_acting": PolicyEntry("GP-CA, never queued", never_queue, explainer="gpca"),
@@ -96,22 +329,22 @@ POLICIES = {
 
 
 def named_policies() -> dict[str, PolicyEntry]:
-    """Return the policies that have a name of their own, those from outside included."""
+    """Return the policies with names of their own, including plugins."""
     return joined_outside("POLICIES", "recovery policy", PolicyEntry, POLICIES)
 
 
 def policy_module(name: str) -> str | None:
-    """Return the module from outside that lists the policy; None of one of the suite's own."""
+    """Return the plugin module that lists the policy; None for built-in policies."""
     return module_outside("POLICIES", "recovery policy", PolicyEntry, name)
 
 
 def is_fixed(name: str, actions: Sequence[str]) -> bool:
-    """Return whether the policy takes the same actions in the same order whatever it is told and observes."""
+    """Return whether the policy takes a fixed sequence of actions, whatever it observes."""
     return name in policies(actions) and name not in named_policies()
 
 
 def policies(actions: Sequence[str]) -> dict[str, PolicyEntry]:
-    """Return all policies by name, those that always take one of these actions or a sequence of them included."""
+    """Return all policies by name, including those that always take one action or a sequence of them."""
     always = {ALWAYS + a: PolicyEntry(f"Always: {a.replace('_', ' ')}", always_act(a)) for a in actions}
     fixed = {
         name: PolicyEntry(title_of_sequence(order), follow_sequence(order))
@@ -121,11 +354,7 @@ def policies(actions: Sequence[str]) -> dict[str, PolicyEntry]:
 
 
 def policy_entry(name: str, actions: Sequence[str]) -> PolicyEntry:
-    """Return the policy of that name.
-
-    Raises:
-        InputError: unknown policy, or one that takes an unknown action.
-    """
-    known = policies(actions)
-    require_known("recovery policy", name, known)
-    return known[name]
+    """Return a policy by name; an InputError for an unknown policy or action."""
+    entries = policies(actions)
+    require_known("recovery policy", name, entries)
+    return entries[name]

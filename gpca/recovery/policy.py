@@ -1,9 +1,8 @@
-"""The policy for uncertain registrations: from concept scores to one of four branches (paper Sec. V, Fig. 6).
+"""The recovery policy: from concept scores to one of four branches (paper Sec. V, Fig. 6).
 
-A case is queued for labeling where the classifier is uncertain about it or no concept dominates; else the dominant
-concept is treated: reinitialize ICP with a broader search (pose), change the viewpoint (overlap), filter and check the
-sensor (noise). After each action the scores are computed again, and after a few attempts that improved too little
-the case is queued as well.
+A case is queued for labeling if the classifier is uncertain or no concept dominates. Otherwise, the dominant concept is
+treated: reinitialize ICP with a broader search (pose), change the viewpoint (overlap), filter and check the sensor
+(noise). Scores are computed again after each action; after several actions without improvement, the case is queued.
 """
 
 from __future__ import annotations
@@ -17,20 +16,20 @@ from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.settings import NotNegative, Share
 
-NOTHING = "nothing"  # the branch of a registration that is fine
-QUEUE = "queue"  # the branch that acts no more: a person labels the case, and the classifier learns it
-TREATMENTS = {"noise": "denoise", "pose": "reinitialize", "overlap": "new_view"}  # the paper maps them so
+NOTHING = "nothing"  # branch of a good registration
+QUEUE = "queue"  # branch in which a person labels the case for the classifier
+TREATMENTS = {"noise": "denoise", "pose": "reinitialize", "overlap": "new_view"}  # as in the paper
 
 
 @dataclass(frozen=True)
 class Thresholds:
-    """When which branch is taken.
+    """Conditions of the branches.
 
     Attributes:
-        uncertain: a case is queued where its BALD, in nats, is above this.
-        dominant: a concept is treated from this score on; with less, none dominates and the case is queued.
-        improvement: an action counts as an improvement where the treated concept's score falls by this or more.
-        attempts: after so many actions without improvement the case is queued.
+        uncertain: BALD in nats above which a case is queued.
+        dominant: score from which a concept is treated; otherwise none dominates and the case is queued.
+        improvement: least decrease of the treated concept's score that counts as an improvement.
+        attempts: number of actions without improvement after which the case is queued.
     """
 
     uncertain: NotNegative = np.inf
@@ -52,7 +51,7 @@ class Thresholds:
 
 @dataclass(frozen=True)
 class Treated:
-    """An action that was taken: for which concept, and by how much that concept's score fell."""
+    """An earlier action: the treated concept, and the decrease of its score."""
 
     concept: str
     fall: float
@@ -60,7 +59,7 @@ class Treated:
 
 @dataclass(frozen=True)
 class Decision:
-    """A branch: the action, or `QUEUE`; the concept that it treats, empty where none; why, in words."""
+    """A branch: the action, or `QUEUE`; the treated concept, or empty; and the reason."""
 
     action: str
     concept: str
@@ -69,12 +68,7 @@ class Decision:
 
 @dataclass(frozen=True)
 class RecoveryPolicy:
-    """The mapping of Fig. 6.
-
-    Attributes:
-        thresholds: see :class:`Thresholds`.
-        treatments: concept -> action.
-    """
+    """The mapping of Fig. 6; `treatments` maps concepts to actions."""
 
     thresholds: Thresholds = field(default_factory=Thresholds)
     treatments: Mapping[str, str] = field(default_factory=lambda: dict(TREATMENTS))
@@ -83,11 +77,11 @@ class RecoveryPolicy:
     def of_settings(
         cls, thresholds: Mapping[str, float | None], treatments: Mapping[str, str], attempts: int, bald_N: np.ndarray
     ) -> RecoveryPolicy:
-        """Build it from the config's thresholds; its `uncertain`, where null, is chosen on calibration samples.
+        """Build a policy from the config; `uncertain` is chosen on calibration samples if null.
 
         Args:
             attempts: see :class:`Thresholds`.
-            bald_N: the uncertainties of the calibration samples (:func:`choose_uncertain`).
+            bald_N: uncertainties of the calibration samples, see :func:`choose_uncertain`.
         """
         declared = {name: value for name, value in thresholds.items() if value is not None}
         queued_share = declared.pop("queued_share")
@@ -102,15 +96,15 @@ class RecoveryPolicy:
         before: Sequence[Treated] = (),
         concepts: Sequence[str] = CONCEPTS,
     ) -> Decision:
-        """Choose the branch for one case.
+        """Choose the branch of a case.
 
-        Of the concepts, those come last whose treatment improved too little before, and of those the ones that were
-        treated least often first; otherwise the largest score leads.
+        Concepts whose treatment improved too little come last, the least often treated first; otherwise, the largest
+        score leads.
 
         Args:
             scores_C: scores ŝ_c that sum to one.
-            bald: uncertainty in nats; 0 where an explainer has none.
-            before: the actions taken in this case so far, in order.
+            bald: uncertainty in nats; 0 for explainers without one.
+            before: earlier actions of this case, in order.
         """
         limits = self.thresholds
         stale = [treated.concept for treated in before if treated.fall < limits.improvement]
@@ -129,17 +123,13 @@ class RecoveryPolicy:
 
 
 def choose_uncertain(bald_N: np.ndarray, queued_share: float) -> float:
-    """Return the BALD in nats that at most so large a share of calibration samples exceeds.
+    """Return the BALD in nats that at most the share `queued_share` of calibration samples exceeds.
 
-    So the share of cases that are left to a person is declared, and what is queued are those that the classifier
-    knows least about.
+    So the share of cases for a person is declared, and the most uncertain ones are queued.
 
     Args:
-        bald_N: uncertainties of samples that the classifier did not learn.
-        queued_share: the share, in [0, 1).
-
-    Raises:
-        InputError: no samples, or a share out of range.
+        bald_N: uncertainties of samples that were not used for training.
+        queued_share: in [0, 1).
     """
     if not 0 <= queued_share < 1:
         raise InputError("recovery.thresholds.queued_share", f"{queued_share} is not in [0, 1)", "give a share")

@@ -1,8 +1,7 @@
-"""A robot's re-enactment of its own registration: what its shots say of the true pose, and what each cause adds.
+"""A robot's re-enactment of its own registration: hypotheses of the true pose and the effect of each cause.
 
-Hypotheses and their enactment are those of :mod:`gpca.reenactment`. From the shots a robot knows two more things than a
-pair of clouds tells: that a pose puts surface where the camera looked and measured something else, and which surface no
-camera has seen. Nothing here is told the true pose.
+It follows :mod:`gpca.reenactment`. The shots add two facts to the pair of clouds: where the camera looked through a
+pose's surface, and which surface no camera has seen.
 """
 
 from __future__ import annotations
@@ -23,7 +22,6 @@ from gpca.causes.truth import LARGEST_ERROR, capped
 from gpca.frames.camera import MeshScene
 from gpca.frames.shots import NEAR, Shot, fuse
 from gpca.recovery.actions import Holding, Robot
-from gpca.recovery.appearance import Appearance
 from gpca.reenactment.enactment import start_twists
 from gpca.reenactment.hypotheses import Hypothesis, find_hypotheses, weights_of
 from gpca.reenactment.observation import NoiseScale, observe
@@ -33,10 +31,41 @@ from gpca.reenactment.surface import ModelSurface
 from gpca.reenactment.verdict import SMALLEST_ERROR, STEEPNESS
 from gpca.seeds import generator
 
-OBSERVED_POINTS, MODEL_POINTS = 384, 768  # that are re-enacted, at most
-PIXELS = 30  # so many pixels are independent of each other,
-UNEXPLAINED = 0.1  # and each disagrees with the true pose with this probability
-LEAST_COVERED = 0.05  # share of the model; a hypothesis that explains less says nothing of what was seen
+OBSERVED_POINTS, MODEL_POINTS = 384, 768  # largest numbers of re-enacted points
+PIXELS = 30  # number of independent pixels
+UNEXPLAINED = 0.1  # probability that a pixel disagrees with the true pose
+LEAST_COVERED = 0.05  # share of the model; below it, a hypothesis does not determine which surface was seen
+THINNED = 4  # step between the compared pixels, in both directions
+
+
+class Appearance:
+    """Thinned pixels of shots, to be compared with the object's mesh."""
+
+    def __init__(self, shots: Sequence[Shot], mesh: MeshScene) -> None:
+        thinned = np.s_[THINNED // 2 :: THINNED, THINNED // 2 :: THINNED]
+        self._mesh = mesh
+        self._views = [
+            (shot.T_world_camera, shot.camera.rays()[thinned], shot.depth_m[thinned], shot.mask[thinned])
+            for shot in shots
+        ]
+
+    def explained(self, T_world_object: np.ndarray, reach_m: float) -> float:
+        """Return the share of pixels that agree with a pose, among those that show the object or should.
+
+        A pixel agrees if the object's measured depth equals the mesh's within `reach_m`. It disagrees if the object is
+        seen but the mesh is absent or elsewhere, or if the camera looked through the mesh at something behind it.
+        Pixels with something in front of the mesh do not count.
+        """
+        agreeing = judged = 0
+        for T_world_camera, rays, depth_m, is_object in self._views:
+            rendered_m = self._mesh.along(rays, inverse(T_world_object) @ T_world_camera).depth_m
+            measured = depth_m > 0
+            hidden = ~is_object & (depth_m < rendered_m - reach_m)
+            expected = np.isfinite(rendered_m)
+            near = np.abs(np.where(expected, rendered_m, np.inf) - depth_m) < reach_m
+            agreeing += (measured & is_object & near).sum()
+            judged += (measured & (is_object | (expected & ~hidden))).sum()
+        return float(agreeing / max(1, judged))
 
 
 @dataclass(frozen=True)
@@ -44,10 +73,10 @@ class KnownModel:
     """An object's model as a surface, in diameters.
 
     Attributes:
-        surface: of `MODEL_POINTS` points. normals: (M, 3) of these, outward.
-        scale: tells noise.
+        surface: `MODEL_POINTS` points. normals: (M, 3) theirs, outward.
+        scale: estimates noise.
         mesh: in meters.
-        diameter_m: the object's.
+        diameter_m: diameter of the object.
     """
 
     surface: ModelSurface
@@ -58,7 +87,7 @@ class KnownModel:
 
     @classmethod
     def of(cls, robot: Robot, random: np.random.Generator) -> KnownModel:
-        """Return what a robot knows of an object's shape."""
+        """Return the model of a robot's object."""
         surface = ModelSurface(robot.points_m[:MODEL_POINTS].astype(np.float64) / robot.diameter_m)
         mesh = MeshScene([(robot.vertices_m, robot.faces)])
         return cls(surface, robot.normals[:MODEL_POINTS], NoiseScale(surface, random), mesh, robot.diameter_m)
@@ -66,15 +95,15 @@ class KnownModel:
 
 @dataclass(frozen=True)
 class Belief:
-    """Where the object may be, after a registration.
+    """Hypotheses of the object's pose after a registration.
 
     Attributes:
-        hypotheses: K of the true pose, each from where the registration began.
-        observed: (N, 3) of what was measured there, in diameters.
+        hypotheses: K hypotheses, relative to the initial pose.
+        observed: (N, 3) measured points at the initial pose, in diameters.
         weight_K: their probabilities.
-        error_K: v̂(all), how far the pose that the registration ended at is off under each, in diameters.
-        failure_K: how probable it is under each that this is no right pose.
-        seconds: that it took.
+        error_K: v̂(all), error of the registration's result under each, in diameters.
+        failure_K: probability of a failure under each.
+        seconds: duration.
     """
 
     hypotheses: Sequence[Hypothesis]
@@ -92,12 +121,11 @@ class Belief:
 
 @dataclass(frozen=True)
 class Reenacted:
-    """A registration's counterfactuals under each hypothesis.
+    """Counterfactuals of a registration under each hypothesis.
 
     Attributes:
-        belief: the hypotheses.
-        error_K_8: v̂ of every subset of the causes, the mean over the starts, in diameters.
-        seconds: that all took.
+        error_K_8: v̂ of every subset of the causes, mean over the starts, in diameters.
+        seconds: total duration.
     """
 
     belief: Belief
@@ -106,9 +134,9 @@ class Reenacted:
 
     @property
     def phi_3(self) -> np.ndarray:
-        """φ̂, what each cause adds to the error, if the registration has failed: the mean over the hypotheses.
+        """φ̂, effect of each cause on the error, given a failure: the mean over the hypotheses.
 
-        A hypothesis counts by how probable it is, times how probable the failure is under it.
+        Hypotheses are weighted by their probability times the probability of a failure under them.
         """
         weight_K = self.belief.weight_K * self.belief.failure_K
         return (weight_K[:, None] * shapley_values(self.error_K_8)).sum(axis=0) / weight_K.sum()
@@ -117,13 +145,11 @@ class Reenacted:
 def believe(
     holding: Holding, known: KnownModel, settings: ReenactmentSettings, truth: CauseSettings, axes: tuple
 ) -> Belief:
-    """Find hypotheses of the true pose.
-
-    A failure is as probable as not where the error is the limit of a failed registration.
+    """Find hypotheses of the true pose; at the limit of a failed registration, a failure has probability 1/2.
 
     Args:
-        truth: of it, this limit is read.
-        axes: name the random numbers.
+        truth: contains this limit.
+        axes: names of the random numbers.
     """
     started = perf_counter()
     d, T_init = known.diameter_m, holding.T_world_object_init
@@ -141,14 +167,14 @@ def believe(
 
 
 def reenact(belief: Belief, holding: Holding, known: KnownModel, truth: CauseSettings, axes: tuple) -> Reenacted:
-    """Register with every subset of the causes, as if each hypothesis were true in turn.
+    """Register with every subset of the causes, under each hypothesis in turn.
 
-    Without noise and without missing surface, the measurement is rebuilt (:func:`gpca.reenactment.rebuilding.rebuild`);
-    without a pose error, the registration starts from the hypothesis.
+    Without noise or missing surface, the measurement is rebuilt (:func:`gpca.reenactment.rebuilding.rebuild`); without
+    a pose error, the registration starts from the hypothesis.
 
     Args:
-        truth: how counterfactuals are registered.
-        axes: name the random numbers.
+        truth: settings of the counterfactual registrations.
+        axes: names of the random numbers.
     """
     started = perf_counter()
     random = generator(*axes, "clouds")
@@ -166,26 +192,23 @@ def reenact(belief: Belief, holding: Holding, known: KnownModel, truth: CauseSet
 
 
 def seen_surface(holding: Holding, known: KnownModel, hypothesis: Hypothesis, noise: float) -> np.ndarray:
-    """Return which of the model's points (M,) some shot has measured, if a hypothesis is true.
+    """Return which model points (M,) were measured by a shot, under a hypothesis.
 
-    Such a point faces the camera, and what was measured at its pixel is the object, as far away as it should be.
+    Such a point faces the camera, and its pixel shows the object at the expected depth.
 
     Args:
-        noise: of the measurement, standard deviation in diameters.
+        noise: standard deviation of the measurement, in diameters.
     """
     d, T = known.diameter_m, _placed(holding, known, hypothesis.T)
-    placed_m, facing_out = transform(T, d * known.surface.points), rotate(T, known.normals)
+    placed_m, normals = transform(T, d * known.surface.points), rotate(T, known.normals)
     reach_m = d * (NEAR + 2 * noise)
     seen_M = np.zeros(len(placed_m), bool)
     for shot in holding.shots:
         v, u, depth_m = shot.project(placed_m)
         near = np.abs(shot.depth_m[v, u] - depth_m) < reach_m
-        seen_M |= _faces(placed_m, facing_out, shot) & (v >= 0) & shot.mask[v, u] & near
+        facing = np.sum(normals * (placed_m - shot.T_world_camera[:3, 3]), axis=1) < 0
+        seen_M |= facing & (v >= 0) & shot.mask[v, u] & near
     return seen_M
-
-
-def _faces(placed_m: np.ndarray, facing_out: np.ndarray, shot: Shot) -> np.ndarray:
-    return np.sum(facing_out * (placed_m - shot.T_world_camera[:3, 3]), axis=1) < 0
 
 
 def _placed(holding: Holding, known: KnownModel, T: np.ndarray) -> np.ndarray:
@@ -194,7 +217,7 @@ def _placed(holding: Holding, known: KnownModel, T: np.ndarray) -> np.ndarray:
 
 
 def _evidence(holding: Holding, known: KnownModel, appearance: Appearance, T: np.ndarray, width: float) -> float:
-    """Return the log-probability of the pixels around the object, if a hypothesis is true."""
+    """Return the log-probability of the pixels around the object under a hypothesis."""
     reach_m = known.diameter_m * max(NEAR, 2.5 * width)
     explained = appearance.explained(_placed(holding, known, T), reach_m)
     return PIXELS * (explained * float(np.log(1 - UNEXPLAINED)) + (1 - explained) * float(np.log(UNEXPLAINED)))

@@ -1,4 +1,4 @@
-"""The settings of the closed loop, read from the config into the library's own classes."""
+"""Settings of the closed loop."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ from gpca.uncertainty.settings import UncertaintySettings
 
 @dataclass(frozen=True)
 class LoopSettings:
-    """How the closed loop runs.
+    """Settings of the loop.
 
     Attributes:
-        failures, good: how many registrations that failed, and that did not, are wanted for each cause.
-        tries: how many situations may be registered to find them, for each cause.
-        budget: how many actions each failure may take.
-        success: error of the pose from which a registration failed, in diameters.
-        cloud_points: how many source and target have.
-        icp: how ICP runs.
+        failures, good: number of failed and of good registrations per cause.
+        tries: largest number of situations that are registered to find them, per cause.
+        budget: number of actions per failure.
+        success: error of the pose above which a registration failed, in diameters.
+        cloud_points: number of points of source and target.
+        icp: settings of ICP.
     """
 
     failures: Count = 8
@@ -46,14 +46,14 @@ class RecoverySettings:
     """All settings of a run of the closed loop.
 
     Attributes:
-        section: the config's section ``recovery``, for all that it hands on as it is.
-        objects: the entry of the source whose objects lie on the tables.
-        loop: how the loop runs.
-        situation: what disturbs the registrations, and on which scenes.
-        encoder, uncertainty: what the explainers share.
-        explainers: the settings of each explainer by its name.
-        reenactment: what the robot believes of its starts, and how many hypotheses it has.
-        counterfactuals: how it registers under each.
+        section: the config's section ``recovery``.
+        objects: entry of the source of the objects on the tables.
+        loop: settings of the loop.
+        situation: disturbances of the registrations, and scenes.
+        encoder, uncertainty: shared by the explainers.
+        explainers: settings of each explainer by name.
+        reenactment: search for the true pose.
+        counterfactuals: registrations under each hypothesis.
     """
 
     section: Mapping
@@ -68,7 +68,7 @@ class RecoverySettings:
 
     @classmethod
     def from_sections(cls, sections: Mapping[str, dict]) -> RecoverySettings:
-        """Build from the sections of the config by name, and from ``explainers`` and ``reenactment``."""
+        """Build from the sections of the config, ``explainers`` and ``reenactment`` by name."""
         recovery, success = sections["recovery"], sections["success"]["error"]
         registration = RegistrationSettings.from_dict(sections["registrations"])
         scenes = SceneSettings.from_dict(sections["scenes"])

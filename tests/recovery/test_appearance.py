@@ -4,7 +4,7 @@ import pytest
 from gpca.alignment.rigid import rigid_motion
 from gpca.frames.camera import Camera, MeshScene
 from gpca.frames.shots import Shot
-from gpca.recovery.appearance import Appearance
+from gpca.recovery.reenactment import Appearance
 
 CAMERA = Camera(80, 80, 80)
 REACH_M = 0.01

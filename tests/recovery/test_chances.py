@@ -16,7 +16,7 @@ def chances():
         known_F = random.choice([-1.0, 1.0], 2)
         trials.append(Trial(known_F, NOTHING, known_F[0] > 0))
         trials += [Trial(known_F, "denoise", known_F[1] > 0), Trial(known_F, "new_view", known_F[1] < 0)]
-    return Chances(trials, tuple(COSTS), inverse_regularisation=1.0)
+    return Chances(trials, tuple(COSTS), inverse_regularization=1.0)
 
 
 def test_chances_follow_what_is_known(chances):

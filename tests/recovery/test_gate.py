@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from gpca.errors import InputError
-from gpca.recovery.gate import alarm_threshold, learn_gate
+from gpca.recovery.chances import alarm_threshold, learn_gate
 
 
 def registrations(count, random):

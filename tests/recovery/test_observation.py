@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 
 from gpca.experiments.recovery.cases import RobotIn
-from gpca.recovery.observation import OBSERVED, observe
+from gpca.recovery.actions import OBSERVED, observe
 
 
 def observed(situation, holding, record, seed=0):

@@ -5,8 +5,7 @@ import pytest
 
 from gpca.errors import InputError
 from gpca.recovery.chances import Chances, ExpectedUtility, Trial
-from gpca.recovery.deciders import Case, Means
-from gpca.recovery.policies import is_fixed, policies, policy_entry
+from gpca.recovery.policies import Case, Means, is_fixed, policies, policy_entry
 from gpca.recovery.policy import NOTHING, QUEUE, RecoveryPolicy, Thresholds
 from gpca.seeds import generator
 

@@ -1,4 +1,4 @@
-from gpca.recovery.sequences import best_order, next_of, sequences, title_of_sequence
+from gpca.recovery.policies import best_order, next_of, sequences, title_of_sequence
 
 COSTS = {"a": 0.01, "b": 0.03, "c": 0.02}
 

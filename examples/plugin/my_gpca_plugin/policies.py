@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from gpca.recovery.deciders import Case, Decide, Means
-from gpca.recovery.policies import PolicyEntry
+from gpca.recovery.policies import Case, Decide, Means, PolicyEntry
 from gpca.recovery.policy import Decision
 
 

@@ -8,8 +8,7 @@ from gpca.alignment.methods.registry import make_method
 from gpca.encoders.registry import make_encoder
 from gpca.explainers.registry import CAUSES, CONCEPTS, explainers
 from gpca.objects.source import resolve, surfaces
-from gpca.recovery.deciders import Case, Means
-from gpca.recovery.policies import policy_entry
+from gpca.recovery.policies import Case, Means, policy_entry
 from gpca.recovery.policy import RecoveryPolicy
 from gpca.uncertainty.estimators.interface import RegisteredPair
 from gpca.uncertainty.estimators.registry import make_estimator

@@ -16,8 +16,7 @@ from gpca.experiments.recovery.cases import Attempt, RobotIn, register_after, re
 from gpca.frames.situations import Situation, Situations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.progress import progress
-from gpca.recovery.actions import Action
-from gpca.recovery.observation import observe
+from gpca.recovery.actions import Action, observe
 from gpca.recovery.settings import LoopSettings
 from gpca.seeds import generator
 
@@ -53,7 +52,7 @@ class Episode:
         return is_right(self.outcomes[actions], self._success)
 
     def observe(self, actions: tuple[str, ...]) -> np.ndarray:
-        """Return what the robot observes after these actions, see :func:`gpca.recovery.observation.observe`."""
+        """Return what the robot observes after these actions, see :func:`gpca.recovery.actions.observe`."""
         if actions not in self._observed:
             attempt = self.outcomes[actions]
             random = generator(*self.situation.axes, "observe", *actions)

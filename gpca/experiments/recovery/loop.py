@@ -17,8 +17,7 @@ from gpca.experiments.recovery.reenactor import Reenactor
 from gpca.experiments.recovery.rehearsal import known
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.recovery.actions import Action
-from gpca.recovery.deciders import Case, Decide, Means
-from gpca.recovery.policies import PolicyEntry, policy_entry
+from gpca.recovery.policies import Case, Decide, Means, PolicyEntry, policy_entry
 from gpca.recovery.settings import LoopSettings
 from gpca.seeds import generator
 

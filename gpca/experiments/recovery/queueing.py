@@ -20,8 +20,7 @@ from gpca.experiments.recovery.rehearsal import Rehearsal, known
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.recovery.chances import ExpectedUtility, Trial, learn_utility
-from gpca.recovery.deciders import Means
-from gpca.recovery.policies import policy_entry
+from gpca.recovery.policies import Means, policy_entry
 from gpca.seeds import generator
 
 if TYPE_CHECKING:

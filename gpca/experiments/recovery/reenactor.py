@@ -11,7 +11,7 @@ from gpca.errors import InputError
 from gpca.experiments.recovery.cases import RobotIn
 from gpca.experiments.recovery.episodes import Episode
 from gpca.process.progress import progress
-from gpca.recovery.gate import alarm_threshold
+from gpca.recovery.chances import alarm_threshold
 from gpca.recovery.reenactment import Belief, KnownModel, Reenacted, believe, reenact
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.seeds import generator
@@ -63,8 +63,8 @@ class Reenactor:
 def calibrated_alarm(episodes: Iterable[Episode], reenactor: Reenactor, false_alarms: float) -> float:
     """Return the probability of a failure that a further good registration exceeds with at most this probability.
 
-    It is set on the good ones among these episodes (:func:`gpca.recovery.gate.alarm_threshold`), of which nothing was
-    learned.
+    It is set on the good ones among these episodes, which were not used for training
+    (:func:`gpca.recovery.chances.alarm_threshold`).
 
     Raises:
         InputError: none of them is good.

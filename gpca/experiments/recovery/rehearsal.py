@@ -12,11 +12,9 @@ import numpy as np
 from gpca.experiments.recovery.answers import Answer, Answers, CaseKey, Explain
 from gpca.experiments.recovery.episodes import Episode
 from gpca.recovery.actions import Action
-from gpca.recovery.chances import Trial
-from gpca.recovery.deciders import Means
-from gpca.recovery.gate import FailureGate, learn_gate
+from gpca.recovery.chances import FailureGate, Trial, learn_gate
+from gpca.recovery.policies import Means, Order, best_order
 from gpca.recovery.policy import NOTHING, RecoveryPolicy
-from gpca.recovery.sequences import Order, best_order
 from gpca.recovery.settings import LoopSettings
 
 if TYPE_CHECKING:

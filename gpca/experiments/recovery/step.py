@@ -30,8 +30,7 @@ from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
 from gpca.recovery.actions import Action, action_of
 from gpca.recovery.chances import learn_utility
-from gpca.recovery.deciders import Means
-from gpca.recovery.policies import PolicyEntry, policy_entry
+from gpca.recovery.policies import Means, PolicyEntry, policy_entry
 from gpca.recovery.settings import LoopSettings, RecoverySettings
 
 # Names every random number of this step, tables included. The number is that of the draw: on the tables and cases of

@@ -11,8 +11,7 @@ from gpca.experiments.recovery.episodes import Episode
 from gpca.experiments.recovery.loop import Loop
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.recovery.actions import ACTIONS, action_of
-from gpca.recovery.deciders import Means
-from gpca.recovery.policies import POLICIES
+from gpca.recovery.policies import POLICIES, Means
 from gpca.recovery.policy import NOTHING, QUEUE, RecoveryPolicy, Thresholds
 from tests.failures import LOOP
 

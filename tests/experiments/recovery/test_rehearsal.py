@@ -7,8 +7,8 @@ from gpca.attribution.scores import Attribution
 from gpca.experiments.recovery.loop_explainers import LoopExplainers
 from gpca.experiments.recovery.rehearsal import Rehearsal, robot_policy, summary
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.recovery.deciders import Means
-from gpca.recovery.gate import FailureGate
+from gpca.recovery.chances import FailureGate
+from gpca.recovery.policies import Means
 
 SECTION = {
     "thresholds": {"uncertain": None, "queued_share": 0.5, "dominant": 0.4, "improvement": 0.3},
