@@ -73,9 +73,8 @@ def resolve(entry: dict, data_dir: str | None) -> dict:
         wanted = entry.get("location") or ", ".join(entry.get("files") or ["location"])
         raise InputError(subject, f"{wanted} does not exist", "correct location, or set data_dir to its parent folder")
     if checksums and len(checksums) != len(urls):
-        raise InputError(
-            subject, f"has {len(urls)} url(s) but {len(checksums)} sha256 value(s)", "give one for each, or null"
-        )
+        fault = f"has {len(urls)} url(s) but {len(checksums)} sha256 value(s)"
+        raise InputError(subject, fault, "give one for each, or null")
     return {**entry, "origin": "download"}
 
 
@@ -97,10 +96,12 @@ def folders(entry: dict, cache_folder: str | Path, unpack: bool = True) -> list[
     cache = require_place(cache_folder)
     urls = _as_list(entry.get("urls") or entry.get("url"))
     checksums = _as_list(entry.get("sha256")) or [None] * len(urls)
-    files = [
-        downloads.fetch(url, sha256, cache, entry.get("location")) for url, sha256 in zip(urls, checksums, strict=True)
-    ]
-    return [_unpacked(file) for file in files] if unpack else files
+    location = entry.get("location")
+    files = [downloads.fetch(url, sha256, cache, location) for url, sha256 in zip(urls, checksums, strict=True)]
+    if not unpack:
+        return files
+    # Folders are named by content, so that an archive that was fetched again is unpacked again.
+    return [downloads.unpack(file, file.with_name(f"{file.stem}-{sha256_of_file(file)[:12]}")) for file in files]
 
 
 def data_files(entry: dict) -> list[Path]:
@@ -125,11 +126,6 @@ def data_folders(entry: dict, data_dir: str | None, downloads: str) -> dict[str,
 def source_modules(entry: dict) -> list[str]:
     """Return the module that reads an entry: it is imported by name at run time, so no import statement shows it."""
     return [_kinds()[entry["kind"]]]
-
-
-def _unpacked(file: Path) -> Path:
-    # The folder is named by content, so an archive that was fetched anew is unpacked anew.
-    return downloads.unpack(file, file.with_name(f"{file.stem}-{sha256_of_file(file)[:12]}"))
 
 
 def _local_data(entry: dict, data_dir: str | None) -> Path | None:

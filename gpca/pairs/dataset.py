@@ -22,11 +22,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
 FARTHEST = 1e3  # diameters from the target's center; a registration may fail, but nothing lies so far away
-SAMPLE_COLUMNS = ("sample", "split", "instance", "dataset", "in_training")
-FRAME_COLUMNS = (  # all that the file may hold
-    *SAMPLE_COLUMNS,
-    *("concept", "scene", "image", "object", "symmetric", "init_from", "init_error", "icp_error", "lost_to"),
-)
+SAMPLE_COLUMNS = ("sample", "split", "instance", "dataset", "in_training")  # of the CSV beside registrations of frames
+FRAME_COLUMNS = (*SAMPLE_COLUMNS, "concept", "scene", "image", "object", "symmetric", "init_from")
+FRAME_COLUMNS += ("init_error", "icp_error", "lost_to")
 RIGID_TOLERANCE = 1e-2  # of a rotation's products with itself; datasets round their poses
 
 
@@ -83,16 +81,16 @@ class Registrations(Container):
         return self.part("target_points", i)
 
     def source(self, i: int) -> np.ndarray:
-        """Return the source cloud (P, 3) of row i as it was observed, before ICP."""
+        """Return the source cloud (P, 3) of row i before ICP."""
         return transform(inverse(self.T_target_source("icp", i)), self.cloud(i).astype(np.float64))
 
     def T_target_source(self, which: str, i: int) -> np.ndarray:
-        """Return the pose ``init``, ``icp`` or ``true`` of row i in the unit of the clouds, the object's diameter."""
+        """Return the pose ``init``, ``icp`` or ``true`` of row i in diameters, the unit of the clouds."""
         return scale_translation(getattr(self, f"T_target_source_{which}")[i], 1 / self.diameter_m[i])
 
     @property
     def embedding(self) -> np.ndarray:
-        """(S, d) of the encoder; only where it is attached."""
+        """The attached embedding (S, d) of an encoder."""
         return self.attached["embedding"]
 
     def rows(self, split: str) -> np.ndarray:
@@ -100,15 +98,12 @@ class Registrations(Container):
         return np.flatnonzero(self.split == split)
 
     def subset(self, rows: np.ndarray) -> Registrations:
-        """Return the given rows, in the given order, with what is attached to them."""
+        """Return the given rows, in the given order, with their attached arrays."""
         return replace(super().subset(rows), attached={name: array[rows] for name, array in self.attached.items()})
 
     @classmethod
     def joined(cls, parts: Sequence[Registrations]) -> Registrations:
-        """Return the registrations of several sources as one, with what is attached to all of them.
-
-        Their samples are numbered anew within each split.
-        """
+        """Return the registrations of several sources as one, their samples renumbered within each split."""
         whole = super().joined(parts)
         sample_S = whole.sample.copy()
         for split in SPLITS:
@@ -118,43 +113,32 @@ class Registrations(Container):
         return replace(whole, sample=sample_S, attached=attached)
 
     def without_labels(self) -> Registrations:
-        """Return the same registrations as explainers may see them, without anything that reveals the perturbation."""
+        """Return the registrations as explainers may see them, without traces of the perturbation."""
         nan_S = np.full(len(self), np.nan)
-        unknown: dict[str, Any] = dict.fromkeys(
-            (name for name in REGISTRATION_COLUMNS if name.startswith("severity_")), nan_S
-        )
+        unknown: dict[str, Any] = {name: nan_S for name in REGISTRATION_COLUMNS if name.startswith("severity_")}
         unknown["T_target_source_true"] = np.full_like(self.T_target_source_true, np.nan)
         return replace(self, concept=np.full(len(self), ""), **unknown)
 
     def check(self, path: str | Path) -> None:
         """Raise an InputError also where a sample occurs twice, or a pose is not rigid or out of reach."""
         super().check(path)
-        possible = {}
+        reach_m = FARTHEST * LARGEST_DIAMETER_M  # cameras are no farther from what they see, either
         for name, T_S_4_4 in self.arrays.items():
             if name.startswith("T_"):
                 R_S_3_3 = T_S_4_4[:, :3, :3]
-                products_S_3_3 = np.einsum("sij,skj->sik", R_S_3_3, R_S_3_3)
-                reach_m = FARTHEST * LARGEST_DIAMETER_M  # a camera, too, is no farther from what it sees
-                possible[name] = (
-                    (np.abs(products_S_3_3 - np.eye(3)).max(axis=(1, 2)) < RIGID_TOLERANCE)
-                    & (np.linalg.det(R_S_3_3) > 0)
-                    & (T_S_4_4[:, 3] == (0, 0, 0, 1)).all(axis=1)
-                    & (np.abs(T_S_4_4[:, :3, 3]) <= reach_m).all(axis=1)
-                ).all()
-        samples = set(zip(self.split.tolist(), self.sample.tolist(), strict=True))
-        possible["sample"] = len(samples) == len(self)
-        if impossible := [name for name, is_possible in possible.items() if not is_possible]:
-            raise InputError(path, f"'{impossible[0]}' contains impossible values", self.remedy)
+                off_S_3_3 = np.abs(np.einsum("sij,skj->sik", R_S_3_3, R_S_3_3) - np.eye(3))
+                rigid = off_S_3_3.max() < RIGID_TOLERANCE and (np.linalg.det(R_S_3_3) > 0).all()
+                near = (np.abs(T_S_4_4[:, :3, 3]) <= reach_m).all()
+                if not (rigid and near and (T_S_4_4[:, 3] == (0, 0, 0, 1)).all()):
+                    raise InputError(path, f"'{name}' contains impossible values", self.remedy)
+        if len(set(zip(self.split.tolist(), self.sample.tolist(), strict=True))) < len(self):
+            raise InputError(path, "'sample' contains impossible values", self.remedy)
 
 
 def load_embeddings(
     path: str | Path, registrations: Registrations, shapes: Mapping[str, tuple[int | str, ...]]
 ) -> dict[str, np.ndarray]:
-    """Read arrays of the registrations from a file of embeddings; see :func:`gpca.io.arrays.load_arrays`.
-
-    Raises:
-        InputError: also where the file is of other samples, or of another source or seed.
-    """
+    """Read arrays of a file of embeddings; InputError where it has other samples, or another source or seed."""
     kinds = dict.fromkeys(shapes, REAL) | {"sample": WHOLE, "split": TEXT}
     arrays = load_arrays(path, {**shapes, "sample": ("S",), "split": ("S",)}, kinds, registrations.axes)
     require_same_samples(path, arrays, registrations.arrays)
@@ -162,28 +146,20 @@ def load_embeddings(
 
 
 def read_embedding(path: str | Path, registrations: Registrations, logits: bool = False) -> dict[str, np.ndarray]:
-    """Read an encoder's arrays to attach to the registrations: ``embedding`` (S, d), if asked ``head_logits`` (S, C).
-
-    Raises:
-        InputError: as :func:`load_embeddings`.
-    """
+    """Read arrays to attach: ``embedding`` (S, d) and, with `logits`, ``head_logits`` (S, C); InputError as above."""
     shapes = {"h": ("S", "d")} | ({"head_logits": ("S", "C")} if logits else {})
     arrays = load_embeddings(path, registrations, shapes)
     return {"embedding": arrays["h"]} | ({"head_logits": arrays["head_logits"]} if logits else {})
 
 
 def read_samples_of_frames(path: str | Path) -> pd.DataFrame:
-    """Read the columns that tell samples apart, as text but for `in_training`."""
+    """Read the columns that identify samples of frames, as text but for `in_training`."""
     rows = read_csv(path, SAMPLE_COLUMNS, others=FRAME_COLUMNS)
     return rows.assign(in_training=rows["in_training"] == "True")
 
 
 def read_instances_of(path: str | Path, registrations: Registrations) -> np.ndarray:
-    """Return the instance (S,) that each registration shows.
-
-    Raises:
-        InputError: the file is of other samples.
-    """
+    """Return the instance (S,) of each registration; InputError where the file has other samples."""
     rows = read_samples_of_frames(path)
     require_same_samples(path, rows, registrations.arrays)
     return numbers(path, rows, "instance", least=0).to_numpy(int)

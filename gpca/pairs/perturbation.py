@@ -1,7 +1,7 @@
 """Controlled perturbations, one concept at a time (paper Sec. IV-A): noise, pose, overlap.
 
-A perturbation makes the observed **source** cloud out of clean points of the object. All lengths are relative to the
-object's diameter. Severities are drawn uniformly from the ranges of :class:`Severities`, the same for every source.
+A perturbation makes the observed **source** cloud from clean points of the object. Lengths are relative to the object's
+diameter. Severities are drawn uniformly from the ranges of :class:`Severities`, the same for every source.
 """
 
 from __future__ import annotations
@@ -85,12 +85,12 @@ def misplace(points: np.ndarray, severities: Severities, random: np.random.Gener
 
 
 def misplacement(angle_rad: float, distance: float, random: np.random.Generator) -> np.ndarray:
-    """Return the transform (4, 4) that turns by an angle about a random axis and shifts in a random direction."""
+    """Return the transform (4, 4) of a turn about a random axis and a shift in a random direction."""
     return displacement(angle_rad * random_direction(random), distance * random_direction(random))
 
 
 def displacement(turn: np.ndarray, shift: np.ndarray) -> np.ndarray:
-    """Return the transform (4, 4) of a rotation vector (3,), in radians, and a shift (3,) after it."""
+    """Return the transform (4, 4) of a rotation vector (3,), in radians, and then a shift (3,)."""
     return rigid_motion(Rotation.from_rotvec(turn).as_matrix(), shift)
 
 
@@ -101,10 +101,9 @@ def crop(points: np.ndarray, severities: Severities, random: np.random.Generator
 
 
 def within_half_space(along_N: np.ndarray, share: float, fewest: int) -> np.ndarray:
-    """Return the rows, in order, that are left when a half-space takes a share of the points, but for the fewest.
+    """Return the rows, in order, that remain when a half-space takes a share of the points, at least `fewest`.
 
-    Args:
-        along_N: how far each point lies along the normal of the plane, toward what is lost.
+    `along_N` is the position of each point along the normal of the plane, toward the half-space.
     """
     left = max(min(fewest, len(along_N)), round(len(along_N) * (1 - share)))
     return np.sort(np.argsort(along_N, kind="stable")[:left])

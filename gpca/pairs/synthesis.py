@@ -27,13 +27,12 @@ TestSamples = Annotated[int, Bounds(minimum=3)]
 
 @dataclass(frozen=True)
 class RegistrationSettings:
-    """How many registrations are made and how (docs/protocol.md).
+    """Numbers of registrations and how they are made (docs/protocol.md).
 
     Attributes:
         train, test: samples of each split, balanced over concepts and objects.
         cloud_points: of source and of target (fewer where the object has fewer than twice as many).
         severities: ranges of the perturbations.
-        icp: how ICP runs.
     """
 
     train: TrainSamples = 800
@@ -53,16 +52,13 @@ class RegistrationSettings:
 def make_registrations(
     objects: ObjectClouds, source: str, seed: int, settings: RegistrationSettings
 ) -> tuple[Registrations, np.ndarray]:
-    """Perturb, align by ICP and label: the dataset of one source and seed.
+    """Return the registrations of one source and seed, and the seconds (S,) of ICP.
 
-    Samples 3t, 3t + 1 and 3t + 2 of a split show object t mod O under the three concepts in random order. Everything
-    random in a sample comes from generators named by source, seed, split and number, so that it does not depend on
-    how many samples there are.
-
-    Returns:
-        the registrations, and the seconds (S,) that ICP took for each.
+    Samples 3t, 3t + 1 and 3t + 2 of a split show object t mod O under the three concepts in random order. Random
+    numbers of a sample are named by source, seed, split and number, so that it does not depend on how many samples
+    there are.
     """
-    require_open3d()  # it is loaded here, or the first sample's seconds would hold its import
+    require_open3d()  # here, so that the first sample's seconds do not include its import
     samples = [(split, n) for split in SPLITS for n in range(getattr(settings, split))]
     records = []
     for split, n in progress(samples, f"registrations of {source}, seed {seed}"):
@@ -70,27 +66,21 @@ def make_registrations(
         concept = generator(source, seed, "concepts", split, deal).permutation(CONCEPTS)[place]
         object_index = deal % len(objects)
         random = generator(source, seed, "registration", split, n)
-        record = _register_one(objects, object_index, concept, settings, random)
-        records.append(record | {"sample": n, "split": split})
+        points = objects.points(object_index) / float(objects.diameters_m[object_index])
+        n_points = min(settings.cloud_points, len(points) // 2)
+        # The clouds share no point: its distance would be zero, which would reveal the concept.
+        order = random.permutation(len(points))
+        source_rows, target_rows = order[:n_points], order[n_points : 2 * n_points]
+        perturbed = PERTURBATIONS[concept](points[source_rows], settings.severities, random)
+        record = align_pair(perturbed, objects, object_index, target_rows, settings.icp)
+        records.append(record | {"concept": concept, "sample": n, "split": split})
     return as_registrations(records, (source, seed))
-
-
-def _register_one(
-    objects: ObjectClouds, object_index: int, concept: str, settings: RegistrationSettings, random: np.random.Generator
-) -> dict:
-    points = objects.points(object_index) / float(objects.diameters_m[object_index])
-    n_points = min(settings.cloud_points, len(points) // 2)
-    # The draws are disjoint: a point in both clouds would have distance zero, and that gives the concept away.
-    order = random.permutation(len(points))
-    source_rows, target_rows = order[:n_points], order[n_points : 2 * n_points]
-    perturbed = PERTURBATIONS[concept](points[source_rows], settings.severities, random)
-    return align_pair(perturbed, objects, object_index, target_rows, settings.icp) | {"concept": concept}
 
 
 def align_pair(
     perturbed: Perturbed, objects: ObjectClouds, object_index: int, target_rows: np.ndarray, icp_settings: ICPSettings
 ) -> dict:
-    """Align a perturbed cloud to points of its object's model, from the identity, and return it as a row's columns.
+    """Align a perturbed cloud to points of its object's model, from the identity; return the columns of its row.
 
     Args:
         perturbed: the cloud in diameters, in the frame of the initial pose.
@@ -103,7 +93,6 @@ def align_pair(
     icp = ICP(target, objects.normals(object_index)[target_rows], icp_settings)
     registration = icp.register(perturbed.points, T_init)
     icp_seconds = perf_counter() - started
-    severity = {name: perturbed.severity.get(name, 0.0) for name in SEVERITIES}
     return {
         "object_index": object_index,
         "object_name": str(objects.names[object_index]),
@@ -118,17 +107,12 @@ def align_pair(
         "icp_seconds": icp_seconds,
         "fitness": registration.fitness,
         "inlier_rmse": registration.inlier_rmse,
-        **{f"severity_{name}": value for name, value in severity.items()},
+        **{f"severity_{name}": perturbed.severity.get(name, 0.0) for name in SEVERITIES},
     }
 
 
 def as_registrations(records: list[dict], axes: Axes | None = None) -> tuple[Registrations, np.ndarray]:
-    """Return rows that :func:`align_pair` made as registrations, and the seconds (S,) that ICP took for each.
-
-    Args:
-        records: the rows.
-        axes: the source and the seed that they are of.
-    """
+    """Return rows of :func:`align_pair` as registrations with these axes, and the seconds (S,) of ICP."""
     columns: dict[str, Any] = {name: np.array([record[name] for record in records]) for name in REGISTRATION_COLUMNS}
     columns |= ragged([record["cloud"] for record in records], [record["target"] for record in records])
     return Registrations(**columns, axes=axes), np.array([record["icp_seconds"] for record in records])
@@ -139,12 +123,12 @@ READINGS: tuple[str, ...] = get_args(Reading)
 
 
 def read_as(reading: str, registrations: Registrations, icp: ICPSettings) -> Registrations:
-    """Return the registrations such that their clouds are what the encoder sees.
+    """Return the registrations with the clouds that the encoder sees: the paper leaves open which it means.
 
     Args:
-        reading: ``aligned`` as ICP left the observed cloud; ``observed`` as it was before ICP, at the initial pose;
-            ``reversed`` aligned by ICP from the model to it.
-        icp: how it runs anew, for ``reversed``.
+        reading: ``aligned`` as ICP left the observed cloud; ``observed`` at the initial pose, before ICP; ``reversed``
+            aligned by ICP from the model to it.
+        icp: for ``reversed``.
 
     Raises:
         InputError: an unknown reading.
@@ -163,9 +147,9 @@ def read_as(reading: str, registrations: Registrations, icp: ICPSettings) -> Reg
 
 
 def registered_backwards(registrations: Registrations, settings: ICPSettings) -> Registrations:
-    """Return the same pairs aligned by ICP from the model to what was observed.
+    """Return the pairs aligned by ICP from the model to the observed cloud.
 
-    The encoder sees the observed cloud as before, moved by the inverse of ICP's result into the frame of the model.
+    The observed cloud is moved by the inverse of ICP's result into the frame of the model.
     """
     clouds, targets, poses, fits = [], [], [], []
     for row in range(len(registrations)):

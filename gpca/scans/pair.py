@@ -16,6 +16,9 @@ from gpca.seeds import generator
 from gpca.settings import Bounds, NotNegative, Positive, PositiveShare
 
 Kind = Literal["room", "object"]
+VOXEL_M = 0.025  # in a room: the voxels of 3DMatch's benchmark
+MOST_CELLS = 2.0**62
+FEWEST_COMMON = 3  # points
 ROOM_M = 3.0  # the usual size of a fragment of a room: objects are registered as if they were as large
 OVERLAP_M = 0.0375  # in a room: how close a point of the other scan counts as the same surface (Predator's 3DMatch)
 
@@ -25,17 +28,15 @@ class ScanPair:
     """Two scans of one scene, in meters, each in the frame of its own sensor.
 
     Attributes:
-        source_N_3, target_M_3: points as they were measured; their numbers differ.
+        source_N_3, target_M_3: points as measured.
         T_target_source: the true pose (4×4).
-        overlap: share of the target's points that the source has as well, in (0, 1]: printed by the data set, or else
-            :func:`gpca.scans.pair.overlap`.
+        overlap: share of the target's points that the source has as well, in (0, 1]: as published, or :func:`overlap`.
         scene: its name.
-        kind: whether the scene is a room or an object.
-        size_m: diagonal of the box around all scans of the scene; of a room it has no use.
+        size_m: diagonal of the box around all scans of the scene; unused for a room.
         source_name, target_name: of the scans in the scene.
-        source_viewpoint_3, target_viewpoint_3: where the sensor stood, each in the frame of its scan; None where it is
-            not known. Normals point there.
-        family: scenes of one family are alike, as two data sets of one object; the scene itself if empty.
+        source_viewpoint_3, target_viewpoint_3: position of the sensor in the frame of its scan, to which normals point;
+            None where unknown.
+        family: of scenes that are alike, as two data sets of one object; the scene itself if empty.
 
     Raises:
         InputError: fewer than three points, NaN, a pose that is not rigid, or a size that is not positive.
@@ -65,70 +66,61 @@ class ScanPair:
 
     @property
     def name(self) -> str:
-        """Scene, target and source, by which random numbers are named: ``kitchen/0/3``."""
+        """Scene, target and source, which name random numbers: ``kitchen/0/3``."""
         return f"{self.scene}/{self.target_name}/{self.source_name}"
 
     @property
     def cluster(self) -> str:
-        """What pairs are clustered and split by: the family, or else the scene."""
+        """The family, or else the scene, by which pairs are clustered and split."""
         return self.family or self.scene
 
     @property
     def scale(self) -> float:
-        """Meters here to a meter of a room: 1 in rooms; settings for rooms hold for objects when multiplied by it."""
+        """Factor from the settings for rooms to those for this pair: 1 in rooms."""
         return 1.0 if self.kind == "room" else self.size_m / ROOM_M
 
     @property
     def overlap_m(self) -> float:
-        """How close a point of the other scan counts as the same surface."""
+        """The distance within which points of both scans count as the same surface."""
         return OVERLAP_M * self.scale
 
     @cached_property
     def source_common_N(self) -> np.ndarray:
-        """Which points (N,) of the source lie on surface that the target has as well, at the true pose."""
+        """Which points (N,) of the source lie on surface of the target, at the true pose."""
         return near(transform(self.T_target_source, self.source_N_3), self.target_M_3, self.overlap_m)
 
     @cached_property
     def target_common_M(self) -> np.ndarray:
-        """Which points (M,) of the target lie on surface that the source has as well, at the true pose."""
+        """Which points (M,) of the target lie on surface of the source, at the true pose."""
         return near(self.target_M_3, transform(self.T_target_source, self.source_N_3), self.overlap_m)
 
 
 def near(points_N_3: np.ndarray, others_M_3: np.ndarray, distance: float) -> np.ndarray:
-    """Return which points (N,) have one of the others within the distance; both in one frame and unit."""
+    """Return which points (N,) are within a distance of any of the others."""
     nearest_N, _ = cKDTree(others_M_3).query(points_N_3, distance_upper_bound=distance)
     return np.isfinite(nearest_N)
-
-
-VOXEL_M = 0.025  # in a room: the voxels of 3DMatch's benchmark
-MOST_CELLS = 2.0**62
 
 
 def overlap(source_N_3: np.ndarray, target_M_3: np.ndarray, T_target_source: np.ndarray, scale: float = 1.0) -> float:
     """Return the share of the target's surface in [0, 1] that the source has as well.
 
-    Args:
-        source_N_3, target_M_3: points, each in its own frame (m).
-        T_target_source: the true pose.
-        scale: as of :attr:`gpca.scans.pair.ScanPair.scale`.
+    It is the share of the target's points within `OVERLAP_M` of the source at the true pose, after both were thinned to
+    voxels, so that the density near a sensor does not matter. The target's share is that published for 3DMatch and
+    3DLoMatch (Huang et al. 2021). `scale` is that of :attr:`ScanPair.scale`.
     """
-    edge = VOXEL_M * scale
-    return overlap_of_voxels(voxels(source_N_3, edge), voxels(target_M_3, edge), T_target_source, scale)
+    source_n_3, target_m_3 = (voxels(points, VOXEL_M * scale) for points in (source_N_3, target_M_3))
+    return overlap_of_voxels(source_n_3, target_m_3, T_target_source, scale)
 
 
 def overlap_of_voxels(
     source_n_3: np.ndarray, target_m_3: np.ndarray, T_target_source: np.ndarray, scale: float = 1.0
 ) -> float:
-    """Return the same of clouds that were thinned to voxels before."""
+    """Return the overlap of clouds that were thinned to voxels before."""
     return float(near(target_m_3, transform(T_target_source, source_n_3), OVERLAP_M * scale).mean())
 
 
 def voxels(points_N_3: np.ndarray, edge: float) -> np.ndarray:
-    """Return the mean (n, 3) of the points in each cube of a grid, sorted by cube; the edge has the points' unit.
-
-    Raises:
-        InputError: the points span more cubes than can be numbered.
-    """
+    """Return the mean (n, 3) of the points in each cube of a grid, sorted by cube; InputError for too many cubes."""
     points_N_3 = np.asarray(points_N_3, np.float64)
     cell_N_3 = np.floor((points_N_3 - points_N_3.min(axis=0)) / edge)
     sizes_3 = cell_N_3.max(axis=0) + 1
@@ -147,7 +139,7 @@ class Rung:
 
     Attributes:
         rotation_deg: about a random axis through the middle of the source.
-        translation_m: in a random direction, in a room; for objects times :attr:`ScanPair.scale`.
+        translation_m: in a random direction; for objects, times :attr:`ScanPair.scale`.
     """
 
     rotation_deg: Annotated[float, Bounds(minimum=0, maximum=180)]
@@ -160,10 +152,7 @@ class Rung:
 
 
 def rungs_of(pairs: int, ladder: Sequence[Rung], *axes: object) -> list[Rung]:
-    """Return the rung of each pair: of as many pairs in a row as there are rungs each has another, in a drawn order.
-
-    So every stratum and scene meets all rungs, with no more of one than of another.
-    """
+    """Return the rung of each pair: each run of as many pairs as rungs has every rung once, in a random order."""
     random, order = generator(*axes, "rungs"), list[int]()
     while len(order) < pairs:
         order += random.permutation(len(ladder)).tolist()
@@ -171,7 +160,7 @@ def rungs_of(pairs: int, ladder: Sequence[Rung], *axes: object) -> list[Rung]:
 
 
 def disturbed(pair: ScanPair, rung: Rung, *axes: object) -> np.ndarray:
-    """Return ``T_target_source`` (4×4) of a start on a rung; the axes, with pair and rung, name the random numbers."""
+    """Return ``T_target_source`` (4×4) of a start on a rung; axes, pair and rung name the random numbers."""
     from scipy.spatial.transform import Rotation
 
     random = generator(*axes, pair.name, rung.name, "start")
@@ -181,12 +170,13 @@ def disturbed(pair: ScanPair, rung: Rung, *axes: object) -> np.ndarray:
     return rigid_motion(R, middle_3 - rotate(R, middle_3) + shift_3) @ pair.T_target_source
 
 
-FEWEST_COMMON = 3  # points
-
-
 @dataclass(frozen=True)
 class ScanSuccess:
-    """Limits of the RMSE over the true overlap, from which a registration has failed.
+    """Limits of the RMSE over the true overlap, above which a registration has failed.
+
+    That is the criterion of 3DMatch (Zeng et al. 2017, after Choi et al. 2015): 0.2 m over the true correspondences.
+    Here they are each point and its true place, as in the benchmark's code, which evaluates the same sum to second
+    order from a 6×6 matrix of each pair.
 
     Attributes:
         room_m: in rooms, in meters.
@@ -204,7 +194,7 @@ class ScanSuccess:
 def overlap_rmse(pair: ScanPair, T_target_source: np.ndarray) -> float:
     """Return the root mean square distance (m) of the common points of the source from their true places.
 
-    Common are those of :attr:`ScanPair.source_common_N`; all points count where fewer than three are common.
+    All points count where fewer than three are common (:attr:`ScanPair.source_common_N`).
     """
     common_N = pair.source_common_N
     points_n_3 = pair.source_N_3[common_N] if common_N.sum() >= FEWEST_COMMON else pair.source_N_3

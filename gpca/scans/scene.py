@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
+from itertools import combinations, pairwise
 from pathlib import Path
 
 import numpy as np
@@ -17,16 +17,14 @@ from gpca.io.container import FLAG, Container, array
 from gpca.scans.pair import ROOM_M, VOXEL_M, Kind, ScanPair, overlap_of_voxels, voxels
 from gpca.seeds import generator
 
-FEWEST_SCANS = 2
-
 
 @dataclass(frozen=True)
 class Scan:
     """Points (N, 3) in the frame of their sensor, in meters.
 
     Attributes:
-        T_scene_scan: the pose in the scene; None where poses are known by pairs alone.
-        viewpoint_3: where the sensor stood, in the same frame as the points; None where that is not known.
+        T_scene_scan: the pose in the scene; None where only poses of pairs are known.
+        viewpoint_3: position of the sensor in the frame of the points; None where unknown.
     """
 
     points_N_3: np.ndarray
@@ -36,13 +34,7 @@ class Scan:
 
 @dataclass(frozen=True)
 class Known:
-    """What a data set prints of a pair; None where it prints nothing.
-
-    Attributes:
-        target, source: names of scans.
-        overlap: share in [0, 1].
-        T_target_source: the true pose.
-    """
+    """The published overlap in [0, 1] and true pose of a pair of scans, by their names; None where unpublished."""
 
     target: str
     source: str
@@ -52,47 +44,40 @@ class Known:
 
 @dataclass(frozen=True)
 class Scene:
-    """A scene.
+    """A scene that was scanned from several places.
 
     Attributes:
-        name, family: as of :class:`gpca.scans.pair.ScanPair`.
-        kind: a room or an object.
+        name, family, kind: as of :class:`gpca.scans.pair.ScanPair`.
         scans: by name, in order.
-        printed: the pairs that the data set lists; where it lists none, each two scans are a pair.
+        printed: the pairs that the data set lists; if empty, all pairs of scans.
     """
 
     name: str
     kind: Kind
     scans: Mapping[str, Scan]
     printed: tuple[Known, ...] = ()
-    family: str = field(default="")
+    family: str = ""
 
     def __post_init__(self) -> None:
-        if len(self.scans) < FEWEST_SCANS:
+        if len(self.scans) < 2:
             raise InputError(f"scene {self.name}", f"has {len(self.scans)} scans", "give at least two")
-        for pair in self.printed:
-            for name in (pair.target, pair.source):
-                if name not in self.scans:
-                    raise InputError(f"scene {self.name}", f"lists a pair with scan '{name}'", "add that scan")
+        for name in (name for pair in self.printed for name in (pair.target, pair.source)):
+            if name not in self.scans:
+                raise InputError(f"scene {self.name}", f"lists a pair with scan '{name}'", "add that scan")
 
     @cached_property
     def size_m(self) -> float:
-        """The diagonal of the box around all scans; of a room :data:`gpca.scans.pair.ROOM_M`, as nothing reads it."""
+        """The diagonal of the box around all scans; of a room `ROOM_M`, as nothing reads it."""
         if self.kind == "room":
             return ROOM_M
-        corners = [
-            corner
-            for name, scan in self.scans.items()
-            for moved in [transform(self._pose(name), scan.points_N_3)]
-            for corner in (moved.min(axis=0), moved.max(axis=0))
-        ]
+        moved = [transform(self._pose(name), scan.points_N_3) for name, scan in self.scans.items()]
+        corners = [corner for points in moved for corner in (points.min(axis=0), points.max(axis=0))]
         return float(np.linalg.norm(np.ptp(np.stack(corners), axis=0)))
 
     def known(self) -> Iterator[Known]:
-        """Yield every pair with its pose and overlap, which is measured where the data set does not print it."""
-        names, scale, thin = list(self.scans), self.size_m / ROOM_M, dict[str, np.ndarray]()
-        every = (Known(names[i], names[j]) for i in range(len(names)) for j in range(i + 1, len(names)))
-        for pair in self.printed or every:
+        """Yield every pair with its pose and its overlap, published or measured."""
+        scale, thin = self.size_m / ROOM_M, dict[str, np.ndarray]()
+        for pair in self.printed or (Known(*names) for names in combinations(self.scans, 2)):
             T_target_source = self._relative(pair)
             if (share := pair.overlap) is None:
                 for name in {pair.source, pair.target} - thin.keys():
@@ -130,12 +115,11 @@ class Scene:
 
 
 def stratum_name(low: float, high: float) -> str:
-    """Return e.g. ``overlap_0.3_0.5``."""
     return f"overlap_{low:g}_{high:g}"
 
 
 def stratum_of(overlap: float, edges: Sequence[float]) -> str | None:
-    """Return the stratum that an overlap is in, the upper edge of the last one included; None where it is in none."""
+    """Return the stratum of an overlap, the upper edge of the last one included; None where it is in none."""
     for low, high in pairwise(edges):
         if low <= overlap < high or (overlap == high == edges[-1]):
             return stratum_name(low, high)
@@ -146,7 +130,7 @@ def choose_pairs(scenes: Iterable[Scene], edges: Sequence[float], most: int, *ax
     """Return up to `most` pairs of each scene and stratum, stratum by stratum, scene by scene.
 
     Args:
-        scenes: read one after another; no more than the chosen clouds are kept.
+        scenes: read one after another; only the chosen clouds are kept.
         edges: of the strata of overlap, ascending.
         axes: name the random numbers; a scene's draw does not depend on the other scenes.
     """
@@ -172,8 +156,7 @@ class ScanPairs(Container):
         scan: (F,) names.
         viewpoint, viewpoint_known: (F, 3) m, 0 where it is unknown, and (F,) whether it is known.
         target, source_scan: (K,) numbers of each pair's scans.
-        T_target_source, overlap, scene, kind, size_m: (K, …) as in :class:`gpca.scans.pair.ScanPair`.
-        cluster: (K,) what pairs are clustered and split by: the scene, or its family.
+        T_target_source, overlap, scene, kind, size_m, cluster: (K, …) as in :class:`gpca.scans.pair.ScanPair`.
     """
 
     points: np.ndarray = array("P 3", offsets="offsets", fewest=3)

@@ -48,18 +48,18 @@ class ScanEntry:
     """A data set of scans: one row of each method in every table.
 
     Attributes:
-        title: as tables name the rows.
+        title: of the rows in tables.
         kind: how the data is read; ``virtual`` is made by the package.
         location: a file or a folder, relative to `data_dir` or to the repository's data.
         scenes: whether its scenes are rooms or objects; npz files may say so themselves.
         unit: of lengths in the files.
-        optional: where there is no such location, a run does without it.
-        sensor_at_origin: the sensor stood at the origin of each scan's frame, so that normals point there.
-        development: scenes on which settings were chosen; other runs than those of development leave them out.
-        families: family of a scene, by name, where several scenes are alike.
+        optional: a run does without it where its location is missing.
+        sensor_at_origin: the sensor stood at the origin of each scan's frame, to which normals point.
+        development: scenes on which settings were chosen; other runs leave them out.
+        families: of scenes that are alike, by the name of the scene.
         benchmark: it is 3DMatch's, whose recalls others have published.
-        address, license: where the data is found, and on which terms.
-        rooms, objects, views: of virtual scenes, how many, and scans of each.
+        address, license: of the data.
+        rooms, objects, views: numbers of virtual scenes, and of the scans of each.
     """
 
     title: Text
@@ -98,11 +98,7 @@ CLOUD = "cloud_"
 
 
 def npz_scenes(entry: ScanEntry, place: Path) -> Iterator[Scene]:
-    """Yield the scene of each npz file of a folder, by name, or of the one file.
-
-    Raises:
-        InputError: no npz file, or one that does not hold what it should.
-    """
+    """Yield the scene of each npz file of a folder, by name, or of the one file; InputError for a faulty one."""
     files = sorted(place.glob("*.npz")) if place.is_dir() else [place]
     if not files:
         raise InputError(place, "the folder has no npz file", "correct location")
@@ -112,12 +108,13 @@ def npz_scenes(entry: ScanEntry, place: Path) -> Iterator[Scene]:
 
 
 def read_scene(path: Path, entry: ScanEntry, printed: tuple[Known, ...] = ()) -> Scene:
-    """Read one file.
-
-    Raises:
-        InputError: unreadable, an array missing or of another shape, NaN, a pose that is not rigid.
-    """
-    members = _members(path)
+    """Read one npz file; InputError for a missing array, another shape, NaN, or a pose that is not rigid."""
+    require_file(path, "no such file", "correct location", np.inf)
+    try:
+        with zipfile.ZipFile(path) as archive:
+            members = [name.removesuffix(".npy") for name in archive.namelist()]
+    except Exception as fault:  # zipfile raises errors of many kinds for a damaged archive
+        raise InputError(path, "is not a readable npz archive", "fetch it again") from fault
     poses = next((name for name in NPZ_POSES if name in members), None)
     if poses is None:
         raise InputError(path, f"has neither {' nor '.join(NPZ_POSES)}", NPZ_REMEDY)
@@ -144,18 +141,8 @@ def read_scene(path: Path, entry: ScanEntry, printed: tuple[Known, ...] = ()) ->
     return Scene(path.stem, entry.scenes or NPZ_POSES[poses], scans, printed)
 
 
-def _members(path: Path) -> list[str]:
-    """Return the names of the arrays of a file."""
-    require_file(path, "no such file", "correct location", np.inf)
-    try:
-        with zipfile.ZipFile(path) as archive:
-            return [name.removesuffix(".npy") for name in archive.namelist()]
-    except Exception as fault:  # zipfile raises errors of many kinds for a damaged archive
-        raise InputError(path, "is not a readable npz archive", "fetch it again") from fault
-
-
 def _read_pairs(path: Path) -> dict[str, tuple[Known, ...]]:
-    """Return the pairs that a file lists, by scene; none where there is no file. A pair may stand in several lists."""
+    """Return the pairs that a file lists, by scene, each once; none where there is no file."""
     if not path.is_file():
         return {}
     rows = read_csv(path, ("scene", "target", "source", "overlap"), ANY, "correct it as docs/scans.md says")
@@ -173,11 +160,7 @@ POSES_REMEDY = "write a name and the 16 numbers of a pose in each line"
 
 
 def ply_scenes(entry: ScanEntry, place: Path) -> Iterator[Scene]:
-    """Yield the scene of the folder, or of each folder in it, by name.
-
-    Raises:
-        InputError: no such folder, no file of poses, or what a file does not hold that it should.
-    """
+    """Yield the scene of the folder, or of each folder in it, by name; InputError for a faulty one."""
     if not entry.scenes:
         raise InputError(entry.title, "does not say what its scenes are", "set scenes: room, or object")
     files = [place / POSES_FILE] if (place / POSES_FILE).exists() else sorted(place.glob(f"*/{POSES_FILE}"))
@@ -227,11 +210,7 @@ BENCHMARK_REMEDY = "fetch the benchmark again"
 
 
 def benchmark_scenes(entry: ScanEntry, place: Path) -> Iterator[Scene]:
-    """Yield the scene of each folder with fragments, by name.
-
-    Raises:
-        InputError: no such folder, no pairs, or what a file does not hold that it should.
-    """
+    """Yield the scene of each folder with fragments, by name; InputError for a faulty one."""
     folder = place / "fragments" if (place / "fragments").is_dir() else place
     found = sorted({path.parent for path in folder.glob("*/cloud_bin_*.ply")})
     if not found:
@@ -266,7 +245,7 @@ def read_log(path: Path) -> dict[tuple[str, str], np.ndarray]:
     """Return ``T_target_source`` (4×4) of each pair of a ``gt.log``, by the numbers of target and source.
 
     Raises:
-        InputError: no such file, other numbers than there should be, no rigid transform, a pair twice.
+        InputError: no such file, another count of numbers, no rigid transform, a pair twice.
     """
     require_file(path, "no such file", BENCHMARK_REMEDY)
     lines = [line.split() for line in path.read_text("utf-8", errors="replace").splitlines() if line.strip()]
@@ -290,7 +269,7 @@ def read_log(path: Path) -> dict[tuple[str, str], np.ndarray]:
 
 
 def _read_overlaps(path: Path) -> dict[tuple[str, str], float]:
-    """Return the overlap of each pair that a file prints; none where there is no file."""
+    """Return the overlap of each pair in a file; none where there is no file."""
     if not path.is_file():
         return {}
     shares = {}
@@ -314,21 +293,14 @@ DEVELOPMENT = "development"  # of the roles of a run
 
 
 def entry_of(settings: Mapping[str, Any]) -> ScanEntry:
-    """Return an entry of the config, checked.
-
-    Raises:
-        InputError: an unknown key, a value of another type, or no location.
-    """
+    """Return an entry of the config, checked; InputError for an unknown key, a wrong type, or no location."""
     return read_settings(ScanEntry, settings)
 
 
 def place_of(entry: ScanEntry, data_dir: str | None) -> Path | None:
     """Return the file or folder of a data set, in `data_dir` or the repository's data.
 
-    A virtual one has none, nor has an optional one that is not there.
-
-    Raises:
-        InputError: it is nowhere, and not optional.
+    None for a virtual one, or an optional one that is missing; InputError for any other that is missing.
     """
     if entry.kind == "virtual":
         return None
@@ -361,11 +333,11 @@ def scenes_of(entry: ScanEntry, place: Path | None, role: str, most_points: int)
 
     Args:
         place: of its files; None of a virtual one.
-        role: of the run: ``development`` has other scenes than ``evaluation``, as the entry says.
-        most_points: larger scans are thinned to so many of their points, drawn at random.
+        role: of the run, ``development`` or ``evaluation``, which have different scenes.
+        most_points: larger scans are thinned to this many of their points, drawn at random.
 
     Raises:
-        InputError: no scenes of the role, or what the reader refuses.
+        InputError: no scenes of the role, or faulty files.
     """
     if entry.kind == "virtual":
         from gpca.scans import virtual  # loads trimesh, which nothing needs that plans a run
@@ -382,18 +354,11 @@ def scenes_of(entry: ScanEntry, place: Path | None, role: str, most_points: int)
     empty = True
     for scene in found:
         empty = False
-        yield _thinned(replace(scene, family=entry.families.get(scene.name, "")), most_points)
+        scans = dict(scene.scans)
+        for name, scan in scene.scans.items():
+            if len(scan.points_N_3) > most_points:
+                order = generator("scans", scene.name, name, "points").permutation(len(scan.points_N_3))
+                scans[name] = replace(scan, points_N_3=scan.points_N_3[np.sort(order[:most_points])])
+        yield replace(scene, family=entry.families.get(scene.name, ""), scans=scans)
     if empty:
         raise InputError(place or entry.title, f"has no scene for {role}", "correct development in the entry")
-
-
-def _thinned(scene: Scene, most: int) -> Scene:
-    """Return the scene with no more than `most` points in each scan."""
-    scans = {}
-    for name, scan in scene.scans.items():
-        points_N_3 = scan.points_N_3
-        if len(points_N_3) > most:
-            kept = generator("scans", scene.name, name, "points").permutation(len(points_N_3))[:most]
-            points_N_3 = points_N_3[np.sort(kept)]
-        scans[name] = Scan(points_N_3, scan.T_scene_scan, scan.viewpoint_3)
-    return replace(scene, scans=scans)

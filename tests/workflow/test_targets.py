@@ -107,7 +107,7 @@ EDITS = {  # a module: what is made again where it has changed, and what is not
     "gpca/objects/point_files.py": ("runtime.csv", "objects/ predictions embeddings registrations"),
     "gpca/objects/procedural.py": (
         "objects/coffee_cup objects/ycb registrations/coffee_cup predictions/coffee_cup objects_coffee_cup scenes",
-        "kernels.csv",
+        "",
     ),
     "gpca/causes/remedied.py": (
         "descriptors/ycb diagnoses/ycb/pair_forest estimates/ model.pt exchange/",
