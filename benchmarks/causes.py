@@ -116,7 +116,7 @@ def plain_error(candidate, subject, xi_n_6, settings) -> float:
 
     from gpca.alignment.icp import ICP
     from gpca.alignment.pose_error import pose_error
-    from gpca.alignment.twist import exp
+    from gpca.alignment.rigid import exp
     from gpca.causes.subjects import JUDGED_POINTS
 
     causes = tuple(np.flatnonzero(candidate.applied).tolist())

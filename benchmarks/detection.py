@@ -52,10 +52,10 @@ def on_frames(explainer, options: argparse.Namespace) -> dict[str, float]:
     import pandas as pd
     from sklearn.metrics import roc_auc_score
 
-    from gpca.alignment.canonical_frame import CanonicalFrame
     from gpca.alignment.rigid import inverse, transform
     from gpca.causes.descriptors import describe_motion
     from gpca.causes.settings import MOTION
+    from gpca.objects.canonical_frame import CanonicalFrame
     from gpca.pairs.dataset import Registrations
     from gpca.process.progress import progress
 
@@ -119,8 +119,7 @@ def resampled(instance_K, random):
 def clean_pairs(explainer, options: argparse.Namespace) -> dict[str, float]:
     import numpy as np
 
-    from gpca.alignment.rigid import transform
-    from gpca.alignment.twist import exp
+    from gpca.alignment.rigid import exp, transform
     from gpca.objects.canonical import ObjectClouds
     from gpca.seeds import generator
 

@@ -187,9 +187,9 @@ class PlainComposition:
         import numpy as np
         import torch
 
-        from gpca.alignment.canonical_frame import CanonicalFrame
         from gpca.alignment.icp import ICP
         from gpca.alignment.rigid import transform
+        from gpca.objects.canonical_frame import CanonicalFrame
 
         frame = CanonicalFrame.of(target)
         source, target = frame.coordinates(source), frame.coordinates(target)

@@ -135,8 +135,7 @@ def test_a_registration_method(config, added_modules, objects):
     from gpca.alignment.methods.interface import Pair
     from gpca.alignment.methods.registry import method_module, methods
     from gpca.alignment.pose_error import adds_error
-    from gpca.alignment.rigid import inverse, transform
-    from gpca.alignment.twist import exp
+    from gpca.alignment.rigid import exp, inverse, transform
 
     added_modules("gpca/alignment/methods/principal_axes.py")
     assert methods()["principal_axes"].title == "Principal axes"

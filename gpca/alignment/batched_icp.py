@@ -1,25 +1,86 @@
 """ICP of one source to one target from many initial poses, with everything that the runs share computed once.
 
-Point-to-point runs are our own compiled loop with Open3D's steps and stopping rule, and end at Open3D's poses wherever
-the correspondences determine one (tests/alignment/test_batched_icp.py). Open3D builds a tree of the target for every
-initial pose and searches it for every point in every iteration; `benchmarks/explainers.py` measures both. The other
-methods call Open3D once per initial pose, but for :class:`BatchedPlaneICP`: all of its runs go one step at a time, with
-Open3D's steps and stopping rule.
+Point-to-point runs are a compiled loop with Open3D's steps and stopping rule, which ends at Open3D's poses
+(docs/registration.md#two-loops-of-icp, tests/alignment/test_batched_icp.py). Open3D builds a tree of the target for
+every initial pose and searches it for every point in every iteration; `benchmarks/explainers.py` measures both.
+:class:`BatchedPlaneICP` takes all point-to-plane runs one step at a time; other methods call Open3D per initial pose.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from gpca.alignment.icp import ICP, ICPSettings, require_cloud
-from gpca.alignment.icp_kernels import CONVERGED, align_all, plane_all, pull_all
-from gpca.alignment.icp_target import make_target
+from gpca.alignment.icp_kernels import CONVERGED, LISTED, align_all, plane_all, pull_all
 
-SINGULAR = 1e-10  # eigenvalue, in the largest, below which a step leaves its direction alone
+MOST_LISTS = 1 << 16  # beyond that, queries in new voxels search the cells
+SINGULAR = 1e-10  # eigenvalue, relative to the largest, below which a step leaves its direction alone
+
+
+class Target(NamedTuple):
+    """Points sorted into cubic cells, and the voxels' lists, which the queries fill.
+
+    Attributes:
+        points: (P, 3) in the order of their cells; a neighbor is a row of it.
+        starts: first point of each cell, and the end of the last one.
+        low: (3,) corner of the cells; the voxels begin `distance` before it.
+        cell, cells: edge of a cell, and number along each axis; `voxel`, `voxels` likewise.
+        list_rows: row of a voxel's list, -1 before it has one.
+        listed, offsets: (lists, LISTED) points, (lists, 3, LISTED) their positions from the voxel's center.
+        reach: minimum distance of all unlisted points from the center.
+        used: (1,) number of lists.
+        distance: farther points are no neighbors; unit of the points.
+    """
+
+    points: np.ndarray
+    starts: np.ndarray
+    low: np.ndarray
+    cell: float
+    cells: np.ndarray
+    voxel: float
+    voxels: np.ndarray
+    list_rows: np.ndarray
+    listed: np.ndarray
+    offsets: np.ndarray
+    reach: np.ndarray
+    used: np.ndarray
+    distance: float
+
+
+def make_target(points: np.ndarray, distance: float) -> Target:
+    """Sort points (P, 3) for searches within `distance`, in the unit of the points."""
+    low, high = points.min(axis=0).astype(np.float64), points.max(axis=0)
+    extent = max(float((high - low).max()), 1e-9)
+    # The points lie on a surface: their number grows with the square of the extent.
+    spacing = extent / np.sqrt(len(points))
+    # However small the cloud, a cell must not be far smaller than the distance: searches widen cell by cell.
+    cell = max(1.5 * spacing, distance / 128)
+    cells = np.floor((high - low) / cell).astype(np.int64) + 1
+    cell_P = np.ravel_multi_index(tuple(np.floor((points - low) / cell).astype(np.int64).T), tuple(cells))
+    order = np.argsort(cell_P, kind="stable")
+    voxel = max(1.5 * spacing, (extent + 2 * distance) / 128)
+    voxels = np.floor((high - low + 2 * distance) / voxel).astype(np.int64) + 1
+    lists = min(MOST_LISTS, int(np.prod(voxels)))
+    return Target(
+        points=np.ascontiguousarray(points[order], np.float64),
+        starts=np.searchsorted(cell_P[order], np.arange(np.prod(cells) + 1)),
+        low=low,
+        cell=cell,
+        cells=cells,
+        voxel=voxel,
+        voxels=voxels,
+        list_rows=np.full(int(np.prod(voxels)), -1, np.int32),
+        listed=np.empty((lists, LISTED), np.int32),
+        offsets=np.empty((lists, 3, LISTED)),
+        reach=np.empty(lists),
+        used=np.zeros(1, np.int64),
+        distance=float(distance),
+    )
 
 
 class BatchedICP:
@@ -45,13 +106,9 @@ class BatchedICP:
     def register(
         self, source: np.ndarray, T_target_source_init_n: np.ndarray, max_iterations: int | None = None
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Align `source` (N, 3) from n initial poses (n, 4, 4).
+        """Align `source` (N, 3) from poses (n, 4, 4): T_target_source (n, 4, 4), fitness (n,), inlier RMSE (n,).
 
-        Point-to-point runs may be given another limit of iterations than the settings'.
-
-        Returns:
-            T_target_source (n, 4, 4), fitness (n,), inlier RMSE (n,), as
-            :class:`gpca.alignment.icp.Registration` has them.
+        `max_iterations` overrides the settings' limit of point-to-point runs.
 
         Raises:
             InputError: fewer than three points, or NaN.
@@ -70,10 +127,11 @@ class BatchedICP:
 
 
 class Pulls:
-    """How the correspondences of a pair pull at a pose: the slope of point-to-point ICP's mean squared distance.
+    """The gradient of point-to-point ICP's mean squared distance at given poses.
 
     Args:
-        target: (P, 3). distance: farther points are no correspondences; unit of the points.
+        target: (P, 3).
+        distance: of the farthest correspondence, in the unit of the points.
     """
 
     def __init__(self, target: np.ndarray, distance: float) -> None:
@@ -83,8 +141,8 @@ class Pulls:
     def __call__(self, source: np.ndarray, T_target_source_n: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the mean of [y × r, r] (n, 6) over correspondences of `source` (N, 3), fitness (n,) and RMSE (n,).
 
-        r = y - q leads to the moved point y from its neighbor q; the mean is half the gradient of the mean of |r|² by
-        a twist on the left of each pose (n, 4, 4).
+        r = y - q is the offset of the moved point y from its neighbor q; the mean is half the gradient of the mean of
+        |r|² by a twist on the left of each pose (n, 4, 4).
         """
         n = len(T_target_source_n)
         pulls_n_6, fitness_n, rmse_n = np.empty((n, 6)), np.empty(n), np.empty(n)
@@ -94,12 +152,7 @@ class Pulls:
 
 
 class BatchedPlaneICP:
-    """ICP to the planes of one target.
-
-    Args:
-        target, target_normals: (P, 3) points, any unit; results come in the same.
-        settings: correspondence distance in the unit of the points, and iterations.
-    """
+    """ICP to the planes of one target (P, 3) with normals; the correspondence distance is in the unit of the points."""
 
     def __init__(self, target: np.ndarray, target_normals: np.ndarray, settings: ICPSettings) -> None:
         require_cloud("target cloud", target)
@@ -110,14 +163,14 @@ class BatchedPlaneICP:
         self.iterations = settings.max_iterations
 
     def register(self, source: np.ndarray, T_target_source_init_n: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Align `source` (N, 3) from n initial poses (n, 4, 4); see :meth:`gpca.alignment.batched_icp.BatchedICP`."""
+        """Align `source` (N, 3) from n initial poses (n, 4, 4), as :meth:`BatchedICP.register`."""
         require_cloud("source cloud", source)
         source = np.ascontiguousarray(source, np.float64)
         poses_n = np.array(T_target_source_init_n, np.float64)
         return _descend(lambda rows_m: self.sums(source, poses_n[rows_m]), poses_n, self.iterations)
 
     def sums(self, source: np.ndarray, poses_n: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Return Σ JᵀJ (n, 6, 6) and Σ Jᵀd (n, 6) of the planes' distances, fitness (n,) and inlier RMSE (n,)."""
+        """Return Σ JᵀJ (n, 6, 6) and Σ Jᵀd (n, 6) of the plane distances d, fitness (n,) and inlier RMSE (n,)."""
         n = len(poses_n)
         sums = np.empty((n, 6, 6)), np.empty((n, 6)), np.empty(n), np.empty(n)
         plane_all(source, self._target, self._normals, np.ascontiguousarray(poses_n), *sums)
@@ -127,10 +180,7 @@ class BatchedPlaneICP:
 def register_each_to_planes(
     icps: Sequence[BatchedPlaneICP], sources: Sequence[np.ndarray], T_target_source_init_n: np.ndarray
 ) -> tuple[np.ndarray, ...]:
-    """Align n sources, each (N, 3), to a target of its own from one pose each, all of them one step at a time.
-
-    Returns what :meth:`BatchedPlaneICP.register` returns, the same numbers as one after the other.
-    """
+    """Align n sources, each (N, 3), to n targets from one pose each, in lockstep; see :meth:`BatchedICP.register`."""
     sources = [np.ascontiguousarray(source, np.float64) for source in sources]
     poses_n = np.array(T_target_source_init_n, np.float64)
 
@@ -144,25 +194,23 @@ def register_each_to_planes(
 def _descend(
     sums: Callable[[np.ndarray], tuple[np.ndarray, ...]], poses_n: np.ndarray, iterations: int
 ) -> tuple[np.ndarray, ...]:
-    """Move the poses (n, 4, 4), in place, until they settle; `sums` are those of the rows (m,) that it is given."""
+    """Move the poses (n, 4, 4) in place until they converge; `sums` returns the sums at the given rows (m,)."""
     hessian_n, gradient_n, fitness_n, rmse_n = sums(np.arange(len(poses_n)))
     active = np.flatnonzero(fitness_n > 0)
     for _ in range(iterations):
         if not len(active):
             break
         poses_n[active] = _steps(hessian_n[active], gradient_n[active]) @ poses_n[active]
-        of_active = sums(active)
-        settled = (np.abs(of_active[2] - fitness_n[active]) < CONVERGED) & (
-            np.abs(of_active[3] - rmse_n[active]) < CONVERGED
-        )
-        for kept, new in zip((hessian_n, gradient_n, fitness_n, rmse_n), of_active, strict=True):
-            kept[active] = new
-        active = active[~settled & (of_active[2] > 0)]
+        hessian_m, gradient_m, fitness_m, rmse_m = sums(active)
+        settled = (np.abs(fitness_m - fitness_n[active]) < CONVERGED) & (np.abs(rmse_m - rmse_n[active]) < CONVERGED)
+        hessian_n[active], gradient_n[active] = hessian_m, gradient_m
+        fitness_n[active], rmse_n[active] = fitness_m, rmse_m
+        active = active[~settled & (fitness_m > 0)]
     return poses_n, fitness_n, rmse_n
 
 
 def _steps(hessian_n_6_6: np.ndarray, gradient_n_6: np.ndarray) -> np.ndarray:
-    """Return Gauss-Newton steps (n, 4, 4); open directions stay (:func:`gpca.alignment.rigid.plane_step`)."""
+    """Return Gauss-Newton steps (n, 4, 4) of least norm, as :func:`gpca.alignment.rigid.plane_step`."""
     values_n_6, axes_n_6_6 = np.linalg.eigh(hessian_n_6_6)
     held_n_6 = values_n_6 > SINGULAR * values_n_6[:, -1:]
     along_n_6 = np.einsum("nji,nj->ni", axes_n_6_6, gradient_n_6)

@@ -1,7 +1,4 @@
-"""Features of points by their neighbors: normals, and the fast point feature histograms by which points are matched.
-
-Rusu, Blodow, Beetz: Fast Point Feature Histograms (FPFH) for 3D Registration, ICRA 2009.
-"""
+"""Normals and fast point feature histograms (FPFH, Rusu et al. 2009) of points, by their neighbors."""
 
 from __future__ import annotations
 
@@ -19,8 +16,7 @@ MOST_NEIGHBORS = 100
 def estimate_normals(points_N_3: np.ndarray, neighbors: int = NEIGHBORS) -> np.ndarray:
     """Return unit normals (N, 3) that point away from the center of the cloud.
 
-    The neighbors leave the sign open. Away from the center is outward on a convex object, and elsewhere at least the
-    same side in two clouds of one object.
+    This is outward on a convex object, and otherwise at least the same side in two clouds of one object.
     """
     cloud = open3d_cloud(points_N_3)
     cloud.estimate_normals(require_open3d().geometry.KDTreeSearchParamKNN(neighbors))
@@ -39,17 +35,14 @@ def fpfh_of_pair(
 
 
 def fpfh(cloud: Any, radius: float = RADIUS, most_neighbors: int = MOST_NEIGHBORS) -> Any:
-    """Return Open3D's features of a cloud with normals, of the nearest so many points within a radius at most.
-
-    Their `.data` is (33, N).
-    """
+    """Return Open3D's features, ``.data`` (33, N), from at most the nearest `most_neighbors` points in the radius."""
     o3d = require_open3d()
     neighbors = o3d.geometry.KDTreeSearchParamHybrid(radius, most_neighbors)
     return o3d.pipelines.registration.compute_fpfh_feature(cloud, neighbors)
 
 
 def mutual_matches(source_N_d: np.ndarray, target_P_d: np.ndarray, most: int) -> np.ndarray:
-    """Return rows (n, 2) of source and target that are each other's nearest in feature space, best `most` of them."""
+    """Return rows (n, 2) of source and target that are each other's nearest in feature space, at most `most`."""
     from scipy.spatial import cKDTree
 
     distance_N, nearest_N = cKDTree(target_P_d).query(source_N_d)

@@ -17,11 +17,11 @@ METHODS = get_args(Method)
 
 @dataclass(frozen=True)
 class ICPSettings:
-    """How ICP runs.
+    """Settings of ICP.
 
     Attributes:
         method: ``point_to_point``, ``point_to_plane`` or ``generalized``.
-        correspondence_distance: largest distance of a correspondence, relative to the diameter.
+        correspondence_distance: of the farthest correspondence, relative to the diameter.
         max_iterations: upper limit; Open3D stops earlier when fitness and RMSE change by less than 1e-6.
     """
 
@@ -44,13 +44,9 @@ class Registration:
 
 
 class ICP:
-    """ICP of many sources to one target, whose cloud and normals are converted once.
+    """Open3D's ICP of many sources to one target (P, 3), in any unit, which the correspondence distance shares.
 
-    Args:
-        target: (P, 3) points, any unit; results come in the same unit.
-        target_normals: (P, 3), needed by point-to-plane and generalized ICP.
-        settings: the correspondence distance is in the unit of the points.
-        kernel: one of Open3D's robust kernels, for point-to-plane and generalized ICP.
+    Point-to-plane and generalized ICP need normals (P, 3) and can take one of Open3D's robust kernels.
     """
 
     def __init__(
@@ -70,11 +66,7 @@ class ICP:
         self._criteria = registration.ICPConvergenceCriteria(max_iteration=settings.max_iterations)
 
     def register(self, source: np.ndarray, T_target_source_init: np.ndarray) -> Registration:
-        """Align `source` (P, 3) from the initial pose.
-
-        Raises:
-            InputError: fewer than three points, or NaN.
-        """
+        """Align `source` (P, 3) from the initial pose; fewer than three points or NaN raise an InputError."""
         require_cloud("source cloud", source)
         registration = self._o3d.pipelines.registration
         align = registration.registration_icp
@@ -98,5 +90,5 @@ def require_cloud(name: str, points: np.ndarray) -> None:
 
 
 def clipped_cost(fitness_n: np.ndarray, inlier_rmse_n: np.ndarray, distance: float) -> np.ndarray:
-    """Return the mean squared distance (n,) of the source's points, cut off at the correspondence distance."""
+    """Mean squared distance (n,) of the source's points, clipped at the correspondence distance."""
     return fitness_n * inlier_rmse_n**2 + (1 - fitness_n) * distance**2

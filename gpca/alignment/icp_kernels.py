@@ -1,14 +1,163 @@
-"""The loops of ICP over poses and points, compiled by numba: point-to-point whole, and the sums of others at a pose."""
+"""Compiled ICP: the nearest target point by lists of points per voxel, and the loops over poses and points.
+
+Target points are sorted into cells. Space is also cut into voxels: the first query in a voxel lists the target points
+nearest to the voxel's center, and later queries there, in any iteration and from any initial pose, choose among those.
+A list knows the radius within which it is complete; where that does not suffice, the cells are searched, so the
+neighbor is always the true one.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
-from gpca.alignment.icp_neighbors import nearest
-from gpca.alignment.icp_target import LISTED
 from gpca.process.compilation import INNER_LOOP, njit
 
+LISTED = 16  # target points per voxel
 CONVERGED = 1e-6  # largest change of fitness and of inlier RMSE in the last iteration; Open3D's default
+
+
+@njit(forceinline=True, **INNER_LOOP)
+def nearest(
+    x, y, z, room, points, starts, low, cell, cells, voxel, voxels, list_rows, listed, offsets, reach, used, distance
+):
+    """Return the row of the target point nearest to (x, y, z), -1 if none is within the distance, and a safe radius.
+
+    Any query within that radius of (x, y, z) has the same result. `room` (LISTED,) float64 is working space; the other
+    arguments are the fields of :class:`gpca.alignment.batched_icp.Target`.
+    """
+    per = 1.0 / voxel
+    i_voxel = (x - low[0] + distance) * per
+    j_voxel = (y - low[1] + distance) * per
+    k_voxel = (z - low[2] + distance) * per
+    if (
+        not (i_voxel >= 0 and j_voxel >= 0 and k_voxel >= 0)
+        or i_voxel >= voxels[0]
+        or j_voxel >= voxels[1]
+        or k_voxel >= voxels[2]
+    ):
+        return -1, 0.0
+    i, j, k = int(i_voxel), int(j_voxel), int(k_voxel)
+    cx = low[0] - distance + (i + 0.5) * voxel
+    cy = low[1] - distance + (j + 0.5) * voxel
+    cz = low[2] - distance + (k + 0.5) * voxel
+    flat = (i * voxels[1] + j) * voxels[2] + k
+    row = list_rows[flat]
+    if row < 0 and used[0] < len(listed):
+        row = used[0]
+        used[0] += 1
+        list_rows[flat] = row
+        reach[row] = _list_nearest(
+            points, starts, low, cell, cells, distance + voxel, cx, cy, cz, listed[row], offsets[row], room
+        )
+    if row >= 0:
+        dx, dy, dz = x - cx, y - cy, z - cz
+        chosen, first_square, second_square = _two_closest(offsets, row, dx, dy, dz)
+        complete = reach[row] - np.sqrt(dx * dx + dy * dy + dz * dz)
+        # An unlisted point may be the second nearest. The radius leaves room for rounding.
+        first, second = np.sqrt(first_square), min(np.sqrt(second_square), complete)
+        if first < distance and first <= complete:
+            return listed[row, chosen], max(0.0, 0.5 * (second - first) - 1e-9 * distance)
+        if min(first, complete) >= distance:
+            return -1, max(0.0, min(first, complete) - distance - 1e-9 * distance)
+    return _search(points, starts, low, cell, cells, distance, x, y, z), 0.0
+
+
+@njit(forceinline=True, **INNER_LOOP)
+def _two_closest(offsets, row, dx, dy, dz):
+    # Without a branch: the nearest point is unpredictable, and a misprediction costs more than the rest.
+    first, second, chosen = np.inf, np.inf, 0
+    for slot in range(LISTED):
+        a, b, c = offsets[row, 0, slot] - dx, offsets[row, 1, slot] - dy, offsets[row, 2, slot] - dz
+        square = a * a + b * b + c * c
+        second = min(second, max(first, square))
+        chosen = slot if square < first else chosen
+        first = min(first, square)
+    return chosen, first, second
+
+
+@njit(**INNER_LOOP)
+def _list_nearest(points, starts, low, cell, cells, radius, x, y, z, listed, offsets, squares):
+    """List the points nearest to a voxel's center; return the radius within which the list is complete."""
+    window = 1
+    while True:
+        squares[:] = radius * radius
+        listed[:] = -1
+        i_low, i_high = _cells_around(x, low[0], cell, cells[0], window)
+        j_low, j_high = _cells_around(y, low[1], cell, cells[1], window)
+        k_low, k_high = _cells_around(z, low[2], cell, cells[2], window)
+        for i in range(i_low, i_high):
+            for j in range(j_low, j_high):
+                first, last = _points_of(starts, cells, i, j, k_low, k_high)
+                for p in range(first, last):
+                    square = _square(points, p, x, y, z)
+                    if square < squares[LISTED - 1]:
+                        slot = LISTED - 1
+                        while slot > 0 and squares[slot - 1] > square:
+                            squares[slot] = squares[slot - 1]
+                            listed[slot] = listed[slot - 1]
+                            slot -= 1
+                        squares[slot] = square
+                        listed[slot] = p
+        reached = _reached(low, cell, x, y, z, window)
+        if reached * reached >= squares[LISTED - 1]:
+            break
+        window += 1
+    for slot in range(LISTED):
+        p = listed[slot]
+        offsets[0, slot] = points[p, 0] - x if p >= 0 else np.inf
+        offsets[1, slot] = points[p, 1] - y if p >= 0 else np.inf
+        offsets[2, slot] = points[p, 2] - z if p >= 0 else np.inf
+    return np.sqrt(squares[LISTED - 1])
+
+
+@njit(**INNER_LOOP)
+def _search(points, starts, low, cell, cells, radius, x, y, z):
+    """Search the cells around a point, in a growing window."""
+    window = 1
+    while True:
+        best, index = radius * radius, -1
+        i_low, i_high = _cells_around(x, low[0], cell, cells[0], window)
+        j_low, j_high = _cells_around(y, low[1], cell, cells[1], window)
+        k_low, k_high = _cells_around(z, low[2], cell, cells[2], window)
+        for i in range(i_low, i_high):
+            for j in range(j_low, j_high):
+                first, last = _points_of(starts, cells, i, j, k_low, k_high)
+                for p in range(first, last):
+                    square = _square(points, p, x, y, z)
+                    if square < best:
+                        best, index = square, p
+        reached = _reached(low, cell, x, y, z, window)
+        if reached * reached >= best:
+            return index
+        window += 1
+
+
+@njit(forceinline=True, **INNER_LOOP)
+def _square(points, p, x, y, z):
+    return (x - points[p, 0]) ** 2 + (y - points[p, 1]) ** 2 + (z - points[p, 2]) ** 2
+
+
+@njit(**INNER_LOOP)
+def _cells_around(x, low, cell, cells, window):
+    i = int(np.floor((x - low) / cell))
+    return max(0, i - window), min(cells, i + window + 1)
+
+
+@njit(forceinline=True, **INNER_LOOP)
+def _points_of(starts, cells, i, j, k_low, k_high):
+    """Return the range of points of a row of cells along the last axis."""
+    if k_low >= k_high:
+        return 0, 0
+    row = (i * cells[1] + j) * cells[2]
+    return starts[row + k_low], starts[row + k_high]
+
+
+@njit(**INNER_LOOP)
+def _reached(low, cell, x, y, z, window):
+    """Return the distance to the border of the window of cells around a point."""
+    a, b, c = (x - low[0]) % cell, (y - low[1]) % cell, (z - low[2]) % cell
+    wall = min(min(min(a, cell - a), min(b, cell - b)), min(c, cell - c))
+    return window * cell + wall
 
 
 @njit(cache=True)
@@ -17,11 +166,11 @@ def align_all(source, target, poses, fitness, rmse, max_iterations):
     room = np.empty(LISTED)
     moments, matrices = np.empty((4, 4)), np.empty((8, 4))
     neighbor = np.empty(len(source), np.int64)
-    # Where each point's neighbor was searched, and the square of the radius around it.
+    # For each point, the position of its last query and the square of the safe radius around it.
     held = np.zeros((len(source), 4))
     for n in range(len(poses)):
         pose = poses[n]
-        held[:, 3] = -1.0  # nothing was searched yet
+        held[:, 3] = -1.0  # no query yet
         fitness[n], rmse[n] = _correspond(source, target, pose, moments, room, neighbor, held)
         for _ in range(max_iterations):
             if fitness[n] > 0:
@@ -65,8 +214,8 @@ def plane_all(source, target, normals, poses, hessians, gradients, fitness, rmse
 
 @njit(**INNER_LOOP)
 def _plane_sums(source, target, normals, pose, hessian, gradient, room, row):
-    points, starts, low, cell, cells, voxel, voxels, list_of_voxel, listed, offsets, reach, used, distance = target
-    lists = (voxel, voxels, list_of_voxel, listed, offsets, reach, used, distance)
+    points, starts, low, cell, cells, voxel, voxels, list_rows, listed, offsets, reach, used, distance = target
+    lists = (voxel, voxels, list_rows, listed, offsets, reach, used, distance)
     count, squares = 0, 0.0
     for i in range(len(source)):
         x, y, z = source[i, 0], source[i, 1], source[i, 2]
@@ -98,7 +247,8 @@ def _correspond(source, target, pose, moments, room, neighbor, held):
     r00, r01, r02, t0 = pose[0, 0], pose[0, 1], pose[0, 2], pose[0, 3]
     r10, r11, r12, t1 = pose[1, 0], pose[1, 1], pose[1, 2], pose[1, 3]
     r20, r21, r22, t2 = pose[2, 0], pose[2, 1], pose[2, 2], pose[2, 3]
-    points, starts, low, cell, cells, voxel, voxels, list_of_voxel, listed, offsets, reach, used, distance = target
+    points, starts, low, cell, cells, voxel, voxels, list_rows, listed, offsets, reach, used, distance = target
+    lists = (voxel, voxels, list_rows, listed, offsets, reach, used, distance)
     limit = distance * distance
     count, squares = 0, 0.0
     m00 = m01 = m02 = m03 = m10 = m11 = m12 = m13 = m20 = m21 = m22 = m23 = m30 = m31 = m32 = 0.0
@@ -107,28 +257,10 @@ def _correspond(source, target, pose, moments, room, neighbor, held):
         px = r00 * x + r01 * y + r02 * z + t0
         py = r10 * x + r11 * y + r12 * z + t1
         pz = r20 * x + r21 * y + r22 * z + t2
-        # As long as a point stays within the radius around where its neighbor was searched, it keeps it.
+        # A point keeps its neighbor as long as it stays within the safe radius of its last query.
         moved = (px - held[i, 0]) ** 2 + (py - held[i, 1]) ** 2 + (pz - held[i, 2]) ** 2
         if moved >= held[i, 3]:
-            index, radius = nearest(
-                px,
-                py,
-                pz,
-                room,
-                points,
-                starts,
-                low,
-                cell,
-                cells,
-                voxel,
-                voxels,
-                list_of_voxel,
-                listed,
-                offsets,
-                reach,
-                used,
-                distance,
-            )
+            index, radius = nearest(px, py, pz, room, points, starts, low, cell, cells, *lists)
             neighbor[i] = index
             held[i, 0], held[i, 1], held[i, 2], held[i, 3] = px, py, pz, radius * radius
         index = neighbor[i]
@@ -158,7 +290,7 @@ def move(pose, moments, room):
     """Apply the rigid motion of least squares between corresponding points to the pose (Horn 1987, by quaternions)."""
     q0, q1, q2 = moments[0, 3], moments[1, 3], moments[2, 3]
     p0, p1, p2 = moments[3, 0], moments[3, 1], moments[3, 2]
-    # Sums of Horn's notation: of the products of the source's first and the target's second coordinate.
+    # Sums in Horn's notation: products of the source's first and the target's second coordinate.
     xx, yx, zx = moments[0, 0] - q0 * p0, moments[0, 1] - q0 * p1, moments[0, 2] - q0 * p2
     xy, yy, zy = moments[1, 0] - q1 * p0, moments[1, 1] - q1 * p1, moments[1, 2] - q1 * p2
     xz, yz, zz = moments[2, 0] - q2 * p0, moments[2, 1] - q2 * p1, moments[2, 2] - q2 * p2
@@ -166,7 +298,7 @@ def move(pose, moments, room):
     matrix[0, 0], matrix[0, 1], matrix[0, 2], matrix[0, 3] = xx + yy + zz, yz - zy, zx - xz, xy - yx
     matrix[1, 1], matrix[1, 2], matrix[1, 3] = xx - yy - zz, xy + yx, zx + xz
     matrix[2, 2], matrix[2, 3], matrix[3, 3] = yy - xx - zz, yz + zy, zz - xx - yy
-    # Correspondences with one single point: what is left of the sums is rounding, and no rotation is better than any.
+    # Correspondences with a single point leave only rounding in the sums: all rotations are equally good.
     rounding = 1e-24 * (q0 * q0 + q1 * q1 + q2 * q2) * (p0 * p0 + p1 * p1 + p2 * p2)
     if xx**2 + xy**2 + xz**2 + yx**2 + yy**2 + yz**2 + zx**2 + zy**2 + zz**2 <= rounding:
         matrix[:] = 0.0

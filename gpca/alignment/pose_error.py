@@ -1,12 +1,38 @@
-"""How far an estimated pose is off: ADD, and ADD-S for symmetric objects (Hinterstoisser et al. 2012)."""
+"""Errors of poses, ADD, and ADD-S for symmetric objects (Hinterstoisser et al. 2012), and when they are a success."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 
 from gpca.alignment.rigid import transform
+from gpca.errors import InputError
+from gpca.settings import Distinct, PositiveShare
 
-JUDGED_POINTS = 1000  # of an object, the first ones, over which an error is usually the mean
+JUDGED_POINTS = 1000  # the first points of an object, over which errors are usually averaged
+
+
+@dataclass(frozen=True)
+class SuccessSettings:
+    """The section ``success`` of the config.
+
+    Attributes:
+        error: smallest error of a failure, ADD or ADD-S, in diameters.
+        curve: other limits, in ascending order, at which shares of successes are shown.
+    """
+
+    error: PositiveShare = 0.03
+    curve: Distinct[PositiveShare] = (0.02, 0.03, 0.05, 0.10)
+
+    def __post_init__(self) -> None:
+        if list(self.curve) != sorted(self.curve):
+            raise InputError("success curve", f"{list(self.curve)} is not in ascending order", "sort it")
+
+
+def success_within(error: float) -> str:
+    """Return the name of the metric for another limit, e.g. ``success_10`` for 10 %."""
+    return f"success_{100 * error:g}"
 
 
 def add_error(points_N_3: np.ndarray, T_estimated: np.ndarray, T_true: np.ndarray) -> float:
@@ -31,22 +57,17 @@ def displacements(T_n: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Return the root mean square distance (n,) by which each transform (n, 4, 4) moves the points (N, 3)."""
     x, y, z = points.T
     squared_n = np.zeros(len(T_n))
-    for i, own in enumerate((x, y, z)):
+    for i, coordinate in enumerate((x, y, z)):
         a, b, c, t = (T_n[:, i, j, None] for j in range(4))
-        squared_n += np.square(a * x + b * y + c * z + t - own).mean(axis=1)
+        squared_n += np.square(a * x + b * y + c * z + t - coordinate).mean(axis=1)
     return np.sqrt(squared_n)
 
 
 class PoseErrors:
     """Errors of many estimates of one object's pose, where the truth is the identity.
 
-    ADD-S is the mean distance to the nearest point, so it is not below the spacing of the points: the mean is over some
-    of them, but the nearest is sought among all.
-
-    Args:
-        points_N_3: of the object, in any unit; errors come in the same.
-        judged: how many of the points, the first ones, the mean is over.
-        symmetric: whether ADD-S counts.
+    Errors are averaged over the first `judged` points, but nearest neighbors are sought among all of them, because
+    ADD-S cannot fall below their spacing. Errors have the unit of the points; `symmetric` selects ADD-S.
     """
 
     def __init__(self, points_N_3: np.ndarray, judged: int, symmetric: bool) -> None:

@@ -1,6 +1,6 @@
-"""Rigid transforms as 4×4 matrices, named for what they map: ``T_target_source`` takes source points to the target.
+"""Rigid transforms as 4×4 matrices, such as ``T_target_source`` from source to target, their twists, and least squares.
 
-The last functions find the one of least squares between corresponding points, and between points and planes.
+A twist ξ = (rotation, translation) is mapped to a rigid motion by exp of SE(3), and back by log.
 """
 
 from __future__ import annotations
@@ -18,11 +18,8 @@ def transform(T_b_a: np.ndarray, points_a: np.ndarray) -> np.ndarray:
 
 
 def rotate(T_b_a: np.ndarray, vectors_a: np.ndarray) -> np.ndarray:
-    """Turn vectors (..., 3) from frame a to frame b, by the rotation of a transform or by a 3×3 matrix.
-
-    Summed from x to z: the order of a BLAS product differs between processors.
-    """
-    x, y, z = np.moveaxis(vectors_a, -1, 0)
+    """Rotate vectors (..., 3) from frame a to frame b, by a transform's rotation or a 3×3 matrix."""
+    x, y, z = np.moveaxis(vectors_a, -1, 0)  # summed in this order, because a BLAS product's differs by processor
     return np.stack([x * to_x + y * to_y + z * to_z for to_x, to_y, to_z in T_b_a[:3, :3]], axis=-1)
 
 
@@ -49,7 +46,7 @@ def inverses(T_b_a_n: np.ndarray) -> np.ndarray:
 
 
 def scale_translation(T_b_a: np.ndarray, factor: float) -> np.ndarray:
-    """Return the transform in another unit of length: rotation kept, translation times `factor`."""
+    """Multiply the translation by `factor`, for another unit of length."""
     scaled = T_b_a.copy()
     scaled[:3, 3] *= factor
     return scaled
@@ -91,9 +88,63 @@ def require_rigid(T_b_a: np.ndarray, subject: object) -> None:
         raise InputError(subject, f"the pose has a translation of {farthest:.3g}", "give it in the unit of the points")
 
 
+def exp(xi_n_6: np.ndarray) -> np.ndarray:
+    """Return the rigid motions (n, 4, 4) of twists (n, 6) in radians and units of length."""
+    from scipy.spatial.transform import Rotation
+
+    shift_n_3 = np.einsum("nij,nj->ni", _left_jacobian(xi_n_6[:, :3]), xi_n_6[:, 3:])
+    return rigid_motion(Rotation.from_rotvec(xi_n_6[:, :3]).as_matrix(), shift_n_3)
+
+
+def log(T_n: np.ndarray) -> np.ndarray:
+    """Return the twists (n, 6) of rigid motions (n, 4, 4), rotations in (-π, π]."""
+    from scipy.spatial.transform import Rotation
+
+    rotation_n_3 = Rotation.from_matrix(T_n[:, :3, :3]).as_rotvec()
+    translation_n_3 = np.linalg.solve(_left_jacobian(rotation_n_3), T_n[:, :3, 3, None])[..., 0]
+    return np.concatenate([rotation_n_3, translation_n_3], axis=1)
+
+
+def adjoint(T_b_a: np.ndarray) -> np.ndarray:
+    """Return Ad (6, 6), which maps twists on the left from frame a to b: exp(Ad ξ) = T_b_a exp(ξ) T_b_a⁻¹."""
+    R, t = T_b_a[:3, :3], T_b_a[:3, 3]
+    Ad = np.zeros((6, 6))
+    Ad[:3, :3] = Ad[3:, 3:] = R
+    Ad[3:, :3] = _cross(t[None])[0] @ R
+    return Ad
+
+
+def point_jacobians(points_N_3: np.ndarray) -> np.ndarray:
+    """Return ∂y/∂ξ = [-[y], I] (N, 3, 6) of points moved by a twist on the left."""
+    jacobians_N_3_6 = np.zeros((len(points_N_3), 3, 6))
+    jacobians_N_3_6[:, :, :3] = -_cross(points_N_3)
+    jacobians_N_3_6[:, :, 3:] = np.eye(3)
+    return jacobians_N_3_6
+
+
+def _cross(vectors_n_3: np.ndarray) -> np.ndarray:
+    """Return [v] (n, 3, 3), with [v] u = v × u."""
+    cross_n = np.zeros((len(vectors_n_3), 3, 3))
+    x, y, z = vectors_n_3.T
+    cross_n[:, 0, 1], cross_n[:, 0, 2], cross_n[:, 1, 2] = -z, y, -x
+    cross_n[:, 1, 0], cross_n[:, 2, 0], cross_n[:, 2, 1] = z, -y, x
+    return cross_n
+
+
+def _left_jacobian(rotation_n_3: np.ndarray) -> np.ndarray:
+    """Return J = I + (1 - cos θ)/θ² [ω] + (θ - sin θ)/θ³ [ω]² (Barfoot 2017, Eq. 7.37)."""
+    theta_n = np.linalg.norm(rotation_n_3, axis=1)
+    small_n = theta_n < 1e-4
+    theta = np.where(small_n, 1.0, theta_n)
+    a_n = np.where(small_n, 0.5 - theta_n**2 / 24, (1 - np.cos(theta)) / theta**2)
+    b_n = np.where(small_n, 1 / 6 - theta_n**2 / 120, (theta - np.sin(theta)) / theta**3)
+    cross_n = _cross(rotation_n_3)
+    return np.eye(3) + a_n[:, None, None] * cross_n + b_n[:, None, None] * (cross_n @ cross_n)
+
+
 def best_rotation(source_n_3: np.ndarray, target_n_3: np.ndarray, weights_n: np.ndarray) -> np.ndarray:
     """Return the rotation (3×3) that minimizes Σ w |q - R p|² (Wahba's problem, by Kabsch 1976)."""
-    # einsum sums in one order on every processor; a BLAS product does not.
+    # einsum sums in the same order on every processor; a BLAS product does not.
     u, _, vt = np.linalg.svd(np.einsum("ni,nj->ij", weights_n[:, None] * target_n_3, source_n_3))
     signs = np.array([1.0, 1.0, np.sign(np.linalg.det(u) * np.linalg.det(vt))])
     return np.einsum("ik,k,kj->ij", u, signs, vt)
@@ -109,10 +160,7 @@ def best_motion(source_n_3: np.ndarray, target_n_3: np.ndarray, weights_n: np.nd
 def plane_step(
     source_n_3: np.ndarray, target_n_3: np.ndarray, normals_n_3: np.ndarray, weights_n: np.ndarray
 ) -> np.ndarray:
-    """Return one Gauss-Newton step (4×4) of Σ w (nᵀ(q - T p))² from the identity (Chen & Medioni 1992).
-
-    Where planes leave a direction open, such as along a plane, it does not move (the solution of least norm).
-    """
+    """Return one Gauss-Newton step (4×4) of Σ w (nᵀ(q - T p))² from the identity, least norm (Chen & Medioni 1992)."""
     from scipy.spatial.transform import Rotation
 
     jacobian_n_6 = np.concatenate([np.cross(source_n_3, normals_n_3), normals_n_3], axis=1)
@@ -121,5 +169,5 @@ def plane_step(
     hessian_6_6 = np.einsum("ni,nj->ij", weighted_n_6, jacobian_n_6)
     gradient_6 = np.einsum("ni,n->i", weighted_n_6, residuals_n)
     step_6 = np.linalg.lstsq(hessian_6_6, gradient_6, rcond=1e-10)[0]
-    # About x, then y, then z, as Open3D does: to first order the order of small angles does not matter.
+    # About x, then y, then z, as in Open3D.
     return rigid_motion(Rotation.from_euler("xyz", step_6[:3]).as_matrix(), step_6[3:])

@@ -15,8 +15,7 @@ from time import perf_counter
 import numpy as np
 
 from gpca.alignment.batched_icp import BatchedICP
-from gpca.alignment.rigid import inverses, transform
-from gpca.alignment.twist import exp
+from gpca.alignment.rigid import exp, inverses, transform
 from gpca.causes.candidate import Candidate, draw_applied, draw_candidate
 from gpca.causes.dataset import Causes
 from gpca.causes.settings import OBSERVED, CauseSettings

@@ -10,8 +10,7 @@ import numpy as np
 
 from gpca.alignment.icp import ICPSettings
 from gpca.alignment.pose_error import displacements
-from gpca.alignment.rigid import inverse, scale_translation
-from gpca.alignment.twist import log
+from gpca.alignment.rigid import inverse, log, scale_translation
 from gpca.causes.dataset import Causes
 from gpca.causes.remedied import describe_remedied
 from gpca.causes.settings import DENSITIES, GROUPS, MOTION, QUANTILES, REMEDIED, DescriptorSettings

@@ -16,8 +16,7 @@ from scipy.spatial import cKDTree
 from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.icp import ICPSettings, clipped_cost
 from gpca.alignment.pose_error import displacements
-from gpca.alignment.rigid import inverse, inverses
-from gpca.alignment.twist import exp
+from gpca.alignment.rigid import exp, inverse, inverses
 from gpca.causes.settings import DescriptorSettings
 from gpca.causes.shapley import SUBSETS, shapley_values
 from gpca.causes.truth import LARGEST_ERROR

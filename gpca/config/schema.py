@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from gpca.alignment.success import SuccessSettings
+from gpca.alignment.pose_error import SuccessSettings
 from gpca.causes.settings import NOT_OF_CAUSES, CauseSettings
 from gpca.classifier.settings import GPCSettings
 from gpca.comparison.published import UNITS

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.alignment.canonical_frame import CanonicalFrame, require_cloud_points, thin
 from gpca.alignment.icp import ICPSettings
 from gpca.alignment.rigid import require_rigid, transform
 from gpca.errors import InputError
@@ -16,6 +15,7 @@ from gpca.io.limits import require_file
 from gpca.numerals import decimal
 from gpca.objects import mesh_folder, point_files
 from gpca.objects.canonical import bounding_center, canonical_cloud, normals_towards_camera
+from gpca.objects.canonical_frame import CanonicalFrame, require_cloud_points, thin
 from gpca.objects.surface import AS_ARGUMENT, AS_OPTION, as_points
 
 if TYPE_CHECKING:

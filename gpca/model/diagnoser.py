@@ -15,8 +15,7 @@ import torch
 
 from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.icp import ICPSettings
-from gpca.alignment.rigid import inverse, transform
-from gpca.alignment.twist import exp
+from gpca.alignment.rigid import exp, inverse, transform
 from gpca.causes.dataset import LABELS, Causes, labels_of
 from gpca.causes.descriptors import describe
 from gpca.causes.settings import GROUPS, OBSERVED, CauseSettings, DescriptorSettings, Moved

@@ -8,15 +8,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.alignment.canonical_frame import CanonicalFrame
-from gpca.alignment.rigid import inverse
-from gpca.alignment.twist import log
+from gpca.alignment.rigid import inverse, log
 from gpca.causes.shapley import ALL, shapley_values
 from gpca.causes.truth import FAILED, NOMINAL
 from gpca.guarantee.conformal import ALARM, GOOD
 from gpca.guarantee.guarantee import Guarantee
 from gpca.guarantee.states import SEVERAL
 from gpca.objects.bop import symmetric_turn
+from gpca.objects.canonical_frame import CanonicalFrame
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.recovery.policy import NOTHING, QUEUE
 from gpca.reenactment.enactment import Enactment

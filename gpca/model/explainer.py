@@ -12,7 +12,6 @@ from time import perf_counter
 import numpy as np
 import torch
 
-from gpca.alignment.canonical_frame import CanonicalFrame, thin
 from gpca.alignment.icp import Method, clipped_cost
 from gpca.alignment.methods.interface import Outcome, Pair
 from gpca.alignment.methods.registry import make_method
@@ -30,6 +29,7 @@ from gpca.model.familiarity import Void, voids_of
 from gpca.model.file import Model
 from gpca.model.location import model_path
 from gpca.model.scene import Scene
+from gpca.objects.canonical_frame import CanonicalFrame, thin
 from gpca.objects.surface import as_points
 from gpca.recovery.policy import NOTHING, Decision, RecoveryPolicy
 from gpca.seeds import generator, seed_of

@@ -18,7 +18,6 @@ from typing import Any
 import numpy as np
 from scipy.special import expit
 
-from gpca.alignment.canonical_frame import CanonicalFrame, require_cloud_points
 from gpca.alignment.pose_error import displacements
 from gpca.alignment.rigid import inverse, require_rigid, transform
 from gpca.causes.settings import OBSERVED, CauseSettings
@@ -29,6 +28,7 @@ from gpca.model.explanation import NOT_SURE, ScanExplanation
 from gpca.model.scan_registration import Scans, in_voxels, voxel_size
 from gpca.model.scene import Scene
 from gpca.objects.canonical import diameter
+from gpca.objects.canonical_frame import CanonicalFrame, require_cloud_points
 from gpca.objects.mesh_folder import meters_per
 from gpca.objects.surface import as_points
 from gpca.pairs.distances import ObservedPair

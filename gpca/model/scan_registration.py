@@ -10,14 +10,13 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from gpca.alignment.batched_icp import BatchedPlaneICP
-from gpca.alignment.canonical_frame import thin
 from gpca.alignment.features import estimate_normals
 from gpca.alignment.icp import ICPSettings, clipped_cost
 from gpca.alignment.methods.interface import Outcome, Pair
 from gpca.alignment.methods.registry import make_method
-from gpca.alignment.rigid import inverse, scale_translation, transform
-from gpca.alignment.twist import exp
+from gpca.alignment.rigid import exp, inverse, scale_translation, transform
 from gpca.errors import InputError
+from gpca.objects.canonical_frame import thin
 from gpca.pairs.distances import ObservedPair
 from gpca.scans.pair import MOST_CELLS, voxels
 from gpca.seeds import generator, seed_of

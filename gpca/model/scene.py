@@ -10,11 +10,11 @@ from pathlib import Path
 
 import numpy as np
 
-from gpca.alignment.canonical_frame import CanonicalFrame
 from gpca.alignment.rigid import transform
 from gpca.causes.counterfactuals import Registrar, Unmeasurable
 from gpca.causes.settings import CauseSettings
 from gpca.causes.shapley import BY_SIZE, SUBSETS
+from gpca.objects.canonical_frame import CanonicalFrame
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reenactment.enactment import Enactment
 from gpca.reenactment.hypotheses import weights_of

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gpca.alignment.pose_error import displacements
-from gpca.alignment.rigid import inverse
-from gpca.alignment.twist import log
+from gpca.alignment.rigid import inverse, log
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.distances import (
     CHANNELS,

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Annotated
 
 from gpca.alignment.icp import ICPSettings
-from gpca.alignment.success import SuccessSettings
+from gpca.alignment.pose_error import SuccessSettings
 from gpca.causes.settings import OBSERVED, CauseSettings, Limits
 from gpca.encoders.registry import EncoderSettings
 from gpca.frames.camera import Camera

@@ -42,7 +42,7 @@ def fit_all(
         moving: whether the poses move; else only the width and the share of outliers are estimated.
         precision, arm: of the anchor (:class:`gpca.reenactment.mixture.Anchor`); 0 for none.
         least: the smallest variance of the normals.
-        points: (3, M) in the order of their cells, see :class:`gpca.alignment.icp_target.Target`.
+        points: (3, M) in the order of their cells, see :class:`gpca.alignment.batched_icp.Target`.
         variance: (n,) of the normals at first, is replaced.
         likelihood, outliers, inlier: (n,), the last (n, N), are filled.
     """

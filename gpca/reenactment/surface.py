@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import cKDTree
 
-from gpca.alignment.icp_target import make_target
+from gpca.alignment.batched_icp import make_target
 from gpca.causes.truth import LARGEST_ERROR
 from gpca.objects.bop import find_symmetries
 from gpca.pairs.distances import second_moments

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gpca.alignment.icp_neighbors import nearest
-from gpca.alignment.icp_target import LISTED
+from gpca.alignment.icp_kernels import LISTED, nearest
 from gpca.process.compilation import njit
 
 

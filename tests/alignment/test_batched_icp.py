@@ -3,11 +3,10 @@ import pytest
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from gpca.alignment import icp_target
+from gpca.alignment import batched_icp
 from gpca.alignment.batched_icp import BatchedICP, BatchedPlaneICP
 from gpca.alignment.icp import ICP, METHODS, ICPSettings
-from gpca.alignment.rigid import transform
-from gpca.alignment.twist import exp
+from gpca.alignment.rigid import exp, transform
 from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS, PERTURBATIONS, Severities
 
@@ -186,7 +185,7 @@ def test_another_source_in_between_changes_nothing(objects):
 def test_with_few_lists_the_poses_are_the_same(objects, monkeypatch):
     source, target, _ = clouds(objects, 2)
     expected = BatchedICP(target, ICPSettings()).register(source, starts(5))
-    monkeypatch.setattr(icp_target, "MOST_LISTS", 10)
+    monkeypatch.setattr(batched_icp, "MOST_LISTS", 10)
     assert_same(BatchedICP(target, ICPSettings()).register(source, starts(5)), expected)
 
 

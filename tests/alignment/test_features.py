@@ -1,8 +1,7 @@
 import numpy as np
 
 from gpca.alignment.features import estimate_normals, fpfh, mutual_matches
-from gpca.alignment.rigid import rotate, transform
-from gpca.alignment.twist import exp
+from gpca.alignment.rigid import exp, rotate, transform
 from gpca.process.environment import open3d_cloud
 
 from .methods.pairs import clouds

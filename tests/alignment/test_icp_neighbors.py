@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from gpca.alignment import icp_target
-from gpca.alignment.icp_neighbors import nearest
-from gpca.alignment.icp_target import LISTED, make_target
+from gpca.alignment import batched_icp
+from gpca.alignment.batched_icp import make_target
+from gpca.alignment.icp_kernels import LISTED, nearest
 
 RANDOM = np.random.default_rng(0)
 ON_SPHERE = RANDOM.normal(size=(250, 3))
@@ -101,7 +101,7 @@ def test_positions_that_only_some_lists_know_have_a_positive_radius():
 @pytest.mark.parametrize("lists", [0, 1, 7])
 @pytest.mark.parametrize("cloud", ["surface", "two clusters", "duplicates", "line"])
 def test_without_room_for_further_lists_neighbors_are_still_the_true_ones(monkeypatch, cloud, lists):
-    monkeypatch.setattr(icp_target, "MOST_LISTS", lists)
+    monkeypatch.setattr(batched_icp, "MOST_LISTS", lists)
     target = make_target(CLOUDS[cloud], 0.1)
     for _ in range(2):  # the second time every voxel that may have a list has it
         check(target, queries(CLOUDS[cloud], 0.1))

@@ -6,7 +6,9 @@ from scipy.spatial.transform import Rotation
 from gpca.alignment.rigid import (
     best_motion,
     best_rotation,
+    exp,
     inverse,
+    log,
     plane_step,
     random_direction,
     require_rigid,
@@ -16,7 +18,6 @@ from gpca.alignment.rigid import (
     scale_translation,
     transform,
 )
-from gpca.alignment.twist import exp, log
 from gpca.errors import InputError
 
 RANDOM = np.random.default_rng(0)

@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from gpca.alignment.rigid import rotation_angle_rad
-from gpca.alignment.twist import adjoint, exp, log, point_jacobians
+from gpca.alignment.rigid import adjoint, exp, log, point_jacobians, rotation_angle_rad
 
 
 def hat(xi_6):

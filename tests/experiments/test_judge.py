@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from gpca.alignment.twist import exp
+from gpca.alignment.rigid import exp
 from gpca.experiments.judge import Judge
 
 

@@ -6,8 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gpca.alignment.rigid import transform
-from gpca.alignment.twist import exp
+from gpca.alignment.rigid import exp, transform
 from gpca.causes.descriptors import WIDTHS
 from gpca.model.diagnoser import REENACTED, REMEDIED, Diagnoser
 from gpca.model.diagnosis import Diagnosis

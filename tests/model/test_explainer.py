@@ -6,8 +6,7 @@ import pytest
 
 from gpca import CanonicalFrame
 from gpca.alignment.icp import ICP, ICPSettings
-from gpca.alignment.rigid import inverse, transform
-from gpca.alignment.twist import exp
+from gpca.alignment.rigid import exp, inverse, transform
 from gpca.code_files import ROOT
 from gpca.errors import InputError
 

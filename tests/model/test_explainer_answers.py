@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from gpca import Explainer
-from gpca.alignment.rigid import inverse, transform
-from gpca.alignment.twist import exp
+from gpca.alignment.rigid import exp, inverse, transform
 from gpca.causes.descriptors import WIDTHS
 from gpca.classifier.settings import GPCSettings
 from gpca.explainers.pair_classifier import PairClassifier

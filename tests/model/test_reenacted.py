@@ -6,11 +6,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from gpca.alignment.canonical_frame import CanonicalFrame
-from gpca.alignment.rigid import transform
-from gpca.alignment.twist import exp
+from gpca.alignment.rigid import exp, transform
 from gpca.causes.shapley import ALL, shapley_values
 from gpca.model.diagnosis import Reenacted, axis_in_words
+from gpca.objects.canonical_frame import CanonicalFrame
 from gpca.reenactment.enactment import Enactment
 from gpca.reenactment.hypotheses import Hypothesis
 from gpca.reenactment.surface import ModelSurface

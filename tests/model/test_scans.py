@@ -10,8 +10,7 @@ import trimesh
 
 from gpca import explain_scans
 from gpca.__main__ import main
-from gpca.alignment.rigid import inverse, transform
-from gpca.alignment.twist import exp
+from gpca.alignment.rigid import exp, inverse, transform
 from gpca.errors import InputError
 from gpca.model.clouds import read_scan
 from gpca.model.explanation import NOT_SURE

@@ -3,8 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gpca.alignment.rigid import inverse, rotation_angle_rad, transform
-from gpca.alignment.twist import exp
+from gpca.alignment.rigid import exp, inverse, rotation_angle_rad, transform
 from gpca.reenactment.hypotheses import distinct_rows, find_hypotheses, first_of_alike, hypothesis_at, log_prior
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface

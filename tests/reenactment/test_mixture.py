@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from gpca.alignment.rigid import inverse, transform
-from gpca.alignment.twist import exp
+from gpca.alignment.rigid import exp, inverse, transform
 from gpca.reenactment.mixture import Anchor, Mixture
 from gpca.reenactment.mixture_kernels import FIRST_OUTLIERS, REACH
 

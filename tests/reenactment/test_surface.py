@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from gpca.alignment.pose_error import PoseErrors
-from gpca.alignment.twist import exp
+from gpca.alignment.rigid import exp
 from gpca.reenactment.surface import CORNER, ModelSurface
 
 

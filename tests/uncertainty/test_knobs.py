@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from gpca.alignment.twist import exp
+from gpca.alignment.rigid import exp
 from gpca.errors import InputError
 from gpca.pairs.perturbation import Severities
 from gpca.uncertainty import knobs

@@ -3,7 +3,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from gpca.alignment.batched_icp import BatchedICP
-from gpca.alignment.twist import exp
+from gpca.alignment.rigid import exp
 from gpca.pairs.perturbation import CONCEPTS, PERTURBATIONS, Severities
 from gpca.uncertainty import remedies
 from gpca.uncertainty.conditions import CORNERS

@@ -86,7 +86,7 @@ EDITS = {  # a module: what is made again where it has changed, and what is not
     ),
     "gpca/alignment/methods/teaser.py": ("methods/ycb table11_severity", "causes/ycb predictions estimates exchange"),
     "gpca/experiments/registration_methods/tables.py": ("table11_registration table11_severity", "methods/ figures/"),
-    "baselines/softmax_head.py": (
+    "baselines/aligned_source.py": (
         "predictions/ycb/softmax_head recovery/ controls/",
         "predictions/ycb/gpca predictions/ycb/shap_additive learners embeddings model.pt gate_rmse",
     ),

@@ -27,13 +27,13 @@ def align(
     correspondence_distance: float = CORRESPONDENCE_DISTANCE,
     feature_neighbors: int = MOST_NEIGHBORS,
 ) -> Outcome:
-    """Minimize a robust cost over all matches that agree in triples.
+    """Minimize a robust cost over all matches in agreeing triples.
 
     Args:
-        feature_radius, feature_neighbors: of the features, in diameters; of the points within it, the nearest so many.
-        inlier_distance: down to which the robust cost is sharpened, in diameters.
-        tuple_similarity: least ratio of the edges of the two triangles of a triple.
-        tuples: most triples that are used.
+        feature_radius, feature_neighbors: radius in diameters and maximum number of a feature's neighbors.
+        inlier_distance: final scale of the robust cost, in diameters.
+        tuple_similarity: minimum ratio of the edges of the two triangles of a triple.
+        tuples: maximum number of triples.
     """
     o3d = require_open3d()
     registration = o3d.pipelines.registration
@@ -49,10 +49,10 @@ def align(
     )
     try:
         result = registration.registration_fgr_based_on_feature_matching(*clouds, *features, option)
-    except RuntimeError as fault:  # with a single match it has none to draw from
+    except RuntimeError as fault:  # it cannot draw triples from a single match
         raise FailedRegistration("too few correspondences agree") from fault
     T_target_source = as_array(result.transformation)
-    if np.array_equal(T_target_source, np.eye(4)):  # what it gives with less than ten
+    if np.array_equal(T_target_source, np.eye(4)):  # its result for fewer than ten matches
         raise FailedRegistration("too few correspondences agree")
     return Outcome.at(pair, T_target_source, correspondence_distance)
 

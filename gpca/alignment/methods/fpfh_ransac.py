@@ -26,13 +26,13 @@ def align(
     correspondence_distance: float = CORRESPONDENCE_DISTANCE,
     feature_neighbors: int = MOST_NEIGHBORS,
 ) -> Outcome:
-    """Take the pose of three matches that agrees with most others.
+    """Return the pose of three matches that agrees with most others.
 
     Args:
-        feature_radius, feature_neighbors: of the features, in diameters; of the points within it, the nearest so many.
-        inlier_distance: within which a match agrees, in diameters.
-        edge_similarity: least ratio of the edges of the two triangles.
-        iterations, confidence: when to stop.
+        feature_radius, feature_neighbors: radius in diameters and maximum number of a feature's neighbors.
+        inlier_distance: of an agreeing match, in diameters.
+        edge_similarity: minimum ratio of the edges of the two triangles.
+        iterations, confidence: stopping rules.
     """
     o3d = require_open3d()
     registration = o3d.pipelines.registration

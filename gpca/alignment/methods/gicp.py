@@ -1,7 +1,4 @@
-"""Generalized ICP (Segal et al. 2009): planes in both clouds, by Open3D and by small_gicp (Koide 2024).
-
-The package small_gicp is optional.
-"""
+"""Generalized ICP (Segal et al. 2009): planes in both clouds, by Open3D and the optional small_gicp (Koide 2024)."""
 
 from __future__ import annotations
 
@@ -26,7 +23,7 @@ LAST_STEP = 1e-4  # of small_gicp, radians and diameters
 def align(
     pair: Pair, correspondence_distance: float = CORRESPONDENCE_DISTANCE, max_iterations: int = MAX_ITERATIONS
 ) -> Outcome:
-    """Minimize the distances between small planes: the target's of its normals, the source's of its neighbors."""
+    """Minimize the distances between small planes, from the target's normals and the source's neighbors."""
     return align_by_open3d(pair, "generalized", correspondence_distance, max_iterations)
 
 
@@ -36,11 +33,11 @@ def align_by_small_gicp(
     correspondence_distance: float = CORRESPONDENCE_DISTANCE,
     max_iterations: int = MAX_ITERATIONS,
 ) -> Outcome:
-    """Minimize the distances between small planes, each of so many neighbors.
+    """Minimize the distances between small planes, each from `neighbours` points.
 
-    Clouds and tree are made here: given plain arrays, small_gicp thins them to cells of 0.25 units, a quarter of an
-    object. Its limits on the last step are those of scans in meters, 1e-3 and 0.1 degrees; here they are smaller. On
-    noisy clouds it never keeps to them, so whether it has come to rest is asked as of the others, by one step more.
+    Clouds and tree are made here, because small_gicp thins plain arrays to cells of 0.25 units, a quarter of an object.
+    Its limits of the last step are for scans in meters; here they are smaller. Noisy clouds never reach them, so one
+    further step decides whether it has converged, as for the other methods.
     """
     package = import_module("small_gicp")
     source, target = package.PointCloud(pair.source), package.PointCloud(pair.target)

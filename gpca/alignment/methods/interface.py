@@ -1,7 +1,4 @@
-"""The interface of registration methods: a pair of clouds in, an outcome out.
-
-All lengths are in one unit, the diameter of the object, as in :class:`gpca.alignment.canonical_frame.CanonicalFrame`.
-"""
+"""The interface of registration methods: a pair of clouds in, an outcome out; all lengths are in object diameters."""
 
 from __future__ import annotations
 
@@ -18,12 +15,11 @@ from gpca.alignment.icp import ICP, ICPSettings, Method, require_cloud
 from gpca.alignment.rigid import require_rigid, transform
 from gpca.errors import InputError
 
-CORRESPONDENCE_DISTANCE = 0.10  # diameters: as far as ICP of the protocol looks for a neighbor
+CORRESPONDENCE_DISTANCE = 0.10  # diameters, as in the protocol's ICP
 MAX_ITERATIONS = 50
 FEWEST = 3  # correspondences that determine a rigid motion
-# Open3D does not tell which of its two rules has stopped it. Where fitness and RMSE have settled, poses still go to and
-# fro by up to 4e-3 diameters, as correspondences change; those that the number of iterations has stopped on their way
-# move by more. A pose is correct within 0.1 diameters.
+# Open3D does not report which rule stopped it. When fitness and RMSE have converged, poses still oscillate by up to
+# 4e-3 diameters, as correspondences change; poses stopped by the number of iterations move more.
 AT_REST = 5e-3
 
 
@@ -37,10 +33,9 @@ class Pair:
 
     Attributes:
         source, target: (N, 3) and (P, 3) points.
-        T_target_source_init: where local methods start; global ones do not read it.
-        source_normals, target_normals: unit vectors in the frame of their cloud, or None
-            (:meth:`with_normals` estimates them).
-        seed: of what a method draws.
+        T_target_source_init: start of local methods; global ones ignore it.
+        source_normals, target_normals: unit vectors in the frame of their cloud, or None (:meth:`with_normals`).
+        seed: of a method's random numbers.
 
     Raises:
         InputError: fewer than three points, NaN, normals of another shape, or an initial pose that is not rigid.
@@ -65,11 +60,11 @@ class Pair:
         require_rigid(self.T_target_source_init, "initial pose")
 
     def started_at(self, T_target_source: np.ndarray) -> Pair:
-        """Return the pair with another initial pose, that of a global method for one."""
+        """Return the pair with another initial pose."""
         return replace(self, T_target_source_init=T_target_source)
 
     def with_normals(self, neighbors: int = NEIGHBORS) -> Pair:
-        """Return the pair with normals of both clouds, estimated from so many neighbors where it has none."""
+        """Return the pair with normals of both clouds, estimated if missing."""
         source_normals, target_normals = self.source_normals, self.target_normals
         return replace(
             self,
@@ -78,7 +73,7 @@ class Pair:
         )
 
     def normals(self, name: str) -> np.ndarray:
-        """Return the normals of the "source" or the "target"; a registration that lacks them fails."""
+        """Return the normals of the "source" or the "target"; without them, the registration fails."""
         normals: np.ndarray | None = getattr(self, f"{name}_normals")
         if normals is None:
             raise FailedRegistration(f"the {name} has no normals")
@@ -95,10 +90,10 @@ class Outcome:
     """The result of a registration method.
 
     Attributes:
-        T_target_source: the pose (4×4); the initial one where there is no other.
-        fitness: share of source points that have a target point within the correspondence distance at the pose.
-        inlier_rmse: over those points, and 0 without any.
-        failure: why the registration failed, empty if it did not.
+        T_target_source: the pose (4×4); the initial one if there is no other.
+        fitness: share of source points with a target point within the correspondence distance at the pose.
+        inlier_rmse: over those points; 0 without any.
+        failure: why the registration failed; empty if it did not.
     """
 
     T_target_source: np.ndarray
@@ -108,12 +103,12 @@ class Outcome:
 
     @property
     def converged(self) -> bool:
-        """Whether the method ended as it should: a pose, and no reason against it."""
+        """Whether the method found a pose and did not fail."""
         return not self.failure
 
     @classmethod
     def at(cls, pair: Pair, T_target_source: np.ndarray, distance: float, failure: str = "") -> Outcome:
-        """Measure a pose as Open3D does, whatever the method minimized; without any correspondence it is a failure."""
+        """Measure a pose as Open3D does, whatever the method minimized; without correspondences, it fails."""
         distance_N, _ = pair.target_tree.query(transform(T_target_source, pair.source), distance_upper_bound=distance)
         inlier_N = distance_N < distance
         if not inlier_N.any():
@@ -127,10 +122,10 @@ class MethodEntry:
     """A method in the registry.
 
     Attributes:
-        title: as tables name the row.
+        title: of its row in tables.
         align: ``align(pair, **settings)`` returns an :class:`Outcome` or raises :class:`FailedRegistration`.
         is_global: whether it needs no initial pose.
-        package: module that it needs and that the suite does not install, if any.
+        package: a required module that the suite does not install, if any.
     """
 
     title: str
@@ -145,7 +140,7 @@ def still_moving(iterations: int) -> str:
 
 
 def as_array(matrix: Any) -> np.ndarray:
-    """Return a matrix of another library as float64, in memory of its own."""
+    """Copy a matrix of another library, as float64."""
     return np.array(matrix, np.float64)
 
 
@@ -167,6 +162,6 @@ def align_by_open3d(
 
 
 def failure_of_a_step(pair: Pair, T_found: np.ndarray, T_further: np.ndarray, max_iterations: int) -> str:
-    """Return why a method must not stop at a pose, given the pose after one more step; empty if it may."""
+    """Return the failure of a method that stopped too early, given the pose after a further step, else empty."""
     moved_N_3 = transform(T_further, pair.source) - transform(T_found, pair.source)
     return still_moving(max_iterations) if np.linalg.norm(moved_N_3, axis=1).max() > AT_REST else ""

@@ -20,19 +20,18 @@ from gpca.alignment.methods.interface import (
 )
 from gpca.alignment.rigid import rigid_motion
 
-# Diameters. On a development seed, the best of 0.02 to 0.13 for clouds of some 500 points; for 2000 it is 0.05.
-VOXEL = 0.08
-# Somewhat more than the package needs: it looks for three neighbors within three voxels, at each of the points left.
+VOXEL = 0.08  # diameters; on a development seed the best for some 500 points (0.05 for 2000)
+# Somewhat more than the package needs: three neighbors within three voxels at each remaining point.
 NEAR, NEIGHBORS, FEATURES = 2.0, 4, 10
 
 
 def align(pair: Pair, voxel: float = VOXEL, correspondence_distance: float = CORRESPONDENCE_DISTANCE) -> Outcome:
-    """Match both clouds, thinned to voxels of an edge in diameters, from which all of its radii follow."""
+    """Match both clouds, thinned to voxels in diameters, which also determine all radii."""
     package = _in_one_thread(import_module("kiss_matcher"))
     for name in ("source", "target"):
         if not _has_features(getattr(pair, name), voxel):
             raise FailedRegistration(f"of the {name}, voxels of {voxel:g} diameters leave too few points")
-    try:  # it does not take voxels below 0.005, nor clouds of which too little is left
+    try:  # it rejects voxels below 0.005, and clouds with too few remaining points
         matcher = package.KISSMatcher(package.KISSMatcherConfig(voxel))
         result = matcher.estimate(pair.source.astype(np.float32), pair.target.astype(np.float32))
     except RuntimeError as fault:
@@ -45,10 +44,9 @@ def align(pair: Pair, voxel: float = VOXEL, correspondence_distance: float = COR
 
 @cache
 def _in_one_thread(package: Any) -> Any:
-    """Return the package, after a first call that left it one thread: several overwrite each other's bits.
+    """Return the package limited to one thread: several threads race, and change a pose now and then.
 
-    A pose would now and then be another one. TBB has no variable for its threads; when it is first called, it starts
-    one for each processor that the process may use.
+    TBB has no variable for its threads; at its first call it starts one for each processor of the process.
     """
     process = os.getpid()
     allowed = os.sched_getaffinity(process)
@@ -62,7 +60,7 @@ def _in_one_thread(package: Any) -> Any:
 
 
 def _has_features(points_N_3: np.ndarray, voxel: float) -> bool:
-    """Return whether enough points have neighbors enough for a normal: with none the package ends the process."""
+    """Return whether enough points have enough neighbors for a normal: without any, the package ends the process."""
     voxels_M_3 = np.unique(np.floor(points_N_3 / max(voxel, 1e-6)), axis=0)
     neighbors_M = cKDTree(voxels_M_3).query_ball_point(voxels_M_3, NEAR, return_length=True)
     return int((neighbors_M > NEIGHBORS).sum()) >= FEATURES

@@ -20,8 +20,8 @@ from gpca.alignment.methods.interface import (
 from gpca.process.environment import require_open3d
 
 Kernel = Literal["HuberLoss", "CauchyLoss", "GMLoss", "TukeyLoss"]
-# Diameters. At 0.02, the middle of the protocol's noise, all that a poor start leaves apart counts as an outlier: Tukey
-# then aligned half of the pairs with a pose error on a development seed, and nearly all at this.
+# Diameters. At 0.02, the middle of the protocol's noise, a poor start makes most points outliers: on a development
+# seed, Tukey aligned half of the pairs with a pose error, and nearly all at 0.05.
 SCALE = 0.05
 
 
@@ -39,11 +39,9 @@ def align_robust(
     correspondence_distance: float = CORRESPONDENCE_DISTANCE,
     max_iterations: int = MAX_ITERATIONS,
 ) -> Outcome:
-    """Minimize a robust kernel of these distances.
+    """Minimize one of Open3D's robust kernels of these distances; `scale` is k, in diameters.
 
-    Args:
-        kernel: its name in Open3D.
-        scale: the residual k at which it begins to bend, in diameters. Open3D's Geman-McClure takes a square.
+    Open3D's Geman-McClure takes its square.
     """
     constant = scale**2 if kernel == "GMLoss" else scale
     loss = getattr(require_open3d().pipelines.registration, kernel)(constant)

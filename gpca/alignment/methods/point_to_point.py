@@ -1,4 +1,4 @@
-"""Point-to-point ICP (Besl & McKay 1992): our compiled loop for many starts, and Open3D's."""
+"""Point-to-point ICP (Besl & McKay 1992): the compiled loop for many starts, and Open3D's."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from gpca.alignment.methods.interface import (
 def align(
     pair: Pair, correspondence_distance: float = CORRESPONDENCE_DISTANCE, max_iterations: int = MAX_ITERATIONS
 ) -> Outcome:
-    """Run our loop, which ends at Open3D's poses."""
+    """Run the compiled loop, which ends at Open3D's poses (docs/registration.md#two-loops-of-icp)."""
     from gpca.alignment.batched_icp import BatchedICP
 
     settings = ICPSettings("point_to_point", correspondence_distance, max_iterations)

@@ -13,7 +13,7 @@ from gpca.process.environment import require_open3d
 from gpca.registry import Registry
 from gpca.settings import require_arguments
 
-# Those without their package too.
+# Includes methods whose package is missing.
 REGISTRY: Registry[MethodEntry] = Registry("registration method", __package__, "METHODS", outside=MethodEntry)
 methods, method_entry, method_module = REGISTRY.entries, REGISTRY.entry, REGISTRY.module
 
@@ -26,7 +26,7 @@ def installed(names: Iterable[str]) -> list[str]:
 
 
 def left_out(names: Iterable[str]) -> dict[str, str]:
-    """Return those of the methods that cannot run here, each with the package that is missing."""
+    """Return the methods that cannot run here, each with its missing package."""
     packages = {name: method_entry(name).package for name in names}
     return {name: package for name, package in packages.items() if package and find_spec(package) is None}
 
@@ -55,10 +55,9 @@ def require_local(name: str) -> None:
 
 
 def make_method(name: str, settings: Mapping[str, object] | None = None) -> Callable[[Pair], Outcome]:
-    """Return a method as a function from pairs to outcomes.
+    """Return a method as a function from pairs to outcomes; a failure becomes an outcome at the initial pose.
 
-    It runs in one thread, however many the process has: Open3D adds up what its threads find in the order in which they
-    end, and draws in that order too. A failure inside the method becomes an outcome at the initial pose.
+    It runs in one thread, because Open3D sums and draws random numbers in the order in which its threads end.
 
     Raises:
         InputError: an unknown name, settings that the method does not take, or a missing package.
@@ -72,12 +71,12 @@ def make_method(name: str, settings: Mapping[str, object] | None = None) -> Call
         raise InputError(
             f"registration method '{name}'", f"needs the package {entry.package}", "install it or leave the method out"
         )
-    utility = require_open3d().utility  # loaded here, and with it the threads that are held to one below
+    utility = require_open3d().utility  # loads the thread pools that are limited below
     threads = ThreadpoolController()
 
     def register(pair: Pair) -> Outcome:
         try:
-            # Open3D's warnings go to standard output; what they say of a pair is in its outcome.
+            # Open3D's warnings go to standard output, and repeat the outcome.
             with threads.limit(limits=1), utility.VerbosityContextManager(utility.VerbosityLevel.Error):
                 outcome = entry.align(pair, **settings)
             if not np.isfinite(outcome.T_target_source).all():

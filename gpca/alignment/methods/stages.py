@@ -1,9 +1,9 @@
-"""ICP as a row of stages that can be exchanged (Rusinkiewicz & Levoy 2001): select, match, reject, weigh, minimize."""
+"""ICP as a sequence of exchangeable stages (Rusinkiewicz & Levoy 2001): select, match, reject, weigh, minimize."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -20,9 +20,9 @@ class Matches:
     """Source points (n, 3) at a pose, each with its nearest target point.
 
     Attributes:
-        rows: (n,) of the target.
+        source_rows, rows: (n,) of source and target.
         distance: (n,) between the two.
-        limit: farther points are no match.
+        limit: of the distances.
     """
 
     pair: Pair
@@ -34,19 +34,12 @@ class Matches:
     limit: float
 
     def kept(self, keep_n: np.ndarray) -> Matches:
-        """Return those of a mask or of rows."""
-        return Matches(
-            self.pair,
-            self.T_target_source,
-            self.source_rows[keep_n],
-            self.source[keep_n],
-            self.rows[keep_n],
-            self.distance[keep_n],
-            self.limit,
-        )
+        """Return the matches of a mask or of rows."""
+        arrays = ("source_rows", "source", "rows", "distance")
+        return replace(self, **{name: getattr(self, name)[keep_n] for name in arrays})
 
     def farthest_at(self, T_target_source: np.ndarray) -> float:
-        """Return the largest distance of the same matches at another pose: as many points have a neighbor within it."""
+        """Return the largest distance of the same matches at another pose."""
         offset_n_3 = transform(T_target_source, self.pair.source[self.source_rows]) - self.pair.target[self.rows]
         return float(np.sqrt(np.square(offset_n_3).sum(axis=1).max()))
 
@@ -61,11 +54,11 @@ class Stages:
     """The exchangeable stages; the defaults are plain ICP.
 
     Attributes:
-        rows: of the source that take part, or None for all.
-        share: of the source's points that are kept, those with the least distances.
-        reject: from matches to those that are kept.
+        rows: participating source points, or None for all.
+        share: of the source's points, those with the smallest distances, that are kept.
+        reject: from matches to the kept matches.
         weigh: from matches to their weights (n,).
-        metric: the distance that is minimized.
+        metric: the minimized distance.
         distance: farther points are no match.
     """
 
@@ -77,16 +70,16 @@ class Stages:
     distance: float = np.inf
 
     def match(self, pair: Pair, T_target_source: np.ndarray, before: Matches | None = None) -> Matches:
-        """Return the matches that are kept at a pose; fewer than three are a failure.
+        """Return the kept matches at a pose; fewer than three are a failure.
 
-        Those of the pose before change nothing but how far the search has to look.
+        Matches at the previous pose only bound the search radius.
         """
         rows_n = np.arange(len(pair.source)) if self.rows is None else self.rows
         source_n_3 = transform(T_target_source, pair.source[rows_n])
         reach = self.distance if before is None else min(self.distance, before.farthest_at(T_target_source))
         distance_n, target_rows_n = pair.target_tree.query(source_n_3, distance_upper_bound=reach * ROUNDING)
-        found = Matches(pair, T_target_source, rows_n, source_n_3, target_rows_n, distance_n, self.distance)
-        near = found.kept(distance_n < self.distance)
+        nearby = Matches(pair, T_target_source, rows_n, source_n_3, target_rows_n, distance_n, self.distance)
+        near = nearby.kept(distance_n < self.distance)
         if self.share < 1:
             near = near.kept(nearest(near.distance, round(self.share * len(rows_n))))
         matches = self.reject(near)
@@ -95,7 +88,7 @@ class Stages:
         return matches
 
     def step(self, matches: Matches) -> np.ndarray:
-        """Return the motion (4×4) that takes the matches closer together."""
+        """Return the motion (4×4) that minimizes the metric over the matches."""
         weights_n = self.weigh(matches)
         if not weights_n.any():
             raise FailedRegistration("no correspondence has any weight")
@@ -107,11 +100,7 @@ class Stages:
 
 
 def run_stages(pair: Pair, stages: Stages, max_iterations: int) -> tuple[np.ndarray, Matches, str]:
-    """Iterate until the share of matches and their RMSE change no more, as in Open3D.
-
-    Returns:
-        the pose, the matches there, and the reason why it must not stop there, if any.
-    """
+    """Iterate until the share of matches and their RMSE converge, as in Open3D: the pose, its matches, any failure."""
     from gpca.alignment.icp_kernels import CONVERGED
 
     T = np.array(pair.T_target_source_init, np.float64)
@@ -132,7 +121,7 @@ def align_by_stages(pair: Pair, stages: Stages, correspondence_distance: float, 
 
 
 def nearest(distance_n: np.ndarray, count: int) -> np.ndarray:
-    """Return the rows of so many of the least distances, in their order; at least one."""
+    """Return the sorted rows of the `count` smallest distances, at least one."""
     return np.sort(np.argsort(distance_n, kind="stable")[: max(1, count)])
 
 

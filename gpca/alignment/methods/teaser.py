@@ -1,8 +1,19 @@
-"""TEASER (Yang et al. 2021): its decoupled solver on mutual matches of FPFH features."""
+"""TEASER (Yang et al. 2021): its decoupled solver, at a scale of 1, on mutual matches of FPFH features.
+
+Differences between two correspondences do not depend on the translation, and their lengths not on the rotation:
+
+1. two correspondences agree if their differences are equally long within the noise;
+2. the largest set in which all agree is a clique;
+3. its differences give the rotation, by graduated non-convexity on truncated least squares (GNC-TLS);
+4. its rotated points give the translation, by voting for each coordinate.
+"""
 
 from __future__ import annotations
 
-from gpca.alignment.decoupled import solve
+from dataclasses import dataclass
+
+import numpy as np
+
 from gpca.alignment.features import MOST_NEIGHBORS, RADIUS, fpfh_of_pair, mutual_matches
 from gpca.alignment.methods.interface import (
     CORRESPONDENCE_DISTANCE,
@@ -12,6 +23,131 @@ from gpca.alignment.methods.interface import (
     Outcome,
     Pair,
 )
+from gpca.alignment.rigid import best_rotation, rigid_motion, rotate
+
+GROWTH = 1.4  # of the convexity parameter μ per iteration, as in the paper
+MOST_ITERATIONS = 100
+SETTLED = 1e-9  # relative change of the cost
+MOST_BRANCHES = 20_000  # limit of the clique search: counted, not timed, to be the same on every machine
+
+
+@dataclass(frozen=True)
+class Solution:
+    """The pose (4×4), the agreeing correspondences, and whether a larger set is excluded for certain."""
+
+    T_target_source: np.ndarray
+    inliers: np.ndarray
+    certain: bool
+
+
+def solve(source_n_3: np.ndarray, target_n_3: np.ndarray, noise: float) -> Solution | None:
+    """Return the pose of corresponding points, or None if no three agree; `noise` bounds a right correspondence."""
+    from scipy.spatial.distance import cdist
+
+    agreeing_n_n = np.abs(cdist(source_n_3, source_n_3) - cdist(target_n_3, target_n_3)) <= 2 * noise
+    clique, certain = largest_clique(agreeing_n_n)
+    if len(clique) < 3:
+        return None
+    one, other = np.triu_indices(len(clique), 1)
+    p_n_3, q_n_3 = source_n_3[clique], target_n_3[clique]
+    R, _ = gnc_rotation(p_n_3[other] - p_n_3[one], q_n_3[other] - q_n_3[one], 2 * noise)
+    shifts_n_3 = q_n_3 - rotate(R, p_n_3)
+    shift_3 = [vote(shifts_n, noise) for shifts_n in shifts_n_3.T]
+    inlier_n = (np.abs(shifts_n_3 - shift_3) <= noise).all(axis=1)
+    return Solution(rigid_motion(R, shift_3), clique[inlier_n], certain)
+
+
+def gnc_rotation(source_m_3: np.ndarray, target_m_3: np.ndarray, bound: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the rotation (3×3) that minimizes Σ min(|b - R a|², bound²), and weights (m,), 1 for inliers.
+
+    Graduated non-convexity (Yang et al. 2020) deforms a convex cost step by step into the truncated one.
+    """
+    limit = bound**2
+    weights_m = np.ones(len(source_m_3))
+    mu, before = 0.0, np.inf
+    R = np.eye(3)
+    for _ in range(MOST_ITERATIONS):
+        R = best_rotation(source_m_3, target_m_3, weights_m)
+        square_m = np.square(target_m_3 - rotate(R, source_m_3)).sum(axis=1)
+        if not mu:
+            if square_m.max() <= limit:  # nothing to reject
+                break
+            mu = limit / (2 * square_m.max() - limit)
+        cost = float((weights_m * square_m).sum())
+        upper, lower = (mu + 1) / mu * limit, mu / (mu + 1) * limit
+        between_m = np.sqrt(limit * mu * (mu + 1) / np.maximum(square_m, lower)) - mu
+        weights_m = np.where(square_m >= upper, 0.0, np.where(square_m <= lower, 1.0, between_m))
+        if abs(cost - before) <= SETTLED * limit or not weights_m.any():
+            break
+        mu, before = GROWTH * mu, cost
+    return R, weights_m
+
+
+def vote(shifts_n: np.ndarray, bound: float) -> float:
+    """Return the t that minimizes Σ min((s - t)², bound²) over shifts (n,), exactly.
+
+    The inliers of t change only where a shift enters or leaves the bound; the best t for a set of inliers is their
+    mean. So every set is tried.
+    """
+    events = np.sort(np.concatenate([shifts_n - bound, shifts_n + bound]))
+    inlier_e_n = np.abs(shifts_n - (events[1:] + events[:-1])[:, None] / 2) <= bound
+    inlier_e_n = inlier_e_n[inlier_e_n.any(axis=1)]
+    counts_e = inlier_e_n.sum(axis=1)
+    means_e = np.where(inlier_e_n, shifts_n, 0).sum(axis=1) / counts_e
+    squares_e = np.where(inlier_e_n, np.square(shifts_n - means_e[:, None]), 0).sum(axis=1)
+    return float(means_e[np.argmin(squares_e + (len(shifts_n) - counts_e) * bound**2)])
+
+
+def largest_clique(adjacent_n_n: np.ndarray, most_branches: int = MOST_BRANCHES) -> tuple[np.ndarray, bool]:
+    """Return the sorted nodes of the largest clique, and whether it is certain that none is larger.
+
+    Branch and bound over bit sets with greedy colors (Tomita & Seki 2003; San Segundo et al. 2011). The adjacency is
+    symmetric; its diagonal is ignored.
+    """
+    adjacent_n_n = adjacent_n_n & ~np.eye(len(adjacent_n_n), dtype=bool)
+    order = np.argsort(-adjacent_n_n.sum(axis=1), kind="stable")  # colors are given to nodes of many neighbors first
+    packed = np.packbits(adjacent_n_n[np.ix_(order, order)], axis=1, bitorder="little")
+    neighbors = [int.from_bytes(row.tobytes(), "little") for row in packed]
+
+    best: list[int] = []
+    path: list[int] = []  # the current clique; candidates and branches hold the continuations of each of its prefixes
+    candidates = [(1 << len(order)) - 1]
+    branches = [_colored(candidates[0], neighbors)]
+    tried = 0
+    while branches:
+        if not branches[-1] or len(path) + branches[-1][-1][1] <= len(best) or tried >= most_branches:
+            branches.pop()
+            candidates.pop()
+            path = path[:-1]
+            continue
+        tried += 1
+        node, _ = branches[-1].pop()
+        candidates[-1] ^= 1 << node
+        further = candidates[-1] & neighbors[node]
+        if further:
+            path.append(node)
+            candidates.append(further)
+            branches.append(_colored(further, neighbors))
+        elif len(path) >= len(best):
+            best = [*path, node]
+    return np.sort(order[best]), tried < most_branches
+
+
+def _colored(candidates: int, neighbors: list[int]) -> list[tuple[int, int]]:
+    """Color the candidates so that neighbors differ, and list (node, color) by color.
+
+    A clique among the candidates up to an entry of the list has at most as many nodes as its color.
+    """
+    colored, color = [], 0
+    while candidates:
+        color += 1
+        free = candidates
+        while free:
+            node = (free & -free).bit_length() - 1
+            free &= ~(neighbors[node] | 1 << node)
+            candidates ^= 1 << node
+            colored.append((node, color))
+    return colored
 
 
 def align(
@@ -22,12 +158,12 @@ def align(
     correspondence_distance: float = CORRESPONDENCE_DISTANCE,
     feature_neighbors: int = MOST_NEIGHBORS,
 ) -> Outcome:
-    """Solve for the pose on which the largest set of matches agrees.
+    """Return the pose on which the largest set of matches agrees.
 
     Args:
-        feature_radius, feature_neighbors: of the features, in diameters; of the points within it, the nearest so many.
-        noise: how far a right match may be off, in diameters: about the spacing of the points.
-        most_matches: the best so many are used; TEASER's authors advise some hundreds.
+        feature_radius, feature_neighbors: radius in diameters and maximum number of a feature's neighbors.
+        noise: bound of a right match's error, in diameters: about the spacing of the points.
+        most_matches: number of best matches used; TEASER's authors advise some hundreds.
     """
     _, features = fpfh_of_pair(pair, feature_radius, feature_neighbors)
     source_N_33, target_P_33 = (each.data.T for each in features)

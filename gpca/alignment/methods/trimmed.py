@@ -1,4 +1,4 @@
-"""Trimmed ICP (Chetverikov et al. 2002): least squares over the share of points that overlap, which it finds itself."""
+"""Trimmed ICP (Chetverikov et al. 2002): least squares over the overlapping share of points, which it estimates."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from gpca.alignment.methods.interface import CORRESPONDENCE_DISTANCE, MAX_ITERAT
 from gpca.alignment.methods.stages import Matches, Stages, run_stages
 from gpca.settings import Share
 
-LEAST_OVERLAP = 0.4  # the paper's; so far down the overlap is searched
-EXPONENT = 2.0  # the paper's λ: how much a larger overlap is worth
+LEAST_OVERLAP = 0.4  # lower end of the search, as in the paper
+EXPONENT = 2.0  # λ of the paper, the preference for a larger overlap
 
 
 def align(
@@ -20,10 +20,10 @@ def align(
     correspondence_distance: float = CORRESPONDENCE_DISTANCE,
     max_iterations: int = MAX_ITERATIONS,
 ) -> Outcome:
-    """Align the share `overlap` of the source that fits best; with 0, the share that fits best is searched too.
+    """Align the share `overlap` of the source that fits best; with 0, minimize over the share ξ too.
 
-    The search minimizes ψ(ξ) = e / ξ^(1+λ), e the mean square of the trimmed distances. No distance is too large for a
-    correspondence; `correspondence_distance` only measures the outcome.
+    The minimized objective is ψ(ξ) = e / ξ^(1+λ), e the mean square of the trimmed distances. `correspondence_distance`
+    does not limit correspondences; it only measures the outcome.
     """
 
     @cache

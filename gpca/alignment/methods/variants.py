@@ -1,7 +1,7 @@
 """The variants of ICP that Rusinkiewicz & Levoy (2001) compare: sampling, rejection, weighting, one at a time.
 
-All minimize distances to planes, as theirs do. The sign of normals counts: those of both clouds have to point to the
-same side of the surface (:func:`gpca.alignment.features.estimate_normals`).
+All minimize distances to planes, as theirs. Normals of both clouds have to point to the same side of the surface
+(:func:`gpca.alignment.features.estimate_normals`).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from gpca.settings import Bounds, PositiveShare
 Sampling = Literal["all", "random", "normal_space"]
 Criterion = Literal["none", "distance", "normals", "trimming"]
 Weighting = Literal["none", "distance", "normals"]
-DIRECTIONS = 64  # of normals, evenly over the sphere: about 25 degrees apart
+DIRECTIONS = 64  # bins of normals, evenly on the sphere: about 25 degrees apart
 
 
 def align(
@@ -35,15 +35,14 @@ def align(
     correspondence_distance: float = CORRESPONDENCE_DISTANCE,
     max_iterations: int = MAX_ITERATIONS,
 ) -> Outcome:
-    """Run one variant; with no sampling, rejection or weighting it is plain ICP.
+    """Run one variant; without sampling, rejection and weighting it is plain ICP.
 
     Args:
-        sampling: points at random, or evenly over the directions of their normals; drawn once per pair.
-        rejection: of distances beyond so many standard deviations above their mean (Masuda 1996), of normals at a
-            larger angle, or of the worst share (Pulli 1999).
+        sampling: random, or even over the directions of the normals; drawn once per pair.
+        rejection: of distances more than `deviations` standard deviations above their mean (Masuda 1996), of normals
+            at an angle above `angle_deg`, or of the `worst` share (Pulli 1999).
         weighting: 1 - d / d_max (Godin 1994), or the cosine between the normals.
         sampled: share of the source's points.
-        deviations, angle_deg, worst: the limits of the rejections.
     """
     stages = Stages(
         rows=_sample(pair, sampling, sampled),
@@ -61,7 +60,7 @@ def _sample(pair: Pair, sampling: Sampling, share: float) -> np.ndarray | None:
     random, points = generator("sampling", sampling, pair.seed), len(pair.source)
     order_N = random.permutation(points)
     if sampling == "normal_space":
-        # One point of each direction in turn, until there are enough: flat parts with many points get no more.
+        # One point of each direction in turn, so that flat parts get no more than others.
         direction_N = _direction(pair.normals("source"))[order_N]
         by_direction_N = np.argsort(direction_N, kind="stable")
         sizes_D = np.bincount(direction_N, minlength=DIRECTIONS)
@@ -72,7 +71,7 @@ def _sample(pair: Pair, sampling: Sampling, share: float) -> np.ndarray | None:
 
 
 def _direction(normals_N_3: np.ndarray) -> np.ndarray:
-    """Return the nearest of `DIRECTIONS` directions on a Fibonacci spiral, for each normal (N,)."""
+    """Index (N,) of the nearest of `DIRECTIONS` directions on a Fibonacci spiral."""
     d_D = np.arange(DIRECTIONS) + 0.5
     polar_D, azimuth_D = np.arccos(1 - 2 * d_D / DIRECTIONS), np.pi * (1 + 5**0.5) * d_D
     directions_D_3 = np.stack(

@@ -8,8 +8,7 @@ from typing import Literal
 import numpy as np
 
 from gpca.alignment.methods.interface import Outcome, Pair
-from gpca.alignment.rigid import inverse, rigid_motion, transform
-from gpca.alignment.twist import log
+from gpca.alignment.rigid import inverse, log, rigid_motion, transform
 from gpca.experiments.judge import Judge
 from gpca.objects.bop import symmetric_turn
 from gpca.pairs.distances import ObservedPair, describe_distances, describe_entropy

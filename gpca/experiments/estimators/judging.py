@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gpca.alignment.rigid import transform
-from gpca.alignment.twist import point_jacobians
+from gpca.alignment.rigid import point_jacobians, transform
 from gpca.experiments.estimators.covariances import JUDGED, covariance_columns
 from gpca.experiments.estimators.references import Reference
 from gpca.experiments.estimators.situations import EstimatedRow

@@ -18,8 +18,7 @@ import numpy as np
 from gpca.alignment.icp import ICPSettings
 from gpca.alignment.methods.interface import CORRESPONDENCE_DISTANCE, MAX_ITERATIONS, Pair
 from gpca.alignment.methods.registry import make_method
-from gpca.alignment.rigid import transform
-from gpca.alignment.twist import exp
+from gpca.alignment.rigid import exp, transform
 from gpca.causes.candidate import Candidate
 from gpca.causes.settings import FEWEST_POINTS
 from gpca.experiments.estimators.settings import Kind

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gpca.alignment.success import SuccessSettings, success_within
+from gpca.alignment.pose_error import SuccessSettings, success_within
 from gpca.errors import InputError
 from gpca.evaluation.intervals import Clustered, Estimate
 from gpca.evaluation.measures import ALL, intervals, source_method_seed

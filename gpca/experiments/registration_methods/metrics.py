@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gpca.alignment.success import SuccessSettings, success_within
+from gpca.alignment.pose_error import SuccessSettings, success_within
 from gpca.evaluation.measures import ALL, source_method_seed, tidy
 from gpca.io.csv_file import numbers, read_csv
 from gpca.pairs.perturbation import CONCEPTS, SEVERITIES

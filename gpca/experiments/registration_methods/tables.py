@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping
 from math import inf
 from typing import TYPE_CHECKING
 
-from gpca.alignment.success import success_within
+from gpca.alignment.pose_error import success_within
 from gpca.evaluation.measures import ALL
 from gpca.experiments.registration_methods.metrics import BINS, INITIAL, NO_START, POINTS, bin_name, row_name
 from gpca.objects.entry import stand_in_clause

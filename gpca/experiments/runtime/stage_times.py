@@ -14,7 +14,6 @@ from gpca.active_learning.acquisition import select
 from gpca.active_learning.rounds import LabelingTask, pool_of
 from gpca.active_learning.settings import ActiveLearningSettings
 from gpca.alignment.batched_icp import BatchedICP
-from gpca.alignment.canonical_frame import CanonicalFrame
 from gpca.alignment.icp import ICP
 from gpca.alignment.rigid import transform
 from gpca.attribution.scores import summarize_draws
@@ -22,6 +21,7 @@ from gpca.classifier.gpc import GPC
 from gpca.classifier.latents import Projection
 from gpca.model.explainer import Explainer
 from gpca.model.file import Model
+from gpca.objects.canonical_frame import CanonicalFrame
 
 STRATEGY = "bald_kmeans"  # of active learning, the paper's
 Result = TypeVar("Result")

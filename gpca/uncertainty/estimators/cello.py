@@ -13,7 +13,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gpca.alignment.twist import adjoint
+from gpca.alignment.rigid import adjoint
 from gpca.uncertainty.estimators.interface import (
     Estimator,
     Example,

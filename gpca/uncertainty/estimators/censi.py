@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gpca.alignment.twist import point_jacobians
+from gpca.alignment.rigid import point_jacobians
 from gpca.uncertainty.estimators.interface import (
     POINT_TO_POINT,
     EstimatorEntry,

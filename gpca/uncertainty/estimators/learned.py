@@ -13,7 +13,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gpca.alignment.twist import exp, log
+from gpca.alignment.rigid import exp, log
 from gpca.seeds import generator
 from gpca.uncertainty.estimators.cello import FEWEST_EXAMPLES, Reduction, along_axes, described, twists_along_axes
 from gpca.uncertainty.estimators.interface import (

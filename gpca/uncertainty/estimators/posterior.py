@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gpca.alignment.methods.interface import CORRESPONDENCE_DISTANCE
-from gpca.alignment.rigid import inverse
-from gpca.alignment.twist import exp, log
+from gpca.alignment.rigid import exp, inverse, log
 from gpca.uncertainty.estimators.interface import RegisteredPair
 
 SMALLEST_VARIANCE = 1e-10  # squared diameters: a cloud on itself has residuals of zero

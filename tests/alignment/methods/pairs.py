@@ -4,8 +4,7 @@ import numpy as np
 
 from gpca.alignment.methods.interface import Pair
 from gpca.alignment.pose_error import adds_error
-from gpca.alignment.rigid import inverse, transform
-from gpca.alignment.twist import exp
+from gpca.alignment.rigid import exp, inverse, transform
 from gpca.pairs.perturbation import PERTURBATIONS, Severities
 
 

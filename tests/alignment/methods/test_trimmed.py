@@ -5,8 +5,7 @@ import pytest
 
 from gpca.alignment.methods.interface import Pair
 from gpca.alignment.methods.registry import make_method
-from gpca.alignment.rigid import inverse, transform
-from gpca.alignment.twist import exp
+from gpca.alignment.rigid import exp, inverse, transform
 
 from .pairs import clouds
 

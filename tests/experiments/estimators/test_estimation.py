@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gpca.alignment.rigid import inverse, transform
-from gpca.alignment.twist import exp
+from gpca.alignment.rigid import exp, inverse, transform
 from gpca.causes.settings import CauseSettings
 from gpca.errors import InputError
 from gpca.experiments.estimators.covariances import COVARIANCE, covariance_of

@@ -8,8 +8,7 @@ import pytest
 
 from gpca.alignment.methods.interface import Pair
 from gpca.alignment.methods.registry import make_method
-from gpca.alignment.rigid import transform
-from gpca.alignment.twist import exp
+from gpca.alignment.rigid import exp, transform
 from gpca.causes.candidate import draw_candidate
 from gpca.causes.settings import CauseSettings
 from gpca.experiments.estimators.references import Redraws, draw_twists

@@ -10,8 +10,7 @@ from baselines.sensitivity import sa_local_additive
 from baselines.shap_kl import shap_over_knobs
 from gpca.alignment.methods import registry
 from gpca.alignment.methods.interface import FailedRegistration, MethodEntry
-from gpca.alignment.rigid import transform
-from gpca.alignment.twist import exp
+from gpca.alignment.rigid import exp, transform
 from gpca.attribution.scores import Attribution
 from gpca.errors import InputError
 from gpca.experiments.controls.rivals import Rival

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from gpca.alignment.rigid import best_motion, transform
-from gpca.alignment.twist import exp, log
+from gpca.alignment.rigid import best_motion, exp, log, transform
 from gpca.uncertainty.estimators.censi import estimate, hessian, mixed_derivatives
 from gpca.uncertainty.estimators.interface import FailedEstimate, Matches
 

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from gpca.alignment.rigid import transform
-from gpca.alignment.twist import exp
+from gpca.alignment.rigid import exp, transform
 from gpca.uncertainty.estimators import bayesian_icp, stein_icp
 from gpca.uncertainty.estimators.posterior import Posterior
 

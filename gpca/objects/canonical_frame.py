@@ -12,12 +12,12 @@ from gpca.objects.mesh_folder import meters_per
 from gpca.objects.surface import IN_CONFIG
 from gpca.seeds import generator
 
-MEASURED_POINTS = 10_000  # so many measure the frame of a larger cloud, since all of them may lie on its hull
+MEASURED_POINTS = 10_000  # at most, that determine the frame: all points of a cloud may lie on its hull
 
 
 @dataclass(frozen=True)
 class CanonicalFrame:
-    """Where the origin lies, the center of the upright bounding box, and the unit: the diameter."""
+    """The origin, the center of the axis-aligned bounding box, and the unit, the diameter."""
 
     center_3: np.ndarray
     diameter: float
@@ -29,7 +29,7 @@ class CanonicalFrame:
         """Measure the points (N, 3) of a target.
 
         Args:
-            subject, say: what the target is, and how its unit is given, for messages.
+            subject, say: the target and the place of its unit, for messages.
 
         Raises:
             InputError: too few points, NaN, points on one line, or a diameter that the unit does not give.
@@ -45,21 +45,21 @@ class CanonicalFrame:
         return (points - self.center_3) / self.diameter
 
     def pose_outside(self, T_b_a: np.ndarray) -> np.ndarray:
-        """Return a motion (4, 4) of this frame as one of the points that it was measured on."""
+        """Return a motion (4, 4) of this frame in the original frame and unit."""
         outside = T_b_a.copy()
         outside[:3, 3] = self.diameter * T_b_a[:3, 3] + self.center_3 - T_b_a[:3, :3] @ self.center_3
         return outside
 
 
 def require_cloud_points(points: np.ndarray, subject: object) -> None:
-    """Raise an InputError unless the points are (N, 3), finite, and no fewer than the encoders have seen."""
+    """Raise an InputError unless the points are (N, 3), finite, and enough for the encoders."""
     require_points(points, subject)
     if len(points) < FEWEST_CLOUD_POINTS:
         raise InputError(subject, f"has {len(points)} points", f"give {FEWEST_CLOUD_POINTS} or more")
 
 
 def thin(points: np.ndarray, most: int, *axes: object) -> np.ndarray:
-    """Return the points (N, 3), or `most` of them, drawn at random by the named axes."""
+    """Return the points (N, 3), or `most` of them drawn at random; the axes name the seed."""
     if len(points) <= most:
         return points
     return points[generator("thinned", *axes).choice(len(points), most, replace=False, shuffle=False)]
