@@ -1,1 +1,1 @@
-"""A new concept from few labels: acquisition, rounds of labeling, streams, learning curves."""
+"""Active learning of new concepts: acquisition, rounds of labeling, streams, learning curves."""

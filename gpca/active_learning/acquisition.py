@@ -1,7 +1,7 @@
-"""Which samples of a pool are worth a label: one function per strategy, found by name (paper Sec. III-C).
+"""Acquisition strategies by name: functions that pick the samples of a pool to label next (paper Sec. III-C).
 
 A strategy gets the pool, the batch size B and a random generator, and returns rows of the pool, best first. Entropy,
-margin, BADGE, CoreSet and TypiClust are scikit-activeml's; BALD needs no ensemble here, the GP's posterior is one.
+margin, BADGE, CoreSet and TypiClust are scikit-activeml's; BALD uses the GP's posterior instead of an ensemble.
 """
 
 from __future__ import annotations
@@ -14,18 +14,18 @@ import numpy as np
 from gpca.errors import require_known
 from gpca.plugins import joined_outside, module_outside
 
-EXPANSION = 4  # K: BALD with k-means forms clusters of K of the B·K most uncertain samples
+EXPANSION = 4  # K: BALD with k-means clusters the B·K most uncertain samples
 
 
 @dataclass(frozen=True)
 class Pool:
-    """N samples without a label, and the classifier's scores for them.
+    """N unlabeled samples and the classifier's scores.
 
     Attributes:
         h_N_d: embeddings, standardized.
         scores_N_C, bald_N: mean class probabilities (Eq. 4) and BALD in nats (Eq. 7).
-        h_labeled_L_d: embeddings of the samples with a label.
-        truth_N: the true classes, for strategies that are an upper bound.
+        h_labeled_L_d: embeddings of the labeled samples.
+        truth_N: true classes, for oracle strategies.
     """
 
     h_N_d: np.ndarray
@@ -37,13 +37,13 @@ class Pool:
 
 @dataclass(frozen=True)
 class Strategy:
-    """A strategy by name.
+    """A registered strategy.
 
     Attributes:
-        title: what tables and figures call it.
-        choose: called with pool, batch size and generator; may return fewer rows, or one twice.
-        oracle: whether it is told the truth about the pool.
-        needs_scores: whether it reads the classifier's scores of the pool.
+        title: title in tables and figures.
+        choose: called with pool, batch size and generator; may return fewer rows, or repeated ones.
+        oracle: whether it reads the true classes.
+        needs_scores: whether it reads the classifier's scores.
     """
 
     title: str
@@ -53,25 +53,25 @@ class Strategy:
 
 
 def strategies() -> dict[str, Strategy]:
-    """Return every strategy by name, those from outside included."""
+    """Return all strategies by name, including plugins."""
     return joined_outside("STRATEGIES", "strategy", Strategy, STRATEGIES)
 
 
 def strategy_module(name: str) -> str | None:
-    """Return the module from outside that lists the strategy; None of one of the suite's own."""
+    """Return the plugin module that lists the strategy; None for built-in strategies."""
     return module_outside("STRATEGIES", "strategy", Strategy, name)
 
 
 def require_strategy(name: str) -> Strategy:
-    """Return the strategy of that name; an unknown one raises an InputError that lists the known."""
+    """Return a strategy by name; an InputError for an unknown name."""
     require_known("strategy", name, strategies())
     return strategies()[name]
 
 
 def select(name: str, pool: Pool, batch: int, random: np.random.Generator) -> np.ndarray:
-    """Return `batch` different rows of the pool, all where it has no more.
+    """Return `batch` different rows of the pool, or all if there are fewer.
 
-    Where a strategy names too few, as some do among identical embeddings, the rest is drawn at random.
+    If a strategy returns too few, as some do for identical embeddings, the others are drawn at random.
     """
     strategy = require_strategy(name)
     wanted = min(batch, len(pool.h_N_d))
@@ -83,7 +83,7 @@ def select(name: str, pool: Pool, batch: int, random: np.random.Generator) -> np
 
 
 def top(values_N: np.ndarray, n: int) -> np.ndarray:
-    """Return the rows of the n largest values, largest first, the first of equals."""
+    """Return the rows of the n largest values, largest first; ties in order."""
     return np.argsort(-values_N, kind="stable")[:n]
 
 
@@ -93,14 +93,14 @@ def random_rows(pool: Pool, batch: int, random: np.random.Generator) -> np.ndarr
 
 
 def random_stratified(pool: Pool, batch: int, random: np.random.Generator) -> np.ndarray:
-    """Draw as many of each true class as can be: what random drawing does with luck."""
+    """Draw equally many of each true class, as far as possible."""
     order = random.permutation(len(pool.h_N_d))
-    place_N = np.empty(len(order))  # each row's place within its class, in random order
+    rank_N = np.empty(len(order))  # of each row within its class, in random order
     for name in np.unique(pool.truth_N):
-        of_class = order[pool.truth_N[order] == name]
-        place_N[of_class] = np.arange(len(of_class))
+        rows = order[pool.truth_N[order] == name]
+        rank_N[rows] = np.arange(len(rows))
     tie_N = random.permutation(len(order))
-    return np.lexsort([tie_N, place_N])[:batch]
+    return np.lexsort([tie_N, rank_N])[:batch]
 
 
 def entropy(pool: Pool, batch: int, _random: np.random.Generator) -> np.ndarray:
@@ -123,9 +123,9 @@ def bald(pool: Pool, batch: int, _random: np.random.Generator) -> np.ndarray:
 
 
 def bald_kmeans(pool: Pool, batch: int, random: np.random.Generator) -> np.ndarray:
-    """Cluster the B·K largest BALD into B clusters of K each and take the sample nearest to each centroid (Sec. III-C).
+    """Cluster the B·K samples of largest BALD into B clusters of K, and take the one nearest to each centroid.
 
-    The most uncertain of these comes first.
+    The most uncertain of these comes first (Sec. III-C).
     """
     candidates = top(pool.bald_N, batch * EXPANSION)
     h_n_d = pool.h_N_d[candidates]
@@ -138,22 +138,22 @@ def bald_kmeans(pool: Pool, batch: int, random: np.random.Generator) -> np.ndarr
 def balanced_kmeans(
     h_n_d: np.ndarray, clusters: int, random: np.random.Generator, most: int = 100
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the cluster (n,) of each sample and the centroids (B, d); sizes of clusters differ by one at most.
+    """Balanced k-means: assign equally many samples to each centroid at the least cost (Malinen and Fränti 2014).
 
-    K-means in which the assignment to the centroids is the cheapest one with as many samples in each cluster
-    (Malinen and Fränti 2014). It ends after `most` passes at the latest.
+    Returns:
+        Cluster (n,) of each sample, and centroids (B, d).
     """
-    from scipy.optimize import linear_sum_assignment  # here, because the workflow imports this file only for the names
+    from scipy.optimize import linear_sum_assignment  # here: planning reads names only
     from scipy.spatial.distance import cdist
     from sklearn.cluster import kmeans_plusplus
 
     h_n_d = h_n_d.astype(float)
     centers_B_d, _ = kmeans_plusplus(h_n_d, clusters, random_state=int(random.integers(2**31)))
-    place_n = np.arange(len(h_n_d)) % clusters  # of each place, its cluster
+    slot_n = np.arange(len(h_n_d)) % clusters  # cluster of each slot
     cluster_n = np.full(len(h_n_d), -1)
     for _ in range(most):
-        _, assigned_n = linear_sum_assignment(cdist(h_n_d, centers_B_d, "sqeuclidean")[:, place_n])
-        before_n, cluster_n = cluster_n, place_n[assigned_n]
+        _, assigned_n = linear_sum_assignment(cdist(h_n_d, centers_B_d, "sqeuclidean")[:, slot_n])
+        before_n, cluster_n = cluster_n, slot_n[assigned_n]
         if np.array_equal(before_n, cluster_n):
             break
         centers_B_d = np.stack([h_n_d[cluster_n == cluster].mean(axis=0) for cluster in range(clusters)])
@@ -161,19 +161,19 @@ def balanced_kmeans(
 
 
 def bald_stochastic(pool: Pool, batch: int, random: np.random.Generator) -> np.ndarray:
-    """Draw without replacement with probability proportional to BALD: PowerBALD (Kirsch et al. 2023), β = 1.
+    """Draw without replacement in proportion to BALD: PowerBALD (Kirsch et al. 2023), β = 1, by Gumbel top-k.
 
-    By the Gumbel-top-k trick; as good as BatchBALD in their comparison, without its joint entropies.
+    It equals BatchBALD in their comparison, without joint entropies.
     """
     return top(np.log(np.maximum(pool.bald_N, 1e-12)) + random.gumbel(size=len(pool.bald_N)), batch)
 
 
 def badge(pool: Pool, batch: int, random: np.random.Generator) -> np.ndarray:
-    """Run k-means++ over the gradients of the last layer for the predicted label (Ash et al. 2020)."""
+    """k-means++ over the gradients of the last layer for the predicted label (Ash et al. 2020)."""
     from skactiveml.base import SkactivemlClassifier
     from skactiveml.pool import Badge
 
-    class Scored(SkactivemlClassifier):  # BADGE asks a classifier for probabilities; ours are known already
+    class Scored(SkactivemlClassifier):  # BADGE asks a classifier for probabilities
         def fit(self, *_data):
             return self
 
@@ -186,26 +186,26 @@ def badge(pool: Pool, batch: int, random: np.random.Generator) -> np.ndarray:
 
 
 def coreset(pool: Pool, batch: int, random: np.random.Generator) -> np.ndarray:
-    """Take the samples farthest from everything labeled, one after the other (Sener & Savarese 2018)."""
+    """Take the samples farthest from all labeled ones, one after the other (Sener & Savarese 2018)."""
     from skactiveml.pool import CoreSet
 
     return _with_labeled(CoreSet(random_state=int(random.integers(2**31))), pool, batch)
 
 
 def typiclust(pool: Pool, batch: int, random: np.random.Generator) -> np.ndarray:
-    """Take the most typical sample of each of the largest clusters without a label (Hacohen et al. 2022)."""
+    """Take the most typical sample of each of the largest unlabeled clusters (Hacohen et al. 2022)."""
     from skactiveml.pool import TypiClust
 
-    options = {"n_init": 1, "max_iter": 20, "init": "random"}  # k-means++ of that many clusters takes all the time
+    options = {"n_init": 1, "max_iter": 20, "init": "random"}  # k-means++ would dominate the runtime
     strategy = TypiClust(random_state=int(random.integers(2**31)), cluster_algo_dict=options)
     try:
         return _with_labeled(strategy, pool, batch)
-    except UnboundLocalError:  # scikit-activeml 1.0.1 raises it where every cluster holds a labeled sample
+    except UnboundLocalError:  # scikit-activeml 1.0.1 raises it if every cluster has a labeled sample
         return np.array([], dtype=int)
 
 
 def _with_labeled(strategy, pool: Pool, batch: int) -> np.ndarray:
-    """Query a strategy that reads the positions of the labeled samples, not their labels."""
+    """Query a strategy that reads the embeddings of the labeled samples, not their labels."""
     labels = np.concatenate([np.full(len(pool.h_N_d), np.nan), np.zeros(len(pool.h_labeled_L_d))])
     return strategy.query(np.concatenate([pool.h_N_d, pool.h_labeled_L_d]), labels, batch_size=batch)
 

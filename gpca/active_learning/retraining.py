@@ -1,6 +1,6 @@
-"""Learning a new concept as the paper describes it: every round fits the classifier to all labels (Sec. III-C, IV-C).
+"""Learning a new concept with a full fit of the classifier in every round, as in the paper (Sec. III-C, IV-C).
 
-In :mod:`gpca.active_learning.rounds` further labels move the posterior alone, which takes a hundredth of the time.
+In :mod:`gpca.active_learning.rounds`, labels only update the posterior, which takes a hundredth of the time.
 """
 
 from __future__ import annotations
@@ -22,15 +22,14 @@ Step = dict[str, float]
 
 
 class Retraining:
-    """Classifiers of the labels that were given so far.
+    """Fits classifiers on growing sets of labels.
 
     Args:
-        task: the start, pool and test samples, not projected.
-        settings: of the classifier.
-        axes: the names of the draws.
-        warm: whether a fit starts from what the one before learned, and not anew.
-        sees_pool: whether inputs are scaled, and inducing inputs and lengthscale start, by the pool too, or by the
-            labeled samples alone.
+        task: initial, pool and test samples, not projected.
+        settings: training of the classifier.
+        axes: names of the draws.
+        warm: whether a fit continues from the last one.
+        sees_pool: whether scaling, inducing inputs and lengthscale are initialized on the pool too.
     """
 
     def __init__(
@@ -48,11 +47,10 @@ class Retraining:
         self._sees_pool = sees_pool
 
     def fit(self, queried: Sequence[int], before: GPC | None) -> GPC:
-        """Return the classifier of the start's labels and those of these rows of the pool.
+        """Return the classifier of the initial labels and of these rows of the pool.
 
         Args:
-            queried: rows of the pool.
-            before: the classifier before the last of them were given; it is not changed.
+            before: the last classifier; it is not changed.
         """
         [(_, gpc)] = self.fit_up_to([self.settings.iterations], queried, before)
         return gpc
@@ -60,7 +58,7 @@ class Retraining:
     def fit_up_to(
         self, iterations: Iterable[int], queried: Sequence[int], before: GPC | None
     ) -> Iterator[tuple[int, GPC]]:
-        """Yield each of these counts in rising order, and the classifier after so many passes over the labels."""
+        """Yield each number of passes over the labels, in rising order, and the classifier after it."""
         initial, pool = self.task.initial, self.task.pool
         rows = list(queried)
         h_L_d = np.concatenate([initial.h, pool.h[rows]])
@@ -72,26 +70,26 @@ class Retraining:
             yield done, gpc
 
     def passes(self, target: float, queried: Sequence[int], before: GPC | None) -> int:
-        """Return the passes, a multiple of `LOOK_EVERY` or all, after which the classifier is first that accurate."""
+        """Return the number of passes, a multiple of `LOOK_EVERY` or all, that first reaches this accuracy."""
         most = self.settings.iterations
         counts = [*range(LOOK_EVERY, most, LOOK_EVERY), most]
         fits = self.fit_up_to(counts, queried, before)
         return next((done for done, gpc in fits if self.look(gpc, queried)["accuracy"] >= target), most)
 
     def look(self, gpc: GPC, queried: Sequence[int]) -> Step:
-        """Return the step of a learning curve after these labels (:func:`gpca.active_learning.rounds.run_rounds`)."""
+        """Return the step after these labels, see :func:`gpca.active_learning.rounds.run_rounds`."""
         return step_of(self.task, gpc, list(queried), self.settings.iterations if queried else 0)
 
 
 @dataclass(frozen=True)
 class Learned:
-    """A learning curve, and the rows of the pool in the order in which they were labeled."""
+    """A learning curve, and the rows of the pool in the order of their labels."""
 
     steps: list[Step]
     queried: list[int]
 
     def labels_to(self, target: float) -> list[int]:
-        """Return the rows that were labeled until the target was reached, or all of them."""
+        """Return the rows labeled until the target was reached, or all."""
         labels = next((int(step["labels"]) for step in self.steps if step["accuracy"] >= target), len(self.queried))
         return self.queried[:labels]
 
@@ -99,18 +97,15 @@ class Learned:
 def learn(
     retraining: Retraining, strategy: str, settings: RetrainingSettings, targets: Sequence[float], *axes: object
 ) -> Learned:
-    """Spend labels by one strategy until all targets are reached, and `settings.least` at least.
+    """Spend labels with one strategy until all targets are reached, and at least `settings.least`.
 
-    In a round that reaches a target first, its labels are also learned one by one, so that they are counted exactly;
-    where a strategy ranks them, the most uncertain comes first.
+    In a round that first reaches a target, labels are also added one by one, to count them exactly; if the strategy
+    ranks them, the most uncertain comes first.
 
     Args:
-        retraining: the classifiers.
-        strategy: by name.
-        settings: of the rounds.
-        targets: accuracies on the test samples, at each of which the curve has a step. With a single one, ``epochs`` of
-            that step are the passes up to the target, not those of the whole retraining.
-        axes: the names of the strategy's draws.
+        targets: accuracies on the test samples; the curve has a step at each. With a single one, ``epochs`` of that
+            step are the passes up to the target instead of those of the whole retraining.
+        axes: names of the strategy's draws.
     """
     task = retraining.task
     random = generator(*axes, "retraining", task.held_out, strategy)
@@ -129,11 +124,11 @@ def learn(
         before, gpc = gpc, retraining.fit(queried + chosen, gpc)
         last = retraining.look(gpc, queried + chosen)
         reached = [target for target in open_targets if last["accuracy"] >= target]
-        of_round = [*_first_at(retraining, reached, queried, chosen, before), last]
+        added = [*_first_at(retraining, reached, queried, chosen, before), last]
         if len(targets) == 1 and reached:
-            rows = queried + chosen[: int(of_round[0]["labels"]) - len(queried)]
-            of_round[0]["epochs"] = retraining.passes(targets[0], rows, before)
-        steps += of_round
+            rows = queried + chosen[: int(added[0]["labels"]) - len(queried)]
+            added[0]["epochs"] = retraining.passes(targets[0], rows, before)
+        steps += added
         queried += chosen
         open_targets = [target for target in open_targets if target not in reached]
     return Learned(steps, queried)
@@ -142,7 +137,7 @@ def learn(
 def _first_at(
     retraining: Retraining, targets: Sequence[float], queried: list[int], chosen: list[int], before: GPC
 ) -> Iterator[Step]:
-    """Yield the steps within a round, which reaches these targets, at which one is reached first."""
+    """Yield the steps within a round at which one of these targets, which it reaches, is first reached."""
     missing = sorted(targets)
     for given in range(1, len(chosen)):
         if not missing:

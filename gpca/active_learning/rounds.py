@@ -1,12 +1,12 @@
-"""Learning a concept that the classifier has never seen from few labels (paper Sec. III-C and IV-C).
+"""Learning a new concept from few labels (paper Sec. III-C and IV-C).
 
-A GPC that knows two concepts meets a pool with all three. In rounds, a strategy picks B samples, their labels join the
-labeled ones and the GPC is retrained; its accuracy on the test samples over the labels spent is the learning curve.
+A GPC trained on the other concepts gets a pool with all. In rounds, a strategy picks B samples, their labels are added
+and the GPC is retrained; the learning curve is its accuracy on the test samples over the number of labels.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from copy import copy
 from dataclasses import dataclass
 from typing import Generic, TypeVar
@@ -14,7 +14,7 @@ from typing import Generic, TypeVar
 import numpy as np
 
 from gpca.active_learning.acquisition import Pool, require_strategy, select
-from gpca.active_learning.settings import ActiveLearningSettings
+from gpca.active_learning.settings import ALL_LABELS, ActiveLearningSettings
 from gpca.classifier.gpc import GPC
 from gpca.classifier.latents import Projection
 from gpca.errors import InputError
@@ -25,23 +25,18 @@ from gpca.seeds import generator
 
 @dataclass(frozen=True)
 class Embedded:
-    """S samples.
-
-    Attributes:
-        embedding: (S, d).
-        concept, split: (S,) label, and ``train`` or ``test``.
-    """
+    """S samples: embedding (S, d), concept (S,) and split (S,), ``train`` or ``test``."""
 
     embedding: np.ndarray
     concept: np.ndarray
     split: np.ndarray
 
     def rows(self, split: str) -> np.ndarray:
-        """Return the row numbers of a split."""
+        """Return the rows of a split."""
         return np.flatnonzero(self.split == split)
 
     def followed_by(self, other: Embedded) -> Embedded:
-        """Return these samples and those of the other after them."""
+        """Append other samples."""
         return Embedded(
             np.concatenate([self.embedding, other.embedding]),
             np.concatenate([self.concept, other.concept]),
@@ -54,7 +49,7 @@ Inputs = TypeVar("Inputs", np.ndarray, Projection)
 
 @dataclass(frozen=True)
 class Samples(Generic[Inputs]):
-    """N embeddings (N, d), later their :class:`Projection`, and their concepts (N,)."""
+    """N embeddings (N, d), or their :class:`Projection`, and their concepts (N,)."""
 
     h: Inputs
     concept_N: np.ndarray
@@ -65,7 +60,7 @@ class Samples(Generic[Inputs]):
 
 @dataclass(frozen=True)
 class LabelingTask(Generic[Inputs]):
-    """The start of one experiment: the concept held out, labeled samples of the others, pool and test samples."""
+    """A held-out concept, initial labeled samples of the others, pool and test samples."""
 
     held_out: str
     initial: Samples
@@ -73,7 +68,7 @@ class LabelingTask(Generic[Inputs]):
     test: Samples
 
     def project(self, gpc: GPC) -> LabelingTask[Projection]:
-        """Return the task with every embedding as the GPC's covariance sees it."""
+        """Project every embedding to the inputs of the GPC's covariance."""
         parts = (Samples(gpc.project(part.h), part.concept_N) for part in (self.initial, self.pool, self.test))
         return LabelingTask(self.held_out, *parts)
 
@@ -86,33 +81,31 @@ def make_task(
     classes: tuple[str, ...] = CONCEPTS,
     new_share: float | None = None,
 ) -> LabelingTask[np.ndarray]:
-    """Split the training samples into those labeled at the start and the pool, which holds all the rest.
+    """Split the training samples into initial labeled samples and the pool of all others.
 
     Args:
-        samples: they carry their embeddings.
-        held_out: the concept of which no sample is labeled at the start.
+        held_out: concept without initial labels.
         axes: names of the draw (source, seed).
-        classes: all concepts; the start has equally many samples of each known one.
-        new_share: share, below 1, of the pool that is of that concept, or as much of it as there is; by default all of
-            its training samples are in the pool.
+        classes: all concepts; the others have equally many initial samples.
+        new_share: share (below 1) of the held-out concept in the pool, if there are enough samples; None keeps all.
 
     Raises:
         InputError: too few training samples.
     """
     train = generator(*axes, "initial", held_out).permutation(samples.rows("train"))
     concept_S = samples.concept
-    known = [concept for concept in classes if concept != held_out]
-    each = settings.initial // len(known)
-    initial = np.concatenate([train[concept_S[train] == concept][:each] for concept in known])
+    others = [concept for concept in classes if concept != held_out]
+    each = settings.initial // len(others)
+    initial = np.concatenate([train[concept_S[train] == concept][:each] for concept in others])
     pool = np.setdiff1d(train, initial)
     new = pool[concept_S[pool] == held_out]
     if new_share is not None:
         kept = round((len(pool) - len(new)) * new_share / (1 - new_share))
         new_kept = generator(*axes, "rare", held_out).permutation(new)[:kept]
         pool, new = np.setdiff1d(pool, np.setdiff1d(new, new_kept)), new_kept
-    if len(initial) < each * len(known) or len(pool) == len(new) or not len(new):
+    if len(initial) < each * len(others) or len(pool) == len(new) or not len(new):
         raise InputError(
-            f"active learning with {settings.initial} labeled samples of {' and '.join(known)}",
+            f"active learning with {settings.initial} labeled samples of {' and '.join(others)}",
             f"leaves none of {len(train)} training samples for the pool",
             f"lower active_learning.initial or raise {'registrations' if classes == CONCEPTS else 'causes'}.train",
         )
@@ -123,10 +116,10 @@ def make_task(
 def initial_gpc(
     task: LabelingTask[np.ndarray], settings: ActiveLearningSettings, *axes: object, classes: tuple[str, ...] = CONCEPTS
 ) -> GPC:
-    """Fit the GPC that knows all of its concepts but one.
+    """Fit the GPC on the initial labels.
 
-    Scaling, inducing inputs and lengthscale are initialized on the unlabeled pool too: it lies open, and inducing
-    inputs at the labeled samples alone would leave none where the new concept is.
+    Scaling, inducing inputs and lengthscale are initialized on the unlabeled pool too; otherwise, no inducing input
+    would be near the new concept.
     """
     gpc = GPC(classes, settings.gpc, *axes, "active_learning", task.held_out)
     around = np.concatenate([task.initial.h, task.pool.h])
@@ -143,18 +136,17 @@ def run_rounds(
     *axes: object,
     answers_N: np.ndarray | None = None,
 ) -> list[dict[str, float]]:
-    """Spend the budget by one strategy.
+    """Spend the budget of labels with one strategy.
 
     Args:
         task: projected by `gpc`.
-        gpc: what :func:`initial_gpc` returns; it is not changed.
-        axes: the names of the draws (source, seed, …).
-        answers_N: the oracle's answer for each sample of the pool; the truth by default.
+        gpc: result of :func:`initial_gpc`; it is not changed.
+        axes: names of the draws (source, seed, …).
+        answers_N: the oracle's answers for the pool; by default, the truth.
 
     Returns:
-        a step per round, the first before any label: ``labels`` spent, ``new_labels`` of the concept held out,
-        ``accuracy`` on all test samples, ``accuracy_new`` on those of the concept held out, and ``epochs`` of the
-        retraining.
+        One step per round, the first before any label: ``labels``, ``new_labels`` of the held-out concept, ``accuracy``
+        on all test samples, ``accuracy_new`` on those of the held-out concept, and ``epochs`` of the retraining.
     """
     return [step for step, _ in rounds(task, gpc, strategy, settings, *axes, answers_N=answers_N)]
 
@@ -167,7 +159,7 @@ def rounds(
     *axes: object,
     answers_N: np.ndarray | None = None,
 ) -> Iterator[tuple[dict[str, float], list[int]]]:
-    """Yield each step of :func:`run_rounds` as it is made, and the rows of the pool that were labeled so far."""
+    """Yield each step of :func:`run_rounds`, and the rows of the pool labeled so far."""
     random = generator(*axes, "active_learning", task.held_out, strategy)
     gpc = copy(gpc)
     answers_N = task.pool.concept_N if answers_N is None else answers_N
@@ -186,7 +178,7 @@ def rounds(
 def pool_of(
     task: LabelingTask[Projection], gpc: GPC, left: np.ndarray, queried: list[int], needs_scores: bool = True
 ) -> Pool:
-    """Return the pool of a strategy: the rows `left`, and the scores and BALD that the GPC gives them."""
+    """Return the rows `left` of the pool with the GPC's scores and BALD, as a strategy reads them."""
     h = task.pool.h[left]
     if needs_scores:
         scores_N_C, _, bald_N = gpc.attribute(h)
@@ -198,7 +190,7 @@ def pool_of(
 
 
 def step_of(task: LabelingTask, gpc: GPC, queried: list[int], epochs: int) -> dict[str, float]:
-    """Return a step of :func:`run_rounds`, after the labels of these rows of the pool are known."""
+    """Return a step of :func:`run_rounds` after the labels of these rows of the pool."""
     accuracy, accuracy_new = accuracies(task, gpc)
     return {
         "labels": len(queried),
@@ -210,11 +202,85 @@ def step_of(task: LabelingTask, gpc: GPC, queried: list[int], epochs: int) -> di
 
 
 def accuracies(task: LabelingTask, classifier) -> tuple[float, float]:
-    """Return the accuracy over all test samples and over those of the concept held out; NaN where there are none.
+    """Return the accuracy on all test samples and on those of the held-out concept; NaN if there are none.
 
-    The classifier is a GPC, or another object with its ``classes`` and ``scores``.
+    Args:
+        classifier: a GPC, or another object with ``classes`` and ``scores``.
     """
     scores_N_C = classifier.scores(task.test.h)
     right_N = np.array(classifier.classes)[scores_N_C.argmax(axis=1)] == task.test.concept_N
     new_N = task.test.concept_N == task.held_out
     return float(right_N.mean()), float(right_N[new_N].mean()) if new_N.any() else float("nan")
+
+
+def answers(concept_N: np.ndarray, classes: tuple[str, ...], share: float, *axes: object) -> np.ndarray:
+    """Return an oracle's answers for N samples, some of them wrong.
+
+    Errors are drawn once for all shares, so that an oracle with more errors repeats those of a better one.
+
+    Args:
+        concept_N: the truth.
+        classes: possible answers.
+        share: share of wrong answers.
+        axes: names of the draw.
+    """
+    random = generator(*axes, "oracle")
+    order = random.permutation(len(concept_N))
+    steps_N = random.integers(1, len(classes), size=len(concept_N))
+    wrong = order[: round(share * len(concept_N))]
+    answer_N = np.array([classes.index(concept) for concept in concept_N], int)
+    answer_N[wrong] = (answer_N[wrong] + steps_N[wrong]) % len(classes)
+    return np.array(classes)[answer_N]
+
+
+@dataclass(frozen=True)
+class NewConceptTrial:
+    """A new concept in one embedding.
+
+    Attributes:
+        embedding: name of the embedding.
+        samples: the embedded samples.
+        held_out: the new concept.
+        classes: all concepts.
+        errors: shares of wrong answers of further oracles, besides one without errors.
+    """
+
+    embedding: str
+    samples: Embedded
+    held_out: str
+    classes: tuple[str, ...]
+    errors: tuple[float, ...] = ()
+
+
+def setting_of(embedding: str, errors: float) -> str:
+    """Return the name of an embedding and of an oracle with a share of errors, for a file of curves."""
+    return f"{embedding}_errors_{round(100 * errors)}" if errors else embedding
+
+
+def run_trial(
+    trial: NewConceptTrial, strategies: Iterable[str], settings: ActiveLearningSettings, *axes: object
+) -> Iterator[tuple[str, str, list[dict[str, float]]]]:
+    """Yield setting, strategy and learning curve of each run (:func:`run_rounds`).
+
+    Start, pool and the strategies' draws are equal for all oracles. `ALL_LABELS` uses the oracle without errors.
+    """
+    held_out, classes = trial.held_out, trial.classes
+    task = make_task(trial.samples, held_out, settings, *axes, classes=classes)
+    axes = (*axes, trial.embedding)
+    gpc = initial_gpc(task, settings, *axes, classes=classes)
+    projected = task.project(gpc)
+    for errors in (0.0, *trial.errors):
+        answers_N = answers(task.pool.concept_N, classes, errors, *axes, held_out)
+        for strategy in strategies:
+            if strategy != ALL_LABELS:
+                curve = run_rounds(projected, gpc, strategy, settings, *axes, answers_N=answers_N)
+            elif not errors:
+                # The classifier is fitted again on all labels, as the limit of what labels can give.
+                h_L_d = np.concatenate([task.initial.h, task.pool.h])
+                labels_L = np.concatenate([task.initial.concept_N, task.pool.concept_N])
+                full = GPC(classes, settings.gpc, *axes, ALL_LABELS, held_out).fit(h_L_d, labels_L)
+                last = step_of(task.project(full), full, list(range(len(task.pool))), settings.gpc.iterations)
+                curve = [step_of(projected, gpc, [], epochs=0), last]
+            else:
+                continue
+            yield setting_of(trial.embedding, errors), strategy, curve

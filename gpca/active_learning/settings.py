@@ -1,4 +1,4 @@
-"""Settings of active learning, in rounds and on a stream, kept apart from its code: nothing here needs torch."""
+"""Settings of active learning, without torch."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from gpca.settings import Bounds, Count, Distinct, OpenShare, PositiveShare, fie
 
 @dataclass(frozen=True)
 class ActiveLearningSettings:
-    """How the rounds go; the same for every strategy.
+    """Rounds of labeling, equal for every strategy.
 
     Attributes:
-        initial: labeled samples of the known concepts before the first query, balanced.
-        labels: L, the budget of queries.
+        initial: number of initial labels of the other concepts, balanced.
+        labels: L, the budget.
         batch: B, labels per round.
-        iterations, tolerance: the most passes over the labels in a retraining, and when it ends before.
-        gpc: the classifier that knows two concepts; its kernel and inducing inputs stay from then on.
+        iterations, tolerance: largest number of passes over the labels in a retraining, and its convergence.
+        gpc: the initial classifier; its kernel and inducing inputs are kept.
     """
 
     initial: Annotated[int, Bounds(minimum=2)] = 120
@@ -31,23 +31,23 @@ class ActiveLearningSettings:
 
     @classmethod
     def from_dict(cls, section: dict) -> ActiveLearningSettings:
-        """Build from the config's section ``active_learning``, of which other parts read the rest."""
-        own = fields_of(section, cls)
-        return cls(**own | ({"gpc": GPCSettings(**own["gpc"])} if "gpc" in own else {}))
+        """Build from the config's section ``active_learning``, which also has other keys."""
+        fields = fields_of(section, cls)
+        return cls(**fields | ({"gpc": GPCSettings(**fields["gpc"])} if "gpc" in fields else {}))
 
 
-LOOK_EVERY = 5  # passes over the labels between looks at the accuracy, where those up to a target are counted
+LOOK_EVERY = 5  # passes over the labels between evaluations, when passes up to a target are counted
 
 
 @dataclass(frozen=True)
 class RetrainingSettings:
-    """How the rounds go in which a classifier is fitted to all labels, as in the paper.
+    """Rounds of labeling with a full fit of the classifier, as in the paper.
 
     Attributes:
-        labels: the budget of queries, of a pool that may hold fewer.
-        least: labels that are given even where the target is reached before; from then on a round has `late_batch`.
+        labels: the budget; the pool may be smaller.
+        least: least number of labels, even if the target is reached earlier; later rounds have `late_batch`.
         batch, late_batch: B, labels per round.
-        gpc: the classifier; by default the paper's.
+        gpc: the classifier; by default, the paper's.
     """
 
     labels: Count = 60
@@ -59,11 +59,11 @@ class RetrainingSettings:
 
 @dataclass(frozen=True)
 class RareSettings(RetrainingSettings):
-    """The same of a concept that is rare in the pool.
+    """Rounds of labeling for a concept that is rare in the pool.
 
     Attributes:
-        shares: of the pool that is of that concept, each in a run of its own.
-        beside_seeds: how many of the run's seeds, from the first, have more than the first share; null: all.
+        shares: shares of the concept in the pool, one run each.
+        beside_seeds: number of seeds with more than the first share; null: all.
     """
 
     shares: Distinct[OpenShare] = (0.05,)
@@ -74,20 +74,20 @@ JUDGED_SHARE = 0.05  # the paper's numbers are compared with the run of this sha
 
 
 def rare_setting(share: float) -> str:
-    """Return the name of that run in a file of curves: ``rare_5`` for a share of 0.05."""
+    """Return the setting's name in a file of curves, such as ``rare_5`` for a share of 0.05."""
     return f"rare_{100 * share:g}"
 
 
 @dataclass(frozen=True)
 class StreamSettings:
-    """How samples arrive and how many labels may be asked for.
+    """Arrivals of a stream and its budget of labels.
 
     Attributes:
         arrivals: length of the stream.
-        quiet: arrivals before the first of the new concept; after them it is a third of what arrives.
-        budget: share of the arrivals that may be asked about; a threshold keeps to it on average.
-        window: arrivals whose BALD sets the threshold, and over which the running accuracy is taken.
-        every: arrivals between two rows of the result.
+        quiet: number of arrivals before the new concept, which is a third of the later ones.
+        budget: share of labeled arrivals, on average.
+        window: number of arrivals for the threshold on BALD and for the running accuracy.
+        every: arrivals per row of the result.
     """
 
     arrivals: Annotated[int, Bounds(minimum=2)] = 300
@@ -97,9 +97,9 @@ class StreamSettings:
     every: Count = 10
 
 
-ALL_LABELS = "all_labels"  # of the pool, at once: what labels can give at most
+ALL_LABELS = "all_labels"  # the whole pool at once, an upper bound
 NEW_CONCEPT_STRATEGIES = ("bald_kmeans", "random", ALL_LABELS)
-FROM_OTHERS = {  # embeddings by encoders of other jobs -> what there has to be
+FROM_OTHERS = {  # embeddings by encoders of other jobs, and what they require
     "other_samples": "two seeds or more",
     "other_source": "two sources or more",
 }
@@ -109,18 +109,18 @@ NewCause = Literal["nominal", "geometry"]
 
 @dataclass(frozen=True)
 class NewConceptSettings:
-    """Settings for learning a concept where no encoder has seen the samples, or the concept, before.
+    """New concepts that no encoder was trained on.
 
     Attributes:
-        seeds: the first so many of the run's.
-        embeddings: of the samples: by an encoder that learned from other samples of the same source, or from another
-            source; or the descriptors of the pair.
-        errors: shares of the oracle's answers that are wrong.
-        erring: embeddings with which such an oracle is asked.
-        points: drawn from each cloud to describe a pair.
-        causes: new concepts where the truth is measured: that nothing is wrong, or that the shape cannot hold the pose.
-        geometry_train, geometry_test: samples of the latter, drawn beside those of the other causes, at most.
-        geometry_candidates: drawn for them in each split, at most.
+        seeds: number of the run's seeds, from the first.
+        embeddings: by an encoder trained on other samples of the source, or on another source; or descriptors of the
+            pair.
+        errors: shares of wrong answers of the oracle.
+        erring: embeddings for which these oracles are asked.
+        points: points per cloud for the descriptors.
+        causes: new concepts with measured truth: nominal, or a shape that cannot hold the pose.
+        geometry_train, geometry_test: largest number of samples of the latter, beside those of the other causes.
+        geometry_candidates: largest number of candidates for them per split.
     """
 
     seeds: Count = 3

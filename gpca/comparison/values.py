@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.active_learning.metrics import CENSORED_BY
+from gpca.active_learning.curves import CENSORED_BY
 from gpca.attribution.metrics import PREDICTED_AS
 from gpca.attribution.predictions import read_predictions
 from gpca.comparison.published import UNITS, Counterpart, Number

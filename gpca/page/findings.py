@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.active_learning.metrics import TABLE
+from gpca.active_learning.curves import TABLE
 from gpca.active_learning.settings import JUDGED_SHARE, rare_setting
 from gpca.evaluation.intervals import UNTRAINED
 from gpca.evaluation.measures import ALL, read_metrics

@@ -3,7 +3,7 @@ import pytest
 from scipy.optimize import minimize
 from scipy.special import log_softmax, softmax
 
-from gpca.active_learning.stream_learners import BayesianLayer
+from gpca.active_learning.stream_models import BayesianLayer
 
 RANDOM = np.random.default_rng(0)
 X_N_D = RANDOM.normal(size=(40, 3))

@@ -3,8 +3,16 @@ import math
 import pandas as pd
 import pytest
 
-from gpca.active_learning.curves import POOL_COLUMNS, STREAM_COLUMNS, read_curves, write_curves
-from gpca.active_learning.metrics import area_under_curve, collect_curves, pool_metrics, stream_metrics
+from gpca.active_learning.curves import (
+    POOL_COLUMNS,
+    STREAM_COLUMNS,
+    area_under_curve,
+    collect_curves,
+    pool_metrics,
+    read_curves,
+    stream_metrics,
+    write_curves,
+)
 from gpca.errors import InputError
 
 

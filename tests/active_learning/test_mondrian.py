@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from gpca.active_learning.mondrian import MondrianForest
+from gpca.active_learning.stream_models import MondrianForest
 
 CENTERS = np.array([[0.0, 0], [4, 0], [0, 4]])
 

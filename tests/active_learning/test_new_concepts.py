@@ -1,8 +1,7 @@
 import numpy as np
 import pytest
 
-from gpca.active_learning.new_concepts import NewConceptTrial, answers, run_trial
-from gpca.active_learning.rounds import Embedded
+from gpca.active_learning.rounds import Embedded, NewConceptTrial, answers, run_trial
 from gpca.active_learning.settings import NEW_CONCEPT_STRATEGIES, ActiveLearningSettings, NewConceptSettings
 from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError

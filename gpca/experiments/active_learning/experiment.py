@@ -63,7 +63,7 @@ EXPERIMENT = Experiment(
     tidy=(
         Tidy(
             "active_learning.csv",
-            "gpca.active_learning.metrics:collect_curves",
+            "gpca.active_learning.curves:collect_curves",
             {"files": "active_learning/{source}/{strategy}/seed{seed}.csv"},
             {"target": "active_learning.target"},
         ),

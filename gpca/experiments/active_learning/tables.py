@@ -12,7 +12,7 @@ from math import inf
 from typing import TYPE_CHECKING, Any
 
 from gpca.active_learning.acquisition import STREAMS, require_strategy
-from gpca.active_learning.metrics import CENSORED_BY, TABLE
+from gpca.active_learning.curves import CENSORED_BY, TABLE
 from gpca.active_learning.settings import LOOK_EVERY, rare_setting
 from gpca.experiments.active_learning.clusters import Clusters
 from gpca.reporting.tables.builder import TableBuilder, cautious_over, crossed, titles_of

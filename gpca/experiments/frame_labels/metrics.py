@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gpca.active_learning.metrics import collect_curves
+from gpca.active_learning.curves import collect_curves
 from gpca.experiments.frame_labels.settings import in_percent
 from gpca.experiments.real_world import metrics
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from gpca.active_learning.metrics import TABLE
+from gpca.active_learning.curves import TABLE
 from gpca.active_learning.settings import ALL_LABELS
 from gpca.experiments.active_learning.tables import COUNT, Quantity, cell_of
 from gpca.experiments.frame_labels.settings import PAIR, in_percent

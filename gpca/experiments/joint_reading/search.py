@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gpca.active_learning.metrics import CENSORED_BY
+from gpca.active_learning.curves import CENSORED_BY
 from gpca.comparison.chance import WITHIN, is_close, permuted, weights
 from gpca.comparison.published import UNITS, Number
 from gpca.comparison.verdicts import Tolerance

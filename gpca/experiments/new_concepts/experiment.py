@@ -37,7 +37,7 @@ EXPERIMENT = Experiment(
     tidy=(
         Tidy(
             "new_concepts.csv",
-            "gpca.active_learning.metrics:collect_curves",
+            "gpca.active_learning.curves:collect_curves",
             {"files": "new_concepts/{source}/{new_concept_strategy}/seed{new_concept_seed}.csv"},
             {"target": "active_learning.target"},
         ),

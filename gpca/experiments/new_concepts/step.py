@@ -9,8 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from gpca.active_learning.curves import POOL_COLUMNS, write_curves
-from gpca.active_learning.new_concepts import NewConceptTrial, run_trial
-from gpca.active_learning.rounds import Embedded
+from gpca.active_learning.rounds import Embedded, NewConceptTrial, run_trial
 from gpca.active_learning.settings import (
     FROM_OTHERS,
     ActiveLearningSettings,

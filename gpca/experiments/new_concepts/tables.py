@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
-from gpca.active_learning.metrics import TABLE
+from gpca.active_learning.curves import TABLE
 from gpca.active_learning.settings import ALL_LABELS
 from gpca.causes.quotas import apportion
 from gpca.causes.truth import BORDERLINE, GEOMETRY, NOMINAL
