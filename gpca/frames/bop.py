@@ -25,10 +25,14 @@ from gpca.objects.mesh_folder import meters_per
 from gpca.objects.surface import Surface, evenly
 
 REMEDY = "the folder may be half unpacked: unpack the dataset again"
-# Wide of every depth camera there is; what lies between is for the measured points to say.
+# Far beyond those of all depth cameras; wrong values within these limits show in the measured points.
 FOCAL_PX = (1.0, 1e6)
 DEPTH_SCALES = (1e-6, 1e6)  # millimeters per unit: from nanometers to kilometers
 FARTHEST_MM = 1e6
+FEWEST_POINTS = 64
+VIEWS = 6  # of an object, as for an instance of the UW RGB-D Object Dataset
+RIM_FACTOR = 3.0  # times the median distance from the middle: farther points are background at a mask's rim
+MOST_ANNOTATIONS = 1000  # of an image
 
 
 def read_images(path: Path) -> dict[int, Any]:
@@ -85,9 +89,6 @@ def _numbers(entry: Any, key: str, count: int, subject: str) -> np.ndarray:
     if not isinstance(entry, dict) or key not in entry:
         raise InputError(subject, f"has no {key}", REMEDY)
     return finite_numbers(entry[key], count, subject, key, REMEDY)
-
-
-FEWEST_POINTS = 64
 
 
 @dataclass(frozen=True)
@@ -152,9 +153,8 @@ class Frame:
         inside = mask > 0
         # A tenth, because the rim of a small mask that was resized or saved as JPEG has values in between.
         if inside.any() and 10 * np.unique(mask[inside], return_counts=True)[1].max() < inside.sum():
-            raise InputError(
-                annotation.mask, "is not a mask: most of its pixel values differ", "write 0 outside, 255 inside"
-            )
+            fault = "is not a mask: most of its pixel values differ"
+            raise InputError(annotation.mask, fault, "write 0 outside, 255 inside")
         return inside
 
 
@@ -172,18 +172,17 @@ def read_frames(folders: Iterable[Path], split: str = "test") -> list[Frame]:
     folders = list(folders)
     scene_files = [path for folder in folders for path in folder.glob(f"**/{split}*/*/scene_gt.json")]
     if not scene_files:
-        raise InputError(
-            ", ".join(map(str, folders)), f"has no {split}*/<scene>/scene_gt.json", "check location or split"
-        )
+        fault = f"has no {split}*/<scene>/scene_gt.json"
+        raise InputError(", ".join(map(str, folders)), fault, "check location or split")
     frames = [frame for path in scene_files for frame in _frames_of_scene(path.parent)]
     if not frames:
         raise InputError(scene_files[0], "lists no image", REMEDY)
     first: dict[tuple[int, int], Frame] = {}
     for frame in frames:
-        if (same := first.setdefault((frame.scene, frame.image), frame)) is not frame:
+        if (same := first.setdefault(frame.place, frame)) is not frame:
             both = f"{same.depth} and {frame.depth}"
             raise InputError(both, "are the same image of the same scene", "set split to the intended folder")
-    return sorted(frames, key=lambda frame: (frame.scene, frame.image))
+    return sorted(frames, key=lambda frame: frame.place)
 
 
 def measured_points(frame: Frame, annotation: Annotation, depth_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -216,11 +215,8 @@ def without_background(
 
 def _require_points(points: np.ndarray, annotation: Annotation) -> None:
     if len(points) < FEWEST_POINTS:
-        raise TooFewPoints(
-            annotation.mask,
-            f"has depth at {len(points)} pixel(s)",
-            f"leave it out: at least {FEWEST_POINTS} are needed",
-        )
+        remedy = f"leave it out: at least {FEWEST_POINTS} are needed"
+        raise TooFewPoints(annotation.mask, f"has depth at {len(points)} pixel(s)", remedy)
 
 
 class TooFewPoints(InputError):
@@ -241,40 +237,23 @@ def _frames_of_scene(folder: Path) -> list[Frame]:
         if not isinstance(truth, list):
             raise InputError(folder / "scene_gt.json", f"image {image} has no list of objects", REMEDY)
         camera_3_3, depth_scale = read_camera(cameras[image], f"{folder / 'scene_camera.json'}: image {image}")
-        frames.append(
-            Frame(
-                scene=scene,
-                image=image,
-                camera_3_3=camera_3_3,
-                depth_scale=depth_scale,
-                depth=_image_file(folder / "depth", f"{image:06d}"),
-                color=_image_file_if_any(colors, f"{image:06d}"),
-                annotations=tuple(_annotation(folder, image, n, entry) for n, entry in enumerate(truth)),
-            )
-        )
+        depth, color = _image_file(folder / "depth", f"{image:06d}"), _image_file(colors, f"{image:06d}", False)
+        annotations = []
+        for n, entry in enumerate(truth):
+            subject = f"{folder / 'scene_gt.json'}: image {image}, object {n}"
+            pose = read_pose(entry, subject)
+            annotations.append(Annotation(*pose, _image_file(folder / "mask_visib", f"{image:06d}_{n:06d}"), subject))
+        frames.append(Frame(scene, image, camera_3_3, depth_scale, depth, color, tuple(annotations)))
     return frames
 
 
-def _annotation(folder: Path, image: int, n: int, entry: object) -> Annotation:
-    subject = f"{folder / 'scene_gt.json'}: image {image}, object {n}"
-    object_id, T_camera_model = read_pose(entry, subject)
-    return Annotation(object_id, T_camera_model, _image_file(folder / "mask_visib", f"{image:06d}_{n:06d}"), subject)
-
-
-def _image_file(folder: Path, stem: str) -> Path:
-    if (path := _image_file_if_any(folder, stem)) is not None:
-        return path
-    raise InputError(folder / f"{stem}.png", "no such image", REMEDY)
-
-
-def _image_file_if_any(folder: Path, stem: str) -> Path | None:
-    paths = (folder / f"{stem}{suffix}" for suffix in (".png", ".jpg", ".jpeg", ".tif"))
-    return next((path for path in paths if path.is_file()), None)
-
-
-VIEWS = 6  # of an object, as of an instance of UW's
-RIM_FACTOR = 3.0  # times the median distance from the middle: what lies beyond is behind the rim of a mask
-MOST_ANNOTATIONS = 1000  # objects of an image at most
+def _image_file(folder: Path, stem: str, required: bool = True) -> Path | None:
+    for suffix in (".png", ".jpg", ".jpeg", ".tif"):
+        if (path := folder / f"{stem}{suffix}").is_file():
+            return path
+    if required:
+        raise InputError(folder / f"{stem}.png", "no such image", REMEDY)
+    return None
 
 
 def from_entry(entry: dict, folder: Path) -> Iterator[Surface]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -13,7 +12,7 @@ from scipy.spatial import cKDTree
 
 from gpca.alignment.rigid import inverse, transform
 from gpca.errors import InputError
-from gpca.frames.bop import Frame, TooFewPoints, measured_points, without_background
+from gpca.frames.bop import Annotation, Frame, TooFewPoints, measured_points, without_background
 from gpca.frames.dataset import CenteredModel, Dataset
 from gpca.frames.initial_pose import (
     EstimatorErrors,
@@ -96,32 +95,26 @@ class Instances(Container):
 
     @property
     def cluster(self) -> np.ndarray:
-        """(I,) the scene: its frames show the same objects in the same places."""
+        """(I,) the scene, whose frames show the same objects in the same poses."""
         return np.array([f"{dataset} {scene}" for dataset, scene in zip(self.dataset, self.scene, strict=True)])
 
     def split(self, source: str, seed: int, test_share: float) -> dict[str, np.ndarray]:
-        """Return the rows of ``train`` and ``test``: whole scenes, as one in training would give another frame away.
+        """Return the rows of ``train`` and ``test``, by whole scenes: frames of one scene reveal each other.
 
-        The seed's fold is tested. Of scenes without a fold, so many as hold the share, in an order of the seed's.
-
-        Raises:
-            InputError: all frames are of one scene.
+        The seed's fold is tested. Of scenes without a fold, a share of the rows is tested, by an order drawn with the
+        seed: at least one scene, never all. InputError where all frames are of one scene.
         """
         by_fold = unseen(self.fold, seed)
         is_test = np.zeros(len(self), bool) if by_fold is None else by_fold
         is_drawn = self.fold == DRAWN
-        is_test[is_drawn] = self._drawn(is_drawn, source, seed, test_share)
-        if is_test.all() or not is_test.any():
-            raise InputError(f"instances of {source}", "all are from one scene", "give frames from at least two scenes")
-        return {"train": np.flatnonzero(~is_test), "test": np.flatnonzero(is_test)}
-
-    def _drawn(self, rows: np.ndarray, source: str, seed: int, test_share: float) -> np.ndarray:
-        """Return which of the rows are in scenes that are drawn for testing: a share, at least one scene, never all."""
-        _, scene_n = np.unique(self.cluster[rows], return_inverse=True)
+        _, scene_n = np.unique(self.cluster[is_drawn], return_inverse=True)
         scenes = generator(source, seed, "split").permutation(len(np.unique(scene_n)))
         sizes_G = np.bincount(scene_n, minlength=len(scenes))[scenes]
         n_test = 1 + int(np.sum(np.cumsum(sizes_G)[:-1] < test_share * len(scene_n)))
-        return np.isin(scene_n, scenes[: min(n_test, len(scenes) - 1)])
+        is_test[is_drawn] = np.isin(scene_n, scenes[: min(n_test, len(scenes) - 1)])
+        if is_test.all() or not is_test.any():
+            raise InputError(f"instances of {source}", "all are from one scene", "give frames from at least two scenes")
+        return {"train": np.flatnonzero(~is_test), "test": np.flatnonzero(is_test)}
 
 
 def points_on_model(instances: Instances, objects: ObjectClouds, most_points: int | None = None) -> np.ndarray:
@@ -173,64 +166,67 @@ def read_instances(
     seen: list[tuple[_Objects, Frame, int, dict]] = []
     for dataset, frames, models in datasets.values():
         catalog = _Objects(dataset, objects, models, settings)
-        of_dataset: list[tuple[_Objects, Frame, int, dict]] = []
+        first = len(seen)
         for frame in progress(frames, f"frames of {dataset.name}"):
             shown = {"dataset": dataset.name, "scene": frame.scene, "image": frame.image}
             shown |= {"camera_3_3": frame.camera_3_3, "colour": str(frame.color or NO_COLOR)}
             shown["fold"] = dataset.fold(frame.scene)
-            of_dataset += [(catalog, frame, n, shown | row) for n, row in catalog.in_frame(frame, left_out)]
-        observations = [catalog.observation(frame, n, row["points_m"]) for _, frame, n, row in of_dataset]
+            seen += [(catalog, frame, n, shown | row) for n, row in catalog.in_frame(frame, left_out)]
+        observations = [catalog.observation(frame.annotations[n], row["points_m"]) for _, frame, n, row in seen[first:]]
         require_shared_form(dataset.name, observations)
-        seen += of_dataset
     if not seen:
         reasons = f"; the first skipped: {left_out[0]}" if left_out else ""
         raise InputError(", ".join(datasets), f"no object is left in any frame{reasons}", "check masks and depth")
-    # Results last: they are measured against poses that fit what was seen.
-    find = _from_results(datasets, seen) if settings.form == "results" else None
-    rows = []
-    for own, frame, n, row in progress(seen, "initial poses"):
-        init_from, T_init = find(own, frame, n, row) if find else (settings.form, own.initial_pose(frame, n, row))
-        rows.append(row | {"T_camera_object_init": T_init, "init_from": init_from})
+    if settings.form == "results":  # last, since errors are measured against poses that fit the measurements
+        poses = _poses_from_results(datasets, seen)
+    else:
+        poses = [
+            (settings.form, own.initial_pose(frame, n, row)) for own, frame, n, row in progress(seen, "initial poses")
+        ]
     for fault in left_out:
         print(f"skipped: {fault}", file=sys.stderr)
-    columns: dict[str, Any] = {
-        name: np.array([row[name] for row in rows]) for name in rows[0] if name not in ("points_m", "pixels")
-    }
-    columns |= {name: np.concatenate([row[name] for row in rows]) for name in ("points_m", "pixels")}
+    rows = [
+        row | {"T_camera_object_init": T_init, "init_from": init_from}
+        for (*_, row), (init_from, T_init) in zip(seen, poses, strict=True)
+    ]
+    parts = ("points_m", "pixels")
+    columns: dict[str, Any] = {name: np.array([row[name] for row in rows]) for name in rows[0] if name not in parts}
+    columns |= {name: np.concatenate([row[name] for row in rows]) for name in parts}
     offsets = np.cumsum([0, *(len(row["points_m"]) for row in rows)], dtype=np.int64)
     return Instances(**columns, offsets=offsets)
 
 
-def _from_results(datasets: Mapping[str, tuple[Dataset, list[Frame], dict]], seen: list) -> Any:
-    """Return a function to initial poses: an estimator's if one found the object, else the truth with an error."""
+def _poses_from_results(
+    datasets: Mapping[str, tuple[Dataset, list[Frame], dict]], seen: list[tuple[_Objects, Frame, int, dict]]
+) -> list[tuple[str, np.ndarray]]:
+    """Return a random estimator that found each object, and its pose; else ``errors``, and the truth with an error."""
     estimators = {name: dataset.estimators() for name, (dataset, _, _) in datasets.items()}
-    estimates: dict[int, tuple[str, np.ndarray]] = {}
-    symmetric = {(catalog.name, number) for catalog, _, _, _ in seen for number in catalog.symmetric_ids()}
-    errors = EstimatorErrors(symmetric)
+    errors = EstimatorErrors({(own.name, number) for own, *_ in seen for number, is_ in own.symmetric.items() if is_})
     for name, (dataset, _, models) in datasets.items():
         for number, T_error in read_pose_errors(dataset.errors, models) if dataset.errors else ():
             errors.add((name, number), T_error)
-    for place, (catalog, frame, n, row) in enumerate(seen):
+    estimates: list[tuple[str, np.ndarray] | None] = []
+    for catalog, frame, n, row in seen:
         annotation = frame.annotations[n]
         number = annotation.object_id
-        alone = Counter(of.object_id for of in frame.annotations)[number] == 1
+        alone = [each.object_id for each in frame.annotations].count(number) == 1
         random = generator(catalog.name, *frame.place, n, "estimator")
         shown = row | {"diameter_m": catalog.diameter_m(number)}
-        if candidates := estimates_of(estimators[catalog.name], (*frame.place, number), alone, shown):
-            chosen = candidates[int(random.integers(len(candidates)))]
-            estimates[place] = chosen
+        candidates = estimates_of(estimators[catalog.name], (*frame.place, number), alone, shown)
+        chosen = candidates[int(random.integers(len(candidates)))] if candidates else None
+        estimates.append(chosen)
+        if chosen:
             errors.add((catalog.name, number), error_of(annotation.T_camera_model, chosen[1]))
-    places = {(catalog.name, *frame.place, n): place for place, (catalog, frame, n, _) in enumerate(seen)}
-
-    def find(catalog: _Objects, frame: Frame, n: int, row: dict) -> tuple[str, np.ndarray]:
-        number = frame.annotations[n].object_id
-        axes = (catalog.name, *frame.place, n)
-        if chosen := estimates.get(places[axes]):
-            return chosen[0], chosen[1] @ catalog.T_model_object(number)
-        T_error = errors.draw((catalog.name, number), generator(*axes, "error"))
-        return "errors", frame.annotations[n].T_camera_model @ T_error @ catalog.T_model_object(number)
-
-    return find
+    poses = []
+    for (catalog, frame, n, _), chosen in zip(seen, estimates, strict=True):
+        annotation = frame.annotations[n]
+        T_model_object = catalog.models[annotation.object_id].T_model_object
+        if chosen is None:
+            random = generator(catalog.name, *frame.place, n, "error")
+            T_error = errors.draw((catalog.name, annotation.object_id), random)
+            chosen = ("errors", annotation.T_camera_model @ T_error)
+        poses.append((chosen[0], chosen[1] @ T_model_object))
+    return poses
 
 
 class _Objects:
@@ -239,14 +235,17 @@ class _Objects:
     def __init__(
         self, dataset: Dataset, objects: ObjectClouds, models: dict[int, CenteredModel], settings: InitialPoseSettings
     ):
-        self.name = dataset.name
-        self._objects = objects
-        self._models = models
-        self._settings = settings
+        self.name, self.models = dataset.name, models
+        self._objects, self._settings = objects, settings
         self._index = {number: objects.names.index(model.surface.name) for number, model in models.items()}
-        self._symmetric = {number: self._is_symmetric(number) for number in models}
         self._trees = {number: cKDTree(objects.points(index)) for number, index in self._index.items()}
         self._registration: dict[int, GlobalRegistration] = {}
+        self.symmetric = {}
+        for number, i in self._index.items():
+            symmetries = models[number].listed_symmetries
+            if symmetries is None:
+                symmetries = find_symmetries(objects.points(i), objects.diameters_m[i])
+            self.symmetric[number] = bool(symmetries)
 
     def in_frame(self, frame: Frame, left_out: list[str]) -> list[tuple[int, dict]]:
         """Return the objects that were measured, by their number among the annotations."""
@@ -256,30 +255,21 @@ class _Objects:
             number = annotation.object_id
             try:
                 points_m, pixels = measured_points(frame, annotation, depth_m)
-                require_plausible(self.observation(frame, n, points_m))
+                require_plausible(self.observation(annotation, points_m))
                 points_m, pixels = without_background(points_m, pixels, annotation, self.diameter_m(number))
             except TooFewPoints as fault:
                 left_out.append(str(fault))
                 continue
-            T_true = annotation.T_camera_model @ self._models[number].T_model_object
-            seen: dict[str, Any] = {"object_index": self._index[number], "symmetric": self._symmetric[number]}
+            T_true = annotation.T_camera_model @ self.models[number].T_model_object
+            seen: dict[str, Any] = {"object_index": self._index[number], "symmetric": self.symmetric[number]}
             seen |= {"T_camera_object_true": T_true, "points_m": points_m.astype(np.float32)}
             rows.append((n, {**seen, "pixels": pixels.astype(np.int32)}))
         return rows
 
-    def observation(self, frame: Frame, n: int, points_m: np.ndarray) -> Observation:
-        annotation = frame.annotations[n]
-        number = annotation.object_id
-        T_model_object, tree = self._models[number].T_model_object, self._trees[number]
-        return Observation(
-            annotation.subject, annotation.T_camera_model, T_model_object, tree, self.diameter_m(number), points_m
-        )
-
-    def T_model_object(self, number: int) -> np.ndarray:
-        return self._models[number].T_model_object
-
-    def symmetric_ids(self) -> list[int]:
-        return [number for number, symmetric in self._symmetric.items() if symmetric]
+    def observation(self, annotation: Annotation, points_m: np.ndarray) -> Observation:
+        number, T_camera_model = annotation.object_id, annotation.T_camera_model
+        T_model_object, tree = self.models[number].T_model_object, self._trees[number]
+        return Observation(annotation.subject, T_camera_model, T_model_object, tree, self.diameter_m(number), points_m)
 
     def initial_pose(self, frame: Frame, n: int, row: dict) -> np.ndarray:
         """Return ``T_camera_object`` that ICP starts from where no estimator is asked."""
@@ -288,17 +278,9 @@ class _Objects:
         if self._settings.form == "true_pose":
             return displace(row["T_camera_object_true"], self.diameter_m(number), self._settings, generator(*axes))
         if number not in self._registration:
-            i = self._index[number]
-            points_m, normals = self._objects.points(i), self._objects.normals(i)
-            self._registration[number] = GlobalRegistration(points_m, normals, self.diameter_m(number), self._settings)
+            cloud = self._objects.clouds[self._index[number]]
+            self._registration[number] = GlobalRegistration(*cloud, self.diameter_m(number), self._settings)
         return self._registration[number].register(row["points_m"], seed_of(*axes))
 
     def diameter_m(self, number: int) -> float:
         return float(self._objects.diameters_m[self._index[number]])
-
-    def _is_symmetric(self, number: int) -> bool:
-        listed = self._models[number].listed_symmetries
-        i = self._index[number]
-        return bool(
-            find_symmetries(self._objects.points(i), self._objects.diameters_m[i]) if listed is None else listed
-        )

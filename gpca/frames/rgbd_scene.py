@@ -32,13 +32,15 @@ def stable_poses(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
     center of the hull is used. InputError for a surface without volume.
     """
     import trimesh
+    from trimesh.util import diagonal_dot
 
     mesh = trimesh.Trimesh(surface.vertices_m, surface.faces, process=False)
     with np.errstate(invalid="ignore", divide="ignore"):  # what is flat or open may enclose no volume
         hull, center_m = mesh.convex_hull, mesh.center_mass
     if hull.volume < FLAT * diameter(surface.vertices_m, surface.name) ** 3:
         raise InputError(f"object '{surface.name}'", "is flat and cannot be stood on a table", "leave it out")
-    if not _is_inside(center_m, hull):
+    # Whether the center is inside, by the test that trimesh repeats until it is passed.
+    if not np.all(diagonal_dot(center_m - hull.triangles_center, hull.face_normals) < 0):
         center_m = hull.center_mass
     return trimesh.poses.compute_stable_poses(mesh, center_mass=center_m, sigma=0.0, threshold=0.0)
 
@@ -47,13 +49,6 @@ def rest(poses_n: np.ndarray, probabilities_n: np.ndarray, random: np.random.Gen
     """Draw one of the stable poses and turn it about the vertical."""
     chosen = poses_n[random.choice(len(poses_n), p=probabilities_n / probabilities_n.sum())]
     return rigid_motion(Rotation.from_euler("z", random.uniform(0, 2 * np.pi)).as_matrix()) @ chosen
-
-
-def _is_inside(point_m: np.ndarray, hull) -> bool:
-    """Return whether a point is inside a convex mesh, by the test that trimesh repeats until it is passed."""
-    from trimesh.util import diagonal_dot
-
-    return bool(np.all(diagonal_dot(point_m - hull.triangles_center, hull.face_normals) < 0))
 
 
 DEPTH_SCALE = 0.1  # millimeters per unit of the depth images
@@ -115,7 +110,11 @@ def write_scenes(surfaces: Iterable[Surface], source: str, settings: SceneSettin
     Random numbers are named by source, scene and view. The folder appears when it is complete. InputError where it
     holds something other than scenes, or the table is too small.
     """
-    _require_replaceable(Path(folder))
+    folder = Path(folder)
+    if folder.exists() and not folder.is_dir():
+        raise InputError(folder, "is not a folder", "choose another name")
+    if folder.is_dir() and any(folder.iterdir()) and not (folder / DESCRIPTION).is_file():
+        raise InputError(folder, "contains files other than scenes, which would be lost", "choose another folder")
     surfaces = [center(surface) for surface in surfaces]
     resting = [stable_poses(surface) for surface in surfaces]
     with whole_folder(folder) as partial:
@@ -128,13 +127,6 @@ def write_scenes(surfaces: Iterable[Surface], source: str, settings: SceneSettin
             middle_m = np.mean([object_.T_world_object[:3, 3] for object_ in standing], axis=0)
             views = camera_poses(settings, middle_m, source, scene)
             _write_scene(partial / f"test/{scene:06d}", surfaces, standing, views, settings, (source, scene))
-
-
-def _require_replaceable(folder: Path) -> None:
-    if folder.exists() and not folder.is_dir():
-        raise InputError(folder, "is not a folder", "choose another name")
-    if folder.is_dir() and any(folder.iterdir()) and not (folder / DESCRIPTION).is_file():
-        raise InputError(folder, "contains files other than scenes, which would be lost", "choose another folder")
 
 
 def lay_table(
@@ -162,9 +154,8 @@ def lay_table(
         flat_m = transform(T_world_object, surfaces[model].vertices_m)[:, :2]
         outline = MultiPoint(flat_m - (flat_m.min(axis=0) + flat_m.max(axis=0)) / 2).convex_hull
         azimuth = random.uniform(0, 2 * np.pi)
-        ways = (
-            distance_m * np.array([np.cos(azimuth), np.sin(azimuth)]) for distance_m in np.arange(0, TABLE_M, 0.005)
-        )
+        direction = np.array([np.cos(azimuth), np.sin(azimuth)])
+        ways = (distance_m * direction for distance_m in np.arange(0, TABLE_M, 0.005))
         free = (way for way in ways if all(translate(outline, *way).distance(o) >= settings.gap_m for o in outlines))
         if (at := next(free, None)) is None:
             fault = f"there is no room for {count} objects {settings.gap_m} m apart"
@@ -217,9 +208,8 @@ def _write_models(surfaces: list[Surface], source: str, folder: Path) -> None:
 
 
 def _write_scene(folder: Path, surfaces, standing: list[Placed], views, settings: SceneSettings, axes: tuple) -> None:
-    meshes = [
-        (transform(p.T_world_object, surfaces[p.model].vertices_m), surfaces[p.model].triangles) for p in standing
-    ]
+    placed = [(p.T_world_object, surfaces[p.model]) for p in standing]
+    meshes = [(transform(T_world_object, surface.vertices_m), surface.triangles) for T_world_object, surface in placed]
     scene = MeshScene([*meshes, table()])
     alone = [MeshScene([mesh]) for mesh in meshes]
     colors_M_3 = np.array([*(model_color(p.model, len(surfaces)) for p in standing), TABLE_COLOR])
@@ -231,53 +221,35 @@ def _write_scene(folder: Path, surfaces, standing: list[Placed], views, settings
     for image, T_world_camera in enumerate(views):
         view = scene.look(settings.camera, T_world_camera)
         depth_m = settings.noise.measure(view, generator(*axes, "depth", image))
-        write_png(
-            folder / f"depth/{image:06d}.png", np.rint(1e3 * depth_m / DEPTH_SCALE).clip(0, 65535).astype(np.uint16)
-        )
+        depth_units = np.rint(1e3 * depth_m / DEPTH_SCALE).clip(0, 65535).astype(np.uint16)
+        write_png(folder / f"depth/{image:06d}.png", depth_units)
         write_png(folder / f"rgb/{image:06d}.png", shade(view, colors_M_3, T_world_camera))
-        truth_json[image] = []
-        info_json[image] = []
+        truth_json[image], info_json[image] = [], []
         for n, object_ in enumerate(standing):
-            whole = alone[n].silhouette(settings.camera, T_world_camera)
-            visible = view.mesh == n
+            whole, visible = alone[n].silhouette(settings.camera, T_world_camera), view.mesh == n
             for kind, mask in (("mask", whole), ("mask_visib", visible)):
                 write_png(folder / f"{kind}/{image:06d}_{n:06d}.png", np.where(mask, 255, 0).astype(np.uint8))
             T_camera_object = inverse(T_world_camera) @ object_.T_world_object
-            truth_json[image].append(_truth(object_.model + 1, T_camera_object))
-            info_json[image].append(_visibility(whole, visible, depth_m))
+            truth_json[image].append({"obj_id": object_.model + 1, **_pose(T_camera_object, "m2c")})
+            info_json[image].append(
+                {
+                    "px_count_all": int(whole.sum()),
+                    "px_count_valid": int((whole & (depth_m > 0)).sum()),
+                    "px_count_visib": int(visible.sum()),
+                    "visib_fract": float(visible.sum() / max(1, whole.sum())),
+                    "bbox_obj": _box(whole),
+                    "bbox_visib": _box(visible),
+                }
+            )
         camera_json[image] = {"cam_K": settings.camera.matrix_3_3.ravel().tolist(), "depth_scale": DEPTH_SCALE}
-        camera_json[image] |= _world(T_world_camera)
+        camera_json[image] |= _pose(inverse(T_world_camera), "w2c")
     for name, content in (("camera", camera_json), ("gt", truth_json), ("gt_info", info_json)):
         _write_json(folder / f"scene_{name}.json", content)
 
 
-def _truth(object_id: int, T_camera_object: np.ndarray) -> dict:
-    rotation = T_camera_object[:3, :3].ravel().tolist()
-    translation_mm = (1e3 * T_camera_object[:3, 3]).tolist()
-    return {"obj_id": object_id, "cam_R_m2c": rotation, "cam_t_m2c": translation_mm}
-
-
-def _world(T_world_camera: np.ndarray) -> dict:
-    T_camera_world = inverse(T_world_camera)
-    return {
-        "cam_R_w2c": T_camera_world[:3, :3].ravel().tolist(),
-        "cam_t_w2c": (1e3 * T_camera_world[:3, 3]).tolist(),
-    }
-
-
-def _visibility(whole: np.ndarray, visible: np.ndarray, depth_m: np.ndarray) -> dict:
-    counts = {
-        "px_count_all": whole.sum(),
-        "px_count_valid": (whole & (depth_m > 0)).sum(),
-        "px_count_visib": visible.sum(),
-    }
-    share = visible.sum() / max(1, whole.sum())
-    return {
-        **{k: int(v) for k, v in counts.items()},
-        "visib_fract": float(share),
-        "bbox_obj": _box(whole),
-        "bbox_visib": _box(visible),
-    }
+def _pose(T: np.ndarray, frames: str) -> dict[str, list[float]]:
+    rotation, translation_mm = T[:3, :3].ravel().tolist(), (1e3 * T[:3, 3]).tolist()
+    return {f"cam_R_{frames}": rotation, f"cam_t_{frames}": translation_mm}
 
 
 def _box(mask: np.ndarray) -> list[int]:
