@@ -3,9 +3,8 @@ import sys
 
 sys.path.insert(0, str(workflow.current_basedir))
 from gpca.config.check import read
-from gpca.config.jobs import export_to_jobs
+from gpca.config.jobs import clear_leftovers, export_to_jobs
 from gpca.config.layers import DEFAULTS, require_sound
-from gpca.config.restart import clear_leftovers
 from gpca.errors import one_line
 from gpca.experiments.registry import experiments
 from gpca.process.time_left import tell_time_left

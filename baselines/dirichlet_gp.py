@@ -38,7 +38,7 @@ class DirichletGP(DrawingExplainer):
         import torch
         from sklearn.preprocessing import StandardScaler
 
-        from gpca.adam import Adam
+        from gpca.portable import Adam
 
         known_concepts(registrations.concept)
         h_N_d = attached(registrations, "embedding")

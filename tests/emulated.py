@@ -18,9 +18,8 @@ def fits() -> dict[str, str]:
     import torch
 
     from baselines.heads import Heads
-    from gpca.adam import Adam
     from gpca.classifier.gpc import GPC, GPCSettings
-    from gpca.elementary import logarithm, square_root
+    from gpca.portable import Adam, logarithm, square_root
 
     random = np.random.default_rng(0)
     weights = torch.from_numpy(random.normal(size=5000).astype(np.float32)).requires_grad_()

@@ -6,8 +6,8 @@ import sys
 import pytest
 import torch
 
-from gpca.adam import Adam
 from gpca.code_files import ROOT
+from gpca.portable import Adam
 
 
 def fitted(make, dtype):

@@ -14,7 +14,7 @@ from packaging.utils import canonicalize_name
 
 from gpca.alignment.methods.registry import methods
 from gpca.code_files import code_files
-from gpca.process.extras import MODULES
+from gpca.process.environment import MODULES
 
 from .documents import ROOT
 

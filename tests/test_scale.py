@@ -7,7 +7,7 @@ import pytest
 from benchmarks import scale
 from benchmarks.schedule import Job
 from gpca.config.check import check
-from gpca.config.leave_out import without_false
+from gpca.config.layers import without_false
 from gpca.errors import InputError
 from gpca.process.time_left import read_times
 

@@ -14,13 +14,12 @@ import torch
 from torch import Tensor
 from torch.overrides import TorchFunctionMode
 
-from gpca.adam import Adam
 from gpca.attribution.scores import summarize_marginals
 from gpca.classifier.latents import expected_log_likelihood
 from gpca.classifier.settings import GPCSettings
 from gpca.classifier.sparse_gp import Standardization, Start
-from gpca.elementary import square_root
 from gpca.errors import InputError
+from gpca.portable import Adam, square_root
 from gpca.process.progress import progress
 from gpca.seeds import generator
 

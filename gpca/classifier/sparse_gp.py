@@ -21,7 +21,7 @@ from torch import Tensor, nn
 
 from gpca.classifier.latents import Latents, Projection
 from gpca.classifier.settings import GPCSettings
-from gpca.elementary import square_root
+from gpca.portable import square_root
 from gpca.seeds import generator, seed_of
 
 # gpytorch's in single precision: added to variances of the prior; smallest variance of a latent.

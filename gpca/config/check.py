@@ -1,14 +1,14 @@
-"""The configuration of a run: checked once, when the workflow loads, so that a mistake stops it with one line."""
+"""Checks the configuration of a run when the workflow loads, so that a mistake stops it with one line."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
+from typing import Any
 
 from gpca.causes.settings import CauseSettings
-from gpca.config.layers import in_order, with_defaults, with_types
-from gpca.config.leave_out import check_left_out, names_left_out, without_false
+from gpca.config.layers import check_left_out, in_order, names_left_out, with_defaults, with_types, without_false
 from gpca.config.schema import whole_config
-from gpca.config.success import with_success
 from gpca.encoders.registry import require_backbone, require_draws
 from gpca.errors import InputError, require_names, with_key
 from gpca.experiments.experiment import LeftOut
@@ -20,10 +20,9 @@ from gpca.objects.source import require_place, resolve
 from gpca.plugins import use
 from gpca.settings import read_settings
 
-# Folders of results/ that no run may take: of reference runs, submissions, and logs beside all runs.
-TAKEN = ("reference", "leaderboard", "logs")
+RESERVED = ("reference", "leaderboard", "logs")  # folders of results/ that are no runs
 BYTES_PER_POINT = 2 * 3 * 4  # in source and target, three float32
-LARGEST_BYTES = 2**36  # few machines have more memory, and five seeds of the paper's protocol take a thousandth
+LARGEST_BYTES = 2**36  # a thousand times what five seeds of the paper's protocol take
 
 
 def read(config: dict, command_line: Mapping, of_module: bool = False) -> tuple[dict, dict[str, dict]]:
@@ -31,14 +30,14 @@ def read(config: dict, command_line: Mapping, of_module: bool = False) -> tuple[
 
     Args:
         command_line: the values given with ``--config``, whose numbers are still text.
-        of_module: it is what another workflow gives this one as a module, so that the defaults are not below it yet.
+        of_module: whether another workflow gives it to this one as a module, so that it lacks the defaults.
 
     Returns:
-        the config of this run in the order of the defaults, without what it leaves out, with its definition of success
-        wherever it is needed; the sources that :func:`check` returns.
+        the config in the order of the defaults, without what it leaves out, with the limit of success in all sections;
+        the sources that :func:`check` returns.
 
     Raises:
-        InputError: what :func:`check` raises.
+        InputError: as :func:`check`.
     """
     whole = in_order(with_types(with_defaults(config) if of_module else config, command_line))
     sources = check(whole)
@@ -46,18 +45,17 @@ def read(config: dict, command_line: Mapping, of_module: bool = False) -> tuple[
 
 
 def check(config: dict) -> dict[str, dict]:
-    """Check a configuration against its settings classes and against what exists.
+    """Check a configuration against its settings classes, plugins, names and data; it is not changed.
 
-    Args:
-        config: as it was given; what it leaves out with ``false`` is not checked, and it stays as it is.
+    Entries that are left out with ``false`` are not checked.
 
     Returns:
         the resolved entry of every source, by name, with ``stand_in`` set.
 
     Raises:
-        InputError: unknown key, wrong type, value out of range; a plugin that cannot be used; unknown source, family,
-            kind, explainer or backbone, or one that is left out; data that is neither in its folder nor
-            downloadable. The line names the key.
+        InputError: unknown key, wrong type, value out of range; an unusable plugin; unknown source, family, kind,
+            explainer or backbone, or one that is left out; data that is neither in its folder nor downloadable. The
+            line names the key.
     """
     require_plain(config, "config key")
     with_key("plugins", use, config.get("plugins") or [])
@@ -65,32 +63,18 @@ def check(config: dict) -> dict[str, dict]:
     read_settings(whole_config(), whole, "config key")
     whole = with_success(whole)
     check_left_out(config)
-
-    def left_out(key: str) -> set[str]:
-        return names_left_out(config, key)
-
-    check_shared(whole, left_out)
+    left_out = partial(names_left_out, config)
+    _check_folders(whole)
+    _check_registrations(whole)
+    _check_names(whole, left_out)
     for experiment in experiments():
         experiment.check(whole, left_out)
     return resolve_sources(whole)
 
 
-def check_shared(config: dict, left_out: LeftOut) -> None:
-    """Check all sections that are no experiment's own, but the sources.
-
-    Raises:
-        InputError: a value that no run can use; the line names its key.
-    """
-    _check_places(config)
-    _check_registrations(config)
-    _check_encoders(config, left_out)
-    _check_explainers(config, left_out)
-    _check_model(config, left_out)
-
-
-def _check_places(config: dict) -> None:
-    """Check the run's name, and the folders that data comes from and downloads go to; reads no data."""
-    if config["run"].lower() in TAKEN:
+def _check_folders(config: dict) -> None:
+    """Check the run's name, and the folders of data and downloads; reads no data."""
+    if config["run"].lower() in RESERVED:
         raise InputError("config key run", f"results/{config['run']} is reserved", "choose another name")
     if config["data_dir"] is not None:
         with_key("data_dir", require_place, config["data_dir"])
@@ -101,7 +85,7 @@ def _check_places(config: dict) -> None:
 
 
 def _check_registrations(config: dict) -> None:
-    """Check that settings agree with each other, and that the samples of one file can be held in memory."""
+    """Check that settings agree with each other, and that the samples of one file fit in memory."""
     if (method := config["registrations"]["icp"]["method"]) != "point_to_point":
         fault = f"is '{method}', but uncertainty and causes are measured by reruns of point-to-point ICP"
         remedy = "use point_to_point; exchange.methods puts other methods beneath the explainers"
@@ -121,24 +105,17 @@ def _check_registrations(config: dict) -> None:
             raise InputError(f"config key {section}.train", fault, f"use fewer or lower {key}")
 
 
-def _check_encoders(config: dict, left_out: LeftOut) -> None:
-    """Check the backbones and their draws, and the encoder whose embeddings are explained.
+def _check_names(config: dict, left_out: LeftOut) -> None:
+    """Check the names of encoders, explainers and sources, and the points that encoders and explainers read.
 
-    How many points a depth frame has of an object is not known here, and clouds of fewer points than a draw repeat
-    some; so draws from those are not checked.
+    Draws of points from depth frames are not checked: their number of points is unknown here, and smaller clouds repeat
+    points.
     """
-    for name, encoder in config["encoders"].items():
+    encoders, points = config["encoders"], config["registrations"]["cloud_points"]
+    for name, encoder in encoders.items():
         with_key(f"encoders.{name}.backbone", require_backbone, encoder["backbone"])
-        require_draws(
-            f"encoders.{name}", encoder, config["registrations"]["cloud_points"], "registrations.cloud_points"
-        )
-    encoders = config["encoders"]
+        require_draws(f"encoders.{name}", encoder, points, "registrations.cloud_points")
     require_names("embedding.encoder", [config["embedding"]["encoder"]], encoders, "encoder", left_out("encoders"))
-
-
-def _check_explainers(config: dict, left_out: LeftOut) -> None:
-    """Check that every explainer exists, takes its settings, and finds the uncertainty and the points that it reads."""
-    points = config["registrations"]["cloud_points"]
     for name, settings in config["explainers"].items():
         key = f"explainers.{name}"
         with_key(key, require_settings, name, settings or {})
@@ -147,14 +124,10 @@ def _check_explainers(config: dict, left_out: LeftOut) -> None:
         if (neighbors := (settings or {}).get("neighbours", 0)) > points:
             fault = f"{neighbors} neighbors are too many for {points} points of a cloud"
             raise InputError(f"config key {key}.neighbours", fault, "lower it, or raise registrations.cloud_points")
-
-
-def _check_model(config: dict, left_out: LeftOut) -> None:
-    """Check the names that the figures of one registration, and the model, depend on."""
     model, sources = config["model"], config["sources"]
     require_names("figures.source", [config["figures"]["source"]], sources, "source", left_out("sources"))
     require_names("model.source", [model["source"]], (*sources, REAL_WORLD), "source", left_out("sources"))
-    require_names("model.encoder", [model["encoder"]], config["encoders"], "encoder", left_out("encoders"))
+    require_names("model.encoder", [model["encoder"]], encoders, "encoder", left_out("encoders"))
 
 
 def resolve_sources(config: dict) -> dict[str, dict]:
@@ -168,3 +141,22 @@ def resolve_sources(config: dict) -> dict[str, dict]:
         | with_key(f"sources.{name}", resolve, entry, config["data_dir"])
         for name, entry in config["sources"].items()
     }
+
+
+def with_success(config: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the config with ``success.error`` as the ``failed`` limit of the causes.
+
+    Raises:
+        InputError: such a limit in the config, which would be a second definition.
+    """
+
+    def limited(key: str, causes: Mapping[str, Any]) -> dict[str, Any]:
+        if "failed" in causes["limits"]:
+            fault = "would be another definition of failure than that of all experiments"
+            raise InputError(f"config key {key}.limits.failed", fault, "set success.error")
+        return {**causes, "limits": {**causes["limits"], "failed": config["success"]["error"]}}
+
+    causes, model = limited("causes", config["causes"]), dict(config["model"])
+    if "limits" in model["causes"]:
+        model["causes"] = limited("model.causes", model["causes"])
+    return {**config, "causes": causes, "model": model}

@@ -1,46 +1,103 @@
-"""The environment that the jobs of a run inherit from the process that plans them."""
+"""The environment that jobs inherit from the process that plans them, and the leftovers of killed runs.
+
+Snakemake locks its working directory by files that outlive it: after ``kill -9`` or a power cut every start ends with a
+LockException until ``--unlock``. So each Snakemake also holds a kernel lock, which ends with the process.
+"""
 
 from __future__ import annotations
 
+import fcntl
 import json
 import os
+import shutil
 import sys
 import sysconfig
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import IO
 
 from gpca.code_files import ROOT
 from gpca.process.processor import pin_instructions
 from gpca.process.provenance import CONFIG_VARIABLE, sha256_of_settings
 
-# Where data lies, and how results are judged: two runs that differ in nothing else are runs of one config.
-OF_NO_RESULT = ("data_dir", "downloads", "comparison", "reference")
+# Sections that change no result: where data lies, and how results are judged.
+WITHOUT_RESULT = ("data_dir", "downloads", "comparison", "reference")
+LEFTOVERS = ("locks", "scripts/*", "shadow/*", "shell_tmp.*")  # of a killed Snakemake in its folder
+_locks: list[IO[str]] = []  # held until this process ends
 
 
 def export_to_jobs(config: Mapping, source_folder: str | Path = ROOT) -> None:
-    """Set environment variables such that jobs run this Python and this very code, wherever the working directory is.
+    """Set environment variables so that jobs run this Python and this code, whatever the working directory.
 
-    PATH begins with this Python's folder: jobs call ``python``, which need not be the one that plans the run where its
-    environment is not activated. PYTHONPATH begins with `source_folder`, unless Python looks there anyway; and with
-    PYTHONSAFEPATH a ``gpca`` in the working directory, such as that of another checkout, is not taken for it. The
-    hashes of the config's sections, but those that no result depends on, are for the provenance. Libraries may use no
-    instructions but those of the common level (:mod:`gpca.process.processor`).
+    PATH begins with this Python's folder, as jobs call ``python``. PYTHONPATH begins with `source_folder`, unless
+    Python looks there anyway, and PYTHONSAFEPATH ignores a ``gpca`` in the working directory. Provenance records the
+    hashes of the config's sections that results depend on. Libraries are limited to the common instructions
+    (:mod:`gpca.process.processor`).
 
     Args:
         config: the whole configuration of the run.
-        source_folder: the folder that holds ``gpca`` and ``baselines``, by default that of the package itself.
+        source_folder: the folder that holds ``gpca`` and ``baselines``.
     """
-    sections = {name: sha256_of_settings(value) for name, value in config.items() if name not in OF_NO_RESULT}
+    sections = {name: sha256_of_settings(value) for name, value in config.items() if name not in WITHOUT_RESULT}
     os.environ[CONFIG_VARIABLE] = json.dumps(sections, sort_keys=True)
-    _put_first("PATH", Path(sys.executable).parent)
+    folders = {"PATH": Path(sys.executable).parent}
     source_folder = Path(source_folder).resolve()
     if source_folder not in {Path(sysconfig.get_path(name)).resolve() for name in ("purelib", "platlib")}:
-        _put_first("PYTHONPATH", source_folder)
+        folders["PYTHONPATH"] = source_folder
+    for variable, folder in folders.items():  # once, however often jobs start jobs
+        others = [name for name in os.environ.get(variable, "").split(os.pathsep) if name and name != str(folder)]
+        os.environ[variable] = os.pathsep.join([str(folder), *others])
     os.environ["PYTHONSAFEPATH"] = "1"
     pin_instructions()
 
 
-def _put_first(variable: str, folder: Path) -> None:
-    """Put a folder at the head of a list of folders, where it stands once however often jobs start jobs."""
-    others = [name for name in os.environ.get(variable, "").split(os.pathsep) if name and name != str(folder)]
-    os.environ[variable] = os.pathsep.join([str(folder), *others])
+def clear_leftovers(temporary: Sequence[str | Path], main: bool = True, folder: str | Path = ".snakemake") -> None:
+    """Lock the working directory, and clear the leftovers of killed Snakemakes if no other one is running.
+
+    All running Snakemakes share a lock of ``running`` in `folder`; one that gets it exclusively is alone. Nothing is
+    done on a file system without such locks.
+
+    Args:
+        temporary: folders that this Snakemake has made elsewhere, and removes unless it is killed.
+        main: whether it runs the workflow; one that was started for a job, as on a cluster, clears nothing.
+        folder: Snakemake's state.
+    """
+    own_folders, folder = [Path(path).absolute() for path in temporary], Path(folder)
+    try:
+        folder.mkdir(exist_ok=True)
+        file = (folder / "running").open("a+", encoding="utf-8")
+    except OSError:  # not writable, which Snakemake reports itself
+        return
+    try:
+        if main and _is_alone(file):
+            file.seek(0)
+            _clear(folder, file.read().splitlines(), own_folders)
+            file.truncate(0)
+        if main:
+            file.writelines(f"{path}\n" for path in own_folders)
+            file.flush()
+        fcntl.flock(file, fcntl.LOCK_SH)
+    except OSError:  # no locks on this file system
+        file.close()
+    else:
+        _locks.append(file)
+
+
+def _is_alone(file: IO[str]) -> bool:
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True
+
+
+def _clear(folder: Path, recorded: list[str], temporary: list[Path]) -> None:
+    leftovers = [path for pattern in LEFTOVERS for path in folder.glob(pattern)]
+    # Of the recorded folders, only siblings of the present ones are removed, with names as tempfile makes them.
+    kinds = {(path.parent, path.name[:-8], len(path.name)) for path in temporary}
+    leftovers += [path for path in map(Path, recorded) if (path.parent, path.name[:-8], len(path.name)) in kinds]
+    for path in leftovers:
+        if path.is_dir() and not path.is_symlink():
+            shutil.rmtree(path, ignore_errors=True)
+        else:
+            path.unlink(missing_ok=True)

@@ -1,99 +1,115 @@
-"""Configs laid over each other: the defaults of the suite, files of a user's own, the values of ``--config``."""
+"""Configs merged over each other: the suite's defaults, a user's files, and ``--config``; ``false`` leaves entries out.
+
+A merged config can add to mappings but take nothing away, hence the ``false``.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from copy import deepcopy
-from functools import cache, reduce
+from dataclasses import fields
+from functools import cache, partial, reduce
 from pathlib import Path
 from typing import Any
 
 from gpca.code_files import ROOT
-from gpca.errors import InputError
+from gpca.config.schema import DESIGNS, Reductions
+from gpca.errors import InputError, require_names
+from gpca.experiments.experiment import EXPLAINERS, Names
+from gpca.experiments.registry import experiments
+from gpca.explainers.registry import explainers
 from gpca.io.structured_text import read_mapping, read_scalar
 
 DEFAULTS = tuple(ROOT / "config" / name for name in ("sources.yaml", "readings.yaml", "config.yaml"))
-TEMPLATE = "__use_yte__"  # lets Snakemake run code that stands in a config
+TEMPLATE = "__use_yte__"  # lets Snakemake run code in a config
+OPTIONAL: dict[str, Names] = {  # mappings whose entries may be false -> their possible names
+    "sources": Names("source"),
+    "encoders": Names("encoder"),
+    "reductions": Names("reduction", lambda: [field.name for field in fields(Reductions)]),
+    "uncertainty": Names("uncertainty", lambda: DESIGNS),
+    "explainers": EXPLAINERS,
+    **{key: names for each in experiments() for key, names in each.leavable.items()},
+}
+# Mappings name -> true or false, or lists of the names that are true.
+SWITCHES = {key: names for each in experiments() for key, names in each.switches.items()}
+# Lists and mappings without the names that are left out elsewhere -> the key of the other mapping.
+LISTED = {key: names for each in experiments() for key, names in each.lists.items()}
 
 
 def read_file(path: str | Path) -> dict[str, Any]:
-    """Return the config of one file; nothing that Snakemake would run, repair or leave out in silence gets through.
+    """Return the config of one file.
 
     Raises:
-        InputError: as :func:`gpca.io.structured_text.read_mapping`, and for a template.
+        InputError: as :func:`gpca.io.structured_text.read_mapping`, which refuses what Snakemake would repair or ignore
+            silently, and for a template, which Snakemake would run.
     """
     config = read_mapping(path)
     if TEMPLATE in config:
-        raise InputError(
-            path, f"is a template, and {TEMPLATE} lets it run code", "write out its values and remove that key"
-        )
+        remedy = "write out its values and remove that key"
+        raise InputError(path, f"is a template, and {TEMPLATE} lets it run code", remedy)
     return config
 
 
 def require_sound(paths: Iterable[str | Path]) -> None:
-    """Raise an InputError for the first config that :func:`read_file` refuses, be it one of the defaults."""
+    """Raise an InputError for the first config that :func:`read_file` refuses, including the defaults."""
     _defaults()
     for path in paths:
         read_file(path)
 
 
 def with_defaults(*configs: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the defaults of the suite with configs laid over them, as Snakemake does it with ``--configfile``."""
-    return reduce(_laid_over, configs, deepcopy(_defaults()))
+    """Return the suite's defaults with configs merged over them, as by Snakemake's ``--configfile``."""
+    return reduce(_merged, configs, deepcopy(_defaults()))
 
 
 @cache
 def _defaults() -> dict[str, Any]:
-    return reduce(_laid_over, map(read_file, DEFAULTS), {})
+    return reduce(_merged, map(read_file, DEFAULTS), {})
 
 
-def in_order(config: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a config whose keys stand in the order of the defaults, further ones behind them.
+def _merged(lower: Mapping[str, Any], upper: Mapping[str, Any]) -> dict[str, Any]:
+    """Merge mappings recursively; any other value of the upper one replaces the lower one's."""
+    merged = dict(lower)
+    for key, value in upper.items():
+        below = merged.get(key)
+        both = isinstance(value, Mapping) and isinstance(below, Mapping)
+        merged[key] = _merged(below or {}, value) if both else value
+    return merged
 
-    Snakemake puts the keys of ``--configfile`` first, and tables have a row for each explainer in the config's order.
+
+def in_order(config: Mapping[str, Any], lower: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """Return a config with its keys in the order of another, by default the defaults; further keys follow.
+
+    Snakemake puts the keys of ``--configfile`` first, and the config's order is that of a table's rows.
     """
-    return _in_order_of(config, _defaults())
-
-
-def _in_order_of(config: Mapping[str, Any], lower: Mapping[str, Any]) -> dict[str, Any]:
-    whole: dict[str, Any] = {}
+    lower = _defaults() if lower is None else lower
+    ordered: dict[str, Any] = {}
     for key in (*(key for key in lower if key in config), *(key for key in config if key not in lower)):
         value, below = config[key], lower.get(key)
         both = isinstance(value, Mapping) and isinstance(below, Mapping)
-        whole[key] = _in_order_of(value, below or {}) if both else value
-    return whole
-
-
-def _laid_over(lower: Mapping[str, Any], upper: Mapping[str, Any]) -> dict[str, Any]:
-    """Return both; where both have a mapping, the two are merged, and of all else the upper one's counts."""
-    whole = dict(lower)
-    for key, value in upper.items():
-        below = whole.get(key)
-        merged = isinstance(value, Mapping) and isinstance(below, Mapping)
-        whole[key] = _laid_over(below or {}, value) if merged else value
-    return whole
+        ordered[key] = in_order(value, below) if both else value
+    return ordered
 
 
 def with_types(config: Mapping[str, Any], command_line: Mapping[str, Any]) -> dict[str, Any]:
     """Return the config with the command line's values read as in a config file: numbers, booleans, null.
 
-    Snakemake reads those inside lists and mappings as text, whatever they are.
+    Snakemake reads values inside lists and mappings as text.
 
     Args:
-        config: of the run, in which values from the command line are laid over the others.
-        command_line: its values alone, as Snakemake parsed them. Only what is the same in the config is read anew: a
-            workflow that uses this one as a module may have a config of its own.
+        command_line: its values alone, as Snakemake parsed them. Only those that the config still has are converted: a
+            workflow that uses this one as a module may have another config.
     """
+
+    def typed(value: Any, given: Any) -> Any:
+        if isinstance(value, Mapping) and isinstance(given, Mapping):
+            return with_types(value, given)
+        return _read(value) if value == given else value
+
     return {
-        name: _typed(value, command_line[name]) if isinstance(command_line, Mapping) and name in command_line else value
+        name: typed(value, command_line[name]) if isinstance(command_line, Mapping) and name in command_line else value
         for name, value in config.items()
     }
-
-
-def _typed(value: Any, command_line: Any) -> Any:
-    if isinstance(value, Mapping) and isinstance(command_line, Mapping):
-        return with_types(value, command_line)
-    return _read(value) if value == command_line else value
 
 
 def _read(value: Any) -> Any:
@@ -102,3 +118,71 @@ def _read(value: Any) -> Any:
     if isinstance(value, list):
         return [_read(entry) for entry in value]
     return read_scalar(value) if isinstance(value, str) else value
+
+
+def without_false(config: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the config without the entries left out and the rows that need them; `config` is not changed.
+
+    A row is an entry of a list, an explainer or a policy. Keys that name one thing that is left out, such as
+    `figures.source`, and lists of nothing else stay: :func:`gpca.config.check.check` refuses them.
+
+    Raises:
+        InputError: a switch that is neither true nor false.
+    """
+    left_out = {key: names_left_out(config, key) for key in OPTIONAL}
+    whole = dict(config)
+    for key, names in left_out.items():
+        _change(whole, key, partial(_without, gone=names))
+    for key in SWITCHES:
+        _change(whole, key, partial(_switched_on, key))
+    for key, of in LISTED.items():
+        gone = left_out[of] if isinstance(of, str) else of(lambda key: names_left_out(config, key))
+        _change(whole, key, partial(_without, gone=gone), (list, dict))
+    if left_out["real_world.datasets"] and not _at(whole, "real_world.datasets"):
+        _change(whole, "real_world.virtual", lambda _frames: None)  # no models are left to render
+    gone = {name for name, entry in explainers().items() if entry.design in left_out["uncertainty"]}
+    for key in (key for key, names in OPTIONAL.items() if names is EXPLAINERS):
+        _change(whole, key, partial(_without, gone=gone))
+    return whole
+
+
+def check_left_out(config: Mapping[str, Any]) -> None:
+    """Raise an InputError for an unknown name that is false, which would have no effect."""
+    for key, names in {**OPTIONAL, **SWITCHES}.items():
+        if names.known:
+            require_names(key, sorted(names_left_out(config, key)), names.known(), names.noun)
+
+
+def names_left_out(config: Mapping[str, Any], key: str) -> set[str]:
+    """Return the names that are false in the mapping at a key, a path with dots."""
+    mapping = _at(config, key)
+    return {name for name, entry in mapping.items() if entry is False} if isinstance(mapping, Mapping) else set()
+
+
+def _switched_on(key: str, switches: Mapping[str, Any]) -> list[str]:
+    for name, switch in switches.items():
+        if not isinstance(switch, bool):
+            raise InputError(f"config key {key}.{name}", f"{switch!r} is not a switch", "give true or false")
+    return [name for name, switch in switches.items() if switch]
+
+
+def _at(config: Any, key: str) -> Any:
+    return reduce(lambda value, name: value.get(name) if isinstance(value, Mapping) else None, key.split("."), config)
+
+
+def _without(names: list | dict, gone: Collection[str]) -> list | dict:
+    """Return a list or mapping without names; a list of nothing else stays."""
+    if isinstance(names, dict):
+        return {name: entry for name, entry in names.items() if name not in gone}
+    return [name for name in names if name not in gone] or names
+
+
+def _change(config: dict[str, Any], key: str, change, kind: type | tuple[type, ...] = dict) -> None:
+    """Apply `change` to the value at the key, in copies of the sections around it."""
+    *path, last = key.split(".")
+    if isinstance(_at(config, key), kind):
+        section = config
+        for name in path:
+            section[name] = dict(section[name])
+            section = section[name]
+        section[last] = change(section[last])

@@ -1,4 +1,4 @@
-"""The whole config as one settings class: the sections that all share, and one of each experiment."""
+"""The whole config as one settings class: shared sections, and those of each experiment."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Objects:
 
 @dataclass(frozen=True)
 class Splits:
-    """The files that say which objects and scenes are for what, and what this run is for."""
+    """Files with the roles of objects and scenes, and the role of this run."""
 
     objects: Place | None
     scenes: Place | None
@@ -44,7 +44,7 @@ class Splits:
 
 @dataclass(frozen=True)
 class NoReduction:
-    """The reduction ``none`` has no settings."""
+    """No settings."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class Reductions:
 
 @dataclass(frozen=True)
 class Embedding:
-    """The encoder and the reduction of the embeddings that explainers read."""
+    """The embeddings that explainers read."""
 
     encoder: str
     reduction: Literal["none"]
@@ -67,7 +67,7 @@ class Embedding:
 
 @dataclass(frozen=True)
 class UncertaintyDesign(UncertaintySettings):
-    """A design of Monte-Carlo ICP, on some test samples of each source and seed or on all."""
+    """A design of Monte-Carlo ICP, and its test samples of each source and seed."""
 
     samples: Annotated[int, Bounds(minimum=3, multipleOf=3)] = 3
 
@@ -77,7 +77,7 @@ Design = Annotated[dict, changes_of(UncertaintyDesign, without=("icp",))]
 
 @dataclass(frozen=True)
 class ExplainedModel:
-    """The settings that the model of ``python -m gpca explain`` learns with."""
+    """The model of ``gpca explain``."""
 
     source: str
     encoder: str
@@ -88,21 +88,21 @@ class ExplainedModel:
 
 @dataclass(frozen=True)
 class Figures:
-    """The source that the figures of one registration show."""
+    """Source of the figures of one registration."""
 
     source: str
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """Verdicts on the numbers that the paper prints, by unit."""
+    """Tolerances of verdicts on printed numbers, by unit."""
 
     tolerances: Annotated[dict, Keys(dict.fromkeys(UNITS, Tolerance), required=UNITS)]
 
 
 @dataclass(frozen=True)
 class SharedSections:
-    """The sections that are no experiment's own."""
+    """The sections that experiments share."""
 
     run: Annotated[str, Field(pattern="^[A-Za-z0-9][A-Za-z0-9_-]*$", max_length=100)]
     data_dir: Place | None
@@ -129,5 +129,5 @@ class SharedSections:
 @cache
 def whole_config() -> type:
     """Return the settings class of a config."""
-    own = [(name, kind, field()) for experiment in experiments() for name, kind in experiment.sections.items()]
-    return make_dataclass("Config", own, bases=(SharedSections,), frozen=True, kw_only=True)
+    sections = [(name, kind, field()) for experiment in experiments() for name, kind in experiment.sections.items()]
+    return make_dataclass("Config", sections, bases=(SharedSections,), frozen=True, kw_only=True)

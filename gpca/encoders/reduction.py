@@ -77,7 +77,7 @@ class Autoencoder:
         import torch
         from torch import nn
 
-        from gpca.adam import Adam
+        from gpca.portable import Adam
 
         d, hidden, batch_size = z_train_N_d.shape[1], 256, 32
         z_N_d = torch.from_numpy(z_train_N_d.astype(np.float32))

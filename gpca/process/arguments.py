@@ -1,4 +1,4 @@
-"""Options of a command line: a parser that refuses in one line, and types for numbers."""
+"""Options of a command line: a parser with one-line errors, and types of numbers."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from gpca.numerals import decimal, whole
 
 
 class OneLineParser(argparse.ArgumentParser):
-    """A parser whose errors take one line, as everywhere in the suite, and whose names do too."""
+    """A parser with one-line errors, which refuses names of several lines."""
 
     def parse_args(self, args=None, namespace=None):
-        """Parse; every text but the settings, if it is neither a path nor a number, has to be a name."""
+        """Parse, and check that every text except the settings is a name."""
         options = super().parse_args(args, namespace)
         for option, value in vars(options).items():
             for text in value if isinstance(value, list) else [value]:
@@ -30,19 +30,19 @@ class OneLineParser(argparse.ArgumentParser):
 
 
 def whole_number(least: int, most: int) -> Callable[[str], int]:
-    """Return the type of an option that takes a whole number from `least` to `most`."""
+    """Return the type of an option with a whole number from `least` to `most`."""
 
     def read(text: str) -> int:
         try:
             return whole(text, least, most)
-        except ValueError as fault:  # argparse shows the words of its own error alone
+        except ValueError as fault:  # argparse shows only the text of its own error
             raise argparse.ArgumentTypeError(str(fault)) from fault
 
     return read
 
 
 def length(text: str) -> float:
-    """Read an option that takes a length above 0, in whatever unit the clouds have."""
+    """Read a positive length in the unit of the clouds."""
     try:
         value = decimal(text)
     except ValueError as fault:
@@ -52,7 +52,5 @@ def length(text: str) -> float:
     return value
 
 
-# More threads than any machine of today has cores; OpenMP and numba crash where they cannot start as many as they are
-# told to, which is at some thousands.
-THREADS = whole_number(1, 256)
-COUNT = whole_number(1, 10**6)  # of what is small; a million of anything that is asked for by hand is a slip
+THREADS = whole_number(1, 256)  # OpenMP and numba crash where they cannot start as many as asked, some thousands
+COUNT = whole_number(1, 10**6)  # larger counts are typos

@@ -1,9 +1,8 @@
-"""Numba, with a folder for what it compiles: one for each state of the code that the loops come from.
+"""Numba with a cache of compiled loops per state of their code.
 
-Numba itself looks at a function's own file alone, and would go on with what it once took from other modules. The
-folders lie beside this module, else in the user's cache, else among the temporary files: in a read-only checkout, say,
-of a user without a home. In them a loop is found by its package, not by its path as numba would, so that a checkout
-that was copied or moved takes along what was compiled.
+Numba itself checks a function's own file only, not the modules that it imports. The caches lie beside this module, else
+in the user's cache, else among the temporary files. They name a loop by its package, not by its path as numba does, so
+that a copied or moved checkout keeps its compiled loops.
 """
 
 from __future__ import annotations
@@ -27,15 +26,15 @@ def _cache_folder() -> Path:
     modules = (".".join(path.relative_to(ROOT).with_suffix("").parts) for path in loops)
     code = b"".join(Path(file).read_bytes() for file in code_files(*modules))
     state = f"loops-{hashlib.sha256(code).hexdigest()[:16]}"
-    if named := os.environ.get(VARIABLE):
-        return Path(named) if Path(named).name == state else Path(named, state)  # the parent process has named it
+    if given := os.environ.get(VARIABLE):  # by the user, or by the parent process with the state
+        return Path(given) if Path(given).name == state else Path(given, state)
     user = Path(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"))
     folders = (Path(__file__).parent / "__pycache__", user / "gpca")
     return (next(filter(_writable, folders), None) or _temporary()) / state
 
 
 def _temporary() -> Path:
-    """Return a folder that belongs to this user alone, since the code in it will be run."""
+    """Return a folder that only this user can write, since the code in it will be run."""
     folder = Path(tempfile.gettempdir(), f"gpca-numba-{os.getuid()}")
     try:
         folder.mkdir(mode=0o700, exist_ok=True)
@@ -60,20 +59,19 @@ from numba import config, njit, prange  # noqa: E402
 from numba.core.caching import UserProvidedCacheLocator  # noqa: E402
 from numba.core.event import Listener, register  # noqa: E402
 
-setattr(config, "CACHE_DIR", os.environ[VARIABLE])  # noqa: B010 - numba declares it at run time; where it was imported before
+setattr(config, "CACHE_DIR", os.environ[VARIABLE])  # noqa: B010 - numba may have been imported before
 
 __all__ = ["INNER_LOOP", "NOTICE", "OVER_CLOUDS", "njit", "prange", "say_when_compiling"]
 
-# Without numba's reference counting (`_nrt`): whenever an array is taken out of a tuple, it counts up and down, which
-# in the loops of ICP takes longer than the search. Functions compiled so cannot make arrays; they are given room to
-# work.
+# Without numba's reference counting (`_nrt`), which takes longer than the search in the loops of ICP, as it counts for
+# every array taken out of a tuple. Such functions cannot allocate arrays.
 INNER_LOOP: dict[str, Any] = {
     "cache": True,
     "_nrt": False,
     "error_model": "numpy",
     "fastmath": {"contract", "nsz", "nnan", "reassoc"},
 }
-# Loops over clouds run in parallel; without "reassoc", so that each sum is made in its written order.
+# Parallel loops over clouds; without "reassoc", so that sums keep their order.
 OVER_CLOUDS: dict[str, Any] = {
     "cache": True,
     "parallel": True,
@@ -83,16 +81,16 @@ OVER_CLOUDS: dict[str, Any] = {
 
 
 class PackageLocator(UserProvidedCacheLocator):
-    """Keeps the loops of a package of ours in a folder of its name."""
+    """Keeps the loops of one of our packages in a folder of its name."""
 
     @classmethod
     def from_function(cls, py_func: Any, py_file: str) -> PackageLocator | None:
-        """Return the locator of a function of ours; None for others, which numba keeps as it always does."""
+        """Return the locator of one of our functions; None leaves others to numba."""
         return super().from_function(py_func, py_file) if Path(py_file).is_relative_to(ROOT) else None
 
     @classmethod
     def get_suitable_cache_subpath(cls, py_file: str) -> str:
-        """Return the name of the package that the file lies in."""
+        """Return the name of the file's package."""
         return ".".join(Path(py_file).relative_to(ROOT).parent.parts)
 
 
@@ -101,7 +99,7 @@ setattr(config, "CACHE_LOCATOR_CLASSES", f"{__name__}.{PackageLocator.__name__},
 
 @cache
 def say_when_compiling() -> None:
-    """Print one line to stderr as soon as a loop is compiled, not loaded: a first call takes longer than all others."""
+    """Print one line to stderr when the first loop is compiled rather than loaded."""
     register("numba:compile", _Notice())
 
 
@@ -114,4 +112,4 @@ class _Notice(Listener):
         self.printed = True
 
     def on_end(self, event: object) -> None:
-        """Do nothing: the line is printed at the start."""
+        """Do nothing."""

@@ -1,6 +1,6 @@
-"""Whether this machine can run the suite: Open3D is the one package that needs libraries of the system.
+"""What this machine lacks: Python packages of extras, and the system libraries that Open3D needs.
 
-``python -m gpca.process.environment`` checks it; ``make`` does so after installing ``environment.lock``.
+``python -m gpca.process.environment`` checks it, as ``make`` does after installing ``environment.lock``.
 """
 
 from __future__ import annotations
@@ -8,15 +8,29 @@ from __future__ import annotations
 import re
 import sys
 from types import ModuleType
-from typing import Any
-
-import numpy as np
+from typing import TYPE_CHECKING, Any
 
 from gpca.errors import InputError
-from gpca.process.extras import remedy
 
-# Shared library -> package (Debian and Ubuntu, Fedora). Any other library is named as it is.
-SYSTEM_PACKAGES = {
+if TYPE_CHECKING:
+    import numpy as np
+
+MODULES = {  # extra of pyproject.toml -> modules of its packages, which `gpca explain` does without
+    "suite": (
+        "manifold3d",
+        "open3d",
+        "PIL",
+        "pooch",
+        "requests",
+        "SALib",
+        "shap",
+        "shapely",
+        "skactiveml",
+        "umap",
+    ),
+    "workflow": ("docutils", "jinja2", "markupsafe", "matplotlib", "snakemake"),
+}
+SYSTEM_PACKAGES = {  # shared library -> package of Debian and Ubuntu, of Fedora
     "libGL.so.1": ("libgl1", "mesa-libGL"),
     "libX11.so.6": ("libx11-6", "libX11"),
     "libgomp.so.1": ("libgomp1", "libgomp"),
@@ -26,12 +40,24 @@ SYSTEM_PACKAGES = {
 }
 
 
+def remedy(extra: str) -> str:
+    """Return how to install the packages of an extra."""
+    return f"install it, 'pip install \".[{extra}]\"' in the folder of the suite"
+
+
+def missing(fault: ModuleNotFoundError) -> str | None:
+    """Return a line about the missing package of an extra; None for another module."""
+    module = (fault.name or "").partition(".")[0]
+    extra = next((name for name, modules in MODULES.items() if module in modules), None)
+    return extra and f"{module}: this Python package is not installed; {remedy(extra)}"
+
+
 def system_library_hint(message: str) -> str | None:
-    """Return the advice for the dynamic linker's `message`, or None if it names no missing shared library."""
-    missing = re.search(r"(\S+\.so[.\d]*): cannot open shared object file", message)
-    if missing is None:
+    """Return a remedy for the dynamic linker's message, None if it names no missing shared library."""
+    match = re.search(r"(\S+\.so[.\d]*): cannot open shared object file", message)
+    if match is None:
         return None
-    library = missing[1]
+    library = match[1]
     if library not in SYSTEM_PACKAGES:
         return f"install the system package that provides {library}"
     debian, fedora = SYSTEM_PACKAGES[library]
@@ -42,8 +68,7 @@ def require_open3d() -> ModuleType:
     """Import and return Open3D.
 
     Raises:
-        InputError: it is not installed or cannot be imported; the line names the extra, or the system library that is
-            missing and its package.
+        InputError: not installed, or not importable; the line names the extra, or the missing system library.
     """
     try:
         import open3d
@@ -56,7 +81,9 @@ def require_open3d() -> ModuleType:
 
 
 def open3d_cloud(points_N_3: np.ndarray, normals_N_3: np.ndarray | None = None) -> Any:
-    """Return Open3D's cloud of points, with normals where they are given."""
+    """Return Open3D's cloud of points, optionally with normals."""
+    import numpy as np  # the pins of the processor precede it
+
     o3d = require_open3d()
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(np.asarray(points_N_3, np.float64)))
     if normals_N_3 is not None:

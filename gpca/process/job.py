@@ -1,4 +1,4 @@
-"""A job of the workflow: what its rule gives a step or a script, and how that runs and ends."""
+"""A job of the workflow: what its rule gives a step or a script, how it runs, prints and ends."""
 
 from __future__ import annotations
 
@@ -11,49 +11,48 @@ from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, TextIO
 
 from gpca.errors import InputError
-from gpca.process.extras import missing
-from gpca.process.interrupts import certain_interrupts
+from gpca.process.environment import missing
 from gpca.process.processor import prepare
-from gpca.process.standard_streams import say, standard_streams
+from gpca.process.progress import certain_interrupts
 
 
 class Job:
-    """The files, names and settings that a rule gives a step, each an attribute by its name in the rule.
+    """The files, names and settings that a rule gives a step, as attributes.
 
-    Files are paths, or lists of them where the rule lists them; ``settings`` is a mapping.
+    Files are paths, or lists of paths where the rule has lists; ``settings`` is a mapping.
     """
 
     def __init__(self, **given: Any) -> None:
         self.__dict__.update(given)
 
     def get(self, name: str, default: Any = None) -> Any:
-        """Return what the rule gives by that name, or the default where it gives nothing: no file, name or text."""
+        """Return what the rule gives by that name, or the default where it is missing or empty."""
         value = self.__dict__.get(name)
         return default if value in (None, "", []) else value
 
     def section(self, name: str) -> dict[str, Any]:
-        """Return a part of ``settings``; what is absent or null is empty."""
+        """Return a part of ``settings``, empty where it is absent or null."""
         return self.settings.get(name) or {}
 
     def by_name(self, section: str, names: Iterable[str]) -> dict[str, dict]:
-        """Return the settings of each of the names in a part of ``settings``; none for those that are not in it."""
+        """Return name -> its settings in a part of ``settings``, empty where absent."""
         return {name: self.section(section).get(name) or {} for name in names}
 
     def settings_and_icp(self) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Return ``settings`` without ``icp``, and that part."""
+        """Return ``settings`` without ``icp``, and ``icp``."""
         settings = dict(self.settings)
         return settings, settings.pop("icp", {})
 
     def files(self, name: str) -> list[Path]:
-        """Return the files of that name where a rule may give one or several."""
+        """Return the files of that name as a list."""
         files = getattr(self, name)
         return files if isinstance(files, list) else [files]
 
     def per_seed(self, *names: str) -> Iterator[tuple]:
-        """Yield each of ``seeds`` with its file from each of the named lists."""
+        """Yield each of ``seeds`` with its files in the named lists."""
         return zip(self.seeds, *(getattr(self, name) for name in names), strict=True)
 
     def __getattr__(self, name: str) -> Any:
@@ -63,8 +62,7 @@ class Job:
 def run_step(snakemake: Any) -> None:
     """Run the step that the rule names in ``params.step``, a module with a function ``run(job)``; then exit.
 
-    What the step and its libraries print to stderr goes to the rule's log. A fault of the input ends as one line there
-    and status 2.
+    All stderr goes to the rule's log. A fault of the input ends as one line there and status 2.
 
     Args:
         snakemake: the object that Snakemake gives a script; the input ``code`` is no data.
@@ -83,7 +81,7 @@ def run_step(snakemake: Any) -> None:
 
 
 def call(step: str, job: Job) -> None:
-    """Run a step: the module of that name, with torch on as many threads as the job has."""
+    """Run the step in the module of that name, with the job's threads for torch."""
     module = import_module(step)
     if "torch" in sys.modules:
         sys.modules["torch"].set_num_threads(job.threads)
@@ -121,7 +119,7 @@ def files_by_name(files: Any) -> dict[str, Path | list[Path]]:
 
 
 def _print_to(logs: Any) -> None:
-    """Let what the process and its libraries print to stderr go to the rule's log, if it has one."""
+    """Redirect stderr of the process and its libraries to the rule's log, if it has one."""
     if logs:
         os.dup2(os.open(logs[0], os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o666), sys.stderr.fileno())
 
@@ -129,8 +127,7 @@ def _print_to(logs: Any) -> None:
 def as_process(name: str, function: Callable[[], int | None]) -> int:
     """Call a function and return the status of the process: 0, or what the function returns.
 
-    A fault of the input ends as one line on stderr and status 2, and so does the lack of a package that
-    an extra installs; Ctrl-C as status 130.
+    A fault of the input, or a missing package of an extra, ends as one line on stderr and status 2; Ctrl-C as 130.
     """
     with _as_process(f"{name}: ") as process:
         process.status = function() or 0
@@ -139,7 +136,7 @@ def as_process(name: str, function: Callable[[], int | None]) -> int:
 
 @contextmanager
 def _as_process(prefix: str = "") -> Iterator[SimpleNamespace]:
-    """Give the block a `status` to set; the faults that end in one line set it themselves."""
+    """Give the block a `status` to set; faults that end in one line set it."""
     process, begun = SimpleNamespace(status=0), False
     try:
         with certain_interrupts(), standard_streams():
@@ -164,9 +161,46 @@ def _as_process(prefix: str = "") -> Iterator[SimpleNamespace]:
 
 
 def keep_freed_memory() -> None:
-    """Let glibc keep what is freed: else every large tensor's pages are faulted in anew, an eighth of training."""
+    """Let glibc keep freed memory: page faults of large tensors take an eighth of the training otherwise."""
     mallopt = getattr(ctypes.CDLL(None), "mallopt", None)  # absent outside glibc
     if mallopt is not None:
         trim_threshold, mmap_threshold = -1, -3  # M_TRIM_THRESHOLD and M_MMAP_THRESHOLD of malloc.h
         mallopt(trim_threshold, 2**31 - 1)
         mallopt(mmap_threshold, 2**30)
+
+
+@contextmanager
+def standard_streams() -> Iterator[None]:
+    """Print letters that the encoding lacks as escapes such as ``\\xb0``, and check that all output was written.
+
+    Raises:
+        InputError: stdout is closed, its reader is gone, or its disk is full.
+    """
+    if sys.stdout is None:
+        raise InputError("stdout", "is closed", "redirect it, for example to /dev/null")
+    if sys.stderr is None:  # its text would be printed to stdout
+        sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
+    for stream in (sys.stdin, sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")
+    try:
+        yield
+    finally:
+        try:
+            sys.stdout.flush()
+        except OSError as fault:
+            _discard(sys.stdout)
+            raise InputError("stdout", f"cannot be written ({fault.strerror})", "redirect it to a file") from fault
+
+
+def say(line: str) -> None:
+    """Print a line to stderr, ignoring a failure."""
+    try:
+        print(line, file=sys.stderr, flush=True)
+    except OSError:
+        _discard(sys.stderr)
+
+
+def _discard(stream: TextIO) -> None:
+    """Drop the buffer of a stream, which Python would flush at its end with another message."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())

@@ -1,13 +1,12 @@
-"""The processor: which one it is, and which of its instructions the libraries may use.
+"""The processor: its facts, and the instructions that libraries may use.
 
-OpenBLAS, MKL, NumPy, torch, oneDNN and numba choose their code by the processor that they find, and each choice rounds
-in its own way; ICP then turns a last digit into another pose. So all are held to one level that every x86-64 machine of
-the last ten years has, x86-64-v3 (AVX2 and FMA), and MKL to the only code that it runs on any vendor's processor.
+OpenBLAS, MKL, NumPy, torch, oneDNN and numba choose their code by the processor, each choice rounds differently, and
+ICP turns a last digit into another pose. So all are limited to x86-64-v3 (AVX2 and FMA), which every x86-64 machine of
+the last ten years has, and MKL to the only code that it runs on any vendor's processor.
 
-Pins choose the code, but not what an instruction does. ``rsqrtps`` and ``rcpps`` are estimates that each vendor defines
-by a table of its own, and MKL starts some of its functions from them at every level. So `gpca.elementary` stands in for
-those, Adam is fused, and ``tests/vendor_guard.py`` fails where a step calls one of them. Nor do pins reach Open3D,
-small_gicp and other libraries that are compiled for one level, or whatever a plugin brings along.
+Pins choose the code, but ``rsqrtps`` and ``rcpps`` are estimates from a table of each vendor, which MKL uses in some
+functions at every level. So `gpca.portable` replaces those and fuses Adam, and ``tests/vendor_guard.py`` fails where a
+step calls them. Pins have no effect on Open3D, small_gicp and other libraries compiled for one level, or on plugins.
 """
 
 from __future__ import annotations
@@ -18,8 +17,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
 
-# Set this to "native" to give every library the instructions that it likes best: results then differ between machines.
-INSTRUCTIONS_VARIABLE = "GPCA_INSTRUCTIONS"
+INSTRUCTIONS_VARIABLE = "GPCA_INSTRUCTIONS"  # "native" allows all instructions; results then differ between machines
 COMMON_LEVEL = "x86-64-v3"
 CPUINFO = Path("/proc/cpuinfo")
 THREAD_VARIABLES = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
@@ -27,32 +25,27 @@ _REQUIRED_FLAGS = {"avx2", "fma", "bmi1", "bmi2", "f16c", "movbe", "abm"}
 _PINS: Mapping[str, str] = MappingProxyType(
     {
         "OPENBLAS_CORETYPE": "Haswell",
-        # MKL answers AVX2 with another branch on AMD than on Intel. The products of the encoders do without it.
+        # For AVX2, MKL takes another branch on AMD than on Intel.
         "MKL_CBWR": "COMPATIBLE",
         "NPY_DISABLE_CPU_FEATURES": "X86_V4 AVX512_ICL AVX512_SPR",
         "ATEN_CPU_CAPABILITY": "avx2",
         "ONEDNN_MAX_CPU_ISA": "AVX2",
         "NUMBA_CPU_NAME": COMMON_LEVEL,
-        "NUMBA_CPU_FEATURES": "",  # those that the name implies; unset, the ones of the machine would be added
+        "NUMBA_CPU_FEATURES": "",  # unset, those of the machine would be added
     }
 )
 
 
 def prepare(threads: int = 1) -> None:
-    """Set this process's threads and instructions, for itself and all that it starts.
-
-    Call it before NumPy, torch, numba or Open3D is imported: each reads its variables once.
-    """
-    # Every library's, or Open3D and torch fight over the cores.
+    """Set the threads and instructions of this process and its children, before NumPy, torch, numba or Open3D load."""
     os.environ.update(dict.fromkeys(THREAD_VARIABLES, str(threads)))
     pin_instructions()
 
 
 def pin_instructions() -> str:
-    """Hold the libraries that are loaded from now on to the common level, and return the level: that or "native".
+    """Limit the libraries that are loaded from now on to the common level, and return it.
 
-    What the environment says of these libraries is overruled. Where the processor lacks the level, or where
-    GPCA_INSTRUCTIONS is "native", nothing is set.
+    Nothing is set, and "native" returned, if the processor lacks the level or GPCA_INSTRUCTIONS is "native".
     """
     if os.environ.get(INSTRUCTIONS_VARIABLE) == "native" or not _flags() >= _REQUIRED_FLAGS:
         return "native"
@@ -61,7 +54,7 @@ def pin_instructions() -> str:
 
 
 def instructions() -> str:
-    """Return the level that this process was held to: "x86-64-v3" or "native"."""
+    """Return the level of this process: "x86-64-v3" or "native"."""
     return COMMON_LEVEL if all(os.environ.get(name) == value for name, value in _PINS.items()) else "native"
 
 
@@ -71,10 +64,7 @@ def cpu_name() -> str:
 
 
 def describe() -> dict[str, str | list[str] | None]:
-    """Return the facts by which libraries choose their code: name, vendor, family, model, flags of vector instructions.
-
-    A field that the system does not report is None.
-    """
+    """Return what libraries choose their code by: name, vendor, family, model, vector instructions; None if unknown."""
     facts = _cpuinfo()
     vector = ("avx", "fma", "amx", "bmi", "f16c", "sse4")
     return {
@@ -93,7 +83,7 @@ def _flags() -> set[str]:
 
 
 def _cpuinfo() -> dict[str, str]:
-    """Return the fields of the first processor that Linux lists, or none."""
+    """Return the fields of the first processor that Linux lists."""
     if not CPUINFO.exists():
         return {}
     first = CPUINFO.read_text(encoding="utf-8").split("\n\n", 1)[0]

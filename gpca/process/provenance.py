@@ -1,4 +1,4 @@
-"""The provenance of results: a JSON sidecar beside every output, apart from the data, which stay comparable."""
+"""The provenance of results: a JSON file beside every output."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from gpca.io.files import require_outputs, sha256_of_file, whole_file
 from gpca.process.processor import describe
 
 LIBRARIES = ("numpy", "scipy", "torch", "gpytorch", "open3d-cpu", "scikit-learn", "numba", "trimesh", "snakemake")
-CONFIG_VARIABLE = "GPCA_CONFIG_SHA256"  # JSON, the hash of each section: set by the Snakefile for its jobs
+CONFIG_VARIABLE = "GPCA_CONFIG_SHA256"  # hash of each section, JSON, for jobs
 
 
 @contextmanager
@@ -35,14 +35,12 @@ def record_provenance(
 ) -> Iterator[None]:
     """Time the block and, when it succeeds, write ``<output>.provenance.json`` beside each output.
 
-    The commit and the hash of environment.lock are those of the checkout that the package lies in; where it is
-    installed elsewhere they are null, and the package's version is all that is known of the code.
+    The commit and the hash of environment.lock are null for a package outside a checkout.
 
     Args:
         outputs, inputs: files; the inputs are hashed (SHA-256).
         settings: all that the result depends on besides its inputs.
-        seed: the repeat, if there is one.
-        folders: the outputs are folders.
+        folders: whether the outputs are folders.
 
     Raises:
         InputError: before the block, for an output that cannot be written: :func:`gpca.io.files.require_outputs`.
@@ -77,15 +75,13 @@ def sha256_of_settings(settings: object) -> str:
 def _code_version() -> dict[str, object]:
     """Return the version, the commit, and whether tracked files differ from it.
 
-    Commit and changes are null without git and where git does not keep this package: a virtual environment may well lie
-    in the checkout of another project, whose commit says nothing of this code.
+    Commit and changes are null without git, and where git does not track this package, as in a virtual environment that
+    lies in another project's checkout.
     """
-    # No import statement: with gpca/__init__.py among the code of every step, a new version would rerun all of them.
+    # No import statement: it would make gpca/__init__.py code of every step, and a new version rerun all of them.
     installed = import_module("gpca").__version__
-    commit, changes, ours = None, None, False
-    if shutil.which("git") is not None:
-        ours = _git("ls-files", "--error-unmatch", "gpca/__init__.py") is not None
-    if ours:
+    commit, changes = None, None
+    if shutil.which("git") and _git("ls-files", "--error-unmatch", "gpca/__init__.py") is not None:
         commit, changes = _git("rev-parse", "HEAD"), _git("status", "--porcelain", "--untracked-files=no")
     if not commit or changes is None:
         return {"version": installed, "commit": None, "dirty": None}

@@ -1,7 +1,7 @@
-"""How long a run still takes: beside Snakemake's count of jobs, by how long the same jobs took before.
+"""Estimates the time left of a run, beside Snakemake's count of jobs.
 
-A job is expected to take what its benchmark file says of an earlier run in the same folder, else the mean of its rule
-in a run that was measured (`TIMES`), else the mean of all others.
+The expected time of a job is that of its benchmark file from an earlier run in the same folder, else the mean of its
+rule in a measured run (`TIMES`), else the mean of all other jobs.
 """
 
 from __future__ import annotations
@@ -16,19 +16,19 @@ from time import monotonic
 from typing import Any
 
 TIMES = Path(__file__).parents[2] / "workflow/measured_times.csv"  # python benchmarks/scale.py results/{run} --times
-USUAL_RUN = "default"  # whose times tell how the jobs of a run that was never measured compare with each other
+USUAL_RUN = "default"  # gives the relative times for a run that was never measured
 EVERY_S = 20.0  # between two lines
-TRUST_S = 120.0  # core time after which this machine's speed counts as much as that of the machine that was measured
-_PROGRESS = "progress"  # the event of Snakemake's own count of jobs
+TRUST_S = 120.0  # core time after which the speeds of this and the measured machine have equal weight
+_PROGRESS = "progress"  # Snakemake's event of its count of jobs
 
 
 class TimeLeft:
     """Work that is left, in seconds of one core.
 
     Args:
-        expected: job, by the path of its benchmark file -> seconds that it took before; None where nobody knows.
-        cores: how many jobs of one core run side by side.
-        trust_s: core time for which the seconds are believed, before those of the jobs that have ended correct them.
+        expected: path of a job's benchmark file -> expected seconds, None where unknown.
+        cores: number of one-core jobs side by side.
+        trust_s: core time that the expected speed is worth against that of the finished jobs.
     """
 
     def __init__(self, expected: Mapping[str, float | None], cores: int, trust_s: float = TRUST_S) -> None:
@@ -43,27 +43,26 @@ class TimeLeft:
         return list(self._left)
 
     def finish(self, job: str, took_s: float | None) -> None:
-        """Note that a job has ended, and the seconds that it took where that is known."""
+        """Note that a job has ended, and the seconds that it took, if known."""
         expected_s = self._left.pop(job)
         if took_s is not None:
             self._expected_s += expected_s
             self._took_s += took_s
 
     def seconds(self) -> float:
-        """Return the expected seconds until the last job ends, if all go on as fast as those that have ended.
+        """Return the expected seconds until the last job ends, at the speed of those that have ended.
 
-        That is the work for each core, or the longest job where that takes longer. Jobs that run count as a whole.
+        It is the work per core, or the longest job. Running jobs count as a whole.
         """
         longest_s = max(self._left.values(), default=0.0)
         return max(sum(self._left.values()) / self._cores, longest_s) * self._took_s / self._expected_s
 
 
 class TimeLeftHandler(logging.Handler):
-    """Follows Snakemake's counts of jobs by a line about the time left, at most one in `EVERY_S`.
+    """Writes a line about the time left after Snakemake's counts of jobs, at most every `EVERY_S`.
 
     Args:
-        time_left: what is left.
-        has_ended: tells whether a job has ended.
+        has_ended: whether a job has ended.
         say: writes a line.
         clock: monotonic seconds.
     """
@@ -80,7 +79,7 @@ class TimeLeftHandler(logging.Handler):
         self._said_s = clock()
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Take a message of Snakemake's; all but its counts of jobs are ignored."""
+        """Handle a message of Snakemake; all but its counts of jobs are ignored."""
         if getattr(record, "event", None) != _PROGRESS or self._clock() - self._said_s < EVERY_S:
             return
         self._said_s = self._clock()
@@ -90,11 +89,11 @@ class TimeLeftHandler(logging.Handler):
 
 
 def tell_time_left(workflow: Any, run: str) -> None:
-    """Let a run that begins tell how long it still takes; nothing where none of its jobs was ever measured.
+    """Print the time left during a run, unless none of its jobs was ever measured.
 
     Args:
         workflow: Snakemake's object of that name, within ``onstart``.
-        run: the name of the run.
+        run: name of the run.
     """
     from snakemake.logging import logger
     from snakemake.settings.enums import Quietness
@@ -117,16 +116,16 @@ def tell_time_left(workflow: Any, run: str) -> None:
 
 
 def seconds_of(benchmark: str | Path) -> float | None:
-    """Return the seconds that a benchmark file says, the sum of its repeats; None where it says nothing."""
+    """Return the seconds in a benchmark file, summed over repeats; None without them."""
     try:
         rows = list(csv.DictReader(Path(benchmark).read_text(encoding="utf-8").splitlines(), delimiter="\t"))
         return sum(float(row["s"]) for row in rows) if rows else None
-    except (OSError, KeyError, TypeError, ValueError):  # it is being written, or another program's
+    except (OSError, KeyError, TypeError, ValueError):  # incomplete, or of another program
         return None
 
 
 def read_times(path: Path) -> dict[str, dict[str, float]]:
-    """Return run -> rule -> mean seconds of its jobs; none where there is no such file."""
+    """Return run -> rule -> mean seconds of its jobs; empty without the file."""
     times: dict[str, dict[str, float]] = {}
     if path.is_file():
         with path.open(encoding="utf-8", newline="") as file:

@@ -11,8 +11,8 @@ from gpca.classifier.gpc import GPC
 from gpca.classifier.gpytorch_classes import GpytorchGPC, SameRoots
 from gpca.classifier.settings import GPCSettings
 from gpca.classifier.sparse_gp import COVARIANCES
-from gpca.elementary import square_root
 from gpca.errors import InputError
+from gpca.portable import square_root
 from tests.vendor_guard import VendorGuard
 
 CLASSES = ("noise", "pose", "overlap")

@@ -3,7 +3,7 @@ import copy
 import pytest
 
 from gpca.config.check import check
-from gpca.config.leave_out import without_false
+from gpca.config.layers import without_false
 from gpca.errors import InputError
 
 from .configs import MISSING, changed, load, merged

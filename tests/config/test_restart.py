@@ -9,12 +9,12 @@ import sys
 import pytest
 
 from gpca.code_files import ROOT
-from gpca.config import restart
-from gpca.config.restart import clear_leftovers
+from gpca.config import jobs as restart
+from gpca.config.jobs import clear_leftovers
 
 LIVES = """
 import sys
-from gpca.config.restart import clear_leftovers
+from gpca.config.jobs import clear_leftovers
 clear_leftovers(sys.argv[1:])
 print("lives", flush=True)
 sys.stdin.read()
@@ -38,8 +38,8 @@ def here(tmp_path, monkeypatch):
         path.parent.mkdir(parents=True, exist_ok=True)
         path.touch()
     yield tmp_path
-    while restart._held:
-        restart._held.pop().close()
+    while restart._locks:
+        restart._locks.pop().close()
 
 
 @pytest.fixture
@@ -79,14 +79,14 @@ def test_a_fresh_folder_has_nothing_to_clear(tmp_path, monkeypatch):
 
 def test_nothing_of_one_that_lives_is_touched_until_it_was_killed(here, start):
     clear_leftovers([])
-    restart._held.pop().close()
+    restart._locks.pop().close()
     first, second = start(), start()
     lock = here / ".snakemake/locks/0.output.lock"
     lock.parent.mkdir()
     lock.touch()
     for living in (first, second):
         clear_leftovers([])
-        restart._held.pop().close()
+        restart._locks.pop().close()
         assert lock.exists()
         living.kill()
         living.wait()
@@ -97,7 +97,7 @@ def test_nothing_of_one_that_lives_is_touched_until_it_was_killed(here, start):
 def test_who_came_second_counts_too(here, start):
     clear_leftovers([])
     start()
-    restart._held.pop().close()
+    restart._locks.pop().close()
     lock = here / ".snakemake/locks/0.output.lock"
     lock.parent.mkdir()
     lock.touch()
@@ -133,12 +133,12 @@ def test_temporary_folders_of_killed_runs_go_with_what_is_in_them(here, start):
     process.wait()
     clear_leftovers([own])
     assert killed.exists()
-    restart._held.pop().close()
+    restart._locks.pop().close()
     other.kill()
     other.wait()
     clear_leftovers([own])
     assert [folder.exists() for folder in folders] == [False, False, False]
-    restart._held.pop().close()
+    restart._locks.pop().close()
 
 
 @pytest.mark.parametrize("name", ["home", "snakemake", "snakemakeabc", "other/snakemakeabcd1234", ".", "..", "/", ""])

@@ -4,7 +4,7 @@ import inspect
 
 import pytest
 
-from gpca.config.leave_out import without_false
+from gpca.config.layers import without_false
 from gpca.experiments.experiment import Experiment, Tidy
 from gpca.experiments.registry import experiments
 from gpca.registry import load as load_function

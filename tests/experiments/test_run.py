@@ -6,7 +6,7 @@ from copy import deepcopy
 import pytest
 
 from gpca.config.check import check
-from gpca.config.leave_out import without_false
+from gpca.config.layers import without_false
 from gpca.experiments.registry import results_of
 from gpca.experiments.run import explainer_of, files_behind, names_of, settings_of
 from gpca.registry import load as load_function

@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from gpca.alignment.rigid import inverse, transform
 from gpca.config.check import check
-from gpca.config.leave_out import without_false
+from gpca.config.layers import without_false
 from gpca.errors import InputError
 from gpca.frames import bop, camera
 from gpca.objects.canonical import ObjectClouds, write_objects

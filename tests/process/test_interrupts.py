@@ -7,9 +7,8 @@ import weakref
 import pytest
 
 from gpca.errors import InputError
-from gpca.process.interrupts import certain_interrupts
 from gpca.process.job import as_process
-from gpca.process.progress import progress
+from gpca.process.progress import certain_interrupts, progress
 
 
 @pytest.fixture(autouse=True)

@@ -8,7 +8,7 @@ from importlib.metadata import packages_distributions
 
 from packaging.utils import canonicalize_name
 
-from gpca.process.extras import MODULES
+from gpca.process.environment import MODULES
 
 from ..documents import ROOT
 from ..test_requirements import needed_by, requirements

@@ -8,7 +8,7 @@ import pytest
 from gpca.causes.dataset import Causes, labels_of
 from gpca.commands.tracks import LARGEST_BYTES
 from gpca.config.check import check
-from gpca.config.leave_out import without_false
+from gpca.config.layers import without_false
 from gpca.errors import InputError
 from gpca.frames.source import REAL_WORLD
 from gpca.tracks import published as module

@@ -7,9 +7,8 @@ import pytest
 
 import gpca
 from gpca.causes.dataset import Causes, labels_of
-from gpca.config.check import check
-from gpca.config.leave_out import without_false
-from gpca.config.success import with_success
+from gpca.config.check import check, with_success
+from gpca.config.layers import without_false
 from gpca.errors import InputError
 from gpca.experiments.controls.settings import HARD
 from gpca.frames.source import REAL_WORLD

@@ -14,9 +14,8 @@ from gpca.__main__ import main
 from gpca.attribution.predictions import prediction_frame
 from gpca.attribution.scores import Attribution
 from gpca.causes.dataset import LABELS
-from gpca.config.check import check
-from gpca.config.leave_out import without_false
-from gpca.config.success import with_success
+from gpca.config.check import check, with_success
+from gpca.config.layers import without_false
 from gpca.errors import InputError
 from gpca.experiments.scan_causes import metrics, step
 from gpca.io.csv_file import write_csv

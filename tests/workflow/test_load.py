@@ -5,7 +5,7 @@ from copy import deepcopy
 import pytest
 
 from gpca.config.check import check
-from gpca.config.leave_out import without_false
+from gpca.config.layers import without_false
 from gpca.experiments.registry import results_of
 from gpca.experiments.run import names_of
 from gpca.registry import load

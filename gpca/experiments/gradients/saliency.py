@@ -14,12 +14,12 @@ import numpy as np
 import torch
 
 from gpca.classifier.gpc import GPC
-from gpca.elementary import log_sum_exp
 from gpca.encoders.registry import EncoderSettings
 from gpca.encoders.training import draw_points
 from gpca.experiments.gradients.settings import GradientSettings
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
+from gpca.portable import log_sum_exp
 from gpca.seeds import generator
 
 if TYPE_CHECKING:

@@ -41,8 +41,7 @@ def learn(examples: Sequence[Example], components: int = 8, steps: int = 100, le
     """
     import torch
 
-    from gpca.adam import Adam
-    from gpca.elementary import logarithm
+    from gpca.portable import Adam, logarithm
 
     require_examples(examples, FEWEST_EXAMPLES)
     reduce = Reduction([example.descriptors for example in examples], components)

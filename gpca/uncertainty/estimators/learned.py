@@ -103,7 +103,7 @@ class _Ensemble:
     ) -> None:
         import torch
 
-        from gpca.adam import Adam
+        from gpca.portable import Adam
 
         features, mean, variance = (torch.from_numpy(array) for array in (features_E_K, mean_E_6, variance_E_6))
         parameters = [self._first, self._second]

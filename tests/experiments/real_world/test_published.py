@@ -5,7 +5,7 @@ from copy import deepcopy
 import pytest
 
 from gpca.config.check import check
-from gpca.config.leave_out import without_false
+from gpca.config.layers import without_false
 from gpca.encoders.registry import make_encoder
 from gpca.errors import InputError
 from gpca.experiments.real_world.experiment import pretraining_of

@@ -1,7 +1,7 @@
 import pytest
 import torch
 
-from gpca.elementary import log_sum_exp, logarithm, square_root
+from gpca.portable import log_sum_exp, logarithm, square_root
 
 
 @pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
