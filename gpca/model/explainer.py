@@ -1,4 +1,7 @@
-"""Explains a user's registration with a trained model, with the functions and settings of the training samples."""
+"""Explains a user's registration with a trained model and the settings of its training samples.
+
+ICP is the compiled loop, not Open3D's as for those samples (docs/protocol.md#two-loops-of-icp).
+"""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ from gpca.alignment.methods.interface import (
 def align(
     pair: Pair, correspondence_distance: float = CORRESPONDENCE_DISTANCE, max_iterations: int = MAX_ITERATIONS
 ) -> Outcome:
-    """Run the compiled loop, which ends at Open3D's poses (docs/registration.md#two-loops-of-icp)."""
+    """Run the compiled loop, which ends at Open3D's poses (docs/protocol.md#two-loops-of-icp)."""
     from gpca.alignment.batched_icp import BatchedICP
 
     settings = ICPSettings("point_to_point", correspondence_distance, max_iterations)
