@@ -1,7 +1,11 @@
+import numpy as np
 import pytest
 import torch
 
-from gpca.encoders.dgcnn import DGCNN
+from gpca.encoders import dgcnn, edge_kernels
+from gpca.encoders.dgcnn import CHANNELS, DGCNN, MOTION, PAIR_ENCODERS, EdgeConv, knn_indices
+from gpca.encoders.layers import stacked_product
+from tests.encoders.per_edge import PerEdgeConv
 
 
 @pytest.fixture(scope="module")
@@ -78,3 +82,169 @@ def test_training_takes_the_statistics_of_all_clouds_whatever_their_sizes():
 
     for one, other in zip(gradients(clouds()), gradients(list(clouds())), strict=True):
         torch.testing.assert_close(one, other, atol=1e-3, rtol=1e-3)
+
+
+TOLERANCE = {"atol": 1e-4, "rtol": 1e-4}
+
+
+def layer_pair(in_features=6, out_features=32, k=8):
+    torch.manual_seed(0)
+    fused, reference = EdgeConv(in_features, out_features, k), PerEdgeConv(in_features, out_features, k)
+    with torch.no_grad():
+        # negative gammas exercise the minimum, non-zero betas the activation's kink
+        fused.norm.weight.normal_()
+        fused.norm.bias.normal_()
+        reference.linear.weight.copy_(fused.weight)
+        reference.norm.load_state_dict(fused.norm.state_dict())
+    return fused, reference
+
+
+def gradients(layer, weight, x, direction):
+    x = x.clone().requires_grad_()
+    (layer(x) * direction).sum().backward()
+    return x.grad, weight.grad, layer.norm.weight.grad, layer.norm.bias.grad
+
+
+@pytest.mark.parametrize("offset", [0.0, 3.0])
+def test_training_agrees_with_per_edge_reference(offset):
+    fused, reference = layer_pair()
+    x = torch.randn(4, 60, 6) + offset
+    direction = torch.randn(4, 60, 32)
+    for _ in range(2):
+        torch.testing.assert_close(fused(x), reference(x), **TOLERANCE)
+    torch.testing.assert_close(fused.norm.running_mean, reference.norm.running_mean, **TOLERANCE)
+    torch.testing.assert_close(fused.norm.running_var, reference.norm.running_var, **TOLERANCE)
+    assert fused.norm.num_batches_tracked == reference.norm.num_batches_tracked
+    ours = gradients(fused, fused.weight, x, direction)
+    theirs = gradients(reference, reference.linear.weight, x, direction)
+    for name, a, b in zip(["x", "weight", "gamma", "beta"], ours, theirs, strict=True):
+        torch.testing.assert_close(a / b.abs().max(), b / b.abs().max(), **TOLERANCE, msg=lambda m, n=name: n + m)
+
+
+def test_inference_agrees_with_per_edge_reference():
+    fused, reference = layer_pair()
+    x = torch.randn(4, 60, 6)
+    fused(x), reference(x)
+    torch.testing.assert_close(fused.eval()(x), reference.eval()(x), **TOLERANCE)
+
+
+def test_a_trained_layer_has_the_gradient_of_the_per_edge_reference_in_its_inputs():
+    fused, reference = layer_pair()
+    x, direction = torch.randn(4, 60, 6), torch.randn(4, 60, 32)
+    fused(x), reference(x)
+    ours, theirs = (
+        torch.autograd.grad((layer.eval()(given) * direction).sum(), given)[0]
+        for layer, given in ((fused, x.clone().requires_grad_()), (reference, x.clone().requires_grad_()))
+    )
+    torch.testing.assert_close(ours, theirs, atol=1e-3, rtol=1e-3)
+
+
+def test_plain_torch_path_agrees_with_fused_path():
+    fused, _ = layer_pair()
+    plain, _ = layer_pair()
+    x = torch.randn(4, 60, 6)
+    neighbours = knn_indices(x, fused.k)
+    w1, w2 = plain.weight.chunk(2, dim=1)
+    plain_out = dgcnn._edge_max_plain(x @ torch.cat([w1, w2 - w1]).T, neighbours.long(), plain.norm)
+    fused_out = fused(x)
+    torch.testing.assert_close(plain_out, fused_out, **TOLERANCE)
+    plain_out.square().sum().backward()
+    fused_out.square().sum().backward()
+    torch.testing.assert_close(fused.weight.grad, plain.weight.grad, atol=1e-3, rtol=1e-3)
+
+
+def test_gradient_check_in_double_precision(monkeypatch):
+    """Of the passes as they are written: to compile them for doubles as well would take ten seconds."""
+    for name in ("gather_extreme_and_sums", "normalize_activate", "edge_max_backward"):
+        monkeypatch.setattr(edge_kernels, name, getattr(edge_kernels, name).py_func)
+    layer = EdgeConv(3, 4, 5).double()
+    x = torch.randn(2, 12, 3, dtype=torch.double, requires_grad=True)
+    assert torch.autograd.gradcheck(lambda x: layer(x), (x,), atol=1e-6)
+
+
+def test_neighbors_are_the_nearest():
+    x = torch.randn(3, 50, 4)
+    expected = torch.cdist(x, x).topk(7, largest=False).indices.sort().values
+    assert torch.equal(knn_indices(x, 7).long().sort().values, expected)
+
+
+def test_ties_go_to_the_lower_index():
+    assert knn_indices(torch.zeros(1, 9, 2), 3).sort().values.tolist() == [[[0, 1, 2]] * 9]
+
+
+def rows_of_all_kinds():
+    random = np.random.default_rng(0)
+    yield from random.normal(size=(20, 60))
+    yield from random.integers(-2, 3, size=(20, 60)).astype(float)
+    yield from 1e6 + random.integers(0, 3, size=(5, 60)) * 0.0625  # the first step is lost in rounding
+    yield np.r_[np.full(8, 5.0), -np.arange(52.0)]  # equal ones first, smaller ones later
+    yield np.zeros(60)
+    yield np.r_[np.full(10, -np.inf), np.arange(50.0)]
+    yield 10.0 ** random.uniform(-30, 30, size=60)
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("k", [1, 8, 60])
+def test_the_smallest_are_those_of_a_stable_sort(dtype, k):
+    rows = np.array(list(rows_of_all_kinds()), dtype)
+    chosen = edge_kernels.smallest_k(rows.reshape(7, 7, 60), k).reshape(-1, k)
+    np.testing.assert_array_equal(np.sort(chosen), np.sort(np.argsort(rows, kind="stable")[:, :k]))
+
+
+def test_a_row_with_nan_still_names_points():
+    rows = np.random.default_rng(0).normal(size=(1, 20, 30)).astype(np.float32)
+    rows[0, ::2, 3] = np.nan
+    rows[0, 5] = np.nan
+    chosen = edge_kernels.smallest_k(rows, 8)
+    assert chosen.min() >= 0
+    assert chosen.max() < 30
+
+
+PAIR_OPTIONS = {"pair_dgcnn": {"k": 6, "widths": (8, 8), "point_features": 8}}
+
+
+@pytest.fixture
+def pairs():
+    torch.manual_seed(0)
+    return torch.randn(3, 2, 16, CHANNELS), torch.randn(3, MOTION)
+
+
+@pytest.fixture(params=PAIR_ENCODERS)
+def pair_encoder(request):
+    torch.manual_seed(1)
+    return PAIR_ENCODERS[request.param](**PAIR_OPTIONS[request.param]).eval()
+
+
+def test_the_order_of_points_does_not_matter_and_the_motion_is_handed_on(pair_encoder, pairs):
+    points, motion = pairs
+    with torch.no_grad():
+        found = pair_encoder(pairs)
+        assert found.shape == (3, pair_encoder.embedding_size)
+        assert torch.equal(found[:, -MOTION:], motion)
+        assert torch.allclose(pair_encoder((points[:, :, torch.randperm(16)], motion)), found, atol=1e-5)
+
+
+def test_both_clouds_count_and_which_is_which(pair_encoder, pairs):
+    points, motion = pairs
+    with torch.no_grad():
+        found = pair_encoder(pairs)[:, :-MOTION]
+        swapped = pair_encoder((points.flip(1), motion))[:, :-MOTION]
+        moved = points.clone()
+        moved[:, 1] += 1  # the model alone
+        assert not torch.allclose(swapped, found, atol=1e-3)
+        assert not torch.allclose(pair_encoder((moved, motion))[:, :-MOTION], found, atol=1e-3)
+
+
+def test_every_weight_of_an_encoder_learns(pair_encoder, pairs):
+    pair_encoder.train()(pairs).square().sum().backward()
+    assert all(weight.grad is not None and weight.grad.abs().sum() > 0 for weight in pair_encoder.parameters())
+
+
+def test_a_stacked_product_has_the_gradients_of_torchs():
+    a, b = torch.randn(2, 3, 4, 5), torch.randn(2, 3, 5, 6)
+    gradients = []
+    for multiply in (stacked_product, torch.matmul):
+        x, y = a.clone().requires_grad_(), b.clone().requires_grad_()
+        multiply(x, y).sin().sum().backward()
+        gradients.append(torch.cat([x.grad.flatten(), y.grad.flatten()]))
+    assert torch.allclose(*gradients, atol=1e-5)

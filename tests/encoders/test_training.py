@@ -1,11 +1,15 @@
-import dataclasses
+"""Training with and without held-out samples, its files, and embeddings."""
 
+import dataclasses
+from collections import OrderedDict
+
+import numpy as np
 import pytest
 import torch
 
 from gpca.encoders import training
-from gpca.encoders.registry import EncoderSettings
-from gpca.encoders.training import load_model, train_encoder, write_weights
+from gpca.encoders.registry import EncoderSettings, make_encoder
+from gpca.encoders.training import draw_points, embed, load_model, train_encoder, write_weights
 from gpca.errors import InputError
 from gpca.pairs.perturbation import Severities
 from gpca.pairs.synthesis import RegistrationSettings, make_registrations
@@ -158,3 +162,119 @@ def test_every_draw_has_a_number_of_points_of_its_own(registrations):
 def test_draws_that_cannot_be_are_refused(changes):
     with pytest.raises(InputError, match="fewest_points"):
         dataclasses.replace(SETTINGS, **changes)
+
+
+VALIDATED = EncoderSettings(
+    draw_points=32, draws=1, epochs=4, batch_size=12, options={"k": 4, "point_features": 8}, validation_share=0.3
+)
+
+
+def with_losses(monkeypatch, losses):
+    """Let validation say these losses, epoch by epoch, and return the rows that it was given."""
+    given, said = [], iter(losses)
+
+    def validate(self, rows):
+        given.append(rows)
+        return {"validation_loss": next(said), "validation_accuracy": 0.5}
+
+    monkeypatch.setattr(training._Training, "validate", validate)
+    return given
+
+
+def test_training_ends_without_a_smaller_loss_and_keeps_the_best_epoch(registrations, monkeypatch):
+    with_losses(monkeypatch, [3.0, 1.0, 2.0, 2.0])
+    model, curve = train_encoder(registrations, "tiny", 0, dataclasses.replace(VALIDATED, patience=1))
+    assert [record["validation_loss"] for record in curve] == [3.0, 1.0, 2.0]
+    with_losses(monkeypatch, [3.0, 1.0, 0.5, 2.0])  # the schedule is the same, so the second epoch is
+    longer, _ = train_encoder(registrations, "tiny", 0, VALIDATED)
+    assert not same_weights(model, longer)
+
+
+def test_a_broken_training_knows_its_best_epoch(registrations, tmp_path, monkeypatch):
+    with_losses(monkeypatch, [1.0, 2.0, 3.0, 4.0])
+    whole, _ = train_encoder(registrations, "tiny", 0, VALIDATED)
+    with_losses(monkeypatch, [1.0, 2.0])
+    with pytest.raises(StopIteration):
+        train_encoder(registrations, "tiny", 0, VALIDATED, tmp_path / "c")
+    with_losses(monkeypatch, [3.0, 4.0])
+    resumed, curve = train_encoder(registrations, "tiny", 0, VALIDATED, tmp_path / "c")
+    assert len(curve) == 4
+    assert same_weights(whole, resumed)
+
+
+def test_groups_are_held_out_whole_and_are_of_the_training(registrations, monkeypatch):
+    group_S = registrations.sample // 6
+    given = with_losses(monkeypatch, [1.0])
+    train_encoder(registrations, "tiny", 0, dataclasses.replace(VALIDATED, epochs=1), group_S=group_S)
+    held_out = given[0]
+    train = registrations.rows("train")
+    assert set(held_out) < set(train)
+    assert not set(group_S[held_out]) & set(group_S[np.setdiff1d(train, held_out)])
+
+
+def test_training_goes_on_from_given_weights(registrations):
+    short = dataclasses.replace(VALIDATED, epochs=1, validation_share=0.0)
+    first, _ = train_encoder(registrations, "tiny", 0, short)
+    still = dataclasses.replace(short, learning_rate=1e-9)
+    on, _ = train_encoder(registrations, "tiny", 1, still, start=first.state_dict())
+    assert torch.allclose(on.head.weight, first.head.weight, atol=1e-5)
+
+
+def test_validation_says_the_loss_of_what_was_held_out(registrations):
+    _, curve = train_encoder(registrations, "tiny", 0, dataclasses.replace(VALIDATED, epochs=1))
+    assert 0 < curve[0]["validation_loss"] < 10
+    assert 0 <= curve[0]["validation_accuracy"] <= 1
+
+
+def test_patience_needs_samples_held_out():
+    with pytest.raises(InputError, match="'patience': needs held-out samples; set validation_share above 0"):
+        EncoderSettings(patience=2)
+
+
+@pytest.fixture(scope="module")
+def model():
+    torch.manual_seed(0)
+    encoder = make_encoder("dgcnn", SETTINGS.options)
+    head = torch.nn.Linear(encoder.embedding_size, 3)
+    return torch.nn.Sequential(OrderedDict(encoder=encoder, head=head)).eval()
+
+
+def test_points_are_of_the_cloud_and_named_by_sample_not_by_batch(registrations):
+    together = draw_points(registrations, np.array([4, 9, 40]), 32, "tiny", 0, "epoch", 1)
+    assert together.shape == (3, 32, 3)
+    for drawn, row in zip(together.numpy(), (4, 9, 40), strict=True):
+        cloud = {tuple(point) for point in registrations.cloud(row)}
+        assert len({tuple(point) for point in drawn} & cloud) == 32
+        alone = draw_points(registrations.subset(np.array([row])), np.array([0]), 32, "tiny", 0, "epoch", 1)
+        assert np.array_equal(alone[0], drawn)
+    other = draw_points(registrations, np.array([4, 9, 40]), 32, "tiny", 0, "epoch", 2)
+    assert not torch.equal(other, together)
+
+
+def test_a_cloud_of_fewer_points_repeats_some(registrations):
+    row = int(np.diff(registrations.offsets).argmin())
+    cloud = registrations.cloud(row)
+    drawn = draw_points(registrations, np.array([row]), 2 * len(cloud), "tiny", 0)[0].numpy()
+    assert drawn.shape == (2 * len(cloud), 3)
+    assert {tuple(point) for point in drawn} <= {tuple(point) for point in cloud}
+
+
+def test_embeddings_do_not_depend_on_the_batch_size(registrations, model):
+    h, _ = embed(model, registrations, "tiny", 0, SETTINGS)
+    assert h.shape == (len(registrations), model.encoder.embedding_size)
+    assert h.dtype == np.float32
+    in_other_batches, _ = embed(model, registrations, "tiny", 0, dataclasses.replace(SETTINGS, batch_size=5))
+    assert np.abs(h - in_other_batches).max() < 1e-5
+
+
+def test_an_embedding_is_the_mean_over_its_draws(registrations, model):
+    rows = np.arange(len(registrations))
+    with torch.no_grad():
+        draws = [model.encoder(draw_points(registrations, rows, 64, "tiny", 0, "embedding", draw)) for draw in range(2)]
+    h, logits = embed(model, registrations, "tiny", 0, SETTINGS)
+    assert np.abs(h - sum(draws).numpy() / 2).max() < 1e-5
+    with torch.no_grad():
+        of_draws = sum(model.head(draw) for draw in draws).numpy() / 2
+    assert np.abs(logits - of_draws).max() < 1e-5
+    assert np.ptp(logits, axis=0).min() > 1e-3
+    assert (draws[0] - draws[1]).abs().max() > 1e-3
