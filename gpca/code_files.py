@@ -23,6 +23,8 @@ BESIDE = {  # what a module reads from its own folder
 def code_files(*modules: str) -> list[str]:
     """Return the files of the given modules and of all project modules they import, anywhere in their text.
 
+    ``module:function`` stands for a function: of the module's imports, those count that it, or what it uses of the
+    module, needs.
     What is imported only for type checking never runs, so it does not count; a file in `BESIDE` counts with its module.
     A module from outside (:mod:`gpca.plugins`) counts as one of the project, with what it imports of its own package
     or, if it is a lone file, from its folder. Paths are sorted, and lead there from the working directory: relative
@@ -36,9 +38,9 @@ def code_files(*modules: str) -> list[str]:
         if module not in reached:
             reached.add(module)
             open_modules += _imports(module)
-    files = [_file_of(module) for module in reached]
+    files = {_file_of(module.split(":")[0]) for module in reached}
     for module in reached.intersection(BESIDE):
-        files += _file_of(module).parent.glob(BESIDE[module])
+        files.update(_file_of(module).parent.glob(BESIDE[module]))
     working = Path.cwd().resolve()  # as ROOT is
     seen = ROOT.relative_to(working) if ROOT.is_relative_to(working) else ROOT
     return sorted(
@@ -56,8 +58,10 @@ _HOLD_STATEMENTS = (ast.stmt, ast.excepthandler, ast.match_case)  # an import is
 @cache
 def _imports(module: str) -> tuple[str, ...]:
     names: set[str] = set()
+    module, _, function = module.partition(":")
     file = _file_of(module)
-    nodes: list[ast.AST] = [ast.parse(file.read_text(encoding="utf-8"))]
+    tree = ast.parse(file.read_text(encoding="utf-8"))
+    nodes: list[ast.AST] = _statements_for(tree, function) if function else [tree]
     while nodes:
         node = nodes.pop()
         if isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING":
@@ -73,6 +77,40 @@ def _imports(module: str) -> tuple[str, ...]:
         names |= {module.rsplit(".", depth)[0] for depth in range(1, module.count(".") + 1)}
         _know_beside(top, names)
     return tuple(sorted(name for name in names if _is_followed(name, top) and _file(name) is not None))
+
+
+def _statements_for(tree: ast.Module, function: str) -> list[ast.AST]:
+    """Return a function of a module, and the module's statements that bind the names that it uses, and so on."""
+    binding: dict[str, ast.stmt] = {}
+    for node in tree.body:
+        names = {node.name} if isinstance(node, (ast.FunctionDef, ast.ClassDef)) else _used_and_bound(node)[1]
+        binding |= dict.fromkeys(names, node)
+    if function not in binding:
+        raise AttributeError(f"the module has no function {function}")
+    statements: dict[ast.AST, None] = {}
+    open_names = [function]
+    while open_names:
+        needed = binding.get(open_names.pop())
+        if needed is None or needed in statements:
+            continue
+        statements[needed] = None
+        used, bound = _used_and_bound(needed)
+        open_names += used - bound
+    return list(statements)
+
+
+def _used_and_bound(node: ast.AST) -> tuple[set[str], set[str]]:
+    """Return the names that a statement reads, and those that it binds."""
+    used: set[str] = set()
+    bound: set[str] = set()
+    for part in ast.walk(node):
+        if isinstance(part, ast.Name):
+            (used if isinstance(part.ctx, ast.Load) else bound).add(part.id)
+        elif isinstance(part, (ast.Import, ast.ImportFrom)):
+            bound |= {alias.asname or alias.name.split(".")[0] for alias in part.names}
+        elif isinstance(part, ast.arg):
+            bound.add(part.arg)
+    return used, bound
 
 
 def _base(node: ast.ImportFrom, module: str, file: Path) -> str:

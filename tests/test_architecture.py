@@ -87,7 +87,7 @@ def test_every_step_and_rule_file_has_its_stage():
     files = {name for *_, names in stages for name in code(names)} - {"sources/*.smk", "Snakefile"}
     rules = ROOT / "workflow/rules"
     written = {str(path.relative_to(rules)) for path in rules.rglob("*.smk")}
-    steps = {step for name in written for step in re.findall(r'step="gpca\.([\w.]+)"', (rules / name).read_text())}
+    steps = {step for name in written for step in re.findall(r'step="gpca\.([\w.:]+)"', (rules / name).read_text())}
     assert steps == {name for _, _, modules, _ in stages for name in code(modules)}
     assert files == written - {"common.smk", "functions.smk"}
 

@@ -144,7 +144,7 @@ from gpca.process.provenance import record_provenance
 from gpca.reporting.figures.style import MATPLOTLIBRC
 from gpca.page.page import TEMPLATES
 assert len(read_published())
-files = [PUBLISHED, REASONS, MATPLOTLIBRC, TEMPLATES / "index.html.jinja", *code_files("gpca.steps.attribute")]
+files = [PUBLISHED, REASONS, MATPLOTLIBRC, TEMPLATES / "index.html.jinja", *code_files("gpca.steps.pairs:attribute")]
 for file in files:
     assert Path(file).is_file(), file
     print(file)

@@ -59,7 +59,7 @@ def test_a_file_that_a_config_names_is_checked_named_and_its_code_is_an_input(fo
     sources = check(config)
     assert "own" in names_of(config, sources)["explainer"]
     assert explainer_module("own") == "my_own"
-    files = code_files("gpca.steps.attribute", explainer_module("own"))
+    files = code_files("gpca.steps.pairs:attribute", explainer_module("own"))
     assert "my_own.py" in files and any(file.endswith("gpca/explainers/interface.py") for file in files)
     config["explainers"]["own"] = {"widths": 4}
     with pytest.raises(InputError, match=r"config key explainers\.own: explainer 'own': setting widths: unknown"):

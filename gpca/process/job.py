@@ -60,7 +60,7 @@ class Job:
 
 
 def run_step(snakemake: Any) -> None:
-    """Run the step that the rule names in ``params.step``, a module with a function ``run(job)``; then exit.
+    """Run the step that the rule names in ``params.step``, then exit; see :func:`call`.
 
     All stderr goes to the rule's log. A fault of the input ends as one line there and status 2.
 
@@ -71,21 +71,22 @@ def run_step(snakemake: Any) -> None:
     prepare(names["threads"])  # before NumPy, torch and numba are loaded
     keep_freed_memory()
     _print_to(snakemake.log)
-    module = names.pop("step")
+    step = names.pop("step")
     names |= {"seed": int(names["seed"])} if "seed" in names else {}
     names["settings"] = json.loads(names.get("settings", "{}"))
     folders = names.pop("folders", {})
     names |= {"data_dir": folders.get("data_dir"), "downloads": Path(folders.get("downloads") or "")}
     job = Job(**names, **files_by_name(snakemake.input), **files_by_name(snakemake.output))
-    sys.exit(as_process(module, lambda: call(module, job)))
+    sys.exit(as_process(step, lambda: call(step, job)))
 
 
 def call(step: str, job: Job) -> None:
-    """Run the step in the module of that name, with the job's threads for torch."""
-    module = import_module(step)
+    """Run a step, ``module:function`` or a module with a function ``run``, with torch on the threads of the job."""
+    module, _, function = step.partition(":")
+    run = getattr(import_module(module), function or "run")
     if "torch" in sys.modules:
         sys.modules["torch"].set_num_threads(job.threads)
-    module.run(job)
+    run(job)
 
 
 @contextmanager

@@ -1,1 +1,1 @@
-"""The steps of the workflow as commands, one file each: files in, one function of the library, files out."""
+"""The steps of the workflow, a function each: files in, files out."""

@@ -1,17 +1,33 @@
-"""Step ``causes``: canonical clouds -> ``causes/{source}/seed{seed}.npz``, registrations with measured causes."""
+"""The steps of registrations with measured causes: causes, descriptors, re-enactments, encoders, and the model file."""
 
 from __future__ import annotations
 
-from gpca.attribution.predictions import write_timings
-from gpca.causes.drawing import draw_causes
-from gpca.causes.settings import CauseSettings
+from time import perf_counter
+from typing import TYPE_CHECKING
+
+from gpca.alignment.icp import ICPSettings
+from gpca.attribution.predictions import read_timings, write_timings
+from gpca.causes.dataset import LABELS, Causes, with_label
+from gpca.causes.settings import CauseSettings, DescriptorSettings
+from gpca.encoders.registry import EncoderSettings
+from gpca.io.arrays import save_arrays
+from gpca.io.csv_file import write_csv
 from gpca.objects.canonical import ObjectClouds
+from gpca.pairs.dataset import Registrations, read_embedding
+from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
+from gpca.reenactment.settings import ReenactmentSettings
+from gpca.settings import read_settings
+
+if TYPE_CHECKING:
+    from gpca.classifier.gpc import GPC
 
 
-def run(job: Job) -> None:
-    """Draw candidates, measure their causes, keep a balanced set."""
+def causes(job: Job) -> None:
+    """Draw candidates, measure their causes and keep a balanced set -> ``causes/{source}/seed{seed}.npz``."""
+    from gpca.causes.drawing import draw_causes
+
     own, icp = job.settings_and_icp()
     settings = CauseSettings.from_dict(own, icp)
     objects = ObjectClouds.load(job.objects, job.source)
@@ -21,3 +37,117 @@ def run(job: Job) -> None:
         causes.save(job.causes)
         tally.save(job.candidates)
         write_timings(job.timings, causes.registrations, icp_seconds_S, icp_seconds_S)
+
+
+def describe(job: Job) -> None:
+    """Describe every pair -> ``descriptors/{source}/seed{seed}.npz``."""
+    from gpca.causes.descriptors import describe_all
+
+    own, icp = job.settings_and_icp()
+    outputs = [job.descriptors, job.timings]
+    with record_provenance(outputs, [job.causes, job.causes_timings], job.settings, seed=job.seed):
+        causes = Causes.load(job.causes, (job.source, job.seed))
+        seconds_S, icp_seconds_S = read_timings(job.causes_timings, causes.registrations)
+        settings = DescriptorSettings(**own)
+        described, own_S, own_icp_S = describe_all(causes, job.source, job.seed, settings, ICPSettings(**icp))
+        described.save(job.descriptors)
+        write_timings(job.timings, causes.registrations, seconds_S + own_S, icp_seconds_S + own_icp_S)
+
+
+def reenact(job: Job) -> None:
+    """Re-enact every pair under hypotheses of its true pose -> ``reenactments/{source}/seed{seed}.npz``.
+
+    Of the truth's settings it reads how ICP runs, and the limits of the states.
+    """
+    from gpca.reenactment.dataset import reenact_all
+
+    settings = read_settings(ReenactmentSettings, job.section("reenactment"))
+    truth = CauseSettings.from_dict(job.section("causes"), job.section("icp"))
+    outputs = [job.reenactments, job.timings]
+    with record_provenance(outputs, [job.causes, job.causes_timings], job.settings, seed=job.seed):
+        causes = Causes.load(job.causes, (job.source, job.seed))
+        seconds_S, icp_seconds_S = read_timings(job.causes_timings, causes.registrations)
+        enacted, own_S, own_icp_S = reenact_all(causes, job.source, job.seed, settings, truth)
+        enacted.save(job.reenactments)
+        write_timings(job.timings, causes.registrations, seconds_S + own_S, icp_seconds_S + own_icp_S)
+
+
+def train_on_causes(job: Job) -> None:
+    """Train an encoder to tell the labels of causes apart -> its weights and curve, and the embeddings of all samples.
+
+    It learns from the training samples that have a label, and keeps a checkpoint.
+    """
+    import pandas as pd
+
+    from gpca.encoders.training import TrainingTask, embed, train_encoder, write_weights
+
+    settings = EncoderSettings(**job.settings)
+    checkpoint = job.weights.with_suffix(".checkpoint")
+    axes = (job.source, job.seed)
+    outputs = [job.weights, job.curve, job.embeddings, job.timings]
+    inputs = [job.causes, job.causes_timings]
+    with record_provenance(outputs, inputs, job.settings, seed=job.seed):
+        causes = Causes.load(job.causes, axes)
+        registrations = causes.registrations
+        seconds_S, icp_seconds_S = read_timings(job.causes_timings, registrations)
+        model, curve = train_encoder(with_label(causes), *axes, settings, checkpoint, TrainingTask(LABELS))
+        started = perf_counter()
+        h_S_d, logits_S_C = embed(model, registrations, *axes, settings)
+        seconds = (perf_counter() - started) / len(h_S_d)
+        write_weights(job.weights, model, axes)
+        write_csv(job.curve, pd.DataFrame(curve), form="%.6g")
+        arrays = {"h": h_S_d, "head_logits": logits_S_C, "sample": registrations.sample, "split": registrations.split}
+        save_arrays(job.embeddings, arrays, axes)
+        write_timings(job.timings, registrations, seconds_S + seconds, icp_seconds_S)
+        checkpoint.unlink(missing_ok=True)
+
+
+def model(job: Job) -> None:
+    """Fit all classifiers and write them with the encoder and the policy -> ``model.pt``, for ``gpca explain``."""
+    from gpca.classifier.settings import GPCSettings
+    from gpca.encoders.training import load_model
+    from gpca.model.diagnoser import TrainingSet, learn
+    from gpca.model.familiarity import Familiarity
+    from gpca.model.file import Model
+    from gpca.recovery.policy import RecoveryPolicy
+    from gpca.reenactment.dataset import Reenactments
+
+    inputs = [job.registrations, job.encoder, job.embeddings, *job.causes, *job.reenactments]
+    with record_provenance([job.out], inputs, job.settings, seed=job.seed):
+        sets = []
+        for causes_file, reenactments_file in zip(job.causes, job.reenactments, strict=True):
+            causes = Causes.load(causes_file)
+            sets.append(TrainingSet.of(causes, Reenactments.load(reenactments_file, causes.registrations)))
+        icp, own = job.section("registrations").get("icp", {}), job.section("model")
+        diagnoser, bald_N = learn(
+            TrainingSet.joined(sets),
+            GPCSettings(**own.get("classifier", {})),
+            CauseSettings.from_dict(job.section("causes") | own.get("causes", {}), icp),
+            ReenactmentSettings(**job.section("reenactment")),
+            own.get("false_alarms", 0.05),
+            *("model", job.seed),
+        )
+        settings, axes = EncoderSettings(**job.section("encoder")), (job.source, job.seed)
+        recovery = job.section("recovery")
+        registrations = Registrations.load(job.registrations, axes)
+        h_S_d, train = read_embedding(job.embeddings, registrations)["embedding"], registrations.rows("train")
+        gpc = GPC(CONCEPTS, GPCSettings(**job.section("gpc")), *axes)
+        Model(
+            diagnoser=diagnoser,
+            encoder=load_model(job.encoder, settings, axes=axes).encoder,
+            encoder_settings=settings,
+            gpc=gpc.fit(h_S_d[train], registrations.concept[train]),
+            icp=ICPSettings(**icp),
+            cloud_points=job.section("registrations").get("cloud_points", 2048),
+            policy=RecoveryPolicy.of_settings(
+                recovery["thresholds"], recovery["treatments"], recovery["loop"]["budget"], bald_N
+            )
+            if recovery
+            else RecoveryPolicy(),
+            title=job.title,
+            stand_in=job.get("stand_in"),
+            learned_from=tuple(job.get("learned_from", ())),
+            familiar=Familiarity.of(
+                (registrations.cloud(row).astype(float), registrations.target(row).astype(float)) for row in train
+            ),
+        ).save(job.out)

@@ -1,21 +1,23 @@
-"""Step ``draw_scans``: a data set of scans -> pairs of each scene and stratum of overlap, with their true poses."""
+"""The step that draws pairs of scans."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from gpca.errors import InputError
 from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
-from gpca.scans.pair import ScanPair
-from gpca.scans.scene import ScanPairs, choose_pairs
-from gpca.scans.source import entry_of, scenes_of
+
+if TYPE_CHECKING:
+    from gpca.scans.pair import ScanPair
 
 
-def run(job: Job) -> None:
-    """Read or make the scenes, and draw their pairs."""
+def draw_scans(job: Job) -> None:
+    """Read or make the scenes of a data set of scans and draw pairs of each scene and stratum of overlap."""
+    from gpca.scans.scene import ScanPairs
+
     with record_provenance([job.out], job.get("data", []), job.settings, seed=job.seed):
         ScanPairs.of(drawn_pairs(job, job.section("choice"))).save(job.out, (job.source, job.seed))
 
@@ -29,6 +31,9 @@ def drawn_pairs(job: Job, choice: Mapping[str, Any]) -> list[ScanPair]:
     Raises:
         InputError: what readers refuse, or no two scans that overlap.
     """
+    from gpca.scans.scene import choose_pairs
+    from gpca.scans.source import entry_of, scenes_of
+
     entry, place = entry_of(job.section("entry")), Path(job.place) if job.get("place") else None
     scenes = scenes_of(entry, place, job.settings["role"], choice["scan_points"])
     pairs = choose_pairs(scenes, choice["strata"], choice["pairs"], job.source, job.seed)

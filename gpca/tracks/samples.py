@@ -206,13 +206,13 @@ def recipe_of(file: str, config: Mapping[str, Any]) -> Recipe:
     if kind in ("objects", "instances") and rest != [REAL_WORLD]:
         [source] = rest
         given = {"source": source, "settings": config["sources"][source], **data, **points}
-        return Recipe("gpca.steps.objects", given, _splits("objects", config), {"out": f"objects/{source}.npz"})
+        return Recipe("gpca.steps.pairs:objects", given, _splits("objects", config), {"out": f"objects/{source}.npz"})
     if kind in ("objects", "instances"):
         section = config["real_world"]
         settings = {"datasets": section["datasets"], "initial_pose": section["initial_pose"]}
         given = {"source": REAL_WORLD, "settings": settings | {"role": config["splits"]["role"]}, **data, **points}
         outputs = {name: f"{name}/{REAL_WORLD}.npz" for name in ("instances", "objects")}
-        return Recipe("gpca.steps.instances", given, _splits("scenes", config), outputs)
+        return Recipe("gpca.steps.frames:instances", given, _splits("scenes", config), outputs)
     seed = int(rest[-1].removeprefix("seed"))
     if kind == "timings":  # an output of the same step
         return recipe_of(f"{rest[1]}/{rest[0]}/{rest[2]}.npz", config)
@@ -247,7 +247,7 @@ def _frames_recipe(kind: str, seed: int, config: Mapping[str, Any], data: Mappin
         return Recipe("gpca.experiments.frame_causes.step", given | {"settings": settings}, inputs, outputs)
     settings |= {"reenactment": config["diagnosis"]["reenactment"] | section["reenactment"]}
     outputs = {"reenactments": f"reenactments/{REAL_WORLD}/seed{seed}.npz"}
-    return Recipe("gpca.steps.reenact_frames", given | {"settings": settings}, inputs | measured, outputs)
+    return Recipe("gpca.steps.frames:reenact_frames", given | {"settings": settings}, inputs | measured, outputs)
 
 
 def _objects_recipe(file: str, kind: str, name_and_seed: dict[str, Any], config: Mapping[str, Any]) -> Recipe:
@@ -285,7 +285,7 @@ def _objects_recipe(file: str, kind: str, name_and_seed: dict[str, Any], config:
         return Recipe("gpca.experiments.controls.encoding", given, {"registrations": path(HARD)}, outputs)
     else:
         raise InputError(file, "is not a file of samples", "name one of a track")
-    return Recipe(f"gpca.steps.{step}", name_and_seed | {"settings": settings}, inputs, outputs)
+    return Recipe(f"gpca.steps.causes:{step}", name_and_seed | {"settings": settings}, inputs, outputs)
 
 
 def _splits(kind: str, config: Mapping[str, Any]) -> dict[str, str]:

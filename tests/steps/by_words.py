@@ -15,7 +15,13 @@ from gpca.process.job import Job, as_process, call
 from gpca.process.processor import THREAD_VARIABLES
 
 IN = "gpca.experiments."
-MODULES = {  # of steps whose module is not gpca.steps.<name>
+SHARED = {  # module of gpca.steps -> the steps that it has, functions of their names
+    "pairs": "objects registrations uncertainty train embed reduce attribute",
+    "causes": "causes describe reenact train_on_causes model",
+    "frames": "scenes instances frame_registrations reenact_frames",
+    "scans": "draw_scans",
+}
+MODULES = {f: f"gpca.steps.{module}:{f}" for module, functions in SHARED.items() for f in functions.split()} | {
     "active_learning": IN + "active_learning.step",
     "without": IN + "active_learning.without_step",
     "controls": IN + "controls.step",
@@ -39,7 +45,6 @@ MODULES = {  # of steps whose module is not gpca.steps.<name>
     "recover": IN + "recovery.step",
     "register_methods": IN + "registration_methods.step",
     "runtime": IN + "runtime.step",
-    "draw_scans": "gpca.steps.scans",
     "register_scans": IN + "scans.step",
     "scan_causes": IN + "scan_causes.step",
     "diagnose_scans": IN + "scan_causes.diagnosis_step",
@@ -114,8 +119,8 @@ def run_apart(words: list[str], folder: Path, code: str = CODE, threads: int = 1
 
 
 def module_of(step: str) -> str:
-    """Return the module of the step that has this name in tests."""
-    return MODULES.get(step, f"gpca.steps.{step}")
+    """Return the step that has this name in tests, as rules name it."""
+    return MODULES[step]
 
 
 def job_of(step: str, words: list[str]) -> Job:

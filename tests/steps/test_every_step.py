@@ -25,7 +25,7 @@ BY_HAND = {"labels.csv", "answers.txt"}  # given by a person, not made
 
 def test_every_step_is_tested_here_or_elsewhere():
     rules = "".join(path.read_text() for path in (ROOT / "workflow/rules").glob("*.smk"))
-    modules = set(re.findall(r'step="(gpca[\w.]+)"', rules))
+    modules = set(re.findall(r'step="(gpca[\w.:]+)"', rules))
     steps = (set(STEP_OPTIONS) | ELSEWHERE) - set(COMMANDS)
     assert modules == {module_of(step) for step in steps}
     assert set(COMMANDS) <= set(STEP_OPTIONS) | ELSEWHERE

@@ -73,7 +73,7 @@ def test_what_is_missing_is_made_once_and_after_what_it_is_made_from(default, tm
 
     def run(recipe, folder):
         assert all(name.startswith("/") or (folder / name).is_file() for name in recipe.inputs.values())
-        made.append(recipe.step.rpartition(".")[2])
+        made.append(recipe.step.rpartition(":")[2])
         for name in recipe.outputs.values():
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             (folder / name).touch()
@@ -90,7 +90,7 @@ def test_a_step_that_fails_ends_in_its_own_line(default, tmp_path):
     damaged = tmp_path / "objects/ycb.npz"
     damaged.parent.mkdir()
     damaged.write_bytes(b"PK")
-    with pytest.raises(InputError, match=r"step gpca\.steps\.causes: .*ycb\.npz: is not a readable npz archive"):
+    with pytest.raises(InputError, match=r"step gpca\.steps\.causes:causes: .*ycb\.npz: is not a readable npz archive"):
         module.make(["causes/ycb/seed0.npz"], tmp_path, default, processes=1)
 
 

@@ -11,7 +11,7 @@ rule causes:
 rule sample_causes:
     input:
         objects="<results>/objects/{source}.npz",
-        code=code_files("gpca.steps.causes"),
+        code=code_files("gpca.steps.causes:causes"),
     output:
         causes="<results>/causes/{source}/seed{seed}.npz",
         candidates="<results>/causes/{source}/seed{seed}.csv",
@@ -25,7 +25,7 @@ rule sample_causes:
     conda:
         "../envs/gpca.yaml"
     params:
-        step="gpca.steps.causes",
+        step="gpca.steps.causes:causes",
         settings=as_json(config["causes"] | ICP),
     script:
         "../scripts/step.py"
@@ -35,7 +35,7 @@ rule describe:
     input:
         causes="<results>/causes/{source}/seed{seed}.npz",
         causes_timings="<results>/timings/{source}/causes/seed{seed}.csv",
-        code=code_files("gpca.steps.describe"),
+        code=code_files("gpca.steps.causes:describe"),
     output:
         descriptors="<results>/descriptors/{source}/seed{seed}.npz",
         timings="<results>/timings/{source}/descriptors/seed{seed}.csv",
@@ -46,7 +46,7 @@ rule describe:
     conda:
         "../envs/gpca.yaml"
     params:
-        step="gpca.steps.describe",
+        step="gpca.steps.causes:describe",
         settings=as_json(DIAGNOSIS["descriptors"] | ICP),
     script:
         "../scripts/step.py"
@@ -56,7 +56,7 @@ rule reenact:
     input:
         causes="<results>/causes/{source}/seed{seed}.npz",
         causes_timings="<results>/timings/{source}/causes/seed{seed}.csv",
-        code=code_files("gpca.steps.reenact"),
+        code=code_files("gpca.steps.causes:reenact"),
     output:
         reenactments="<results>/reenactments/{source}/seed{seed}.npz",
         timings="<results>/timings/{source}/reenactments/seed{seed}.csv",
@@ -69,7 +69,7 @@ rule reenact:
     conda:
         "../envs/gpca.yaml"
     params:
-        step="gpca.steps.reenact",
+        step="gpca.steps.causes:reenact",
         settings=as_json(
             {"reenactment": DIAGNOSIS["reenactment"], "causes": config["causes"]} | ICP
         ),
@@ -82,7 +82,7 @@ rule train_on_causes:
         causes="<results>/causes/{source}/seed{seed}.npz",
         causes_timings="<results>/timings/{source}/causes/seed{seed}.csv",
         code=code_files(
-            "gpca.steps.train_on_causes", backbone_module(DIAGNOSIS["encoder"])
+            "gpca.steps.causes:train_on_causes", backbone_module(DIAGNOSIS["encoder"])
         ),
     output:
         weights="<results>/cause_encoders/{source}/seed{seed}.pt",
@@ -97,7 +97,7 @@ rule train_on_causes:
     conda:
         "../envs/gpca.yaml"
     params:
-        step="gpca.steps.train_on_causes",
+        step="gpca.steps.causes:train_on_causes",
         settings=as_json(DIAGNOSIS["encoder"]),
     script:
         "../scripts/step.py"

@@ -76,7 +76,7 @@ def backbone_module(settings):
 
 def encoder_code(step):
     return lambda wildcards: code_files(
-        f"gpca.steps.{step}", encoder_module(wildcards.backbone)
+        f"gpca.steps.pairs:{step}", encoder_module(wildcards.backbone)
     )
 
 

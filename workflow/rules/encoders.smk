@@ -49,7 +49,7 @@ rule train_encoder:
     conda:
         "../envs/gpca.yaml"
     params:
-        step="gpca.steps.train",
+        step="gpca.steps.pairs:train",
         settings=encoder_settings,
     script:
         "../scripts/step.py"
@@ -77,7 +77,7 @@ rule pretrain_encoder:
         mem_mb=3000,
         runtime=180,
     params:
-        step="gpca.steps.train",
+        step="gpca.steps.pairs:train",
         source="pretraining",
         settings=lambda wildcards: encoder_settings(
             wildcards, pretraining_of(REAL_WORLD, wildcards.backbone)
@@ -111,7 +111,7 @@ rule train_on_frames:
     conda:
         "../envs/gpca.yaml"
     params:
-        step="gpca.steps.train",
+        step="gpca.steps.pairs:train",
         settings=lambda wildcards: encoder_settings(
             wildcards, (REAL_WORLD["training"] or {}).get(wildcards.backbone)
         ),
@@ -137,7 +137,7 @@ rule embed:
     conda:
         "../envs/gpca.yaml"
     params:
-        step="gpca.steps.embed",
+        step="gpca.steps.pairs:embed",
         settings=encoder_settings,
         encoder_of=lambda wildcards: (
             FRAMES if wildcards.source in NAMES["condition"] else wildcards.source
@@ -163,7 +163,7 @@ rule reduce_embeddings:
             "<results>/embeddings/{{source}}/{{backbone}}/none/seed{seed}.npz",
             seed=SEEDS,
         ),
-        code=code_files("gpca.steps.reduce"),
+        code=code_files("gpca.steps.pairs:reduce"),
     output:
         out=collect(
             "<results>/embeddings/{{source}}/{{backbone}}/{{reduction}}/seed{seed}.npz",
@@ -178,7 +178,7 @@ rule reduce_embeddings:
     conda:
         "../envs/gpca.yaml"
     params:
-        step="gpca.steps.reduce",
+        step="gpca.steps.pairs:reduce",
         settings=settings("reductions", "{reduction}"),
         seeds=SEEDS,
     script:
@@ -192,7 +192,7 @@ use rule reduce_embeddings as reduce_published with:
             "<results>/embeddings/{{source}}/{{backbone}}/none/seed{seed}.npz",
             seed=NAMES["published_seed"],
         ),
-        code=code_files("gpca.steps.reduce"),
+        code=code_files("gpca.steps.pairs:reduce"),
     output:
         out=collect(
             "<results>/embeddings/{{source}}/{{backbone}}/{{reduction}}/seed{seed}.npz",

@@ -20,7 +20,7 @@ rule attribute:
             "<results>/registrations/{{source}}/seed{seed}.npz", seed=SEEDS
         ),
         code=lambda wildcards: code_files(
-            "gpca.steps.attribute",
+            "gpca.steps.pairs:attribute",
             explainer_module(explainer_of(wildcards.explainer, NAMES)),
         ),
     output:
@@ -40,7 +40,7 @@ rule attribute:
     conda:
         "../envs/gpca.yaml"
     params:
-        step="gpca.steps.attribute",
+        step="gpca.steps.pairs:attribute",
         explainer=lambda wildcards: explainer_of(wildcards.explainer, NAMES),
         settings=lambda wildcards: as_json(explainer_settings(wildcards)),
         seeds=SEEDS,
@@ -56,7 +56,7 @@ use rule attribute as attribute_published with:
             "<results>/registrations/{{source}}/seed{seed}.npz",
             seed=NAMES["published_seed"],
         ),
-        code=code_files("gpca.steps.attribute", explainer_module("gpca")),
+        code=code_files("gpca.steps.pairs:attribute", explainer_module("gpca")),
     output:
         predictions=collect(
             "<results>/predictions/{{source}}/{{explainer}}/seed{seed}.csv",
@@ -87,7 +87,7 @@ use rule attribute as attribute_one_encoder with:
         registrations=[
             f"<results>/registrations/{FRAMES}/seed{SEEDS[0]}.npz" for _ in SEEDS
         ],
-        code=code_files("gpca.steps.attribute", explainer_module("gpca")),
+        code=code_files("gpca.steps.pairs:attribute", explainer_module("gpca")),
     wildcard_constraints:
         source=ONE_ENCODER,
     params:

@@ -46,7 +46,7 @@ rule reenact_frames:
         objects=f"<results>/objects/{FRAMES}.npz",
         frame_causes="<results>/frame_causes/seed{seed}.npz",
         starts="<results>/frame_starts/seed{seed}.npz",
-        code=code_files("gpca.steps.reenact_frames"),
+        code=code_files("gpca.steps.frames:reenact_frames"),
     output:
         reenactments=f"<results>/reenactments/{FRAMES}/seed{{seed}}.npz",
     log:
@@ -57,7 +57,7 @@ rule reenact_frames:
     conda:
         "../envs/gpca.yaml"
     params:
-        step="gpca.steps.reenact_frames",
+        step="gpca.steps.frames:reenact_frames",
         settings=as_json(
             {
                 "reenactment": DIAGNOSIS["reenactment"] | REAL_WORLD["reenactment"],

@@ -42,7 +42,7 @@ wildcard_constraints:
 
 rule render_scenes:
     input:
-        code=code_files("gpca.steps.scenes"),
+        code=code_files("gpca.steps.frames:scenes"),
     output:
         out=directory(f"<results>/scenes/{FRAMES}"),
     log:
@@ -53,7 +53,7 @@ rule render_scenes:
     conda:
         "../envs/gpca.yaml"
     params:
-        step="gpca.steps.scenes",
+        step="gpca.steps.frames:scenes",
         settings=settings("real_world", "scenes"),
         source=FRAMES,
     script:
@@ -64,7 +64,7 @@ rule instances:
     input:
         **FRAMES_FROM,
         splits=split_file("scenes") if REAL_WORLD["datasets"] else [],
-        code=code_files("gpca.steps.instances"),
+        code=code_files("gpca.steps.frames:instances"),
     output:
         instances="<results>/instances/{frames}.npz",
         objects="<results>/objects/{frames}.npz",
@@ -76,7 +76,7 @@ rule instances:
     conda:
         "../envs/gpca.yaml"
     params:
-        step="gpca.steps.instances",
+        step="gpca.steps.frames:instances",
         settings=lambda wildcards: as_json(
             {
                 "datasets": REAL_WORLD["datasets"],
@@ -96,7 +96,7 @@ rule register_frames:
     input:
         instances="<results>/instances/{frames}.npz",
         objects="<results>/objects/{frames}.npz",
-        code=code_files("gpca.steps.frame_registrations"),
+        code=code_files("gpca.steps.frames:frame_registrations"),
     output:
         registrations="<results>/registrations/{frames}/seed{seed}.npz",
         poses="<results>/poses/{frames}/seed{seed}.csv",
@@ -109,7 +109,7 @@ rule register_frames:
     conda:
         "../envs/gpca.yaml"
     params:
-        step="gpca.steps.frame_registrations",
+        step="gpca.steps.frames:frame_registrations",
         settings=as_json(
             config["registrations"]
             | {

@@ -23,7 +23,7 @@ if NAMES["development_seed"]:
         input:
             data=data_files(DEVELOPMENT_OBJECTS),
             splits=split_file("objects"),
-            code=code_files("gpca.steps.objects", *source_modules(DEVELOPMENT_OBJECTS)),
+            code=code_files("gpca.steps.pairs:objects", *source_modules(DEVELOPMENT_OBJECTS)),
         output:
             out=f"<results>/objects/{DEVELOPMENT}.npz",
         log:
@@ -34,7 +34,7 @@ if NAMES["development_seed"]:
         conda:
             "../envs/gpca.yaml"
         params:
-            step="gpca.steps.objects",
+            step="gpca.steps.pairs:objects",
             source=DEVELOPMENT,
             settings=as_json(JOINT["objects"]),
             folders=data_folders(

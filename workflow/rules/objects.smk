@@ -12,7 +12,7 @@ rule sample_objects:
         data=lambda wildcards: data_files(SOURCES[wildcards.source]),
         splits=split_file("objects"),
         code=lambda wildcards: code_files(
-            "gpca.steps.objects", *source_modules(SOURCES[wildcards.source])
+            "gpca.steps.pairs:objects", *source_modules(SOURCES[wildcards.source])
         ),
     output:
         out="<results>/objects/{source}.npz",
@@ -26,7 +26,7 @@ rule sample_objects:
     conda:
         "../envs/gpca.yaml"
     params:
-        step="gpca.steps.objects",
+        step="gpca.steps.pairs:objects",
         settings=settings("sources", "{source}"),
         folders=lambda wildcards: data_folders(
             SOURCES[wildcards.source], config["data_dir"], config["downloads"]

@@ -11,7 +11,7 @@ rule registrations:
 rule register:
     input:
         objects="<results>/objects/{source}.npz",
-        code=code_files("gpca.steps.registrations"),
+        code=code_files("gpca.steps.pairs:registrations"),
     output:
         registrations="<results>/registrations/{source}/seed{seed}.npz",
         timings="<results>/timings/{source}/icp/seed{seed}.csv",
@@ -25,7 +25,7 @@ rule register:
     conda:
         "../envs/gpca.yaml"
     params:
-        step="gpca.steps.registrations",
+        step="gpca.steps.pairs:registrations",
         settings=settings("registrations"),
     script:
         "../scripts/step.py"

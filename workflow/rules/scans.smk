@@ -25,7 +25,7 @@ rule draw_scans:
         data=lambda wildcards: files_of_scans(
             SCAN_ENTRIES[wildcards.scan_set], config["data_dir"]
         ),
-        code=code_files("gpca.steps.scans"),
+        code=code_files("gpca.steps.scans:draw_scans"),
     output:
         out="<results>/scans/{scan_set}/seed{seed}.npz",
     log:
@@ -36,7 +36,7 @@ rule draw_scans:
     conda:
         "../envs/gpca.yaml"
     params:
-        step="gpca.steps.scans",
+        step="gpca.steps.scans:draw_scans",
         source=lambda wildcards: wildcards.scan_set,
         settings=lambda wildcards: as_json(
             {

@@ -174,7 +174,7 @@ rule pretrain_on_other_cloud:
             source=PRETRAINED_ON,
             seed=SEEDS[0],
         ),
-        code=code_files("gpca.steps.train", encoder_module(BACKBONE)),
+        code=code_files("gpca.steps.pairs:train", encoder_module(BACKBONE)),
     output:
         weights=f"<results>/other_clouds/pretrained/{BACKBONE}/{{cloud}}.pt",
         curve=f"<results>/other_clouds/pretrained/{BACKBONE}/{{cloud}}.csv",
@@ -191,7 +191,7 @@ rule pretrain_on_other_cloud:
         mem_mb=3000,
         runtime=180,
     params:
-        step="gpca.steps.train",
+        step="gpca.steps.pairs:train",
         source="pretraining",
         settings=lambda wildcards: other_cloud_settings(
             wildcards, REAL_WORLD["pretraining"]
@@ -213,7 +213,7 @@ rule train_on_other_cloud:
         ),
         registrations=f"<results>/registrations/{FRAMES}/seed{{seed}}.npz",
         poses=f"<results>/poses/{FRAMES}/seed{{seed}}.csv",
-        code=code_files("gpca.steps.train", encoder_module(BACKBONE)),
+        code=code_files("gpca.steps.pairs:train", encoder_module(BACKBONE)),
     output:
         weights=f"<results>/other_clouds/{FRAMES}/{BACKBONE}/{{cloud}}/seed{{seed}}.pt",
         curve=f"<results>/other_clouds/{FRAMES}/{BACKBONE}/{{cloud}}/seed{{seed}}.csv",
@@ -227,7 +227,7 @@ rule train_on_other_cloud:
     conda:
         "../envs/gpca.yaml"
     params:
-        step="gpca.steps.train",
+        step="gpca.steps.pairs:train",
         settings=lambda wildcards: other_cloud_settings(
             wildcards, (REAL_WORLD["training"] or {}).get(BACKBONE)
         ),
@@ -241,7 +241,7 @@ rule embed_other_cloud:
         registrations=f"<results>/registrations/{FRAMES}/seed{{seed}}.npz",
         registration_timings=f"<results>/timings/{FRAMES}/icp/seed{{seed}}.csv",
         encoder=f"<results>/other_clouds/{FRAMES}/{BACKBONE}/{{cloud}}/seed{{seed}}.pt",
-        code=code_files("gpca.steps.embed", encoder_module(BACKBONE)),
+        code=code_files("gpca.steps.pairs:embed", encoder_module(BACKBONE)),
     output:
         embeddings=f"<results>/other_clouds/{FRAMES}/{BACKBONE}/{{cloud}}/seed{{seed}}.npz",
         timings=f"<results>/timings/{FRAMES}/{BACKBONE}_{{cloud}}/seed{{seed}}.csv",
@@ -255,7 +255,7 @@ rule embed_other_cloud:
     conda:
         "../envs/gpca.yaml"
     params:
-        step="gpca.steps.embed",
+        step="gpca.steps.pairs:embed",
         settings=lambda wildcards: other_cloud_settings(
             wildcards, (REAL_WORLD["training"] or {}).get(BACKBONE)
         ),

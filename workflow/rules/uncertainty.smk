@@ -14,7 +14,7 @@ rule run_icp:
         registrations=collect(
             "<results>/registrations/{{source}}/seed{seed}.npz", seed=SEEDS
         ),
-        code=code_files("gpca.steps.uncertainty"),
+        code=code_files("gpca.steps.pairs:uncertainty"),
     output:
         outcomes=collect(
             "<results>/uncertainty/{{source}}/{{design}}/seed{seed}.npz", seed=SEEDS
@@ -34,7 +34,7 @@ rule run_icp:
     conda:
         "../envs/gpca.yaml"
     params:
-        step="gpca.steps.uncertainty",
+        step="gpca.steps.pairs:uncertainty",
         settings=lambda wildcards: as_json(
             config["uncertainty"][wildcards.design]
             | {"icp": config["registrations"]["icp"]}

@@ -1,0 +1,206 @@
+"""The steps of the paper's protocol: objects, registrations, uncertainty, encoders, and explainers' predictions."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gpca.alignment.icp import ICPSettings
+from gpca.attribution.predictions import read_timings, write_predictions, write_timings
+from gpca.encoders.registry import EncoderSettings
+from gpca.errors import InputError
+from gpca.io.arrays import REAL, REGENERATE, TEXT, WHOLE, load_arrays, save_arrays
+from gpca.io.csv_file import write_csv
+from gpca.io.names import Axes
+from gpca.objects.canonical import ObjectClouds, write_objects
+from gpca.pairs.dataset import Registrations, read_embedding, read_instances_of
+from gpca.process.job import Job
+from gpca.process.provenance import record_provenance
+
+if TYPE_CHECKING:
+    from gpca.explainers.interface import ExplainerEntry
+
+
+def objects(job: Job) -> None:
+    """Read a configured source's surfaces -> canonical clouds, ``objects/{source}.npz``."""
+    from gpca.objects.source import data_files, resolve, surfaces
+
+    entry = resolve(job.settings, job.data_dir)
+    declared = {"entry": entry, "surface_points": job.surface_points}
+    splits = job.get("splits")
+    with record_provenance([job.out], [*data_files(entry), *filter(None, [splits])], declared):
+        write_objects(surfaces(entry, job.downloads), job.source, job.out, job.surface_points, splits)
+
+
+def registrations(job: Job) -> None:
+    """Perturb and align canonical clouds -> ``registrations/{source}/seed{seed}.npz``."""
+    from gpca.pairs.synthesis import RegistrationSettings, make_registrations
+
+    settings = RegistrationSettings.from_dict(job.settings)
+    objects = ObjectClouds.load(job.objects, job.source)
+    with record_provenance([job.registrations, job.timings], [job.objects], job.settings, seed=job.seed):
+        registrations, icp_seconds_S = make_registrations(objects, job.source, job.seed, settings)
+        registrations.save(job.registrations)
+        write_timings(job.timings, registrations, icp_seconds_S, icp_seconds_S)
+
+
+def uncertainty(job: Job) -> None:
+    """Run the conditions of a design by Monte-Carlo ICP, seed by seed -> ``uncertainty/{source}/{design}/``."""
+    from gpca.uncertainty.designs import DESIGNS, design_rows, evaluate_design
+    from gpca.uncertainty.outcomes import write_seconds
+    from gpca.uncertainty.settings import UncertaintySettings
+
+    own, icp = job.settings_and_icp()
+    samples = own.pop("samples", None)
+    settings = UncertaintySettings(**own, icp=ICPSettings(**icp))
+    for seed, registrations_path, out, table, timings in job.per_seed("registrations", "outcomes", "tables", "timings"):
+        with record_provenance([out, table, timings], [registrations_path], job.settings, seed=seed):
+            registrations = Registrations.load(registrations_path, (job.source, seed))
+            chosen = registrations.subset(design_rows(registrations, job.design, samples))
+            outcomes, *seconds = evaluate_design(job.design, chosen, job.source, seed, settings)
+            outcomes.save(out, (job.source, seed))
+            outcomes.write_table(table, DESIGNS[job.design].conditions)
+            write_seconds(timings, outcomes, *seconds)
+
+
+def train(job: Job) -> None:
+    """Train an encoder on registrations -> its weights and training curve.
+
+    A checkpoint lies beside the weights until they are written. The encoder of depth frames starts from one that was
+    trained on the registrations of all sources together.
+    """
+    import pandas as pd
+
+    from gpca.encoders.training import load_model, train_encoder, write_weights
+    from gpca.pairs.synthesis import read_as
+
+    of_encoder, of_icp = job.settings_and_icp()
+    settings, icp = EncoderSettings(**of_encoder), ICPSettings(**of_icp)
+    poses, weights = job.get("poses"), job.get("start")
+    files = job.files("registrations")
+    sources = job.get("registrations_of", [job.source])
+    parts = [Registrations.load(path, (source, job.seed)) for path, source in zip(files, sources, strict=True)]
+    registrations = Registrations.joined(parts)
+    # Clouds of frames are as small as objects look, so some of their points are drawn twice; others are as configured.
+    if poses is None and settings.draw_points > (most := int(np.diff(registrations.offsets).max())):
+        fault = f"the largest cloud has {most} points, fewer than draw_points, {settings.draw_points}"
+        raise InputError(
+            job.files("registrations")[0], fault, "lower draw_points, or raise cloud_points of registrations"
+        )
+    instance_S = read_instances_of(poses, registrations) if poses else None
+    start = load_model(weights, settings).state_dict() if weights else None
+    # This is no output of the rule: Snakemake removes those before a rerun, and the rerun is what needs it.
+    checkpoint = job.weights.with_suffix(".checkpoint")
+    inputs = [*files, *(path for path in (poses, weights) if path)]
+    with record_provenance([job.weights, job.curve], inputs, job.settings, seed=job.seed):
+        seen = read_as(settings.reading, registrations, icp)
+        model, curve = train_encoder(seen, job.source, job.seed, settings, checkpoint, start=start, group_S=instance_S)
+        write_weights(job.weights, model, (job.source, job.seed))
+        write_csv(job.curve, pd.DataFrame(curve), form="%.6g")
+        checkpoint.unlink(missing_ok=True)
+
+
+def embed(job: Job) -> None:
+    """Embed the registrations by an encoder -> ``embeddings/{source}/{backbone}/{reduction}/seed{seed}.npz``."""
+    from gpca.encoders.training import embed, load_model
+    from gpca.pairs.synthesis import read_as
+
+    of_encoder, of_icp = job.settings_and_icp()
+    settings, icp = EncoderSettings(**of_encoder), ICPSettings(**of_icp)
+    inputs, axes = [job.registrations, job.encoder], (job.source, job.seed)
+    with record_provenance([job.embeddings, job.timings], inputs, job.settings, seed=job.seed):
+        registrations = Registrations.load(job.registrations, axes)
+        seconds_S, icp_seconds_S = read_timings(job.registration_timings, registrations)
+        model = load_model(job.encoder, settings, axes=(job.get("encoder_of", job.source), job.seed))
+        started = perf_counter()
+        seen = read_as(settings.reading, registrations, icp)
+        h_S_d, logits_S_C = embed(model, seen, *axes, settings)
+        seconds = (perf_counter() - started) / len(h_S_d)
+        arrays = {"h": h_S_d, "head_logits": logits_S_C, "sample": registrations.sample, "split": registrations.split}
+        save_arrays(job.embeddings, arrays, axes)
+        write_timings(job.timings, registrations, seconds_S + seconds, icp_seconds_S)
+
+
+EMBEDDING_SHAPES = {"h": ("S", "d"), "head_logits": ("S", "C"), "sample": ("S",), "split": ("S",)}
+EMBEDDING_KINDS = {"h": REAL, "head_logits": REAL, "sample": WHOLE, "split": TEXT}
+
+
+def reduce(job: Job) -> None:
+    """Fit a reduction to the training rows of embeddings and reduce every row, seed by seed; all else is kept."""
+    from gpca.encoders.reduction import make_reduction, reduce
+
+    make_reduction(job.reduction, job.settings)
+    for seed, embeddings, out in job.per_seed("embeddings", "out"):
+        with record_provenance([out], [embeddings], job.settings, seed=seed):
+            arrays = load_arrays(embeddings, EMBEDDING_SHAPES, EMBEDDING_KINDS, (job.source, seed))
+            h_S_d = arrays["h"]
+            train_S = arrays["split"] == "train"
+            if not train_S.any():
+                raise InputError(embeddings, "has no training samples", REGENERATE)
+            axes = (job.source, seed, "reduction")
+            reduced_S_c = reduce(job.reduction, h_S_d[train_S], h_S_d, job.settings, *axes)
+            save_arrays(out, {name: arrays[name] for name in EMBEDDING_SHAPES} | {"h": reduced_S_c}, (job.source, seed))
+
+
+def attribute(job: Job) -> None:
+    """Fit an explainer to the training rows and explain every row, seed by seed -> predictions and timings."""
+    from gpca.explainers.interface import Describing
+    from gpca.explainers.registry import explainer_entry
+
+    entry = explainer_entry(job.explainer)
+    none = [None] * len(job.seeds)
+    optional = [job.get(name, none) for name in ("embeddings", "uncertainty", "uncertainty_timings")]
+    files = zip(job.registrations, *optional, job.input_timings, strict=True)
+    for (seed, predictions, timings), inputs in zip(job.per_seed("predictions", "timings"), files, strict=True):
+        explainer = entry.make(job.source, seed, **job.settings)
+        with record_provenance([predictions, timings], [path for path in inputs if path], job.settings, seed=seed):
+            axes = (job.get("files_of", job.source), job.get("files_seed", seed))
+            registrations = _with_what_it_reads(entry, axes, *inputs)
+            observed = registrations if entry.oracle else registrations.without_labels()
+            started = perf_counter()
+            if isinstance(explainer, Describing):  # once, for training and for explanation
+                observed = explainer.describe(observed)
+            describing_seconds = (perf_counter() - started) / len(observed)
+            train = registrations.rows("train")
+            if len(train):  # a design may cover the test samples alone; what reads it learns nothing
+                explainer.fit(replace(registrations, attached=observed.attached).subset(train))
+            attribution = explainer.explain(observed)
+            write_predictions(predictions, registrations, attribution)
+            write_timings(
+                timings,
+                registrations,
+                registrations.attached["earlier_seconds"] + describing_seconds + attribution.seconds_N,
+                registrations.attached["earlier_icp_seconds"] + attribution.icp_seconds_N,
+            )
+
+
+def _with_what_it_reads(
+    entry: ExplainerEntry,
+    axes: Axes,
+    registrations: Path,
+    embeddings: Path,
+    uncertainty: Path,
+    uncertainty_timings: Path,
+    timings: Path,
+) -> Registrations:
+    """Return the registrations that the explainer gets, with what it reads and the seconds spent before attached."""
+    from gpca.uncertainty.conditions import CONDITIONS
+    from gpca.uncertainty.outcomes import Outcomes, read_seconds
+
+    loaded = Registrations.load(registrations, axes)
+    seconds_S, icp_seconds_S = read_timings(timings, loaded)
+    attached = {"earlier_seconds": seconds_S, "earlier_icp_seconds": icp_seconds_S}
+    if entry.design:
+        outcomes = Outcomes.load(uncertainty, axes)
+        conditions = outcomes.uncertainty.shape[1]
+        if entry.design in CONDITIONS and conditions != len(CONDITIONS[entry.design]):
+            fault = f"{conditions} conditions are not those of design '{entry.design}'"
+            raise InputError(uncertainty, fault, REGENERATE)
+        return outcomes.attach_to(replace(loaded, attached=attached), *read_seconds(uncertainty_timings, outcomes))
+    if entry.reads == "embeddings":
+        attached |= read_embedding(embeddings, loaded, logits=True)
+    return replace(loaded, attached=attached)
