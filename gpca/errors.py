@@ -1,4 +1,4 @@
-"""The one exception for a user's mistake: shown as one line, never as a traceback."""
+"""The exception for a user's mistake, which is shown as one line instead of a traceback."""
 
 from __future__ import annotations
 
@@ -9,9 +9,8 @@ from typing import Any
 
 
 class InputError(ValueError):
-    """A fault in something the user gave: a file, a folder, a setting, a name.
+    """A fault in the user's file, folder, setting or name: one line with subject, fault and remedy.
 
-    The message is one line that names the thing, what is wrong with it and what to do.
     The command line prints it to stderr and exits with status 2.
     """
 
@@ -20,14 +19,14 @@ class InputError(ValueError):
         super().__init__(" ".join(line.split()))
 
 
-def require_known(kind: str, name: object, known: Collection[str]) -> None:
-    """Raise an InputError that lists the known names of a kind of thing unless this is one of them."""
-    if name not in known:
-        raise InputError(f"{kind} '{name}'", "unknown", f"choose one of {', '.join(known)}")
+def require_known(kind: str, name: object, names: Collection[str]) -> None:
+    """Raise an InputError that lists the possible names unless `name` is one of them."""
+    if name not in names:
+        raise InputError(f"{kind} '{name}'", "unknown", f"choose one of {', '.join(names)}")
 
 
 def with_key(key: str, function: Callable[..., Any], *arguments: object) -> Any:
-    """Call the function and name the config's key in front of its InputError, or of what the system refuses."""
+    """Call the function, and prefix its InputError or OSError with the config's key."""
     try:
         return function(*arguments)
     except (InputError, OSError) as fault:
@@ -37,7 +36,7 @@ def with_key(key: str, function: Callable[..., Any], *arguments: object) -> Any:
 def require_names(
     key: str, names: Iterable[str], known: Collection[str], noun: str, left_out: Collection[str] = ()
 ) -> None:
-    """Raise an InputError for the first of the names at a key that is not known, or that the config leaves out."""
+    """Raise an InputError for the first name at a key that is unknown, or that the config leaves out."""
     for name in names:
         if name not in known:
             fault = f"{noun} '{name}' is left out" if name in left_out else f"no {noun} '{name}'"
@@ -46,7 +45,7 @@ def require_names(
 
 @contextmanager
 def one_line() -> Iterator[None]:
-    """End the process with one line where the user gave something faulty, or where a file cannot be used."""
+    """End the process with one line for an InputError or OSError."""
     try:
         yield
     except (InputError, OSError) as fault:

@@ -1,4 +1,4 @@
-"""Things found by name: entries that the modules of a folder list, and functions written ``module:name``."""
+"""Registries: entries by name that the modules of a folder list; and functions by ``module:name``."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ Entry = TypeVar("Entry")
 
 
 class Registry(Generic[Entry]):
-    """All entries of a kind: registration methods, say. A file that is new in the folder is found at the next call.
+    """All entries of a kind, such as registration methods; files that are new in the folder need no further listing.
 
     Args:
-        kind: what an entry is, as messages call it.
-        folder: name of the package whose modules list them.
-        variable: of a module, its entries by name; a module without it lists none.
-        first: modules elsewhere, whose entries come before those of the folder.
-        outside: type of the entries that modules from outside may list too, after all others; None where none may.
+        kind: name of an entry in messages.
+        folder: package of the modules that list entries.
+        variable: of a module, its entries by name.
+        first: modules elsewhere, whose entries come first.
+        outside: type of the entries that modules of plugins may list, which come last; None for no plugins.
     """
 
     def __init__(
@@ -38,7 +38,11 @@ class Registry(Generic[Entry]):
         return {name: entry for of_module in self.by_module().values() for name, entry in of_module.items()}
 
     def entry(self, name: str) -> Entry:
-        """Return the entry of that name; an unknown one raises an InputError that lists the known."""
+        """Return the entry of that name.
+
+        Raises:
+            InputError: an unknown name.
+        """
         entries = self.entries()
         require_known(self.kind, name, entries)
         return entries[name]
@@ -52,15 +56,15 @@ class Registry(Generic[Entry]):
         """Return the entries of each module.
 
         Raises:
-            InputError: a module from outside that cannot be used (:mod:`gpca.plugins`).
+            InputError: an unusable plugin (:mod:`gpca.plugins`).
         """
         files = pkgutil.iter_modules(import_module(self._folder).__path__)
         names = sorted(f"{self._folder}.{file.name}" for file in files)
-        own = {name: getattr(import_module(name), self._variable, {}) for name in (*self._first, *names)}
+        by_module = {name: getattr(import_module(name), self._variable, {}) for name in (*self._first, *names)}
         if self._outside is None:
-            return own
-        known = [name for entries in own.values() for name in entries]
-        return own | entries_outside(self._variable, self.kind, self._outside, known)
+            return by_module
+        taken = [name for entries in by_module.values() for name in entries]
+        return by_module | entries_outside(self._variable, self.kind, self._outside, taken)
 
 
 def load(name: str) -> Any:

@@ -14,8 +14,7 @@ from gpca.numerals import whole
 def seed_of(*axes: object) -> int:
     """Return a 63-bit seed for the named axes, e.g. ``seed_of("ycb", 3, "registration", 17)``.
 
-    The axes are joined in order with a separator that cannot occur in a name, and hashed (SHA-256);
-    the same axes give the same seed on every platform, the name of a file in every locale.
+    It is the SHA-256 of the axes, joined by a separator that no name contains, and equal on all platforms and locales.
     """
     text = "\x1f".join(str(axis) for axis in axes)
     return int.from_bytes(hashlib.sha256(text.encode(errors="surrogateescape")).digest()[:8], "big") >> 1
@@ -27,7 +26,7 @@ def generator(*axes: object) -> np.random.Generator:
 
 
 def seed_of_file(path: str | Path) -> int:
-    """Return the seed that the name of a run's file tells, ``…/seed3.npz``; InputError where it tells none."""
+    """Return the seed in the name of a run's file, ``…/seed3.npz``; InputError for another name."""
     name = Path(path).stem
     try:
         if name.startswith("seed"):

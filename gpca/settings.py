@@ -1,4 +1,4 @@
-"""Settings: what the types of a settings class, or of a function's arguments, allow. pydantic checks them.
+"""Settings: types of a settings class, or of a function's arguments, that pydantic checks.
 
 A settings class is a frozen dataclass with fields such as ``batch: Annotated[int, Bounds(minimum=2)]``.
 """
@@ -20,13 +20,12 @@ if TYPE_CHECKING:
     from pydantic_core import CoreSchema, ErrorDetails
 
 T = TypeVar("T")
-# No count of a run comes near a million, and no setting near the other: what is above is a slip, which would otherwise
-# end hours later, or in no memory left.
-LARGEST = {"int": 10**6, "float": 1e12}
+LARGEST = {"int": 10**6, "float": 1e12}  # larger numbers are typos, which would end hours later or in no memory
+UNKNOWN = ("unexpected_keyword_argument", "extra_forbidden")  # pydantic's faults
 
 
 class Bounds:
-    """The range of a number; one without an upper end has that of its type, `LARGEST`."""
+    """The range of a number, by default up to `LARGEST`."""
 
     def __init__(
         self,
@@ -41,7 +40,7 @@ class Bounds:
         self._bounds = {name: bound for name, bound in bounds.items() if bound is not None}
 
     def __get_pydantic_core_schema__(self, kind: type, handler: GetCoreSchemaHandler) -> CoreSchema:
-        """Narrow the number's schema."""
+        """Add the range to the number's schema."""
         schema: dict[str, Any] = dict(handler(kind))
         upper = {} if {"le", "lt"} & self._bounds.keys() else {"le": LARGEST[schema["type"]]}
         return schema | self._bounds | upper
@@ -56,7 +55,7 @@ OpenShare = Annotated[float, Bounds(exclusiveMinimum=0, exclusiveMaximum=1)]
 
 
 class Different:
-    """Marks a list whose values differ, and of which there are so many at least."""
+    """Marks a list of at least `fewest` different values."""
 
     def __init__(self, fewest: int = 1) -> None:
         self._fewest = fewest
@@ -79,7 +78,7 @@ Distinct = Annotated[tuple[T, ...], Different()]  # one or more
 
 
 class Keys:
-    """Marks a mapping as one of these keys, each with a type of its own: some of them must be there, and no other."""
+    """Marks a mapping with a type for each key; some are required, and others are refused if it is closed."""
 
     def __init__(self, kinds: Mapping[str, Any], required: Iterable[str] = (), closed: bool = True) -> None:
         self.kinds = kinds
@@ -100,41 +99,40 @@ class Keys:
 
 
 def part_of(settings: type, without: Collection[str] = ()) -> Keys:
-    """Mark a mapping as the settings of that class without some; each of the others must be there."""
+    """Mark a mapping as the settings of a class without some names, all required."""
     kinds = changes_of(settings, without).kinds
     return Keys(kinds, required=kinds)
 
 
 def changes_of(settings: type, without: Collection[str] = ()) -> Keys:
-    """Mark a mapping as settings of that class that replace others; of these none need be there, and some may not."""
+    """Mark a mapping as optional settings of a class without some names."""
     hints = get_type_hints(settings, include_extras=True)
     return Keys({name: kind for name, kind in hints.items() if name not in without})
 
 
 def fields_of(section: Mapping[str, Any], *kinds: type) -> dict[str, Any]:
-    """Return those entries of a section that are fields of one of these settings classes."""
+    """Return the entries of a section that are fields of one of these settings classes."""
     names = {field.name for kind in kinds for field in fields(kind)}
     return {name: value for name, value in section.items() if name in names}
 
 
 class ArgumentsOf:
-    """Marks a function's ``**arguments`` as those of another function or settings class."""
+    """Marks a function's ``**arguments`` as those of another function or class."""
 
     def __init__(self, function: Callable) -> None:
         self.function = function
 
 
 def read_settings(kind: type[T], settings: Mapping[str, Any], subject: str = "setting") -> T:
-    """Return an instance of a settings class, with all that it holds, from what a config says.
+    """Return an instance of a settings class from a section of a config.
 
     Args:
         kind: the class, or another type that pydantic knows.
-        settings: of text, numbers, booleans, None, lists and mappings.
-        subject: stands before the name of a key in messages.
+        settings: text, numbers, booleans, None, lists and mappings.
+        subject: precedes the name of a key in messages.
 
     Raises:
-        InputError: a key that is unknown or missing, a value of another type or out of range, or values that do not
-            fit each other.
+        InputError: an unknown or missing key, a value of another type or out of range, or inconsistent values.
     """
     from pydantic import ValidationError
 
@@ -146,31 +144,26 @@ def read_settings(kind: type[T], settings: Mapping[str, Any], subject: str = "se
 
 
 def require_arguments(subject: str, function: Callable, leading: int, settings: Mapping[str, object]) -> None:
-    """Check settings that a function takes by the names of its arguments.
+    """Check settings that a function takes as named arguments, after `leading` others.
 
-    A number without a range is one from 0 on where its default is.
-
-    Args:
-        subject: what has the settings, for the message.
-        function: what takes them, after `leading` other arguments.
+    A number without a range must not be negative unless its default is.
 
     Raises:
-        InputError: what :func:`read_settings` raises.
+        InputError: as :func:`read_settings`.
     """
     read_settings(_settings_of_arguments(function, leading), settings, f"{subject}: setting")
 
 
 @cache
 def _settings_of_arguments(function: Callable, leading: int) -> Any:
-    kinds, required, closed = _arguments(function, leading)
-    return Annotated[dict, Keys(kinds, required, closed)]
+    return Annotated[dict, Keys(*_arguments(function, leading))]
 
 
 def _arguments(function: Callable, leading: int) -> tuple[dict[str, Any], set[str], bool]:
-    """Return the types of the arguments after the first, those without a default, and whether these are all."""
-    plain = function.func if isinstance(function, partial) else function
-    made = isclass(plain) and not is_dataclass(plain)
-    hints = get_type_hints(plain.__init__ if made else plain, include_extras=True)
+    """Return the types of the arguments after the leading ones, those without a default, and whether these are all."""
+    plain: Any = function.func if isinstance(function, partial) else function
+    has_init = isclass(plain) and not is_dataclass(plain)
+    hints = get_type_hints(plain.__init__ if has_init else plain, include_extras=True)
     kinds: dict[str, Any] = {}
     others: dict[str, Any] = {}
     required, closed = set(), True
@@ -181,9 +174,8 @@ def _arguments(function: Callable, leading: int) -> tuple[dict[str, Any], set[st
             closed = source is not None
             others = _arguments(source.function, 0)[0] if source else {}
         elif parameter.kind is not Parameter.VAR_POSITIONAL:
-            kinds[parameter.name] = (
-                Annotated[hint, Bounds(minimum=0)] if hint in (int, float) and not default < 0 else hint
-            )
+            is_free = hint not in (int, float) or default < 0
+            kinds[parameter.name] = hint if is_free else Annotated[hint, Bounds(minimum=0)]
             if default is Parameter.empty:
                 required.add(parameter.name)
     return others | kinds, required, closed
@@ -198,25 +190,22 @@ def _adapter(kind: Any) -> TypeAdapter:
     return TypeAdapter(list[kind], config=config)  # a list, as a dataclass takes no config from elsewhere
 
 
-UNKNOWN = ("unexpected_keyword_argument", "extra_forbidden")
-
-
 def _input_error(faults: list[ErrorDetails], settings: Any, adapter: TypeAdapter, subject: str) -> InputError:
-    """Return the error that tells the worst fault: an unknown key, or else a value that its type allows."""
+    """Return the worst fault: an unknown key, else a value of the right type."""
     fault = min(faults, key=lambda fault: (fault["type"] not in UNKNOWN, fault["type"].endswith("_type")))
     path = list(_path(settings, fault["loc"][1:]))
     key, value = ".".join(map(str, path)), fault["input"]
     if fault["type"] in UNKNOWN:
-        known = list(_keys_at(adapter.json_schema(), path[:-1]))
-        close = get_close_matches(str(path[-1]), known, n=1)
-        remedy = f"did you mean {close[0]}?" if close else f"choose one of {', '.join(known)}"
+        names = list(_keys_at(adapter.json_schema(), path[:-1]))
+        close = get_close_matches(str(path[-1]), names, n=1)
+        remedy = f"did you mean {close[0]}?" if close else f"choose one of {', '.join(names)}"
         return InputError(f"{subject} {key}", "unknown", remedy)
     if fault["type"] == "missing" and isinstance(path[-1], int):
         return InputError(f"{subject} {'.'.join(map(str, path[:-1]))}", f"{value} is too short")
     if fault["type"] == "missing":
         return InputError(f"{subject} {key}", "is missing", "add it, as in config/config.yaml")
     if fault["type"] == "value_error":
-        error = fault["ctx"]["error"]  # of the settings as a whole, which names them itself, where there is no path
+        error = fault["ctx"]["error"]  # without a path, it concerns the settings as a whole and names them
         return InputError(f"{subject} {key}", str(error)) if path else error
     # Input should be less than ..., String should have ..., List should have at least 1 item after validation, not 0
     message = fault["msg"][fault["msg"].index("should") :].split(" after validation")[0]
@@ -225,7 +214,7 @@ def _input_error(faults: list[ErrorDetails], settings: Any, adapter: TypeAdapter
 
 
 def _path(settings: Any, location: Iterable[str | int]) -> Iterator[str | int]:
-    """Find the keys in where pydantic locates a fault, beside which it names the parts of unions."""
+    """Yield the keys of pydantic's location of a fault, without its names of the parts of unions."""
     for name in location:
         inside = dict(enumerate(settings)) if isinstance(settings, list) else settings
         if isinstance(inside, Mapping) and name in inside:
@@ -236,7 +225,7 @@ def _path(settings: Any, location: Iterable[str | int]) -> Iterator[str | int]:
 
 
 def _keys_at(schema: dict, path: Iterable[str | int]) -> Iterator[str]:
-    """Find the keys that a JSON schema knows at a path."""
+    """Yield the keys that a JSON schema allows at a path."""
 
     def alternatives(part: dict) -> Iterator[dict]:
         part = schema["$defs"][part["$ref"].rpartition("/")[2]] if "$ref" in part else part
