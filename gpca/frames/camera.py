@@ -177,6 +177,11 @@ def shade(view: View, colors_M_3: np.ndarray, T_world_camera: np.ndarray) -> np.
     return np.rint(255 * np.clip(colors, 0, 1)).astype(np.uint8)
 
 
+def direction(azimuth: float, elevation: float) -> np.ndarray:
+    """Return the unit vector (3,) at these angles, in radians."""
+    return np.array([*(np.cos(elevation) * np.array([np.cos(azimuth), np.sin(azimuth)])), np.sin(elevation)])
+
+
 def look_at(eye_m: np.ndarray, target_m: np.ndarray) -> np.ndarray:
     """Return ``T_world_camera`` of an upright camera at `eye_m` that looks at `target_m` (world z up)."""
     z = (target_m - eye_m) / np.linalg.norm(target_m - eye_m)
@@ -231,9 +236,8 @@ def rendered_views(mesh: Surface, count: int) -> Iterator[Surface]:
     scene = MeshScene([(mesh.vertices_m, mesh.faces)])
     for number in range(count):
         level = number % len(ELEVATIONS_DEG)
-        elevation, azimuth = np.deg2rad(ELEVATIONS_DEG[level]), 2 * np.pi * number / count
-        flat = np.cos(elevation) * np.array([np.cos(azimuth), np.sin(azimuth)])
-        T_world_camera = look_at(center_m + VIEW_DISTANCE_M * np.array([*flat, np.sin(elevation)]), center_m)
+        toward = direction(2 * np.pi * number / count, np.deg2rad(ELEVATIONS_DEG[level]))
+        T_world_camera = look_at(center_m + VIEW_DISTANCE_M * toward, center_m)
         name = f"{mesh.name}_{level + 1}_{number}"
         depth_m = VIEW_NOISE.measure(scene.look(VIEW_CAMERA, T_world_camera), generator(name, "view"))
         points_m, _ = back_project(depth_m, depth_m > 0, VIEW_CAMERA.matrix_3_3)

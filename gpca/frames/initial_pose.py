@@ -64,7 +64,11 @@ def read_bop_results(
         if key[2] not in known:
             raise InputError(subject, f"the dataset has no object {key[2]}", "check results, or fetch the models again")
         (score,) = _entries(subject, row, "score", 1)
-        pose = _pose(subject, row)
+        pose = rigid_motion(_entries(subject, row, "R", 9).reshape(3, 3), _entries(subject, row, "t", 3) / 1000)
+        require_rotation(pose, subject)
+        if pose[2, 3] <= 0:
+            fault = f"t has z = {1e3 * pose[2, 3]:.6g} mm, not in front of the camera"
+            raise InputError(subject, fault, "leave out failed estimates")
         if annotated := distances_m[key[:2]]:
             ratios.append(float(np.linalg.norm(pose[:3, 3]) / np.median(annotated)))
             _require_unit(subject, ratios[-1], ONE_OFF)
@@ -74,32 +78,12 @@ def read_bop_results(
     return {key: [T for _, T in sorted(poses, key=lambda pose: -pose[0])] for key, poses in scored_poses.items()}
 
 
-def nearest_to(poses: list[np.ndarray], pixels_P_2: np.ndarray, camera_3_3: np.ndarray) -> np.ndarray:
-    """Return the pose whose origin is seen nearest to the mask's center: several equal objects may be in sight."""
-    center_2 = pixels_P_2.mean(axis=0)
-    seen = [camera_3_3 @ pose[:3, 3] for pose in poses]
-    return poses[int(np.argmin([np.linalg.norm(p[:2] / p[2] - center_2) for p in seen]))]
-
-
 def _id(subject: str, row: dict, column: str) -> int:
     text = str(row[column]).strip()
     try:
         return whole(text)
     except ValueError as fault:
         raise InputError(subject, f"{column} is {text[:40]!r}, not a whole number", REMEDY) from fault
-
-
-def _pose(subject: str, row: dict) -> np.ndarray:
-    R_camera_model = _entries(subject, row, "R", 9).reshape(3, 3)
-    T_camera_model = rigid_motion(R_camera_model, _entries(subject, row, "t", 3) / 1000)
-    require_rotation(T_camera_model, subject)
-    if T_camera_model[2, 3] <= 0:
-        raise InputError(
-            subject,
-            f"t has z = {1e3 * T_camera_model[2, 3]:.6g} mm, not in front of the camera",
-            "leave out failed estimates",
-        )
-    return T_camera_model
 
 
 def _entries(subject: str, row: dict, column: str, count: int) -> np.ndarray:
@@ -120,11 +104,8 @@ def _require_unit(subject: object, ratio: float, most: float) -> None:
     tenfold = float(np.log10(max(ratio, 1e-9)))
     nearest = round(tenfold) if abs(tenfold - round(tenfold)) < UNIT_OFF else 0
     unit = {-3: "in meters", -1: "in centimeters", 3: "in micrometers"}.get(nearest, "in another unit")
-    raise InputError(
-        subject,
-        f"t is {ratio:.2g} times as long as that of the objects annotated in the image",
-        f"is t {unit}? the format requires millimeters",
-    )
+    fault = f"t is {ratio:.2g} times as long as that of the objects annotated in the image"
+    raise InputError(subject, fault, f"is t {unit}? the format requires millimeters")
 
 
 def estimates_of(
@@ -142,7 +123,10 @@ def estimates_of(
     estimates = []
     for name in sorted(poses_by_estimator):
         if poses := poses_by_estimator[name].get(place):
-            pose = nearest_to(poses, seen["pixels"], seen["camera_3_3"])
+            # The pose whose origin is seen nearest to the mask's center: several equal objects may be in sight.
+            shown = [seen["camera_3_3"] @ pose[:3, 3] for pose in poses]
+            center_2 = seen["pixels"].mean(axis=0)
+            pose = poses[int(np.argmin([np.linalg.norm(p[:2] / p[2] - center_2) for p in shown]))]
             away_m = np.linalg.norm(pose[:3, 3] - np.median(seen["points_m"], axis=0))
             if alone or away_m <= seen["diameter_m"]:
                 estimates.append((name, pose))
@@ -167,14 +151,12 @@ class EstimatorErrors:
 
     def draw(self, object_: tuple[str, int], random: np.random.Generator) -> np.ndarray:
         """Return one error of this object, else of any without symmetry; InputError where there is none."""
-        errors = self.of_object.get(object_) or self._of_others()
+        of_others = (errors for each, errors in self.of_object.items() if each not in self.symmetric)
+        errors = self.of_object.get(object_) or [T for errors in of_others for T in errors]
         if not errors:
             fault = "no estimator has a result for an object without symmetry"
             raise InputError("real_world.datasets", fault, "name more results, or a file of errors")
         return errors[int(random.integers(len(errors)))]
-
-    def _of_others(self) -> list[np.ndarray]:
-        return [T for object_, errors in self.of_object.items() if object_ not in self.symmetric for T in errors]
 
 
 def error_of(T_camera_true: np.ndarray, T_camera_estimated: np.ndarray) -> np.ndarray:
@@ -267,36 +249,23 @@ class GlobalRegistration:
         cloud.orient_normals_towards_camera_location(np.zeros(3))
         (source, source_features), (model, model_features) = self._features(cloud), self._model
         reach_m = 1.5 * self._voxel_m
-        tree = cKDTree(source.points)
-        model_m = np.asarray(model.points)
-        normals = np.asarray(model.normals)
+        checkers = [
+            registration.CorrespondenceCheckerBasedOnEdgeLength(0.9),
+            registration.CorrespondenceCheckerBasedOnDistance(reach_m),
+            registration.CorrespondenceCheckerBasedOnNormal(np.deg2rad(60)),
+        ]
+        tree, model_m, normals = cKDTree(source.points), np.asarray(model.points), np.asarray(model.normals)
         best, best_share = np.eye(4), -1.0
         for number in range(self._settings.tries):
             o3d.utility.random.seed((seed + number) % 2**31)
+            clouds = (source, model, source_features, model_features)
+            by_points, criteria = registration.TransformationEstimationPointToPoint(), (4000, 0.999)
             coarse = registration.registration_ransac_based_on_feature_matching(
-                source,
-                model,
-                source_features,
-                model_features,
-                mutual_filter=False,
-                max_correspondence_distance=reach_m,
-                estimation_method=registration.TransformationEstimationPointToPoint(),
-                ransac_n=3,
-                checkers=[
-                    registration.CorrespondenceCheckerBasedOnEdgeLength(0.9),
-                    registration.CorrespondenceCheckerBasedOnDistance(reach_m),
-                    registration.CorrespondenceCheckerBasedOnNormal(np.deg2rad(60)),
-                ],
-                criteria=registration.RANSACConvergenceCriteria(4000, 0.999),
+                *clouds, False, reach_m, by_points, 3, checkers, registration.RANSACConvergenceCriteria(*criteria)
             )
-            fine = registration.registration_icp(
-                source,
-                model,
-                reach_m,
-                coarse.transformation,
-                registration.TransformationEstimationPointToPlane(),
-                registration.ICPConvergenceCriteria(max_iteration=20),
-            )
+            to_planes = registration.TransformationEstimationPointToPlane()
+            stop = registration.ICPConvergenceCriteria(max_iteration=20)
+            fine = registration.registration_icp(source, model, reach_m, coarse.transformation, to_planes, stop)
             T_camera_object = inverse(np.array(fine.transformation))
             seen_m = transform(T_camera_object, model_m)
             facing = np.sum(seen_m * rotate(T_camera_object, normals), axis=1) < 0

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from gpca.alignment.rigid import inverse, rigid_motion, transform
 from gpca.errors import InputError
-from gpca.frames.camera import TABLE_M, Camera, DepthNoise, MeshScene, look_at, shade, table
+from gpca.frames.camera import TABLE_M, Camera, DepthNoise, MeshScene, direction, look_at, shade, table
 from gpca.io.files import whole_folder
 from gpca.objects.bop import find_symmetries
 from gpca.objects.canonical import canonical_cloud, diameter
@@ -174,9 +174,8 @@ def camera_poses(settings: SceneSettings, middle_m: np.ndarray, source: str, sce
     for view in range(settings.views):
         azimuth = turn + 2 * np.pi * (view + random.uniform(-0.3, 0.3)) / settings.views
         elevation = np.deg2rad(random.uniform(*settings.elevation_deg))
-        flat = np.array([np.cos(azimuth), np.sin(azimuth)]) * np.cos(elevation)
         target_m = middle_m + np.append(random.uniform(-0.03, 0.03, size=2), 0.0)
-        eye_m = target_m + random.uniform(*settings.distance_m) * np.array([*flat, np.sin(elevation)])
+        eye_m = target_m + random.uniform(*settings.distance_m) * direction(azimuth, elevation)
         poses.append(look_at(eye_m, target_m))
     return poses
 

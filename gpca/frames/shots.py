@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from gpca.alignment.rigid import inverse, rotate, transform
-from gpca.frames.camera import Camera, MeshScene, back_project, look_at, table
+from gpca.frames.camera import Camera, MeshScene, back_project, direction, look_at, table
 from gpca.process.environment import open3d_cloud
 
 
@@ -248,12 +249,9 @@ _FACES = np.array([triangle for a, b, c, d in _SIDES for triangle in ([a, b, c],
 
 def candidates(center_m: np.ndarray, distance_m: float, azimuths: int, elevations_deg: Sequence[float]) -> np.ndarray:
     """Return camera poses ``T_world_camera`` (n, 4, 4) on a hemisphere about a point, which they look at."""
-    poses = []
-    for elevation in np.deg2rad(elevations_deg):
-        for azimuth in 2 * np.pi * np.arange(azimuths) / azimuths:
-            flat = np.cos(elevation) * np.array([np.cos(azimuth), np.sin(azimuth)])
-            poses.append(look_at(center_m + distance_m * np.array([*flat, np.sin(elevation)]), center_m))
-    return np.array(poses)
+    angles = product(np.deg2rad(elevations_deg), 2 * np.pi * np.arange(azimuths) / azimuths)
+    ways = (direction(azimuth, elevation) for elevation, azimuth in angles)
+    return np.array([look_at(center_m + distance_m * way, center_m) for way in ways])
 
 
 def occupy(points_m: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:

@@ -11,7 +11,7 @@ from scipy.spatial import ConvexHull
 
 from gpca.alignment.rigid import inverse, scale_translation, transform
 from gpca.errors import InputError
-from gpca.frames.camera import TABLE_M, Camera, DepthNoise, MeshScene, look_at, table
+from gpca.frames.camera import TABLE_M, Camera, DepthNoise, MeshScene, direction, look_at, table
 from gpca.frames.initial_pose import GlobalRegistration, InitialPoseSettings
 from gpca.frames.rgbd_scene import Placed, SceneSettings, center, lay_table, rest, stable_poses
 from gpca.frames.shots import Shot, median_depth
@@ -23,10 +23,10 @@ from gpca.seeds import generator, seed_of
 from gpca.settings import NotNegative
 
 COARSE = 4  # images are thinned by this factor where only shares of pixels count
-LEAST_VISIBLE = 0.7  # so much of an object must be seen before anything is put in front of it
-REDRAWS = 40  # a situation without room for its cause is drawn anew so many times
-OCCLUDERS = 6  # so many are tried in front of an object
-OCCLUDER_TURN_DEG = 20.0  # the occluder stands so far off the line to the camera, at most
+LEAST_VISIBLE = 0.7  # share of an object that must be visible before anything is put in front of it
+REDRAWS = 40  # of a situation without room for its cause
+OCCLUDERS = 6  # tried in front of an object
+OCCLUDER_TURN_DEG = 20.0  # largest angle of the occluder off the line to the camera
 
 
 @dataclass(frozen=True)
@@ -183,7 +183,7 @@ class Situations:
             axes_now = (*self._part, *axes, redraw)
             random = generator(*axes_now)
             clean = self._clean(random, axes_now)
-            if clean is not None and (disturbed := self._disturbed(clean, cause, random)) is not None:
+            if clean and (disturbed := self._disturbed(clean, cause, random)):
                 return disturbed, clean
         raise InputError(f"recovery: situation {axes}", f"has no room for cause '{cause}'", "widen recovery.hidden")
 
@@ -203,22 +203,12 @@ class Situations:
             self._tables[number] = lay_table(self._shelf.surfaces, scenes, source, number, self._shelf.resting)
         standing = list(self._tables[number])
         standing.insert(0, standing.pop(int(random.integers(len(standing)))))
-        T_world_object = standing[0].T_world_object
         azimuth = random.uniform(0, 2 * np.pi)
-        elevation = np.deg2rad(random.uniform(*scenes.elevation_deg))
-        toward = np.array([*(np.cos(elevation) * np.array([np.cos(azimuth), np.sin(azimuth)])), np.sin(elevation)])
-        center_m = T_world_object[:3, 3]
-        situation = Situation(
-            self._shelf,
-            tuple(standing),
-            look_at(center_m + random.uniform(*scenes.distance_m) * toward, center_m),
-            np.eye(4),
-            scenes.camera,
-            scenes.noise,
-            "",
-            number,
-            axes,
-        )
+        toward = direction(azimuth, np.deg2rad(random.uniform(*scenes.elevation_deg)))
+        center_m = standing[0].T_world_object[:3, 3]
+        T_world_camera = look_at(center_m + random.uniform(*scenes.distance_m) * toward, center_m)
+        drawn = (np.eye(4), scenes.camera, scenes.noise, "", number, axes)
+        situation = Situation(self._shelf, tuple(standing), T_world_camera, *drawn)
         whole = self._silhouette(situation, situation.standing[0]).sum()
         return situation if whole and situation.visible().sum() >= LEAST_VISIBLE * whole else None
 

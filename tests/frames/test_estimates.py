@@ -7,7 +7,6 @@ from gpca.frames.initial_pose import (
     InitialPoseSettings,
     error_of,
     estimates_of,
-    nearest_to,
     read_bop_results,
     read_pose_errors,
 )
@@ -142,7 +141,9 @@ def test_of_several_equal_objects_the_one_seen_in_the_mask_is_meant():
     camera_3_3 = np.array([[100.0, 0, 50], [0, 100, 50], [0, 0, 1]])
     poses = [np.eye(4), np.eye(4)]
     poses[0][:3, 3], poses[1][:3, 3] = (0.2, 0, 1), (-0.2, 0, 1)
-    assert nearest_to(poses, np.array([[29, 50], [33, 52]]), camera_3_3) is poses[1]
+    seen = {"pixels": np.array([[29, 50], [33, 52]]), "camera_3_3": camera_3_3, "points_m": np.zeros((3, 3))}
+    [(name, pose)] = estimates_of({"mine": {(0, 0, 1): poses}}, (0, 0, 1), True, seen)
+    assert name == "mine" and pose is poses[1]
 
 
 def test_instances_start_from_the_results_and_without_any_from_an_error_of_these(scenes, tiny, tmp_path):
