@@ -98,7 +98,7 @@ def model(registrations, diagnoser):
     from gpca.classifier.settings import GPCSettings
     from gpca.encoders.registry import EncoderSettings
     from gpca.encoders.training import embed, make_model
-    from gpca.model.familiarity import Familiarity
+    from gpca.model.clouds import Familiarity
     from gpca.model.file import Model
     from gpca.pairs.perturbation import CONCEPTS
     from gpca.recovery.policy import RecoveryPolicy, Thresholds

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gpca.guarantee.conformal import OUTCOMES
-from gpca.guarantee.states import STATES
+from gpca.guarantee.guarantee import STATES
 
 from .documents import ROOT
 

@@ -53,7 +53,6 @@ class Strategy:
 
 
 def strategies() -> dict[str, Strategy]:
-    """Return all strategies by name, including plugins."""
     return joined_outside("STRATEGIES", "strategy", Strategy, STRATEGIES)
 
 
@@ -63,7 +62,6 @@ def strategy_module(name: str) -> str | None:
 
 
 def require_strategy(name: str) -> Strategy:
-    """Return a strategy by name; an InputError for an unknown name."""
     require_known("strategy", name, strategies())
     return strategies()[name]
 
@@ -88,7 +86,6 @@ def top(values_N: np.ndarray, n: int) -> np.ndarray:
 
 
 def random_rows(pool: Pool, batch: int, random: np.random.Generator) -> np.ndarray:
-    """Draw at random."""
     return random.permutation(len(pool.h_N_d))[:batch]
 
 
@@ -118,7 +115,6 @@ def margin(pool: Pool, batch: int, _random: np.random.Generator) -> np.ndarray:
 
 
 def bald(pool: Pool, batch: int, _random: np.random.Generator) -> np.ndarray:
-    """Take the largest BALD (Houlsby et al. 2011)."""
     return top(pool.bald_N, batch)
 
 

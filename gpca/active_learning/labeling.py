@@ -64,7 +64,6 @@ class Queue(Container):
 
 
 def is_queue(path: str | Path) -> bool:
-    """Return whether a file is a queue, and not the registrations of a run."""
     try:
         with zipfile.ZipFile(path) as archive:
             return f"{QUEUE_MARK}.npy" in archive.namelist()

@@ -31,7 +31,6 @@ OBJECT_OPTIONS = ("model", "fast", "uncertainty", "estimator", "queue", "png")  
 
 
 def add_explain_arguments(parser: ArgumentParser) -> None:
-    """Declare files and options."""
     parser.add_argument("source", type=Path, nargs="+", help=f"observed cloud or mesh ({FORMATS})")
     parser.add_argument("target", type=Path, help="reference to which each source is aligned")
     parser.add_argument("--init", type=Path, help="text file with the 4×4 matrix T_target_source, the initial pose")

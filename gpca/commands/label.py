@@ -57,7 +57,6 @@ def add_label_arguments(parser: ArgumentParser) -> None:
 
 
 def run_label(options: Namespace) -> None:
-    """Ask, write, retrain, until the questions, the answers or the samples are used up."""
     torch.set_num_threads(options.threads)
     settings = read_settings(GPCSettings, {"learning_rate": 0.2, "iterations": 150} | options.settings)
     read = [options.registrations, options.embeddings, options.answers, options.model]
@@ -109,7 +108,6 @@ def _require_fitting(options: Namespace, queued: bool) -> None:
 
 
 def _queued(options: Namespace) -> tuple[Queue, np.ndarray, Model]:
-    """Return a queue, its embeddings, and the model whose classifier asks."""
     from gpca.model.file import Model
     from gpca.model.location import model_path
 
@@ -200,7 +198,6 @@ def _finish(session: Session, registrations: Registrations | Queue, model: Model
 
 
 def _write_model(model: Model, session: Session, path: Path) -> None:
-    """Write the model with the classifier that has learned the answers; its diagnosis is as before."""
     if new := [concept for concept in session.gpc.classes if concept not in CONCEPTS]:
         fault = f"is not written: a model file cannot hold the new concept {', '.join(new)}"
         raise InputError(path, fault, "the labels are kept; name one of " + ", ".join(CONCEPTS) + " instead")

@@ -12,7 +12,6 @@ CONFIG = Path("config/config.yaml")  # relative to the folder of the suite
 
 
 def add_check_config_arguments(parser: ArgumentParser) -> None:
-    """Declare the configs."""
     parser.add_argument("configs", nargs="*", type=Path, help="config files, merged into the default in this order")
 
 
@@ -92,7 +91,6 @@ def _snakemake(folder: Path, targets: list[str]) -> str:
 
 
 def add_compare_arguments(parser: ArgumentParser) -> None:
-    """Declare the folders and the page."""
     parser.add_argument("one", type=Path, help="folder of a run or a reference, such as results/default")
     parser.add_argument("other", type=Path, help="folder of another run")
     parser.add_argument("--out", type=Path, default=Path("compare.html"), help="the page (default: compare.html)")

@@ -134,7 +134,7 @@ def licenses_of(origin: str, objects: Path) -> list[License]:
     Raises:
         InputError: none is listed; the message names `objects`, which were made from it.
     """
-    licenses = [license for words, license in _licenses() if any(word in origin for word in words)]
+    licenses = [license for words, license in _listed_licenses() if any(word in origin for word in words)]
     if not licenses:
         fault = f"was made from '{Path(origin).name}', which is from a dataset without a known license"
         raise InputError(objects, fault, f"add the dataset to {LICENSES}")
@@ -142,7 +142,7 @@ def licenses_of(origin: str, objects: Path) -> list[License]:
 
 
 @cache
-def _licenses() -> tuple[tuple[tuple[str, ...], License], ...]:
+def _listed_licenses() -> tuple[tuple[tuple[str, ...], License], ...]:
     return tuple(
         (tuple(entry["found"]), License(dataset, entry["license"], entry["known"]))
         for dataset, entry in load_own_yaml(LICENSES).items()
@@ -322,7 +322,6 @@ def _table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
 
 
 def add_ship_arguments(parser: ArgumentParser) -> None:
-    """Declare the files."""
     parser.add_argument(
         "--model", required=True, type=Path, help="model in the folder of its run, such as results/full/model.pt"
     )

@@ -90,7 +90,6 @@ def _method_names(method: str, track: Track) -> list[str]:
 
 
 def add_score_arguments(parser: ArgumentParser) -> None:
-    """Declare the track and the file."""
     parser.add_argument("track", help=f"one of {', '.join(TRACKS)}")
     parser.add_argument("predictions", type=Path, help="CSV with a head of comments (docs/outside.md)")
 
@@ -109,7 +108,6 @@ def run_score(options: Namespace) -> int:
 
 
 def add_leaderboard_arguments(parser: ArgumentParser) -> None:
-    """Declare the folder and the page."""
     folder = leaderboard.FOLDER
     parser.add_argument(
         "--submissions", type=Path, default=folder, help="folder of CSV files (default: results/leaderboard)"
@@ -138,7 +136,6 @@ def run_leaderboard(options: Namespace) -> int:
 
 
 def add_ship_predictions_arguments(parser: ArgumentParser) -> None:
-    """Declare folders and tracks."""
     folder = Path("results") / DEFAULT
     parser.add_argument(
         "--run", dest="folder", type=Path, default=folder, help=f"folder of the run (default: {folder})"

@@ -213,19 +213,16 @@ def calibrate_alarm(
 
 
 def require_share(name: str, share: float) -> None:
-    """Raise an InputError unless the share is strictly between 0 and 1."""
     if not 0 < share < 1:
         raise InputError(name, f"{share} is not strictly between 0 and 1", "give a share such as 0.9 or 0.05")
 
 
 def require_scores(scores_N_K: np.ndarray, states: Sequence[str]) -> None:
-    """Raise an InputError unless there is a finite score for each sample and state."""
     if scores_N_K.ndim != 2 or scores_N_K.shape[1] != len(states) or not np.isfinite(scores_N_K).all():
         fault = f"have the shape {scores_N_K.shape} or are not finite"
         raise InputError("scores", fault, f"give a finite number for each of {', '.join(states)}")
 
 
 def require_failures(failure_N: np.ndarray) -> None:
-    """Raise an InputError unless there is one finite score per sample."""
     if failure_N.ndim != 1 or not np.isfinite(failure_N).all():
         raise InputError("scores of failure", "are not one finite number for each sample", "leave out the others")

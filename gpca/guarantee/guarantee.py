@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from gpca.causes.truth import BORDERLINE
+from gpca.causes.dataset import LABELS, labels_of
+from gpca.causes.truth import BORDERLINE, NOMINAL, Truth
 from gpca.errors import InputError
 from gpca.guarantee.conformal import (
     PROBABILITY,
@@ -18,9 +19,11 @@ from gpca.guarantee.conformal import (
     StateSets,
     calibrate_alarm,
     calibrate_sets,
+    require_scores,
 )
-from gpca.guarantee.states import STATES
 
+SEVERAL = "several"
+STATES = (*LABELS, SEVERAL)
 REMEDY = "calibrate it again"
 
 
@@ -89,7 +92,7 @@ def calibrate(
     it resembles the others.
 
     Args:
-        scores_N_K: scores of the states, as :func:`gpca.guarantee.states.state_scores` returns them. The score of
+        scores_N_K: scores of the states, as :func:`gpca.guarantee.guarantee.state_scores` returns them. The score of
             failure is 1 minus that of the first state, nominal.
         state_N: true states; ``borderline`` samples are left out.
         family_N: family of each sample, or None.
@@ -116,3 +119,31 @@ def calibrate(
 
 def _plain(number: float) -> float | None:
     return number if isfinite(number) else None
+
+
+def states_of(truth: Truth) -> np.ndarray:
+    """Return the state (S,) of each registration: one of `STATES`, or ``borderline`` if it has no label.
+
+    A failure with at most one cause above the limit has the state of its dominant cause.
+    """
+    label_S = labels_of(truth)
+    failed_S = (label_S != NOMINAL) & (label_S != BORDERLINE)
+    return np.where(failed_S & (truth.causes.sum(axis=1) > 1), SEVERAL, label_S)
+
+
+def state_scores(scores_N_4: np.ndarray) -> np.ndarray:
+    """Return scores (N, 5) of `STATES` that sum to 1, from the scores of nominal and of the three causes.
+
+    The scores of the causes are normalized to shares s. A failure has the single cause c with the probability s_c² that
+    two draws from the shares both give c, and several causes with 1 - Σ s_c². Sets are valid with any such rule; a
+    better one would make them smaller.
+    """
+    require_scores(scores_N_4, LABELS)
+    nominal_N = np.clip(scores_N_4[:, 0], 0, 1)
+    causes_N_3 = np.maximum(scores_N_4[:, 1:], 0)
+    sum_N_1 = causes_N_3.sum(axis=1, keepdims=True)
+    share_N_3 = np.where(sum_N_1 > 0, causes_N_3 / np.where(sum_N_1 > 0, sum_N_1, 1), 1 / causes_N_3.shape[1])
+    both_N_3 = share_N_3**2
+    failed_N_1 = 1 - nominal_N[:, None]
+    several_N_1 = np.maximum(1 - both_N_3.sum(axis=1, keepdims=True), 0)
+    return np.column_stack([nominal_N, failed_N_1 * both_N_3, failed_N_1 * several_N_1])

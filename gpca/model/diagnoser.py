@@ -25,8 +25,7 @@ from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
 from gpca.explainers.pair_classifier import Judgment, PairClassifier
 from gpca.guarantee.conformal import highest_level
-from gpca.guarantee.guarantee import Guarantee, calibrate
-from gpca.guarantee.states import states_of
+from gpca.guarantee.guarantee import Guarantee, calibrate, states_of
 from gpca.model.diagnosis import Diagnosis, Guaranteed, Reenacted, state_probabilities
 from gpca.pairs.distances import ObservedPair
 from gpca.pairs.perturbation import CONCEPTS

@@ -12,8 +12,7 @@ from gpca.alignment.rigid import inverse, log
 from gpca.causes.shapley import ALL, shapley_values
 from gpca.causes.truth import FAILED, NOMINAL
 from gpca.guarantee.conformal import ALARM, GOOD
-from gpca.guarantee.guarantee import Guarantee
-from gpca.guarantee.states import SEVERAL
+from gpca.guarantee.guarantee import SEVERAL, Guarantee
 from gpca.objects.bop import symmetric_turn
 from gpca.objects.canonical_frame import CanonicalFrame
 from gpca.pairs.perturbation import CONCEPTS
@@ -91,7 +90,7 @@ class Guaranteed:
 
 
 def state_probabilities(judged: Judgment) -> np.ndarray:
-    """Return probabilities (N, 5) of :data:`gpca.guarantee.states.STATES` that sum to 1.
+    """Return probabilities (N, 5) of :data:`gpca.guarantee.guarantee.STATES` that sum to 1.
 
     Causes are assumed to be independent, given a failure. The probability that a failure has no cause is distributed
     over the causes in proportion to their probabilities, since a failure without a cause above the limit is labeled by
@@ -281,7 +280,7 @@ class Diagnosis:
         bald: largest BALD among the questions, nats (Eq. 7).
         expected_error: expected error of the pose: ADD, or ADD-S of a symmetric object.
         unlikeness: distance to the training samples, scaled so that 1 % of them exceed 1.
-        void: whether the pair is such that no number here means anything (:mod:`gpca.model.familiarity`).
+        void: whether the pair is such that no number here means anything (:mod:`gpca.model.clouds`).
         guarantee: set of states and alarm; None in older models and fast diagnoses.
         reenacted: the counterfactuals; None if nothing was re-enacted.
     """

@@ -24,11 +24,10 @@ from gpca.causes.settings import Limits
 from gpca.causes.truth import NOMINAL
 from gpca.encoders.training import best_device
 from gpca.errors import InputError
-from gpca.model.clouds import OR_SCANS, Clouds
+from gpca.model.clouds import OR_SCANS, Clouds, Void, voids_of
 from gpca.model.diagnoser import QUICK_HYPOTHESES, QUICK_POINTS
 from gpca.model.diagnosis import CHECK, Diagnosis
 from gpca.model.explanation import Explanation, PoseSpread
-from gpca.model.familiarity import Void, voids_of
 from gpca.model.file import Model
 from gpca.model.location import model_path
 from gpca.model.scene import Scene
@@ -280,7 +279,6 @@ class Explainer:
         return warnings
 
     def _fits_inverted(self, clouds: Clouds, outcome: Outcome) -> bool:
-        """Return whether ICP ends far better from the inverse of the initial pose."""
         if outcome.fitness >= GOOD_FITNESS:
             return False
         from_inverse = clouds.frame.coordinates(transform(inverse(clouds.T_target_source_init), clouds.seen))

@@ -27,10 +27,9 @@ from gpca.errors import InputError
 from gpca.explainers.classifiers import require_trees
 from gpca.explainers.pair_classifier import ABSENT, PRESENT
 from gpca.guarantee.conformal import Nonconformity
-from gpca.guarantee.guarantee import Guarantee
-from gpca.guarantee.states import STATES
+from gpca.guarantee.guarantee import STATES, Guarantee
+from gpca.model.clouds import MEASURES, Familiarity
 from gpca.model.diagnoser import REENACTED, REMEDIED, Diagnoser
-from gpca.model.familiarity import MEASURES, Familiarity
 from gpca.model.location import REMEDY, require_model
 from gpca.objects.canonical import FEWEST_CLOUD_POINTS
 from gpca.pairs.perturbation import CONCEPTS

@@ -16,7 +16,6 @@ REMEDY = "make one with 'make results', or by itself with 'snakemake -j2 results
 
 
 def require_model(path: str | Path) -> None:
-    """Raise an InputError unless the file exists and can be read."""
     require_file(path, "no such model", REMEDY)
 
 

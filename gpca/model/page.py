@@ -10,7 +10,7 @@ from math import sqrt
 
 from gpca.causes.shapley import BY_SIZE
 from gpca.guarantee.conformal import ALARM, GOOD
-from gpca.guarantee.states import STATES
+from gpca.guarantee.guarantee import STATES
 from gpca.model.diagnosis import IN_WORDS, UNKNOWN, Reenacted
 from gpca.model.scene import ASSETS, WITHOUT, Scene, taken_out
 from gpca.recovery.policy import NOTHING
@@ -117,20 +117,17 @@ def headline(explained: Mapping) -> str:
 
 
 def warnings(lines: Sequence[str]) -> str:
-    """List the reasons to doubt the explanation."""
     items = "".join(f"<li>{escape(line)}</li>" for line in lines)
     return f'<ul class="warnings">{items}</ul>' if items else ""
 
 
 def action(explained: Mapping, advice: str) -> str:
-    """State what to do, and why."""
     do = "nothing" if explained["action"] == NOTHING else advice
     why = f"<p>Reason: {escape(explained['reason'])}.</p>"
     return section("What to do", f'<p class="action">{sentence(do)}</p>{why}')
 
 
 def promise(explained: Mapping) -> str:
-    """State the guarantee: set of states and alarm."""
     diagnosis = explained["diagnosis"]
     if diagnosis is None or diagnosis["state"] == UNKNOWN:
         return ""
@@ -161,7 +158,6 @@ def promise(explained: Mapping) -> str:
 
 
 def causes(explained: Mapping) -> str:
-    """Draw the probability of each cause with its standard deviation and its effect on the error."""
     diagnosis, unit = explained["diagnosis"], explained["unit"]
     if diagnosis is None:
         return ""
@@ -229,7 +225,6 @@ def counterfactuals(
 
 
 def as_in_the_paper(explained: Mapping) -> str:
-    """Draw GP-CA's scores."""
     if not explained["scores"]:
         return ""
     bars = (bar(name, score, sqrt(explained["variances"][name]), "") for name, score in explained["scores"].items())
@@ -238,7 +233,6 @@ def as_in_the_paper(explained: Mapping) -> str:
 
 
 def details(explained: Mapping, names: Mapping[str, str]) -> str:
-    """List the pose, the fit of the clouds, the inputs and the notes."""
     unit = explained["unit"]
     rows = {
         **{name.capitalize(): value for name, value in names.items() if value},
@@ -256,7 +250,6 @@ def details(explained: Mapping, names: Mapping[str, str]) -> str:
 
 
 def section(title: str, body: str) -> str:
-    """Return a part of the page with its heading."""
     return f"<section><h2>{escape(title)}</h2>{body}</section>\n"
 
 
@@ -271,7 +264,6 @@ def bar(name: str, share: float, spread: float, note: str) -> str:
 
 
 def length(value: float, unit: str) -> str:
-    """Format a length."""
     return f"{value:.2g} {unit}"
 
 

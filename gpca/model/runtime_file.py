@@ -26,5 +26,4 @@ OF_ONE_EXPLANATION = ("icp", "features", "sampling", "scores")
 
 
 def read_runtime(path: str | Path) -> pd.DataFrame:
-    """Read the rows."""
     return read_numbers(path, RUNTIME_COLUMNS, ("threads", "repeats", "mean_s", "deviation_s", "median_s"))

@@ -162,7 +162,6 @@ def unpacked(cloud: dict) -> np.ndarray:
 
 
 def flat(T: np.ndarray) -> list[float]:
-    """Return a matrix row by row, with seven digits."""
     return [float(f"{value:.7g}") for value in T.ravel()]
 
 

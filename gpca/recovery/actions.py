@@ -172,7 +172,6 @@ ACTIONS: dict[str, Action] = {"reinitialize": reinitialize, "new_view": new_view
 
 
 def action_of(name: str, settings: Mapping[str, object]) -> Action:
-    """Return an action with its settings; an InputError for an unknown name or setting."""
     from functools import partial
 
     require_known("recovery action", name, ACTIONS)

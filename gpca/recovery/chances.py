@@ -123,7 +123,6 @@ class Chances:
 def learn_utility(
     trials: Iterable[Sequence[Trial]], costs: Mapping[str, float], actions: Sequence[str], needless: float = 0.0
 ) -> ExpectedUtility:
-    """Train the policy on the trials of several episodes."""
     joined = [trial for episode in trials for trial in episode]
     return ExpectedUtility(Chances(joined, actions), {action: costs[action] for action in actions}, needless)
 

@@ -214,17 +214,14 @@ def follow_truth(means: Means) -> Decide:
 
 
 def always_act(action: str) -> Callable[[Means], Decide]:
-    """Make the policy that always takes this action."""
     return lambda means: lambda case: Decision(action, "", "always")
 
 
 def follow_sequence(order: Order) -> Callable[[Means], Decide]:
-    """Make the policy that takes these actions in turn, from the start again after the last."""
     return lambda means: lambda case: Decision(next_of(order, case.actions), "", "next of a fixed sequence")
 
 
 def next_of(order: Order, taken: Sequence[str]) -> str:
-    """Return the next action of a sequence, which repeats."""
     return order[len(taken) % len(order)]
 
 
@@ -236,7 +233,6 @@ def sequences(actions: Sequence[str]) -> dict[str, Order]:
 
 
 def title_of_sequence(order: Order) -> str:
-    """Return the title in tables, such as ``Reinitialize, then new view``."""
     return ", then ".join(action.replace("_", " ") for action in order).capitalize()
 
 
@@ -354,7 +350,6 @@ def policies(actions: Sequence[str]) -> dict[str, PolicyEntry]:
 
 
 def policy_entry(name: str, actions: Sequence[str]) -> PolicyEntry:
-    """Return a policy by name; an InputError for an unknown policy or action."""
     entries = policies(actions)
     require_known("recovery policy", name, entries)
     return entries[name]

@@ -212,7 +212,6 @@ def seen_surface(holding: Holding, known: KnownModel, hypothesis: Hypothesis, no
 
 
 def _placed(holding: Holding, known: KnownModel, T: np.ndarray) -> np.ndarray:
-    """Return the ``T_world_object`` of a hypothesis."""
     return holding.T_world_object_init @ scale_translation(inverse(T), known.diameter_m)
 
 

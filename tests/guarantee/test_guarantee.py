@@ -9,8 +9,7 @@ from gpca.causes.dataset import labels_of
 from gpca.causes.truth import BORDERLINE, Truth
 from gpca.errors import InputError
 from gpca.guarantee.conformal import OUTCOMES
-from gpca.guarantee.guarantee import Guarantee, calibrate
-from gpca.guarantee.states import SEVERAL, STATES, state_scores, states_of
+from gpca.guarantee.guarantee import SEVERAL, STATES, Guarantee, calibrate, state_scores, states_of
 
 
 def drawn(random, samples):

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from gpca import Explainer
+from gpca.model.clouds import MEASURES, Familiarity, hidden_share, measure, voids_of
 from gpca.model.diagnosis import ADVICE, CHECK, UNKNOWN
-from gpca.model.familiarity import MEASURES, Familiarity, hidden_share, measure, voids_of
 from gpca.objects.canonical import canonical_cloud
 from gpca.objects.procedural import FAMILIES, surfaces
 

@@ -12,8 +12,7 @@ from gpca.experiments.guarantee.scored import Scored
 from gpca.experiments.guarantee.settings import GuaranteeSettings
 from gpca.frames.source import REAL_WORLD
 from gpca.guarantee.conformal import ALARM, GOOD
-from gpca.guarantee.guarantee import calibrate
-from gpca.guarantee.states import state_scores
+from gpca.guarantee.guarantee import calibrate, state_scores
 
 FAMILIES = "families"  # the condition in which the promises are made
 PLAIN, BY_SAMPLE, BY_STATE, CONFIDENT, BY_FAMILY = VARIANTS = (

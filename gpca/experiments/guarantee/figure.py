@@ -12,7 +12,7 @@ from gpca.evaluation.measures import ALL
 from gpca.experiments.diagnosis.judged import POOLED
 from gpca.experiments.guarantee.answers import BY_FAMILY, BY_SAMPLE, BY_STATE, CONFIDENT, FAMILIES, PLAIN
 from gpca.experiments.guarantee.metrics import COVERAGE, FALSE_ALARMS, MISSED, SHARES, SIZE
-from gpca.guarantee.states import STATES
+from gpca.guarantee.guarantee import STATES
 from gpca.reporting.figures.panels import in_lines, legend_below, panels
 from gpca.reporting.figures.style import (
     BLUE,

@@ -18,7 +18,7 @@ from gpca.experiments.guarantee.experiment import promises
 from gpca.experiments.guarantee.scored import Scored
 from gpca.experiments.guarantee.settings import GuaranteeSettings
 from gpca.guarantee.conformal import ALARM, GOOD, NOT_SURE
-from gpca.guarantee.states import STATES
+from gpca.guarantee.guarantee import STATES
 from gpca.io.csv_file import read_numbers
 from gpca.seeds import generator
 from gpca.settings import read_settings

@@ -13,7 +13,7 @@ from gpca.causes.descriptors import Descriptors
 from gpca.causes.truth import BORDERLINE
 from gpca.errors import InputError
 from gpca.experiments.guarantee.scored import Scored
-from gpca.guarantee.states import states_of
+from gpca.guarantee.guarantee import states_of
 from gpca.io.arrays import REGENERATE
 from gpca.io.names import Axes
 from gpca.pairs.dataset import Registrations

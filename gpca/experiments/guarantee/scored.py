@@ -11,7 +11,7 @@ import numpy as np
 
 from gpca.causes.dataset import LABELS
 from gpca.errors import InputError
-from gpca.guarantee.states import STATES
+from gpca.guarantee.guarantee import STATES
 from gpca.io.csv_file import read_numbers, write_csv
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ class Scored:
         model: (N,) names what gave the scores. Those of different models are never mixed.
         source, seed, sample: (N,) what was asked about.
         family: (N,) of shapes, or the scene of a depth frame.
-        state: (N,) the true one, of :data:`gpca.guarantee.states.STATES`.
+        state: (N,) the true one, of :data:`gpca.guarantee.guarantee.STATES`.
         taught: (N,) the model learned from this very sample.
         severity: (N,) of what was done to it, as a share of the most in any sample.
         weight: (N,) how much it counts.

@@ -24,7 +24,7 @@ from gpca.experiments.guarantee.pool import Pool, axes_of, read_pool
 from gpca.experiments.guarantee.scored import SCORES, Scored, joined
 from gpca.explainers.registry import CAUSES, explainer_entry
 from gpca.frames.source import REAL_WORLD
-from gpca.guarantee.states import states_of
+from gpca.guarantee.guarantee import states_of
 from gpca.io.container import REGENERATE_BOTH, require_same_samples
 from gpca.io.csv_file import ANY, read_csv
 from gpca.objects.canonical import BY_ICP

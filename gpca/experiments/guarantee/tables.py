@@ -14,7 +14,7 @@ from gpca.experiments.frame_causes.tables import FEWEST_FAILURES
 from gpca.experiments.guarantee.answers import BY_FAMILY, BY_SAMPLE, BY_STATE, CONFIDENT, FAMILIES, PLAIN
 from gpca.experiments.guarantee.metrics import COVERAGE, FALSE_ALARMS, MISSED, SHARES, SINGLE, SIZE, UNSURE
 from gpca.frames.source import REAL_WORLD
-from gpca.guarantee.states import STATES
+from gpca.guarantee.guarantee import STATES
 from gpca.objects.entry import title_of
 from gpca.reporting.tables.builder import TableBuilder, crossed
 from gpca.reporting.tables.cells import interval_cell, plain_cell, rows_where

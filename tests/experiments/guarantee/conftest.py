@@ -5,7 +5,7 @@ import pytest
 
 from gpca.causes.dataset import LABELS
 from gpca.experiments.guarantee.scored import Scored, joined
-from gpca.guarantee.states import SEVERAL, STATES
+from gpca.guarantee.guarantee import SEVERAL, STATES
 
 FAMILIES = np.array([f"family{number:02d}" for number in range(12)])
 

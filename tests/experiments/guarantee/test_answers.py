@@ -20,7 +20,7 @@ from gpca.experiments.guarantee.answers import (
 )
 from gpca.experiments.guarantee.settings import GuaranteeSettings
 from gpca.guarantee.conformal import ALARM, GOOD, NOT_SURE
-from gpca.guarantee.states import STATES
+from gpca.guarantee.guarantee import STATES
 
 SETTINGS = GuaranteeSettings(level=0.8)
 

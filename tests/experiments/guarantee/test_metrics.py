@@ -21,7 +21,7 @@ from gpca.experiments.guarantee.metrics import (
 from gpca.experiments.guarantee.scored import Scored
 from gpca.experiments.guarantee.settings import GuaranteeSettings
 from gpca.experiments.guarantee.tables import table19_guarantee, table19_shift
-from gpca.guarantee.states import STATES
+from gpca.guarantee.guarantee import STATES
 from gpca.io.csv_file import write_csv
 
 SECTION = {

@@ -16,7 +16,7 @@ from gpca.errors import InputError
 from gpca.experiments.guarantee import step
 from gpca.experiments.guarantee.pool import parts_of, read_pool
 from gpca.experiments.guarantee.scored import Scored
-from gpca.guarantee.states import states_of
+from gpca.guarantee.guarantee import states_of
 from gpca.io.csv_file import write_csv
 from gpca.process.job import Job
 from gpca.reenactment.dataset import Reenactments
