@@ -1,6 +1,12 @@
-from gpca.config.layers import DEFAULTS, in_order, read_file, with_defaults
+import copy
 
-from .configs import CONFIG, merged
+import pytest
+
+from gpca.config.check import check
+from gpca.config.layers import DEFAULTS, in_order, read_file, with_defaults, without_false
+from gpca.errors import InputError
+
+from .configs import CONFIG, MISSING, changed, load, merged
 
 
 def test_rows_that_a_config_adds_stand_where_the_defaults_have_them():
@@ -14,3 +20,117 @@ def test_rows_that_a_config_adds_stand_where_the_defaults_have_them():
     assert found == given
     assert list(found) == list(lower)
     assert list(found["controls"]["explainers"]) == [*usual, "my_own"]
+
+
+@pytest.mark.parametrize(
+    "key",
+    [
+        *(
+            "sources.linemod",
+            "encoders.pointnet2",
+            "reductions.umap",
+            "uncertainty.oracle",
+            "explainers.shap_supervised",
+        ),
+        *("methods.trimmed", "estimators.stein_icp", "estimator_pairs.methods.point_to_plane"),
+        *("learners.learner_forest", "recovery.policies.random", "active_learning.strategies.badge"),
+    ],
+)
+def test_what_is_false_is_left_out_as_if_it_were_not_there(key):
+    config, never_there = changed(key, False), changed(key, MISSING)
+    if key == "uncertainty.oracle":
+        config["explainers"]["shap_oracle"] = {}
+    # The rows that need it.
+    never_there["kernel_grid"]["sources"] = [n for n in ("ycb", "linemod") if n in never_there["sources"]]
+    for part in ("backbones", "training"):
+        named = never_there["real_world"][part]
+        there = [name for name in named if name in never_there["encoders"]]
+        never_there["real_world"][part] = there if part == "backbones" else {name: named[name] for name in there}
+    never_there["frame_labels"]["backbones"] = [n for n in ("dgcnn", "pointnet2") if n in never_there["encoders"]]
+    never_there["real_world"]["reductions"] = ["none", *never_there["reductions"]]
+    never_there["exchange"]["estimators"] = [
+        name for name in never_there["exchange"]["estimators"] if name in never_there["estimators"]
+    ]
+    of_scans = never_there["scans"]["methods"]
+    never_there["scans"]["methods"] = {name: of_scans[name] for name in of_scans if name in never_there["methods"]}
+    if key == "uncertainty.oracle":
+        del never_there["explainers"]["shap_oracle"]
+    given = copy.deepcopy(config)
+    assert without_false(config) == without_false(never_there)
+    assert check(config) == check(never_there)
+    assert config == given  # for a Snakemake that is given this config once more
+
+
+def test_an_action_takes_its_own_policy_along():
+    config = merged(load(), {"recovery": {"actions": {"new_view": False}, "treatments": {"overlap": "denoise"}}})
+    recovery = without_false(config)["recovery"]
+    assert list(recovery["actions"]) == ["reinitialize", "denoise"]
+    assert "always_denoise" in recovery["policies"]
+    assert "always_new_view" not in recovery["policies"]
+    assert not any("new_view" in policy for policy in recovery["policies"])
+
+
+def test_a_policy_goes_with_the_uncertainty_that_its_explainer_reads():
+    whole = without_false(changed("uncertainty.removal", False))
+    assert "shap_removal" not in whole["recovery"]["policies"]
+    assert not {"shap_removal", "shap_removal_residual", "sa_local_removal"} & set(whole["explainers"])
+    check(changed("uncertainty.removal", False))
+
+
+def test_switches_are_a_list_in_their_order_and_a_list_may_stand_in_their_place():
+    strategies = without_false(changed("active_learning.strategies.entropy", False))["active_learning"]["strategies"]
+    assert strategies[:4] == ["random", "random_stratified", "margin", "bald"]
+    given = changed("active_learning.strategies", ["bald", "random"])
+    assert without_false(given)["active_learning"]["strategies"] == ["bald", "random"]
+
+
+def test_a_dataset_that_is_false_leaves_the_scenes():
+    config = merged(load(), {"real_world": {"datasets": dict.fromkeys(load()["real_world"]["datasets"], False)}})
+    whole = without_false(config)["real_world"]
+    assert (whole["datasets"], whole["virtual"]) == ({}, None)
+    check(config)
+
+
+def test_virtual_frames_stay_while_a_dataset_does():
+    config = merged(load(), {"real_world": {"datasets": {"visp": False}}})
+    assert without_false(config)["real_world"]["virtual"] == load()["real_world"]["virtual"]
+
+
+@pytest.mark.parametrize(
+    ("key", "message"),
+    [
+        ("methods.fgr", "method_pairs.global_start: registration method 'fgr' is left out; choose one of point_to_"),
+        ("estimators.gauss", "estimators: no estimator 'gauss'; choose one of bayesian_icp, "),
+        ("methods.icp", "methods: no registration method 'icp'; choose one of fgr, "),
+        ("encoders.dgcnn", "embedding.encoder: encoder 'dgcnn' is left out; choose one of pointnet, "),
+        ("sources.ycb", "learning_curve.sources: source 'ycb' is left out; choose one of coffee_cup, linemod"),
+        ("sources.coffee_cup", "figures.source: source 'coffee_cup' is left out; choose one of linemod, ycb"),
+        ("recovery.actions.denoise", "recovery.treatments.noise: action 'denoise' is left out; choose one of reinit"),
+        ("uncertainty.causal", "uncertainty.causal: is missing; add it"),
+        # Names of nothing.
+        ("explainers.shap_orcale", "explainers: no explainer 'shap_orcale'; choose one of "),
+        ("learners.learner_tree", "learners: no learner 'learner_tree'; choose one of "),
+        ("reductions.tsne", "reductions: no reduction 'tsne'; choose one of none, pca, umap, autoencoder"),
+        ("uncertainty.sobol", "uncertainty: no uncertainty 'sobol'; choose one of additive, "),
+        ("active_learning.strategies.bold", "active_learning.strategies: no strategy 'bold'; choose one of random, "),
+        ("recovery.policies.always_pray", "recovery.policies: no policy 'always_pray'; choose one of gpca, "),
+        ("recovery.actions.pray", "recovery.actions: no action 'pray'; choose one of reinitialize, "),
+    ],
+)
+def test_what_cannot_be_left_out_is_one_line_that_names_the_key(key, message):
+    with pytest.raises(InputError) as caught:
+        check(changed(key, False))
+    assert str(caught.value).startswith(f"config key {message}")
+
+
+@pytest.mark.parametrize("value", [None, {}, "yes", 1])
+def test_a_switch_is_true_or_false(value):
+    with pytest.raises(InputError, match=r"^config key recovery\.policies\.gpca: .* is not a switch; give true or fal"):
+        check(changed("recovery.policies.gpca", value))
+
+
+def test_nothing_is_left():
+    config = load()
+    config["explainers"] = dict.fromkeys(config["explainers"], False)
+    with pytest.raises(InputError, match=r"^config key explainers: \{\} should have at least 1 item"):
+        check(config)

@@ -15,6 +15,7 @@ from gpca.encoders.registry import ENCODERS, OPTIONS
 from gpca.uncertainty import designs
 
 from ..documents import ROOT
+from .configs import load
 
 SCHEMA = TypeAdapter(whole_config()).json_schema()
 
@@ -51,3 +52,18 @@ def test_nothing_heavy_is_loaded_to_plan_a_run():
     program = f"import sys, {', '.join(sorted(modules))}; sys.exit(str({heavy} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, cwd=ROOT)
     assert done.stderr.strip() == "set()"
+
+
+@pytest.mark.parametrize("names", [(), ("smoke",), ("full",)])
+def test_the_shipped_configs_have_training_samples_for_every_start(names):
+    config = load(*names)
+    train, active = config["registrations"]["train"], config["active_learning"]
+    pool = config["readings"]["groups"]["pool"]
+    for initial in (active["initial"], *([min(pool["initial"])] if pool else [])):
+        assert initial // 2 < train // 3
+    stream, known = active["stream"], 2 * (train // 3 - active["initial"] // 2)
+    new = round((stream["arrivals"] - stream["quiet"]) / 3)
+    assert 0 < new <= train // 3
+    assert stream["arrivals"] - new <= known
+    for cause in ("noise", "pose", "overlap"):
+        assert active["initial"] // 3 <= round(config["causes"]["shares"][cause] * config["causes"]["train"])
