@@ -18,7 +18,7 @@ from gpca.errors import InputError
 from gpca.io.arrays import TEXT, WHOLE, save_arrays
 from gpca.io.container import Container, array
 from gpca.io.csv_file import read_csv
-from gpca.io.names import Axes
+from gpca.io.files import Axes
 from gpca.numerals import whole
 from gpca.pairs.dataset import ragged
 from gpca.seeds import generator

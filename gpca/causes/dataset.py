@@ -11,7 +11,7 @@ from gpca.causes.shapley import SUBSETS
 from gpca.causes.truth import BORDERLINE, FAILED, NOMINAL, Truth
 from gpca.io.arrays import REAL, WHOLE, load_arrays, save_arrays
 from gpca.io.container import FLAG, Container, Shapes, array
-from gpca.io.names import Axes
+from gpca.io.files import Axes
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 

@@ -15,7 +15,7 @@ from gpca.causes.settings import CauseSettings
 from gpca.causes.shapley import SUBSETS
 from gpca.causes.subjects import Subject
 from gpca.causes.truth import Truth, capped, joined
-from gpca.io.names import Axes
+from gpca.io.files import Axes
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.pairs.synthesis import as_registrations
 from gpca.seeds import generator

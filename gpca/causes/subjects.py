@@ -14,7 +14,7 @@ from gpca.causes.counterfactuals import Counterfactuals, Registrar, Unmeasurable
 from gpca.causes.settings import CauseSettings
 from gpca.causes.shapley import NONE
 from gpca.errors import InputError
-from gpca.io.names import SPLITS
+from gpca.io.files import SPLITS
 from gpca.objects.bop import find_symmetries
 from gpca.objects.canonical import ObjectClouds, drawn, unseen
 from gpca.pairs.perturbation import CONCEPTS

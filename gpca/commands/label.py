@@ -20,8 +20,7 @@ from gpca.attribution.predictions import write_predictions
 from gpca.attribution.scores import Attribution
 from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
-from gpca.io.files import require_outputs
-from gpca.io.limits import require_file
+from gpca.io.files import require_file, require_outputs
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.arguments import COUNT

@@ -12,8 +12,7 @@ from typing import Any
 
 import torch
 
-from gpca.io.files import whole_file
-from gpca.io.limits import LARGEST_NUMBER
+from gpca.io.files import LARGEST_NUMBER, whole_file
 
 
 def read_tensors(path: str | Path) -> Any:

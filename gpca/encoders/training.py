@@ -21,8 +21,7 @@ from torch import nn
 from gpca.encoders.registry import EncoderSettings, make_encoder
 from gpca.encoders.tensor_file import read_tensors, write_tensors
 from gpca.errors import InputError
-from gpca.io.limits import require_file
-from gpca.io.names import Axes, require_axes
+from gpca.io.files import Axes, require_axes, require_file
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.progress import progress

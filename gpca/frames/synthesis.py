@@ -13,7 +13,7 @@ import numpy as np
 from gpca.alignment.pose_error import JUDGED_POINTS, pose_error
 from gpca.alignment.rigid import inverse, scale_translation, transform
 from gpca.frames.instances import Instances
-from gpca.io.names import SPLITS
+from gpca.io.files import SPLITS
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS, PERTURBATIONS, Perturbed

@@ -12,9 +12,17 @@ from typing import IO
 import numpy as np
 
 from gpca.errors import InputError
-from gpca.io.files import whole_file
-from gpca.io.limits import LARGEST_NUMBER, is_bounded, require_file, require_memory
-from gpca.io.names import SPLITS, Axes, is_name, require_axes
+from gpca.io.files import (
+    LARGEST_NUMBER,
+    SPLITS,
+    Axes,
+    is_bounded,
+    is_name,
+    require_axes,
+    require_file,
+    require_memory,
+    whole_file,
+)
 
 REGENERATE = "regenerate it with Snakemake"
 TEXT, WHOLE, REAL = "U", "iu", "iuf"  # what an array holds, in the letters of NumPy

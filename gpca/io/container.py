@@ -11,7 +11,7 @@ import numpy as np
 
 from gpca.errors import InputError
 from gpca.io.arrays import REAL, REGENERATE, TEXT, WHOLE, axes_in, load_arrays, save_arrays
-from gpca.io.names import Axes
+from gpca.io.files import Axes
 
 if TYPE_CHECKING:
     import pandas as pd

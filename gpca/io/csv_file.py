@@ -10,33 +10,30 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpca.errors import InputError
-from gpca.io.files import whole_file
-from gpca.io.limits import require_file
-from gpca.io.names import SPLITS
+from gpca.io.files import SPLITS, require_file, whole_file
 from gpca.numerals import decimal
 
 if TYPE_CHECKING:
     import pandas as pd
 
-_CONTROL = r"[\x00-\x08\x0a-\x1f\x7f]"  # all but tabs, by which a user's program may part numbers
-NAMES = ("object", "cluster", "method", "explainer", "policy")  # columns whose entries name something in every file
+_CONTROL = r"[\x00-\x08\x0a-\x1f\x7f]"  # all but tabs
+NAMES = ("object", "cluster", "method", "explainer", "policy")  # columns of names, which must not be empty
 ANY = ("*",)
 
 
 def read_csv(
     path: str | Path, columns: Iterable[str], others: Iterable[str] = (), remedy: str = "regenerate it"
 ) -> pd.DataFrame:
-    """Read a CSV file with these columns and at least one row, every entry as the text that stands there.
+    """Read a CSV file with at least one row, all entries as text.
 
     Args:
-        path: the file.
-        columns: those that have to be there.
-        others: patterns of those that may be there too; `ANY` in a file of a user, or of which a part is read.
-        remedy: what to do about a damaged file.
+        columns: required ones.
+        others: patterns of optional ones; `ANY` for files of users, or if only a part is read.
+        remedy: for a damaged file.
 
     Raises:
-        InputError: missing, empty or unreadable file, column that is missing, unknown or there twice, no rows, rows
-            longer than the head, an entry of several lines, an empty name, a split that is neither train nor test.
+        InputError: missing, empty or unreadable file; missing, unknown or repeated column; no rows, rows longer than
+            the head; an entry of several lines, an empty name, an unknown split.
     """
     require_file(path, "no such file", "make it with snakemake")
     import pandas as pd
@@ -50,9 +47,9 @@ def read_csv(
     needed = tuple(columns)
     if missing := [column for column in needed if column not in rows.columns]:
         raise InputError(path, f"column '{missing[0]}' is missing", remedy)
-    if not isinstance(rows.index, pd.RangeIndex):  # pandas takes what is too much for an index, and shifts the rest
+    if not isinstance(rows.index, pd.RangeIndex):  # pandas takes surplus entries as the index
         raise InputError(path, "has rows with more entries than columns", remedy)
-    # pandas gives the second of two columns another name, so the head is read once more as it stands.
+    # pandas renames repeated columns, so the head is read again without names.
     head = pd.read_csv(path, dtype=str, keep_default_na=False, header=None, nrows=1).iloc[0]
     if (twice := head[head.duplicated()]).size:
         raise InputError(path, f"column '{twice.iloc[0]}' appears twice", remedy)
@@ -66,7 +63,7 @@ def read_csv(
 
 
 def _require_entries(path: str | Path, rows: pd.DataFrame, remedy: str) -> None:
-    """Raise an InputError for an entry that no file of any kind can have."""
+    """Raise an InputError for an entry that is invalid in any file."""
     for name, entries in rows.items():
         faults = [("a line break or another control character", entries.str.contains(_CONTROL))]
         if name in NAMES:
@@ -79,7 +76,7 @@ def _require_entries(path: str | Path, rows: pd.DataFrame, remedy: str) -> None:
 
 
 def numbers(path: str | Path, rows: pd.DataFrame, column: str, needed=True, least: float = -np.inf) -> pd.Series:
-    """Return a column as float64; NaN where it is not `needed` and no number.
+    """Return a column as float64; NaN for other entries where they are not `needed`.
 
     Raises:
         InputError: no number where one is needed; a number below `least`.
@@ -102,10 +99,10 @@ def read_numbers(
     least: float = -np.inf,
     others: Iterable[str] = (),
 ) -> pd.DataFrame:
-    """Read a CSV file as :func:`read_csv` does, its numeric columns as numbers; only optional ones may be empty, NaN.
+    """Read a CSV file as :func:`read_csv` does, with numeric columns as numbers; empty optional entries become NaN.
 
     Raises:
-        InputError: as of :func:`read_csv` and :func:`numbers`.
+        InputError: as :func:`read_csv` and :func:`numbers`.
     """
     rows, may_be_empty = read_csv(path, columns, others), set(optional)
     for column in numeric:
@@ -115,7 +112,7 @@ def read_numbers(
 
 
 def finite_number(subject: object, name: str, text: str, remedy: str = "regenerate it") -> float:
-    """Return the number that one field holds; `subject` and `name` say where it stands.
+    """Return the number in a field; `subject` and `name` locate it in messages.
 
     Raises:
         InputError: no number, NaN or infinity.
@@ -127,6 +124,6 @@ def finite_number(subject: object, name: str, text: str, remedy: str = "regenera
 
 
 def write_csv(path: str | Path, frame: pd.DataFrame, form: str | None = "%.6f") -> None:
-    """Write a CSV file, whole or not at all; `form` is that of numbers with decimals, None for all their digits."""
+    """Write a CSV file, whole or not at all, with floats in `form`; None keeps all digits."""
     with whole_file(path) as partial:
         frame.to_csv(partial, index=False, float_format=form, lineterminator="\n")

@@ -1,31 +1,117 @@
-"""Files and folders: written whole or not at all, checked before the work; and images."""
+"""Files: readable within limits, written whole or not at all, named, and images.
+
+A small file may claim to be large, or unpack to a large one, so sizes are checked before anything is read. The step
+that makes a file writes source and seed into it, and those that read it check them, since files of another source or
+seed often have the same shapes.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import os
 import shutil
+import stat
 import warnings
+import zipfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-
-import numpy as np
+from typing import TYPE_CHECKING
+from unicodedata import category
 
 from gpca.errors import InputError
-from gpca.io.limits import require_file
 
-MOST_PIXELS = 2**26  # of an image; depth cameras have a tenth of that, and a few bytes may unpack to any number
+if TYPE_CHECKING:
+    import numpy as np
+
+LARGEST_FILE_BYTES = 10**9  # twice Stanford's Lucy of 28 million triangles; parsing takes several times the size
+# A compressed archive may hold this multiple of its size, or SMALL_BYTES. Measured numbers shrink to a half at best and
+# masks to a twentieth.
+LARGEST_RATIO = 20
+SMALL_BYTES = 2**28
+LARGEST_NUMBER = 1e15  # squares of larger numbers leave the range of float32
+MOST_PIXELS = 2**26  # of an image, ten times a depth camera's
 IMAGE_FORMATS = ("PNG", "JPEG", "TIFF")  # Pillow knows others by their content, and runs programs for some
+SPLITS = ("train", "test")
+Axes = tuple[str, int | None]  # source and seed; the objects of a source have no seed
+_BREAKS = ("Cc", "Zl", "Zp")  # control characters, and separators of lines and paragraphs
+_BOUNDED = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
+
+
+def require_file(path: str | Path, fault: str, remedy: str, largest_bytes: float = LARGEST_FILE_BYTES) -> None:
+    """Raise an InputError unless a file of the user can be read to its end; every reader of such files calls this.
+
+    Reading a device, a pipe, or an empty file of the kernel, as in /proc, may never end.
+
+    Args:
+        fault: the message for a missing file.
+        largest_bytes: that its reader can parse.
+    """
+    try:
+        status = os.stat(path)
+        if stat.S_ISREG(status.st_mode) and status.st_size:
+            os.close(os.open(path, os.O_RDONLY))
+    except (FileNotFoundError, NotADirectoryError) as missing:
+        raise InputError(path, fault, remedy) from missing
+    except (OSError, ValueError) as denied:  # no permission, a loop of links, an impossible name
+        reason = getattr(denied, "strerror", None) or denied
+        raise InputError(path, f"cannot be read ({reason})", "correct its name or permissions") from denied
+    if not stat.S_ISREG(status.st_mode):
+        kind = "a folder" if stat.S_ISDIR(status.st_mode) else "a device, pipe or socket"
+        raise InputError(path, f"is {kind}, not a file", remedy)
+    if not status.st_size:
+        raise InputError(path, "is empty", remedy)
+    if status.st_size > largest_bytes:
+        raise InputError(path, f"is {_size(status.st_size)}, more than the limit of {_size(largest_bytes)}", remedy)
+
+
+def _size(number_of_bytes: float) -> str:
+    scale, unit = (1e9, "GB") if number_of_bytes >= 1e9 else (1e6, "MB")
+    return f"{number_of_bytes / scale:.3g} {unit}"
+
+
+def require_memory(needed_bytes: int, file_bytes: int, subject: object, remedy: str) -> None:
+    """Raise an InputError unless a file of `file_bytes` can plausibly hold `needed_bytes`, and the machine can.
+
+    The limit is half of the physical memory, as checks and conversions take as much again.
+    """
+    if needed_bytes > max(SMALL_BYTES, LARGEST_RATIO * file_bytes):
+        fault = f"would unpack to {needed_bytes / 1e9:.3g} GB, more than {LARGEST_RATIO} times its size"
+        raise InputError(subject, fault, remedy)
+    memory_bytes = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    if needed_bytes > memory_bytes / 2:
+        fault = f"takes {needed_bytes / 1e9:.3g} GB, more than half of this machine's {memory_bytes / 1e9:.3g} GB"
+        raise InputError(subject, fault, "use a machine with more memory, or smaller data")
+
+
+def is_bounded(info: zipfile.ZipInfo) -> bool:
+    """Return whether a member of a zip can be read in pieces; bzip2 and LZMA may give megabytes for a byte."""
+    return info.compress_type in _BOUNDED
+
+
+def is_name(text: str) -> bool:
+    """Return whether a text is not blank and fits on a line."""
+    return bool(text.strip()) and not any(category(character) in _BREAKS for character in text)
+
+
+def _in_words(axes: Axes) -> str:
+    source, seed = axes
+    return f"source '{source}'" + ("" if seed is None else f", seed {seed}")
+
+
+def require_axes(path: str | Path, actual: Axes, expected: Axes | None) -> None:
+    """Raise an InputError unless a file has the expected source and seed; None accepts any."""
+    if expected is not None and actual != expected:
+        wanted = _in_words(expected)
+        raise InputError(path, f"is of {_in_words(actual)}, not of {wanted}", f"give the file of {wanted}")
 
 
 @contextmanager
 def whole_file(path: str | Path) -> Iterator[Path]:
-    """Yield a temporary path beside `path`; on success it is renamed to `path`, on failure removed.
+    """Yield a temporary path beside `path`, which is renamed to `path` on success and removed on failure.
 
-    A reader therefore never sees half a file, and a killed run leaves the old one in place. The half that it may leave
-    beside it has a fixed name, so whoever writes the file next replaces it; no two jobs of a workflow write one file.
-    The temporary name keeps the suffix, because several writers choose their format by it.
+    A killed run leaves the old file, and a partial one with a fixed name that the next writer replaces. The name keeps
+    the suffix, by which several writers choose their format.
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -38,16 +124,14 @@ def whole_file(path: str | Path) -> Iterator[Path]:
 
 
 def require_outputs(outputs: Iterable[str | Path], inputs: Iterable[str | Path] = (), folders: bool = False) -> None:
-    """Check, before the work, that files can be written when it is done, and that none of them is what it starts from.
+    """Check before the work that its outputs can be written, and that none of them is an input; folders may be missing.
 
     Args:
-        outputs: of the work; a folder that is missing on the way to one of them is made by whoever writes it.
-        inputs: of the work.
-        folders: the outputs are folders.
+        folders: whether the outputs are folders.
 
     Raises:
-        InputError: two outputs, or an output and an input, are the same file; an output is a folder where it should be
-            a file, lies below something that is no folder, or in a folder that may not be written to.
+        InputError: two outputs, or an output and an input, are the same file; an output exists but is not a file, lies
+            below a file, or in a folder without permission.
     """
     taken = {Path(os.path.realpath(path)) for path in inputs}
     for output in map(Path, outputs):
@@ -59,7 +143,7 @@ def require_outputs(outputs: Iterable[str | Path], inputs: Iterable[str | Path] 
         existing = next(folder for folder in place.parents if os.path.lexists(folder))
         if not existing.is_dir():
             raise InputError(output, f"cannot be written: {existing} is not a folder", "choose another name")
-        # Root may write to /proc, as far as permissions tell.
+        # Permissions let root write to /proc, which fails.
         if not os.access(existing, os.W_OK | os.X_OK) or existing.is_relative_to("/proc"):
             raise InputError(
                 output, f"cannot be written: no permission to write to {existing}", "choose another folder"
@@ -68,7 +152,7 @@ def require_outputs(outputs: Iterable[str | Path], inputs: Iterable[str | Path] 
 
 @contextmanager
 def whole_folder(path: str | Path) -> Iterator[Path]:
-    """Yield a temporary folder beside `path`; on success it takes the place of `path`, on failure it is removed."""
+    """Yield a temporary folder beside `path`, which replaces `path` on success and is removed on failure."""
     path = Path(path)
     partial = path.with_name(f".{path.name}.partial")
     shutil.rmtree(partial, ignore_errors=True)  # what a killed run left
@@ -88,12 +172,13 @@ def sha256_of_file(path: str | Path) -> str:
 
 
 def read_image(path: str | Path, remedy: str) -> np.ndarray:
-    """Return the pixels of an image, (H, W) or (H, W, channels), of the file's own depth.
+    """Return the pixels of an image, (H, W) or (H, W, channels), in the file's depth.
 
     Raises:
-        InputError: missing, truncated, unreadable or too large; it ends with the remedy.
+        InputError: missing, truncated, unreadable or too large.
     """
     require_file(path, "no such image", remedy)
+    import numpy as np
     from PIL import Image
 
     too_many = f"has more than {MOST_PIXELS} pixels, too many for a frame"

@@ -1,4 +1,4 @@
-"""YAML and JSON files of others: read within bounds, without repeated keys, and with plain values alone."""
+"""YAML and JSON files of users: within limits, without repeated keys, with plain values only."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ import numpy as np
 import yaml
 
 from gpca.errors import InputError
-from gpca.io.limits import require_file
+from gpca.io.files import require_file
 
-LARGEST_CONFIG_BYTES = 2**18  # fifteen times the longest config of the suite; PyYAML reads it within seconds
-MOST_ENTRIES = 100_000  # with every alias unfolded; the configs of the suite have a thousand
+LARGEST_CONFIG_BYTES = 2**18  # fifteen times the longest config of the suite
+MOST_ENTRIES = 100_000  # with all aliases expanded; the suite's configs have a thousand
 _MERGE = "tag:yaml.org,2002:merge"
-# What every YAML reads alike. PyYAML, and with it Snakemake, reads by YAML 1.1 more than most people know of: 12:30 is
-# 750, 010 is 8, 1_000 is 1000 and `no` is false. What is written so is refused, since what was meant is anyone's guess.
+# Scalars that YAML 1.1 and 1.2 read alike; others are refused as ambiguous. By YAML 1.1, which PyYAML and Snakemake
+# read, 12:30 is 750, 010 is 8, 1_000 is 1000 and `no` is false.
 _ALIKE = {
     int: re.compile("[-+]?(0|[1-9][0-9]*|0x[0-9a-fA-F]+)"),
     float: re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)"),
     bool: re.compile("true|True|TRUE|false|False|FALSE"),
     type(None): re.compile("|~|null|Null|NULL"),
 }
-LARGEST_JSON_BYTES = 2**26  # ten times the largest scene of the BOP benchmark; parsed, it takes ten times the memory
+LARGEST_JSON_BYTES = 2**26  # ten times the largest scene of the BOP benchmark
 
 
 def load_own_yaml(path: Path) -> Any:
-    """Return what a YAML file of the package holds; libyaml takes a fifth of the time, where PyYAML has it."""
+    """Return the content of a YAML file of the package, by libyaml if available, in a fifth of the time."""
     loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
     return yaml.load(path.read_text(encoding="utf-8"), Loader=loader)
 
@@ -38,9 +38,9 @@ def read_mapping(path: str | Path) -> dict[str, Any]:
     """Return the mapping that a YAML or JSON file holds.
 
     Raises:
-        InputError: no such file, too large, not UTF-8, neither YAML nor JSON, no mapping, a key that stands twice,
-            a number or switch that YAML 1.1 alone has (`_ALIKE`), aliases that unfold to more than `MOST_ENTRIES` or to
-            themselves, or what :func:`require_plain` refuses.
+        InputError: no such file, too large, not UTF-8, neither YAML nor JSON, no mapping, a repeated key, a scalar that
+            only YAML 1.1 has (`_ALIKE`), aliases that expand to more than `MOST_ENTRIES` or contain themselves, or what
+            :func:`require_plain` refuses.
     """
     path = Path(path)
     require_file(path, "no such file", "name a config, a YAML or JSON file", LARGEST_CONFIG_BYTES)
@@ -61,7 +61,7 @@ def read_mapping(path: str | Path) -> dict[str, Any]:
 
 
 def read_scalar(text: str) -> Any:
-    """Return the number, the boolean or the null that a text is in every YAML, else the text itself."""
+    """Return the number, boolean or null that every YAML version reads in a text, else the text."""
     try:
         value = yaml.safe_load(text)
     except (yaml.YAMLError, ValueError):  # a name or a path
@@ -71,10 +71,7 @@ def read_scalar(text: str) -> Any:
 
 
 def require_plain(mapping: Mapping, subject: object) -> None:
-    """Raise an InputError for a key that is not text, and for a value that JSON cannot express.
-
-    Texts with line breaks or other control characters are refused too: they would end up in file names and tables.
-    """
+    """Raise an InputError for a key that is not text, a value that JSON lacks, or a control character in a text."""
     for path, value in _entries(mapping):
         key = ".".join(map(str, path))
         if not isinstance(path[-1], str | _Index):
@@ -99,7 +96,7 @@ def _entries(value: Any, path: tuple = ()) -> Iterator[tuple[tuple, Any]]:
 
 
 def _printable(text: str) -> bool:
-    """Return whether a text has no control character of ASCII or Unicode and no half of a surrogate pair."""
+    """Return whether a text has no control character and no half of a surrogate pair."""
     return not any(ord(letter) < 32 or 127 <= ord(letter) < 160 or 0xD800 <= ord(letter) < 0xE000 for letter in text)
 
 
@@ -109,7 +106,7 @@ def _parse_yaml(text: str, path: Path) -> Any:
         node = loader.get_single_node()
         if node is None:
             return None
-        # On the nodes, before any alias is unfolded.
+        # Before aliases are expanded.
         if _size(node, {}, path) > MOST_ENTRIES:
             raise InputError(path, f"its aliases expand to more than {MOST_ENTRIES} entries", "write the entries out")
         return loader.construct_document(node)
@@ -117,21 +114,21 @@ def _parse_yaml(text: str, path: Path) -> Any:
         raise InputError(path, "is nested too deeply", "nest it less") from fault
     except InputError:
         raise
-    except (yaml.YAMLError, ValueError) as fault:  # a date or a number may look like one and be none
+    except (yaml.YAMLError, ValueError) as fault:  # also an impossible date or number
         raise InputError(path, f"is neither YAML nor JSON: {fault}", "correct it there") from fault
 
 
 def _size(node: yaml.Node, sizes: dict[int, int | None], path: Path) -> int:
-    """Return how many entries a node has with all aliases unfolded."""
-    place = f"line {node.start_mark.line + 1}"
+    """Return the number of entries of a node with all aliases expanded."""
+    line = f"line {node.start_mark.line + 1}"
     if isinstance(node, yaml.ScalarNode):
-        _require_alike(node, f"{path}: {place}")
+        _require_alike(node, f"{path}: {line}")
         return 1
-    if (known := sizes.get(id(node), 0)) is None:
-        raise InputError(path, f"{place}: the value that begins here contains itself", "remove the alias")
-    if known:
-        return known
-    sizes[id(node)] = None  # on the way
+    if (size := sizes.get(id(node), 0)) is None:
+        raise InputError(path, f"{line}: the value that begins here contains itself", "remove the alias")
+    if size:
+        return size
+    sizes[id(node)] = None  # in progress
     parts = node.value if isinstance(node, yaml.SequenceNode) else [part for pair in node.value for part in pair]
     size = 1 + sum(_size(part, sizes, path) for part in parts)
     if isinstance(node, yaml.MappingNode):
@@ -139,25 +136,27 @@ def _size(node: yaml.Node, sizes: dict[int, int | None], path: Path) -> int:
         for key, _ in node.value:
             if isinstance(key, yaml.ScalarNode) and key.tag != _MERGE:
                 if (key.tag, key.value) in seen:
-                    line = key.start_mark.line + 1
-                    raise InputError(path, f"line {line}: key '{key.value}' appears twice", "keep one of them")
+                    fault = f"line {key.start_mark.line + 1}: key '{key.value}' appears twice"
+                    raise InputError(path, fault, "keep one of them")
                 seen.add((key.tag, key.value))
     sizes[id(node)] = size
     return size
 
 
-def _require_alike(node: yaml.ScalarNode, place: str) -> None:
+def _require_alike(node: yaml.ScalarNode, subject: str) -> None:
     if node.tag == _MERGE:
         return
     value = yaml.constructor.SafeConstructor().construct_object(node)
     if (alike := _ALIKE.get(type(value))) and not alike.fullmatch(node.value):
         raise InputError(
-            place, f"YAML 1.1 reads {node.value} as {value}", f'write {json.dumps(value)}, or "{node.value}" in quotes'
+            subject,
+            f"YAML 1.1 reads {node.value} as {value}",
+            f'write {json.dumps(value)}, or "{node.value}" in quotes',
         )
 
 
 def read_json(path: Path, what: str, remedy: str) -> dict[str, Any]:
-    """Return the object that a JSON file holds.
+    """Return the object in a JSON file.
 
     Args:
         what: the kind of file, for the message: "is not `what`".
@@ -179,8 +178,7 @@ def parse_json(text: str) -> Any:
     """Return the value of a JSON text.
 
     Raises:
-        ValueError: no JSON (a JSONDecodeError), nested too deeply, a key that stands twice in an object, of which
-            Python would keep the last, or NaN or infinity, which JSON does not have.
+        ValueError: no JSON (a JSONDecodeError), nested too deeply, a repeated key, NaN or infinity.
     """
     try:
         return json.loads(text, object_pairs_hook=_without_duplicates, parse_constant=_no_constant)
@@ -189,10 +187,10 @@ def parse_json(text: str) -> Any:
 
 
 def finite_numbers(value: Any, count: int, subject: object, name: str, remedy: str) -> np.ndarray:
-    """Return the numbers of a list, or of a list of rows; one number may stand by itself.
+    """Return the numbers of a list, or of a list of rows; a single number needs no list.
 
     Raises:
-        InputError: another count, something else than a number, or one that is not finite; it says that `name` has it.
+        InputError: another count, something else than a number, or one that is not finite.
     """
     rows = value if isinstance(value, list) and count > 1 else [value]
     numbers = [number for row in rows for number in (row if isinstance(row, list) and count > 1 else [row])]

@@ -16,7 +16,7 @@ import numpy as np
 from gpca.alignment.icp import ICPSettings
 from gpca.alignment.rigid import require_rigid, transform
 from gpca.errors import InputError
-from gpca.io.limits import require_file
+from gpca.io.files import require_file
 from gpca.numerals import decimal
 from gpca.objects import mesh_folder, point_files
 from gpca.objects.canonical import bounding_center, canonical_cloud, normals_towards_camera

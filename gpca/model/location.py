@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 from gpca.errors import InputError
-from gpca.io.limits import require_file
+from gpca.io.files import require_file
 
 VARIABLE = "GPCA_MODEL"  # environment variable with the path of the model
 RESULTS = Path("results")  # in the working directory

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from gpca.errors import InputError
-from gpca.io.limits import require_file
+from gpca.io.files import require_file
 from gpca.io.structured_text import finite_numbers, read_json
 from gpca.numerals import whole
 from gpca.objects.canonical import diameter

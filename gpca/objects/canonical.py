@@ -27,7 +27,7 @@ from gpca import seeds
 from gpca.errors import InputError
 from gpca.io.arrays import REAL, REGENERATE, TEXT, WHOLE, load_arrays, save_arrays
 from gpca.io.csv_file import read_csv
-from gpca.io.names import is_name
+from gpca.io.files import is_name
 from gpca.objects.surface import IN_CONFIG, Surface, instance_of
 from gpca.process.environment import open3d_cloud, require_open3d
 from gpca.seeds import generator

@@ -25,8 +25,7 @@ from typing import IO, Any
 from urllib.parse import urlsplit
 
 from gpca.errors import InputError
-from gpca.io.files import sha256_of_file, whole_file, whole_folder
-from gpca.io.limits import LARGEST_FILE_BYTES, is_bounded, require_file
+from gpca.io.files import LARGEST_FILE_BYTES, is_bounded, require_file, sha256_of_file, whole_file, whole_folder
 from gpca.io.structured_text import read_json
 
 TIMEOUT_S = 30

@@ -13,7 +13,7 @@ from typing import IO
 import numpy as np
 
 from gpca.errors import InputError
-from gpca.io.limits import require_file
+from gpca.io.files import require_file
 from gpca.numerals import decimal
 from gpca.objects.canonical import require_points
 from gpca.objects.surface import Surface

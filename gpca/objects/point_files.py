@@ -23,7 +23,7 @@ from types import ModuleType
 import numpy as np
 
 from gpca.errors import InputError
-from gpca.io.limits import require_file, require_memory
+from gpca.io.files import require_file, require_memory
 from gpca.numerals import whole
 from gpca.objects.canonical import require_points
 from gpca.objects.downloads import open_archive

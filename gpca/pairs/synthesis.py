@@ -12,7 +12,7 @@ from gpca.alignment.features import estimate_normals
 from gpca.alignment.icp import ICP, ICPSettings
 from gpca.alignment.rigid import inverse, scale_translation, transform
 from gpca.errors import InputError
-from gpca.io.names import SPLITS, Axes
+from gpca.io.files import SPLITS, Axes
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import REGISTRATION_COLUMNS, Registrations, ragged
 from gpca.pairs.perturbation import CONCEPTS, PERTURBATIONS, SEVERITIES, Perturbed, Severities

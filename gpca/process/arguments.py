@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import NoReturn
 
 from gpca.errors import InputError
-from gpca.io.names import is_name
+from gpca.io.files import is_name
 from gpca.numerals import decimal, whole
 
 

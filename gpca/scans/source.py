@@ -28,7 +28,7 @@ from gpca.alignment.rigid import require_rigid, scale_translation
 from gpca.errors import InputError
 from gpca.io.arrays import REAL, load_arrays
 from gpca.io.csv_file import ANY, numbers, read_csv
-from gpca.io.limits import require_file
+from gpca.io.files import require_file
 from gpca.numerals import decimal, whole
 from gpca.objects.canonical import require_points
 from gpca.objects.entry import Place, Text, Unit

@@ -15,7 +15,7 @@ from gpca.encoders.registry import EncoderSettings
 from gpca.errors import InputError
 from gpca.io.arrays import REAL, REGENERATE, TEXT, WHOLE, load_arrays, save_arrays
 from gpca.io.csv_file import write_csv
-from gpca.io.names import Axes
+from gpca.io.files import Axes
 from gpca.objects.canonical import ObjectClouds, write_objects
 from gpca.pairs.dataset import Registrations, read_embedding, read_instances_of
 from gpca.process.job import Job

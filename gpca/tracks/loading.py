@@ -10,7 +10,7 @@ import numpy as np
 
 from gpca.causes.dataset import LABELS, Causes, labels_of
 from gpca.errors import InputError, require_known
-from gpca.io.names import SPLITS
+from gpca.io.files import SPLITS
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.tracks.samples import Samples

@@ -23,9 +23,7 @@ from pathlib import Path
 import numpy as np
 
 from gpca.errors import InputError
-from gpca.io.files import whole_file
-from gpca.io.limits import require_file
-from gpca.io.names import is_name
+from gpca.io.files import is_name, require_file, whole_file
 from gpca.numerals import decimal, whole
 from gpca.tracks.published import NO_CALLS, NOTHING_NAMED, Method, Published
 from gpca.tracks.track import TRACKS

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from gpca.errors import InputError
-from gpca.io.names import SPLITS
+from gpca.io.files import SPLITS
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS, SEVERITIES
 from gpca.process.progress import progress

@@ -1,11 +1,24 @@
 import os
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import pytest
 
-from gpca.io.files import whole_file, whole_folder
+from gpca.encoders.registry import EncoderSettings
+from gpca.encoders.training import load_model
+from gpca.errors import InputError
+from gpca.io.arrays import load_arrays
+from gpca.io.csv_file import read_csv
+from gpca.io.files import read_image, require_file, whole_file, whole_folder
+from gpca.io.structured_text import read_json, read_mapping
+from gpca.model.clouds import read_points, read_pose
+from gpca.model.file import Model
+from gpca.objects import point_files
+from gpca.objects.bop import read_models_info
+from gpca.objects.downloads import open_archive
+from gpca.objects.mesh_folder import files_in, surfaces
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -58,3 +71,78 @@ def test_what_a_killed_run_leaves_is_hidden_and_gone_after_the_next_one(kind, wh
         (partial if kind == "file" else partial / "one").write_text("whole")
     assert set(tmp_path.iterdir()) == {path, of_another}
     assert [file.read_text() for file in ([path] if kind == "file" else path.iterdir())] == ["whole"]
+
+
+NOBODY = 65534
+READERS = {
+    "arrays.npz": lambda path: load_arrays(path, {"x": ("N",)}),
+    "rows.csv": lambda path: read_csv(path, ["x"]),
+    "weights.pt": lambda path: load_model(path, EncoderSettings()),
+    "model.pt": Model.load,
+    "frame.png": lambda path: read_image(path, "fetch it"),
+    "scene.json": lambda path: read_json(path, "a scene", "fetch it"),
+    "models_info.json": read_models_info,
+    "mine.yaml": read_mapping,
+    "pose.txt": read_pose,
+    "data.zip": lambda path: next(iter(open_archive(path).__enter__())),
+    "view.pcd": lambda path: next(point_files.surfaces(files_in(path.parent, None, point_files.SUFFIXES))),
+    "part.obj": lambda path: next(surfaces(files_in(path.parent, None, (".obj",)), "m")),
+    **{f"cloud.{suffix}": lambda path: read_points(path, "m") for suffix in ("ply", "pcd", "obj", "stl", "off")},
+}
+everywhere = pytest.mark.parametrize("name", READERS)
+
+
+@pytest.fixture
+def folder():
+    """A folder that any user can enter, which pytest's own are not."""
+    with tempfile.TemporaryDirectory() as made:
+        Path(made).chmod(0o755)
+        yield Path(made)
+
+
+@pytest.fixture
+def unprivileged():
+    """The rights of a user who is not root: root may read everything."""
+    if os.geteuid() != 0:
+        yield
+        return
+    os.seteuid(NOBODY)
+    yield
+    os.seteuid(0)
+
+
+@everywhere
+def test_a_pipe_is_not_read(folder, name):
+    os.mkfifo(folder / name)
+    with pytest.raises(InputError, match=f"{name}: is a device, pipe or socket, not a file; "):
+        READERS[name](folder / name)
+
+
+@everywhere
+def test_what_the_kernel_shows_as_an_empty_file_is_not_read(folder, name):
+    (folder / name).symlink_to("/proc/version")  # that of /proc/kmsg never ends
+    with pytest.raises(InputError, match=f"{name}: is empty; "):
+        READERS[name](folder / name)
+
+
+@everywhere
+def test_a_missing_permission_is_not_taken_for_damage(folder, name, request):
+    (folder / name).write_text("content")
+    (folder / name).chmod(0)
+    request.getfixturevalue("unprivileged")
+    with pytest.raises(InputError, match=rf"{name}: cannot be read \(Permission denied\); "):
+        READERS[name](folder / name)
+
+
+@pytest.mark.parametrize("name", ["loop", "x" * 300, "a\0b"])
+def test_a_name_that_leads_to_no_file_is_one_line(folder, name):
+    (folder / "loop").symlink_to("loop")
+    with pytest.raises(InputError, match="cannot be read"):
+        require_file(folder / name, "no such file", "make it")
+
+
+def test_sizes_are_in_the_unit_that_fits(folder):
+    (folder / "a").write_bytes(bytes(2_000_000))
+    for limit, words in ((1_500_000, "is 2 MB, more than the limit of 1.5 MB"), (100_000, "of 0.1 MB")):
+        with pytest.raises(InputError, match=words):
+            require_file(folder / "a", "no such file", "make it", limit)

@@ -15,7 +15,7 @@ from gpca.errors import InputError
 from gpca.experiments.guarantee.scored import Scored
 from gpca.guarantee.guarantee import states_of
 from gpca.io.arrays import REGENERATE
-from gpca.io.names import Axes
+from gpca.io.files import Axes
 from gpca.pairs.dataset import Registrations
 from gpca.reenactment.dataset import Reenactments
 from gpca.reenactment.features import reenactment_features

@@ -16,7 +16,7 @@ from gpca.frames.rgbd_scene import TABLE_COLOR, model_color
 from gpca.frames.shots import Shot, best_viewpoint
 from gpca.frames.situations import Situation
 from gpca.io.arrays import save_arrays
-from gpca.io.names import Axes
+from gpca.io.files import Axes
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.recovery.actions import Action, look_around
 from gpca.recovery.settings import LoopSettings

@@ -17,7 +17,7 @@ from gpca.experiments.judge import Judges
 from gpca.experiments.registration_methods.trial import pair_to_register
 from gpca.experiments.substitution.estimated import OBSERVED, Estimates, KnobbedRegistrar
 from gpca.experiments.substitution.settings import ESTIMATOR, FAILURE, LABELS, METHOD, ExchangeSettings
-from gpca.io.names import SPLITS
+from gpca.io.files import SPLITS
 from gpca.pairs.dataset import Registrations, ragged
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.progress import progress
