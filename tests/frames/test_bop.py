@@ -1,4 +1,8 @@
+"""Scenes whose JSON files no camera and no annotator wrote: each is refused by the command line."""
+
 import json
+import math
+import os
 import shutil
 
 import numpy as np
@@ -17,19 +21,11 @@ from gpca.frames.bop import (
 )
 from gpca.frames.dataset import Dataset, read_models
 
+from ..hostile import refusal
+from .damage import CAMERA, SCENE, TRUTH, edit, instances, save
 from .tiny import read
 
-SCENE = "test/000001"
-
-
-def edit(path, change):
-    content = json.loads(path.read_text())
-    change(content)
-    path.write_text(json.dumps(content))
-
-
-def save(path, pixels):
-    Image.fromarray(pixels).save(path)
+TABLE = "test/000001"  # the scene, below the folder of the dataset
 
 
 def test_a_pixel_is_projected_back_by_hand():
@@ -62,14 +58,14 @@ def test_frames_are_found_in_any_archive_of_the_dataset_and_may_be_a_draw(scenes
 
 
 def test_colour_may_be_jpeg(damaged):
-    for path in (damaged / SCENE / "rgb").iterdir():
+    for path in (damaged / TABLE / "rgb").iterdir():
         Image.open(path).save(path.with_suffix(".jpg"))
         path.unlink()
     assert {frame.color.suffix for frame in read_frames([damaged])} == {".png", ".jpg"}
 
 
 def test_an_object_of_which_little_was_measured_is_left_out_and_named(tiny, damaged, tmp_path, capsys):
-    mask = damaged / SCENE / "mask_visib/000000_000001.png"
+    mask = damaged / TABLE / "mask_visib/000000_000001.png"
     pixels = np.zeros((120, 160), np.uint8)
     pixels[60, 40:70] = 255
     save(mask, pixels)
@@ -83,46 +79,46 @@ def test_an_object_of_which_little_was_measured_is_left_out_and_named(tiny, dama
 
 
 FAULTS = {
-    "no depth": (lambda f: (f / SCENE / "depth/000001.png").unlink(), "depth/000001.png: no such image"),
-    "no mask": (lambda f: (f / SCENE / "mask_visib/000000_000002.png").unlink(), "000000_000002.png: no such image"),
-    "no camera": (lambda f: (f / SCENE / "scene_camera.json").unlink(), "scene_camera.json: no such file"),
-    "half unpacked": (lambda f: [p.unlink() for p in (f / SCENE / "depth").iterdir()], "may be half unpacked"),
+    "no depth": (lambda f: (f / TABLE / "depth/000001.png").unlink(), "depth/000001.png: no such image"),
+    "no mask": (lambda f: (f / TABLE / "mask_visib/000000_000002.png").unlink(), "000000_000002.png: no such image"),
+    "no camera": (lambda f: (f / TABLE / "scene_camera.json").unlink(), "scene_camera.json: no such file"),
+    "half unpacked": (lambda f: [p.unlink() for p in (f / TABLE / "depth").iterdir()], "may be half unpacked"),
     "no scene": (lambda f: [p.unlink() for p in f.rglob("scene_gt.json")], "has no test"),
-    "broken JSON": (lambda f: (f / SCENE / "scene_gt.json").write_text("{"), "scene_gt.json: is not a scene's JSON"),
+    "broken JSON": (lambda f: (f / TABLE / "scene_gt.json").write_text("{"), "scene_gt.json: is not a scene's JSON"),
     "camera of another image": (
-        lambda f: edit(f / SCENE / "scene_camera.json", lambda c: c.pop("1")),
+        lambda f: edit(f / TABLE / "scene_camera.json", lambda c: c.pop("1")),
         "scene_camera.json: has no image 1",
     ),
     "camera without K": (
-        lambda f: edit(f / SCENE / "scene_camera.json", lambda c: c["1"].pop("cam_K")),
+        lambda f: edit(f / TABLE / "scene_camera.json", lambda c: c["1"].pop("cam_K")),
         "scene_camera.json: image 1: has no cam_K",
     ),
     "depth of another size": (
-        lambda f: save(f / SCENE / "depth/000000.png", np.full((60, 80), 7000, np.uint16)),
+        lambda f: save(f / TABLE / "depth/000000.png", np.full((60, 80), 7000, np.uint16)),
         "000000_000000.png: is 160×120 but depth is 80×60",
     ),
     "no measurement": (
-        lambda f: save(f / SCENE / "depth/000000.png", np.zeros((120, 160), np.uint16)),
+        lambda f: save(f / TABLE / "depth/000000.png", np.zeros((120, 160), np.uint16)),
         "depth/000000.png: has no depth: every pixel is 0",
     ),
     "colour for depth": (
-        lambda f: save(f / SCENE / "depth/000000.png", np.ones((120, 160, 3), np.uint8)),
+        lambda f: save(f / TABLE / "depth/000000.png", np.ones((120, 160, 3), np.uint8)),
         "is a color image, not depth",
     ),
     "truncated depth": (
-        lambda f: (f / SCENE / "depth/000000.png").write_bytes((f / SCENE / "depth/000000.png").read_bytes()[:999]),
+        lambda f: (f / TABLE / "depth/000000.png").write_bytes((f / TABLE / "depth/000000.png").read_bytes()[:999]),
         "depth/000000.png: is truncated",
     ),
     "unknown object": (
-        lambda f: edit(f / SCENE / "scene_gt.json", lambda g: g["0"][0].update(obj_id=77)),
+        lambda f: edit(f / TABLE / "scene_gt.json", lambda g: g["0"][0].update(obj_id=77)),
         "tiny: object 77: has no model in",
     ),
     "no rotation": (
-        lambda f: edit(f / SCENE / "scene_gt.json", lambda g: g["0"][1].update(cam_R_m2c=[1, 0, 0, 0, 1, 0, 0, 0, -1])),
+        lambda f: edit(f / TABLE / "scene_gt.json", lambda g: g["0"][1].update(cam_R_m2c=[1, 0, 0, 0, 1, 0, 0, 0, -1])),
         "scene_gt.json: image 0, object 1: the pose is not a rigid transform",
     ),
     "eight numbers": (
-        lambda f: edit(f / SCENE / "scene_gt.json", lambda g: g["0"][1].update(cam_R_m2c=[1, 0, 0, 0, 1, 0, 0, 0])),
+        lambda f: edit(f / TABLE / "scene_gt.json", lambda g: g["0"][1].update(cam_R_m2c=[1, 0, 0, 0, 1, 0, 0, 0])),
         "image 0, object 1: cam_R_m2c has 8 numbers, not 9",
     ),
     "no models": (lambda f: [p.unlink() for p in (f / "models").glob("*.ply")], "has no models/obj_"),
@@ -150,3 +146,197 @@ def test_models_and_frames_may_come_in_archives_of_their_own(scenes, tmp_path):
     assert models.keys() == read_models(whole, whole.frames()).keys()
     with pytest.raises(InputError, match="has no models/obj_"):
         read_models(Dataset("tiny", folders[1:]), apart.frames())
+
+
+NOT_FINITE = "contains a number that is not finite"
+ROTATION = [1, 0, 0, 0, 1, 0, 0, 0, 1]
+
+
+def camera_values(focal_px=150.0, u=79.5, v=59.5, y=150.0, below=0, last=(0, 0, 1)):
+    return [focal_px, 0, u, below, y, v, *last]
+
+
+CAMERAS = {
+    "no focal length": ("cam_K", camera_values(0), "focal lengths 0 and 150 px"),
+    "negative focal length": ("cam_K", camera_values(-150), "focal lengths -150 and 150 px"),
+    "huge focal length": ("cam_K", camera_values(1e200), "focal lengths 1e+200 and 150 px"),
+    "NaN": ("cam_K", camera_values(math.nan), "NaN is not a number"),
+    "infinity": ("cam_K", camera_values(u=-math.inf), "-Infinity is not a number"),
+    "an integer without end": ("cam_K", camera_values(10**400), NOT_FINITE),
+    "rotated": ("cam_K", camera_values(below=3.0), "is not a camera matrix"),
+    "principal point on the moon": ("cam_K", camera_values(u=1e9), "principal point outside any image"),
+    "eight numbers": ("cam_K", camera_values()[:8], "cam_K has 8 numbers, not 9"),
+    "a number for a list": ("cam_K", 150.0, "cam_K has 1 numbers, not 9"),
+    "numbers as words": ("cam_K", ["150", *camera_values()[1:]], "cam_K contains '150', which is not a number"),
+    "lists in lists": ("cam_K", [[[150]], *camera_values()[1:]], "which is not a number"),
+    "scale zero": ("depth_scale", 0, "depth_scale is 0"),
+    "scale infinite": ("depth_scale", math.inf, "Infinity is not a number"),
+    "scale huge": ("depth_scale", 1e30, "depth_scale is 1e+30"),
+    "scale a list": ("depth_scale", [0.1], "depth_scale contains [0.1], which is not a number"),
+}
+
+
+@pytest.mark.parametrize("name", CAMERAS)
+def test_a_camera_that_cannot_be(damaged, name):
+    key, value, words = CAMERAS[name]
+    edit(damaged.parent / CAMERA, lambda cameras: cameras["0"].update({key: value}))
+    refusal(instances(), damaged.parent, f"{CAMERA}", words)
+
+
+POSES = {
+    "R of NaN": ("cam_R_m2c", [math.nan] * 9, "NaN is not a number"),
+    "R of zeros": ("cam_R_m2c", [0] * 9, "not orthogonal or not of unit length"),
+    "R scaled": ("cam_R_m2c", [1.01, 0, 0, 0, 1.01, 0, 0, 0, 1.01], "not orthogonal or not of unit length"),
+    "R sheared": ("cam_R_m2c", [1, 0.1, 0, 0, 1, 0, 0, 0, 1], "not orthogonal"),
+    "R mirrored": ("cam_R_m2c", [-1, 0, 0, 0, 1, 0, 0, 0, 1], "it is mirrored: its determinant is -1"),
+    "R a quaternion": ("cam_R_m2c", [0, 0, 0, 1], "cam_R_m2c has 4 numbers, not 9"),
+    "t of NaN": ("cam_t_m2c", [0, 0, math.nan], "NaN is not a number"),
+    "t beyond floats": ("cam_t_m2c", [0, 0, 10**400], NOT_FINITE),
+    "t beyond sight": ("cam_t_m2c", [0, 0, 1e12], "cam_t_m2c is 1e+12 mm"),
+    "t of two": ("cam_t_m2c", [0, 700], "cam_t_m2c has 2 numbers, not 3"),
+    "id a fraction": ("obj_id", 1.5, "obj_id is 1.5"),
+    "id huge": ("obj_id", 10**30, "obj_id is 1e+30"),
+    "id a way out": ("obj_id", "../../1", "obj_id contains '../../1'"),
+}
+
+
+@pytest.mark.parametrize("name", POSES)
+def test_an_annotation_that_cannot_be(damaged, name):
+    key, value, words = POSES[name]
+    edit(damaged.parent / TRUTH, lambda truth: truth["0"][1].update({key: value}))
+    where = (str(TRUTH),) if "NaN" in words else (f"{TRUTH}: image 0, object 1:",)
+    refusal(instances(), damaged.parent, *where, words)
+
+
+def test_an_object_without_a_model(damaged):
+    edit(damaged.parent / TRUTH, lambda truth: truth["0"][1].update(obj_id=77))
+    refusal(instances(), damaged.parent, "object 77", "has no model in", "fetch the models again")
+
+
+TRUTHS = {
+    "a list": ("[]", "its top level is not an object"),
+    "nothing": ("", "is empty"),
+    "half": ('{"0": [{"obj_id": 1', "is not a scene's JSON file"),
+    "no UTF-8": (b'{"\xff": []}', "is not a scene's JSON file ('utf-8' codec"),
+    "deep lists": ('{"0": ' + "[" * 100_000 + "]" * 100_000 + "}", "nested too deep"),
+    "an image twice": ('{"0": [], "0": []}', "key '0' appears twice"),
+    "an image twice in other words": ('{"0": [], "00": []}', "image 0 occurs twice"),
+    "a negative image": ('{"-1": []}', "its key '-1' is not an image number"),
+    "an image in other digits": ('{"١": []}', "is not an image number"),
+    "a map of objects": ('{"0": {"1": 2}}', "image 0 has no list of objects"),
+    "null": ('{"0": null}', "image 0 has no list of objects"),
+    "a word for an object": ('{"0": ["obj_id"]}', "image 0, object 0: has no cam_R_m2c"),
+    "an image that is not there": ('{"7": []}', "has no image 7"),
+    "a pose twice": ('{"0": [{"obj_id": 1, "obj_id": 2}]}', "key 'obj_id' appears twice"),
+}
+
+
+@pytest.mark.parametrize("name", TRUTHS)
+def test_a_file_of_poses_that_is_none(damaged, name):
+    content, words = TRUTHS[name]
+    (damaged.parent / TRUTH).write_bytes(content if isinstance(content, bytes) else content.encode())
+    refusal(instances(), damaged.parent, str(SCENE), words)
+
+
+def test_a_file_of_poses_too_large_to_be_one(damaged):
+    with (damaged.parent / TRUTH).open("r+b") as file:
+        file.truncate(2**33)
+    refusal(instances(), damaged.parent, str(TRUTH), "is 8.59 GB, more than the limit of 67.1 MB")
+
+
+def as_folder(path):
+    path.unlink()
+    path.mkdir()
+
+
+def as_pipe(path):
+    path.unlink()
+    os.mkfifo(path)
+
+
+def as_loop(path):
+    path.unlink()
+    path.symlink_to(path.name)
+
+
+def as_dead_link(path):
+    path.unlink()
+    path.symlink_to("nowhere")
+
+
+INSTEAD = {as_folder: "is a folder", as_pipe: "is a device, pipe", as_loop: "cannot be read", as_dead_link: "no such"}
+
+
+@pytest.mark.parametrize("spoil", INSTEAD)
+@pytest.mark.parametrize("name", ["scene_camera.json", "depth/000000.png", "mask_visib/000000_000000.png"])
+def test_something_else_in_place_of_a_file(damaged, name, spoil):
+    spoil(damaged.parent / SCENE / name)
+    found = "no such" if name.endswith(".png") else INSTEAD[spoil]  # an image may have any of several suffixes
+    refusal(instances(), damaged.parent, f"{SCENE / name}: {found}")
+
+
+def empty(folder):
+    for path in folder.rglob("scene_gt.json"):
+        path.write_text("{}")
+
+
+def without_objects(folder):
+    for path in folder.rglob("scene_gt.json"):
+        edit(path, lambda truth: truth.update({image: [] for image in truth}))
+
+
+def named(folder):
+    (folder / "test/000001").rename(folder / "test/first")
+
+
+def twice(folder):
+    (folder / "test_other").mkdir()
+    (folder / "test/000001").rename(folder / "test_other/000000")
+
+
+FOLDERS = {
+    "scenes without images": (empty, "lists no image"),
+    "images without objects": (without_objects, "list no object in any frame"),
+    "a scene with a name": (named, "test/first: the name of a scene's folder is not a number"),
+    "a scene in two folders": (twice, "are the same image of the same scene; set split"),
+    "no scenes": (lambda folder: (folder / "test").rename(folder / "train"), "has no test*/<scene>/scene_gt.json"),
+}
+
+
+@pytest.mark.parametrize("name", FOLDERS)
+def test_a_folder_that_is_no_dataset(damaged, name):
+    spoil, words = FOLDERS[name]
+    spoil(damaged)
+    refusal(instances(), damaged.parent, words, ";")
+
+
+@pytest.mark.parametrize("location", ["nowhere", "tiny/models/models_info.json", "tiny/models"])
+def test_a_location_without_scenes(damaged, location):
+    refusal(instances(scenes=location), damaged.parent, f"{location}: has no test*/<scene>/scene_gt.json")
+
+
+def test_what_a_real_dataset_may_have_is_no_fault(scenes, tmp_path):
+    import shutil
+
+    from .tiny import read
+
+    shutil.copytree(scenes, tmp_path / "tiny")
+    expected, _ = read(scenes, tmp_path / "objects.npz")
+
+    def change_cameras(cameras):
+        for camera in cameras.values():
+            camera["cam_K"] = [camera["cam_K"][row : row + 3] for row in (0, 3, 6)]
+            camera["elev"] = "unknown keys"
+
+    def change_poses(truth):
+        for entries in truth.values():
+            for entry in entries:
+                entry["obj_id"] = float(entry["obj_id"])
+
+    edit(tmp_path / CAMERA, change_cameras)
+    edit(tmp_path / TRUTH, change_poses)
+    (tmp_path / CAMERA).rename(tmp_path / "camera.json")
+    (tmp_path / CAMERA).symlink_to(tmp_path / "camera.json")
+    (tmp_path / SCENE / "scene_gt_info.json").write_text(json.dumps(None))
+    found, _ = read(tmp_path / "tiny", tmp_path / "objects.npz")
+    assert (found.points_m == expected.points_m).all()

@@ -1,3 +1,6 @@
+"""Results files that no estimator meant."""
+
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -6,7 +9,21 @@ import pytest
 from gpca.alignment.pose_error import pose_error
 from gpca.alignment.rigid import inverse, rotation_angle_rad
 from gpca.errors import InputError
-from gpca.frames.initial_pose import GlobalRegistration, InitialPoseSettings, displace
+from gpca.frames.initial_pose import (
+    EstimatorErrors,
+    GlobalRegistration,
+    InitialPoseSettings,
+    displace,
+    error_of,
+    estimates_of,
+    read_bop_results,
+    read_pose_errors,
+)
+
+from ..hostile import refusal
+from ..steps.by_words import main
+from .damage import instances
+from .tiny import read
 
 
 def test_an_error_is_within_its_declared_size():
@@ -41,3 +58,297 @@ def test_features_find_an_object_that_has_no_symmetry(tiny):
 def test_an_unknown_form_is_refused():
     with pytest.raises(InputError, match="initial pose 'guess': unknown; choose one of results, true_pose"):
         replace(InitialPoseSettings(), form="guess")
+
+
+ERRORS = "scene_id,im_id,obj_id,estimator,rx,ry,rz,tx,ty,tz"
+SEEN = {
+    "points_m": np.array([[0.0, 0, 1], [0.01, 0, 1], [0, 0.01, 1]]),
+    "pixels": np.array([[50, 50], [51, 50], [50, 51]]),
+    "camera_3_3": np.array([[100.0, 0, 50], [0, 100, 50], [0, 0, 1]]),
+    "diameter_m": 0.1,
+}
+HEAD = "scene_id,im_id,obj_id,score,R,t,time\n"
+ONE = "1 0 0 0 1 0 0 0 1"
+
+
+def pose(x_m, z_m=1.0):
+    T = np.eye(4)
+    T[:3, 3] = x_m, 0, z_m
+    return T
+
+
+def test_every_estimator_that_spoke_of_an_object_has_an_estimate():
+    estimators = {"b": {(1, 2, 3): [pose(0.02)]}, "a": {(1, 2, 3): [pose(0.01)]}, "c": {}}
+    found = estimates_of(estimators, (1, 2, 3), True, SEEN)
+    assert [(name, T[0, 3]) for name, T in found] == [("a", 0.01), ("b", 0.02)]
+    assert estimates_of(estimators, (1, 2, 4), True, SEEN) == []
+
+
+def test_among_equal_objects_an_estimate_elsewhere_is_of_another_one():
+    estimators = {"a": {(1, 2, 3): [pose(0.3)]}}
+    assert estimates_of(estimators, (1, 2, 3), False, SEEN) == []
+    assert estimates_of(estimators, (1, 2, 3), True, SEEN)  # the only one of its kind: a bad estimate is one too
+
+
+def test_errors_are_those_of_the_object_or_of_others_without_symmetry():
+    errors = EstimatorErrors(symmetric={("a", 2)})
+    for object_, x_m in ((("a", 1), 0.1), (("a", 2), 0.2), (("b", 1), 0.3)):
+        errors.add(object_, pose(x_m))
+    random = np.random.default_rng(0)
+
+    def drawn(object_):
+        return {errors.draw(object_, random)[0, 3] for _ in range(30)}
+
+    assert drawn(("a", 2)) == {0.2}
+    assert drawn(("b", 7)) == {0.1, 0.3}
+    with pytest.raises(InputError, match="no estimator has a result for an object without symmetry"):
+        EstimatorErrors(symmetric=()).draw(("a", 1), random)
+
+
+def test_an_error_takes_the_true_pose_to_the_estimated_one():
+    true, estimated = pose(0.1, 0.8), pose(0.3, 0.9)
+    assert np.allclose(true @ error_of(true, estimated), estimated)
+
+
+def test_a_file_of_errors_is_read_in_metres_and_of_known_objects(tmp_path):
+    path = tmp_path / "errors.csv"
+    path.write_text(f"{ERRORS}\n48,1,1,x,0,0,{np.pi / 2},1.5,0,-20\n48,1,9,x,0,0,0,0,0,0\n")
+    [(number, T)] = read_pose_errors(path, [1])
+    assert number == 1
+    assert np.allclose(T[:3, 3], [0.0015, 0, -0.02])
+    assert np.allclose(T[:3, 0], [0, 1, 0])
+
+
+@pytest.mark.parametrize(
+    ("row", "expected"),
+    [
+        ("48,1,1.5,x,0,0,0,0,0,0", "'obj_id' contains values that are not whole numbers"),
+        ("48,1,1,x,0,0,180,0,0,0", "contains a rotation of more than half a turn; give rotation vectors in radians"),
+        ("48,1,1,x,0,0,0,0,0,1e9", "contains an error of more than 10 m; give translations in millimeters"),
+        ("48,1,1,x,0,nan,0,0,0,0", "column 'ry' contains values that are not finite numbers"),
+    ],
+)
+def test_a_faulty_file_of_errors_is_refused(tmp_path, row, expected):
+    path = tmp_path / "errors.csv"
+    path.write_text(f"{ERRORS}\n{row}\n")
+    with pytest.raises(InputError, match=expected):
+        read_pose_errors(path, [1])
+
+
+def results(tmp_path, *lines, head=HEAD):
+    path = tmp_path / "results.csv"
+    path.write_text(head + "\n".join(lines) + "\n")
+    return path
+
+
+def test_results_are_read_best_first_row_by_row_and_in_metres(tmp_path):
+    quarter = "0 -1 0 1 0 0 0 0 1"
+    path = results(
+        tmp_path, f"1,0,3,0.2,{ONE},100 200 300,-1", f"1,0,3,0.9,{quarter},1 2 3,-1", f"2,5,4,1,{ONE},0 0 9,0.1"
+    )
+    found = read_bop_results(path, {(1, 0): [0.3], (2, 5): []}, {3, 4})
+    assert set(found) == {(1, 0, 3), (2, 5, 4)}
+    best, second = found[1, 0, 3]
+    assert best[:3, 3].tolist() == [0.001, 0.002, 0.003]
+    assert (best[:3, :3] @ [1, 0, 0]).tolist() == [0, 1, 0]
+    assert second[:3, 3].tolist() == [0.1, 0.2, 0.3]
+
+
+DISTANCES_M, KNOWN = {(1, 0): [0.7, 0.8]}, {3}
+FAULTS = {
+    "no column R": ((f"1,0,3,0.2,{ONE}",), "scene_id,im_id,obj_id,score,t\n", "column 'R' is missing"),
+    "eight entries": (("1,0,3,0.2,1 0 0 0 1 0 0 0,1 2 3,-1",), HEAD, "line 2: R has 8 entries, not 9"),
+    "two entries": ((f"1,0,3,0.2,{ONE},1 2,-1",), HEAD, "line 2: t has 2 entries, not 3"),
+    "words": ((f"1,0,3,0.2,{ONE},1 2 x,-1",), HEAD, "t contains values that are not finite numbers"),
+    "a mirror": (
+        ("1,0,3,0.2,1 0 0 0 1 0 0 0 -1,1 2 900,-1",),
+        HEAD,
+        "line 2: the pose is not a rigid transform: it is mirrored",
+    ),
+    "NaN": ((f"1,0,3,0.2,{ONE},1 2 nan,-1",), HEAD, "t contains values that are not finite"),
+    "an image that is not there": (
+        (f"1,0,3,1,{ONE},1 2 800,1", f"1,8,3,1,{ONE},1 2 800,1"),
+        HEAD,
+        "line 3: the dataset has no image 8",
+    ),
+    "no number": ((f"1,0,cup,1,{ONE},1 2 3,1",), HEAD, "line 2: obj_id is 'cup', not a whole number"),
+    "no rows": ((), HEAD, "has no rows"),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_faulty_results_are_refused_in_one_line(tmp_path, fault):
+    lines, head, expected = FAULTS[fault]
+    with pytest.raises(InputError, match=expected) as caught:
+        read_bop_results(results(tmp_path, *lines, head=head), DISTANCES_M, KNOWN)
+    assert str(caught.value).startswith(str(tmp_path / "results.csv"))
+
+
+def test_of_several_equal_objects_the_one_seen_in_the_mask_is_meant():
+    camera_3_3 = np.array([[100.0, 0, 50], [0, 100, 50], [0, 0, 1]])
+    poses = [np.eye(4), np.eye(4)]
+    poses[0][:3, 3], poses[1][:3, 3] = (0.2, 0, 1), (-0.2, 0, 1)
+    seen = {"pixels": np.array([[29, 50], [33, 52]]), "camera_3_3": camera_3_3, "points_m": np.zeros((3, 3))}
+    [(name, pose)] = estimates_of({"mine": {(0, 0, 1): poses}}, (0, 0, 1), True, seen)
+    assert name == "mine" and pose is poses[1]
+
+
+def test_instances_start_from_the_results_and_without_any_from_an_error_of_these(scenes, tiny, tmp_path):
+    instances, objects = tiny
+    lines = []
+    for i in range(0, len(instances), 2):  # of every other instance; objects are centred, so models' poses are theirs
+        T, name = instances.T_camera_object_true[i], objects.names[instances.object_index[i]]
+        number = ["brick", "cylinder", "cone", "capsule", "bracket"].index(name.removeprefix("tiny ")) + 1
+        R, t = " ".join(map(str, T[:3, :3].ravel())), " ".join(map(str, 1e3 * T[:3, 3] + 1.0))
+        lines.append(f"{instances.scene[i]},{instances.image[i]},{number},1.0,{R},{t},-1")
+    path = results(tmp_path, *lines)
+    found, _ = read(scenes, tmp_path / "objects.npz", InitialPoseSettings("results"), path)
+    assert len(found) == len(instances)
+    assert (found.init_from == np.where(np.arange(len(found)) % 2 == 0, "results", "errors")).all()
+    errors_m = (found.T_camera_object_init - found.T_camera_object_true)[:, :3, 3]
+    assert np.allclose(errors_m[::2], 1e-3, atol=1e-6)
+    assert np.allclose(np.linalg.norm(errors_m, axis=1), np.sqrt(3) * 1e-3, atol=1e-6)
+
+
+def test_results_must_be_named_for_poses_to_come_from_them(scenes, tmp_path):
+    with pytest.raises(InputError, match="dataset tiny: has no results file"):
+        read(scenes, tmp_path / "objects.npz", InitialPoseSettings("results"))
+
+
+RESULTS_HEAD = "scene_id,im_id,obj_id,score,R,t,time"
+
+
+@pytest.fixture(scope="module")
+def lines(scenes):
+    """The true poses of the tiny dataset as an estimator would write them."""
+    found = []
+    for path in sorted(scenes.rglob("scene_gt.json")):
+        for image, entries in json.loads(path.read_text()).items():
+            for entry in entries:
+                R, t = (" ".join(map(repr, entry[key])) for key in ("cam_R_m2c", "cam_t_m2c"))
+                found.append([str(int(path.parent.name)), image, str(entry["obj_id"]), "1.0", R, t, "-1"])
+    return found
+
+
+@pytest.fixture
+def call(damaged, lines):
+    """Return a function that damages the results file and the arguments that read it."""
+
+    def write(change=None, content=None, head=RESULTS_HEAD):
+        rows = [list(line) for line in lines]
+        if change:
+            change(rows)
+        text = "\n".join([head, *(",".join(row) for row in rows)]) + "\n" if content is None else content
+        encoded = text if isinstance(text, bytes) else text.encode()
+        (damaged.parent / "results.csv").write_bytes(encoded)
+        entry = {"location": "tiny", "results": "results.csv"}
+        given = {"initial_pose": {"form": "results"}, "datasets": {"tiny": entry}}
+        return [*instances(given, scenes=None), "--data-dir", str(damaged.parent)]
+
+    return write
+
+
+def one(column, value):
+    def change(rows):
+        rows[2][column] = value
+
+    return change
+
+
+def scaled(factor, only=slice(None)):
+    def change(rows):
+        for row in rows[only]:
+            row[5] = " ".join(repr(factor * float(value)) for value in row[5].split())
+
+    return change
+
+
+ROWS = {
+    "t in metres": (scaled(1e-3), "is t in meters? the format requires millimeters"),
+    "one t in metres": (scaled(1e-3, slice(3, 4)), "line 5: t is"),
+    "t in centimetres": (scaled(0.1), "is t in centimeters? the format requires millimeters"),
+    "t of zeros": (one(5, "0 0 0"), "line 4: t has z = 0 mm, not in front of the camera"),
+    "t behind": (scaled(-1), "line 2: t has z = -"),
+    "t infinite": (one(5, "0 0 inf"), "line 4: t contains values that are not finite numbers"),
+    "t huge": (one(5, "0 0 1e90"), "line 4: t is"),
+    "t of two": (one(5, "0 700"), "line 4: t has 2 entries, not 3"),
+    "t in other digits": (one(5, "0 0 ٧٠٠"), "line 4: t contains values that are not"),
+    "R of zeros": (one(4, "0 0 0 0 0 0 0 0 0"), "line 4: the pose is not a rigid transform: its axes are not"),
+    "R mirrored": (one(4, "1 0 0 0 1 0 0 0 -1"), "line 4: the pose is not a rigid transform: it is mirrored"),
+    "R scaled": (one(4, "2 0 0 0 2 0 0 0 2"), "not orthogonal or not of unit length"),
+    "R a quaternion": (one(4, "1 0 0 0"), "line 4: R has 4 entries, not 9"),
+    "score NaN": (one(3, "nan"), "line 4: score contains values that are not finite numbers"),
+    "score missing": (one(3, ""), "line 4: score has 0 entries, not 1"),
+    "score with NUL": (one(3, "1\0"), "line 4: column 'score' contains a line break or another control"),
+    "object unknown": (one(2, "77"), "line 4: the dataset has no object 77"),
+    "object negative": (one(2, "-1"), "line 4: obj_id is '-1', not a whole number"),
+    "object without end": (one(2, "9" * 5000), "line 4: obj_id is '999"),
+    "image unknown": (one(1, "999"), "line 4: the dataset has no image 999"),
+    "a row too long": (lambda rows: rows[2].append("1"), "results.csv"),
+    "a row too short": (lambda rows: rows[2].__delitem__(slice(3, None)), "line 4: score has 0 entries"),
+    "no rows": (lambda rows: rows.clear(), "has no rows"),
+    "of another dataset": (lambda rows: [row.__setitem__(0, "50") for row in rows], "of scene 50"),
+}
+
+
+@pytest.mark.parametrize("name", ROWS)
+def test_a_row_that_cannot_be(call, damaged, name):
+    change, words = ROWS[name]
+    refusal(call(change), damaged.parent, "results.csv", words, ";")
+
+
+HEADS = {
+    "column missing": (RESULTS_HEAD.replace("score", "confidence"), "column 'score' is missing"),
+    "column twice": (RESULTS_HEAD.replace("time", "t"), "column 't' appears twice"),
+    "no head": ("1,0,1,1.0,1 0 0 0 1 0 0 0 1,0 0 700,-1", "column 'scene_id' is missing"),
+    "semicolons": (RESULTS_HEAD.replace(",", ";"), "results.csv"),
+}
+
+
+@pytest.mark.parametrize("name", HEADS)
+def test_a_head_that_is_none(call, damaged, name):
+    head, words = HEADS[name]
+    refusal(call(head=head), damaged.parent, "results.csv", words, ";")
+
+
+FILES = {
+    "empty": (b"", "is empty"),
+    "blank": (b"\n\n\n", "results.csv"),
+    "UTF-16": (RESULTS_HEAD.encode("utf-16"), "is not a readable CSV file"),
+    "Latin-1": (f"{RESULTS_HEAD}\n1,0,1,1.0,é,0 0 1,-1\n".encode("latin-1"), "is not a readable CSV file"),
+    "NUL bytes": (b"\0" * 999, "column 'scene_id' is missing"),
+    "an open quote": (f'{RESULTS_HEAD}\n"1,0,1,1.0\n'.encode(), "is not a readable CSV file"),
+    "JSON": (b'{"scene_id": 1}', "column 'scene_id' is missing"),
+    "an archive": (b"PK\x03\x04" + bytes(range(256)), "results.csv"),
+}
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_a_file_that_is_no_results_file(call, damaged, name):
+    content, words = FILES[name]
+    refusal(call(content=content), damaged.parent, "results.csv", words, ";")
+
+
+def test_a_folder_in_place_of_results(call, damaged):
+    arguments = call()
+    (damaged.parent / "results.csv").unlink()
+    (damaged.parent / "results.csv").mkdir()
+    refusal(arguments, damaged.parent, "results.csv: no such results file")
+
+
+def test_no_results_where_poses_come_from_them(damaged):
+    given = {"initial_pose": {"form": "results"}, "datasets": {"tiny": {"location": str(damaged)}}}
+    refusal(instances(given, scenes=None), damaged.parent, "dataset tiny: has no results file; set results")
+
+
+def test_good_results_are_read(call, damaged, lines, capsys):
+    from gpca.frames.instances import Instances
+
+    def add(rows):
+        rows += [[*row[:3], "-0.5", "1 0 0 0 1 0 0 0 1", "1e2 -2.5E1 2000.", ""] for row in rows[:2]]  # a bad guess
+
+    outputs = {name: str(damaged.parent / name) for name in ("instances.npz", "objects.npz")}
+    assert main([outputs.get(argument, argument) for argument in call(add)]) == 0
+    read = Instances.load(outputs["instances.npz"])
+    assert np.allclose(read.T_camera_object_init, read.T_camera_object_true, atol=1e-9)
+    assert len(read) + capsys.readouterr().err.count("skipped") == len(lines)

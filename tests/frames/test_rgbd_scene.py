@@ -1,7 +1,11 @@
+"""Settings and folders that the step ``scenes`` refuses."""
+
 import json
+import shutil
 
 import numpy as np
 import pytest
+import trimesh
 
 from gpca.alignment.rigid import transform
 from gpca.errors import InputError
@@ -9,7 +13,9 @@ from gpca.frames.camera import DepthNoise
 from gpca.frames.instances import points_on_model
 from gpca.frames.rgbd_scene import SceneSettings, lay_table, stable_poses, write_scenes
 from gpca.io.files import read_image
+from gpca.objects.surface import Surface
 
+from ..hostile import refusal
 from .tiny import PERFECT, scene_settings, surfaces
 
 
@@ -79,3 +85,59 @@ def test_ranges_that_run_downwards_are_refused():
     with pytest.raises(InputError, match=r"distance_m: \[0.9, 0.5\] is in descending order"):
         SceneSettings.from_dict({"distance_m": [0.9, 0.5]})
     assert SceneSettings.from_dict({"noise": {"scale": 0.0, "dropout": 0.0}}).noise == PERFECT
+
+
+def surface(mesh, name="thing"):
+    return Surface(name, np.asarray(mesh.vertices), np.asarray(mesh.faces))
+
+
+def test_a_brick_rests_most_often_on_its_largest_side():
+    poses_n, probabilities_n = stable_poses(surface(trimesh.creation.box((0.3, 0.2, 0.1))))
+    assert len(poses_n) == 6
+    assert probabilities_n.sum() == pytest.approx(1)
+    height_n = np.abs(poses_n[:, 2, :3] @ [0.3, 0.2, 0.1])
+    assert height_n[np.argmax(probabilities_n)] == pytest.approx(0.1)
+
+
+def test_an_open_scan_with_its_centre_of_mass_outside_still_rests():
+    """Of a bowl without a lid whose integral ends outside of it: trimesh alone would look for a centre without end."""
+    ball = trimesh.creation.icosphere(subdivisions=2, radius=0.1)
+    ball.apply_translation((0, 0, 1.0))
+    bowl = ball.slice_plane((0, 0, 1.0), (0, 0, -1))
+    assert not bowl.is_watertight
+    assert bowl.center_mass[2] < bowl.vertices[:, 2].min()
+    poses_n, probabilities_n = stable_poses(surface(bowl))
+    assert probabilities_n.sum() == pytest.approx(1)
+    for pose in poses_n:
+        assert trimesh.transform_points(bowl.vertices, pose)[:, 2].min() == pytest.approx(0, abs=1e-9)
+
+
+def test_a_flat_object_is_refused():
+    square = trimesh.Trimesh([(0, 0, 0), (0.1, 0, 0), (0.1, 0.1, 0), (0, 0.1, 0)], [(0, 1, 2), (0, 2, 3)])
+    with pytest.raises(InputError, match="object 'card': is flat and cannot be stood on a table; leave it out"):
+        stable_poses(surface(square, "card"))
+
+
+SETTINGS = {
+    "no room": ({"gap_m": 1.0, "objects": [8, 8]}, "there is no room for 8 objects 1.0 m apart"),
+    "downwards": ({"objects": [5, 2]}, "scenes objects: [5, 2] is in descending order"),
+    "a family that is none": ({"families": ["spoons"]}, "family 'spoons': no such procedural family"),
+}
+
+
+@pytest.mark.parametrize("name", SETTINGS)
+def test_settings_of_scenes_that_cannot_be(tmp_path, name):
+    given, words = SETTINGS[name]
+    small = {"count": 2, "views": 1, "camera": {"width": 64, "height": 48, "focal_px": 60}, "families": ["linemod"]}
+    arguments = ["scenes", "--source", "tiny", "--settings", json.dumps({**small, **given}), "--out", "drawn"]
+    refusal(arguments, tmp_path, words)
+
+
+def test_scenes_replace_scenes(scenes, tmp_path):
+    from gpca.frames.rgbd_scene import write_scenes
+
+    from .tiny import scene_settings, surfaces
+
+    shutil.copytree(scenes, tmp_path / "tiny")
+    write_scenes(surfaces(), "tiny", scene_settings(count=2, views=1), tmp_path / "tiny")
+    assert len(list((tmp_path / "tiny").rglob("depth/*.png"))) == 2

@@ -1,9 +1,16 @@
+"""Mesh and cloud files that are damaged, or say what they do not hold, through the command line."""
+
+import json
+import re
+
 import numpy as np
 import pytest
 import trimesh
 
 from gpca.errors import InputError
 from gpca.objects.mesh_folder import SUFFIXES, files_in, from_entry, meters_per, surfaces
+
+from ..hostile import refusal
 
 BOX = trimesh.creation.box((10.0, 20.0, 30.0))
 XYZ = "property float x\nproperty float y\nproperty float z\n"
@@ -145,3 +152,212 @@ def test_missing_and_empty_folder_and_unit(tmp_path):
     for unit in ("inch", None):
         with pytest.raises(InputError, match="set unit"):
             meters_per(unit)
+
+
+BALL = trimesh.creation.icosphere(2, radius=50)
+VERTICES = [" ".join(f"{x:.5f}" for x in vertex) for vertex in BALL.vertices]
+MESHES_FACES = ["3 " + " ".join(map(str, face)) for face in BALL.faces]
+MESHES_XYZ = "property float x\nproperty float y\nproperty float z\n"
+
+
+def ply(vertices=VERTICES, faces=MESHES_FACES, n_vertices=None, n_faces=None, properties=MESHES_XYZ):
+    head = f"ply\nformat ascii 1.0\nelement vertex {len(vertices) if n_vertices is None else n_vertices}\n{properties}"
+    head += f"element face {len(faces) if n_faces is None else n_faces}\nproperty list uchar int vertex_indices\n"
+    return "\n".join([f"{head}end_header", *vertices, *faces, ""])
+
+
+def off(vertices=VERTICES, faces=MESHES_FACES, head="OFF"):
+    return "\n".join([head, f"{len(VERTICES)} {len(MESHES_FACES)} 0", *vertices, *faces, ""])
+
+
+def obj(vertices=VERTICES, faces=None):
+    faces = BALL.faces + 1 if faces is None else faces
+    return "\n".join([*(f"v {v}" for v in vertices), *("f " + " ".join(map(str, face)) for face in faces), ""])
+
+
+def pcd(rows=("0.1 0.2 0.3",) * 70, data="ascii", **changes):
+    head = {"FIELDS": "x y z", "SIZE": "4 4 4", "TYPE": "F F F", "COUNT": "1 1 1", "WIDTH": len(rows), "HEIGHT": 1}
+    head |= {"POINTS": len(rows)} | changes
+    text = "\n".join(f"{key} {value}" for key, value in head.items()) + f"\nDATA {data}\n"
+    return text.encode() + (rows if isinstance(rows, bytes) else "\n".join([*rows, ""]).encode())
+
+
+def compressed(points):
+    body = np.array([len(BOMB), 12 * points], "<u4").tobytes() + BOMB
+    return pcd(body, "binary_compressed", WIDTH=points, POINTS=points)
+
+
+def changed(rows, row, index=5):
+    return [*rows[:index], row, *rows[index + 1 :]]
+
+
+def binary(spoil):
+    content = bytearray(BALL.export(file_type="ply", encoding="binary"))
+    spoil(content, content.index(b"end_header\n") + len(b"end_header\n"))
+    return bytes(content)
+
+
+def cornered(corners):
+    """A binary PLY whose faces have as many corners."""
+    face = np.dtype([("n", "u1"), ("corners", "<i4", (corners,))])
+    faces = np.array([(corners, range(i, i + corners)) for i in range(150)], face)
+    head = ply(n_faces=150).replace("ascii", "binary_little_endian").partition("end_header\n")
+    return "".join(head[:2]).encode() + BALL.vertices.astype("<f4").tobytes() + faces.tobytes()
+
+
+def stl(spoil):
+    content = bytearray(BALL.export(file_type="stl"))
+    spoil(content)
+    return bytes(content)
+
+
+def stl_text():
+    return BALL.export(file_type="stl_ascii")
+
+
+def write(content, start, new):
+    content[start : start + len(new)] = new
+
+
+NAN = np.float32(np.nan).tobytes()
+LAST_LIST = -13  # bytes of a triangle
+BOMB = b"\x00A" + b"\xe0\xff\x00" * 3_000_000  # LZF: each three bytes copy 264
+MESHES = {
+    # rows that are too wide: the coordinates would be others
+    "every_wide.ply": ply([f"1051 {row}" for row in VERTICES]),
+    "one_wide.ply": ply(changed(VERTICES, f"1051 {VERTICES[5]}")),
+    "words.ply": ply(changed(VERTICES, "1 2 x")),
+    "list_too_long.ply": ply(faces=changed(MESHES_FACES, "4 1 2 3")),
+    "two_corners.ply": ply(faces=changed(MESHES_FACES, "2 1 2")),
+    "negative_corner.ply": ply(faces=changed(MESHES_FACES, "3 1 2 -1")),
+    "far_corner.ply": ply(faces=changed(MESHES_FACES, "3 1 2 162")),
+    # counts
+    "more_rows.ply": ply(n_faces=len(MESHES_FACES) - 5),
+    "fewer_rows.ply": ply(n_faces=len(MESHES_FACES) + 5),
+    "negative_count.ply": ply(n_vertices=-5),
+    "huge_count.ply": ply(n_vertices=10**15),
+    "no_vertices.ply": ply([], []),
+    "two_axes.ply": ply(
+        [row.rsplit(" ", 1)[0] for row in VERTICES], properties=MESHES_XYZ.replace("property float z\n", "")
+    ),
+    "no_end.ply": ply()[:100],
+    "vertices_twice.ply": ply().replace("element face", f"element vertex {len(VERTICES)}\n{MESHES_XYZ}element face"),
+    "x_twice.ply": ply([f"{row} 1" for row in VERTICES], properties=f"{MESHES_XYZ}property float x\n"),
+    "property_of_nothing.ply": ply().replace("element vertex", "property float x\nelement vertex"),
+    "middle_endian.ply": binary(lambda content, start: write(content, 0, content[:40].replace(b"little", b"middle"))),
+    "no_format.ply": binary(lambda content, start: write(content, 4, b"comment")),
+    "two_corners_binary.ply": cornered(2),
+    # numbers
+    "nan.ply": ply(changed(VERTICES, "nan 0 0")),
+    "infinite.ply": ply(changed(VERTICES, "1e39 0 0")),
+    "huge.ply": ply([f"{row}e30" for row in VERTICES]),
+    "one_point.ply": ply(["1 2 3"] * len(VERTICES)),
+    "binary_count.ply": binary(lambda content, start: write(content, 0, content[:start].replace(b" 162", b" 163"))),
+    "binary_list.ply": binary(lambda content, start: write(content, len(content) + LAST_LIST, b"\x04")),
+    "binary_corner.ply": binary(lambda content, start: write(content, len(content) - 4, b"\xff\xff\xff\x7f")),
+    "binary_cut.ply": binary(lambda content, start: content.__delitem__(slice(len(content) - 130, None))),
+    # OFF
+    "every_wide.off": off([f"1051 {row}" for row in VERTICES]),
+    "two_corners.off": off(faces=changed(MESHES_FACES, "2 1 2")),
+    "list_too_long.off": off(faces=changed(MESHES_FACES, "5 1 2 3")),
+    "more_rows.off": off(faces=[*MESHES_FACES, *MESHES_FACES]),
+    "cut.off": off(faces=MESHES_FACES[:-1]),
+    "nan.off": off(changed(VERTICES, "nan 0 0")),
+    "not.off": off(head="ABC"),
+    # OBJ
+    "index_0.obj": obj(faces=BALL.faces),
+    "cut_between_faces.obj": obj(faces=BALL.faces[:160] + 1),
+    "far_corner.obj": obj(faces=[*(BALL.faces + 1), [1, 2, 163]]),
+    "counts_back.obj": obj(faces=BALL.faces - 162) + "v 1 2 3\n",
+    "weights.obj": obj([f"1051 {row}" for row in VERTICES]),
+    "zeros.obj": "\0" * 3_000_000,
+    # STL
+    "cut.stl": stl_text()[:4000],
+    "cut_between_faces.stl": "\n".join(stl_text().splitlines()[:351]),
+    "nan_text.stl": stl_text().replace("vertex", "vertex nan", 1),
+    "count_too_high.stl": stl(lambda content: write(content, 80, (10**9).to_bytes(4, "little"))),
+    "count_too_low.stl": stl(lambda content: write(content, 80, (10).to_bytes(4, "little"))),
+    "binary_cut.stl": stl(lambda content: content.__delitem__(slice(84 + 2000, None))),
+    "misspelled_vertex.stl": stl_text().replace("vertex", "vertx"),
+    "misspelled_normal.stl": stl_text().replace("facet normal", "facet norml", 1),
+    "two_vertices.stl": re.sub("vertex .*\n", "", stl_text(), count=1),
+    "two_numbers.stl": re.sub(r"(vertex \S+ \S+) \S+", r"\1", stl_text(), count=1),
+    "no_end.stl": stl_text().replace("endsolid", ""),
+    "binary_nan.stl": stl(lambda content: write(content, 96, NAN)),
+}
+CLOUDS = {
+    "one_place.pcd": pcd(),
+    "empty.pcd": pcd(()),
+    "two_columns.pcd": pcd(FIELDS="x y", SIZE="4 4", TYPE="F F", COUNT="1 1"),
+    "nan.pcd": pcd(("nan 0 0",) * 70),
+    "complex.pcd": pcd(("1+2j 0 0",) * 70),
+    "huge_count.pcd": pcd(COUNT="1 1 99999999999"),
+    "huge_width.pcd": pcd(WIDTH=10**15, POINTS=10**15),
+    "bomb.pcd": compressed(6 * 10**7),
+    "longer_than_said.pcd": compressed(70),
+}
+
+FAULTS = {
+    "middle_endian.ply": "its format 'binary_middle_endian' is unknown",
+    "no_format.ply": "its format '' is unknown",
+    "vertices_twice.ply": "declares element vertex twice",
+    "x_twice.ply": "declares property 'x' twice",
+    "two_corners.ply": f"row 6 of {len(MESHES_FACES)} of element face has 2 corners",
+    "two_corners_binary.ply": "element face has rows of 2 corners",
+    "two_corners.off": f"face 6 of {len(MESHES_FACES)} has 2 corners",
+    "misspelled_vertex.stl": "line 4: 'vertx' stands where 'vertex' should",
+    "misspelled_normal.stl": "line 2: 'facet norml' stands where 'facet normal' should",
+    "two_numbers.stl": "line 4: 'vertex' has 2 numbers",
+    "zeros.obj": "a line is longer than 1048576 bytes, so it is not text",
+}
+
+
+def arguments(kind, **options):
+    settings = {"kind": kind, "location": ".", "unit": "mm"} | options
+    return ["objects", "--source", "s", "--data-dir", ".", "--out", "objects.npz", "--settings", json.dumps(settings)]
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_a_mesh_that_is_not_what_it_says_is_refused(name, tmp_path):
+    content = MESHES[name]
+    (tmp_path / name).write_bytes(content if isinstance(content, bytes) else content.encode())
+    refusal(arguments("mesh_folder"), tmp_path, name.split(".")[0], FAULTS.get(name, ""))
+
+
+@pytest.mark.parametrize("name", CLOUDS)
+def test_a_cloud_that_is_not_what_it_says_is_refused(name, tmp_path):
+    (tmp_path / name).write_bytes(CLOUDS[name])
+    refusal(arguments("uw_rgbd", unit="m"), tmp_path, name.split(".")[0])
+
+
+def test_a_file_too_large_to_be_parsed_is_not_opened(tmp_path):
+    for name, kind in (("sparse.ply", "mesh_folder"), ("sparse.pcd", "uw_rgbd")):
+        with (tmp_path / name).open("wb") as file:
+            file.truncate(5 * 10**9)
+        refusal(arguments(kind, unit="m"), tmp_path, name, "is 5 GB, more than the limit of 1 GB")
+
+
+@pytest.mark.parametrize("name", ["zeros.obj", "zeros.off", "zeros.stl", "zeros.ply"])
+def test_more_text_than_can_be_parsed_is_not_read(name, tmp_path):
+    heads = {".stl": b"solid\n", ".ply": b"ply\nformat ascii 1.0\nelement vertex 9\nend_header\n"}
+    with (tmp_path / name).open("wb") as file:
+        file.write(heads.get(name[-4:], b""))
+        file.truncate(9 * 10**8)
+    line = refusal(arguments("mesh_folder"), tmp_path, name, "has 900 MB of text, more than the limit of 250 MB")
+    assert "truncated" not in line
+
+
+def test_the_same_files_unspoilt_are_read(tmp_path):
+    from gpca.objects.mesh_folder import files_in, surfaces
+
+    for name, content in {"ball.ply": ply(), "ball.off": off(), "ball.obj": obj()}.items():
+        (tmp_path / name).write_text(content)
+    (tmp_path / "back.obj").write_text(obj(faces=BALL.faces - 162))
+    (tmp_path / "colours.off").write_text(off([f"{row} 255 0 0" for row in VERTICES], head="COFF"))
+    (tmp_path / "ball.stl").write_text(stl_text())
+    (tmp_path / "capitals.stl").write_text(stl_text().replace("solid", "Solid a b").replace("vertex", "  VERTEX"))
+    (tmp_path / "two_solids.stl").write_text(stl_text() + "\n" + stl_text().replace("solid", "solid other"))
+    (tmp_path / "binary.ply").write_bytes(binary(lambda content, start: None))
+    (tmp_path / "binary.stl").write_bytes(stl(lambda content: None))
+    for surface in surfaces(files_in(tmp_path, None, (".ply", ".obj", ".off", ".stl")), "mm"):
+        np.testing.assert_allclose(np.ptp(surface.vertices_m, axis=0), 0.1, atol=1e-6)

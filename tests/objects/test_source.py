@@ -11,8 +11,9 @@ import pytest
 import trimesh
 
 from gpca.errors import InputError
+from gpca.objects.entry import stand_in_clause, title_of
 from gpca.objects.source import data_files, data_folders, resolve, surfaces
-from tests.objects.test_pcd import ascii_pcd
+from tests.objects.test_point_files import ascii_pcd
 
 BOP = {"title": "Toy", "kind": "bop", "location": "bop/toy", "url": "https://example.org/toy_models.zip"}
 CUPS = {
@@ -169,3 +170,19 @@ def test_a_step_is_told_the_one_folder_that_the_data_of_a_source_comes_from():
     assert data_folders({"origin": "local"}, None, "kept") == {}
     assert data_folders({"origin": "download"}, "/data", "kept") == {"downloads": "kept"}
     assert data_folders({"origin": "procedural"}, "/data", "kept") == {}
+
+
+REAL = {"title": "YCB", "stand_in": False}
+STAND_IN = {"title": "YCB", "stand_in": True}
+
+
+def test_only_a_stand_in_is_called_one():
+    assert title_of(REAL) == "YCB"
+    assert title_of(STAND_IN) == "YCB (procedural stand-in)"
+
+
+def test_a_caption_tells_stand_ins_from_a_mixture():
+    assert stand_in_clause([REAL, REAL]) == stand_in_clause([]) == ""
+    whole, partly = stand_in_clause([STAND_IN, STAND_IN]), stand_in_clause([STAND_IN, REAL])
+    assert "stand-in" in whole and "partly" not in whole
+    assert partly.replace("partly ", "") == whole == stand_in_clause([STAND_IN, REAL], partly=False)

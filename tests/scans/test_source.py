@@ -4,14 +4,24 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import trimesh
 
+from gpca.alignment.rigid import scale_translation
 from gpca.errors import InputError
 from gpca.scans.pair import near
 from gpca.scans.scene import ScanPairs
-from gpca.scans.source import data_files, entry_of, place_of, scenes_of
+from gpca.scans.source import (
+    ScanEntry,
+    benchmark_scenes,
+    data_files,
+    entry_of,
+    npz_scenes,
+    place_of,
+    ply_scenes,
+    scenes_of,
+)
 from gpca.scans.virtual import compound, room
 
-from .test_readers import write_npz
 from .tiny import pair, scene
 
 FOLDER = {"title": "Tiny", "kind": "npz", "location": "scans"}
@@ -121,3 +131,203 @@ def test_a_pose_is_needed_of_every_scan():
     lost = replace(of, scans={name: replace(scan, T_scene_scan=None) for name, scan in of.scans.items()})
     with pytest.raises(InputError, match="scene floor: has no pose of scan '0'"):
         list(lost.known())
+
+
+def entry(kind, **settings):
+    return ScanEntry(title="Tiny", kind=kind, location="there", **settings)
+
+
+def write_npz(path, poses="T_scene_cloud", order="index", change=lambda arrays: arrays):
+    scans = scene().scans
+    names = np.array([int(name) for name in scans]) if order == "index" else np.array(list(scans))
+    arrays = {f"cloud_{name}": scan.points_N_3.astype(np.float32) for name, scan in scans.items()}
+    arrays |= {poses: np.stack([scan.T_scene_scan for scan in scans.values()])} | ({order: names} if order else {})
+    path.parent.mkdir(parents=True, exist_ok=True)
+    np.savez(path, **change(arrays))
+    return path
+
+
+def write_ply(path, points):
+    path.parent.mkdir(parents=True, exist_ok=True)
+    trimesh.PointCloud(points).export(path)
+
+
+def write_folder(folder, factor=1.0):
+    lines = ["# name, and the pose row by row"]
+    for name, scan in scene().scans.items():
+        write_ply(folder / f"{name}.ply", scan.points_N_3 * factor)
+        pose = scale_translation(scan.T_scene_scan, factor).ravel()
+        lines.append(f"{name} {' '.join(f'{number:.9g}' for number in pose)}")
+    (folder / "poses.txt").write_text("\n".join(lines) + "\n")
+    return folder
+
+
+def write_benchmark(folder, log="floor-evaluation/gt.log", overlaps="0,1,0.25\n"):
+    of = scene()
+    for name, scan in of.scans.items():
+        write_ply(folder / f"floor/cloud_bin_{name}.ply", scan.points_N_3)
+    text = ""
+    for known in of.known():
+        text += f"{known.target}\t {known.source}\t 3\n"
+        text += "".join("\t ".join(f"{number:.8e}" for number in row) + "\n" for row in known.T_target_source)
+    (folder / log).parent.mkdir(exist_ok=True)
+    (folder / log).write_text(text)
+    if overlaps:
+        (folder / log).with_name("gt_overlap.log").write_text(overlaps)
+    return folder
+
+
+def assert_same(read, tolerance=1e-6):
+    known, expected = list(read.known()), list(scene().known())
+    assert [(k.target, k.source) for k in known] == [(k.target, k.source) for k in expected]
+    for read_pair, true in zip(known, expected, strict=True):
+        np.testing.assert_allclose(read_pair.T_target_source, true.T_target_source, atol=tolerance)
+    for name, scan in scene().scans.items():
+        np.testing.assert_allclose(read.scans[name].points_N_3, scan.points_N_3, atol=1e-6)
+
+
+@pytest.mark.parametrize("order", ["index", "name", ""])
+def test_npz(tmp_path, order):
+    write_npz(tmp_path / "floor.npz", order=order)
+    [read] = npz_scenes(entry("npz"), tmp_path)
+    assert (read.name, read.kind) == ("floor", "room")
+    assert_same(read)
+    [alone] = npz_scenes(entry("npz", scenes="object"), tmp_path / "floor.npz")
+    assert alone.kind == "object" and alone.scans["0"].viewpoint_3 is None
+    [model] = npz_scenes(entry("npz", sensor_at_origin=True), write_npz(tmp_path / "b/cup.npz", "T_model_cloud"))
+    assert model.kind == "object" and (model.scans["2"].viewpoint_3 == 0).all()
+
+
+def test_pairs_beside_npz_files_are_those_that_count(tmp_path):
+    write_npz(tmp_path / "floor.npz")
+    write_npz(tmp_path / "other.npz")
+    rows = "list,scene,target,source,overlap\n3DMatch,floor,0,2,0.31\n3DLoMatch,floor,0,2,0.29\n3DMatch,floor,0,1,0.6\n"
+    (tmp_path / "pairs.csv").write_text(rows)
+    floor, other = npz_scenes(entry("npz"), tmp_path)
+    assert [(pair.target, pair.source, pair.overlap) for pair in floor.known()] == [("0", "2", 0.29), ("0", "1", 0.6)]
+    assert len(list(other.known())) == 3
+    (tmp_path / "pairs.csv").write_text(rows.replace("0.31", "31"))
+    with pytest.raises(InputError, match=r"pairs.csv: column 'overlap' contains numbers above 1; give shares"):
+        list(npz_scenes(entry("npz"), tmp_path))
+
+
+def without(name):
+    return lambda arrays: {key: value for key, value in arrays.items() if key != name}
+
+
+def changed(name, change):
+    return lambda arrays: arrays | {name: change(arrays[name])}
+
+
+NPZ_FAULTS = [
+    (without("T_scene_cloud"), "floor.npz: has neither T_scene_cloud nor T_model_cloud; make it as docs/scans.md says"),
+    (without("cloud_1"), "array 'cloud_1' is missing"),
+    (lambda arrays: arrays | {"cloud_9": arrays["cloud_1"]}, "array 'cloud_9' has no pose"),
+    (changed("index", lambda index: index * 0), "array 'index' names a cloud twice"),
+    (changed("index", lambda index: index[1:]), r"array 'index' is 2, not 3|is 3×4×4, not 2×4×4"),
+    (changed("cloud_0", lambda points: points[:, :2]), "array 'cloud_0' is 1000×2, not "),
+    (changed("cloud_0", lambda points: points * np.nan), "array 'cloud_0' contains NaN.*; make it as docs/scans.md"),
+    (changed("T_scene_cloud", lambda poses: 2 * poses), "T_scene_cloud of 0: the pose is not a rigid transform"),
+    (changed("cloud_0", lambda points: points.astype(object)), "contains pickled objects, which are never loaded"),
+]
+
+
+@pytest.mark.parametrize(("change", "message"), NPZ_FAULTS)
+def test_faults_of_npz(tmp_path, change, message):
+    write_npz(tmp_path / "floor.npz", change=change)
+    with pytest.raises(InputError, match=message):
+        list(npz_scenes(entry("npz"), tmp_path))
+
+
+def test_no_npz_and_no_archive(tmp_path):
+    with pytest.raises(InputError, match="the folder has no npz file; correct location"):
+        list(npz_scenes(entry("npz"), tmp_path))
+    (tmp_path / "floor.npz").write_text("not a zip")
+    with pytest.raises(InputError, match=r"floor.npz: is not a readable npz archive; fetch it again"):
+        list(npz_scenes(entry("npz"), tmp_path))
+
+
+def test_ply_folder(tmp_path):
+    [read] = ply_scenes(entry("ply_folder", scenes="room"), write_folder(tmp_path / "floor"))
+    assert (read.name, read.kind) == ("floor", "room")
+    assert_same(read)
+    write_folder(tmp_path / "more/a", 1000.0)
+    write_folder(tmp_path / "more/b", 1000.0)
+    several = list(ply_scenes(entry("ply_folder", scenes="object", unit="mm"), tmp_path / "more"))
+    assert [each.name for each in several] == ["a", "b"]
+    assert_same(several[1])
+
+
+PLY_FAULTS = [
+    (lambda text: "", "poses.txt: is empty"),
+    (lambda text: "# none\n", "poses.txt: has no poses"),
+    (lambda text: text + "0 1 2\n", "poses.txt, line 5: has 3 words; write a name and the 16 numbers"),
+    (lambda text: text.replace("\n1 ", "\n0 "), "poses.txt, line 3: '0' is no name of a file beside it, or stands"),
+    (lambda text: text.replace("\n1 ", "\n../1 "), r"poses.txt, line 3: '../1' is no name of a file beside it"),
+    (lambda text: text.replace("0.3", "o.3", 1), "poses.txt, line 3: 'o.3' is not a finite decimal number"),
+    (lambda text: text.replace("\n0 1 ", "\n0 2 "), "poses.txt, line 2: the pose is not a rigid transform"),
+    (lambda text: text.replace("\n2 ", "\n3 "), "3.ply: no such file"),
+]
+
+
+@pytest.mark.parametrize(("change", "message"), PLY_FAULTS)
+def test_faults_of_ply_folders(tmp_path, change, message):
+    poses = write_folder(tmp_path) / "poses.txt"
+    poses.write_text(change(poses.read_text()))
+    with pytest.raises(InputError, match=message):
+        list(ply_scenes(entry("ply_folder", scenes="room"), tmp_path))
+
+
+def test_a_ply_folder_says_what_it_is_and_has_poses(tmp_path):
+    with pytest.raises(InputError, match="Tiny: does not say what its scenes are; set scenes"):
+        list(ply_scenes(entry("ply_folder"), tmp_path))
+    with pytest.raises(InputError, match=r"poses.txt: no such file; give the poses of the scans"):
+        list(ply_scenes(entry("ply_folder", scenes="room"), tmp_path))
+
+
+@pytest.mark.parametrize("log", ["floor/gt.log", "floor-evaluation/gt.log"])
+def test_layout_of_3dmatch(tmp_path, log):
+    [read] = benchmark_scenes(entry("threedmatch"), write_benchmark(tmp_path, log))
+    assert (read.name, read.kind) == ("floor", "room")
+    assert_same(read)
+    shares = [pair.overlap for pair in read.known()]
+    assert shares[0] == 0.25 and shares[1:] == pytest.approx([0.2, 0.7], abs=0.06)  # those not printed are measured
+
+
+BENCHMARK_FAULTS = [
+    (lambda text: text[: text.rindex("\n", 0, -1)], "gt.log: has 14 lines, not 5 for each pair"),
+    (lambda text: text.replace("3\n", "\n", 1), "gt.log, pair 1: it has not 3 numbers and then 4"),
+    (lambda text: text.replace("1\t 3", "0\t 3", 1), "gt.log, pair 1: pairs 0 with 0 once more, or with itself"),
+    (lambda text: text.replace("1.0", "9.0"), "gt.log, pair 1: the pose is not a rigid transform"),
+    (lambda text: text.replace("2\t 3", "8\t 3", 1), "cloud_bin_8.ply: no such file"),
+]
+
+
+@pytest.mark.parametrize(("change", "message"), BENCHMARK_FAULTS)
+def test_faults_of_the_benchmark(tmp_path, change, message):
+    log = write_benchmark(tmp_path) / "floor-evaluation/gt.log"
+    log.write_text(change(log.read_text()))
+    with pytest.raises(InputError, match=message):
+        list(benchmark_scenes(entry("threedmatch"), tmp_path))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("0,1\n", "gt_overlap.log, line 1: has 2 numbers instead of target, source and overlap"),
+        ("0,1,1.5\n", "gt_overlap.log, line 1: the overlap 1.5 is no share"),
+        ("0,x,0.5\n", "gt_overlap.log, line 1: 'x' is not a whole number"),
+    ],
+)
+def test_faults_of_printed_overlaps(tmp_path, text, message):
+    write_benchmark(tmp_path, overlaps=text)
+    with pytest.raises(InputError, match=message):
+        list(benchmark_scenes(entry("threedmatch"), tmp_path))
+
+
+def test_a_benchmark_without_fragments_or_pairs_is_refused(tmp_path):
+    with pytest.raises(InputError, match=r"has no <scene>/cloud_bin_<number>.ply; correct location"):
+        list(benchmark_scenes(entry("threedmatch"), tmp_path))
+    (write_benchmark(tmp_path) / "floor-evaluation/gt.log").unlink()
+    with pytest.raises(InputError, match=r"floor/gt.log: no such file; put it there, or into floor-evaluation"):
+        list(benchmark_scenes(entry("threedmatch"), tmp_path))

@@ -8,7 +8,7 @@ from gpca.config.layers import with_defaults
 from gpca.errors import InputError
 from gpca.experiments.scans.experiment import EXPERIMENT, check, missing, names, shown
 from gpca.experiments.scans.settings import ChoiceSettings, part
-from tests.scans.test_readers import write_npz
+from tests.scans.test_source import write_npz
 
 
 @pytest.fixture

@@ -1,0 +1,383 @@
+"""Archives that would fill the memory or leave their folder, through the command line."""
+
+import gzip
+import hashlib
+import io
+import json
+import os
+import shutil
+import socket
+import tarfile
+import zipfile
+
+import pytest
+
+from gpca.errors import InputError
+from gpca.objects import downloads
+from gpca.objects.downloads import cached_path, fetch, unpack
+
+from ..hostile import refusal
+
+CONTENT = b"some archive" * 1000
+SHA256 = hashlib.sha256(CONTENT).hexdigest()
+
+
+@pytest.fixture
+def url(server):
+    (server.folder / "data").mkdir()
+    (server.folder / "data" / "models.zip").write_bytes(CONTENT)
+    return f"{server.url}/data/models.zip"
+
+
+def files(folder):
+    return [path for path in folder.rglob("*") if path.is_file()]
+
+
+def test_fetches_once(url, server, tmp_path):
+    path = fetch(url, SHA256, tmp_path)
+    assert path == tmp_path / "127.0.0.1" / "data" / "models.zip"
+    assert path.read_bytes() == CONTENT
+    assert fetch(url, SHA256.upper(), tmp_path) == path
+    assert len(server.requests) == 1
+    assert files(tmp_path) == [path]
+
+
+def test_unpinned_checksum_is_printed(url, tmp_path, capsys):
+    fetch(url, None, tmp_path)
+    output = capsys.readouterr()
+    assert SHA256 in output.err
+    assert output.out == ""
+
+
+def test_wrong_checksum_removes_the_download(url, tmp_path):
+    with pytest.raises(InputError, match=f"{url}: .*expected sha256 {'0' * 64}, got {SHA256}"):
+        fetch(url, "0" * 64, tmp_path)
+    assert files(tmp_path) == []
+
+
+def test_wrong_checksum_keeps_a_file_that_was_there(url, server, tmp_path):
+    path = fetch(url, None, tmp_path)
+    with pytest.raises(InputError, match=f"expected sha256 {'0' * 64}, got {SHA256}; delete {path}"):
+        fetch(url, "0" * 64, tmp_path)
+    assert path.read_bytes() == CONTENT
+
+
+def test_no_network(tmp_path, monkeypatch):
+    monkeypatch.setenv("NO_PROXY", "127.0.0.1")
+    with socket.socket() as closed:  # bound but not listening: refuses every connection
+        closed.bind(("127.0.0.1", 0))
+        url = f"http://127.0.0.1:{closed.getsockname()[1]}/lm_models.zip"
+        with pytest.raises(InputError) as caught:
+            fetch(url, None, tmp_path, location="bop/lm")
+    by_hand = tmp_path / "127.0.0.1" / "lm_models.zip"
+    assert str(caught.value) == (
+        f"{url}: cannot be reached; set data_dir to a folder that contains bop/lm, or download it by hand to {by_hand}"
+    )
+    assert files(tmp_path) == []
+
+
+def test_file_fetched_by_hand_needs_no_network(tmp_path):
+    url = "http://127.0.0.1:9/data/models.zip"
+    path = cached_path(url, tmp_path)
+    path.parent.mkdir(parents=True)
+    path.write_bytes(CONTENT)
+    assert fetch(url, SHA256, tmp_path) == path
+
+
+def test_error_answer_and_interrupted_transfer(server, tmp_path):
+    with pytest.raises(InputError, match=r"none\.zip: .*the server answered 404"):
+        fetch(f"{server.url}/none.zip", None, tmp_path)
+    with pytest.raises(InputError, match=r"short\.zip: "):
+        fetch(f"{server.url}/short.zip", None, tmp_path)
+    assert files(tmp_path) == []
+
+
+@pytest.mark.parametrize("name", ["drip.zip", "drip-head.zip"])
+def test_a_server_that_sends_a_byte_now_and_then_is_left(server, tmp_path, monkeypatch, name):
+    monkeypatch.setattr(downloads, "GRACE_S", 0)
+    monkeypatch.setattr(downloads, "SLOWEST_BYTES_PER_S", 10**6)
+    with pytest.raises(InputError, match=rf"{name}: sent \d+ bytes in \d+ s, which is too slow; set data_dir"):
+        fetch(f"{server.url}/{name}", None, tmp_path)
+    assert files(tmp_path) == []
+
+
+def test_a_download_that_is_larger_than_any_is_stopped(server, url, tmp_path, monkeypatch):
+    monkeypatch.setattr(downloads, "LARGEST_DOWNLOAD_BYTES", len(CONTENT) - 1)
+    with pytest.raises(InputError, match=r"models\.zip: sends more than 11999 bytes"):
+        fetch(url, None, tmp_path)
+    assert files(tmp_path) == []
+
+
+def test_each_url_has_a_file_of_its_own_within_the_cache(tmp_path):
+    urls = [
+        "https://a.org/x/m.zip",
+        "https://b.org/x/m.zip",
+        "https://a.org/m.zip",
+        "https://a.org/m.zip?v=1",
+        "https://a.org/m.zip?v=/2",
+    ]
+    assert len({cached_path(url, tmp_path) for url in urls}) == len(urls)
+    assert cached_path("https://a.org/../../../m.zip", tmp_path) == tmp_path / "a.org" / "m.zip"
+
+
+@pytest.mark.parametrize(
+    "url", ["ftp://a.org/m.zip", "file:///etc/passwd", "a.org/m.zip", "https://a.org/", "", "http:///m.zip"]
+)
+def test_no_file_address(url, tmp_path):
+    with pytest.raises(InputError, match="http or https"):
+        fetch(url, None, tmp_path)
+
+
+FILES = {"models/obj_000001.ply": os.urandom(5000), "models/deep/er/info.json": b"{}", "top.txt": b"t"}
+
+
+def pack(path, files=FILES, extra=()):
+    """Zip, tar or tgz by the suffix; `extra` are TarInfo or ZipInfo objects without content."""
+    if path.suffix == ".zip":
+        with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+            archive.writestr("models/", "")
+            for name, content in files.items():
+                archive.writestr(name, content)
+            for info in extra:
+                archive.writestr(info, "target")
+        return path
+    with tarfile.open(path, "w:gz" if path.suffix == ".tgz" else "w") as archive:
+        folder = tarfile.TarInfo("./models")
+        folder.type = tarfile.DIRTYPE
+        archive.addfile(folder)
+        for name, content in files.items():
+            info = tarfile.TarInfo(name)
+            info.size = len(content)
+            archive.addfile(info, io.BytesIO(content))
+        for info in extra:
+            archive.addfile(info)
+    return path
+
+
+def contents(folder):
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def nothing_left(tmp_path, archive):
+    return [path for path in tmp_path.rglob("*") if path != archive] == []
+
+
+FORMATS = pytest.mark.parametrize("suffix", ["zip", "tar", "tgz"])
+
+
+@FORMATS
+def test_unpacks(tmp_path, suffix):
+    archive = pack(tmp_path / f"a.{suffix}")
+    assert unpack(archive, tmp_path / "new" / "target") == tmp_path / "new" / "target"
+    assert contents(tmp_path / "new/target") == FILES
+
+
+def change(folder):
+    (folder / "top.txt").write_bytes(b"u")  # as long as before
+
+
+def lengthen(folder):
+    (folder / "models/deep/er/info.json").write_bytes(b"{} ")
+
+
+def lose(folder):
+    (folder / "models/obj_000001.ply").unlink()
+
+
+def add(folder):
+    (folder / "models/obj_000002.ply").write_bytes(b"ply")
+
+
+CHANGES = {change: "top.txt: was changed", lengthen: "info.json: was changed"}
+CHANGES |= {lose: "obj_000001.ply: is missing", add: "obj_000002.ply: is not from the archive"}
+
+
+@FORMATS
+def test_a_folder_that_was_unpacked_is_checked_and_kept(tmp_path, suffix):
+    archive = pack(tmp_path / f"a.{suffix}")
+    folder = unpack(archive, tmp_path / "target")
+    (folder / ".DS_Store").write_bytes(b"what a desktop leaves")
+    before = (folder / "top.txt").stat().st_mtime_ns
+    assert unpack(archive, folder) == folder
+    assert (folder / "top.txt").stat().st_mtime_ns == before
+
+
+@FORMATS
+@pytest.mark.parametrize("change", CHANGES)
+def test_a_folder_that_was_changed_since_is_refused(tmp_path, suffix, change):
+    archive = pack(tmp_path / f"a.{suffix}")
+    folder = unpack(archive, tmp_path / "target")
+    change(folder)
+    with pytest.raises(InputError, match=f"{CHANGES[change]}.*; remove {folder} and target.sha256.json"):
+        unpack(archive, folder)
+    for path in (folder, tmp_path / "target.sha256.json"):
+        shutil.rmtree(path) if path.is_dir() else path.unlink()
+    assert contents(unpack(archive, folder)) == FILES
+
+
+def test_a_folder_without_a_list_is_unpacked_again(tmp_path):
+    archive = pack(tmp_path / "a.zip")
+    folder = unpack(archive, tmp_path / "target")
+    change(folder)
+    (tmp_path / "target.sha256.json").unlink()
+    assert contents(unpack(archive, folder)) == FILES
+
+
+@pytest.mark.parametrize("text", [" ", "{", "[1, 2]", "null"])
+def test_a_list_that_is_damaged_is_refused(tmp_path, text):
+    archive = pack(tmp_path / "a.zip")
+    folder = unpack(archive, tmp_path / "target")
+    (tmp_path / "target.sha256.json").write_text(text)
+    with pytest.raises(InputError, match=r"target\.sha256\.json: is not a list of files .*; remove"):
+        unpack(archive, folder)
+
+
+@FORMATS
+@pytest.mark.parametrize(
+    "name", ["../evil", "models/../../evil", "/tmp/evil", "..\\evil", "C:\\evil", "\\\\host\\evil"]
+)
+def test_path_that_leaves_the_folder(tmp_path, suffix, name):
+    archive = pack(tmp_path / f"a.{suffix}", {**FILES, name: b"evil"})
+    with pytest.raises(InputError, match=rf"a\.{suffix}: member .*evil' would leave"):
+        unpack(archive, tmp_path / "target")
+    assert nothing_left(tmp_path, archive)
+
+
+@pytest.mark.parametrize("kind", [tarfile.SYMTYPE, tarfile.LNKTYPE, tarfile.FIFOTYPE, tarfile.CHRTYPE])
+def test_links_and_devices_in_a_tar(tmp_path, kind):
+    info = tarfile.TarInfo("models/link")
+    info.type, info.linkname = kind, "top.txt"
+    archive = pack(tmp_path / "a.tar", extra=[info])
+    with pytest.raises(InputError, match="'models/link' is a link"):
+        unpack(archive, tmp_path / "target")
+    assert nothing_left(tmp_path, archive)
+
+
+def test_link_in_a_zip(tmp_path):
+    info = zipfile.ZipInfo("link")
+    info.create_system, info.external_attr = 3, 0o120777 << 16
+    archive = pack(tmp_path / "a.zip", extra=[info])
+    with pytest.raises(InputError, match="'link' is a link"):
+        unpack(archive, tmp_path / "target")
+    assert nothing_left(tmp_path, archive)
+
+
+@FORMATS
+@pytest.mark.parametrize("kept", [0.0, 0.1, 0.6, 0.95])
+def test_truncated(tmp_path, suffix, kept):
+    archive = pack(tmp_path / f"a.{suffix}", {**FILES, "last.bin": os.urandom(30000)})
+    content = archive.read_bytes()
+    archive.write_bytes(content[: int(kept * len(content))])
+    with pytest.raises(InputError, match=rf"a\.{suffix}: is {'a truncated' if kept else 'empty'}"):
+        unpack(archive, tmp_path / "target")
+    assert nothing_left(tmp_path, archive)
+
+
+def test_tar_cut_between_two_members(tmp_path):
+    archive = pack(tmp_path / "a.tar", {"a": b"1" * 512, "b": b"2" * 512})
+    archive.write_bytes(archive.read_bytes()[: 512 + 1024])  # the folder and a; b and the end mark are lost
+    with pytest.raises(InputError, match="truncated"):
+        unpack(archive, tmp_path / "target")
+
+
+@pytest.mark.parametrize("suffix", ["zip", "tgz"])
+def test_damaged_content(tmp_path, suffix):
+    archive = pack(tmp_path / f"a.{suffix}")
+    content = bytearray(archive.read_bytes())
+    content[2000] ^= 0xFF
+    archive.write_bytes(content)
+    with pytest.raises(InputError, match="damaged"):
+        unpack(archive, tmp_path / "target")
+    assert nothing_left(tmp_path, archive)
+
+
+@FORMATS
+def test_bomb(tmp_path, suffix):
+    archive = pack(tmp_path / f"a.{suffix}", {"zeros": bytes(2_000_000)})
+    with pytest.raises(InputError, match=r"more than 0\.001 GB"):
+        unpack(archive, tmp_path / "target", largest_bytes=10**6)
+    assert nothing_left(tmp_path, archive)
+
+
+def test_file_that_is_also_a_folder(tmp_path):
+    archive = pack(tmp_path / "a.tar", {"a": b"1", "a/b": b"2"})
+    with pytest.raises(InputError, match="both a file and a folder"):
+        unpack(archive, tmp_path / "target")
+    assert nothing_left(tmp_path, archive)
+
+
+def test_no_archive(tmp_path):
+    (tmp_path / "page.zip").write_text("<html>please log in</html>" * 100)
+    with pytest.raises(InputError, match=r"page\.zip"):
+        unpack(tmp_path / "page.zip", tmp_path / "target")
+    with pytest.raises(InputError, match="no such file"):
+        unpack(tmp_path / "none.zip", tmp_path / "target")
+
+
+VIEW = "mug_1_1_1.pcd"
+GB = 10**9
+
+
+def header(kind, size, name=VIEW):
+    info = tarfile.TarInfo(name)
+    info.type, info.size = kind, size
+    return info.tobuf(tarfile.GNU_FORMAT)
+
+
+def said_to_hold(path, kind, size):
+    """A tar that says that it holds so much: a hole in an uncompressed one, and nothing in a compressed one."""
+    if path.suffix == ".tgz":
+        path.write_bytes(gzip.compress(header(kind, size) + bytes(10240)))
+        return
+    with path.open("wb") as file:
+        file.write(header(kind, size))
+        file.truncate(512 + -(-size // 512) * 512 + 1024)
+
+
+def zipped(path, method=zipfile.ZIP_DEFLATED, content=b"x"):
+    with zipfile.ZipFile(path, "w", method) as file:
+        file.writestr(VIEW, content)
+
+
+def with_member(path, name, kind=tarfile.REGTYPE):
+    info = tarfile.TarInfo(name)
+    info.type, info.size, info.linkname = kind, 1 if kind == tarfile.REGTYPE else 0, "/etc/passwd"
+    with tarfile.open(path, "w") as file:
+        file.addfile(info, io.BytesIO(b"x"))
+
+
+LONG = {"pax header": tarfile.XHDTYPE, "global header": tarfile.XGLTYPE, "long name": tarfile.GNUTYPE_LONGNAME}
+LONG |= {"long link": tarfile.GNUTYPE_LONGLINK, "header of Solaris": tarfile.SOLARIS_XHDTYPE}
+ARCHIVES = {
+    **{f"{name}.tar": lambda path, kind=kind: said_to_hold(path, kind, 3 * GB) for name, kind in LONG.items()},
+    "long name.tgz": lambda path: said_to_hold(path, tarfile.GNUTYPE_LONGNAME, 3 * GB),
+    "member.tar": lambda path: said_to_hold(path, tarfile.REGTYPE, 3 * GB),
+    "members.tar": lambda path: said_to_hold(path, tarfile.REGTYPE, 30 * GB),
+    "bytes missing.tgz": lambda path: said_to_hold(path, tarfile.REGTYPE, 3 * GB),
+    "link.tar": lambda path: with_member(path, VIEW, tarfile.SYMTYPE),
+    "no cloud.tar": lambda path: with_member(path, "mug.txt"),
+    "damaged cloud.tar": lambda path: with_member(path, VIEW),
+}
+
+
+@pytest.mark.parametrize("name", ARCHIVES)
+def test_an_archive_of_views_is_refused(name, tmp_path):
+    ARCHIVES[name](tmp_path / name)
+    settings = json.dumps({"kind": "uw_rgbd", "location": ".", "unit": "m"})
+    command = ["objects", "--source", "s", "--data-dir", ".", "--out", "new.npz", "--settings", settings]
+    refusal(command, tmp_path, name)
+
+
+@pytest.mark.parametrize("method", [zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
+def test_compression_that_cannot_be_read_piece_by_piece_is_refused(method, tmp_path):
+    zipped(tmp_path / "a.zip", method, bytes(10**6))
+    with pytest.raises(InputError, match=r"a\.zip: member 'mug_1_1_1\.pcd' is compressed by a method other"):
+        unpack(tmp_path / "a.zip", tmp_path / "target")
+
+
+def test_a_disk_that_is_too_small_is_named_before_anything_is_written(tmp_path, monkeypatch):
+    zipped(tmp_path / "a.zip", content=bytes(5 * 10**6))
+    monkeypatch.setattr(downloads.shutil, "disk_usage", lambda folder: type("Usage", (), {"free": 10**6}))
+    with pytest.raises(InputError, match=r"a\.zip: unpacks to 0\.005 GB, but 0\.001 GB of the disk are free"):
+        unpack(tmp_path / "a.zip", tmp_path / "target")
+    assert [path.name for path in tmp_path.iterdir()] == ["a.zip"]

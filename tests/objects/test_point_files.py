@@ -1,0 +1,315 @@
+"""Points in tables of numbers: NumPy's files, text, and KITTI's."""
+
+import io
+import sys
+import tarfile
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from gpca.errors import InputError
+from gpca.objects.point_files import CARTESIAN, from_entry, parse_pcd, read_scanner_file, read_table, surfaces
+
+# The layout of the UW dataset.
+HEADER = """# .PCD v.7 - Point Cloud Data file format
+FIELDS x y z rgb imX imY
+SIZE 4 4 4 4 4 4
+TYPE F F F F F F
+COUNT 1 1 1 1 1 1
+WIDTH {width}
+HEIGHT {height}
+VIEWPOINT 0 0 0 1 0 0 0
+POINTS {points}
+DATA {data}
+"""
+ROWS = ["0.1 0.2 0.7 4.5107335e-39 314 218", "-0.1 0.25 0.75 1e-39 315 218", "nan nan nan 0 0 0", "0 0.5 0.5 0 1 1"]
+
+
+def ascii_pcd(rows, width=None, height=1, points=None, data="ascii"):
+    width = len(rows) // height if width is None else width
+    points = len(rows) if points is None else points
+    return (HEADER.format(width=width, height=height, points=points, data=data) + "\n".join(rows) + "\n").encode()
+
+
+def binary_pcd(points, header_points=None):
+    """x, y, z between other fields, one of them repeated, one with two values, two of one name."""
+    dtype = [("a", "<u1", 3), ("z", "<f8"), ("x", "<f4"), ("b", "<i2", 2), ("y", "<f4")]
+    table = np.zeros(len(points), dtype)
+    for i, axis in enumerate("xyz"):
+        table[axis] = points[:, i]
+    table["a"], table["b"] = 255, -1
+    n = len(points) if header_points is None else header_points
+    header = f"VERSION 0.7\nFIELDS _ z x _ y\nSIZE 1 8 4 2 4\nTYPE U F F I F\nCOUNT 3 1 1 2 1\nWIDTH {n}\nHEIGHT 1\n"
+    return f"{header}POINTS {n}\nDATA binary\n".encode() + table.tobytes()
+
+
+def test_ascii():
+    points = parse_pcd(ascii_pcd([ROWS[0], ROWS[1], ROWS[3]]), "x")
+    assert points.dtype == np.float64
+    assert points.tolist() == [[0.1, 0.2, 0.7], [-0.1, 0.25, 0.75], [0, 0.5, 0.5]]
+
+
+def test_binary_among_other_fields():
+    points = np.random.default_rng(0).normal(size=(50, 3)).astype(np.float32)
+    assert np.array_equal(parse_pcd(binary_pcd(points), "x"), points)
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "binary", "binary_compressed"])
+def test_agrees_with_open3d(encoding, tmp_path):
+    import open3d as o3d
+
+    rng = np.random.default_rng(0)
+    # Random, constant and periodic stretches: literals, short and long copies, copies that overlap themselves.
+    points = np.vstack([rng.normal(size=(300, 3)), np.full((500, 3), 0.5), np.tile(rng.normal(size=(7, 3)), (90, 1))])
+    points = points.astype(np.float32).astype(np.float64)
+    cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
+    cloud.colors = o3d.utility.Vector3dVector(rng.uniform(size=points.shape))
+    path = str(tmp_path / "cloud.pcd")
+    o3d.io.write_point_cloud(path, cloud, write_ascii=encoding == "ascii", compressed=encoding == "binary_compressed")
+    content = (tmp_path / "cloud.pcd").read_bytes()
+    assert f"DATA {encoding}\n".encode() in content
+    assert parse_pcd(content, "x") == pytest.approx(points, abs=1e-9 if encoding != "ascii" else 1e-6)
+    for kept in (len(content) - 40, len(content) - 400):
+        with pytest.raises(InputError, match=r"^x: is not a readable PCD"):
+            parse_pcd(content[:kept], "x")
+
+
+def test_organised_cloud_drops_missing_depth():
+    assert len(parse_pcd(ascii_pcd(ROWS, width=2, height=2), "x")) == 3
+
+
+def test_nan_in_an_unorganised_cloud():
+    with pytest.raises(InputError, match=r"view\.pcd: 1 of 4 points contain NaN"):
+        parse_pcd(ascii_pcd(ROWS), "view.pcd")
+
+
+def test_infinity_in_an_organised_cloud():
+    with pytest.raises(InputError, match="infinity"):
+        parse_pcd(ascii_pcd([*ROWS[:3], "inf 0 0 0 0 0"], width=2, height=2), "x")
+
+
+GOOD = ascii_pcd([ROWS[0], ROWS[1]]).decode()
+WRONG = {
+    "empty file": ("", "DATA"),
+    "not a pcd": ("ply\nformat ascii 1.0\n", "DATA"),
+    "no data line": (GOOD.replace("DATA ascii", "DATE ascii"), "DATA"),
+    "data unknown": (GOOD.replace("DATA ascii", "DATA base64"), "DATA base64"),
+    "no fields": (GOOD.replace("FIELDS", "COLUMNS"), "FIELDS"),
+    "no width": (GOOD.replace("WIDTH 2\n", ""), "WIDTH"),
+    "no z": (GOOD.replace("x y z", "x y w"), "lacks x, y or z"),
+    "short size": (GOOD.replace("SIZE 4", "SIZE"), "differ in length"),
+    "unknown type": (GOOD.replace("TYPE F", "TYPE Q"), "TYPE"),
+    "unknown size": (GOOD.replace("SIZE 4", "SIZE 3"), "SIZE"),
+    "double x": (GOOD.replace("COUNT 1", "COUNT 2"), "x, y or z"),
+    "points differ": (GOOD.replace("POINTS 2", "POINTS 3"), "POINTS is not"),
+    "points no number": (GOOD.replace("POINTS 2", "POINTS two"), "two"),
+    "width with an underline": (GOOD.replace("WIDTH 2", "WIDTH 0_2"), "'0_2' is not a whole number"),
+    "count with an underline": (GOOD.replace("COUNT 1 1 1 1", "COUNT 1 1 1 0_1"), "'0_1' is not a whole number"),
+    "negative": (GOOD.replace("WIDTH 2", "WIDTH -2").replace("HEIGHT 1", "HEIGHT -1"), "'-2' is not a whole number"),
+    "rows missing": (GOOD.replace("WIDTH 2", "WIDTH 9").replace("POINTS 2", "POINTS 9"), "9×6"),
+    "value missing": (GOOD.replace(" 315 218", " 315"), "column"),
+    "no number": (GOOD.replace("0.75", "abc"), "abc"),
+    "no rows": (ascii_pcd([], points=0).decode(), "has no points"),
+}
+
+
+@pytest.mark.parametrize("fault", WRONG)
+def test_wrong_header_or_data(fault):
+    content, message = WRONG[fault]
+    with pytest.raises(InputError, match=f"^view.pcd: .*{message}"):
+        parse_pcd(content.encode(), "view.pcd")
+
+
+@pytest.mark.parametrize("header_points", [49, 51, 10**15])
+def test_binary_of_another_size(header_points):
+    with pytest.raises(InputError, match="bytes of data"):
+        parse_pcd(binary_pcd(np.ones((50, 3)), header_points), "x")
+
+
+def test_damaged_compression():
+    header = HEADER.format(width=1, height=1, points=1, data="binary_compressed").encode()
+    for body in (b"", b"\x09\0\0\0", b"\x03\0\0\0\x18\0\0\0\x20\xff\xff", b"\x02\0\0\0\x18\0\0\0\x00\x41"):
+        with pytest.raises(InputError, match="not a readable PCD"):
+            parse_pcd(header + body, "x")
+
+
+POINTS = np.random.default_rng(0).normal(size=(70, 3))
+WIDE = np.column_stack([POINTS, np.arange(70)])
+
+
+def text(separator, head="", rows=WIDE):
+    body = "\n".join(separator.join(f"{x:.9g}" for x in row) for row in rows)
+    return lambda path: path.write_text(f"{head}{body}\n")
+
+
+FILES = {
+    "cloud.npy": lambda path: np.save(path, WIDE),
+    "single.npy": lambda path: np.save(path, POINTS.astype(np.float32)),
+    "pixels.npy": lambda path: np.save(path, np.insert(POINTS, 5, np.nan, axis=0)[:, None]),
+    "named.npy": lambda path: np.save(path, np.rec.fromarrays(POINTS.T, names="x,y,z")),
+    "cloud.npz": lambda path: np.savez(path, normals=-POINTS, points=POINTS),
+    "only.npz": lambda path: np.savez_compressed(path, whatever=POINTS),
+    "cloud.xyz": text(" ", "# x y z i\n"),
+    "count.xyz": text(" ", "70\n"),
+    "cloud.csv": text(","),
+    "head.csv": text(";", "intensity;Z;y;x\n", WIDE[:, ::-1]),
+    "cloud.bin": lambda path: WIDE.astype("<f4").tofile(path),
+}
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_points_are_read_from_every_format(tmp_path, name):
+    FILES[name](tmp_path / name)
+    points = read_table(tmp_path / name)
+    assert points.dtype == np.float64
+    np.testing.assert_allclose(points, POINTS, atol=1e-6)
+
+
+FAULTS = {
+    "few.npy": (
+        lambda path: np.save(path, POINTS[:, :2]),
+        r"has the shape \(70, 2\), not \(N, 3\); export it as three",
+    ),
+    "turned.npy": (lambda path: np.save(path, POINTS.T), r"has the shape \(3, 70\), not \(N, 3\); transpose it"),
+    "texts.npy": (lambda path: np.save(path, POINTS.astype(str)), "holds values of type <U32, not numbers"),
+    "pickle.npy": (lambda path: np.save(path, np.array([{}]), allow_pickle=True), "is not a readable .npy file"),
+    "cut.npy": (lambda path: path.write_bytes(b"\x93NUMPY"), "is not a readable .npy file"),
+    "two.npz": (lambda path: np.savez(path, a=POINTS, b=POINTS), r"holds several arrays \(a, b\), none of them named"),
+    "cut.npz": (lambda path: path.write_bytes(b"PK"), "is not a readable .npz file"),
+    "two.xyz": (text(" ", rows=POINTS[:, :2]), "has 2 columns; export it"),
+    "ragged.xyz": (lambda path: path.write_text("1 2 3\n4 5\n"), "is no table of numbers"),
+    "words.xyz": (lambda path: path.write_text("1 2 3\n4 five 6\n"), "is no table of numbers"),
+    "underline.csv": (lambda path: path.write_text("1,2,3\n4,5_0,6\n"), "is no table of numbers"),
+    "empty.csv": (lambda path: path.write_text("# nothing\n"), "has no points"),
+    "head.csv": (lambda path: path.write_text("x,y,z\n"), "has no points"),
+    "names.csv": (lambda path: path.write_text("lat,lon,height\n1,2,3\n"), "has the columns lat, lon, height, not x"),
+    "odd.bin": (lambda path: path.write_bytes(bytes(100)), "has 100 bytes, which are no rows of 4 float32"),
+    "other.bin": (lambda path: np.full(64, 0x7F7F7F7F, "<u4").tofile(path), "in meters, as scans of KITTI do"),
+}
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_a_file_that_cannot_be_right_is_one_line(tmp_path, name):
+    write, message = FAULTS[name]
+    write(tmp_path / name)
+    with pytest.raises(InputError, match=message) as caught:
+        read_table(tmp_path / name)
+    assert str(caught.value).startswith(f"{tmp_path / name}: ")
+    assert "\n" not in str(caught.value)
+
+
+SCANNER_FILES_POINTS = np.arange(12.0).reshape(4, 3)
+
+
+class E57:
+    """As pye57 0.4 is used: scans by their number, in the frame of the file."""
+
+    scan_count = 2
+
+    def __init__(self, path):
+        assert isinstance(path, str)
+
+    def read_scan(self, number, ignore_missing_fields):
+        assert ignore_missing_fields
+        return dict(zip(CARTESIAN, SCANNER_FILES_POINTS[2 * number : 2 * number + 2].T, strict=True))
+
+    def close(self):
+        pass
+
+
+def las(path):
+    return SimpleNamespace(xyz=SCANNER_FILES_POINTS)
+
+
+def cut(path):
+    raise ValueError("No LazBackend selected, cannot decompress data")
+
+
+@pytest.mark.parametrize(
+    ("name", "package", "module"),
+    [("scan.las", "laspy", SimpleNamespace(read=las)), ("scan.e57", "pye57", SimpleNamespace(E57=E57))],
+)
+def test_points_come_from_the_package_of_the_format(tmp_path, monkeypatch, name, package, module):
+    (tmp_path / name).write_bytes(b"scan")
+    monkeypatch.setitem(sys.modules, package, module)
+    np.testing.assert_array_equal(read_scanner_file(tmp_path / name), SCANNER_FILES_POINTS)
+
+
+@pytest.mark.parametrize(("name", "package"), [("scan.laz", "laspy"), ("scan.e57", "pye57")])
+def test_a_missing_package_is_named_with_the_command_that_installs_it(tmp_path, monkeypatch, name, package):
+    (tmp_path / name).write_bytes(b"scan")
+    monkeypatch.setitem(sys.modules, package, None)
+    with pytest.raises(InputError, match=rf"needs the package {package}, which is not installed; pip install"):
+        read_scanner_file(tmp_path / name)
+
+
+def test_what_the_package_cannot_read_is_one_line(tmp_path, monkeypatch):
+    (tmp_path / "scan.laz").write_bytes(b"scan")
+    monkeypatch.setitem(sys.modules, "laspy", SimpleNamespace(read=cut))
+    with pytest.raises(InputError, match=r"cannot be read \(No LazBackend .*; pip install 'laspy\[lazrs\]'"):
+        read_scanner_file(tmp_path / "scan.laz")
+
+
+def view(depth):
+    return ascii_pcd([f"0 {i / 100} {depth} 0 0 0" for i in range(3)])
+
+
+def write_tar(path, members, mode="w"):
+    with tarfile.open(path, mode) as archive:
+        for name, content in members.items():
+            info = tarfile.TarInfo(name)
+            info.size = len(content)
+            archive.addfile(info, io.BytesIO(content))
+    return path
+
+
+@pytest.fixture
+def mug_tar(tmp_path):
+    """Instance 1: sequences 1, 2 and 4 of 20 frames each, in the order of names that no number keeps."""
+    names = sorted(f"coffee_mug_1/coffee_mug_1_{sequence}_{frame}" for sequence in (1, 2, 4) for frame in range(1, 21))
+    members = {f"{name}.pcd": view(int(name.split("_")[-1])) for name in names}
+    return write_tar(tmp_path / "coffee_mug_1.tar", {**members, "coffee_mug_1/readme.txt": b"hello"})
+
+
+def test_views_are_spread_evenly_over_sequences_and_frames(mug_tar):
+    found = list(surfaces([mug_tar]))
+    assert [surface.name for surface in found] == [
+        f"coffee_mug_1_{sequence}_{frame}" for sequence in (1, 2, 4) for frame in (1, 11)
+    ]
+    assert found[1].vertices_m[:, 2].tolist() == [11, 11, 11]
+    assert found[0].faces is None
+
+
+def test_single_files_tars_and_instances_together(tmp_path, mug_tar):
+    for name in ("apple_1_1_1", "apple_1_1_2", "apple_2_1_1", "loose"):
+        (tmp_path / f"{name}.pcd").write_bytes(view(500))
+    write_tar(tmp_path / "coffee_mug_2.tgz", {"./coffee_mug_2_1_1.pcd": view(700)}, "w:gz")
+    found = list(from_entry({"views_per_instance": 1, "unit": "mm"}, tmp_path))
+    names = ["apple_1_1_1", "apple_2_1_1", "loose", "coffee_mug_1_1_1", "coffee_mug_2_1_1"]
+    assert [surface.name for surface in found] == names
+    assert found[-1].vertices_m[:, 2] == pytest.approx(np.full(3, 0.7))
+    assert len(list(from_entry({"views_per_instance": 1}, mug_tar))) == 1
+
+
+def test_faults_name_the_tar_and_its_member(tmp_path):
+    wrong = write_tar(tmp_path / "wrong.tar", {"a/mug_1_1_1.pcd": view(1).replace(b"FIELDS", b"FEILDS")})
+    with pytest.raises(InputError, match=r"wrong\.tar, member a/mug_1_1_1\.pcd: .*FIELDS"):
+        list(surfaces([wrong]))
+    with pytest.raises(InputError, match=r"empty\.tar: the archive has no \.pcd"):
+        list(surfaces([write_tar(tmp_path / "empty.tar", {"readme.txt": b""})]))
+
+
+@pytest.mark.parametrize("kept", [0.1, 0.5, 0.8])
+def test_truncated_tar(mug_tar, kept):
+    content = mug_tar.read_bytes()
+    mug_tar.write_bytes(content[: int(kept * len(content))])
+    with pytest.raises(InputError, match=r"coffee_mug_1\.tar: is a truncated"):
+        list(surfaces([mug_tar]))
+
+
+def test_missing_and_empty_folder(tmp_path):
+    with pytest.raises(InputError, match="no such folder"):
+        list(from_entry({}, tmp_path / "nowhere"))
+    with pytest.raises(InputError, match="has none of"):
+        list(from_entry({}, tmp_path))
