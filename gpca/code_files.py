@@ -1,4 +1,4 @@
-"""Which source files a step depends on: Snakemake does not notice edits in imported modules unless they are inputs."""
+"""The source files that a step depends on, as inputs of its rule: Snakemake does not track imported modules."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from pathlib import Path
 
 from gpca.plugins import ROOTS, lone_root
 
-ROOT = Path(__file__).resolve().parent.parent  # the folder that holds both packages: a checkout, or site-packages
+ROOT = Path(__file__).resolve().parent.parent  # of both packages: a checkout, or site-packages
 PACKAGES = ("gpca", "baselines")
-BESIDE = {  # what a module reads from its own folder
+BESIDE = {  # files that a module reads from its folder
     "gpca.comparison.claims": "claims.yaml",
     "gpca.comparison.published": "*.csv",
     "gpca.reporting.figures.style": "matplotlibrc",
@@ -21,15 +21,12 @@ BESIDE = {  # what a module reads from its own folder
 
 
 def code_files(*modules: str) -> list[str]:
-    """Return the files of the given modules and of all project modules they import, anywhere in their text.
+    """Return the files of modules and of all project modules that they import, and their files in `BESIDE`; sorted.
 
-    ``module:function`` stands for a function: of the module's imports, those count that it, or what it uses of the
-    module, needs.
-    What is imported only for type checking never runs, so it does not count; a file in `BESIDE` counts with its module.
-    A module from outside (:mod:`gpca.plugins`) counts as one of the project, with what it imports of its own package
-    or, if it is a lone file, from its folder. Paths are sorted, and lead there from the working directory: relative
-    where the files lie below it, as in a run at the root of a checkout, else absolute. Modules chosen by name at run
-    time (kinds of source, encoders, explainers) are not seen and have to be given.
+    For ``module:function``, only the imports that the function needs count. Imports for type checking do not. A plugin
+    (:mod:`gpca.plugins`) counts with its imports from its package or, if it is a single file, from its folder. Paths
+    are relative where they are below the working directory, else absolute. Modules that are chosen by name at run time
+    (kinds of source, encoders, explainers) must be given.
     """
     reached: set[str] = set()
     open_modules = list(modules)
@@ -52,7 +49,7 @@ def _from(working: Path, file: Path) -> str:
     return str(file.relative_to(working) if file.is_relative_to(working) else file)
 
 
-_HOLD_STATEMENTS = (ast.stmt, ast.excepthandler, ast.match_case)  # an import is a statement: no need to go into others
+_HOLD_STATEMENTS = (ast.stmt, ast.excepthandler, ast.match_case)  # imports are statements, not expressions
 
 
 @cache
@@ -73,7 +70,7 @@ def _imports(module: str) -> tuple[str, ...]:
         elif isinstance(node, ast.ImportFrom) and (base := _base(node, module, file)):
             names |= {base} | {f"{base}.{alias.name}" for alias in node.names}
     top = module.split(".")[0]
-    if top not in PACKAGES:  # what stands in the packages around it runs first
+    if top not in PACKAGES:  # the packages around it run first
         names |= {module.rsplit(".", depth)[0] for depth in range(1, module.count(".") + 1)}
         _know_beside(top, names)
     return tuple(sorted(name for name in names if _is_followed(name, top) and _file(name) is not None))
@@ -114,7 +111,7 @@ def _used_and_bound(node: ast.AST) -> tuple[set[str], set[str]]:
 
 
 def _base(node: ast.ImportFrom, module: str, file: Path) -> str:
-    """Return the module that names are imported from; a dot stands for the package around the importing one."""
+    """Return the absolute name of the module that names are imported from."""
     if not node.level:
         return node.module or ""
     package = module.split(".") if file.stem == "__init__" else module.split(".")[:-1]
@@ -123,7 +120,7 @@ def _base(node: ast.ImportFrom, module: str, file: Path) -> str:
 
 
 def _know_beside(top: str, names: set[str]) -> None:
-    """Note where modules lie that a lone file of a user's imports from its own folder."""
+    """Note the folder of modules that a single-file plugin imports from beside it."""
     if (folder := lone_root(top)) is not None:
         for first in {name.split(".")[0] for name in names} - {*PACKAGES}:
             if (folder / f"{first}.py").is_file() or (folder / first).is_dir():
@@ -131,7 +128,7 @@ def _know_beside(top: str, names: set[str]) -> None:
 
 
 def _is_followed(name: str, importing: str) -> bool:
-    """Return whether an import leads to code that counts, seen from a module whose name begins with `importing`."""
+    """Return whether an import from a module of the package `importing` counts."""
     first = name.split(".")[0]
     if first in PACKAGES or first == importing:
         return True

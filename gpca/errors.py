@@ -34,13 +34,13 @@ def with_key(key: str, function: Callable[..., Any], *arguments: object) -> Any:
 
 
 def require_names(
-    key: str, names: Iterable[str], known: Collection[str], noun: str, left_out: Collection[str] = ()
+    key: str, names: Iterable[str], allowed: Collection[str], noun: str, left_out: Collection[str] = ()
 ) -> None:
     """Raise an InputError for the first name at a key that is unknown, or that the config leaves out."""
     for name in names:
-        if name not in known:
+        if name not in allowed:
             fault = f"{noun} '{name}' is left out" if name in left_out else f"no {noun} '{name}'"
-            raise InputError(f"config key {key}", fault, f"choose one of {', '.join(known)}")
+            raise InputError(f"config key {key}", fault, f"choose one of {', '.join(allowed)}")
 
 
 @contextmanager

@@ -35,7 +35,7 @@ class Registry(Generic[Entry]):
 
     def entries(self) -> dict[str, Entry]:
         """Return all entries by name."""
-        return {name: entry for of_module in self.by_module().values() for name, entry in of_module.items()}
+        return {name: entry for entries in self.by_module().values() for name, entry in entries.items()}
 
     def entry(self, name: str) -> Entry:
         """Return the entry of that name.

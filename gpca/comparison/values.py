@@ -226,7 +226,7 @@ def cluster_draws(
         if folder in asked.values():
             rows = read_predictions(path, ("set",) if folder[0] == "learners" else ())
             parts[folder].append(rows[rows["split"] == "test"].assign(seed=seed))
-    samples = {folder: pd.concat(of_seeds, ignore_index=True) for folder, of_seeds in parts.items()}
+    samples = {folder: pd.concat(tables, ignore_index=True) for folder, tables in parts.items()}
     weights = {
         folder: pigeonhole_weights(generator("printed", folder[1]), rows["seed"], rows["cluster"])
         for folder, rows in samples.items()

@@ -25,12 +25,12 @@ BYTES_PER_POINT = 2 * 3 * 4  # in source and target, three float32
 LARGEST_BYTES = 2**36  # a thousand times what five seeds of the paper's protocol take
 
 
-def read(config: dict, command_line: Mapping, of_module: bool = False) -> tuple[dict, dict[str, dict]]:
+def read(config: dict, command_line: Mapping, as_module: bool = False) -> tuple[dict, dict[str, dict]]:
     """Read the config of a run as Snakemake merged it.
 
     Args:
         command_line: the values given with ``--config``, whose numbers are still text.
-        of_module: whether another workflow gives it to this one as a module, so that it lacks the defaults.
+        as_module: whether another workflow gives it to this one as a module, so that it lacks the defaults.
 
     Returns:
         the config in the order of the defaults, without what it leaves out, with the limit of success in all sections;
@@ -39,7 +39,7 @@ def read(config: dict, command_line: Mapping, of_module: bool = False) -> tuple[
     Raises:
         InputError: as :func:`check`.
     """
-    whole = in_order(with_types(with_defaults(config) if of_module else config, command_line))
+    whole = in_order(with_types(with_defaults(config) if as_module else config, command_line))
     sources = check(whole)
     return with_success(without_false(whole)), sources
 
@@ -88,7 +88,7 @@ def _check_registrations(config: dict) -> None:
     """Check that settings agree with each other, and that the samples of one file fit in memory."""
     if (method := config["registrations"]["icp"]["method"]) != "point_to_point":
         fault = f"is '{method}', but uncertainty and causes are measured by reruns of point-to-point ICP"
-        remedy = "use point_to_point; exchange.methods puts other methods beneath the explainers"
+        remedy = "use point_to_point; exchange.methods replaces it by other methods below the explainers"
         raise InputError("config key registrations.icp.method", fault, remedy)
     for key, causes in {"causes": {}, "model.causes": config["model"]["causes"]}.items():
         with_key(key, CauseSettings.from_dict, config["causes"] | causes, config["registrations"]["icp"])

@@ -135,12 +135,12 @@ def require_outputs(outputs: Iterable[str | Path], inputs: Iterable[str | Path] 
     """
     taken = {Path(os.path.realpath(path)) for path in inputs}
     for output in map(Path, outputs):
-        if (place := Path(os.path.realpath(output))) in taken:
+        if (real := Path(os.path.realpath(output))) in taken:
             raise InputError(output, "is also an input or another output", "give each file its own name")
-        taken.add(place)
-        if place.exists() and not (place.is_dir() if folders else place.is_file()):  # a device would be replaced
+        taken.add(real)
+        if real.exists() and not (real.is_dir() if folders else real.is_file()):  # a device would be replaced
             raise InputError(output, f"exists but is not a {'folder' if folders else 'file'}", "choose another name")
-        existing = next(folder for folder in place.parents if os.path.lexists(folder))
+        existing = next(folder for folder in real.parents if os.path.lexists(folder))
         if not existing.is_dir():
             raise InputError(output, f"cannot be written: {existing} is not a folder", "choose another name")
         # Permissions let root write to /proc, which fails.

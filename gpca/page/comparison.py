@@ -29,24 +29,24 @@ def page_comparison(path: str | Path, reference: str | Path | None = None) -> di
     if not Path(path).is_file():
         return None
     rows = _rows(path)
-    of_reference = reference is not None and not any(row["tone"] for row in rows)
-    if reference is not None and of_reference:
+    is_reference = reference is not None and not any(row["tone"] for row in rows)
+    if reference is not None and is_reference:
         this_run = {number_of(row): row["reproduced"] for row in rows}
         rows = [row | {"this_run": this_run.get(number_of(row), "")} for row in _rows(reference)]
     tables = []
     for name in dict.fromkeys(row["table"] for row in rows):
-        of_table = [row for row in rows if row["table"] == name]
-        objects = list(dict.fromkeys(row["objects"] for row in of_table if row["objects"]))
-        for row in of_table:
+        table_rows = [row for row in rows if row["table"] == name]
+        objects = list(dict.fromkeys(row["objects"] for row in table_rows if row["objects"]))
+        for row in table_rows:
             if len(objects) == 1 or any(row["objects"].startswith(row[key]) for key in ("row", "column")):
                 row["objects"] = ""
         title = TABLES[name].title if name in TABLES else ""
         words = title if name == TEXT else f"Table {name}: {title}"
-        tables.append({"name": name, "title": words, "objects": "; ".join(objects), "rows": of_table})
+        tables.append({"name": name, "title": words, "objects": "; ".join(objects), "rows": table_rows})
     counts = Counter(row["group"] for row in rows)
     order = [*TONES, *sorted(set(counts) - {*TONES, DEVIATION, REPEAT}), DEVIATION, REPEAT]
     return {
-        "of_reference": of_reference,
+        "is_reference": is_reference,
         "tables": tables,
         "verdicts": [(verdict, TONES.get(verdict, ""), counts[verdict]) for verdict in order if counts[verdict]],
     }

@@ -96,7 +96,7 @@ def _protocol(metrics: pd.DataFrame, titles: Titles) -> Finding | None:
 
 
 def _rival(metrics: pd.DataFrame, titles: Titles) -> Finding | None:
-    means = {name: of_sources.mean() for name, of_sources in _accuracies(metrics).items()}
+    means = {name: accuracies.mean() for name, accuracies in _accuracies(metrics).items()}
     forms = {name: mean for name, mean in means.items() if name in GPCA_FORMS}
     others = {name: means[name] for name, entry in titles.explainers.items() if name in means and not entry["oracle"]}
     others = {name: mean for name, mean in others.items() if name not in forms and name not in UNTRAINED}
@@ -104,7 +104,7 @@ def _rival(metrics: pd.DataFrame, titles: Titles) -> Finding | None:
         return None
     best, best_form = max(others, key=others.__getitem__), max(forms, key=forms.__getitem__)
     text = (
-        f"{titles.explainers[best]['title']} comes first among the {len(others)} other explainers that are not told "
+        f"{titles.explainers[best]['title']} comes first among the {len(others)} other explainers without access to "
         f"the truth, with {_percent(others[best], 1)} on average over the datasets, where "
         f"{titles.explainers[best_form]['title']} has {_percent(forms[best_form], 1)}."
     )
@@ -197,7 +197,7 @@ def _recovery(metrics: pd.DataFrame, titles: Titles) -> Finding | None:
     shares = rows.groupby("method")["value"].mean()
     if "gpca" not in shares:
         return None
-    others = {"random": "random actions", "oracle": "a policy that is told the cause"}
+    others = {"random": "random actions", "oracle": "a policy that knows the cause"}
     beside = [f"{words} {_percent(shares[name])}" for name, words in others.items() if name in shares]
     text = (
         f"In a closed loop on rendered tables, GP-CA's policy repairs {_percent(shares['gpca'])} of the failed "
@@ -210,7 +210,7 @@ def _accuracies(metrics: pd.DataFrame) -> dict[str, np.ndarray]:
     """Return method -> mean accuracy over the seeds, by source."""
     rows = metrics[(metrics["metric"] == "accuracy") & (metrics["concept"] == ALL)]
     means = rows.groupby(["method", "source"])["value"].mean()
-    return {str(method): of_method.to_numpy() for method, of_method in means.groupby(level="method")}
+    return {str(method): accuracies.to_numpy() for method, accuracies in means.groupby(level="method")}
 
 
 def _median_labels(metrics: pd.DataFrame, strategy: str) -> str | None:

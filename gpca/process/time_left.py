@@ -102,8 +102,8 @@ def tell_time_left(workflow: Any, run: str) -> None:
     by_rule = times.get(run, times.get(USUAL_RUN, {}))
     jobs = {str(job.benchmark): job for job in workflow.dag.needrun_jobs() if job.benchmark}
     before = {path: seconds_of(path) for path in jobs}
-    of_rule = {path: by_rule.get(job.rule.name) for path, job in jobs.items()}
-    expected = {path: of_rule[path] if before[path] is None else before[path] for path in jobs}
+    usual = {path: by_rule.get(job.rule.name) for path, job in jobs.items()}
+    expected = {path: usual[path] if before[path] is None else before[path] for path in jobs}
     if not any(expected.values()):
         return
     side_by_side = workflow.cores if workflow.local_exec else workflow.nodes

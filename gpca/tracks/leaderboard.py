@@ -90,7 +90,7 @@ def table_of(
                 cells["icp_calls"] = plain_cell(method.icp_calls, seeds, samples)
             cells["samples"] = plain_cell(samples, seeds, samples)
             title = AGAIN[CEILING] if method is None else (MARK if name in submitted else "") + method.title
-            reads = "truth" if method is None else method.reads or "not said"
+            reads = "truth" if method is None else method.reads or "unknown"
             labels, few = [(name, title), (reads, reads)], ""
             if heads:
                 states = {state: states_of_group[group][state] for state in track.required_states}

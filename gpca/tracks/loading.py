@@ -130,8 +130,8 @@ def load(
     source = source or parts[0][0]
     require_known("source", source, sorted({name for name, _ in parts}))
     if (source, seed) not in parts:
-        known = ", ".join(str(number) for name, number in parts if name == source)
-        raise InputError(f"seed {seed}", f"has no samples of the track {track}", f"choose one of {known}")
+        seeds = ", ".join(str(number) for name, number in parts if name == source)
+        raise InputError(f"seed {seed}", f"has no samples of the track {track}", f"choose one of {seeds}")
     if split is not None:
         require_known("split", split, SPLITS)
     if split == "train" and chosen.track.without_training:

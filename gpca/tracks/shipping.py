@@ -52,12 +52,12 @@ def collect(track: Track, run: Path, config: Mapping[str, Any]) -> Published:
         causes = Causes.load(run / track.file(*part), part)
         tested[part] = causes.subset(causes.rows("test"))
     methods = []
-    for key, of_method in _predictions(track, run, config, parts).items():
+    for key, by_part in _predictions(track, run, config, parts).items():
         for part in parts:
             samples = [str(number) for number in tested[part].registrations.sample]
-            if part not in of_method or of_method[part]["sample"].tolist() != samples:
+            if part not in by_part or by_part[part]["sample"].tolist() != samples:
                 raise InputError(run, "has predictions of other test samples than its own", "finish the run")
-        methods.append(_method(key, track, config, [of_method[part] for part in parts]))
+        methods.append(_method(key, track, config, [by_part[part] for part in parts]))
     optional = [pattern.format(source=source, seed=seed) for pattern in track.read for source, seed in parts]
     optional += [
         f"{folder}/{source}/seed{seed}.npz"
@@ -77,7 +77,7 @@ def _rows(track: Track, run: Path, tested: Mapping[Part, Causes]) -> Rows:
     columns: dict[str, list] = {}
     for (source, seed), causes in tested.items():
         n, registrations = len(causes), causes.registrations
-        of_part: dict[str, Any] = {
+        arrays: dict[str, Any] = {
             "source": np.full(n, source),
             "seed": np.full(n, seed),
             "sample": registrations.sample,
@@ -98,7 +98,7 @@ def _rows(track: Track, run: Path, tested: Mapping[Part, Causes]) -> Rows:
         }
         if track.name == FRAMES_TRACK:
             rows = _sample_rows(run / f"frame_causes/seed{seed}.csv", SAMPLE_COLUMNS, registrations.sample)
-            of_part |= {
+            arrays |= {
                 "start": rows["start"].to_numpy(str),
                 "instance": rows["instance"].to_numpy(int),
                 "scene": (rows["dataset"] + " " + rows["scene"]).to_numpy(str),
@@ -107,8 +107,8 @@ def _rows(track: Track, run: Path, tested: Mapping[Part, Causes]) -> Rows:
         if track.name == SCANS_TRACK:
             path = run / f"scan_causes/{source}/seed{seed}.csv"
             rows = _sample_rows(path, SCAN_COLUMNS, registrations.sample)
-            of_part |= {"start": rows["start"].to_numpy(str), "counted": numbers(path, rows, "times") == 0}
-        for name, column in of_part.items():
+            arrays |= {"start": rows["start"].to_numpy(str), "counted": numbers(path, rows, "times") == 0}
+        for name, column in arrays.items():
             columns.setdefault(name, []).append(column)
     return Rows(**{name: np.concatenate(parts) for name, parts in columns.items()})
 
@@ -136,8 +136,8 @@ def _predictions(
             raise InputError(path, "is of other data sets than there are samples of", "finish the run")
         for column, wanted in {"control": HARD, "scans": source}.items():
             rows = rows[rows[column] == wanted] if column in rows else rows
-        for (name, learned), of_method in rows.groupby(["explainer", "learned"], sort=False):
-            test_rows = of_method[of_method["split"] == "test"]
+        for (name, learned), method_rows in rows.groupby(["explainer", "learned"], sort=False):
+            test_rows = method_rows[method_rows["split"] == "test"]
             predictions.setdefault((str(name), str(learned)), {})[source, seed] = test_rows
     if not predictions:
         raise InputError(run, f"has no predictions for the track {track.name}", "finish the run")

@@ -202,8 +202,8 @@ def _predict_scans(trial: Trial, seed: int, sets: list[str]):
     files = {kind: samples.files(f"{kind}/{each}/seed{seed}.npz" for each in sets) for kind in kinds}
     folders = {"encoders": "cause_encoders"} if reads == EMBEDDED else {}
     if trial.training == OBJECTS:
-        of_objects = reads if reads in FOLDERS else DESCRIBED
-        folders |= {"causes": "causes", of_objects: FOLDERS[of_objects]}
+        kind = reads if reads in FOLDERS else DESCRIBED
+        folders |= {"causes": "causes", kind: FOLDERS[kind]}
     settings = diagnosis_settings(samples.config, {trial.name: [trial.training]}, {trial.name: trial.settings})
     with TemporaryDirectory() as folder:
         path = Path(folder) / f"seed{seed}.csv"

@@ -53,11 +53,11 @@ def test_where_nothing_is_judged_the_verdicts_are_the_references(tmp_path):
     reference = written(tmp_path / "real", HEAD + "".join(LINES))
     own = LINES[0].replace(",close,", ",not comparable,").replace("97.44", "88.8")
     shown = page_comparison(written(tmp_path, HEAD + own), reference)
-    assert shown["of_reference"]
+    assert shown["is_reference"]
     assert [row["verdict"] for row in rows_of(shown)] == ["close", "reproduced", "not reproduced", "not run"]
     assert [row["this_run"] for row in rows_of(shown)] == ["88.8", "", "", ""]
     judged = page_comparison(written(tmp_path, HEAD + own + LINES[1]), reference)
-    assert not judged["of_reference"]
+    assert not judged["is_reference"]
     assert [row["verdict"] for row in rows_of(judged)] == ["not comparable", "reproduced"]
 
 
