@@ -12,7 +12,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
 import torch
 
 from gpca.active_learning.labeling import SKIPPED, LabelFile, Question, Queue, Session, is_queue, require_name
@@ -64,16 +63,26 @@ def run_label(options: Namespace) -> None:
     require_file(options.registrations, "no such file", "make it with Snakemake, or by 'gpca explain --queue'")
     queued = is_queue(options.registrations)
     _require_fitting(options, queued)
-    registrations, h_S_d, model = _queued(options) if queued else (*_load(options), None)
-    if isinstance(registrations, Queue):
-        keys = [("train", row) for row in range(len(registrations))]
-        start = {}
+    registrations: Registrations | Queue
+    model: Model | None = None
+    start: dict[tuple[str, int], str] = {}
+    if queued:
+        registrations, model = _queued(options)
+        h_S_d, keys = registrations.h, [("train", row) for row in range(len(registrations))]
     else:
+        registrations = Registrations.load(options.registrations)
+        h_S_d = read_embedding(options.embeddings, registrations)["embedding"]
         keys = list(zip(registrations.split.tolist(), registrations.sample.tolist(), strict=True))
-        start = _start(registrations, keys, options)
+        # The first training samples of the given concepts, equally many of each.
+        each, train = max(1, options.initial // len(options.known)), registrations.rows("train")
+        for concept in options.known:
+            rows = train[registrations.concept[train] == concept][:each]
+            start |= {keys[row]: str(registrations.concept[row]) for row in rows}
     labels = LabelFile(options.labels, dict.fromkeys(keys))
     session = Session(h_S_d, keys, start, labels, settings, options.strategy, gpc=None if model is None else model.gpc)
-    answers = _answers(options.answers)
+    if options.answers is not None:
+        require_file(options.answers, "no such file", "give a text file with one answer per line")
+    answers = sys.stdin if options.answers is None else options.answers.open(encoding="utf-8")
     questions_asked = 0
     print(f"{len(start)} labeled at the start, {len(session.answered)} answered before, {len(keys)} samples")
     print("answer with a concept or with " + ", ".join(f"{name} ({what})" for name, what in COMMANDS.items()))
@@ -106,7 +115,7 @@ def _require_fitting(options: Namespace, queued: bool) -> None:
                 raise InputError(f"--{name}", "is for the queue of an explanation alone", "leave it out")
 
 
-def _queued(options: Namespace) -> tuple[Queue, np.ndarray, Model]:
+def _queued(options: Namespace) -> tuple[Queue, Model]:
     from gpca.model.file import Model
     from gpca.model.location import model_path
 
@@ -116,27 +125,7 @@ def _queued(options: Namespace) -> tuple[Queue, np.ndarray, Model]:
     if queue.h.shape[1] != width:
         fault = f"holds embeddings of {queue.h.shape[1]} numbers, but those of {path} have {width}"
         raise InputError(options.registrations, fault, "name the model that explained them with --model")
-    return queue, queue.h, model
-
-
-def _load(options: Namespace) -> tuple[Registrations, np.ndarray]:
-    registrations = Registrations.load(options.registrations)
-    return registrations, read_embedding(options.embeddings, registrations)["embedding"]
-
-
-def _start(registrations: Registrations, keys: list, options: Namespace) -> dict:
-    """Return the first training samples of the known concepts, as many of each, with their labels."""
-    each = max(1, options.initial // len(options.known))
-    train = registrations.rows("train")
-    rows = [row for concept in options.known for row in train[registrations.concept[train] == concept][:each]]
-    return {keys[row]: str(registrations.concept[row]) for row in rows}
-
-
-def _answers(path: Path | None):
-    if path is None:
-        return sys.stdin
-    require_file(path, "no such file", "give a text file with one answer per line")
-    return path.open(encoding="utf-8")
+    return queue, model
 
 
 def _ask(

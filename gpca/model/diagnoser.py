@@ -293,9 +293,10 @@ def calibrated(training: TrainingSet, judged: Judgment, false_alarms: float) -> 
     """
     scores_N_5 = state_probabilities(judged)
     family_N = training.family_N if highest_level(0, training.family_N) >= LEVEL else None
-    options = {"level": LEVEL, "missed": MISSED, "false_alarms": false_alarms}
-    by_family = calibrate(scores_N_5, training.state_N, family_N, **options)
-    single = calibrate(scores_N_5, training.state_N, None, **options)
+    by_family, single = (
+        calibrate(scores_N_5, training.state_N, families, level=LEVEL, missed=MISSED, false_alarms=false_alarms)
+        for families in (family_N, None)
+    )
     return Guarantee(by_family.state_sets, single.failure_alarm, by_family.samples, by_family.families)
 
 

@@ -167,44 +167,37 @@ def follow_reenactment(means: Means) -> Decide:
 def gated(make: Callable[[Means], Decide]) -> Callable[[Means], Decide]:
     """Let a policy act only if the gate raises an alarm at the start."""
 
-    def make_gated(means: Means) -> Decide:
-        gate = means.gate
-        assert gate is not None
+    def alarms(means: Means, case: Case) -> bool:
+        assert means.gate is not None and case.observed_F is not None
+        return means.gate.alarms(case.observed_F)
 
-        def alarms(case: Case) -> bool:
-            assert case.observed_F is not None
-            return gate.alarms(case.observed_F)
-
-        return _unless_good(make(means), alarms)
-
-    return make_gated
+    return _unless_good(make, alarms)
 
 
 def gated_by_reenactment(make: Callable[[Means], Decide]) -> Callable[[Means], Decide]:
     """Let a policy act only if the re-enactment raises an alarm at the start."""
 
-    def make_gated(means: Means) -> Decide:
-        threshold = means.alarm
-        assert threshold is not None
+    def alarms(means: Means, case: Case) -> bool:
+        assert means.alarm is not None and case.reenacted is not None
+        return case.reenacted.belief.failure > means.alarm
 
-        def alarms(case: Case) -> bool:
-            assert case.reenacted is not None
-            return case.reenacted.belief.failure > threshold
-
-        return _unless_good(make(means), alarms)
-
-    return make_gated
+    return _unless_good(make, alarms)
 
 
-def _unless_good(decide: Decide, alarms: Callable[[Case], bool]) -> Decide:
+def _unless_good(make: Callable[[Means], Decide], alarms: Callable[[Means, Case], bool]) -> Callable[[Means], Decide]:
     """Ask for the alarm at the start only: a later decision means that the pose is still wrong."""
 
-    def decide_gated(case: Case) -> Decision:
-        if case.actions or alarms(case):
-            return decide(case)
-        return Decision(NOTHING, "", "it is taken for good")
+    def make_gated(means: Means) -> Decide:
+        decide = make(means)
 
-    return decide_gated
+        def decide_gated(case: Case) -> Decision:
+            if case.actions or alarms(means, case):
+                return decide(case)
+            return Decision(NOTHING, "", "it is taken for good")
+
+        return decide_gated
+
+    return make_gated
 
 
 def follow_truth(means: Means) -> Decide:

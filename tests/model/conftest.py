@@ -1,11 +1,12 @@
 """A model file beside a mesh, to be spoiled and explained with; an explainer, and a pair to explain."""
 
 import pytest
+import trimesh
 
 from gpca import Explainer
 from gpca.alignment.rigid import inverse, transform
 
-from .spoiled import BALL
+BALL = trimesh.creation.icosphere(3, radius=50)
 
 
 @pytest.fixture(scope="module")

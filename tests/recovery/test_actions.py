@@ -1,3 +1,7 @@
+"""Actions of a robot, and what it observes."""
+
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -5,7 +9,7 @@ from gpca.alignment.rigid import inverse, rotation_angle_rad
 from gpca.errors import InputError
 from gpca.experiments.recovery.cases import RobotIn, register_after, register_held
 from gpca.recovery import actions
-from gpca.recovery.actions import ACTIONS, action_of, best_start
+from gpca.recovery.actions import ACTIONS, OBSERVED, action_of, best_start, observe
 from tests.failures import LOOP
 
 from ..documents import block
@@ -65,3 +69,23 @@ def test_the_pose_that_explains_the_shots_is_started_from(start):
 def test_unknown_actions_and_settings_are_refused(name, given, fault):
     with pytest.raises(InputError, match=fault):
         action_of(name, given)
+
+
+def observed(situation, holding, record, seed=0):
+    numbers = observe(holding, record, RobotIn(situation), np.random.default_rng(seed))
+    return dict(zip(OBSERVED, numbers, strict=True))
+
+
+def test_a_wrong_pose_loses_to_a_rival_and_a_right_one_does_not(start):
+    situation, outcome = start
+    wrong = observed(situation, outcome.holding, outcome.record)
+    right = observed(situation, replace(outcome.holding, T_world_object=situation.T_world_object), outcome.record)
+    assert wrong["rival_gain"] > 0.1 > right["rival_gain"]
+    assert wrong["rival_distance"] > right["rival_distance"]
+    assert all(0 <= numbers["rivals"] <= 1 for numbers in (wrong, right))
+    assert np.isfinite([*wrong.values()]).all()
+
+
+def test_what_is_observed_hangs_on_the_named_random_numbers_alone(start):
+    situation, outcome = start
+    assert observed(situation, outcome.holding, outcome.record) == observed(situation, outcome.holding, outcome.record)

@@ -1,13 +1,56 @@
-"""Model files whose GP-CA, diagnoser, settings or names hold what cannot be, through loading and ``explain``."""
+"""Model files that are damaged, or contain impossible values, and files of points and poses that cannot be used."""
 
+import functools
+import zipfile
+
+import numpy as np
 import pytest
 import torch
+import trimesh
 
 from gpca.errors import InputError
 from gpca.model.file import Model
 
 from ..hostile import refusal
-from .spoiled import EXPLAIN, HUGE, NAN, drop, indefinite, put, spoil
+from .conftest import BALL
+
+EXPLAIN = ["explain", "ball.ply", "ball.ply", "--unit", "mm", "--model", "model.pt"]
+NAN, HUGE = float("nan"), 10**9
+
+
+def part(content, path):
+    """The mapping that a path of names ends in, and its last name."""
+    *parents, last = path.split("/")
+    return functools.reduce(lambda inner, name: inner[name], parents, content), last
+
+
+def put(path, value):
+    def spoil(content):
+        inner, last = part(content, path)
+        inner[last] = value(inner[last]) if callable(value) else value
+
+    return spoil
+
+
+def drop(path):
+    def spoil(content):
+        inner, last = part(content, path)
+        del inner[last]
+
+    return spoil
+
+
+def spoil(path, change):
+    content = torch.load(path, weights_only=True)
+    change(content)
+    torch.save(content, path)
+
+
+def indefinite(covariance):
+    """Variances above 0, and between the first two values a correlation of 2."""
+    covariance = covariance.clone()
+    covariance[:, 0, 1] = covariance[:, 1, 0] = 2 * (covariance[:, 0, 0] * covariance[:, 1, 1]).sqrt()
+    return covariance
 
 
 def weight(content):
@@ -144,3 +187,164 @@ def test_a_model_with_what_cannot_be_is_not_loaded(fault, folder):
 def test_a_model_that_would_hang_or_fill_the_memory_is_refused(fault, folder):
     spoil(folder / "model.pt", CONTENTS[fault])
     refusal(EXPLAIN, folder, "model.pt", "make one with")
+
+
+def members(path, change):
+    """Write the zip anew, each member as `change` gives it: name, content and compression."""
+    with zipfile.ZipFile(path) as archive:
+        found = [(info.filename, archive.read(info)) for info in archive.infolist()]
+    with zipfile.ZipFile(path, "w", compresslevel=1) as archive:
+        for name, content in found:
+            for new_name, new_content, compression in change(name, content):
+                archive.writestr(new_name, new_content, compression)
+
+
+def is_data(name):
+    return name.endswith("/data/0")
+
+
+FILES = {
+    "nothing": lambda path: path.write_bytes(b""),
+    "half of it": lambda path: path.write_bytes(path.read_bytes()[: path.stat().st_size // 2]),
+    "text": lambda path: path.write_text("version https://git-lfs.github.com/spec/v1\n"),
+    "a folder": lambda path: (path.unlink(), path.mkdir()),
+    "a device": lambda path: (path.unlink(), path.symlink_to("/dev/zero")),
+    "code": lambda path: torch.save(print, path),
+    "an old pickle": lambda path: torch.save({"format": "GP-CA model"}, path, _use_new_zipfile_serialization=False),
+    "a compressed bomb": lambda path: members(
+        path,
+        lambda name, content: [(name, bytes(600 << 20) if is_data(name) else content, zipfile.ZIP_DEFLATED)],
+    ),
+    "a member that is gone": lambda path: members(
+        path, lambda name, content: [] if is_data(name) else [(name, content, zipfile.ZIP_STORED)]
+    ),
+    "a member that is too short": lambda path: members(
+        path, lambda name, content: [(name, content[:8] if is_data(name) else content, zipfile.ZIP_STORED)]
+    ),
+}
+
+
+@pytest.mark.parametrize("fault", FILES)
+def test_a_file_that_is_no_model_is_refused(fault, folder):
+    FILES[fault](folder / "model.pt")
+    refusal(EXPLAIN, folder, "model.pt", "make one with")
+
+
+def flip(content, position):
+    changed = bytearray(content)
+    changed[position] ^= 1 << (position % 8)
+    return bytes(changed)
+
+
+@pytest.mark.parametrize("share", [0.05, 0.5, 0.95])
+def test_a_flipped_bit_in_the_data_is_found(share, folder):
+    path = folder / "model.pt"
+    with zipfile.ZipFile(path) as archive:
+        tensors = [info for info in archive.infolist() if "/data/" in info.filename]
+        info = max(tensors, key=lambda info: info.file_size)
+        content = archive.read(info)
+    start = path.read_bytes().index(content)
+    path.write_bytes(flip(path.read_bytes(), start + int(share * len(content))))
+    refusal(EXPLAIN, folder, "model.pt", "checksum")
+
+
+def tensors_of(model):
+    kernel = model.gpc.state()["kernel"]
+    return [
+        *model.encoder.state_dict().values(),
+        *kernel.values(),
+        *map(torch.as_tensor, vars(model.gpc._latents).values()),
+    ]
+
+
+def test_a_flipped_bit_anywhere_is_found_or_harmless(saved, tmp_path):
+    """Data, headers, padding, directory: 400 places, drawn anew nowhere."""
+    content, expected = saved.read_bytes(), Model.load(saved)
+    path = tmp_path / "model.pt"
+    found = 0
+    for position in np.random.default_rng(0).integers(len(content), size=400):
+        path.write_bytes(flip(content, int(position)))
+        try:
+            loaded = Model.load(path)
+        except InputError:
+            found += 1
+            continue
+        assert all(map(torch.equal, tensors_of(loaded), tensors_of(expected)))
+        for name in ("encoder_settings", "icp", "cloud_points", "policy", "title", "stand_in", "concepts"):
+            assert getattr(loaded, name) == getattr(expected, name)
+    assert found > 200
+
+
+POINTS = np.random.default_rng(0).normal(size=(200, 3)) * 30
+
+
+def cloud(points):
+    return lambda path: trimesh.PointCloud(points).export(path)
+
+
+def ascii_cloud(rows, properties="xyz"):
+    head = "\n".join(
+        ["ply", "format ascii 1.0", f"element vertex {len(rows)}", *(f"property float {p}" for p in properties)]
+    )
+    return lambda path: path.write_text("\n".join([head, "end_header", *(" ".join(map(str, row)) for row in rows), ""]))
+
+
+def pcd(rows):
+    head = f"FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH {len(rows)}\nHEIGHT 1\n"
+    head += f"POINTS {len(rows)}\nDATA ascii\n"
+    return lambda path: path.write_text(head + "".join(" ".join(map(str, row)) + "\n" for row in rows))
+
+
+CLOUDS = {
+    "empty.ply": ascii_cloud([]),
+    "nothing.ply": lambda path: path.touch(),
+    "one.ply": cloud(POINTS[:1]),
+    "few.ply": cloud(POINTS[:63]),
+    "nan.ply": ascii_cloud([*POINTS[1:], ("nan", 0, 0)]),
+    "two.ply": ascii_cloud(POINTS[:, :2], "xy"),
+    "wide.ply": ascii_cloud([(1051, *row) for row in POINTS]),
+    "same.ply": ascii_cloud([(1, 2, 3)] * 200),
+    "huge.ply": ascii_cloud(POINTS * 1e30),
+    "metres.ply": cloud(POINTS / 1000),
+    "giant.ply": lambda path: path.open("wb").truncate(5 * 10**9),
+    "device.ply": lambda path: path.symlink_to("/dev/zero"),
+    "folder.ply": lambda path: path.mkdir(),
+    "nan.pcd": pcd([*POINTS[1:], ("nan", 0, 0)]),
+    "two.pcd": pcd(POINTS[:, :2]),
+    "points.txt": lambda path: np.savetxt(path, POINTS),
+    "two.npy": lambda path: np.save(path, POINTS[:, :2]),
+    "objects.npy": lambda path: np.save(path, np.array([{}] * 99), allow_pickle=True),
+    "pickle.npz": lambda path: np.savez(path, points=np.array([{}] * 99)),
+    "wide.npz": lambda path: np.savez(path, first=POINTS, second=POINTS),
+    "nan.xyz": lambda path: np.savetxt(path, np.where(POINTS > 60, np.nan, POINTS)),
+    "words.csv": lambda path: path.write_text("a,b,c\n1,2,3\n"),
+    "odd.bin": lambda path: path.write_bytes(bytes(1001)),
+    "scan.las": lambda path: path.write_bytes(b"LASF"),
+    "scene.glb": lambda path: path.write_bytes(BALL.export(file_type="glb")[:500]),
+}
+
+
+@pytest.mark.parametrize(("name", "role"), [(name, i % 2) for i, name in enumerate(CLOUDS)])
+def test_points_that_cannot_be_explained_are_refused(name, role, folder):
+    CLOUDS[name](folder / name)
+    files = ["ball.ply", "ball.ply"]
+    files[role] = name
+    refusal(["explain", *files, *EXPLAIN[3:]], folder, name)
+
+
+POSES = {
+    "empty": "",
+    "short": "1 0 0 0",
+    "words": "one " * 16,
+    "nan": "nan " * 16,
+    "mirrored": "-1 0 0 0  0 1 0 0  0 0 1 0  0 0 0 1",
+    "scaled": "2 0 0 0  0 2 0 0  0 0 2 0  0 0 0 1",
+    "last row": "1 0 0 0  0 1 0 0  0 0 1 0  0 0 0 2",
+    "giant": "0 " * 10**6,
+}
+
+
+@pytest.mark.parametrize("fault", POSES)
+def test_a_start_that_is_no_pose_is_refused(fault, folder):
+    (folder / "pose.txt").write_bytes(POSES[fault].encode("utf-8", "surrogateescape"))
+    refusal([*EXPLAIN, "--init", "pose.txt"], folder, "pose.txt")
