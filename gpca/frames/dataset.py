@@ -185,16 +185,16 @@ def datasets_of(
     entries = resolve_datasets(datasets, data_dir)
     if not entries:
         raise InputError("real_world.datasets", "is empty", "name a dataset, or the folder of the step scenes")
-    return {
-        name: Dataset(
-            name,
-            tuple(folders(entry, downloads)),
-            places=read_scene_splits(splits, name) if splits else {},
-            role=role,
-            **_dataset_options(entry),
+    found = {}
+    for name, entry in entries.items():
+        options = {key: entry[key] for key in ("unit", "split", "most_frames") if key in entry}
+        options |= {key: Path(entry[key]) if entry.get(key) else None for key in ("models", "errors")}
+        places = read_scene_splits(splits, name) if splits else {}
+        results = tuple(map(Path, entry["results"]))
+        found[name] = Dataset(
+            name, tuple(folders(entry, downloads)), places=places, role=role, results=results, **options
         )
-        for name, entry in entries.items()
-    }
+    return found
 
 
 def models_of(datasets: Mapping[str, Dataset]) -> dict[str, dict[int, CenteredModel]]:
@@ -264,9 +264,3 @@ def simplified(surface: Surface, most_faces: int = MOST_FACES) -> Surface:
     mesh = o3d.geometry.TriangleMesh(vertices(surface.vertices_m), triangles(surface.faces.astype(np.int32)))
     mesh = mesh.simplify_quadric_decimation(most_faces)
     return Surface(surface.name, np.asarray(mesh.vertices), np.asarray(mesh.triangles).astype(np.int64))
-
-
-def _dataset_options(entry: dict) -> dict:
-    options = {name: entry[name] for name in ("unit", "split", "most_frames") if name in entry}
-    paths = {name: Path(entry[name]) if entry.get(name) else None for name in ("models", "errors")}
-    return options | paths | {"results": tuple(map(Path, entry["results"]))}

@@ -8,70 +8,54 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from gpca.alignment.rigid import inverse, scale_translation, transform
+from gpca.alignment.rigid import inverse, rigid_motion, scale_translation, transform
 from gpca.errors import InputError
 
-# Diameters, from the median measured point to the model. Of 223 annotated objects of five datasets the worst lies at
-# 0.034; turned at random in its place, the worst lies at 0.298. What is farther is not where its pose says.
+# Median distance of measured points from the model, in diameters. Of 223 annotated objects of five datasets the worst
+# is at 0.034; turned at random, the worst is at 0.298. Objects that are farther away do not fit their poses.
 FARTHEST = 0.3
 JUDGED_POINTS = 200  # of each object, enough for a median
-NEARER = 3.0  # so many times nearer than FARTHEST lies an object once the fault is undone that explains its place
+NEARER = 3.0  # a fault explains an object if undoing it brings the points this many times nearer than FARTHEST
 
-# The same of a whole dataset, whose median object is judged: in diameters, or in meters where that is more, because the
-# noise of a sensor does not shrink with the object. Of five datasets the worst lies at 0.56 of this limit; with all
-# poses 30 mm off or every R the identity the best lies at 1.5 (docs/real_world.md).
+# Limit for the median object of a dataset: in diameters, or in meters where that is more, since sensor noise does not
+# shrink with the object. Of five datasets the worst is at 0.56 of this limit; with all poses 30 mm off or every R the
+# identity, the best is at 1.5 (docs/real_world.md).
 FAR, FAR_M = 0.03, 0.004
 JUDGED_OBJECTS = 64
-# A shared fault is one whose undoing brings the points so many times nearer. Focal lengths that are 1.1 times too long
-# lie within the limit above, and 2.0 to 2.7 times nearer when undone; what is correct is no nearer in any other form.
+# Undoing a shared fault brings the points this many times nearer. Focal lengths that are 1.1 times too long are within
+# the limit above, and 2.0 to 2.7 times nearer when undone; correct data are no nearer in any other form.
 SHARED_NEARER = 1.5
 
-MIRROR = np.diag([-1.0, 1.0, 1.0])
-TO_OPENGL = np.diag([1.0, -1.0, -1.0, 1.0])
 Undo = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
-def _turned(T_camera_model: np.ndarray) -> np.ndarray:
-    T = T_camera_model.copy()
-    T[:3, :3] = T[:3, :3].T
-    return T
+def _transposed(T_camera_model: np.ndarray) -> np.ndarray:
+    return rigid_motion(T_camera_model[:3, :3].T, T_camera_model[:3, 3])
 
 
-def _scaled_depth(factor: float) -> Undo:
-    return lambda T, points: (T, factor * points)
-
-
-def _scaled_pose(factor: float) -> Undo:
-    return lambda T, points: (scale_translation(T, factor), points)
-
-
-def _scaled_focal_length(factor: float) -> Undo:
-    return lambda T, points: (T, points / (factor, factor, 1.0))
-
-
-# What people do to a pose or a camera, and how it is undone: (T_camera_model, points in the camera's frame) -> the same
-# as they were meant.
+# Usual mistakes about a pose or a camera, and how to undo them, from T_camera_model and points in the camera's frame.
 FAULTS: dict[str, Undo] = {
-    "is cam_t_m2c in meters? the format requires millimeters": _scaled_pose(1000),
-    "is cam_t_m2c in centimeters? the format requires millimeters": _scaled_pose(10),
-    "is cam_t_m2c in micrometers? the format requires millimeters": _scaled_pose(0.001),
-    "is cam_R_m2c listed by columns? the format requires rows": lambda T, points: (_turned(T), points),
+    "is cam_t_m2c in meters? the format requires millimeters": lambda T, points: (scale_translation(T, 1000), points),
+    "is cam_t_m2c in centimeters? the format requires millimeters": lambda T, points: (
+        scale_translation(T, 10),
+        points,
+    ),
+    "is cam_t_m2c in micrometers? the format requires millimeters": (
+        lambda T, points: (scale_translation(T, 0.001), points)
+    ),
+    "is cam_R_m2c listed by columns? the format requires rows": lambda T, points: (_transposed(T), points),
     "is the pose from camera to model? the format requires model to camera": lambda T, points: (inverse(T), points),
-    "are the camera axes OpenGL's? the format's y points down and z forward": lambda T, points: (TO_OPENGL @ T, points),
-    "is the image mirrored?": lambda T, points: (T, points @ MIRROR),
-    **{
-        f"is depth_scale wrong? the depth fits when it is {factor:g} times as large": _scaled_depth(factor)
-        for factor in (0.001, 0.01, 0.1, 0.25, 0.5, 2, 4, 10, 100, 1000)
-    },
-    **{
-        f"is cam_K wrong? the depth fits when its focal lengths are about {factor:g} times as long": (
-            _scaled_focal_length(factor)
-        )
-        for factor in (0.5, 0.67, 0.8, 0.85, 0.9, 0.95, 1.05, 1.1, 1.15, 1.25, 1.5, 2)
-    },
+    "are the camera axes OpenGL's? the format's y points down and z forward": (
+        lambda T, points: (np.diag([1.0, -1.0, -1.0, 1.0]) @ T, points)
+    ),
+    "is the image mirrored?": lambda T, points: (T, points @ np.diag([-1.0, 1.0, 1.0])),
 }
-UNKNOWN = "check its pose, mask, cam_K and depth_scale"
-UNKNOWN_SHARED = "check cam_R_m2c and cam_t_m2c, cam_K, and that the models are those that the poses were made for"
+for factor in (0.001, 0.01, 0.1, 0.25, 0.5, 2, 4, 10, 100, 1000):
+    reason = f"is depth_scale wrong? the depth fits when it is {factor:g} times as large"
+    FAULTS[reason] = lambda T, points, factor=factor: (T, factor * points)
+for factor in (0.5, 0.67, 0.8, 0.85, 0.9, 0.95, 1.05, 1.1, 1.15, 1.25, 1.5, 2):
+    reason = f"is cam_K wrong? the depth fits when its focal lengths are about {factor:g} times as long"
+    FAULTS[reason] = lambda T, points, factor=factor: (T, points / (factor, factor, 1.0))
 
 
 @dataclass(frozen=True)
@@ -128,7 +112,7 @@ def require_plausible(observed: Observation) -> None:
         observed.subject,
         f"half of its measured points lie {1e3 * distance * observed.diameter_m:.0f} mm or more from the model in the "
         f"annotated pose, {distance:.2g} diameters",
-        likeliest if undone[likeliest] * NEARER < FARTHEST else UNKNOWN,
+        likeliest if undone[likeliest] * NEARER < FARTHEST else "check its pose, mask, cam_K and depth_scale",
     )
 
 
@@ -162,5 +146,7 @@ def require_shared_form(dataset: str, observations: Sequence[Observation]) -> No
         raise InputError(
             subject,
             f"{fault}, above the limit of {100 * FAR:g} % or {1e3 * FAR_M:g} mm, whichever is more",
-            "every cam_R_m2c is the identity: fill in the rotations" if identity else UNKNOWN_SHARED,
+            "every cam_R_m2c is the identity: fill in the rotations"
+            if identity
+            else "check cam_R_m2c and cam_t_m2c, cam_K, and that the models are those that the poses were made for",
         )

@@ -68,7 +68,8 @@ def all_starts(
         InputError: a faulty file of results or errors.
     """
     found = _estimated(instances, objects, datasets, models)
-    found += [(i, NATIVE, GLOBAL, instances.T_camera_object_init[i]) for i in np.flatnonzero(_is_global(instances))]
+    by_features = np.flatnonzero(instances.init_from == GLOBAL)
+    found += [(i, NATIVE, GLOBAL, instances.T_camera_object_init[i]) for i in by_features]
     for number, (turn_deg, shift) in enumerate(rungs):
         name = f"{turn_deg:g} deg, {shift:g} d"
         for i in range(len(instances)):
@@ -82,10 +83,6 @@ def all_starts(
     return Starts(
         np.array(instance_K, int), np.array(kind_K, str), np.array(from_K, str), np.array(T_K, float).reshape(-1, 4, 4)
     )
-
-
-def _is_global(instances: Instances) -> np.ndarray:
-    return instances.init_from == GLOBAL
 
 
 def _axes(instances: Instances, i: int) -> tuple:

@@ -138,12 +138,19 @@ def occlude(
         pixels_P_2: (u, v) of points of instance i.
         share: of these pixels, to be covered.
     """
-    others = np.flatnonzero(
-        (instances.dataset == instances.dataset[i]) & (instances.object_index != instances.object_index[i])
-    )
+    from scipy.ndimage import binary_closing
+
+    same_dataset_I = instances.dataset == instances.dataset[i]
+    others = np.flatnonzero(same_dataset_I & (instances.object_index != instances.object_index[i]))
     center = pixels_P_2.mean(axis=0)
     for other in random.permutation(others):
-        silhouette, corner = _silhouette(instances.pixels_of(other))
+        pixels = instances.pixels_of(other)
+        corner = pixels.min(axis=0)
+        u, v = (pixels - corner).T
+        mask = np.zeros((v.max() + 1, u.max() + 1), bool)
+        mask[v, u] = True
+        # Closed where single pixels were not measured.
+        silhouette = binary_closing(np.pad(mask, 3), iterations=2)[3:-3, 3:-3]
         angle = random.uniform(0, 2 * np.pi)
         direction = np.array([np.cos(angle), np.sin(angle)])
         reach = np.linalg.norm(np.ptp(pixels_P_2, axis=0)) + np.linalg.norm(silhouette.shape)
@@ -155,17 +162,6 @@ def occlude(
         if abs(covered_P.mean() - share) <= TOLERANCE:
             return ~covered_P
     return None
-
-
-def _silhouette(pixels_P_2: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the mask in its bounding box, single unmeasured pixels closed, and the corner of the box."""
-    from scipy.ndimage import binary_closing
-
-    corner = pixels_P_2.min(axis=0)
-    u, v = (pixels_P_2 - corner).T
-    mask = np.zeros((v.max() + 1, u.max() + 1), bool)
-    mask[v, u] = True
-    return binary_closing(np.pad(mask, 3), iterations=2)[3:-3, 3:-3], corner
 
 
 def _covers(silhouette: np.ndarray, pixels_P_2: np.ndarray) -> np.ndarray:

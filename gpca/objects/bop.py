@@ -43,7 +43,14 @@ def surfaces(folder: str | Path, unit: str = "mm", objects: Sequence[int] | None
     scale = meters_per(unit)
     info = read_models_info(models / "models_info.json")
     listed_mm = {number: model["diameter"] for number, model in info.items()}
-    ids = sorted(map(_id, models.glob("obj_[0-9]*.ply"))) if objects is None else sorted(objects)
+    ids = sorted(objects or ())
+    if objects is None:
+        for path in models.glob("obj_[0-9]*.ply"):
+            try:
+                ids.append(whole(path.stem.removeprefix("obj_")))
+            except ValueError as fault:
+                raise InputError(path, "is not named obj_{number}.ply", "name it like obj_000001.ply") from fault
+        ids.sort()
     require_models(models, ids)
     if unlisted := [number for number in ids if number not in listed_mm]:
         raise InputError(models / "models_info.json", f"lists no object {unlisted[0]}", "fetch the models again")
@@ -52,20 +59,10 @@ def surfaces(folder: str | Path, unit: str = "mm", objects: Sequence[int] | None
         surface = read_surface(path, scale)
         measured_mm = 1e3 * diameter(surface.vertices_m, path)
         if abs(measured_mm - listed_mm[number]) > DIAMETER_TOLERANCE * listed_mm[number]:
-            raise InputError(
-                path,
-                f"its diameter is {measured_mm:.4g} mm in unit {unit}, but models_info.json lists "
-                f"{listed_mm[number]:.4g} mm",
-                "check unit in the config (BOP models are in mm), or fetch the models again",
-            )
+            fault = f"its diameter is {measured_mm:.4g} mm in unit {unit}, but models_info.json lists"
+            remedy = "check unit in the config (BOP models are in mm), or fetch the models again"
+            raise InputError(path, f"{fault} {listed_mm[number]:.4g} mm", remedy)
         yield surface
-
-
-def _id(path: Path) -> int:
-    try:
-        return whole(path.stem.removeprefix("obj_"))
-    except ValueError as fault:
-        raise InputError(path, "is not named obj_{number}.ply", "name it like obj_000001.ply") from fault
 
 
 def require_entry(entry: dict, folder: Path) -> None:
@@ -198,10 +195,8 @@ def find_symmetries(points_N_3: np.ndarray, diameter: float) -> dict[str, list]:
                 T = np.eye(4)
                 T[:3, :3] = Rotation.from_rotvec(np.deg2rad(angle) * axis).as_matrix()
                 discrete.append(T.round(9).ravel().tolist())
-    return {
-        **({"symmetries_discrete": discrete} if discrete else {}),
-        **({"symmetries_continuous": continuous} if continuous else {}),
-    }
+    found = {"symmetries_discrete": discrete, "symmetries_continuous": continuous}
+    return {key: entries for key, entries in found.items() if entries}
 
 
 def angle_up_to_symmetry(R_3_3: np.ndarray, symmetries: Mapping[str, list]) -> float:

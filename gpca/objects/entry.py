@@ -28,14 +28,13 @@ class Source:
     """A source of objects: one row in every table.
 
     Attributes:
-        title: as tables name the row.
         kind: how the data is read.
         family: of procedural objects.
         location, files: the folder, relative to `data_dir`, and patterns below it.
-        objects: numbers of objects; all where left out.
+        objects: numbers of objects; all if empty.
         unit: of lengths in the files.
-        url, urls, sha256: what is downloaded where the location is not there.
-        views_per_instance: at most so many single views of one instance.
+        url, urls, sha256: of the download, where the location does not exist.
+        views_per_instance: at most, of single views.
         stand_in: every title says that the objects are stand-ins.
     """
 

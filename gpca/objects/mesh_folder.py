@@ -23,7 +23,7 @@ METERS_PER_UNIT = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 
 
 def from_entry(entry: dict, folder: Path) -> Iterator[Surface]:
-    """Return surfaces of a configured source: keys `files` (patterns, default every mesh of the folder) and `unit`."""
+    """Return surfaces of a configured source: keys `files` (patterns, default all meshes of the folder) and `unit`."""
     return surfaces(files_in(folder, entry.get("files"), SUFFIXES), entry.get("unit"))
 
 

@@ -25,7 +25,7 @@ Point = Sequence[float] | np.ndarray
 
 
 class Shape(NamedTuple):
-    """A solid in millimeters, the extents that it is stretched to, and the diameter that it is scaled to after that."""
+    """A solid in millimeters, the extents that it is stretched to, and the diameter that it is then scaled to."""
 
     solid: Manifold
     extents_mm: Point | None = None
@@ -33,17 +33,13 @@ class Shape(NamedTuple):
 
 
 def surfaces(family: str) -> Iterator[Surface]:
-    """Yield the objects of a family as closed meshes in meters, in a fixed order; the same at every call.
-
-    Raises:
-        InputError: at the call, for a family that is not one of FAMILIES.
-    """
+    """Yield the objects of a family as closed meshes in meters, in a fixed order; InputError for an unknown family."""
     require_family(family)
     return (_surface(name, shape) for name, shape in FAMILIES[family]().items())
 
 
 def require_family(family: str) -> None:
-    """Raise an InputError that names the known families unless `family` is one of them."""
+    """Raise an InputError for an unknown family."""
     if family not in FAMILIES:
         raise InputError(f"family '{family}'", "no such procedural family", f"choose one of {', '.join(FAMILIES)}")
 
@@ -133,10 +129,8 @@ class Cup(NamedTuple):
 
     Attributes:
         profile: (outer radius, height) from the foot (height 0) to the rim.
-        wall, floor: thicknesses.
-        handles: how many, evenly around.
-        joints: heights of the lower and the upper joint of a handle.
-        reach, grip: how far the middle line of a handle stands out, and half its thickness.
+        joints: heights of the lower and the upper joint of each handle.
+        reach, grip: of the handle's middle line from the wall, and half its thickness.
     """
 
     profile: tuple[tuple[float, float], ...]
@@ -186,10 +180,6 @@ def _cup(cup: Cup) -> Shape:
         ]
         solid += tube(path, cup.grip).rotate((0, 0, 360 * number / cup.handles))
     return Shape(solid - cavity)  # last, since handles reach into the wall
-
-
-def _cups() -> dict[str, Shape]:
-    return {name: _cup(cup) for name, cup in CUPS.items()}
 
 
 def _linemod() -> dict[str, Shape]:
@@ -319,4 +309,8 @@ def _ycb() -> dict[str, Shape]:
     }
 
 
-FAMILIES: dict[str, Callable[[], dict[str, Shape]]] = {"coffee_cup": _cups, "linemod": _linemod, "ycb": _ycb}
+FAMILIES: dict[str, Callable[[], dict[str, Shape]]] = {
+    "coffee_cup": lambda: {name: _cup(cup) for name, cup in CUPS.items()},
+    "linemod": _linemod,
+    "ycb": _ycb,
+}
