@@ -115,7 +115,7 @@ STEPS = {  # module -> files that it depends on, and some that it does not
         {"gpca/explainers/interface.py", "gpca/encoders/training.py"},
     ),
     "gpca.experiments.new_concepts.step": (
-        {"gpca/causes/drawing.py", "gpca/causes/descriptors.py", "gpca/active_learning/new_concepts.py"},
+        {"gpca/causes/drawing.py", "gpca/causes/descriptors.py", "gpca/active_learning/rounds.py"},
         {"gpca/explainers/interface.py", "gpca/active_learning/stream.py"},
     ),
     "gpca.experiments.frame_labels.step": (
