@@ -16,7 +16,7 @@ VERDICT, NUMBERS = "verdict", "reenactment"  # attached arrays
 
 
 class Reenact(ScoringExplainer):
-    """Scores are the probabilities of the re-enactment itself (:mod:`gpca.reenactment.verdict`)."""
+    """Scores are the probabilities of the re-enactment itself (:mod:`gpca.reenactment.dataset`)."""
 
     labels = LABELS
 

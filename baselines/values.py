@@ -15,8 +15,7 @@ import numpy as np
 from baselines.gates import NominalThreshold
 from gpca.attribution.scores import Attribution
 from gpca.causes.dataset import LABELS
-from gpca.causes.shapley import ALL, SUBSETS
-from gpca.causes.truth import NOMINAL
+from gpca.causes.truth import ALL, NOMINAL, SUBSETS
 from gpca.errors import InputError
 from gpca.explainers.classifiers import ClassifierExplainer, standardized_regression
 from gpca.explainers.interface import ScoringExplainer, attached
@@ -124,7 +123,7 @@ class RemovalValues(ScoringExplainer):
     """Causes by remedies: the cause whose remedy moves the result most is named.
 
     The worth of a subset of remedies is v̂, the distance of the result from that with all remedies
-    (:mod:`gpca.causes.remedied`). A remedy moves every result a little, so `values`, from v̂ (N, 8), are standardized
+    (:mod:`gpca.causes.descriptors`). A remedy moves every result a little, so `values`, from v̂ (N, 8), are standardized
     over the nominal samples. v̂ with all causes left alone is the alarm for the label nominal.
     """
 

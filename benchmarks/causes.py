@@ -37,8 +37,8 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--objects", type=Path, help="file of canonical clouds, in place of procedural objects")
     options = parser.parse_args(arguments)
     prepare()
+    from gpca.causes.measuring import measure_clean_pairs, read_subjects
     from gpca.causes.settings import CauseSettings
-    from gpca.causes.subjects import measure_clean_pairs, read_subjects
     from gpca.objects.canonical import ObjectClouds
 
     source = options.objects.stem if options.objects else options.family
@@ -65,10 +65,8 @@ def measure(subjects, source: str, settings, uncertainty_limit: float, candidate
     """Measure the candidates; see the head of the file."""
     import numpy as np
 
-    from gpca.causes.candidate import draw_applied, draw_candidate
-    from gpca.causes.counterfactuals import Counterfactuals, Registrar, Unmeasurable
-    from gpca.causes.shapley import ALL, SUBSETS
-    from gpca.causes.truth import BORDERLINE, FAILED, Truth
+    from gpca.causes.candidate import Counterfactuals, Registrar, Unmeasurable, draw_applied, draw_candidate
+    from gpca.causes.truth import ALL, BORDERLINE, FAILED, SUBSETS, Truth
     from gpca.seeds import generator
 
     worths, seconds, ratios, differences = [], [], [], []
@@ -117,7 +115,7 @@ def plain_error(candidate, subject, xi_n_6, settings) -> float:
     from gpca.alignment.icp import ICP
     from gpca.alignment.pose_error import pose_error
     from gpca.alignment.rigid import exp
-    from gpca.causes.subjects import JUDGED_POINTS
+    from gpca.causes.measuring import JUDGED_POINTS
 
     causes = tuple(np.flatnonzero(candidate.applied).tolist())
     errors = []

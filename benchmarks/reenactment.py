@@ -35,12 +35,11 @@ def main(arguments: list[str] | None = None) -> None:
 
     from benchmarks.causes import procedural
     from gpca.causes.candidate import draw_candidate
+    from gpca.causes.measuring import read_subjects
     from gpca.causes.settings import CauseSettings
-    from gpca.causes.subjects import read_subjects
-    from gpca.reenactment.enactment import enact
+    from gpca.reenactment.enactment import NoiseScale, enact
     from gpca.reenactment.hypotheses import find_hypotheses
     from gpca.reenactment.mixture import Mixture
-    from gpca.reenactment.observation import NoiseScale
     from gpca.reenactment.settings import ReenactmentSettings
     from gpca.reenactment.surface import ModelSurface
 
@@ -87,7 +86,7 @@ def plain_log_likelihood(model, observed, least_width: float) -> float:
     """Return the mean log-likelihood of the mixture after as many iterations, of every partner of every point."""
     import numpy as np
 
-    from gpca.reenactment.mixture_kernels import (
+    from gpca.reenactment.mixture import (
         FEWEST_OUTLIERS,
         FIRST_OUTLIERS,
         FIRST_WIDTH,

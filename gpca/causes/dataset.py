@@ -7,8 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gpca.causes.shapley import SUBSETS
-from gpca.causes.truth import BORDERLINE, FAILED, NOMINAL, Truth
+from gpca.causes.truth import BORDERLINE, FAILED, NOMINAL, SUBSETS, Truth
 from gpca.io.arrays import REAL, WHOLE, load_arrays, save_arrays
 from gpca.io.container import FLAG, Container, Shapes, array
 from gpca.io.files import Axes

@@ -1,4 +1,11 @@
-"""Descriptors of registered pairs in groups, the file that holds them, and what has to be seen for each."""
+"""Descriptors of registered pairs in groups, the file that holds them, and what has to be seen for each.
+
+The group `remedied` has counterfactuals that anyone can make of their own registration: it is run again with remedies.
+The observed cloud is denoised, ICP starts from farther off and the best result counts, or the observed cloud is aligned
+to the model, in which it finds partners everywhere however much of it is missing. The result with all three remedies
+stands for the unknown truth: v̂ of a subset of the causes, those that are left alone, is how far the results with the
+other remedies lie from it.
+"""
 
 from __future__ import annotations
 
@@ -7,19 +14,107 @@ from dataclasses import dataclass
 from time import perf_counter
 
 import numpy as np
+from scipy.spatial import cKDTree
 
-from gpca.alignment.icp import ICPSettings
+from gpca.alignment.batched_icp import BatchedICP
+from gpca.alignment.icp import ICPSettings, clipped_cost
 from gpca.alignment.pose_error import displacements
-from gpca.alignment.rigid import inverse, log, scale_translation
+from gpca.alignment.rigid import exp, inverse, inverses, log, scale_translation
 from gpca.causes.dataset import Causes
-from gpca.causes.remedied import describe_remedied
 from gpca.causes.settings import DENSITIES, GROUPS, MOTION, QUANTILES, REMEDIED, DescriptorSettings
-from gpca.causes.shapley import SUBSETS
+from gpca.causes.truth import LARGEST_ERROR, SUBSETS, shapley_values
 from gpca.io.arrays import TEXT, WHOLE
 from gpca.io.container import Container, array
 from gpca.pairs.distances import ENTROPY, ObservedPair, describe_distances, describe_entropy
-from gpca.pairs.perturbation import POSE
+from gpca.pairs.perturbation import NOISE, OVERLAP, POSE
 from gpca.process.progress import progress
+from gpca.seeds import generator
+from gpca.uncertainty.interventions import denoise
+
+
+def describe_remedied(pair: ObservedPair, settings: DescriptorSettings, icp: ICPSettings) -> np.ndarray:
+    """Return the numbers of :data:`gpca.causes.settings.REMEDIED`.
+
+    For each subset of the causes that are left alone: v̂ in diameters; after the Shapley values of v̂, how far the best
+    result moves the observed cloud from where it lies, and the best result's cost (squared diameters) and fitness.
+    Last, the share of the points that denoising takes for outliers, and how far it smooths.
+    """
+    observed = pair.observed[generator(*pair.axes, "remedies").permutation(len(pair.observed))]
+    cleaned = denoise(observed)
+    starts = _starts(pair, settings)
+    model = pair.model[: settings.icp_points]
+    results = []
+    for present in SUBSETS:
+        cloud = (observed if NOISE in present else cleaned)[: settings.icp_points]
+        onto_observed = OVERLAP in present
+        results.append(_register(cloud, model, starts[POSE in present], onto_observed, icp))
+    truth = results[0].best
+    error_8 = np.array(
+        [
+            results[0].best_error(truth, observed),
+            *(
+                result.mean_error(truth, observed) if POSE in present else result.best_error(truth, observed)
+                for present, result in zip(SUBSETS[1:], results[1:], strict=True)
+            ),
+        ]
+    )
+    return np.concatenate(
+        [
+            error_8,
+            shapley_values(error_8[None])[0],
+            displacements(np.array([result.best for result in results]), observed),
+            [result.cost_n.min() for result in results],
+            [result.fitness_n[result.cost_n.argmin()] for result in results],
+            [1 - len(cleaned) / len(observed)],
+            [np.sqrt(np.square(cKDTree(cleaned).query(observed)[0]).mean())],
+        ]
+    )
+
+
+@dataclass(frozen=True)
+class _Results:
+    """Poses (n, 4, 4) of the observed cloud relative to where ICP put it, with cost and fitness (n,)."""
+
+    T_n: np.ndarray
+    cost_n: np.ndarray
+    fitness_n: np.ndarray
+
+    @property
+    def best(self) -> np.ndarray:
+        return self.T_n[self.cost_n.argmin()]
+
+    def mean_error(self, truth: np.ndarray, points: np.ndarray) -> float:
+        return float(_errors(self.T_n, truth, points).mean())
+
+    def best_error(self, truth: np.ndarray, points: np.ndarray) -> float:
+        return float(_errors(self.best[None], truth, points)[0])
+
+
+def _errors(T_n: np.ndarray, truth: np.ndarray, points: np.ndarray) -> np.ndarray:
+    return np.minimum(displacements(T_n @ inverse(truth), points), LARGEST_ERROR)
+
+
+def _starts(pair: ObservedPair, settings: DescriptorSettings) -> dict[bool, np.ndarray]:
+    """Return the starts (k, 4, 4) where the pose error is left alone, and the restart's: farther off, and more."""
+    random = generator(*pair.axes, "restarts")
+    near_k_6, far_k_6 = settings.twists(
+        random.normal(size=(settings.starts, 6)), random.normal(size=(settings.restarts, 6))
+    )
+    near_k_6[0] = far_k_6[0] = 0
+    return {True: exp(near_k_6) @ pair.T_init, False: exp(far_k_6) @ pair.T_init}
+
+
+def _register(
+    observed: np.ndarray, model: np.ndarray, starts_n: np.ndarray, onto_observed: bool, icp: ICPSettings
+) -> _Results:
+    """Align the model to the observed cloud, as the registration did, or the observed cloud to the model."""
+    if onto_observed:
+        T_n, fitness_n, rmse_n = BatchedICP(observed, icp).register(model, inverses(starts_n))
+        T_n = inverses(T_n)
+    else:
+        T_n, fitness_n, rmse_n = BatchedICP(model, icp).register(observed, starts_n)
+    return _Results(T_n, clipped_cost(fitness_n, rmse_n, icp.correspondence_distance), fitness_n)
+
 
 SPREAD_FLOOR = 1e-4  # of the spread's variances, as in the truth (docs/causes.md)
 SMALLEST_COST = 1e-9  # squared diameters

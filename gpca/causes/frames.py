@@ -21,13 +21,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gpca.alignment.rigid import inverse, rotation_angle_rad, scale_translation
-from gpca.causes.candidate import Candidate
-from gpca.causes.counterfactuals import Registrar, Unmeasurable
+from gpca.causes.candidate import Candidate, Registrar, Unmeasurable
 from gpca.causes.dataset import Causes
-from gpca.causes.measuring import Measuring, as_causes
+from gpca.causes.measuring import Measuring, Subject, as_causes, measure_clean_pairs
 from gpca.causes.settings import FEWEST_POINTS, CauseSettings, FrameCauseSettings
-from gpca.causes.shapley import ALL, NONE
-from gpca.causes.subjects import Subject, measure_clean_pairs
+from gpca.causes.truth import ALL, NONE
 from gpca.errors import InputError
 from gpca.frames.camera import MeshScene
 from gpca.frames.instances import Instances

@@ -1,8 +1,9 @@
-"""Registrations of scans to scans whose causes are measured: real sensors, real overlap, nothing of it simulated.
+"""Registrations of scans to scans whose causes are measured: real sensors, real overlap.
 
-What may be taken away from a pair, and what is added to it, says :mod:`gpca.causes.scan_candidate`. The source moves
-onto the target. Its errors are root mean square distances over the surface that both scans truly have in common, scaled
-so that the limit of success is that of all other experiments.
+Nothing is simulated but the noise that is added. Given the true pose, the pose error can be taken away, by a start from
+the truth, and so can what only one of the scans sees. Measured noise cannot be taken away, so as a cause it is an
+addition, in multiples of the sensor's. The source moves onto the target. Errors are root mean square distances over the
+surface that both scans truly have in common, scaled so that the limit of success is that of all other experiments.
 
 A *natural* registration has no added noise: it is what an estimate by a local method makes of two scans as they are.
 """
@@ -12,28 +13,208 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.spatial import cKDTree
 
-from gpca.causes.counterfactuals import Counterfactuals, Registrar, Unmeasurable
+from gpca.alignment.features import estimate_normals
+from gpca.alignment.pose_error import displacements
+from gpca.alignment.rigid import inverse, inverses, rigid_motion, rotate, rotation_angle_rad, transform
+from gpca.causes.candidate import Candidate, Counterfactuals, Registrar, Unmeasurable
 from gpca.causes.dataset import Causes
-from gpca.causes.measuring import Measuring, as_causes
-from gpca.causes.scan_candidate import DrawnScans
+from gpca.causes.measuring import Measuring, Subject, as_causes
 from gpca.causes.settings import FEWEST_POINTS, CauseSettings
-from gpca.causes.shapley import ALL, NONE
-from gpca.causes.subjects import Subject
+from gpca.causes.truth import ALL, NONE
 from gpca.errors import InputError
 from gpca.objects.canonical import DRAWN
-from gpca.pairs.perturbation import CONCEPTS, SEVERITIES
+from gpca.pairs.perturbation import CONCEPTS, NOISE, OVERLAP, POSE, SEVERITIES
 from gpca.process.progress import progress
-from gpca.scans.pair import ScanPair, ScanSuccess
+from gpca.scans.pair import ROOM_M, ScanPair, ScanSuccess
 from gpca.scans.scene import ScanPairs
 from gpca.seeds import generator
 from gpca.uncertainty.spread import divergence
 
 if TYPE_CHECKING:
     import pandas as pd
+
+
+JUDGED_POINTS = 512  # of the common surface, over which an error is the root mean square
+NORMAL_DEVIATION = 1.4826  # of a normal distribution, in median distances from its mean
+
+
+@dataclass(frozen=True, kw_only=True)
+class ScanCandidate(Candidate):
+    """Two scans: the source is what was observed, the target is the model.
+
+    Attributes:
+        noisy_model: (P, 3) the target's points with the noise that is added.
+        model_common: rows of them that lie on surface that the source has as well; ``seen`` has those of the source.
+    """
+
+    noisy_model: np.ndarray
+    model_common: np.ndarray
+
+    def reference(self, causes: tuple[int, ...]) -> np.ndarray:
+        """Return the target's points that a registration with these of the applied causes is given."""
+        points = self.noisy_model if NOISE in causes else self.model
+        return points if OVERLAP in causes else points[self.model_common]
+
+    def changing_reference(self, causes: tuple[int, ...]) -> tuple[int, ...]:
+        """Return those of the causes that change the target: all but a pose error."""
+        return tuple(cause for cause in causes if cause != POSE)
+
+
+@dataclass(frozen=True)
+class OverlapErrors:
+    """Root mean square distances of the common points from their true places.
+
+    Attributes:
+        common: (N, 3) the points, where they truly lie.
+        factor: turns these distances into errors, see :attr:`DrawnScans.error_factor`.
+    """
+
+    common: np.ndarray
+    factor: float
+
+    def __call__(self, T_observed_model_n: np.ndarray) -> np.ndarray:
+        """Return the errors (n,) of poses (n, 4, 4) of the target in what was observed; the identity is right."""
+        return self.factor * displacements(inverses(T_observed_model_n), self.common)
+
+
+@dataclass(frozen=True)
+class DrawnScans:
+    """Some points of both scans of a pair, where they truly lie, in the target's frame about its middle.
+
+    Lengths are relative to :attr:`unit_m`.
+
+    Attributes:
+        pair: the scans.
+        source, target: (N, 3) and (P, 3).
+        source_common, target_common: rows of either that lie on surface that the other scan has as well.
+        error_factor: an error is the distance (RMSE over the common points) times this, so that the limit of success
+            is the same number for all pairs, and for whole objects.
+    """
+
+    pair: ScanPair
+    source: np.ndarray
+    target: np.ndarray
+    source_common: np.ndarray
+    target_common: np.ndarray
+    error_factor: float
+
+    @classmethod
+    def of(cls, pair: ScanPair, points: int, limit_m: float, failed: float, random: np.random.Generator) -> DrawnScans:
+        """Draw the points.
+
+        Args:
+            points: of each scan, at most.
+            limit_m: RMSE from which a registration of this pair has failed.
+            failed: the error that this is to be.
+        """
+        rows_N, rows_M = (
+            np.sort(random.permutation(len(cloud))[:points]) for cloud in (pair.source_N_3, pair.target_M_3)
+        )
+        center_3, unit_m = middle(pair), unit_of(pair)
+        return cls(
+            pair=pair,
+            source=(transform(pair.T_target_source, pair.source_N_3[rows_N].astype(np.float64)) - center_3) / unit_m,
+            target=(pair.target_M_3[rows_M].astype(np.float64) - center_3) / unit_m,
+            source_common=np.flatnonzero(pair.source_common_N[rows_N]),
+            target_common=np.flatnonzero(pair.target_common_M[rows_M]),
+            error_factor=failed * unit_m / limit_m,
+        )
+
+    @property
+    def unit_m(self) -> float:
+        """The usual size of what is scanned, in meters."""
+        return unit_of(self.pair)
+
+    @cached_property
+    def errors(self) -> OverlapErrors:
+        """The errors of poses."""
+        return OverlapErrors(self.source[self.source_common][:JUDGED_POINTS], self.error_factor)
+
+    @cached_property
+    def sensor_noise(self) -> float:
+        """The standard deviation of a measured point across its surface (:func:`sensor_noise_m`)."""
+        return sensor_noise_m(self.pair) / self.unit_m
+
+    def candidate(self, T_target_source_init: np.ndarray, times: float, random: np.random.Generator) -> ScanCandidate:
+        """Return the pair started somewhere, with so many times the sensor's noise added to both scans.
+
+        Args:
+            T_target_source_init: 4×4, in meters, in the frames of the scans.
+        """
+        noise = times * self.sensor_noise if times else 0.0
+        jitter_N, jitter_M = (noise * random.normal(size=cloud.shape) for cloud in (self.source, self.target))
+        T_init, middle_3 = self.displaced(T_target_source_init), self.source.mean(axis=0)
+        applied = np.ones(len(CONCEPTS), bool)
+        applied[NOISE] = times > 0
+        return ScanCandidate(
+            applied=applied,
+            model=self.target,
+            clean=self.source,
+            noisy=self.source + jitter_N,
+            noisy_model=self.target + jitter_M,
+            seen=self.source_common,
+            model_common=self.target_common,
+            kept=np.arange(len(self.source)),
+            T_near=np.eye(4),
+            T_init=T_init,
+            severity={
+                "noise": noise,
+                "outliers": 0.0,
+                "rotation_rad": rotation_angle_rad(T_init),
+                "translation": float(np.linalg.norm(transform(T_init, middle_3) - middle_3)),
+                "crop": 1 - self.pair.overlap,
+            },
+        )
+
+    def displaced(self, T_target_source: np.ndarray) -> np.ndarray:
+        """Return where (4×4) a pose puts points of the source that lie at their true places."""
+        return motion_between(self.pair, self.pair.T_target_source, T_target_source)
+
+
+def motion_between(pair: ScanPair, T_target_source_from: np.ndarray, T_target_source_to: np.ndarray) -> np.ndarray:
+    """Return the motion (4×4) of points of the source from one pose to another, as a pair is registered.
+
+    Args:
+        pair: its clouds are read, and not its true pose.
+        T_target_source_from, T_target_source_to: 4×4, meters.
+    """
+    T_m, center_3 = T_target_source_to @ inverse(T_target_source_from), middle(pair)
+    # Poses of data sets are rounded, so that the last row of a product may not be exact.
+    return rigid_motion(T_m[:3, :3], (rotate(T_m, center_3) + T_m[:3, 3] - center_3) / unit_of(pair))
+
+
+def unit_of(pair: ScanPair) -> float:
+    """Return the length, in meters, that counts as the diameter of whole objects does: the usual size of a scan."""
+    return ROOM_M * pair.scale
+
+
+def middle(pair: ScanPair) -> np.ndarray:
+    """Return the middle (3,) of the box around the target, in meters."""
+    return (pair.target_M_3.min(axis=0).astype(np.float64) + pair.target_M_3.max(axis=0)) / 2
+
+
+def sensor_noise_m(pair: ScanPair) -> float:
+    """Return the standard deviation, in meters, of measured points across the surface.
+
+    It is that of the distances at the true pose of the source's common points from the planes of the target's nearest
+    points, by their median; both scans' noise adds up in it. Errors of the true pose and of the planes count too, so it
+    is an upper bound.
+    """
+    common = transform(pair.T_target_source, pair.source_N_3[pair.source_common_N].astype(np.float64))
+    if not len(common):
+        return 0.0
+    target = pair.target_M_3.astype(np.float64)
+    rows = cKDTree(target).query(common)[1]
+    offsets, normals = common - target[rows], estimate_normals(target)[rows]
+    across = offsets[:, 0] * normals[:, 0] + offsets[:, 1] * normals[:, 1] + offsets[:, 2] * normals[:, 2]
+    return float(NORMAL_DEVIATION * np.median(np.abs(across)) / np.sqrt(2))
+
 
 LADDER, GLOBAL = KINDS = ("ladder", "global")
 

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from gpca.causes.shapley import SUBSETS
+from gpca.causes.truth import SUBSETS
 from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS, HalfTurn, Hidden, Severities, Shift
 from gpca.settings import Bounds, Count, OpenShare, Positive, Share, read_settings

@@ -19,8 +19,7 @@ from gpca.alignment.rigid import exp, inverse, transform
 from gpca.causes.dataset import LABELS, Causes, labels_of
 from gpca.causes.descriptors import describe
 from gpca.causes.settings import GROUPS, OBSERVED, CauseSettings, DescriptorSettings, Moved
-from gpca.causes.shapley import ALL
-from gpca.causes.truth import BORDERLINE, LARGEST_ERROR, NOMINAL
+from gpca.causes.truth import ALL, BORDERLINE, LARGEST_ERROR, NOMINAL
 from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
 from gpca.explainers.pair_classifier import Judgment, PairClassifier
@@ -29,9 +28,8 @@ from gpca.guarantee.guarantee import Guarantee, calibrate, states_of
 from gpca.model.diagnosis import Diagnosis, Guaranteed, Reenacted, state_probabilities
 from gpca.pairs.distances import ObservedPair
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.reenactment.dataset import Reenactments, row_of
+from gpca.reenactment.dataset import Reenactments, reenactment_features, row_of
 from gpca.reenactment.enactment import Enactment, reenact
-from gpca.reenactment.features import reenactment_features
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface
 from gpca.seeds import generator
@@ -194,7 +192,7 @@ class TrainingSet:
     """N registrations with measured causes.
 
     Attributes:
-        features_N_F: :func:`gpca.reenactment.features.reenactment_features`.
+        features_N_F: :func:`gpca.reenactment.dataset.reenactment_features`.
         label_N: nominal, a dominant cause, or borderline.
         state_N: the label, but ``several`` for failures with several causes.
         causes_N_3: whether each concept is a cause.

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpca.alignment.rigid import inverse, log
-from gpca.causes.shapley import ALL, shapley_values
-from gpca.causes.truth import FAILED, NOMINAL
+from gpca.causes.truth import ALL, FAILED, NOMINAL, shapley_values
 from gpca.guarantee.conformal import ALARM, GOOD
 from gpca.guarantee.guarantee import SEVERAL, Guarantee
 from gpca.objects.bop import symmetric_turn

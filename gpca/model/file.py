@@ -34,8 +34,7 @@ from gpca.model.location import REMEDY, require_model
 from gpca.objects.canonical import FEWEST_CLOUD_POINTS
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.recovery.policy import TREATMENTS, RecoveryPolicy, Thresholds
-from gpca.reenactment.dataset import DESCRIBED
-from gpca.reenactment.features import FEATURES
+from gpca.reenactment.dataset import DESCRIBED, FEATURES
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.settings import read_settings
 from gpca.uncertainty.settings import FEWEST_STARTS, UncertaintySettings

@@ -8,7 +8,7 @@ from functools import cache
 from html import escape
 from math import sqrt
 
-from gpca.causes.shapley import BY_SIZE
+from gpca.causes.truth import BY_SIZE
 from gpca.guarantee.conformal import ALARM, GOOD
 from gpca.guarantee.guarantee import STATES
 from gpca.model.diagnosis import IN_WORDS, UNKNOWN, Reenacted

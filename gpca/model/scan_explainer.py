@@ -35,7 +35,7 @@ from gpca.pairs.distances import ObservedPair
 from gpca.recovery.policy import NOTHING, TREATMENTS
 from gpca.reenactment.enactment import Enactment
 from gpca.reenactment.hypotheses import INDEPENDENT, weights_of
-from gpca.reenactment.scan_enactment import reenact_scan
+from gpca.reenactment.scans import reenact_scan
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface
 

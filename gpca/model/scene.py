@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from gpca.alignment.rigid import transform
-from gpca.causes.counterfactuals import Registrar, Unmeasurable
+from gpca.causes.candidate import Registrar, Unmeasurable
 from gpca.causes.settings import CauseSettings
-from gpca.causes.shapley import BY_SIZE, SUBSETS
+from gpca.causes.truth import BY_SIZE, SUBSETS
 from gpca.objects.canonical_frame import CanonicalFrame
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reenactment.enactment import Enactment
@@ -48,7 +48,7 @@ class Possibility:
     Attributes:
         probability: among all hypotheses.
         T: (4, 4) maps the source at its initial pose to the hypothesis.
-        what_ifs: one per subset of the causes, in the order of :data:`gpca.causes.shapley.SUBSETS`.
+        what_ifs: one per subset of the causes, in the order of :data:`gpca.causes.truth.SUBSETS`.
     """
 
     probability: float

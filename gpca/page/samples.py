@@ -9,11 +9,10 @@ import numpy as np
 
 from gpca.alignment.rigid import inverse, transform
 from gpca.attribution.predictions import concepts_of, read_predictions
-from gpca.causes.counterfactuals import replay
+from gpca.causes.candidate import replay
 from gpca.causes.dataset import Causes
 from gpca.causes.settings import CauseSettings, Limits
-from gpca.causes.shapley import BY_SIZE
-from gpca.causes.truth import FAILED
+from gpca.causes.truth import BY_SIZE, FAILED
 from gpca.errors import InputError
 from gpca.experiments.method.shown_sample import observed_uncertainties, registration_error, state_of_error
 from gpca.model.scene import flat, packed, packed_pair, taken_out
@@ -169,7 +168,7 @@ def packed_registration(
     Args:
         reach: correspondence distance of ICP, in diameters.
         observed_8: the observed cloud (P, 3) as aligned by ICP with each subset of the causes, in the order of
-            :data:`gpca.causes.shapley.SUBSETS`; none without measured causes. A repeated registration is packed once,
+            :data:`gpca.causes.truth.SUBSETS`; none without measured causes. A repeated registration is packed once,
             and referred to by its number afterwards.
     """
     target = thinned(registrations.target(row).astype(float), POINTS)

@@ -15,20 +15,17 @@ import numpy as np
 from scipy.special import expit
 
 from gpca.alignment.rigid import inverse, rotate, scale_translation, transform
-from gpca.causes.counterfactuals import Counterfactuals, Registrar, Unmeasurable
+from gpca.causes.candidate import Counterfactuals, Registrar, Unmeasurable
 from gpca.causes.settings import CauseSettings
-from gpca.causes.shapley import SUBSETS, shapley_values
-from gpca.causes.truth import LARGEST_ERROR, capped
+from gpca.causes.truth import LARGEST_ERROR, SUBSETS, capped, shapley_values
 from gpca.frames.camera import MeshScene
 from gpca.frames.shots import NEAR, Shot, fuse
 from gpca.recovery.actions import Holding, Robot
-from gpca.reenactment.enactment import start_twists
+from gpca.reenactment.dataset import SMALLEST_ERROR, STEEPNESS
+from gpca.reenactment.enactment import NoiseScale, observe, rebuild, start_twists
 from gpca.reenactment.hypotheses import Hypothesis, find_hypotheses, weights_of
-from gpca.reenactment.observation import NoiseScale, observe
-from gpca.reenactment.rebuilding import rebuild
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface
-from gpca.reenactment.verdict import SMALLEST_ERROR, STEEPNESS
 from gpca.seeds import generator
 
 OBSERVED_POINTS, MODEL_POINTS = 384, 768  # largest numbers of re-enacted points
@@ -169,7 +166,7 @@ def believe(
 def reenact(belief: Belief, holding: Holding, known: KnownModel, truth: CauseSettings, axes: tuple) -> Reenacted:
     """Register with every subset of the causes, under each hypothesis in turn.
 
-    Without noise or missing surface, the measurement is rebuilt (:func:`gpca.reenactment.rebuilding.rebuild`); without
+    Without noise or missing surface, the measurement is rebuilt (:func:`gpca.reenactment.enactment.rebuild`); without
     a pose error, the registration starts from the hypothesis.
 
     Args:

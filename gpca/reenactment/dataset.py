@@ -1,4 +1,4 @@
-"""Re-enactments of registrations, and the file that holds them."""
+"""Re-enactments of registrations: their file, their verdict, and the numbers that learners read."""
 
 from __future__ import annotations
 
@@ -7,22 +7,47 @@ from dataclasses import dataclass
 from time import perf_counter
 
 import numpy as np
+from scipy.special import expit
 
 from gpca.alignment.pose_error import displacements
 from gpca.alignment.rigid import transform
 from gpca.causes.dataset import LABELS, Causes
 from gpca.causes.descriptors import WIDTHS, describe_plainly, observed_pair
-from gpca.causes.settings import CauseSettings
-from gpca.causes.shapley import SUBSETS
+from gpca.causes.settings import CauseSettings, Limits
+from gpca.causes.truth import ALL, SUBSETS, shapley_values
 from gpca.io.arrays import TEXT, WHOLE
 from gpca.io.container import Container, array
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.distances import ObservedPair
+from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.progress import progress
 from gpca.reenactment.enactment import Enactment, reenact
 from gpca.reenactment.hypotheses import weights_of
 from gpca.reenactment.settings import ReenactmentSettings
-from gpca.reenactment.verdict import verdict
+
+STEEPNESS = 8.0  # of the probability of a failure in the logarithm of v̂
+SMALLEST_ERROR = 1e-4  # diameters
+
+
+def verdict(error_S_K_8: np.ndarray, weight_S_K: np.ndarray, limits: Limits) -> np.ndarray:
+    """Return the probabilities (S, 4) of nominal and of each cause to be the dominant one, of S pairs.
+
+    Under each of K hypotheses a failure is as probable as not where v̂(all) is midway between the limits, and φ̂ is known
+    up to the limit of a cause: P(cause) is its softmax at that temperature. Hypotheses are weighted by how probable
+    they are.
+
+    Args:
+        error_S_K_8: v̂.
+        weight_S_K: probabilities of the hypotheses, 0 where there is none.
+    """
+    middle = np.sqrt(limits.nominal * limits.failed)
+    failed_S_K = expit(STEEPNESS * np.log(np.maximum(error_S_K_8[..., ALL], SMALLEST_ERROR) / middle))
+    phi_S_K_3 = shapley_values(error_S_K_8.reshape(-1, ALL + 1)).reshape(*weight_S_K.shape, -1)
+    share_S_K_3 = np.exp((phi_S_K_3 - phi_S_K_3.max(axis=2, keepdims=True)) / limits.cause)
+    share_S_K_3 /= share_S_K_3.sum(axis=2, keepdims=True)
+    causes_S_3 = (weight_S_K[..., None] * failed_S_K[..., None] * share_S_K_3).sum(axis=1)
+    return np.column_stack([1 - causes_S_3.sum(axis=1), causes_S_3])
+
 
 MEASURED = ("log_likelihood", "width", "covered", "noise", "outliers", "missing", "to_start", "to_result")
 DESCRIBED = ("distances", "planes", "motion", "starts")  # groups of descriptors, without further registrations
@@ -44,7 +69,7 @@ class Reenactments(Container):
             severities of noise, outliers and crop under it; and how far (root mean square, diameters) the observed
             points then lie from where the registration began, and from where it ended.
         described: (S, F) the groups `DESCRIBED` of descriptors (:mod:`gpca.causes.descriptors`), side by side.
-        verdict: (S, 4) of :func:`gpca.reenactment.verdict.verdict`.
+        verdict: (S, 4) of :func:`gpca.reenactment.dataset.verdict`.
     """
 
     sample: np.ndarray = array("S", WHOLE)
@@ -121,3 +146,43 @@ def _measured(enactment: Enactment, pair: ObservedPair) -> list[float]:
         displacements(hypothesis.T[None], before)[0],
         displacements((hypothesis.T @ pair.T_init)[None], pair.observed)[0],
     ]
+
+
+SMALLEST_ERROR = 1e-4  # diameters
+SMALLEST_SUM = 0.01  # diameters, of the |φ̂| whose shares are taken
+FEATURES = (
+    *(f"{whose}_error_{subset}" for whose in ("first", "mean", "second") for subset in range(len(SUBSETS))),
+    *(f"{whose}_phi_{concept}" for whose in ("first", "mean", "second") for concept in CONCEPTS),
+    *(f"share_{concept}" for concept in CONCEPTS),
+    *(f"uncertainty_{subset}" for subset in range(1, len(SUBSETS))),
+    *(f"{whose}_{name}" for whose in ("first", "second") for name in MEASURED),
+    *("first_weight", "second_weight", "entropy", "error_deviation", "least_error", "largest_error"),
+)
+
+
+def reenactment_features(reenactments: Reenactments) -> np.ndarray:
+    """Return `FEATURES` (S, F), and after them the descriptors of each pair.
+
+    Logarithms of v̂ and φ̂ of the two most probable hypotheses and of the mean over all; the shares of that mean φ̂; û,
+    compressed, of the first; what was measured under both; how sure the hypotheses are, and how far v̂(all) varies.
+    """
+    weight_S_K, error_S_K_8 = reenactments.weight, reenactments.error
+    mean_S_8 = (weight_S_K[..., None] * error_S_K_8).sum(axis=1)
+    errors = [error_S_K_8[:, 0], mean_S_8, error_S_K_8[:, 1]]
+    phi = [shapley_values(error_S_8) for error_S_8 in errors]
+    sums = np.maximum(np.abs(phi[1]).sum(axis=1, keepdims=True), SMALLEST_SUM)
+    all_S_K = error_S_K_8[..., ALL]
+    deviation_S = np.sqrt((weight_S_K * (all_S_K - mean_S_8[:, ALL, None]) ** 2).sum(axis=1))
+    entropy_S = -(weight_S_K * np.log(np.maximum(weight_S_K, 1e-12))).sum(axis=1)
+    return np.column_stack(
+        [
+            *(np.log(np.maximum(error_S_8, SMALLEST_ERROR)) for error_S_8 in errors),
+            *phi,
+            phi[1] / sums,
+            np.log1p(reenactments.uncertainty[:, 0, 1:]),
+            *(reenactments.measured[:, k] for k in range(2)),
+            *(weight_S_K[:, k] for k in range(2)),
+            *(entropy_S, deviation_S, all_S_K.min(axis=1), all_S_K.max(axis=1)),
+            reenactments.described,
+        ]
+    )

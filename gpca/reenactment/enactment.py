@@ -1,4 +1,8 @@
-"""The truth's counterfactuals under the hypotheses of an observer: v̂, û and φ̂."""
+"""The truth's counterfactuals under hypotheses of an observer: v̂, û and φ̂.
+
+A hypothesis says which observed points are outliers, how large the noise is and which part of the surface is missing.
+From this the pair is rebuilt without each of its causes, and registered again.
+"""
 
 from __future__ import annotations
 
@@ -10,18 +14,140 @@ from time import perf_counter
 import numpy as np
 
 from gpca.alignment.rigid import inverse, transform
-from gpca.causes.candidate import Candidate
-from gpca.causes.counterfactuals import Counterfactuals, Registrar, Unmeasurable
+from gpca.causes.candidate import Candidate, Counterfactuals, Registrar, Unmeasurable
 from gpca.causes.settings import CauseSettings
-from gpca.causes.shapley import SUBSETS, shapley_values
-from gpca.causes.truth import LARGEST_ERROR
+from gpca.causes.truth import LARGEST_ERROR, SUBSETS, shapley_values
 from gpca.pairs.distances import ObservedPair
+from gpca.pairs.perturbation import CONCEPTS, NOISE, OVERLAP, POSE
 from gpca.reenactment.hypotheses import Hypothesis, find_hypotheses
-from gpca.reenactment.observation import NoiseScale, observe
-from gpca.reenactment.rebuilding import rebuild
 from gpca.reenactment.settings import ReenactmentSettings
-from gpca.reenactment.surface import ModelSurface
+from gpca.reenactment.surface import ModelSurface, covered_points, trimmed_square
 from gpca.seeds import generator
+
+NOISES = np.array([0.0, 0.01, 0.02, 0.03, 0.045, 0.06, 0.08, 0.11])  # diameters, that are simulated
+SIMULATED = 512  # points, at least
+FEWEST_INLIERS = 16
+QUIET = 0.004  # diameters; noise that is no larger is none
+
+
+class NoiseScale:
+    """Tells noise from the distances of points to a model's planes, by noise that is simulated on the model itself.
+
+    The nearest point of a noisy one is often not where it came from, so distances grow more slowly than the noise.
+    """
+
+    def __init__(self, surface: ModelSurface, random: np.random.Generator) -> None:
+        repeats = max(1, -(-SIMULATED // len(surface.points)))
+        points = np.tile(surface.points, (repeats, 1))
+        unit = random.normal(size=points.shape)
+        squares = [trimmed_square(surface.residuals(points + noise * unit)[0]) for noise in NOISES]
+        roots = np.sqrt(np.array(squares) + surface.roughness)
+        self._roots = np.maximum.accumulate(roots + 1e-9 * np.arange(len(roots)))
+
+    def noise(self, residuals_N: np.ndarray) -> float:
+        """Return the standard deviation per axis, in diameters, that makes distances from planes as large as these."""
+        return float(np.interp(np.sqrt(trimmed_square(residuals_N)), self._roots, NOISES))
+
+
+@dataclass(frozen=True)
+class Observation:
+    """The observed points (N, 3) where a hypothesis puts them in the model.
+
+    Attributes:
+        points: (N, 3).
+        is_outlier: (N,).
+        noise: standard deviation per axis, diameters.
+        residuals, rows: (N,) signed distances from the plane of the nearest model point, and that point.
+        covered: (M,) which points of the model were observed.
+    """
+
+    points: np.ndarray
+    is_outlier: np.ndarray
+    noise: float
+    residuals: np.ndarray
+    rows: np.ndarray
+    covered: np.ndarray
+
+    @property
+    def outliers(self) -> float:
+        """The share of the points that are outliers."""
+        return float(self.is_outlier.mean())
+
+    @property
+    def missing(self) -> float:
+        """The share of the model that was not observed."""
+        return float(1 - self.covered.mean())
+
+
+def observe(
+    observed: np.ndarray,
+    hypothesis: Hypothesis,
+    surface: ModelSurface,
+    scale: NoiseScale,
+    random: np.random.Generator,
+) -> Observation:
+    """Return what a hypothesis says of the observed points (N, 3)."""
+    points = transform(hypothesis.T, observed)
+    is_outlier = hypothesis.inlier_N <= 0.5
+    fewest = min(len(points), max(FEWEST_INLIERS, len(points) // 2))
+    if (~is_outlier).sum() < FEWEST_INLIERS:
+        is_outlier = np.ones(len(points), bool)
+        is_outlier[np.argsort(-hypothesis.inlier_N, kind="stable")[:fewest]] = False
+    residuals, rows = surface.residuals(points)
+    noise = scale.noise(residuals[~is_outlier])
+    covered = covered_points(surface.points, points[~is_outlier], noise, random)
+    return Observation(points, is_outlier, noise, residuals, rows, covered)
+
+
+FEW_OUTLIERS = 0.01  # share of the points; fewer are none
+MOST_ADDED = 1024  # points
+BESIDE = 0.6  # of the spacing: so far from a model's point, in its plane, a fresh point may lie
+
+
+def rebuild(T: np.ndarray, observation: Observation, surface: ModelSurface, random: np.random.Generator) -> Candidate:
+    """Return the pair as a candidate of the truth: what was observed is its noisy cloud, of which a part is kept.
+
+    Noise is taken away by moving each point to its plane, as far as the noise exceeds the roughness of the planes;
+    outliers become fresh points. Missing surface is filled with fresh points, as dense as the rest and as noisy.
+
+    Args:
+        T: 4×4, the hypothesis: takes what was observed to the model.
+    """
+    noise, missing = observation.noise, observation.missing
+    quiet = noise <= QUIET and observation.outliers < FEW_OUTLIERS
+    clean = observation.points
+    covered, absent = np.flatnonzero(observation.covered), np.flatnonzero(~observation.covered)
+    if not quiet:
+        if noise > QUIET:
+            moved = noise**2 / (noise**2 + surface.roughness) * observation.residuals
+            clean = clean - moved[:, None] * surface.normals[observation.rows]
+        fresh = fresh_points(surface, covered, len(clean), random)
+        clean = np.where(observation.is_outlier[:, None], fresh, clean)
+    count = min(MOST_ADDED, round(len(clean) * missing / (1 - missing)))
+    added = fresh_points(surface, absent, count, random) if count else np.empty((0, 3))
+    jitter, anywhere = random.normal(size=added.shape), random.uniform(-0.5, 0.5, size=added.shape)
+    scattered = random.random(count) < observation.outliers
+    noisy = np.where(scattered[:, None] & (not quiet), anywhere, added + (noise > QUIET) * noise * jitter)
+    applied = np.zeros(len(CONCEPTS), bool)
+    applied[NOISE], applied[POSE], applied[OVERLAP] = not quiet, True, count > 0
+    return Candidate(
+        applied=applied,
+        model=surface.points,
+        clean=np.concatenate([clean, added]),
+        noisy=np.concatenate([observation.points, noisy]),
+        seen=np.arange(len(clean) + count),
+        kept=np.arange(len(clean)),
+        T_near=np.eye(4),
+        T_init=inverse(T),
+        severity={"noise": noise, "outliers": observation.outliers, "crop": missing},
+    )
+
+
+def fresh_points(surface: ModelSurface, rows: np.ndarray, count: int, random: np.random.Generator) -> np.ndarray:
+    """Return points (count, 3) of the surface around some of the model's points."""
+    chosen = random.choice(rows, size=count, replace=count > len(rows))
+    beside = random.uniform(-BESIDE, BESIDE, size=(count, 2, 1)) * surface.spacing_M[chosen, None, None]
+    return surface.points[chosen] + (beside * surface.tangents[chosen]).sum(axis=1)
 
 
 @dataclass(frozen=True)
@@ -91,7 +217,7 @@ def register(
     """Register every subset of a candidate's causes; what cannot be registered is as wrong as can be.
 
     Args:
-        errors, misses: as for :class:`gpca.causes.counterfactuals.Counterfactuals` and its registrar.
+        errors, misses: as for :class:`gpca.causes.candidate.Counterfactuals` and its registrar.
     """
     started = perf_counter()
     measured = Counterfactuals(Registrar(candidate, truth, misses), errors, xi_n_6, truth)

@@ -1,26 +1,58 @@
 """Hypotheses of the true pose, with the probability of each.
 
-ICP from many starts, on few points, finds where the observed cloud may lie in the model; the mixture
-(:mod:`gpca.reenactment.mixture`) refines the best of these ends, at last on all points, and says how likely each is.
-Poses take what was observed, where it lay before the registration, to the model: the identity is the initial pose.
+ICP from starts spread evenly over rotations of every size, on few points, finds where the observed cloud may lie in the
+model; the mixture (:mod:`gpca.reenactment.mixture`) refines the best of these ends, at last on all points, and says how
+likely each is. Poses take what was observed, where it lay before the registration, to the model: the identity is the
+initial pose.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.icp import ICPSettings, clipped_cost
-from gpca.alignment.rigid import inverses, rotation_angle_rad, transform
-from gpca.reenactment.half_space import share_within
+from gpca.alignment.rigid import inverses, rigid_motion, rotate, rotation_angle_rad, transform
 from gpca.reenactment.mixture import Anchor, Fits, Mixture
 from gpca.reenactment.settings import ReenactmentSettings
-from gpca.reenactment.starts import search_starts
-from gpca.reenactment.surface import ModelSurface
+from gpca.reenactment.surface import ModelSurface, share_within
+
+# How many rotations, up to which angle (degrees), and whether about the cloud's own center or that of its frame. Where
+# surface is missing, the center of what was observed is not the object's; where the start is off, the frame's is not.
+SPREADS = ((48, 109.0, True), (24, 100.0, False), (24, 180.0, True))
+
+
+def search_starts(observed: np.ndarray, model: np.ndarray) -> np.ndarray:
+    """Return poses (n, 4, 4) of the observed points (N, 3) in the frame of the model (M, 3), the identity first."""
+    center, model_center = observed.mean(axis=0), model.mean(axis=0)
+    poses = [np.eye(4)[None]]
+    for count, largest_deg, about_center in SPREADS:
+        R_n = rotations(count, largest_deg)
+        shift_n = model_center - np.stack([rotate(R, center) for R in R_n]) if about_center else np.zeros((len(R_n), 3))
+        poses.append(rigid_motion(R_n, shift_n))
+    return np.concatenate(poses)
+
+
+@cache
+def rotations(count: int, largest_deg: float) -> np.ndarray:
+    """Return about so many rotations (n, 3, 3) of at most an angle, spread evenly (super-Fibonacci, Alexa 2022)."""
+    largest = np.deg2rad(largest_deg)
+    share = (largest - np.sin(largest)) / np.pi  # of all rotations
+    n = round(count / share)
+    i = np.arange(n) + 0.5
+    inner, outer = np.sqrt(i / n), np.sqrt(1 - i / n)
+    first, second = 2 * np.pi * i / 2**0.5, 2 * np.pi * i / 1.533751168755204288118041
+    spread = Rotation.from_quat(
+        np.column_stack([inner * np.sin(first), inner * np.cos(first), outer * np.sin(second), outer * np.cos(second)])
+    )
+    return spread.as_matrix()[spread.magnitude() <= largest]
+
 
 # Points of the observed cloud and of the model that ICP sees from all starts, and the mixture from the best ends.
 SEARCHED, SEARCHED_MODEL = 128, 256

@@ -144,7 +144,7 @@ def reenact_frames(job: Job) -> None:
     from gpca.frames.dataset import datasets_of, files_behind, meshes_of, models_of
     from gpca.frames.instances import Instances, require_of_objects
     from gpca.frames.starts import Starts
-    from gpca.reenactment.frame_enactment import reenact_frames
+    from gpca.reenactment.frames import reenact_frames
 
     settings = read_settings(ReenactmentSettings, job.section("reenactment"))
     truth = CauseSettings.from_dict(job.section("causes"), job.section("icp"))

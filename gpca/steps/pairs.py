@@ -188,8 +188,8 @@ def _with_what_it_reads(
     timings: Path,
 ) -> Registrations:
     """Return the registrations that the explainer gets, with what it reads and the seconds spent before attached."""
-    from gpca.uncertainty.conditions import CONDITIONS
     from gpca.uncertainty.outcomes import Outcomes, read_seconds
+    from gpca.uncertainty.settings import CONDITIONS
 
     loaded = Registrations.load(registrations, axes)
     seconds_S, icp_seconds_S = read_timings(timings, loaded)

@@ -12,8 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from gpca.causes.shapley import SUBSETS
-from gpca.causes.truth import Truth
+from gpca.causes.truth import SUBSETS, Truth
 from gpca.code_files import ROOT
 from gpca.errors import InputError
 from gpca.experiments.diagnosis.judged import SampleTruth

@@ -19,11 +19,9 @@ from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS, SEVERITIES
 from gpca.process.progress import progress
 from gpca.seeds import generator, seed_of
-from gpca.uncertainty.conditions import CONDITIONS, CORNERS, LATIN, SALTELLI, Remedies
-from gpca.uncertainty.knobs import MIDDLE, UNTOUCHED, UPPER, KnobRuns, Knobs
+from gpca.uncertainty.interventions import MIDDLE, UNTOUCHED, UPPER, KnobRuns, Knobs, RemedyRuns
 from gpca.uncertainty.outcomes import Outcomes
-from gpca.uncertainty.remedies import RemedyRuns
-from gpca.uncertainty.settings import UncertaintySettings
+from gpca.uncertainty.settings import CONDITIONS, CORNERS, LATIN, SALTELLI, Remedies, UncertaintySettings
 from gpca.uncertainty.spread import Spread, divergence
 
 STEP = 0.1  # a local derivative takes this step, in the knob's range
@@ -231,3 +229,34 @@ def evaluate_design(
     uncertainty_S_K = divergence(clean, columns["covariance"], settings.floor)
     outcomes = Outcomes(sample=observed.sample, split=observed.split, uncertainty=uncertainty_S_K, **columns)
     return outcomes, seconds_S_K, icp_seconds_S_K
+
+
+class LiveUncertainty:
+    """u(noise, spread, overlap) of an observed pair in nats; nothing is kept from one call to the next.
+
+    Its random numbers are those of the sample in design ``additive``, so it gives what the design's table holds.
+
+    Attributes:
+        icp_calls: runs of ICP so far, those of the clean run included.
+    """
+
+    def __init__(
+        self, registrations: Registrations, row: int, source: str, seed: int, settings: UncertaintySettings
+    ) -> None:
+        self.icp_calls = 0
+        self._floor = settings.floor
+        self._runs = knob_runs(registrations, row, source, seed, settings)
+        self._clean_6_6 = self._covariance(UNTOUCHED)
+
+    def __call__(self, knobs: Knobs) -> float:
+        """Register from all starts with the knobs as given, and return the uncertainty.
+
+        Raises:
+            InputError: a knob outside its range.
+        """
+        return float(divergence(self._clean_6_6, self._covariance(knobs), self._floor))
+
+    def _covariance(self, knobs: Knobs) -> np.ndarray:
+        runs, _ = self._runs.runs(knobs)
+        self.icp_calls += runs.icp_calls
+        return runs.covariance(self._runs.T_ref)

@@ -1,13 +1,14 @@
-"""Settings of Monte-Carlo ICP, kept apart from the code that runs it: nothing here needs compiled loops."""
+"""Settings of Monte-Carlo ICP and the conditions of each design; nothing here needs compiled loops."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from gpca.alignment.icp import ICPSettings
+from gpca.pairs.perturbation import CONCEPTS
 from gpca.settings import Bounds
 
 MONTE_CARLO = "monte_carlo"  # the estimator that these are settings of
@@ -41,3 +42,33 @@ class UncertaintySettings:
     def deviation_6(self) -> np.ndarray:
         """Standard deviations (σ_rot ×3, σ_t ×3) of a start's twist, in radians and diameters."""
         return start_deviation(self.start_rotation_deg, self.start_translation)
+
+
+class Remedies(NamedTuple):
+    """The switches of the remedies, in the order of the concepts noise, pose, overlap."""
+
+    denoise: bool = False
+    restart: bool = False
+    trim: bool = False
+
+
+LATIN = 24  # settings of the knobs in a Latin hypercube
+SALTELLI = 8  # base samples of Saltelli's scheme, which makes five settings of each
+# The corners of the cube of three switches; corner b has switch i on where bit i of b is set.
+CORNERS = tuple(tuple(bool(corner >> i & 1) for i in range(3)) for corner in range(8))
+
+
+def _corners(switches: tuple[str, ...], none: str) -> tuple[str, ...]:
+    """Return a name for each corner: the switches that are on, `none` where all are off."""
+    return tuple("+".join(name for name, on in zip(switches, corner, strict=True) if on) or none for corner in CORNERS)
+
+
+CONDITIONS = {
+    "additive": (*_corners(CONCEPTS, "untouched"), *(f"{concept}_step" for concept in CONCEPTS)),
+    "latin": ("untouched", *(f"latin_{k}" for k in range(LATIN))),
+    "saltelli": ("untouched", *(f"saltelli_{k}" for k in range(5 * SALTELLI))),
+    "oracle": _corners(CONCEPTS, "untouched"),
+    "removal": _corners(Remedies._fields, "observed"),
+    "observed": ("observed",),
+    "causal": ("reference", "clean", "observed"),
+}

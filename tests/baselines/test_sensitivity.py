@@ -8,7 +8,7 @@ from baselines.sensitivity import local_derivatives, partial_rank_correlations, 
 from gpca.explainers.registry import explainer_entry
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.uncertainty.designs import STEP, sample_knobs
-from gpca.uncertainty.knobs import UNTOUCHED, UPPER
+from gpca.uncertainty.interventions import UNTOUCHED, UPPER
 
 KINDS = {"sa_prcc_additive": "latin", "sa_sobol_additive": "saltelli"}
 ADDITIVE = ("sa_local_additive", *KINDS)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from gpca.causes.subjects import read_subjects
+from gpca.causes.measuring import read_subjects
 from tests.pairs.conftest import pair  # noqa: F401
 
 

@@ -6,8 +6,7 @@ import pytest
 from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.pose_error import PoseErrors, pose_error
 from gpca.alignment.rigid import exp, inverse
-from gpca.causes.candidate import draw_candidate
-from gpca.causes.counterfactuals import Counterfactuals, Registrar, Unmeasurable
+from gpca.causes.candidate import Counterfactuals, Registrar, Unmeasurable, draw_candidate
 from gpca.causes.settings import CauseSettings
 from gpca.uncertainty.spread import divergence
 

@@ -7,9 +7,8 @@ import pytest
 from gpca.alignment.pose_error import PoseErrors
 from gpca.alignment.rigid import inverse, rotation_angle_rad, transform
 from gpca.causes import drawing
-from gpca.causes.counterfactuals import Registrar, Unmeasurable
-from gpca.causes.drawing import draw_causes, draw_geometry
-from gpca.causes.quotas import group_of
+from gpca.causes.candidate import Registrar, Unmeasurable
+from gpca.causes.drawing import draw_causes, draw_geometry, group_of
 from gpca.causes.settings import CauseSettings, CauseSeverities, Limits
 from gpca.errors import InputError
 from gpca.objects.canonical import ObjectClouds
@@ -118,7 +117,7 @@ def test_symmetric_objects_are_judged_by_the_shape(four, monkeypatch):
         seen[len(seen)] = symmetric
         return PoseErrors(points, judged, symmetric)
 
-    monkeypatch.setattr("gpca.causes.subjects.PoseErrors", errors)
+    monkeypatch.setattr("gpca.causes.measuring.PoseErrors", errors)
     subjects = drawing.read_subjects(four)
     assert list(seen.values()) == [subject.symmetric for subject in subjects] == [True, False, False, False]
 

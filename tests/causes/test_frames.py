@@ -7,8 +7,7 @@ import pytest
 
 from gpca.causes.frames import chosen_starts, frame_candidate, measure_frames, subjects_of
 from gpca.causes.settings import CauseSettings, FrameCauseSettings
-from gpca.causes.shapley import ALL
-from gpca.causes.truth import LARGEST_ERROR
+from gpca.causes.truth import ALL, LARGEST_ERROR
 from gpca.errors import InputError
 from gpca.frames.dataset import meshes_of
 from gpca.frames.shots import clean_view

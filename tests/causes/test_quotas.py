@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from gpca.causes.quotas import Quotas, Tally, apportion, group_of
+from gpca.causes.drawing import Quotas, Tally, apportion, group_of
 from gpca.causes.settings import CauseSettings, Shares
 from gpca.causes.truth import Truth
 

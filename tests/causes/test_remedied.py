@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-import gpca.causes.remedied as module
+import gpca.causes.descriptors as module
 from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.rigid import inverse, transform
-from gpca.causes.remedied import NOISE, OVERLAP, POSE, describe_remedied
+from gpca.causes.descriptors import NOISE, OVERLAP, POSE, describe_remedied
 from gpca.causes.settings import REMEDIED, DescriptorSettings
-from gpca.causes.shapley import ALL
+from gpca.causes.truth import ALL
 from tests.pairs.conftest import FEW, ICP
 
 

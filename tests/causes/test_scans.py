@@ -7,12 +7,19 @@ import pytest
 from scipy.spatial import cKDTree
 
 from gpca.alignment.rigid import rigid_motion, transform
-from gpca.causes.counterfactuals import Registrar
-from gpca.causes.scan_candidate import DrawnScans, OverlapErrors, sensor_noise_m, unit_of
-from gpca.causes.scans import GLOBAL, LADDER, ScanStart, measure_scans
+from gpca.causes.candidate import Registrar
+from gpca.causes.scans import (
+    GLOBAL,
+    LADDER,
+    DrawnScans,
+    OverlapErrors,
+    ScanStart,
+    measure_scans,
+    sensor_noise_m,
+    unit_of,
+)
 from gpca.causes.settings import OBSERVED, CauseSettings
-from gpca.causes.shapley import ALL, NONE
-from gpca.causes.truth import FAILED, GEOMETRY
+from gpca.causes.truth import ALL, FAILED, GEOMETRY, NONE
 from gpca.errors import InputError
 from gpca.scans.pair import ScanSuccess, overlap_rmse
 from tests.scans.corner import corner_pair, start_off

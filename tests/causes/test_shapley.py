@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from baselines.shap_kl import shapley_values as by_library
-from gpca.causes.shapley import ALL, NONE, SUBSETS, shapley_values
+from gpca.causes.truth import ALL, NONE, SUBSETS, shapley_values
 
 RANDOM = np.random.default_rng(100)
 

@@ -2,8 +2,8 @@ from dataclasses import replace
 
 import pytest
 
+from gpca.causes.measuring import measure_clean_pairs, split_by_object
 from gpca.causes.settings import CauseSettings, Limits, Shares
-from gpca.causes.subjects import measure_clean_pairs, split_by_object
 from gpca.errors import InputError
 
 SETTINGS = CauseSettings(points=(128, 192), clean_pairs=20)
@@ -76,7 +76,7 @@ def test_a_few_pairs_that_are_off_by_chance_do_not_leave_an_object_out(subjects,
     def clean_pair(subject, _source, _seed, number, _settings):
         return 0.03 if subject.name == unlucky and number % 8 < 6 else 0.01, 0.5
 
-    monkeypatch.setattr("gpca.causes.subjects._clean_pair", clean_pair)
+    monkeypatch.setattr("gpca.causes.measuring._clean_pair", clean_pair)
     left, limit = measure_clean_pairs(subjects, "four", 100, SETTINGS)
     assert left == subjects
     assert limit == 0.5

@@ -10,7 +10,7 @@ from scipy import stats
 from gpca.alignment.rigid import exp, transform
 from gpca.causes.descriptors import WIDTHS
 from gpca.causes.settings import CauseSettings
-from gpca.causes.shapley import ALL
+from gpca.causes.truth import ALL
 from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
 from gpca.explainers.pair_classifier import Judgment, PairClassifier
@@ -26,8 +26,7 @@ from gpca.model.diagnoser import (
 )
 from gpca.model.diagnosis import Diagnosis, state_probabilities
 from gpca.model.file import FEATURE_COUNTS
-from gpca.reenactment.dataset import Reenactments
-from gpca.reenactment.features import FEATURES, reenactment_features
+from gpca.reenactment.dataset import FEATURES, Reenactments, reenactment_features
 from gpca.reenactment.settings import ReenactmentSettings
 
 SMALL_MOTION = exp(np.array([[0.05, -0.02, 0.03, 0.01, 0.02, -0.01]]))[0]

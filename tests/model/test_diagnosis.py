@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gpca.alignment.rigid import exp, transform
-from gpca.causes.shapley import ALL, shapley_values
+from gpca.causes.truth import ALL, shapley_values
 from gpca.model.diagnosis import Reenacted, axis_in_words
 from gpca.objects.canonical_frame import CanonicalFrame
 from gpca.reenactment.enactment import Enactment

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gpca.alignment.rigid import transform
-from gpca.causes.shapley import ALL, BY_SIZE
+from gpca.causes.truth import ALL, BY_SIZE
 from gpca.model.scene import MOST_POINTS, packed, taken_out, unpacked
 
 from ..page.test_in_a_browser import chromium, in_a_browser, with_script

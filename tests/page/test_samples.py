@@ -7,7 +7,7 @@ import pytest
 
 from gpca.alignment.rigid import inverse, transform
 from gpca.causes.settings import CauseSettings, Limits
-from gpca.causes.shapley import ALL, BY_SIZE
+from gpca.causes.truth import ALL, BY_SIZE
 from gpca.errors import InputError
 from gpca.experiments.method.concepts import source_before_icp
 from gpca.model.scene import unpacked

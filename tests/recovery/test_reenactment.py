@@ -8,7 +8,7 @@ import pytest
 
 from gpca.alignment.rigid import inverse, rigid_motion, scale_translation
 from gpca.causes.settings import OBSERVED, CauseSettings
-from gpca.causes.shapley import ALL, NONE
+from gpca.causes.truth import ALL, NONE
 from gpca.experiments.recovery.cases import RobotIn, register_after
 from gpca.frames.camera import Camera, MeshScene
 from gpca.frames.shots import Shot

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from gpca.alignment.rigid import inverse, transform
-from gpca.causes.candidate import draw_candidate
-from gpca.causes.counterfactuals import Registrar
+from gpca.causes.candidate import Registrar, draw_candidate
 from gpca.causes.settings import CauseSettings, CauseSeverities
 from gpca.pairs.distances import ObservedPair
 from gpca.pairs.perturbation import CONCEPTS

@@ -5,8 +5,7 @@ import pytest
 
 from gpca.causes.settings import CauseSettings
 from gpca.errors import InputError
-from gpca.reenactment.dataset import Reenactments, reenact_all
-from gpca.reenactment.features import FEATURES, reenactment_features
+from gpca.reenactment.dataset import FEATURES, Reenactments, reenact_all, reenactment_features
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.settings import read_settings
 

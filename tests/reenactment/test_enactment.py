@@ -3,14 +3,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gpca.causes.counterfactuals import Counterfactuals, Registrar
+from gpca.causes.candidate import Counterfactuals, Registrar
 from gpca.causes.dataset import LABELS
-from gpca.causes.shapley import ALL, NONE
-from gpca.reenactment.dataset import as_arrays
+from gpca.causes.truth import ALL, NONE
+from gpca.reenactment.dataset import as_arrays, verdict
 from gpca.reenactment.enactment import reenact
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface
-from gpca.reenactment.verdict import verdict
 from tests.reenactment.conftest import TRUTH, candidate_of, pair_of
 
 SETTINGS = ReenactmentSettings()

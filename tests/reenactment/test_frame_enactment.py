@@ -1,6 +1,6 @@
 """Frames whose answer is known, re-enacted by an observer who knows the mesh and the camera, but not the pose."""
 
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,12 +10,11 @@ from gpca.causes.dataset import LABELS
 from gpca.causes.descriptors import observed_pair
 from gpca.causes.frames import measure_frames, subjects_of
 from gpca.causes.settings import CauseSettings
-from gpca.causes.shapley import ALL, shapley_values
+from gpca.causes.truth import ALL, shapley_values
 from gpca.errors import InputError
 from gpca.frames.dataset import meshes_of
 from gpca.reenactment.dataset import Reenactments
-from gpca.reenactment.frame_enactment import reenact_frames
-from gpca.reenactment.frame_view import FrameView, KnownObject
+from gpca.reenactment.frames import FrameView, KnownObject, reenact_frames
 from gpca.reenactment.settings import ReenactmentSettings
 from tests.frames.bracket import hidden, misplaced, models_in, most_seen, noisy, own_starts
 
@@ -133,6 +132,6 @@ def test_where_nothing_of_the_mesh_is_in_sight_only_a_pose_error_is_taken_away(s
 def test_starts_of_other_registrations_are_refused(seen, objects, meshes):
     causes = measured(seen, objects, meshes)
     starts = own_starts(seen)
-    none = type(starts)(*(getattr(starts, field.name)[:0] for field in fields(starts)))
+    none = starts.subset(np.arange(0))
     with pytest.raises(InputError, match="are of other registrations than the causes"):
         reenact_frames(causes, none, seen, objects, meshes, SETTINGS, TRUTH)

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from gpca.reenactment.half_space import covered_points, directions
+from gpca.reenactment.surface import covered_points, directions
 
 
 def seen(points, share, along):

@@ -3,8 +3,7 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from gpca.alignment.rigid import exp, inverse, transform
-from gpca.reenactment.mixture import Anchor, Mixture
-from gpca.reenactment.mixture_kernels import FIRST_OUTLIERS, REACH
+from gpca.reenactment.mixture import FIRST_OUTLIERS, REACH, Anchor, Mixture
 
 RANDOM = np.random.default_rng(100)
 

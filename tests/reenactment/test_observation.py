@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
+from gpca.reenactment.enactment import NoiseScale, observe
 from gpca.reenactment.hypotheses import Hypothesis
-from gpca.reenactment.observation import NoiseScale, observe
 
 
 def hypothesis(inlier_N):

@@ -2,9 +2,8 @@ import numpy as np
 import pytest
 
 from gpca.pairs.perturbation import NOISE, OVERLAP
+from gpca.reenactment.enactment import NoiseScale, fresh_points, observe, rebuild
 from gpca.reenactment.hypotheses import Hypothesis
-from gpca.reenactment.observation import NoiseScale, observe
-from gpca.reenactment.rebuilding import fresh_points, rebuild
 from tests.reenactment.conftest import candidate_of
 
 

@@ -9,11 +9,11 @@ from gpca.alignment.rigid import rotation_angle_rad, scale_translation
 from gpca.causes.dataset import LABELS
 from gpca.causes.scans import LADDER, ScanStart, measure_scans
 from gpca.causes.settings import OBSERVED, CauseSettings
-from gpca.causes.shapley import ALL
+from gpca.causes.truth import ALL
 from gpca.reenactment.dataset import Reenactments
+from gpca.reenactment.enactment import NoiseScale
 from gpca.reenactment.hypotheses import Hypothesis
-from gpca.reenactment.observation import NoiseScale
-from gpca.reenactment.scan_enactment import cropped, reenact_scans
+from gpca.reenactment.scans import cropped, reenact_scans
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface
 from gpca.scans.pair import ScanSuccess

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from gpca.reenactment.starts import rotations, search_starts
+from gpca.reenactment.hypotheses import rotations, search_starts
 
 
 @pytest.mark.parametrize(("count", "largest_deg", "gap_deg"), [(48, 109.0, 45), (24, 180.0, 75)])

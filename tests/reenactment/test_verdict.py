@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from gpca.causes.settings import Limits
-from gpca.reenactment.verdict import verdict
+from gpca.reenactment.dataset import verdict
 
 LIMITS = Limits()
 ONE = np.array([1.0, 0, 0])

@@ -6,10 +6,9 @@ import pytest
 from gpca.alignment.rigid import transform
 from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.uncertainty.conditions import CONDITIONS, CORNERS, LATIN, SALTELLI
 from gpca.uncertainty.designs import DESIGNS, KNOB_RANGE, STEP, RegisteredRow, sample_knobs
-from gpca.uncertainty.knobs import MIDDLE, UNTOUCHED, UPPER
-from gpca.uncertainty.settings import UncertaintySettings
+from gpca.uncertainty.interventions import MIDDLE, UNTOUCHED, UPPER
+from gpca.uncertainty.settings import CONDITIONS, CORNERS, LATIN, SALTELLI, UncertaintySettings
 
 SETTINGS = UncertaintySettings(starts=13, icp_points=60)
 XI = np.random.default_rng(0).normal(size=(13, 6)) * SETTINGS.deviation_6()

@@ -1,5 +1,3 @@
-from dataclasses import fields
-
 import numpy as np
 import pytest
 
@@ -12,7 +10,7 @@ from gpca.uncertainty.settings import UncertaintySettings
 from gpca.uncertainty.spread import divergence
 
 SETTINGS = UncertaintySettings(starts=13, icp_points=60)
-COLUMNS = tuple(field.name for field in fields(Outcomes))
+COLUMNS = tuple(Outcomes.array_fields())
 
 
 def evaluate(design, registrations, rows, source="tiny", seed=0, settings=SETTINGS):

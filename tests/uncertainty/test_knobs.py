@@ -5,8 +5,8 @@ from scipy.optimize import linprog
 from gpca.alignment.rigid import exp
 from gpca.errors import InputError
 from gpca.pairs.perturbation import Severities
-from gpca.uncertainty import knobs
-from gpca.uncertainty.knobs import MIDDLE, MOST, UNTOUCHED, UPPER, KnobRuns, Knobs
+from gpca.uncertainty import interventions
+from gpca.uncertainty.interventions import MIDDLE, MOST, UNTOUCHED, UPPER, KnobRuns, Knobs
 from gpca.uncertainty.settings import UncertaintySettings
 from gpca.uncertainty.spread import run_from_starts
 
@@ -31,7 +31,7 @@ def calls(monkeypatch):
         seen.append((source, T_init, xi_n_6))
         return run_from_starts(icp, source, T_init, xi_n_6)
 
-    monkeypatch.setattr(knobs, "run_from_starts", recorded)
+    monkeypatch.setattr(interventions, "run_from_starts", recorded)
     return seen
 
 

@@ -2,9 +2,8 @@ import numpy as np
 import pytest
 
 from gpca.errors import InputError
-from gpca.uncertainty.designs import ADDITIVE_KNOBS, evaluate_design
-from gpca.uncertainty.knobs import UNTOUCHED, Knobs
-from gpca.uncertainty.live import LiveUncertainty
+from gpca.uncertainty.designs import ADDITIVE_KNOBS, LiveUncertainty, evaluate_design
+from gpca.uncertainty.interventions import UNTOUCHED, Knobs
 from gpca.uncertainty.settings import UncertaintySettings
 
 SETTINGS = UncertaintySettings(starts=13, icp_points=60)

@@ -5,10 +5,17 @@ from scipy.spatial import cKDTree
 from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.rigid import exp
 from gpca.pairs.perturbation import CONCEPTS, PERTURBATIONS, Severities
-from gpca.uncertainty import remedies
-from gpca.uncertainty.conditions import CORNERS
-from gpca.uncertainty.remedies import FEWEST_POINTS, RESTARTS, Remedies, RemedyRuns, best_of_neighbors, denoise, trim
-from gpca.uncertainty.settings import UncertaintySettings
+from gpca.uncertainty import interventions
+from gpca.uncertainty.interventions import (
+    FEWEST_TRIMMED,
+    RESTARTS,
+    Remedies,
+    RemedyRuns,
+    best_of_neighbors,
+    denoise,
+    trim,
+)
+from gpca.uncertainty.settings import CORNERS, UncertaintySettings
 from gpca.uncertainty.spread import Runs
 
 SETTINGS = UncertaintySettings(starts=13, icp_points=100)
@@ -79,12 +86,12 @@ def test_the_target_is_trimmed_to_what_the_source_covers():
     assert np.array_equal(trim(target, target, 0.1), target)
 
 
-@pytest.mark.parametrize("covered", [0, 1, FEWEST_POINTS - 1, FEWEST_POINTS])
+@pytest.mark.parametrize("covered", [0, 1, FEWEST_TRIMMED - 1, FEWEST_TRIMMED])
 def test_with_hardly_any_overlap_nothing_is_trimmed(covered):
     target = plane(200)
     source = np.concatenate([target[:covered], target + np.array([0, 0, 20.0])])
     kept = trim(target, source, 1e-6)
-    assert len(kept) == (covered if covered >= FEWEST_POINTS else 200)
+    assert len(kept) == (covered if covered >= FEWEST_TRIMMED else 200)
 
 
 # Restarting
@@ -174,8 +181,8 @@ def test_a_combination_does_not_depend_on_those_before_it():
 def test_what_several_combinations_share_is_worked_out_by_the_first_that_needs_it(monkeypatch):
     worked_out = []
     for name in ("denoise", "trim"):
-        work = getattr(remedies, name)
-        monkeypatch.setattr(remedies, name, lambda *given, n=name, w=work: worked_out.append(n) or w(*given))
+        work = getattr(interventions, name)
+        monkeypatch.setattr(interventions, name, lambda *given, n=name, w=work: worked_out.append(n) or w(*given))
     evaluate = remedy_runs("noise", 0, 300)
     evaluate(Remedies())
     evaluate(Remedies(restart=True))

@@ -109,11 +109,11 @@ EDITS = {  # a module: what is made again where it has changed, and what is not
         "objects/coffee_cup objects/ycb registrations/coffee_cup predictions/coffee_cup objects_coffee_cup scenes",
         "",
     ),
-    "gpca/causes/remedied.py": (
+    "gpca/causes/descriptors.py": (
         "descriptors/ycb diagnoses/ycb/pair_forest estimates/ model.pt exchange/",
         "predictions causes/ recovery methods/",
     ),
-    "gpca/uncertainty/estimators/censi.py": ("estimates/ exchange/ estimators.csv", "uncertainty/ causes/ methods/"),
+    "gpca/uncertainty/estimators/analytic.py": ("estimates/ exchange/ estimators.csv", "uncertainty/ causes/ methods/"),
     "baselines/descriptors.py": ("diagnoses/ycb/pair_forest table9_causes", "predictions"),
     "gpca/experiments/controls/variants.py": (
         "controls/ control_embeddings/ transfer",

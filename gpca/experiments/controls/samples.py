@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpca.alignment.rigid import inverse
-from gpca.causes.subjects import Subject, read_subjects
+from gpca.causes.measuring import Subject, read_subjects
 from gpca.io.csv_file import read_numbers
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations

@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpca.attribution.predictions import read_predictions
-from gpca.causes.counterfactuals import replay
+from gpca.causes.candidate import replay
 from gpca.causes.dataset import LABELS, Causes
 from gpca.causes.settings import CauseSettings
-from gpca.causes.shapley import ALL, BY_SIZE, SUBSETS
-from gpca.causes.truth import FAILED
+from gpca.causes.truth import ALL, BY_SIZE, FAILED, SUBSETS
 from gpca.errors import InputError
 from gpca.evaluation.measures import source_method_seed
 from gpca.objects.canonical import ObjectClouds

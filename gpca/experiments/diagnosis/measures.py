@@ -9,8 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from gpca.causes.dataset import LABELS
-from gpca.causes.shapley import ALL
-from gpca.causes.truth import BORDERLINE, NOMINAL
+from gpca.causes.truth import ALL, BORDERLINE, NOMINAL
 from gpca.experiments.diagnosis.judged import Judged
 from gpca.pairs.perturbation import CONCEPTS
 

@@ -20,8 +20,7 @@ from gpca.explainers.registry import CAUSES, explainer_entry
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
-from gpca.reenactment.dataset import Reenactments
-from gpca.reenactment.features import reenactment_features
+from gpca.reenactment.dataset import Reenactments, reenactment_features
 from gpca.reenactment.settings import ReenactmentSettings
 
 

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.causes.shapley import ALL
-from gpca.causes.truth import BORDERLINE, FAILED, NOMINAL
+from gpca.causes.truth import ALL, BORDERLINE, FAILED, NOMINAL
 from gpca.evaluation.intervals import pigeonhole_weights
 from gpca.experiments.diagnosis.judged import POOLED, Judged
 from gpca.experiments.diagnosis.measures import of_decisions

@@ -25,7 +25,7 @@ from gpca.experiments.estimators.settings import Kind
 from gpca.pairs.perturbation import within_half_space
 from gpca.seeds import generator
 from gpca.uncertainty.estimators.interface import POINT_TO_PLANE, POINT_TO_POINT, RegisteredPair
-from gpca.uncertainty.estimators.monte_carlo import sample
+from gpca.uncertainty.estimators.starts import sample
 
 Clouds = Iterator[tuple[np.ndarray, np.ndarray]]  # (N, 3) of sources and (P, 3) of targets
 SETTINGS = ICPSettings("point_to_point", CORRESPONDENCE_DISTANCE, MAX_ITERATIONS)  # to points and to planes

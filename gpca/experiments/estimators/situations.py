@@ -12,7 +12,7 @@ import numpy as np
 from gpca.alignment.methods.interface import Pair
 from gpca.alignment.methods.registry import make_method
 from gpca.alignment.rigid import inverse, transform
-from gpca.causes.counterfactuals import candidate_of, surface_of
+from gpca.causes.candidate import candidate_of, surface_of
 from gpca.causes.dataset import Causes
 from gpca.causes.descriptors import observed_pair
 from gpca.causes.settings import CauseSettings

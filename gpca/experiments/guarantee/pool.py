@@ -17,8 +17,7 @@ from gpca.guarantee.guarantee import states_of
 from gpca.io.arrays import REGENERATE
 from gpca.io.files import Axes
 from gpca.pairs.dataset import Registrations
-from gpca.reenactment.dataset import Reenactments
-from gpca.reenactment.features import reenactment_features
+from gpca.reenactment.dataset import Reenactments, reenactment_features
 from gpca.seeds import generator
 
 PARTS = 3  # of families that no file deals into folds

@@ -32,7 +32,7 @@ from gpca.explainers.registry import explainer_entry
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.progress import progress
-from gpca.uncertainty.knobs import MIDDLE, UPPER
+from gpca.uncertainty.interventions import MIDDLE, UPPER
 
 LOWER = (0.01, 1.5, 0.20)  # the knobs at the lower ends of the severities
 KNOBS = {"low": LOWER, "middle": MIDDLE, "high": UPPER}

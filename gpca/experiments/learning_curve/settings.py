@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any
 
-from gpca.causes.quotas import apportion
+from gpca.causes.drawing import apportion
 from gpca.causes.truth import BORDERLINE, GEOMETRY
 from gpca.classifier.settings import GPCSettings
 from gpca.settings import Bounds, Count, Distinct

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from gpca.attribution.scores import Attribution
-from gpca.uncertainty.knobs import MIDDLE, UNTOUCHED, Knobs
-from gpca.uncertainty.live import LiveUncertainty
+from gpca.uncertainty.designs import LiveUncertainty
+from gpca.uncertainty.interventions import MIDDLE, UNTOUCHED, Knobs
 
 
 def live_values(uncertainty: LiveUncertainty) -> np.ndarray:

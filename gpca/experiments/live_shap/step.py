@@ -13,8 +13,7 @@ from gpca.pairs.dataset import Registrations
 from gpca.process.job import Job
 from gpca.process.progress import progress
 from gpca.process.provenance import record_provenance
-from gpca.uncertainty.designs import design_rows
-from gpca.uncertainty.live import LiveUncertainty
+from gpca.uncertainty.designs import LiveUncertainty, design_rows
 from gpca.uncertainty.outcomes import Outcomes
 from gpca.uncertainty.settings import UncertaintySettings
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from gpca.active_learning.curves import TABLE
 from gpca.active_learning.settings import ALL_LABELS
-from gpca.causes.quotas import apportion
+from gpca.causes.drawing import apportion
 from gpca.causes.truth import BORDERLINE, GEOMETRY, NOMINAL
 from gpca.evaluation.measures import ALL
 from gpca.experiments.active_learning.clusters import Clusters

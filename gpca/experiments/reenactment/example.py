@@ -12,8 +12,7 @@ from gpca.alignment.rigid import transform
 from gpca.causes.dataset import Causes
 from gpca.causes.descriptors import observed_pair
 from gpca.causes.settings import CauseSettings
-from gpca.causes.shapley import ALL, BY_SIZE, SUBSETS
-from gpca.causes.truth import FAILED
+from gpca.causes.truth import ALL, BY_SIZE, FAILED, SUBSETS
 from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS, NOISE, OVERLAP
 from gpca.reenactment.dataset import Reenactments

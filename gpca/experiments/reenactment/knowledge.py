@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from gpca.causes.shapley import ALL, BY_SIZE, SUBSETS
+from gpca.causes.truth import ALL, BY_SIZE, SUBSETS
 from gpca.pairs.perturbation import CONCEPTS, NOISE, OVERLAP, POSE
 
 NOTHING, EVERYTHING = "nothing", "everything"

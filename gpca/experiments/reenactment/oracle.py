@@ -9,8 +9,7 @@ import numpy as np
 
 from gpca.alignment.rigid import inverse, transform
 from gpca.attribution.scores import Attribution
-from gpca.causes.candidate import Candidate
-from gpca.causes.counterfactuals import candidate_of, surface_of
+from gpca.causes.candidate import Candidate, candidate_of, surface_of
 from gpca.causes.dataset import LABELS, Causes
 from gpca.causes.descriptors import observed_pair
 from gpca.causes.settings import CauseSettings
@@ -20,12 +19,11 @@ from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.distances import ObservedPair
 from gpca.pairs.perturbation import NOISE, OVERLAP, POSE
 from gpca.process.progress import progress
-from gpca.reenactment.enactment import Enactment, enact, reenact, register, start_twists
+from gpca.reenactment.dataset import verdict
+from gpca.reenactment.enactment import Enactment, NoiseScale, enact, reenact, register, start_twists
 from gpca.reenactment.hypotheses import hypothesis_at, weights_of
-from gpca.reenactment.observation import NoiseScale
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface
-from gpca.reenactment.verdict import verdict
 from gpca.seeds import generator
 
 SAME = 1e-3  # diameters; points that were drawn again lie no farther from those in the file, which are rounded
@@ -59,7 +57,7 @@ def ask_oracles(
 def verdicts(
     pair: ObservedPair, true: Candidate, settings: ReenactmentSettings, truth: CauseSettings
 ) -> dict[str, np.ndarray]:
-    """Return the verdict (4,) of :func:`gpca.reenactment.verdict.verdict` on one pair, by what is known.
+    """Return the verdict (4,) of :func:`gpca.reenactment.dataset.verdict` on one pair, by what is known.
 
     Args:
         true: the candidate that the pair is.
@@ -112,7 +110,7 @@ def informed(
     known, else as the rest was found to be.
 
     Args:
-        rebuilt: of :func:`gpca.reenactment.rebuilding.rebuild`: the observed points come first.
+        rebuilt: of :func:`gpca.reenactment.enactment.rebuild`: the observed points come first.
         T_model_true: 4×4, where the hypothesis puts what truly lies in the model: the identity if it is right.
         true: the candidate that was observed.
     """

@@ -32,8 +32,7 @@ from gpca.io.csv_file import write_csv
 from gpca.pairs.dataset import Registrations
 from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
-from gpca.reenactment.dataset import Reenactments
-from gpca.reenactment.features import reenactment_features
+from gpca.reenactment.dataset import Reenactments, reenactment_features
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.settings import read_settings
 

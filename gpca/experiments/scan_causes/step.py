@@ -9,8 +9,7 @@ import numpy as np
 from gpca.alignment.methods.registry import make_method
 from gpca.alignment.rigid import scale_translation
 from gpca.causes.descriptors import describe_all
-from gpca.causes.scan_candidate import motion_between
-from gpca.causes.scans import ScanStart, measure_scans
+from gpca.causes.scans import ScanStart, measure_scans, motion_between
 from gpca.causes.settings import OBSERVED, CauseSettings, DescriptorSettings
 from gpca.experiments.scan_causes.samples import GlobalMethod, starts_of
 from gpca.experiments.scan_causes.settings import ScanSamples
@@ -19,7 +18,7 @@ from gpca.experiments.scans.trial import pair_to_register
 from gpca.io.csv_file import write_csv
 from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
-from gpca.reenactment.scan_enactment import reenact_scans
+from gpca.reenactment.scans import reenact_scans
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.scans.pair import ScanPair, ScanSuccess
 from gpca.scans.scene import ScanPairs

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from gpca.alignment.rigid import inverse, transform
-from gpca.causes.shapley import shapley_values
+from gpca.causes.truth import shapley_values
 from gpca.evaluation.measures import ALL
 from gpca.experiments.specification_curve.run_files import Row, RunFiles
 from gpca.experiments.specification_curve.settings import Reading, ReadingSizes
@@ -16,10 +16,9 @@ from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.progress import progress
 from gpca.seeds import generator
-from gpca.uncertainty.conditions import CORNERS
 from gpca.uncertainty.designs import KNOB_RANGE, STEP, RegisteredRow, design_rows
-from gpca.uncertainty.knobs import MIDDLE, UNTOUCHED, KnobRuns, Knobs
-from gpca.uncertainty.settings import UncertaintySettings
+from gpca.uncertainty.interventions import MIDDLE, UNTOUCHED, KnobRuns, Knobs
+from gpca.uncertainty.settings import CORNERS, UncertaintySettings
 from gpca.uncertainty.spread import divergence, log_determinant, log_residual
 
 Pair = tuple[str, dict[str, tuple[tuple, KnobRuns]]]  # its concept, and by name the clouds that are run and their runs

@@ -22,8 +22,8 @@ from gpca.process.progress import progress
 from gpca.seeds import generator, seed_of
 from gpca.uncertainty.designs import ADDITIVE_KNOBS, RegisteredRow
 from gpca.uncertainty.estimators.interface import POINT_TO_POINT, Estimate, Example, RegisteredPair
-from gpca.uncertainty.estimators.monte_carlo import sample
-from gpca.uncertainty.knobs import UNTOUCHED, KnobbedSource, Knobs
+from gpca.uncertainty.estimators.starts import sample
+from gpca.uncertainty.interventions import UNTOUCHED, KnobbedSource, Knobs
 from gpca.uncertainty.settings import UncertaintySettings
 from gpca.uncertainty.spread import divergence
 

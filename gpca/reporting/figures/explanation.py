@@ -8,7 +8,7 @@ from textwrap import fill, wrap
 import numpy as np
 
 from gpca.alignment.rigid import transform
-from gpca.causes.shapley import BY_SIZE
+from gpca.causes.truth import BY_SIZE
 from gpca.model.explanation import Explanation
 from gpca.model.scene import Scene, distances, taken_out
 from gpca.reporting.figures.cloud_views import thinned, widest_views

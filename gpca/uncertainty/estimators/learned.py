@@ -1,11 +1,4 @@
-"""A learned covariance of an aleatoric and an epistemic part, after De Maio & Lacroix (2022): some networks.
-
-Each network gives the mean and the variances of the error from a pair's descriptors. What they say on average is how
-much registrations of such a pair differ (aleatoric); how much they contradict each other, how little they know of such
-pairs (epistemic, Lakshminarayanan et al. 2017). Theirs is variational, on clouds.
-
-It models the error, whatever it comes from: it is taught with errors against true poses (ICRA 2022).
-"""
+"""Covariances that are learned from registrations of training objects: CELLO-3D, and an ensemble of networks."""
 
 from __future__ import annotations
 
@@ -13,23 +6,128 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gpca.alignment.rigid import exp, log
+from gpca.alignment.rigid import adjoint, exp, log
 from gpca.seeds import generator
-from gpca.uncertainty.estimators.cello import FEWEST_EXAMPLES, Reduction, along_axes, described, twists_along_axes
 from gpca.uncertainty.estimators.interface import (
     Estimator,
     EstimatorEntry,
     Example,
+    FailedEstimate,
     RegisteredPair,
     intrinsic_frame,
     require_examples,
 )
+from gpca.uncertainty.estimators.interface import EstimatorEntry as Entry
+
+FEWEST_EXAMPLES = 8
+FLOOR = 1e-8  # squared radians and diameters, of a training variance
+LEAST_SINGULAR = 1e-6  # of the largest: what is below is rounding
+
+
+def learn_cello(
+    examples: Sequence[Example], components: int = 8, steps: int = 100, learning_rate: float = 0.05
+) -> Estimator:
+    """Learn a metric of descriptors that finds similar training pairs (CELLO-3D, Landry et al., ICRA 2019).
+
+    The covariance is the mean of the training pairs' covariances with weights exp(-|L (φ - φ')|²). L is diagonal,
+    chosen so that the runs of each training pair are likely under the covariance that the others give it. It models how
+    results vary between the runs that it learns from: starts and data where both vary. An error that all runs of a pair
+    share is not modeled.
+
+    Axes of a pair have no common sign, over which the covariance between two of them averages out: what is learned are
+    the six variances along the principal axes of the target (:func:`intrinsic_frame`).
+
+    Args:
+        components: of a PCA of the descriptors.
+        steps, learning_rate: of Adam on the leave-one-out likelihood.
+    """
+    import torch
+
+    from gpca.portable import Adam, logarithm
+
+    require_examples(examples, FEWEST_EXAMPLES)
+    reduce = Reduction([example.descriptors for example in examples], components)
+    features = torch.from_numpy(reduce(np.array([example.descriptors for example in examples])))
+    variances_E_6 = np.array([_variances(example) for example in examples])
+    variances = torch.from_numpy(variances_E_6)
+    log_scale = torch.zeros(features.shape[1], dtype=torch.float64, requires_grad=True)
+    optimizer = Adam([log_scale], learning_rate)
+    others = torch.eye(len(examples), dtype=torch.bool)
+    for _ in range(steps):
+        optimizer.zero_grad()
+        scaled = features * torch.exp(log_scale)
+        lengths = scaled.square().sum(dim=1)
+        squares = lengths[:, None] + lengths - 2 * scaled @ scaled.T
+        weights = torch.softmax((-squares).masked_fill(others, -torch.inf), dim=1)
+        predicted = weights @ variances
+        loss = (logarithm(predicted) + variances / predicted).sum(dim=1).mean()
+        loss.backward()
+        optimizer.step()
+    scale_K = np.exp(log_scale.detach().numpy())
+    known_E_K = features.numpy() * scale_K
+
+    def estimate(registered: RegisteredPair) -> np.ndarray:
+        squares_E = np.square(reduce(described(registered)[None]) * scale_K - known_E_K).sum(axis=1)
+        weights_E = np.exp(squares_E.min() - squares_E)
+        variances_6 = (weights_E[:, None] * variances_E_6).sum(axis=0) / weights_E.sum()
+        return along_axes(np.diag(variances_6), intrinsic_frame(registered.pair.target))
+
+    return estimate
+
+
+class Reduction:
+    """Descriptors, standardized and limited, onto their first principal components.
+
+    There are at most one fewer than training pairs: along any other axis these do not differ, and another pair would
+    lie infinitely far away.
+    """
+
+    def __init__(self, descriptors: Sequence[np.ndarray], components: int) -> None:
+        stacked_E_F = np.array(descriptors)
+        self._mean_F, deviation_F = stacked_E_F.mean(axis=0), stacked_E_F.std(axis=0)
+        self._deviation_F = np.where(deviation_F > 1e-9, deviation_F, np.inf)  # what never changes says nothing
+        _, singular_F, axes_F_F = np.linalg.svd(self._standard(stacked_E_F), full_matrices=False)
+        axes_F_F = axes_F_F[singular_F > LEAST_SINGULAR * singular_F[0]]
+        largest = np.abs(axes_F_F).argmax(axis=1)  # a component's sign is arbitrary
+        signs = np.sign(axes_F_F[np.arange(len(axes_F_F)), largest])
+        self._axes_K_F = (axes_F_F * signs[:, None])[:components]
+        self._size_K = np.einsum("ef,kf->ek", self._standard(stacked_E_F), self._axes_K_F).std(axis=0)
+
+    def __call__(self, descriptors_n_F: np.ndarray) -> np.ndarray:
+        """Return the components (n, K), of unit deviation over the training pairs."""
+        return np.einsum("nf,kf->nk", self._standard(descriptors_n_F), self._axes_K_F) / self._size_K
+
+    def _standard(self, descriptors_n_F: np.ndarray) -> np.ndarray:
+        return np.clip((descriptors_n_F - self._mean_F) / self._deviation_F, -5, 5)
+
+
+def described(registered: RegisteredPair) -> np.ndarray:
+    """Return the pair's descriptors (F,); without any the estimate fails."""
+    if registered.describe is None:
+        raise FailedEstimate("the pair has no descriptors")
+    return registered.describe()
+
+
+def along_axes(covariance_6_6: np.ndarray, T_target_intrinsic: np.ndarray) -> np.ndarray:
+    """Return a covariance of the intrinsic frame as one of the target's frame."""
+    Ad = adjoint(T_target_intrinsic)
+    return Ad @ covariance_6_6 @ Ad.T
+
+
+def twists_along_axes(twists_n_6: np.ndarray, T_target_intrinsic: np.ndarray) -> np.ndarray:
+    """Return twists of the target's frame (n, 6) in the intrinsic one."""
+    return np.linalg.solve(adjoint(T_target_intrinsic), twists_n_6.T).T
+
+
+def _variances(example: Example) -> np.ndarray:
+    return twists_along_axes(example.twists, example.T_target_intrinsic).var(axis=0) + FLOOR
+
 
 COMPONENTS = 16  # of the descriptors
 SMALLEST_LOG, LARGEST_LOG = -16.0, 2.0  # of a variance, in squared radians or diameters
 
 
-def learn(
+def learn_ensemble(
     examples: Sequence[Example],
     members: int = 5,
     hidden: int = 32,
@@ -37,7 +135,11 @@ def learn(
     learning_rate: float = 0.01,
     weight_decay: float = 1e-3,
 ) -> Estimator:
-    """Train the networks on the errors of training registrations against their true poses.
+    """Train networks on errors of training registrations against true poses (after De Maio & Lacroix, ICRA 2022).
+
+    Each network gives the mean and the variances of the error from a pair's descriptors. Their average spread is
+    aleatoric, their disagreement epistemic (Lakshminarayanan et al. 2017). The original is variational, on clouds. It
+    models the error, whatever causes it.
 
     Six means and six variances along the target's principal axes, by the Gaussian likelihood of all runs of a pair.
 
@@ -132,4 +234,7 @@ def _errors(example: Example) -> np.ndarray:
     return twists_along_axes(log(away_n), example.T_target_intrinsic)
 
 
-ESTIMATORS = {"learned": EstimatorEntry("Learned ensemble", "error", learn=learn)}
+ESTIMATORS = {
+    "cello": Entry("CELLO-3D", "starts and data", learn=learn_cello),
+    "learned": EstimatorEntry("Learned ensemble", "error", learn=learn_ensemble),
+}

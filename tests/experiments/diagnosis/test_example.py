@@ -1,10 +1,9 @@
 import numpy as np
 import pytest
 
-from gpca.causes.counterfactuals import replay
+from gpca.causes.candidate import replay
 from gpca.causes.settings import CauseSettings
-from gpca.causes.shapley import ALL
-from gpca.causes.truth import FAILED
+from gpca.causes.truth import ALL, FAILED
 from gpca.errors import InputError
 from gpca.experiments.diagnosis.example import CLEAR, GAP, TRUTH, _draw_scores, choose_sample, draw_causes_example
 from gpca.objects.canonical import write_objects

@@ -35,7 +35,7 @@ def situations(causes, four):
 def tried(situations):
     """The same source stands for another one; half of its few training samples suffice to learn from."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("gpca.uncertainty.estimators.cello.FEWEST_EXAMPLES", 6)
+        patch.setattr("gpca.uncertainty.estimators.learned.FEWEST_EXAMPLES", 6)
         return try_estimators(situations, situations, ESTIMATORS, SETTINGS)
 
 

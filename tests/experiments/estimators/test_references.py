@@ -13,7 +13,7 @@ from gpca.causes.candidate import draw_candidate
 from gpca.causes.settings import CauseSettings
 from gpca.experiments.estimators.references import Redraws, draw_twists
 from gpca.uncertainty.estimators.interface import RegisteredPair
-from gpca.uncertainty.estimators.monte_carlo import sample
+from gpca.uncertainty.estimators.starts import sample
 
 SETTINGS = CauseSettings(points=(256, 512))
 POINTS = 10_000  # more than there are

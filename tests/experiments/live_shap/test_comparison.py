@@ -8,11 +8,9 @@ from gpca.experiments.live_shap.comparison import compared, live_values
 from gpca.experiments.live_shap.experiment import names
 from gpca.experiments.live_shap.tables import live_shap
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.uncertainty.conditions import CORNERS
-from gpca.uncertainty.designs import evaluate_design
-from gpca.uncertainty.knobs import MIDDLE, UNTOUCHED, Knobs
-from gpca.uncertainty.live import LiveUncertainty
-from gpca.uncertainty.settings import UncertaintySettings
+from gpca.uncertainty.designs import LiveUncertainty, evaluate_design
+from gpca.uncertainty.interventions import MIDDLE, UNTOUCHED, Knobs
+from gpca.uncertainty.settings import CORNERS, UncertaintySettings
 
 SETTINGS = UncertaintySettings(starts=13, icp_points=60)
 SOURCES = {"tiny": {"title": "Tiny", "stand_in": True}}

@@ -8,15 +8,14 @@ import pytest
 from gpca.alignment.rigid import inverse
 from gpca.causes.dataset import LABELS
 from gpca.causes.settings import CauseSettings
-from gpca.causes.shapley import ALL, SUBSETS
+from gpca.causes.truth import ALL, SUBSETS
 from gpca.errors import InputError
 from gpca.experiments.reenactment.knowledge import EVERYTHING, KNOWN, NOTHING, in_words
 from gpca.experiments.reenactment.oracle import ask_oracles, informed
 from gpca.pairs.perturbation import NOISE, OVERLAP, POSE
 from gpca.reenactment.dataset import reenact_all
+from gpca.reenactment.enactment import NoiseScale, observe, rebuild
 from gpca.reenactment.hypotheses import Hypothesis
-from gpca.reenactment.observation import NoiseScale, observe
-from gpca.reenactment.rebuilding import rebuild
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface
 from tests.conftest import FEW_CAUSES

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gpca.alignment.rigid import adjoint, exp, log
-from gpca.uncertainty.estimators import cello, learned
+from gpca.uncertainty.estimators import learned
 from gpca.uncertainty.estimators.interface import Example, FailedEstimate, intrinsic_frame
 
 from .cases import ellipsoid, registered
@@ -33,9 +33,9 @@ def variances(estimate, easy):
     return back @ covariance @ back.T
 
 
-@pytest.mark.parametrize(("module", "tolerance"), [(cello, 0.35), (learned, 0.6)])
-def test_the_covariance_is_that_of_like_pairs(module, tolerance):
-    estimate = module.learn(EXAMPLES)
+@pytest.mark.parametrize(("learn", "tolerance"), [(learned.learn_cello, 0.35), (learned.learn_ensemble, 0.6)])
+def test_the_covariance_is_that_of_like_pairs(learn, tolerance):
+    estimate = learn(EXAMPLES)
     for easy, factor in ((True, 1), (False, 10)):
         found = variances(estimate, easy)
         assert np.diag(found) == pytest.approx(factor * SCALE_6**2, rel=tolerance)
@@ -51,7 +51,7 @@ def test_networks_contradict_each_other_far_from_what_they_know():
         runs = 0.005 * random.normal(size=(13, 6))
         descriptors = np.concatenate([[x], 0.01 * random.normal(size=3)])
         examples.append(Example(descriptors, runs, adjoint(FRAME) @ truth, FRAME))
-    reduce = cello.Reduction([each.descriptors for each in examples], 4)
+    reduce = learned.Reduction([each.descriptors for each in examples], 4)
     networks = learned._Ensemble(4, 16, 5)
     features = reduce(np.array([each.descriptors for each in examples]))
     errors = [learned._errors(each) for each in examples]
@@ -72,20 +72,20 @@ def test_descriptors_that_say_nothing_are_not_learned_by_heart():
     """Each training pair is predicted by the others alone; by itself too, the metric would single it out."""
     random = np.random.default_rng(5)
     blind = [Example(random.normal(size=7), each.twists, each.true_twist, FRAME) for each in EXAMPLES]
-    pooled = np.mean([cello._variances(each) for each in blind], axis=0)
-    assert np.diag(variances(cello.learn(blind), True)) == pytest.approx(pooled, rel=0.4)
+    pooled = np.mean([learned._variances(each) for each in blind], axis=0)
+    assert np.diag(variances(learned.learn_cello(blind), True)) == pytest.approx(pooled, rel=0.4)
 
 
-@pytest.mark.parametrize("module", [cello, learned])
-def test_too_few_examples_and_a_pair_without_descriptors_are_failures(module):
+@pytest.mark.parametrize("learn", [learned.learn_cello, learned.learn_ensemble])
+def test_too_few_examples_and_a_pair_without_descriptors_are_failures(learn):
     with pytest.raises(FailedEstimate, match="7 registrations to learn from, not 8"):
-        module.learn(EXAMPLES[:7])
+        learn(EXAMPLES[:7])
     with pytest.raises(FailedEstimate, match="the pair has no descriptors"):
-        module.learn(EXAMPLES[:8], steps=1)(registered())
+        learn(EXAMPLES[:8], steps=1)(registered())
 
 
 def test_what_never_changes_says_nothing():
-    reduce = cello.Reduction([np.array([1.0, x, 5.0]) for x in range(4)], 8)
+    reduce = learned.Reduction([np.array([1.0, x, 5.0]) for x in range(4)], 8)
     assert np.isfinite(reduce(np.array([[2.0, 1.0, 9.0]]))).all()
     assert reduce(np.array([[2.0, 1.0, 9.0]])) == pytest.approx(reduce(np.array([[1.0, 1.0, 5.0]])))
 
@@ -93,7 +93,7 @@ def test_what_never_changes_says_nothing():
 @pytest.mark.parametrize("examples", [6, 8])
 def test_of_fewer_examples_than_components_no_axis_is_kept_along_which_they_do_not_differ(examples):
     random = np.random.default_rng(0)
-    reduce = cello.Reduction(random.normal(size=(examples, 20)), 16)
+    reduce = learned.Reduction(random.normal(size=(examples, 20)), 16)
     another = reduce(random.normal(size=(5, 20)))
     assert another.shape[1] == examples - 1
     assert np.abs(another).max() < 10
@@ -101,6 +101,6 @@ def test_of_fewer_examples_than_components_no_axis_is_kept_along_which_they_do_n
 
 def test_twists_go_to_the_axes_and_back():
     twist = np.arange(6.0)[None] / 50
-    along = cello.twists_along_axes(twist, FRAME)
+    along = learned.twists_along_axes(twist, FRAME)
     assert exp(along)[0] == pytest.approx(np.linalg.inv(FRAME) @ exp(twist)[0] @ FRAME)
     assert log(FRAME @ exp(along) @ np.linalg.inv(FRAME)) == pytest.approx(twist)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gpca.alignment.rigid import exp, transform
-from gpca.uncertainty.estimators import bayesian_icp, stein_icp
+from gpca.uncertainty.estimators import posterior
 from gpca.uncertainty.estimators.posterior import Posterior
 
 from .cases import DEVIATION_6, registered
@@ -26,7 +26,7 @@ def whitened(covariance):
 
 def test_langevin_visits_a_gaussian_as_it_is():
     random = np.random.default_rng(0)
-    visited = bayesian_icp.langevin(slope, np.zeros((400, 6)), COVARIANCE, 500, 100, 0.1, random)
+    visited = posterior.langevin(slope, np.zeros((400, 6)), COVARIANCE, 500, 100, 0.1, random)
     assert (np.abs(visited.mean(axis=0) - MEAN) / np.sqrt(np.diag(COVARIANCE))).max() < 0.12
     # The steps make it larger by 1 / (1 - ε/4).
     assert whitened(np.cov(visited, rowvar=False)) == pytest.approx(np.eye(6) / (1 - 0.1 / 4), abs=0.06)
@@ -35,14 +35,14 @@ def test_langevin_visits_a_gaussian_as_it_is():
 def test_langevin_needs_no_preconditioner_to_be_right():
     random = np.random.default_rng(0)
     step = 2 * np.linalg.eigvalsh(COVARIANCE)[0] * np.eye(6)
-    visited = bayesian_icp.langevin(slope, np.zeros((200, 6)), step, 1500, 500, 0.1, random)
+    visited = posterior.langevin(slope, np.zeros((200, 6)), step, 1500, 500, 0.1, random)
     assert np.diag(whitened(np.cov(visited, rowvar=False))) == pytest.approx(np.ones(6), abs=0.25)
 
 
 def test_stein_particles_spread_as_a_gaussian():
     """A hundred particles in six dimensions are known to spread too little; the shape is right."""
     start = np.random.default_rng(0).normal(size=(100, 6)) * 0.2
-    ended = stein_icp.descend(slope, start, 600, 0.02)
+    ended = posterior.descend(slope, start, 600, 0.02)
     assert (np.abs(ended.mean(axis=0) - MEAN) / np.sqrt(np.diag(COVARIANCE))).max() < 0.15
     values = np.linalg.eigvalsh(whitened(np.cov(ended, rowvar=False)))
     assert values.min() > 0.5 and values.max() < 1.2
@@ -50,7 +50,7 @@ def test_stein_particles_spread_as_a_gaussian():
 
 
 def test_one_particle_alone_climbs_to_the_maximum():
-    ended = stein_icp.descend(slope, np.full((1, 6), 0.2), 400, 0.02)
+    ended = posterior.descend(slope, np.full((1, 6), 0.2), 400, 0.02)
     assert ended[0] == pytest.approx(MEAN, abs=2e-3)
 
 
@@ -78,10 +78,10 @@ def test_a_part_of_the_points_counts_for_all():
     assert mean == pytest.approx(posterior.slope(np.full((1, 6), 0.01)), rel=1e-9)
 
 
-@pytest.mark.parametrize("module", [bayesian_icp, stein_icp])
-def test_on_a_pair_both_are_surer_than_the_starts_and_repeat_themselves(module):
+@pytest.mark.parametrize("estimate", [posterior.bayesian_icp, posterior.stein_icp])
+def test_on_a_pair_both_are_surer_than_the_starts_and_repeat_themselves(estimate):
     pair = registered(noise=0.01)
-    found = module.estimate(pair, steps=40)
+    found = estimate(pair, steps=40)
     assert (np.linalg.eigvalsh(found) > 0).all()
     assert (np.diag(found) < DEVIATION_6**2).all()
-    assert (found == module.estimate(pair, steps=40)).all()
+    assert (found == estimate(pair, steps=40)).all()

@@ -1,9 +1,6 @@
-"""Censi's closed form (2007): how the minimum of ICP's cost moves with the points, while the matches stay.
+"""Covariances in closed form from the derivatives of ICP's cost, for the matches at the pose that was found.
 
-With A(z, ξ) the cost of the points z at the twist ξ, Σ = H⁻¹ (∂²A/∂z∂ξ) Σ_z (∂²A/∂z∂ξ)ᵀ H⁻¹ with H = ∂²A/∂ξ². That the
-matches change with the pose is left out.
-
-It models the data, that is the sensor's noise: Censi (ICRA 2007) asks how the estimate changes with the measurements.
+Both model the data: how the estimate changes with the sensor's noise, and nothing else.
 """
 
 from __future__ import annotations
@@ -12,6 +9,7 @@ import numpy as np
 
 from gpca.alignment.rigid import point_jacobians
 from gpca.uncertainty.estimators.interface import (
+    POINT_TO_PLANE,
     POINT_TO_POINT,
     EstimatorEntry,
     FailedEstimate,
@@ -21,8 +19,35 @@ from gpca.uncertainty.estimators.interface import (
 )
 
 
-def estimate(registered: RegisteredPair, noise: float = 0.0) -> np.ndarray:
-    """Return Σ of point-to-point ICP.
+def bonnabel(registered: RegisteredPair, noise: float = 0.0) -> np.ndarray:
+    """Return Σ = σ² (Σ JᵀJ)⁻¹ of point-to-plane ICP (Bonnabel, Barczyk & Goulette, ACC 2016).
+
+    Between points and planes a match may slide along its plane and costs nothing, so matches that change do no harm.
+    Between points the same formula makes the pose look held where it is not.
+
+    Args:
+        noise: σ, standard deviation of the distances from planes, in diameters; with 0 it is estimated from them.
+
+    Raises:
+        FailedEstimate: another method than point-to-plane, no normals, or a singular Hessian.
+    """
+    if registered.method.startswith(POINT_TO_POINT):
+        raise FailedEstimate(
+            "the Hessian is no covariance of point-to-point, as it leaves out that matches change with the pose; "
+            "register by point_to_plane"
+        )
+    if registered.method != POINT_TO_PLANE:
+        raise FailedEstimate(f"the rule is that of point_to_plane, not of '{registered.method}'")
+    distances_n, rows_n_6 = registered.matches().plane_rows()
+    variance = noise**2 if noise else np.square(distances_n).sum() / max(len(distances_n) - 6, 1)
+    return variance * inverse_hessian(np.einsum("ni,nj->ij", rows_n_6, rows_n_6))
+
+
+def censi(registered: RegisteredPair, noise: float = 0.0) -> np.ndarray:
+    """Return Σ of point-to-point ICP (Censi, ICRA 2007).
+
+    With A(z, ξ) the cost of the points z at the twist ξ, Σ = H⁻¹ (∂²A/∂z∂ξ) Σ_z (∂²A/∂z∂ξ)ᵀ H⁻¹ with H = ∂²A/∂ξ². It
+    leaves out that the matches change with the pose.
 
     Args:
         noise: standard deviation of every coordinate of both clouds' points, in diameters; with 0 it is estimated from
@@ -63,4 +88,7 @@ def mixed_derivatives(matches: Matches) -> tuple[np.ndarray, np.ndarray]:
     return of_source_n_6_3, of_target_n_6_3
 
 
-ESTIMATORS = {"censi": EstimatorEntry("Censi, closed form", "data", estimate)}
+ESTIMATORS = {
+    "bonnabel": EstimatorEntry("Bonnabel, point-to-plane", "data", bonnabel),
+    "censi": EstimatorEntry("Censi, closed form", "data", censi),
+}

@@ -14,15 +14,14 @@ import numpy as np
 from gpca.alignment.rigid import inverse, transform
 from gpca.causes.dataset import Causes
 from gpca.causes.descriptors import observed_pair
-from gpca.causes.scan_candidate import OverlapErrors, ScanCandidate
+from gpca.causes.scans import OverlapErrors, ScanCandidate
 from gpca.causes.settings import FEWEST_POINTS, CauseSettings
 from gpca.pairs.distances import ObservedPair
 from gpca.pairs.perturbation import CONCEPTS, NOISE, OVERLAP, POSE
 from gpca.process.progress import progress
 from gpca.reenactment.dataset import Reenactments, row_of
-from gpca.reenactment.enactment import Enactment, register, start_twists
+from gpca.reenactment.enactment import QUIET, Enactment, NoiseScale, register, start_twists
 from gpca.reenactment.hypotheses import Hypothesis, find_hypotheses
-from gpca.reenactment.observation import QUIET, NoiseScale
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface
 from gpca.scans.pair import near
@@ -42,7 +41,7 @@ def reenact_scans(
 
     Args:
         causes: as :func:`gpca.causes.scans.measure_scans` returns them.
-        error_factor_S: (S,) of :class:`gpca.causes.scan_candidate.DrawnScans`: what counts as a failure.
+        error_factor_S: (S,) of :class:`gpca.causes.scans.DrawnScans`: what counts as a failure.
         truth: how counterfactuals are registered, and the limits of the states.
         T_found_S: (k, 4, 4) for each row, where else the source may belong: what global methods found takes it there
             from where the registration began.

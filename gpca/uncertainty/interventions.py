@@ -1,0 +1,221 @@
+"""Interventions on a pair whose uncertainty answers: perturbations as knobs, and remedies as switches.
+
+The registration's uncertainty is a function f(noise, spread, overlap) of the knobs (Qin et al. 2024); SHAP and
+sensitivity analysis explain that function. Jitter, direction of the cut and starts are drawn once per pair, so that two
+settings differ by the knobs alone. Remedies are for a pair whose cause is to be found: denoise, restart more broadly,
+trim to the overlap. Whichever lowers the uncertainty points to the cause, and what was perturbed is not known.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cached_property
+from time import perf_counter
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from gpca.alignment.batched_icp import BatchedICP
+from gpca.alignment.rigid import random_direction, transform
+from gpca.errors import InputError
+from gpca.pairs.perturbation import within_half_space
+from gpca.uncertainty.settings import Remedies, UncertaintySettings
+from gpca.uncertainty.spread import Runs, Spread, run_from_starts, summarize_runs
+
+
+class Knobs(NamedTuple):
+    """Setting of the three features, in the order of the concepts noise, pose, overlap.
+
+    Attributes:
+        noise: standard deviation of the jitter added to the source, relative to the diameter.
+        spread: factor on the spread of the initial poses.
+        overlap: share of the source's points that is cut off.
+    """
+
+    noise: float = 0.0
+    spread: float = 1.0
+    overlap: float = 0.0
+
+
+UNTOUCHED = Knobs()
+# The middle of the severities: 2 % noise; starts 37.5° and 19 % of the diameter off, not 10° and 5 %; 40 % cut off.
+MIDDLE = Knobs(0.02, 3.75, 0.40)
+UPPER = Knobs(0.03, 6.0, 0.60)  # their upper ends: 3 %, 60°, 60 %
+MOST = Knobs(1.0, 100.0, 0.95)
+FEWEST_LEFT = 3  # that a cut leaves
+
+
+class KnobbedSource:
+    """A source cloud under any setting of noise and overlap.
+
+    Args:
+        source: (N, 3), in diameters.
+        random: draws the jitter and the direction of the cut.
+    """
+
+    def __init__(self, source: np.ndarray, random: np.random.Generator) -> None:
+        self._source = source
+        self._jitter = random.normal(size=source.shape)
+        self._along = source @ random_direction(random)
+
+    def at(self, knobs: Knobs) -> np.ndarray:
+        """Return the points (n, 3) that are left, with their jitter.
+
+        Raises:
+            InputError: a knob outside its range.
+        """
+        for name, value, most in zip(Knobs._fields, knobs, MOST, strict=True):
+            if not 0 <= value <= most:
+                raise InputError(f"knob '{name}'", f"{value} is outside [0, {most}]", "give a value within it")
+        kept = within_half_space(self._along, knobs.overlap, FEWEST_LEFT)
+        return (self._source + knobs.noise * self._jitter)[kept]
+
+
+class KnobRuns:
+    """The function f of one pair; a setting that was evaluated is not evaluated again.
+
+    Args:
+        source: (N, 3), in its own frame. target: (Q, 3). Relative to the diameter.
+        T_target_source_init: initial pose. T_ref: pose from which the spread is measured.
+        xi_n_6: twists of the starts.
+    """
+
+    def __init__(
+        self,
+        source: np.ndarray,
+        target: np.ndarray,
+        T_target_source_init: np.ndarray,
+        T_ref: np.ndarray,
+        xi_n_6: np.ndarray,
+        settings: UncertaintySettings,
+        random: np.random.Generator,
+    ) -> None:
+        self._xi_n_6 = xi_n_6
+        self._source = KnobbedSource(source, random)
+        self._target = target
+        self._T_init = T_target_source_init
+        self.T_ref = T_ref
+        self._settings = settings
+        self._icp = BatchedICP(target, settings.icp)
+        self._seen: dict[Knobs, Spread] = {}
+
+    def __call__(self, knobs: Knobs) -> Spread:
+        """Evaluate one setting; the outcome of one seen before costs nothing.
+
+        Raises:
+            InputError: a knob outside its range.
+        """
+        if knobs in self._seen:
+            return replace(self._seen[knobs], icp_calls=0, icp_seconds=0.0, seconds=0.0)
+        self._seen[knobs] = self._evaluate(knobs)
+        return self._seen[knobs]
+
+    def _evaluate(self, knobs: Knobs) -> Spread:
+        started = perf_counter()
+        runs, source = self.runs(knobs)
+        return summarize_runs(runs, cKDTree(source), self._target, self.T_ref, self._settings, started)
+
+    def runs(self, knobs: Knobs) -> tuple[Runs, np.ndarray]:
+        """Run ICP from all starts under one setting, seen before or not; return the runs and the source (N, 3).
+
+        Raises:
+            InputError: a knob outside its range.
+        """
+        source = self._source.at(knobs)
+        return run_from_starts(self._icp, source, self._T_init, knobs.spread * self._xi_n_6), source
+
+
+NEIGHBORS = 24  # so many span the plane that a point is moved to
+OUTLIER_RATIO = 2.0  # standard deviations beyond the mean neighbor distance
+BROADER = 3.75  # spread of the restarts, in that of the other starts: the middle of the pose severities
+RESTARTS = 5  # the one with the lowest cost counts
+FEWEST_TRIMMED = 16  # where a trimmed target would have fewer, nothing is trimmed
+
+
+class RemedyRuns:
+    """Runs of one observed pair under every combination of remedies.
+
+    Args:
+        source: (N, 3), in its own frame. target: (Q, 3). Relative to the diameter; ICP sees fewer of their points
+            than denoising and the residual do.
+        T_target_source_init, T_target_source_icp: initial and found pose.
+        xi_n_6: twists of the starts.
+    """
+
+    def __init__(
+        self,
+        source: np.ndarray,
+        target: np.ndarray,
+        T_target_source_init: np.ndarray,
+        T_target_source_icp: np.ndarray,
+        xi_n_6: np.ndarray,
+        settings: UncertaintySettings,
+        random: np.random.Generator,
+    ) -> None:
+        self._xi_n_6 = xi_n_6
+        self._settings = settings
+        self._T_init = T_target_source_init
+        self._T_icp = T_target_source_icp
+        self._source = source[random.permutation(len(source))]
+        self._target = target
+
+    def __call__(self, remedies: Remedies) -> Spread:
+        """Evaluate one combination; work that several share is done, and charged, once."""
+        started = perf_counter()
+        tree, points = self._denoised if remedies.denoise else self._observed
+        icp, target = self._trimmed if remedies.trim else self._whole
+        xi_n_6 = BROADER * self._xi_n_6 if remedies.restart else self._xi_n_6
+        runs = run_from_starts(icp, points[: self._settings.icp_points], self._T_init, xi_n_6)
+        if remedies.restart:
+            runs = best_of_neighbors(runs, self._settings.icp.correspondence_distance)
+        return summarize_runs(runs, tree, target, self._T_icp, self._settings, started)
+
+    @cached_property
+    def _observed(self) -> tuple[cKDTree, np.ndarray]:
+        return cKDTree(self._source), self._source
+
+    @cached_property
+    def _denoised(self) -> tuple[cKDTree, np.ndarray]:
+        points = denoise(self._source)
+        return cKDTree(points), points
+
+    @cached_property
+    def _whole(self) -> tuple[BatchedICP, np.ndarray]:
+        return BatchedICP(self._target[: self._settings.icp_points], self._settings.icp), self._target
+
+    @cached_property
+    def _trimmed(self) -> tuple[BatchedICP, np.ndarray]:
+        aligned = transform(self._T_icp, self._source)
+        points = trim(self._target, aligned, self._settings.icp.correspondence_distance)
+        return BatchedICP(points[: self._settings.icp_points], self._settings.icp), points
+
+
+def denoise(points: np.ndarray) -> np.ndarray:
+    """Remove statistical outliers (Rusu et al. 2008) and move every other point onto the plane of its neighbors.
+
+    The plane is that of least squares, moving least squares of order one (Alexa et al. 2003).
+    """
+    neighbors = min(NEIGHBORS, len(points))
+    distances, rows = cKDTree(points).query(points, neighbors)
+    mean_N = distances.mean(axis=1)
+    kept = mean_N <= mean_N.mean() + OUTLIER_RATIO * mean_N.std()
+    around_N_k_3 = points[rows[kept]]
+    center_N_3 = around_N_k_3.mean(axis=1)
+    offset_N_k_3 = around_N_k_3 - center_N_3[:, None]
+    normal_N_3 = np.linalg.eigh(np.swapaxes(offset_N_k_3, 1, 2) @ offset_N_k_3)[1][:, :, 0]
+    height_N = np.einsum("ni,ni->n", points[kept] - center_N_3, normal_N_3)
+    return points[kept] - height_N[:, None] * normal_N_3
+
+
+def trim(target: np.ndarray, aligned_source: np.ndarray, distance: float) -> np.ndarray:
+    """Return the target's points within `distance` of the aligned source; all where hardly any are."""
+    kept = cKDTree(aligned_source).query(target, distance_upper_bound=distance)[0] < distance
+    return target[kept] if kept.sum() >= FEWEST_TRIMMED else target
+
+
+def best_of_neighbors(runs: Runs, distance: float) -> Runs:
+    """Replace every run by the best of itself and the next ones, as if each result had come from `RESTARTS` starts."""
+    cost_n = runs.cost_n(distance)
+    rows_n_k = (np.arange(len(cost_n))[:, None] + np.arange(RESTARTS)) % len(cost_n)
+    return runs.chosen(rows_n_k[np.arange(len(cost_n)), cost_n[rows_n_k].argmin(axis=1)])
