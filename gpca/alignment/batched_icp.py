@@ -15,8 +15,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from gpca.alignment.icp import ICP, ICPSettings, require_cloud
-from gpca.alignment.icp_kernels import CONVERGED, LISTED, align_all, plane_all, pull_all
+from gpca.alignment.icp import CONVERGED, ICP, ICPSettings, require_cloud
 
 MOST_LISTS = 1 << 16  # beyond that, queries in new voxels search the cells
 SINGULAR = 1e-10  # eigenvalue, relative to the largest, below which a step leaves its direction alone
@@ -54,6 +53,8 @@ class Target(NamedTuple):
 
 def make_target(points: np.ndarray, distance: float) -> Target:
     """Sort points (P, 3) for searches within `distance`, in the unit of the points."""
+    from gpca.alignment.icp_kernels import LISTED
+
     low, high = points.min(axis=0).astype(np.float64), points.max(axis=0)
     extent = max(float((high - low).max()), 1e-9)
     # The points lie on a surface: their number grows with the square of the extent.
@@ -116,6 +117,8 @@ class BatchedICP:
         require_cloud("source cloud", source)
         poses_n = np.array(T_target_source_init_n, np.float64)
         if self._settings.method == "point_to_point":
+            from gpca.alignment.icp_kernels import align_all
+
             fitness_n, rmse_n = np.empty(len(poses_n)), np.empty(len(poses_n))
             source = np.ascontiguousarray(source, np.float64)
             iterations = self._settings.max_iterations if max_iterations is None else max_iterations
@@ -144,6 +147,8 @@ class Pulls:
         r = y - q is the offset of the moved point y from its neighbor q; the mean is half the gradient of the mean of
         |r|² by a twist on the left of each pose (n, 4, 4).
         """
+        from gpca.alignment.icp_kernels import pull_all
+
         n = len(T_target_source_n)
         pulls_n_6, fitness_n, rmse_n = np.empty((n, 6)), np.empty(n), np.empty(n)
         source = np.ascontiguousarray(source, np.float64)
@@ -171,6 +176,8 @@ class BatchedPlaneICP:
 
     def sums(self, source: np.ndarray, poses_n: np.ndarray) -> tuple[np.ndarray, ...]:
         """Return Σ JᵀJ (n, 6, 6) and Σ Jᵀd (n, 6) of the plane distances d, fitness (n,) and inlier RMSE (n,)."""
+        from gpca.alignment.icp_kernels import plane_all
+
         n = len(poses_n)
         sums = np.empty((n, 6, 6)), np.empty((n, 6)), np.empty(n), np.empty(n)
         plane_all(source, self._target, self._normals, np.ascontiguousarray(poses_n), *sums)

@@ -13,6 +13,7 @@ from gpca.settings import Bounds, Count
 
 Method = Literal["point_to_point", "point_to_plane", "generalized"]
 METHODS = get_args(Method)
+CONVERGED = 1e-6  # largest change of fitness and of inlier RMSE in the last iteration; Open3D's default
 
 
 @dataclass(frozen=True)

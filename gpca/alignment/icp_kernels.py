@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from gpca.alignment.icp import CONVERGED
 from gpca.process.compilation import INNER_LOOP, njit
 
 LISTED = 16  # target points per voxel
-CONVERGED = 1e-6  # largest change of fitness and of inlier RMSE in the last iteration; Open3D's default
 
 
 @njit(forceinline=True, **INNER_LOOP)

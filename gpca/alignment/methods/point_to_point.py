@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.icp import ICPSettings
 from gpca.alignment.methods.interface import (
     CORRESPONDENCE_DISTANCE,
@@ -19,8 +20,6 @@ def align(
     pair: Pair, correspondence_distance: float = CORRESPONDENCE_DISTANCE, max_iterations: int = MAX_ITERATIONS
 ) -> Outcome:
     """Run the compiled loop, which ends at Open3D's poses (docs/protocol.md#two-loops-of-icp)."""
-    from gpca.alignment.batched_icp import BatchedICP
-
     settings = ICPSettings("point_to_point", correspondence_distance, max_iterations)
     icp = BatchedICP(pair.target, settings)
     T_1, fitness_1, rmse_1 = icp.register(pair.source, pair.T_target_source_init[None])

@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from gpca.alignment.icp import CONVERGED
 from gpca.alignment.methods.interface import FEWEST, FailedRegistration, Outcome, Pair, failure_of_a_step
 from gpca.alignment.rigid import best_motion, plane_step, rotate, transform
 
@@ -101,8 +102,6 @@ class Stages:
 
 def run_stages(pair: Pair, stages: Stages, max_iterations: int) -> tuple[np.ndarray, Matches, str]:
     """Iterate until the share of matches and their RMSE converge, as in Open3D: the pose, its matches, any failure."""
-    from gpca.alignment.icp_kernels import CONVERGED
-
     T = np.array(pair.T_target_source_init, np.float64)
     matches = stages.match(pair, T)
     for _ in range(max_iterations):
