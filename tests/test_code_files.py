@@ -53,10 +53,7 @@ def project(tmp_path, monkeypatch):
         (["gpca.says_so"], ["gpca/says_so.py"]),
         (["gpca.typed"], ["gpca/base.py", "gpca/typed.py"]),
         (["gpca.unrelated", "gpca.base"], ["gpca/base.py", "gpca/unrelated.py"]),
-        (
-            ["gpca.steps:first"],
-            ["gpca/__init__.py", "gpca/base.py", "gpca/late.py", "gpca/middle.py", "gpca/steps.py"],
-        ),
+        (["gpca.steps:first"], ["gpca/__init__.py", "gpca/base.py", "gpca/late.py", "gpca/middle.py", "gpca/steps.py"]),
         (["gpca.steps:second"], ["gpca/base.py", "gpca/steps.py", "gpca/unrelated.py"]),
         (["gpca.steps:helper", "gpca.steps:second"], ["gpca/base.py", "gpca/steps.py", "gpca/unrelated.py"]),
     ],

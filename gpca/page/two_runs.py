@@ -171,11 +171,7 @@ def _cell(one: str, other: str) -> dict[str, str]:
 
 
 def write_comparison(
-    folders: Folders,
-    tables: Sequence[TwoTables],
-    alone: Sequence[Sequence[str]],
-    titles: Mapping[str, str],
-    path: Path,
+    folders: Folders, tables: Sequence[TwoTables], alone: Sequence[Sequence[str]], titles: Mapping[str, str], path: Path
 ) -> None:
     """Write the page of two runs, which refers to their figures.
 

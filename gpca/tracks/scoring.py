@@ -71,10 +71,7 @@ def score(published: Published, submitted: Mapping[str, Method]) -> tuple[pd.Dat
                 difference_B = values[headline] - measured[against][0][headline]
                 estimate = interval(difference_B, drawn_B_N[:, counts[headline]], difference=True)
                 differences.append((group, name, against, *estimate))
-    return (
-        pd.DataFrame(rows, columns=list(COLUMNS)),
-        pd.DataFrame(differences, columns=["group", "method", *AGAINST]),
-    )
+    return (pd.DataFrame(rows, columns=list(COLUMNS)), pd.DataFrame(differences, columns=["group", "method", *AGAINST]))
 
 
 def groups_of(published: Published) -> Iterator[Group]:

@@ -29,10 +29,7 @@ TEXTS = {
     "merge of itself": ("encoders: &e\n  <<: *e\n", "contains itself"),
     "nested lists": ("seeds: " + "[" * 3000 + "]" * 3000, "nested too deeply"),
     "nested JSON": ('{"seeds": ' + "[" * 100_000 + "]" * 100_000 + "}", "nested too deeply"),
-    "chain of aliases": (
-        "\n".join(["a0: &a0 []", *(f"a{i}: &a{i} [*a{i - 1}]" for i in range(1, 3000))]),
-        "expand",
-    ),
+    "chain of aliases": ("\n".join(["a0: &a0 []", *(f"a{i}: &a{i} [*a{i - 1}]" for i in range(1, 3000))]), "expand"),
     "key twice": ("seeds: [0]\nrun: a\nseeds: [1]", "line 3: key 'seeds' appears twice"),
     "nested key twice": ("registrations:\n  train: 36\n  train: 90\n", "line 3: key 'train' appears twice"),
     "key twice in JSON": ('{"seeds": [0], "seeds": [1]}', "key 'seeds' appears twice"),
