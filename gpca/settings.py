@@ -98,10 +98,14 @@ class Keys:
         return core_schema.typed_dict_schema(fields, extra_behavior=others, config=strict)
 
 
+def required(**kinds: Any) -> Keys:
+    """Mark a mapping as one of these required keys with their types."""
+    return Keys(kinds, required=kinds)
+
+
 def part_of(settings: type, without: Collection[str] = ()) -> Keys:
     """Mark a mapping as the settings of a class without some names, all required."""
-    kinds = changes_of(settings, without).kinds
-    return Keys(kinds, required=kinds)
+    return required(**changes_of(settings, without).kinds)
 
 
 def changes_of(settings: type, without: Collection[str] = ()) -> Keys:

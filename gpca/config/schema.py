@@ -20,26 +20,10 @@ from gpca.experiments.experiment import ByName
 from gpca.experiments.registry import experiments
 from gpca.objects.entry import Name, NamedSource, Place, SurfacePoints
 from gpca.pairs.synthesis import RegistrationSettings
-from gpca.settings import Bounds, Different, Distinct, Keys, OpenShare, changes_of, part_of
+from gpca.settings import Bounds, Different, Distinct, Keys, OpenShare, changes_of, part_of, required
 from gpca.uncertainty.settings import UncertaintySettings
 
 DESIGNS = ("additive", "latin", "saltelli", "oracle", "removal", "causal")  # gpca.uncertainty.designs needs numba
-
-
-@dataclass(frozen=True)
-class Objects:
-    """The number of points sampled on each mesh."""
-
-    surface_points: SurfacePoints
-
-
-@dataclass(frozen=True)
-class Splits:
-    """Files with the roles of objects and scenes, and the role of this run."""
-
-    objects: Place | None
-    scenes: Place | None
-    role: Literal["development", "evaluation"]
 
 
 @dataclass(frozen=True)
@@ -58,14 +42,6 @@ class Reductions:
 
 
 @dataclass(frozen=True)
-class Embedding:
-    """The embeddings that explainers read."""
-
-    encoder: str
-    reduction: Literal["none"]
-
-
-@dataclass(frozen=True)
 class UncertaintyDesign(UncertaintySettings):
     """A design of Monte-Carlo ICP, and its test samples of each source and seed."""
 
@@ -73,31 +49,9 @@ class UncertaintyDesign(UncertaintySettings):
 
 
 Design = Annotated[dict, changes_of(UncertaintyDesign, without=("icp",))]
-
-
-@dataclass(frozen=True)
-class ExplainedModel:
-    """The model of ``gpca explain``."""
-
-    source: str
-    encoder: str
-    causes: Annotated[dict, changes_of(CauseSettings, without=NOT_OF_CAUSES)]
-    classifier: GPCSettings
-    false_alarms: OpenShare
-
-
-@dataclass(frozen=True)
-class Figures:
-    """Source of the figures of one registration."""
-
-    source: str
-
-
-@dataclass(frozen=True)
-class Comparison:
-    """Tolerances of verdicts on printed numbers, by unit."""
-
-    tolerances: Annotated[dict, Keys(dict.fromkeys(UNITS, Tolerance), required=UNITS)]
+ModelCauses = Annotated[dict, changes_of(CauseSettings, without=NOT_OF_CAUSES)]
+Role = Literal["development", "evaluation"]
+Tolerances = Annotated[dict, Keys(dict.fromkeys(UNITS, Tolerance), required=UNITS)]
 
 
 @dataclass(frozen=True)
@@ -109,20 +63,23 @@ class SharedSections:
     downloads: Place
     plugins: Annotated[tuple[Place, ...], Different(fewest=0)]
     seeds: Distinct[Annotated[int, Bounds(minimum=0, maximum=2**32 - 1)]]
-    objects: Objects
-    splits: Splits
+    objects: Annotated[dict, required(surface_points=SurfacePoints)]
+    splits: Annotated[dict, required(objects=Place | None, scenes=Place | None, role=Role)]
     success: SuccessSettings
     registrations: Annotated[dict, part_of(RegistrationSettings)]
     encoders: Annotated[dict[Name, NamedEncoder], Field(min_length=1)]
     reductions: Reductions
-    embedding: Embedding
+    embedding: Annotated[dict, required(encoder=str, reduction=Literal["none"])]
     uncertainty: Annotated[dict, Keys(dict.fromkeys(DESIGNS, Design), required=("causal",))]
     causes: Annotated[dict, part_of(CauseSettings, without=NOT_OF_CAUSES)]
     explainers: ByName
-    model: ExplainedModel
-    comparison: Comparison
+    model: Annotated[  # of `gpca explain`
+        dict,
+        required(source=str, encoder=str, causes=ModelCauses, classifier=GPCSettings, false_alarms=OpenShare),
+    ]
+    comparison: Annotated[dict, required(tolerances=Tolerances)]
     reference: Allowance
-    figures: Figures
+    figures: Annotated[dict, required(source=str)]  # of one registration
     sources: Annotated[dict[Name, NamedSource], Field(min_length=1)]
 
 
