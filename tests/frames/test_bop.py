@@ -4,6 +4,7 @@ import json
 import math
 import os
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -78,6 +79,17 @@ def test_an_object_of_which_little_was_measured_is_left_out_and_named(tiny, dama
         measured_points(frame, frame.annotations[1], frame.depth_m())
 
 
+DEPTH = f"{TABLE}/depth/000000.png"
+
+
+def edited(name, change):
+    return lambda folder: edit(folder / TABLE / f"scene_{name}.json", change)
+
+
+def with_depth(pixels):
+    return lambda folder: save(folder / DEPTH, pixels)
+
+
 FAULTS = {
     "no depth": (lambda f: (f / TABLE / "depth/000001.png").unlink(), "depth/000001.png: no such image"),
     "no mask": (lambda f: (f / TABLE / "mask_visib/000000_000002.png").unlink(), "000000_000002.png: no such image"),
@@ -85,40 +97,28 @@ FAULTS = {
     "half unpacked": (lambda f: [p.unlink() for p in (f / TABLE / "depth").iterdir()], "may be half unpacked"),
     "no scene": (lambda f: [p.unlink() for p in f.rglob("scene_gt.json")], "has no test"),
     "broken JSON": (lambda f: (f / TABLE / "scene_gt.json").write_text("{"), "scene_gt.json: is not a scene's JSON"),
-    "camera of another image": (
-        lambda f: edit(f / TABLE / "scene_camera.json", lambda c: c.pop("1")),
-        "scene_camera.json: has no image 1",
-    ),
-    "camera without K": (
-        lambda f: edit(f / TABLE / "scene_camera.json", lambda c: c["1"].pop("cam_K")),
-        "scene_camera.json: image 1: has no cam_K",
-    ),
+    "camera of another image": (edited("camera", lambda c: c.pop("1")), "scene_camera.json: has no image 1"),
+    "camera without K": (edited("camera", lambda c: c["1"].pop("cam_K")), "scene_camera.json: image 1: has no cam_K"),
     "depth of another size": (
-        lambda f: save(f / TABLE / "depth/000000.png", np.full((60, 80), 7000, np.uint16)),
+        with_depth(np.full((60, 80), 7000, np.uint16)),
         "000000_000000.png: is 160×120 but depth is 80×60",
     ),
     "no measurement": (
-        lambda f: save(f / TABLE / "depth/000000.png", np.zeros((120, 160), np.uint16)),
+        with_depth(np.zeros((120, 160), np.uint16)),
         "depth/000000.png: has no depth: every pixel is 0",
     ),
-    "colour for depth": (
-        lambda f: save(f / TABLE / "depth/000000.png", np.ones((120, 160, 3), np.uint8)),
-        "is a color image, not depth",
-    ),
+    "color for depth": (with_depth(np.ones((120, 160, 3), np.uint8)), "is a color image, not depth"),
     "truncated depth": (
-        lambda f: (f / TABLE / "depth/000000.png").write_bytes((f / TABLE / "depth/000000.png").read_bytes()[:999]),
+        lambda f: (f / DEPTH).write_bytes((f / DEPTH).read_bytes()[:999]),
         "depth/000000.png: is truncated",
     ),
-    "unknown object": (
-        lambda f: edit(f / TABLE / "scene_gt.json", lambda g: g["0"][0].update(obj_id=77)),
-        "tiny: object 77: has no model in",
-    ),
+    "unknown object": (edited("gt", lambda g: g["0"][0].update(obj_id=77)), "tiny: object 77: has no model in"),
     "no rotation": (
-        lambda f: edit(f / TABLE / "scene_gt.json", lambda g: g["0"][1].update(cam_R_m2c=[1, 0, 0, 0, 1, 0, 0, 0, -1])),
+        edited("gt", lambda g: g["0"][1].update(cam_R_m2c=[1, 0, 0, 0, 1, 0, 0, 0, -1])),
         "scene_gt.json: image 0, object 1: the pose is not a rigid transform",
     ),
     "eight numbers": (
-        lambda f: edit(f / TABLE / "scene_gt.json", lambda g: g["0"][1].update(cam_R_m2c=[1, 0, 0, 0, 1, 0, 0, 0])),
+        edited("gt", lambda g: g["0"][1].update(cam_R_m2c=[1, 0, 0, 0, 1, 0, 0, 0])),
         "image 0, object 1: cam_R_m2c has 8 numbers, not 9",
     ),
     "no models": (lambda f: [p.unlink() for p in (f / "models").glob("*.ply")], "has no models/obj_"),
@@ -244,49 +244,26 @@ def test_a_file_of_poses_too_large_to_be_one(damaged):
     refusal(instances(), damaged.parent, str(TRUTH), "is 8.59 GB, more than the limit of 67.1 MB")
 
 
-def as_folder(path):
-    path.unlink()
-    path.mkdir()
+INSTEAD = {
+    "folder": (Path.mkdir, "is a folder"),
+    "pipe": (os.mkfifo, "is a device, pipe"),
+    "loop": (lambda path: path.symlink_to(path.name), "cannot be read"),
+    "dead link": (lambda path: path.symlink_to("nowhere"), "no such"),
+}
 
 
-def as_pipe(path):
-    path.unlink()
-    os.mkfifo(path)
-
-
-def as_loop(path):
-    path.unlink()
-    path.symlink_to(path.name)
-
-
-def as_dead_link(path):
-    path.unlink()
-    path.symlink_to("nowhere")
-
-
-INSTEAD = {as_folder: "is a folder", as_pipe: "is a device, pipe", as_loop: "cannot be read", as_dead_link: "no such"}
-
-
-@pytest.mark.parametrize("spoil", INSTEAD)
+@pytest.mark.parametrize("kind", INSTEAD)
 @pytest.mark.parametrize("name", ["scene_camera.json", "depth/000000.png", "mask_visib/000000_000000.png"])
-def test_something_else_in_place_of_a_file(damaged, name, spoil):
-    spoil(damaged.parent / SCENE / name)
-    found = "no such" if name.endswith(".png") else INSTEAD[spoil]  # an image may have any of several suffixes
-    refusal(instances(), damaged.parent, f"{SCENE / name}: {found}")
+def test_something_else_in_place_of_a_file(damaged, name, kind):
+    make, found = INSTEAD[kind]
+    (path := damaged.parent / SCENE / name).unlink()
+    make(path)
+    # An image may have any of several suffixes.
+    refusal(instances(), damaged.parent, f"{SCENE / name}: {'no such' if name.endswith('.png') else found}")
 
 
-def empty(folder):
-    for path in folder.rglob("scene_gt.json"):
-        path.write_text("{}")
-
-
-def without_objects(folder):
-    for path in folder.rglob("scene_gt.json"):
-        edit(path, lambda truth: truth.update({image: [] for image in truth}))
-
-
-def named(folder):
-    (folder / "test/000001").rename(folder / "test/first")
+def all_truths(change):
+    return lambda folder: [edit(path, change) for path in folder.rglob("scene_gt.json")]
 
 
 def twice(folder):
@@ -295,9 +272,15 @@ def twice(folder):
 
 
 FOLDERS = {
-    "scenes without images": (empty, "lists no image"),
-    "images without objects": (without_objects, "list no object in any frame"),
-    "a scene with a name": (named, "test/first: the name of a scene's folder is not a number"),
+    "scenes without images": (all_truths(lambda truth: truth.clear()), "lists no image"),
+    "images without objects": (
+        all_truths(lambda truth: truth.update({image: [] for image in truth})),
+        "list no object in any frame",
+    ),
+    "a scene with a name": (
+        lambda folder: (folder / "test/000001").rename(folder / "test/first"),
+        "test/first: the name of a scene's folder is not a number",
+    ),
     "a scene in two folders": (twice, "are the same image of the same scene; set split"),
     "no scenes": (lambda folder: (folder / "test").rename(folder / "train"), "has no test*/<scene>/scene_gt.json"),
 }
@@ -316,10 +299,6 @@ def test_a_location_without_scenes(damaged, location):
 
 
 def test_what_a_real_dataset_may_have_is_no_fault(scenes, tmp_path):
-    import shutil
-
-    from .tiny import read
-
     shutil.copytree(scenes, tmp_path / "tiny")
     expected, _ = read(scenes, tmp_path / "objects.npz")
 

@@ -172,24 +172,15 @@ def test_unpacks(tmp_path, suffix):
     assert contents(tmp_path / "new/target") == FILES
 
 
-def change(folder):
-    (folder / "top.txt").write_bytes(b"u")  # as long as before
-
-
-def lengthen(folder):
-    (folder / "models/deep/er/info.json").write_bytes(b"{} ")
-
-
-def lose(folder):
-    (folder / "models/obj_000001.ply").unlink()
-
-
-def add(folder):
-    (folder / "models/obj_000002.ply").write_bytes(b"ply")
-
-
-CHANGES = {change: "top.txt: was changed", lengthen: "info.json: was changed"}
-CHANGES |= {lose: "obj_000001.ply: is missing", add: "obj_000002.ply: is not from the archive"}
+CHANGES = {
+    "changed": (lambda folder: (folder / "top.txt").write_bytes(b"u"), "top.txt: was changed"),  # as long as before
+    "longer": (lambda folder: (folder / "models/deep/er/info.json").write_bytes(b"{} "), "info.json: was changed"),
+    "lost": (lambda folder: (folder / "models/obj_000001.ply").unlink(), "obj_000001.ply: is missing"),
+    "added": (
+        lambda folder: (folder / "models/obj_000002.ply").write_bytes(b"ply"),
+        "obj_000002.ply: is not from the archive",
+    ),
+}
 
 
 @FORMATS
@@ -203,12 +194,13 @@ def test_a_folder_that_was_unpacked_is_checked_and_kept(tmp_path, suffix):
 
 
 @FORMATS
-@pytest.mark.parametrize("change", CHANGES)
-def test_a_folder_that_was_changed_since_is_refused(tmp_path, suffix, change):
+@pytest.mark.parametrize("name", CHANGES)
+def test_a_folder_that_was_changed_since_is_refused(tmp_path, suffix, name):
+    change, fault = CHANGES[name]
     archive = pack(tmp_path / f"a.{suffix}")
     folder = unpack(archive, tmp_path / "target")
     change(folder)
-    with pytest.raises(InputError, match=f"{CHANGES[change]}.*; remove {folder} and target.sha256.json"):
+    with pytest.raises(InputError, match=f"{fault}.*; remove {folder} and target.sha256.json"):
         unpack(archive, folder)
     for path in (folder, tmp_path / "target.sha256.json"):
         shutil.rmtree(path) if path.is_dir() else path.unlink()
@@ -218,7 +210,7 @@ def test_a_folder_that_was_changed_since_is_refused(tmp_path, suffix, change):
 def test_a_folder_without_a_list_is_unpacked_again(tmp_path):
     archive = pack(tmp_path / "a.zip")
     folder = unpack(archive, tmp_path / "target")
-    change(folder)
+    (folder / "top.txt").write_bytes(b"u")
     (tmp_path / "target.sha256.json").unlink()
     assert contents(unpack(archive, folder)) == FILES
 
