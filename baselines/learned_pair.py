@@ -66,7 +66,7 @@ class LearnedPairGPCA(PairDescription, GPCA):
         from gpca.encoders.registry import EncoderSettings
         from gpca.encoders.training import TrainingTask, embed, train_encoder
 
-        points, motion = self._prefix + "points", self._prefix + "told"
+        points, motion = self._prefix + "points", self._prefix + "encoder_motion"
 
         def seen(pairs: Registrations) -> Registrations:
             described = self.describe(pairs)

@@ -134,11 +134,6 @@ class MethodEntry:
     package: str = ""
 
 
-def still_moving(iterations: int) -> str:
-    """Return the failure of a method that was stopped."""
-    return f"has not converged in {iterations} iterations"
-
-
 def as_array(matrix: Any) -> np.ndarray:
     """Copy a matrix of another library, as float64."""
     return np.array(matrix, np.float64)
@@ -164,4 +159,5 @@ def align_by_open3d(
 def failure_of_a_step(pair: Pair, T_found: np.ndarray, T_further: np.ndarray, max_iterations: int) -> str:
     """Return the failure of a method that stopped too early, given the pose after a further step, else empty."""
     moved_N_3 = transform(T_further, pair.source) - transform(T_found, pair.source)
-    return still_moving(max_iterations) if np.linalg.norm(moved_N_3, axis=1).max() > AT_REST else ""
+    moving = np.linalg.norm(moved_N_3, axis=1).max() > AT_REST
+    return f"has not converged in {max_iterations} iterations" if moving else ""

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from gpca.alignment.icp import CONVERGED
-from gpca.alignment.methods.interface import FEWEST, FailedRegistration, Outcome, Pair, failure_of_a_step
+from gpca.alignment.methods.interface import FEWEST, FailedRegistration, Pair, failure_of_a_step
 from gpca.alignment.rigid import best_motion, plane_step, rotate, transform
 
 Metric = Literal["point_to_point", "point_to_plane"]
@@ -111,12 +111,6 @@ def run_stages(pair: Pair, stages: Stages, max_iterations: int) -> tuple[np.ndar
         if share < CONVERGED and abs(_rmse(matches) - _rmse(before)) < CONVERGED:
             break
     return T, matches, failure_of_a_step(pair, T, stages.step(matches) @ T, max_iterations)
-
-
-def align_by_stages(pair: Pair, stages: Stages, correspondence_distance: float, max_iterations: int) -> Outcome:
-    """Run the stages and measure the pose that they end at."""
-    T, _, failure = run_stages(pair, stages, max_iterations)
-    return Outcome.at(pair, T, correspondence_distance, failure)
 
 
 def nearest(distance_n: np.ndarray, count: int) -> np.ndarray:

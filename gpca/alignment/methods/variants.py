@@ -12,7 +12,7 @@ from typing import Annotated, Literal
 import numpy as np
 
 from gpca.alignment.methods.interface import CORRESPONDENCE_DISTANCE, MAX_ITERATIONS, MethodEntry, Outcome, Pair
-from gpca.alignment.methods.stages import Matches, Metric, Stages, align_by_stages, nearest
+from gpca.alignment.methods.stages import Matches, Metric, Stages, nearest, run_stages
 from gpca.seeds import generator
 from gpca.settings import Bounds, PositiveShare
 
@@ -51,7 +51,8 @@ def align(
         metric=metric,
         distance=correspondence_distance,
     )
-    return align_by_stages(pair, stages, correspondence_distance, max_iterations)
+    T, _, failure = run_stages(pair, stages, max_iterations)
+    return Outcome.at(pair, T, correspondence_distance, failure)
 
 
 def _sample(pair: Pair, sampling: Sampling, share: float) -> np.ndarray | None:
