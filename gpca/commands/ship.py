@@ -220,7 +220,7 @@ def _licenses(origin: Origin) -> list[str]:
     for source in origin.sources:
         for license in source.licenses:
             used.setdefault(license, []).append(source.title)
-    rows = [(of.dataset, of.license, of.known, "; ".join(dict.fromkeys(titles))) for of, titles in used.items()]
+    rows = [(key.dataset, key.license, key.known, "; ".join(dict.fromkeys(titles))) for key, titles in used.items()]
     return [
         "The file holds weights, descriptors and embeddings that were computed from these data, but none of their "
         "points or images. The data stay under their own licenses; this page takes no position on whether these extend "
@@ -243,13 +243,13 @@ def _scores(origin: Origin, scores: pd.DataFrame) -> list[str]:
     rows, committees = [], 0
     for source, title in titles.items():
         for explainer, words in EXPLAINERS.items():
-            of = scores[(scores["source"] == source) & (scores["method"] == explainer)].set_index("metric")
-            if len(of):
+            metrics = scores[(scores["source"] == source) & (scores["method"] == explainer)].set_index("metric")
+            if len(metrics):
                 committees += explainer == COMMITTEE
-                samples, seeds = of["samples"].reindex(list(MEASURES)).dropna(), of["seeds"].iloc[0]
+                samples, seeds = metrics["samples"].reindex(list(MEASURES)).dropna(), metrics["seeds"].iloc[0]
                 counts = " to ".join(f"{count:.0f}" for count in sorted({samples.min(), samples.max()}))
                 counts = f"{counts} ({seeds:.0f})"
-                rows.append((title, words, *(_interval(of, metric) for metric in MEASURES), counts))
+                rows.append((title, words, *(_interval(metrics, metric) for metric in MEASURES), counts))
     if not committees:
         raise InputError("cause_intervals.csv", f"has no scores of {COMMITTEE}", "switch it on in diagnosis.explainers")
     changes = origin.record["settings"].get("model", {}).get("causes", {})
@@ -266,10 +266,10 @@ def _scores(origin: Origin, scores: pd.DataFrame) -> list[str]:
     ]
 
 
-def _interval(of: pd.DataFrame, metric: str) -> str:
-    if metric not in of.index:
+def _interval(metrics: pd.DataFrame, metric: str) -> str:
+    if metric not in metrics.index:
         return "–"
-    value, low, high = of.loc[metric, ["value", "low", "high"]]
+    value, low, high = metrics.loc[metric, ["value", "low", "high"]]
     return f"{value:.3f} ({low:.3f} to {high:.3f})"
 
 

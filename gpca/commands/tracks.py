@@ -141,12 +141,12 @@ def add_ship_predictions_arguments(parser: ArgumentParser) -> None:
         "--run", dest="folder", type=Path, default=folder, help=f"folder of the run (default: {folder})"
     )
     parser.add_argument("--out", type=Path, default=FOLDER, help="folder to write them to")
-    of_default = [name for name, track in TRACKS.items() if track.run == DEFAULT]
+    default_tracks = [name for name, track in TRACKS.items() if track.run == DEFAULT]
     words = "; ".join(f"{name} needs the run {track.run}" for name, track in TRACKS.items() if track.run != DEFAULT)
     parser.add_argument(
         "--tracks",
         nargs="+",
-        default=of_default,
+        default=default_tracks,
         help=f"tracks to extract (default: those of the default run; {words})",
     )
 

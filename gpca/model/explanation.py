@@ -63,11 +63,7 @@ class Page(ABC):
 
     @abstractmethod
     def html(self, names: Mapping[str, str] | None = None) -> str:
-        """Return a page that needs no other file: both clouds in 3-D, causes, poses, counterfactuals.
-
-        Args:
-            names: names of the files and the model, for the page's details.
-        """
+        """Return the page."""
 
     def save_html(self, path: str | Path, names: Mapping[str, str] | None = None) -> None:
         """Write :meth:`html` to a file."""

@@ -126,22 +126,19 @@ def weigh_alarmed(means: Means) -> Decide:
 def act_at_random(means: Means) -> Decide:
     """Take a random action, possibly repeatedly."""
 
-    def decide(case: Case) -> Decision:
+    def drawn(case: Case) -> int:
         # The random numbers restart at every decision, so earlier draws are repeated.
-        drawn = case.random.integers(len(means.actions), size=len(case.actions) + 1)[-1]
-        return Decision(means.actions[int(drawn)], "", "at random")
+        return int(case.random.integers(len(means.actions), size=len(case.actions) + 1)[-1])
 
-    return decide
+    return lambda case: Decision(means.actions[drawn(case)], "", "at random")
 
 
 def act_in_turn(means: Means) -> Decide:
     """Take all actions in turn, in a random order for each case."""
-
-    def decide(case: Case) -> Decision:
-        order = case.random.permutation(len(means.actions))
-        return Decision(means.actions[order[len(case.actions) % len(means.actions)]], "", "in turn")
-
-    return decide
+    count = len(means.actions)
+    return lambda case: Decision(
+        means.actions[case.random.permutation(count)[len(case.actions) % count]], "", "in turn"
+    )
 
 
 def follow_rehearsed(means: Means) -> Decide:

@@ -140,7 +140,7 @@ class Reenacted:
 
 
 def believe(
-    holding: Holding, known: KnownModel, settings: ReenactmentSettings, truth: CauseSettings, axes: tuple
+    holding: Holding, shape: KnownModel, settings: ReenactmentSettings, truth: CauseSettings, axes: tuple
 ) -> Belief:
     """Find hypotheses of the true pose; at the limit of a failed registration, a failure has probability 1/2.
 
@@ -149,21 +149,21 @@ def believe(
         axes: names of the random numbers.
     """
     started = perf_counter()
-    d, T_init = known.diameter_m, holding.T_world_object_init
+    d, T_init = shape.diameter_m, holding.T_world_object_init
     random = generator(*axes, "hypotheses")
     cloud_m = fuse(holding.shots, d, holding.filtered)
     cloud_m = cloud_m[np.sort(random.permutation(len(cloud_m))[:OBSERVED_POINTS])]
     observed = transform(inverse(T_init), cloud_m) / d
     T_result = scale_translation(inverse(holding.T_world_object) @ T_init, 1 / d)
-    evidence = partial(_evidence, holding, known, Appearance(holding.shots, known.mesh))
-    hypotheses = find_hypotheses(observed, known.surface, T_result[None], settings, random, evidence)
+    evidence = partial(_evidence, holding, shape, Appearance(holding.shots, shape.mesh))
+    hypotheses = find_hypotheses(observed, shape.surface, T_result[None], settings, random, evidence)
     T_off_K = np.stack([T_result @ inverse(hypothesis.T) for hypothesis in hypotheses])
-    error_K = capped(known.surface.errors(T_off_K))
+    error_K = capped(shape.surface.errors(T_off_K))
     failure_K = expit(STEEPNESS * np.log(np.maximum(error_K, SMALLEST_ERROR) / truth.limits.failed))
     return Belief(hypotheses, observed, weights_of(hypotheses), error_K, failure_K, perf_counter() - started)
 
 
-def reenact(belief: Belief, holding: Holding, known: KnownModel, truth: CauseSettings, axes: tuple) -> Reenacted:
+def reenact(belief: Belief, holding: Holding, shape: KnownModel, truth: CauseSettings, axes: tuple) -> Reenacted:
     """Register with every subset of the causes, under each hypothesis in turn.
 
     Without noise or missing surface, the measurement is rebuilt (:func:`gpca.reenactment.enactment.rebuild`); without
@@ -178,17 +178,17 @@ def reenact(belief: Belief, holding: Holding, known: KnownModel, truth: CauseSet
     xi_n_6 = start_twists(axes, truth)
     error_K_8 = []
     for hypothesis in belief.hypotheses:
-        observation = observe(belief.observed, hypothesis, known.surface, known.scale, random)
-        covered_M = seen_surface(holding, known, hypothesis, observation.noise)
+        observation = observe(belief.observed, hypothesis, shape.surface, shape.scale, random)
+        covered_M = seen_surface(holding, shape, hypothesis, observation.noise)
         if covered_M.mean() >= LEAST_COVERED:
             observation = replace(observation, covered=covered_M)
-        candidate = rebuild(hypothesis.T, observation, known.surface, random)
-        measured = Counterfactuals(Registrar(candidate, truth, misses=True), known.surface.errors, xi_n_6, truth)
+        candidate = rebuild(hypothesis.T, observation, shape.surface, random)
+        measured = Counterfactuals(Registrar(candidate, truth, misses=True), shape.surface.errors, xi_n_6, truth)
         error_K_8.append([_error(measured, subset) for subset in range(len(SUBSETS))])
     return Reenacted(belief, np.array(error_K_8), belief.seconds + perf_counter() - started)
 
 
-def seen_surface(holding: Holding, known: KnownModel, hypothesis: Hypothesis, noise: float) -> np.ndarray:
+def seen_surface(holding: Holding, shape: KnownModel, hypothesis: Hypothesis, noise: float) -> np.ndarray:
     """Return which model points (M,) were measured by a shot, under a hypothesis.
 
     Such a point faces the camera, and its pixel shows the object at the expected depth.
@@ -196,8 +196,8 @@ def seen_surface(holding: Holding, known: KnownModel, hypothesis: Hypothesis, no
     Args:
         noise: standard deviation of the measurement, in diameters.
     """
-    d, T = known.diameter_m, _placed(holding, known, hypothesis.T)
-    placed_m, normals = transform(T, d * known.surface.points), rotate(T, known.normals)
+    d, T = shape.diameter_m, _placed(holding, shape, hypothesis.T)
+    placed_m, normals = transform(T, d * shape.surface.points), rotate(T, shape.normals)
     reach_m = d * (NEAR + 2 * noise)
     seen_M = np.zeros(len(placed_m), bool)
     for shot in holding.shots:
@@ -208,14 +208,14 @@ def seen_surface(holding: Holding, known: KnownModel, hypothesis: Hypothesis, no
     return seen_M
 
 
-def _placed(holding: Holding, known: KnownModel, T: np.ndarray) -> np.ndarray:
-    return holding.T_world_object_init @ scale_translation(inverse(T), known.diameter_m)
+def _placed(holding: Holding, shape: KnownModel, T: np.ndarray) -> np.ndarray:
+    return holding.T_world_object_init @ scale_translation(inverse(T), shape.diameter_m)
 
 
-def _evidence(holding: Holding, known: KnownModel, appearance: Appearance, T: np.ndarray, width: float) -> float:
+def _evidence(holding: Holding, shape: KnownModel, appearance: Appearance, T: np.ndarray, width: float) -> float:
     """Return the log-probability of the pixels around the object under a hypothesis."""
-    reach_m = known.diameter_m * max(NEAR, 2.5 * width)
-    explained = appearance.explained(_placed(holding, known, T), reach_m)
+    reach_m = shape.diameter_m * max(NEAR, 2.5 * width)
+    explained = appearance.explained(_placed(holding, shape, T), reach_m)
     return PIXELS * (explained * float(np.log(1 - UNEXPLAINED)) + (1 - explained) * float(np.log(UNEXPLAINED)))
 
 
