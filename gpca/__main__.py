@@ -48,9 +48,17 @@ def main(arguments: list[str] | None = None) -> int:
     return as_process(f"gpca {chosen}", lambda: _run(arguments, chosen))
 
 
+def add_common_arguments(command: ArgumentParser) -> None:
+    """Declare the arguments of every command."""
+    threads = "number of threads for torch, numba and OpenMP (default 1)"
+    command.add_argument("--threads", type=THREADS, default=1, help=threads)
+    command.add_argument("--settings", default="{}", help="the command's section of the config, as JSON")
+
+
 def _run(arguments: list[str], chosen: str | None) -> int:
+    program = "gpca" if Path(sys.argv[0]).stem == "gpca" else "python -m gpca"
     parser = OneLineParser(
-        prog=_program(), description="Commands to run by hand; the steps of the workflow are its targets."
+        prog=program, description="Commands to run by hand; the steps of the workflow are its targets."
     )
     parser.add_argument("--version", action="version", version=f"gpca {__version__}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="command")
@@ -58,47 +66,24 @@ def _run(arguments: list[str], chosen: str | None) -> int:
         command = commands.add_parser(name, help=summary, description=summary)
         add_common_arguments(command)
         if name == chosen:  # the others bring libraries that take seconds to load
-            _set_threads(arguments)
+            early = OneLineParser(prog=program, add_help=False)
+            early.add_argument("--threads", type=THREADS, default=1)
+            prepare(early.parse_known_args(arguments)[0].threads)  # before any library is loaded
             keep_freed_memory()
             add_arguments, run = load_command(name)
             add_arguments(command)
             command.set_defaults(run=run)
     options = parser.parse_args(arguments)
-    options.settings = _mapping(options.settings)
-    return options.run(options) or 0
-
-
-def add_common_arguments(command: ArgumentParser) -> None:
-    """Declare what every command takes."""
-    command.add_argument(
-        "--threads", type=THREADS, default=1, help="number of threads for torch, numba and OpenMP (default 1)"
-    )
-    command.add_argument("--settings", default="{}", help="the command's section of the config, as JSON")
-
-
-def _program() -> str:
-    """Return the program as the user called it."""
-    return "gpca" if Path(sys.argv[0]).stem == "gpca" else "python -m gpca"
-
-
-def _set_threads(arguments: list[str]) -> None:
-    """Pin every library's threads and instructions before any of them is loaded."""
-    early = OneLineParser(prog=_program(), add_help=False)
-    early.add_argument("--threads", type=THREADS, default=1)
-    prepare(early.parse_known_args(arguments)[0].threads)
-
-
-def _mapping(text: str) -> dict:
     from gpca.io.structured_text import parse_json, require_plain
 
     try:
-        settings = parse_json(text)
+        options.settings = parse_json(options.settings)
     except ValueError as fault:
         raise InputError("--settings", f"invalid JSON: {fault}", "give a JSON object") from fault
-    if not isinstance(settings, dict):
+    if not isinstance(options.settings, dict):
         raise InputError("--settings", "not a JSON object", 'give one, such as {"draw_points": 512}')
-    require_plain(settings, "--settings")
-    return settings
+    require_plain(options.settings, "--settings")
+    return options.run(options) or 0
 
 
 if __name__ == "__main__":
