@@ -152,7 +152,7 @@ def with_shared_models(models_of: Mapping[str, dict[int, CenteredModel]]) -> dic
 
 def distinct_surfaces(models_of: Mapping[str, dict[int, CenteredModel]]) -> list[Surface]:
     """Return the surfaces of all datasets' models, shared ones once."""
-    models = [model for of_dataset in models_of.values() for model in of_dataset.values()]
+    models = [model for by_id in models_of.values() for model in by_id.values()]
     return list({(model.surface.name, shape_of(model)): model.surface for model in models}.values())
 
 
@@ -213,8 +213,8 @@ def untested_surfaces(datasets: Mapping[str, Dataset]) -> list[Surface]:
         if dataset.fold(frame.scene) != TRAINING and annotation.object_id in models[name]
     }
     untested = {
-        name: {number: model for number, model in of_dataset.items() if shape_of(model) not in tested}
-        for name, of_dataset in models.items()
+        name: {number: model for number, model in by_id.items() if shape_of(model) not in tested}
+        for name, by_id in models.items()
     }
     return distinct_surfaces(untested)
 

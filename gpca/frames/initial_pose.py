@@ -30,7 +30,7 @@ REMEDY = "export it again"
 ONE_OFF = 100.0
 # ... and half of a file's are not off by more than this, unless the unit is wrong: centimeters would be by 10.
 HALF_OFF = 3.0
-UNIT_OFF = 0.3  # of a tenfold: so near to a power of ten the unit is told by it
+UNIT_OFF = 0.3  # largest distance of log10 of a ratio from a whole number that identifies a unit
 
 PosesByObject = Mapping[tuple[int, int, int], list[np.ndarray]]
 ERROR_COLUMNS = ("obj_id", "rx", "ry", "rz", "tx", "ty", "tz")
@@ -139,20 +139,20 @@ class EstimatorErrors:
 
     Attributes:
         symmetric: objects whose errors are not used for others, as they contain turns by a symmetry.
-        of_object: (dataset, object id) -> errors ``T_true_estimated`` (4, 4), meters.
+        by_object: (dataset, object id) -> errors ``T_true_estimated`` (4, 4), meters.
     """
 
     symmetric: Collection[tuple[str, int]]
-    of_object: dict[tuple[str, int], list[np.ndarray]] = field(default_factory=dict)
+    by_object: dict[tuple[str, int], list[np.ndarray]] = field(default_factory=dict)
 
     def add(self, object_: tuple[str, int], T_true_estimated: np.ndarray) -> None:
         """Add an error that an estimator made on an object."""
-        self.of_object.setdefault(object_, []).append(T_true_estimated)
+        self.by_object.setdefault(object_, []).append(T_true_estimated)
 
     def draw(self, object_: tuple[str, int], random: np.random.Generator) -> np.ndarray:
         """Return one error of this object, else of any without symmetry; InputError where there is none."""
-        of_others = (errors for each, errors in self.of_object.items() if each not in self.symmetric)
-        errors = self.of_object.get(object_) or [T for errors in of_others for T in errors]
+        others = (errors for each, errors in self.by_object.items() if each not in self.symmetric)
+        errors = self.by_object.get(object_) or [T for errors in others for T in errors]
         if not errors:
             fault = "no estimator has a result for an object without symmetry"
             raise InputError("real_world.datasets", fault, "name more results, or a file of errors")

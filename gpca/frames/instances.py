@@ -181,7 +181,8 @@ def read_instances(
         poses = _poses_from_results(datasets, seen)
     else:
         poses = [
-            (settings.form, own.initial_pose(frame, n, row)) for own, frame, n, row in progress(seen, "initial poses")
+            (settings.form, catalog.initial_pose(frame, n, row))
+            for catalog, frame, n, row in progress(seen, "initial poses")
         ]
     for fault in left_out:
         print(f"skipped: {fault}", file=sys.stderr)
@@ -201,7 +202,9 @@ def _poses_from_results(
 ) -> list[tuple[str, np.ndarray]]:
     """Return a random estimator that found each object, and its pose; else ``errors``, and the truth with an error."""
     estimators = {name: dataset.estimators() for name, (dataset, _, _) in datasets.items()}
-    errors = EstimatorErrors({(own.name, number) for own, *_ in seen for number, is_ in own.symmetric.items() if is_})
+    errors = EstimatorErrors(
+        {(catalog.name, number) for catalog, *_ in seen for number, symmetric in catalog.symmetric.items() if symmetric}
+    )
     for name, (dataset, _, models) in datasets.items():
         for number, T_error in read_pose_errors(dataset.errors, models) if dataset.errors else ():
             errors.add((name, number), T_error)

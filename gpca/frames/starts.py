@@ -100,8 +100,8 @@ def _estimated(
     """Return the estimators' poses, and for instances without any the truth with an error made elsewhere."""
     numbers = {
         (name, objects.names.index(model.surface.name)): number
-        for name, of_dataset in models.items()
-        for number, model in of_dataset.items()
+        for name, by_id in models.items()
+        for number, model in by_id.items()
     }
     place_I = [
         (str(instances.dataset[i]), numbers[str(instances.dataset[i]), int(instances.object_index[i])])
@@ -136,7 +136,7 @@ def _estimated(
             found.append((i, kind, estimator, T_camera_model @ T_model_object))
             T_camera_model_true = instances.T_camera_object_true[i] @ inverse(T_model_object)
             errors.add((name, number), error_of(T_camera_model_true, T_camera_model))
-    without = sorted(set(range(len(instances))) - {start[0] for start in found}) if errors.of_object else []
+    without = sorted(set(range(len(instances))) - {start[0] for start in found}) if errors.by_object else []
     for i in without:
         name, number = place_I[i]
         T_model_object = models[name][number].T_model_object

@@ -242,8 +242,8 @@ class ObjectClouds:
         if len(set(names)) < len(names):
             raise InputError(path, "contains two objects with the same name", REGENERATE)
         parts = (np.split(arrays[key], offsets[1:-1]) for key in ("points_m", "normals"))
-        alike = {name: tuple(arrays[name].tolist()) for name in ("families", "folds") if name in arrays}
-        objects = cls(tuple(names), arrays["diameters_m"], tuple(zip(*parts, strict=True)), **alike)
+        optional = {name: tuple(arrays[name].tolist()) for name in ("families", "folds") if name in arrays}
+        objects = cls(tuple(names), arrays["diameters_m"], tuple(zip(*parts, strict=True)), **optional)
         for i, name in enumerate(names):
             objects._require_possible(i, f"{path}, object '{name}'")
         return objects
@@ -283,7 +283,7 @@ class ObjectClouds:
     def save(self, path: str | Path, source: str) -> None:
         """Write the objects npz, and list the objects on stderr."""
         points_m, normals = zip(*self.clouds, strict=True)
-        alike = {"families": np.array(self.families), "folds": np.array(self.folds)} if self.families else {}
+        optional = {"families": np.array(self.families), "folds": np.array(self.folds)} if self.families else {}
         save_arrays(
             path,
             {
@@ -292,7 +292,7 @@ class ObjectClouds:
                 "normals": np.concatenate(normals),
                 "offsets": np.cumsum([0, *map(len, points_m)], dtype=np.int64),
                 "diameters_m": self.diameters_m,
-                **alike,
+                **optional,
             },
             (source, None),
         )
@@ -326,8 +326,8 @@ def read_object_splits(path: str | Path, source: str) -> dict[str, Place]:
             folds or roles.
     """
     rows = read_csv(path, ("source", "object", "name", "family", "role", "fold"), remedy="restore it")
-    of_source = rows[rows["source"] == source]
-    return _places(path, of_source["object"], of_source["family"], of_source["role"], of_source["fold"])
+    rows = rows[rows["source"] == source]
+    return _places(path, rows["object"], rows["family"], rows["role"], rows["fold"])
 
 
 def read_scene_splits(path: str | Path, dataset: str) -> dict[int, Place]:
@@ -336,11 +336,11 @@ def read_scene_splits(path: str | Path, dataset: str) -> dict[int, Place]:
     InputError as in :func:`read_object_splits`, and for an unknown word for truth or estimates.
     """
     rows = read_csv(path, ("dataset", "scene", "role", "fold"), others=tuple(WORTH), remedy="restore it")
-    of_dataset = rows[rows["dataset"] == dataset]
-    clusters = [f"{dataset} {scene}" for scene in of_dataset["scene"]]
-    places = _places(path, of_dataset["scene"], clusters, of_dataset["role"], of_dataset["fold"])
+    rows = rows[rows["dataset"] == dataset]
+    clusters = [f"{dataset} {scene}" for scene in rows["scene"]]
+    places = _places(path, rows["scene"], clusters, rows["role"], rows["fold"])
     for column, words in WORTH.items():
-        for scene, word in zip(of_dataset["scene"], of_dataset.get(column, ()), strict=False):
+        for scene, word in zip(rows["scene"], rows.get(column, ()), strict=False):
             if word not in words:
                 fault = f"scene {scene} of {dataset} has '{word}' as {column}"
                 raise InputError(path, fault, f"choose one of {', '.join(words)}")
@@ -350,7 +350,7 @@ def read_scene_splits(path: str | Path, dataset: str) -> dict[int, Place]:
 
 def _places(path, names, clusters, roles, folds) -> dict[str, Place]:
     places: dict[str, Place] = {}
-    of_cluster: dict[str, Place] = {}
+    by_cluster: dict[str, Place] = {}
     for name, cluster, role, fold in zip(names, clusters, roles, folds, strict=True):
         if name in places:
             raise InputError(path, f"'{name}' occurs twice", "keep one of its rows")
@@ -359,7 +359,7 @@ def _places(path, names, clusters, roles, folds) -> dict[str, Place]:
         if not fold.isdecimal() and role != UNUSED:
             raise InputError(path, f"'{name}' has the fold '{fold}'", "number the folds from 0")
         place = Place(cluster, role, int(fold) if role != UNUSED else DRAWN)
-        if place != of_cluster.setdefault(cluster, place):
+        if place != by_cluster.setdefault(cluster, place):
             raise InputError(path, f"'{cluster}' has two roles or is in two folds", "give all of it one of each")
         places[name] = place
     return places

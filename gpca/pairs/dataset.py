@@ -171,5 +171,5 @@ REGISTRATION_COLUMNS = tuple(name for name in Registrations.array_fields() if na
 
 def ragged(clouds: list[np.ndarray], targets: list[np.ndarray]) -> dict[str, Any]:
     """Return the four arrays of `CLOUDS` for the clouds and targets of all rows."""
-    ends = [np.cumsum([0, *(len(cloud) for cloud in of_kind)], dtype=np.int64) for of_kind in (clouds, targets)]
+    ends = [np.cumsum([0, *(len(cloud) for cloud in each)], dtype=np.int64) for each in (clouds, targets)]
     return dict(zip(CLOUDS, (np.concatenate(clouds), ends[0], np.concatenate(targets), ends[1]), strict=True))

@@ -216,8 +216,12 @@ def benchmark_scenes(entry: ScanEntry, place: Path) -> Iterator[Scene]:
     if not found:
         raise InputError(folder, "has no <scene>/cloud_bin_<number>.ply", "correct location")
     scale = meters_per(entry.unit)
-    for of_scene in found:
-        log = _log_of(of_scene, place)
+    for scene_folder in found:
+        evaluation = f"{scene_folder.name}-evaluation"
+        folders = (scene_folder, scene_folder.with_name(evaluation), place / "gt_result" / evaluation)
+        log = next((path for path in (folder / "gt.log" for folder in folders) if path.is_file()), None)
+        if log is None:
+            raise InputError(scene_folder / "gt.log", "no such file", f"put it there, or into {evaluation} beside it")
         shares = _read_overlaps(log.with_name("gt_overlap.log"))
         printed = tuple(
             Known(target, source, shares.get((target, source)), scale_translation(T, scale))
@@ -226,19 +230,10 @@ def benchmark_scenes(entry: ScanEntry, place: Path) -> Iterator[Scene]:
         named = sorted({name for pair in printed for name in (pair.target, pair.source)}, key=int)
         viewpoint_3 = np.zeros(3) if entry.sensor_at_origin else None
         scans = {
-            name: Scan(read_surface(of_scene / f"cloud_bin_{name}.ply", scale).vertices_m, None, viewpoint_3)
+            name: Scan(read_surface(scene_folder / f"cloud_bin_{name}.ply", scale).vertices_m, None, viewpoint_3)
             for name in named
         }
-        yield Scene(of_scene.name, entry.scenes or "room", scans, printed)
-
-
-def _log_of(of_scene: Path, place: Path) -> Path:
-    evaluation = f"{of_scene.name}-evaluation"
-    folders = (of_scene, of_scene.with_name(evaluation), place / "gt_result" / evaluation)
-    log = next((folder / "gt.log" for folder in folders if (folder / "gt.log").is_file()), None)
-    if log is None:
-        raise InputError(of_scene / "gt.log", "no such file", f"put it there, or into {evaluation} beside it")
-    return log
+        yield Scene(scene_folder.name, entry.scenes or "room", scans, printed)
 
 
 def read_log(path: Path) -> dict[tuple[str, str], np.ndarray]:
