@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from time import perf_counter
-from typing import TYPE_CHECKING
 
 from gpca.alignment.icp import ICPSettings
 from gpca.attribution.predictions import read_timings, write_timings
@@ -19,9 +18,6 @@ from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.settings import read_settings
-
-if TYPE_CHECKING:
-    from gpca.classifier.gpc import GPC
 
 
 def causes(job: Job) -> None:
@@ -104,6 +100,7 @@ def train_on_causes(job: Job) -> None:
 
 def model(job: Job) -> None:
     """Fit all classifiers and write them with the encoder and the policy -> ``model.pt``, for ``gpca explain``."""
+    from gpca.classifier.gpc import GPC
     from gpca.classifier.settings import GPCSettings
     from gpca.encoders.training import load_model
     from gpca.model.clouds import Familiarity
