@@ -106,7 +106,7 @@ FAULTS = [
     ("exchange.estimators", ["gauss"], "exchange.estimators: no estimator 'gauss'; choose one of monte_carlo, "),
     ("exchange.sources", ["cup"], "exchange.sources: no source 'cup'; choose one of coffee_cup, "),
     ("exchange.explainers.shap_removal", {}, "explainer 'shap_removal': reads design 'removal', which"),
-    ("estimators.gauss", {}, "estimators.gauss: estimator 'gauss': unknown; choose one of bayesian_icp, "),
+    ("estimators.gauss", {}, "estimators.gauss: estimator 'gauss': unknown; choose one of bonnabel, "),
     ("estimators.censi.sigma", 1, "estimators.censi: estimator 'censi': setting sigma: unknown"),
     ("estimators.stein_icp.steps", -1, "estimators.stein_icp: estimator 'stein_icp': setting steps: -1 should be gre"),
     ("estimator_pairs.repeat", 20, "estimator_pairs.repeat: unknown; did you mean repeats?"),

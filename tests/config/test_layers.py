@@ -100,7 +100,7 @@ def test_virtual_frames_stay_while_a_dataset_does():
     ("key", "message"),
     [
         ("methods.fgr", "method_pairs.global_start: registration method 'fgr' is left out; choose one of point_to_"),
-        ("estimators.gauss", "estimators: no estimator 'gauss'; choose one of bayesian_icp, "),
+        ("estimators.gauss", "estimators: no estimator 'gauss'; choose one of bonnabel, "),
         ("methods.icp", "methods: no registration method 'icp'; choose one of fgr, "),
         ("encoders.dgcnn", "embedding.encoder: encoder 'dgcnn' is left out; choose one of pointnet, "),
         ("sources.ycb", "learning_curve.sources: source 'ycb' is left out; choose one of coffee_cup, linemod"),
