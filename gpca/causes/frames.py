@@ -14,25 +14,23 @@ never shows an object's back: the side that it hides by itself counts as no caus
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator, Mapping
+from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gpca.alignment.rigid import inverse, rotation_angle_rad, scale_translation
-from gpca.causes.candidate import Candidate, Registrar, Unmeasurable
+from gpca.causes.candidate import Candidate, Unmeasurable
 from gpca.causes.dataset import Causes
-from gpca.causes.measuring import Measuring, Subject, as_causes, measure_clean_pairs
+from gpca.causes.measuring import Case, Measuring, Subject, found_in, measure_cases, measure_clean_pairs
 from gpca.causes.settings import FEWEST_POINTS, CauseSettings, FrameCauseSettings
-from gpca.causes.truth import ALL, NONE
-from gpca.errors import InputError
 from gpca.frames.camera import MeshScene
 from gpca.frames.instances import Instances
 from gpca.frames.shots import CleanView, clean_view, rendered_side
 from gpca.frames.starts import KINDS, Starts
 from gpca.objects.canonical import TRAINING, ObjectClouds
-from gpca.pairs.perturbation import CONCEPTS, SEVERITIES
+from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.progress import progress
 from gpca.seeds import generator
 
@@ -87,24 +85,22 @@ def measure_frames(
         InputError: no registration can be measured.
     """
     subjects, limit = measure_clean_pairs(subjects_of(instances, starts.instance, objects), source, seed, settings)
-    measuring, of_object = Measuring(settings, limit), {subject.index: subject for subject in subjects}
-    records: list[dict[str, Any]] = []
-    for k in progress(range(len(starts)), f"causes of {source}, seed {seed}"):
-        i, began = int(starts.instance[k]), f"{starts.kind[k]}, {starts.init_from[k]}"
-        axes = (source, seed, "frame causes", i, began)
-        try:
-            if (subject := of_object.get(int(instances.object_index[i]))) is None:
-                raise Unmeasurable("its clean pairs are misaligned")
-            T_init = starts.T_camera_object_init[k]
-            candidate = frame_candidate(instances, i, T_init, subject, meshes[subject.index], points, generator(*axes))
-            records.append(_measured(candidate, measuring, subject, axes) | {"sample": k, "split": "test"})
-        except Unmeasurable as fault:
-            print(f"causes of {source}: instance {i} ({began}) is skipped: {fault}", file=sys.stderr)
-    if not records:
-        raise InputError(
-            f"causes of {source}", "no instance in the frames can be measured", "check the meshes and poses"
-        )
-    causes, _ = as_causes(records, (source, seed))
+    of_object = {subject.index: subject for subject in subjects}
+
+    def cases() -> Iterator[Case]:
+        for k in progress(range(len(starts)), f"causes of {source}, seed {seed}"):
+            i, began = int(starts.instance[k]), f"{starts.kind[k]}, {starts.init_from[k]}"
+            axes = (source, seed, "frame causes", i, began)
+            yield Case(k, i, f"instance {i} ({began})", axes, partial(candidate, k, i, axes))
+
+    def candidate(k: int, i: int, axes: tuple) -> tuple[Candidate, Subject]:
+        if (subject := of_object.get(int(instances.object_index[i]))) is None:
+            raise Unmeasurable("its clean pairs are misaligned")
+        T_init, random = starts.T_camera_object_init[k], generator(*axes)
+        return frame_candidate(instances, i, T_init, subject, meshes[subject.index], points, random), subject
+
+    nothing = ("no instance in the frames can be measured", "check the meshes and poses")
+    causes = measure_cases(cases(), Measuring(settings, limit), (source, seed), nothing)
     return causes, _table(instances, starts, causes)
 
 
@@ -192,16 +188,6 @@ def _drawn(points_N_3: np.ndarray, most: int, random: np.random.Generator) -> np
     return points_N_3[random.permutation(len(points_N_3))[:most]]
 
 
-def _measured(candidate: Candidate, measuring: Measuring, subject: Subject, axes: tuple) -> dict[str, Any]:
-    registrar = Registrar(candidate, measuring.settings, misses=True)
-    truths = [
-        measuring.truth(measuring.counterfactuals(registrar, subject, axes, starts))
-        for starts in ("starts", "other starts")
-    ]
-    observed = measuring.observed(registrar, subject, axes)
-    return {**observed, "truth": truths[0], "again": truths[1], "candidate": axes[3]}
-
-
 def subjects_of(instances: Instances, rows: np.ndarray, objects: ObjectClouds) -> list[Subject]:
     """Return the objects that the instances show; symmetric is what the dataset says is."""
     return [
@@ -213,14 +199,10 @@ def subjects_of(instances: Instances, rows: np.ndarray, objects: ObjectClouds) -
 def _table(instances: Instances, starts: Starts, causes: Causes) -> pd.DataFrame:
     import pandas as pd
 
-    registrations, truth = causes.registrations, causes.truth
+    registrations, (severities, found) = causes.registrations, found_in(causes)
     started = starts.subset(registrations.sample)
     seen = {"instance": started.instance, "start": started.kind, "init_from": started.init_from}
     seen |= {name: getattr(instances, name)[started.instance] for name in ("dataset", "scene", "image")}
-    severities = {name: getattr(registrations, f"severity_{name}") for name in SEVERITIES}
-    judged = {"missed": ~causes.fitness_runs.any(axis=1), "state": truth.state, "dominant": truth.dominant}
-    judged |= {"error": truth.error[:, ALL], "error_clean": truth.error[:, NONE]}
-    judged |= {f"phi_{concept}": truth.phi[:, c] for c, concept in enumerate(CONCEPTS)}
     return pd.DataFrame(
-        {"sample": registrations.sample, **seen, "object": registrations.object_name, **severities, **judged}
+        {"sample": registrations.sample, **seen, "object": registrations.object_name, **severities, **found}
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,15 +11,15 @@ import numpy as np
 
 from gpca.alignment.pose_error import PoseErrors
 from gpca.alignment.rigid import inverse, scale_translation, transform
-from gpca.causes.candidate import Counterfactuals, Registrar, Unmeasurable, draw_candidate, redrawn
+from gpca.causes.candidate import Candidate, Counterfactuals, Registrar, Unmeasurable, draw_candidate, redrawn
 from gpca.causes.dataset import Causes
 from gpca.causes.settings import CauseSettings
-from gpca.causes.truth import NONE, SUBSETS, Truth, capped, joined
+from gpca.causes.truth import ALL, NONE, SUBSETS, Truth, capped, joined
 from gpca.errors import InputError
 from gpca.io.files import SPLITS, Axes
 from gpca.objects.bop import find_symmetries
 from gpca.objects.canonical import ObjectClouds, drawn, unseen
-from gpca.pairs.perturbation import CONCEPTS
+from gpca.pairs.perturbation import CONCEPTS, SEVERITIES
 from gpca.pairs.synthesis import as_registrations
 from gpca.process.progress import progress
 from gpca.seeds import generator
@@ -221,6 +221,67 @@ class Measuring:
     def _twists(self, axes: tuple, starts: str) -> np.ndarray:
         shape = (self.settings.starts, 6)
         return generator(*axes, starts).normal(size=shape) * self.settings.deviation_6()
+
+
+@dataclass(frozen=True)
+class Case:
+    """A registration to be measured that was not drawn: one in a depth frame, or one of two scans.
+
+    Attributes:
+        sample, candidate: numbers of its row and of what it shows.
+        name: for messages.
+        axes: name its random numbers.
+        make: returns the candidate and what stands for its object; may raise `Unmeasurable`.
+    """
+
+    sample: int
+    candidate: int
+    name: str
+    axes: tuple
+    make: Callable[[], tuple[Candidate, Subject]]
+
+
+def measure_cases(cases: Iterable[Case], measuring: Measuring, axes: Axes, nothing: tuple[str, str]) -> Causes:
+    """Measure registrations as test samples, from two sets of starts each.
+
+    This is the one way to measure what happened in a world that gives cases: depth frames (:mod:`gpca.causes.frames`)
+    or scans (:mod:`gpca.causes.scans`). A world provides the cases, each with two clouds, everything that may be taken
+    away from them and the errors of poses; and a table of what else is known of the measured rows (:func:`found_in`).
+    Drawn objects are measured by the same :class:`Measuring`, but one by one, since most are refused
+    (:mod:`gpca.causes.drawing`).
+
+    A registration that finds no correspondence is measured where it started; one that cannot be measured is left out
+    and named on stderr.
+
+    Args:
+        nothing: the fault if no case can be measured, and its remedy.
+    """
+    records: list[dict[str, Any]] = []
+    for case in cases:
+        try:
+            candidate, subject = case.make()
+            registrar = Registrar(candidate, measuring.settings, misses=True)
+            truth, again = (
+                measuring.truth(measuring.counterfactuals(registrar, subject, case.axes, starts))
+                for starts in ("starts", "other starts")
+            )
+            record = {**measuring.observed(registrar, subject, case.axes), "truth": truth, "again": again}
+            records.append(record | {"sample": case.sample, "split": "test", "candidate": case.candidate})
+        except Unmeasurable as fault:
+            print(f"causes of {axes[0]}: {case.name} is skipped: {fault}", file=sys.stderr)
+    if not records:
+        raise InputError(f"causes of {axes[0]}", *nothing)
+    return as_causes(records, axes)[0]
+
+
+def found_in(causes: Causes) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return the severities and what was found of each row, as columns of a table of samples."""
+    truth = causes.truth
+    severities = {name: getattr(causes.registrations, f"severity_{name}") for name in SEVERITIES}
+    found = {"missed": ~causes.fitness_runs.any(axis=1), "state": truth.state, "dominant": truth.dominant}
+    found |= {"error": truth.error[:, ALL], "error_clean": truth.error[:, NONE]}
+    found |= {f"phi_{concept}": truth.phi[:, c] for c, concept in enumerate(CONCEPTS)}
+    return severities, found
 
 
 def as_causes(records: list[dict[str, Any]], axes: Axes) -> tuple[Causes, np.ndarray]:

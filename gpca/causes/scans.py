@@ -11,10 +11,10 @@ A *natural* registration has no added noise: it is what an estimate by a local m
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from functools import cached_property, partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -24,12 +24,11 @@ from gpca.alignment.pose_error import displacements
 from gpca.alignment.rigid import inverse, inverses, rigid_motion, rotate, rotation_angle_rad, transform
 from gpca.causes.candidate import Candidate, Counterfactuals, Registrar, Unmeasurable
 from gpca.causes.dataset import Causes
-from gpca.causes.measuring import Measuring, Subject, as_causes
+from gpca.causes.measuring import Case, Measuring, Subject, found_in, measure_cases
 from gpca.causes.settings import FEWEST_POINTS, CauseSettings
-from gpca.causes.truth import ALL, NONE
-from gpca.errors import InputError
+from gpca.causes.truth import NONE
 from gpca.objects.canonical import DRAWN
-from gpca.pairs.perturbation import CONCEPTS, NOISE, OVERLAP, POSE, SEVERITIES
+from gpca.pairs.perturbation import CONCEPTS, NOISE, OVERLAP, POSE
 from gpca.process.progress import progress
 from gpca.scans.pair import ROOM_M, ScanPair, ScanSuccess
 from gpca.scans.scene import ScanPairs
@@ -275,23 +274,24 @@ def measure_scans(
         except Unmeasurable as fault:
             print(f"causes of {source}: pair {scans.pair.name} is skipped: {fault}", file=sys.stderr)
     measuring = Measuring(settings, float(np.quantile(limits, settings.limits.clean)) if limits else 0.0)
-    records, seen = [], []
-    for number, start in enumerate(progress(starts, f"causes of {source}, seed {seed}")):
-        if start.pair not in drawn:
-            continue
+
+    def cases() -> Iterator[Case]:
+        for number, start in enumerate(progress(starts, f"causes of {source}, seed {seed}")):
+            if start.pair in drawn:
+                name = drawn[start.pair].pair.name
+                axes = (source, seed, "scan causes", name, start.init_from)  # the same starts, whatever noise is added
+                title = f"pair {name} ({start.kind}, {start.init_from})"
+                yield Case(number, number, title, axes, partial(candidate, start, axes))
+
+    def candidate(start: ScanStart, axes: tuple) -> tuple[Candidate, Subject]:
         scans = drawn[start.pair]
-        try:
-            record = _measured(scans, start, measuring, (source, seed))
-        except Unmeasurable as fault:
-            name = f"pair {scans.pair.name} ({start.kind}, {start.init_from})"
-            print(f"causes of {source}: {name} is skipped: {fault}", file=sys.stderr)
-            continue
-        records.append(record | {"sample": number, "split": "test", "candidate": number})
-        seen.append((start, scans))
-    if not records:
-        raise InputError(f"causes of {source}", "no registration of the scans can be measured", "check their poses")
-    causes, _ = as_causes(records, (source, seed))
-    return causes, _table(seen, causes)
+        noisy = scans.candidate(start.T_target_source, start.times, generator(*axes, "noise", start.times))
+        return noisy, _subject(scans, start.pair)
+
+    nothing = ("no registration of the scans can be measured", "check their poses")
+    causes = measure_cases(cases(), measuring, (source, seed), nothing)
+    measured = [starts[number] for number in causes.registrations.sample]
+    return causes, _table([(start, drawn[start.pair]) for start in measured], causes)
 
 
 def _drawn(
@@ -324,18 +324,6 @@ def _require_common(scans: DrawnScans) -> None:
         raise Unmeasurable("too few of its points lie on surface that both scans see")
 
 
-def _measured(scans: DrawnScans, start: ScanStart, measuring: Measuring, axes: tuple) -> dict[str, Any]:
-    axes = (*axes, "scan causes", scans.pair.name, start.init_from)  # the same starts, however much noise is added
-    candidate = scans.candidate(start.T_target_source, start.times, generator(*axes, "noise", start.times))
-    registrar = Registrar(candidate, measuring.settings, misses=True)
-    subject = _subject(scans, start.pair)
-    truths = [
-        measuring.truth(measuring.counterfactuals(registrar, subject, axes, drawn))
-        for drawn in ("starts", "other starts")
-    ]
-    return {**measuring.observed(registrar, subject, axes), "truth": truths[0], "again": truths[1]}
-
-
 def _subject(scans: DrawnScans, number: int) -> Subject:
     """Return the pair in the place of an object, and its scene in that of a family."""
     return Subject(
@@ -353,15 +341,11 @@ def _subject(scans: DrawnScans, number: int) -> Subject:
 def _table(seen: Sequence[tuple[ScanStart, DrawnScans]], causes: Causes) -> pd.DataFrame:
     import pandas as pd
 
-    registrations, truth = causes.registrations, causes.truth
+    registrations, (severities, found) = causes.registrations, found_in(causes)
     starts, scans = zip(*seen, strict=True)
-    told = {"pair": [each.pair.name for each in scans], "cluster": registrations.cluster}
-    told |= {"kind": [each.pair.kind for each in scans], "overlap": [each.pair.overlap for each in scans]}
-    told |= {"start": [start.kind for start in starts], "init_from": [start.init_from for start in starts]}
-    told |= {"times": [start.times for start in starts], "sensor_noise": [each.sensor_noise for each in scans]}
-    severities = {name: getattr(registrations, f"severity_{name}") for name in SEVERITIES}
-    judged = {"missed": ~causes.fitness_runs.any(axis=1), "state": truth.state, "dominant": truth.dominant}
-    judged |= {"error": truth.error[:, ALL], "error_clean": truth.error[:, NONE]}
-    judged |= {f"phi_{concept}": truth.phi[:, c] for c, concept in enumerate(CONCEPTS)}
+    known = {"pair": [each.pair.name for each in scans], "cluster": registrations.cluster}
+    known |= {"kind": [each.pair.kind for each in scans], "overlap": [each.pair.overlap for each in scans]}
+    known |= {"start": [start.kind for start in starts], "init_from": [start.init_from for start in starts]}
+    known |= {"times": [start.times for start in starts], "sensor_noise": [each.sensor_noise for each in scans]}
     factors = {"error_factor": [each.error_factor for each in scans]}
-    return pd.DataFrame({"sample": registrations.sample, **told, **severities, **judged, **factors})
+    return pd.DataFrame({"sample": registrations.sample, **known, **severities, **found, **factors})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from time import perf_counter
 
@@ -53,6 +53,12 @@ MEASURED = ("log_likelihood", "width", "covered", "noise", "outliers", "missing"
 DESCRIBED = ("distances", "planes", "motion", "starts")  # groups of descriptors, without further registrations
 
 
+# What re-enacts a row in the world that its registration comes from: it takes the observed pair and the number of the
+# row, finds hypotheses of the true pose and returns the counterfactuals under each, the most probable first. Whole
+# objects: :func:`gpca.reenactment.enactment.reenact`; depth frames and scans: the modules of this folder so named.
+World = Callable[[ObservedPair, int], list[Enactment]]
+
+
 @dataclass(frozen=True)
 class Reenactments(Container):
     """The re-enactments of S registrations under K hypotheses each, the most probable first.
@@ -98,18 +104,26 @@ class Reenactments(Container):
 
 
 def reenact_all(
-    causes: Causes, source: str, seed: int, settings: ReenactmentSettings, truth: CauseSettings
+    causes: Causes,
+    source: str,
+    seed: int | None,
+    settings: ReenactmentSettings,
+    truth: CauseSettings,
+    world: World | None = None,
 ) -> tuple[Reenactments, np.ndarray, np.ndarray]:
     """Return the re-enactments of every row, the seconds (S,) that each took, and those of its registrations.
 
+    Of the causes it reads both clouds, the initial pose and what registrations found.
+
     Args:
         truth: how counterfactuals are registered, and the limits of the states.
+        world: where the rows come from; whole objects by default.
     """
     rows, seconds, icp_seconds = [], [], []
     for row in progress(range(len(causes)), f"re-enactments of {source}, seed {seed}"):
         started = perf_counter()
         pair = observed_pair(causes, row, source, seed, "reenactment")
-        enactments = reenact(pair, settings, truth)
+        enactments = world(pair, row) if world else reenact(pair, settings, truth)
         rows.append(row_of(enactments, pair, settings, truth))
         seconds.append(perf_counter() - started)
         icp_seconds.append(sum(enactment.icp_seconds for enactment in enactments))

@@ -17,7 +17,6 @@ from scipy.spatial import cKDTree
 from gpca.alignment.rigid import inverse, scale_translation, transform
 from gpca.causes.candidate import Candidate
 from gpca.causes.dataset import Causes
-from gpca.causes.descriptors import observed_pair
 from gpca.causes.frames import candidate_of_view, outline, subjects_of
 from gpca.causes.measuring import Subject
 from gpca.causes.settings import FEWEST_POINTS, CauseSettings
@@ -28,8 +27,7 @@ from gpca.frames.shots import MOST_PIXELS, CleanView, Sighting, clean_view, rend
 from gpca.frames.starts import Starts
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.distances import ObservedPair
-from gpca.process.progress import progress
-from gpca.reenactment.dataset import Reenactments, row_of
+from gpca.reenactment.dataset import Reenactments, reenact_all
 from gpca.reenactment.enactment import Enactment, register, start_twists
 from gpca.reenactment.hypotheses import (
     FITTED,
@@ -222,14 +220,13 @@ def reenact_frames(
         for subject in subjects_of(instances, starts.instance, objects)
     }
 
-    rows = []
-    for row in progress(range(len(causes)), "re-enactments of frames"):
+    def world(pair: ObservedPair, row: int) -> list[Enactment]:
         i = int(starts.instance[row])
-        pair = observed_pair(causes, row, *(registrations.axes or ()), "reenactment")
-        own = known[int(instances.object_index[i])]
-        view = FrameView(pair, own, instances.camera_3_3[i], instances.pixels_of(i), starts.T_camera_object_init[row])
-        rows.append(row_of(reenact_frame(view, settings, truth), pair, settings, truth))
-    return Reenactments.of_rows(rows, truth, registrations)
+        own, T_start = known[int(instances.object_index[i])], starts.T_camera_object_init[row]
+        view = FrameView(pair, own, instances.camera_3_3[i], instances.pixels_of(i), T_start)
+        return reenact_frame(view, settings, truth)
+
+    return reenact_all(causes, *(registrations.axes or ("", None)), settings, truth, world)[0]
 
 
 def reenact_frame(view: FrameView, settings: ReenactmentSettings, truth: CauseSettings) -> list[Enactment]:

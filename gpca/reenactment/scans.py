@@ -13,13 +13,11 @@ import numpy as np
 
 from gpca.alignment.rigid import inverse, transform
 from gpca.causes.dataset import Causes
-from gpca.causes.descriptors import observed_pair
 from gpca.causes.scans import OverlapErrors, ScanCandidate
 from gpca.causes.settings import FEWEST_POINTS, CauseSettings
 from gpca.pairs.distances import ObservedPair
 from gpca.pairs.perturbation import CONCEPTS, NOISE, OVERLAP, POSE
-from gpca.process.progress import progress
-from gpca.reenactment.dataset import Reenactments, row_of
+from gpca.reenactment.dataset import Reenactments, reenact_all
 from gpca.reenactment.enactment import QUIET, Enactment, NoiseScale, register, start_twists
 from gpca.reenactment.hypotheses import Hypothesis, find_hypotheses
 from gpca.reenactment.settings import ReenactmentSettings
@@ -46,13 +44,12 @@ def reenact_scans(
         T_found_S: (k, 4, 4) for each row, where else the source may belong: what global methods found takes it there
             from where the registration began.
     """
-    registrations, rows = causes.registrations, []
-    for row in progress(range(len(causes)), "re-enactments of scans"):
-        pair = observed_pair(causes, row, *(registrations.axes or ()), "reenactment")
+
+    def world(pair: ObservedPair, row: int) -> list[Enactment]:
         found_k = None if T_found_S is None else T_found_S[row]
-        enactments = reenact_scan(pair, float(error_factor_S[row]), settings, truth, found_k)
-        rows.append(row_of(enactments, pair, settings, truth))
-    return Reenactments.of_rows(rows, truth, registrations)
+        return reenact_scan(pair, float(error_factor_S[row]), settings, truth, found_k)
+
+    return reenact_all(causes, *(causes.registrations.axes or ("", None)), settings, truth, world)[0]
 
 
 def reenact_scan(

@@ -21,10 +21,9 @@ from gpca.errors import InputError
 from gpca.experiments.controls.protocol import ControlRun
 from gpca.experiments.controls.rivals import make_rivals
 from gpca.experiments.controls.settings import HARD, ControlSettings
-from gpca.experiments.diagnosis.step import explained, with_what_it_reads
+from gpca.experiments.diagnosis.step import DESCRIBED, EMBEDDED, explained, with_what_it_reads
 from gpca.experiments.frame_causes.diagnosis_step import FramesToExplain
 from gpca.experiments.scan_causes import diagnosis_step as scan_step
-from gpca.experiments.scan_causes.diagnosis_step import DESCRIBED, EMBEDDED
 from gpca.experiments.scan_causes.experiment import diagnosis_settings
 from gpca.experiments.scan_causes.settings import OBJECTS
 from gpca.explainers.interface import BARE, REENACTED, ExplainerEntry

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import json
+from abc import ABC, abstractmethod
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from gpca.attribution.predictions import read_timings, write_predictions, write_timings
 from gpca.attribution.scores import Attribution
-from gpca.causes.dataset import Causes, labeled
+from gpca.causes.dataset import LABELS, Causes, labeled
 from gpca.causes.descriptors import Descriptors
 from gpca.causes.settings import DescriptorSettings
 from gpca.causes.truth import BORDERLINE
+from gpca.encoders.registry import EncoderSettings
 from gpca.errors import InputError
 from gpca.explainers.interface import BARE, REENACTED, ConceptExplainer, ExplainerEntry, icp_calls
 from gpca.explainers.registry import CAUSES, explainer_entry
@@ -22,6 +25,8 @@ from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
 from gpca.reenactment.dataset import Reenactments, reenactment_features
 from gpca.reenactment.settings import ReenactmentSettings
+
+EMBEDDED, DESCRIBED = "embeddings", "descriptors"  # `reads` of explainers; all but these and `REENACTED` need neither
 
 
 def run(job: Job) -> None:
@@ -89,3 +94,78 @@ def with_what_it_reads(registrations: Registrations, entry: ExplainerEntry, path
     else:
         read = dict(Descriptors.load(path, registrations).groups)
     return replace(registrations, attached={**registrations.attached, **read})
+
+
+class World(ABC):
+    """Registrations that explainers which learned from objects are asked about: in depth frames, or of scans.
+
+    Diagnosis of held-out objects is :func:`run`: there one file has training and test rows. An implementation for
+    another world provides what its explainers read of its registrations but embeddings (:meth:`_read`), and from whom
+    an explainer learns (its method ``attribution``).
+
+    Args:
+        files: of all sources of objects, by what explainers read, and their encoders.
+        registrations: those of this world, with labels.
+        starts: runs of each from other starts.
+    """
+
+    def __init__(self, job: Job, files: dict[str, list[Path]], registrations: Registrations, starts: int) -> None:
+        self._axes, self._files, self._registrations = (job.source, job.seed), files, registrations
+        self._encoder = EncoderSettings(**job.section("encoder"))
+        self._descriptors = DescriptorSettings(**job.section("descriptors"))
+        calls = ReenactmentSettings(**job.section("reenactment")).calls(starts)
+        self._calls = partial(icp_calls, starts=starts, descriptors=self._descriptors, reenactment=calls)
+        self._from_objects: dict[str, list[Registrations]] = {}
+        self._prepared: dict[tuple[str, bool], list[tuple[Registrations, Registrations]]] = {}
+
+    @abstractmethod
+    def _read(self, reads: str) -> Registrations:
+        """Return the registrations with their descriptors or re-enactments attached."""
+
+    def _training_sets(self, entry: ExplainerEntry, reads: str) -> list[Registrations]:
+        """Return the training rows of each source of objects, with what an explainer reads."""
+        if reads not in self._from_objects:
+            parts = []
+            for causes, path in zip(self._files["causes"], self._files[reads], strict=True):
+                registrations = with_what_it_reads(labeled(Causes.load(causes)), entry, path)
+                parts.append(registrations.subset(training_rows(registrations, causes)))
+            self._from_objects[reads] = parts
+        return self._from_objects[reads]
+
+    def _sets(self, entry: ExplainerEntry, from_objects: bool = True) -> list[tuple[Registrations, Registrations]]:
+        """Return what an explainer learns from, and the registrations it is asked about; the same twice if not objects.
+
+        Descriptors and re-enactments of all sources are one set; embeddings are by an encoder for each source.
+        """
+        reads = entry.reads if entry.reads in (EMBEDDED, REENACTED) else DESCRIBED
+        if (reads, from_objects) not in self._prepared:
+            entry = explainer_entry("gpca_pair", CAUSES) if reads == DESCRIBED else entry
+            learned = self._training_sets(entry, reads) if from_objects else []
+            asked = self._embedded(learned) if reads == EMBEDDED else [self._read(reads)]
+            if reads != EMBEDDED and from_objects:
+                learned = [Registrations.joined(learned)]
+            self._prepared[reads, from_objects] = list(zip(learned or asked, asked, strict=True))
+        return self._prepared[reads, from_objects]
+
+    def _embedded(self, learned: list[Registrations]) -> list[Registrations]:
+        """Return the registrations with embeddings by the encoder of each source of objects."""
+        from gpca.encoders.training import embed, load_model
+
+        observed, embedded = observed_only(self._registrations), []
+        axes = [part.axes for part in learned] or [None] * len(self._files["encoders"])
+        for weights, trained_on in zip(self._files["encoders"], axes, strict=True):
+            model = load_model(weights, self._encoder, LABELS, trained_on)
+            h_S_d, logits_S_C = embed(model, observed, *self._axes, self._encoder)
+            attached = {**self._registrations.attached, "embedding": h_S_d, "head_logits": logits_S_C}
+            embedded.append(replace(self._registrations, attached=attached))
+        return embedded
+
+    def _mean(self, entry: ExplainerEntry, attributions: list[Attribution]) -> Attribution:
+        """Return the mean of the scores over all sets, with the runs of ICP that the explainer needs."""
+        return Attribution.of_scores(
+            LABELS,
+            np.mean([each.scores_N_C for each in attributions], axis=0),
+            seconds=0.0,
+            icp_calls=self._calls(entry.sees),
+            abstained_N=np.all([each.abstained_N for each in attributions], axis=0),
+        )

@@ -10,7 +10,6 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
-from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,26 +19,22 @@ from gpca.attribution.predictions import prediction_frame
 from gpca.attribution.scores import Attribution
 from gpca.causes.dataset import LABELS, Causes, labeled
 from gpca.causes.descriptors import Descriptors
-from gpca.causes.settings import DescriptorSettings
 from gpca.causes.truth import BORDERLINE
-from gpca.encoders.registry import EncoderSettings
 from gpca.errors import InputError
-from gpca.experiments.diagnosis.step import observed_only, training_rows, with_what_it_reads
+from gpca.experiments.diagnosis.step import DESCRIBED, EMBEDDED, World, observed_only
 from gpca.experiments.scan_causes.settings import OBJECTS, ScanSamples
-from gpca.explainers.interface import REENACTED, ExplainerEntry, icp_calls
+from gpca.explainers.interface import REENACTED
 from gpca.explainers.registry import CAUSES, explainer_entry
 from gpca.io.csv_file import write_csv
 from gpca.pairs.dataset import Registrations
 from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
 from gpca.reenactment.dataset import Reenactments, reenactment_features
-from gpca.reenactment.settings import ReenactmentSettings
 from gpca.settings import read_settings
 
 if TYPE_CHECKING:
     import pandas as pd
 
-EMBEDDED, DESCRIBED = "embeddings", "descriptors"  # `reads` of explainers; all but these and `REENACTED` need neither
 FEWEST_LABELS = 2  # among the samples that an explainer learns from
 
 
@@ -74,27 +69,22 @@ def folds_of(cluster_S: np.ndarray, most: int) -> np.ndarray:
     return number_S % min(most, len(clusters))
 
 
-class _ScansToExplain:
-    """Registrations of scans to be explained, and the training data of the explainers.
+class _ScansToExplain(World):
+    """Registrations of scans to be explained; see :class:`gpca.experiments.diagnosis.step.World`.
 
     Args:
         lessons: files of all sources of objects, by what explainers read.
     """
 
     def __init__(self, job: Job, lessons: dict[str, list[Path]]) -> None:
-        self._axes, self._lessons = (job.source, job.seed), lessons
-        self._encoder = EncoderSettings(**job.section("encoder"))
-        folds = read_settings(ScanSamples, job.section("samples")).folds
         files = zip(job.scan_causes, job.scan_descriptors, job.scan_reenactments, strict=True)
         parts = [_measured(*paths) for paths in files]
         self._names, self._own = [path.parent.name for path in job.scan_causes], [own for own, _ in parts]
-        self._registrations = Registrations.joined([with_labels for _, with_labels in parts])
-        self._fold_S = folds_of(self._registrations.cluster, folds)
-        starts = job.section("causes")["starts"]
-        reenactment = read_settings(ReenactmentSettings, job.section("reenactment")).calls(starts)
-        descriptors = DescriptorSettings(**job.section("descriptors"))
-        self._calls = partial(icp_calls, starts=starts, descriptors=descriptors, reenactment=reenactment)
-        self._of_objects: dict[str, list[Registrations]] = {}
+        joined = Registrations.joined([with_labels for _, with_labels in parts])
+        self._all_read = joined
+        labels_alone = replace(joined, attached={"causes": joined.attached["causes"]})
+        super().__init__(job, lessons, labels_alone, job.section("causes")["starts"])
+        self._fold_S = folds_of(joined.cluster, read_settings(ScanSamples, job.section("samples")).folds)
 
     def predictions(self, attribution: Attribution) -> pd.DataFrame:
         """Return the rows of a prediction file, the data set of each in column ``scans``."""
@@ -116,75 +106,36 @@ class _ScansToExplain:
     def attribution(self, name: str, learned: str, settings: dict) -> Attribution | None:
         """Return the mean of the scores over all that the explainer reads; several are the encoders of embeddings.
 
-        None where it would have to learn from fewer labels than tell anything apart.
+        None where it would have to learn from fewer than two classes.
         """
         entry = explainer_entry(name, CAUSES)
-        said: list[Attribution] = []
-        for lessons, asked in self._learned_and_asked(entry, learned):
+        attributions: list[Attribution] = []
+        for training_set, asked in self._sets(entry, learned == OBJECTS):
             answers = []
-            for rows, taught in self._parts(lessons, asked):
-                if len(np.unique(taught.concept)) < FEWEST_LABELS:
+            for rows, training in self._parts(training_set, asked):
+                if len(np.unique(training.concept)) < FEWEST_LABELS:
                     return None
                 explainer = entry.make(*self._axes, **settings)
-                explainer.fit(taught)
+                explainer.fit(training)
                 answers.append((rows, explainer.explain(observed_only(asked.subset(rows)))))
             order = np.argsort(np.concatenate([rows for rows, _ in answers]))
             scores_N_4 = np.concatenate([answer.scores_N_C for _, answer in answers])[order]
             abstained_N = np.concatenate([answer.abstained_N for _, answer in answers])[order]
-            said.append(Attribution.of_scores(LABELS, scores_N_4, seconds=0.0, abstained_N=abstained_N))
-        return Attribution.of_scores(
-            LABELS,
-            np.mean([each.scores_N_C for each in said], axis=0),
-            seconds=0.0,
-            icp_calls=self._calls(entry.sees),
-            abstained_N=np.all([each.abstained_N for each in said], axis=0),
-        )
+            attributions.append(Attribution.of_scores(LABELS, scores_N_4, seconds=0.0, abstained_N=abstained_N))
+        return self._mean(entry, attributions)
 
-    def _parts(self, lessons: Registrations | None, asked: Registrations) -> Iterator[tuple[np.ndarray, Registrations]]:
-        """Yield rows that are asked about, and what is learned for them: the lessons, or the rows of other folds."""
-        if lessons is not None:
-            yield np.arange(len(asked)), lessons
+    def _read(self, reads: str) -> Registrations:
+        return self._all_read
+
+    def _parts(self, learned: Registrations, asked: Registrations) -> Iterator[tuple[np.ndarray, Registrations]]:
+        """Yield rows that are asked about, and what is learned for them: objects, or the rows of other folds."""
+        if learned is not asked:
+            yield np.arange(len(asked)), learned
             return
         labeled_S = asked.concept != BORDERLINE
         for fold in np.unique(self._fold_S):
             taught = np.flatnonzero(labeled_S & (self._fold_S != fold))
             yield np.flatnonzero(self._fold_S == fold), asked.subset(taught)
-
-    def _learned_and_asked(
-        self, entry: ExplainerEntry, learned: str
-    ) -> Iterator[tuple[Registrations | None, Registrations]]:
-        reads = entry.reads if entry.reads in (EMBEDDED, REENACTED) else DESCRIBED
-        if reads == EMBEDDED:
-            of_objects = self._taught_by_objects(entry, reads) if learned == OBJECTS else [None] * len(self._embedded)
-            yield from zip(of_objects, self._embedded, strict=True)
-            return
-        entry = entry if reads == REENACTED else explainer_entry("gpca_pair", CAUSES)
-        yield (
-            Registrations.joined(self._taught_by_objects(entry, reads)) if learned == OBJECTS else None,
-            self._registrations,
-        )
-
-    def _taught_by_objects(self, entry: ExplainerEntry, reads: str) -> list[Registrations]:
-        """Return the training rows of each source of objects, with what an explainer reads."""
-        if reads not in self._of_objects:
-            parts = []
-            for causes, path in zip(self._lessons["causes"], self._lessons[reads], strict=True):
-                registrations = with_what_it_reads(labeled(Causes.load(causes)), entry, path)
-                parts.append(registrations.subset(training_rows(registrations, causes)))
-            self._of_objects[reads] = parts
-        return self._of_objects[reads]
-
-    @cached_property
-    def _embedded(self) -> list[Registrations]:
-        """The registrations with the embeddings of each source's encoder."""
-        from gpca.encoders.training import embed, load_model
-
-        observed, embedded = observed_only(self._registrations), []
-        for weights in self._lessons["encoders"]:
-            h_S_d, logits_S_C = embed(load_model(weights, self._encoder, LABELS), observed, *self._axes, self._encoder)
-            attached = {"embedding": h_S_d, "head_logits": logits_S_C, "causes": self._registrations.attached["causes"]}
-            embedded.append(replace(self._registrations, attached=attached))
-        return embedded
 
 
 def _measured(
