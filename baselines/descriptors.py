@@ -19,9 +19,17 @@ from gpca.causes.descriptors import EVERY, EVERYTHING, RESIDUALS, Columns, seen
 from gpca.causes.settings import DENSITIES
 from gpca.causes.truth import NOMINAL
 from gpca.classifier.settings import GPCArguments, LearningRate
-from gpca.explainers.classifiers import ClassifierExplainer, boosted_trees, known_concepts, standardized_regression
+from gpca.explainers.classifiers import boosted_trees, known_concepts, standardized_regression
 from gpca.explainers.gpca import DescriptorGPCA
-from gpca.explainers.interface import ConceptExplainer, ExplainerEntry, ScoringExplainer, Sees, attached, in_words
+from gpca.explainers.interface import (
+    ClassifierExplainer,
+    ConceptExplainer,
+    ExplainerEntry,
+    ScoringExplainer,
+    Sees,
+    attached,
+    in_words,
+)
 from gpca.pairs.dataset import Registrations
 from gpca.seeds import seed_of
 from gpca.settings import Count, Positive

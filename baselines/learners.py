@@ -10,13 +10,8 @@ from functools import partial
 import numpy as np
 
 from gpca.errors import InputError
-from gpca.explainers.classifiers import (
-    PAPERS_RANDOM_STATE,
-    ClassifierExplainer,
-    ConceptClassifier,
-    standardized_regression,
-)
-from gpca.explainers.interface import ExplainerEntry, attached
+from gpca.explainers.classifiers import PAPERS_RANDOM_STATE, ConceptClassifier, standardized_regression
+from gpca.explainers.interface import ClassifierExplainer, ExplainerEntry, attached
 from gpca.pairs.dataset import Registrations
 from gpca.settings import Count, Positive
 

@@ -13,9 +13,9 @@ import numpy as np
 
 from gpca.causes.settings import DescribedPoints
 from gpca.classifier.settings import GPCArguments
-from gpca.explainers.classifiers import ClassifierExplainer, standardized_regression
+from gpca.explainers.classifiers import standardized_regression
 from gpca.explainers.gpca import DescriptorGPCA
-from gpca.explainers.interface import ExplainerEntry, Sees, measured
+from gpca.explainers.interface import ClassifierExplainer, ExplainerEntry, Sees, measured
 from gpca.pairs.dataset import Registrations
 from gpca.seeds import seed_of
 from gpca.settings import Count, Positive

@@ -6,9 +6,9 @@ import numpy as np
 
 from baselines.descriptors import Committee, randomized_trees
 from gpca.causes.dataset import LABELS
-from gpca.explainers.classifiers import ClassifierExplainer, boosted_trees
+from gpca.explainers.classifiers import boosted_trees
 from gpca.explainers.gpca import DescriptorGPCA
-from gpca.explainers.interface import REENACTED, ExplainerEntry, ScoringExplainer, Sees, attached
+from gpca.explainers.interface import REENACTED, ClassifierExplainer, ExplainerEntry, ScoringExplainer, Sees, attached
 from gpca.pairs.dataset import Registrations
 
 SEES: Sees = ("pair", "motion", "runs", "reenactment")

@@ -14,8 +14,8 @@ from typing import Annotated
 import numpy as np
 
 from gpca.attribution.scores import Attribution
-from gpca.explainers.classifiers import ClassifierExplainer, standardized_regression
-from gpca.explainers.interface import ExplainerEntry, attached, measured
+from gpca.explainers.classifiers import standardized_regression
+from gpca.explainers.interface import ClassifierExplainer, ExplainerEntry, attached, measured
 from gpca.pairs.dataset import Registrations
 from gpca.seeds import seed_of
 from gpca.settings import Bounds, Count, Positive

@@ -17,8 +17,8 @@ from gpca.attribution.scores import Attribution
 from gpca.causes.dataset import LABELS
 from gpca.causes.truth import ALL, NOMINAL, SUBSETS
 from gpca.errors import InputError
-from gpca.explainers.classifiers import ClassifierExplainer, standardized_regression
-from gpca.explainers.interface import ScoringExplainer, attached
+from gpca.explainers.classifiers import standardized_regression
+from gpca.explainers.interface import ClassifierExplainer, ScoringExplainer, attached
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.settings import Positive

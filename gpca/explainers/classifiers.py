@@ -7,8 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from gpca.errors import InputError
-from gpca.explainers.interface import ScoringExplainer
-from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import seed_of
 
@@ -40,25 +38,6 @@ class ConceptClassifier:
         columns = [self._labels.index(concept) for concept in self._classifier.classes_]
         scores_N_C[:, columns] = self._classifier.predict_proba(features_N_F)
         return scores_N_C
-
-
-class ClassifierExplainer(ScoringExplainer):
-    """Scores are the probabilities of an initially unfitted scikit-learn classifier on some features."""
-
-    def __init__(self, classifier) -> None:
-        self._classifier = ConceptClassifier(classifier, self.labels)
-
-    def fit(self, registrations: Registrations) -> None:
-        """Fit the classifier to the labeled registrations."""
-        self._classifier.fit(self.features(registrations), registrations.concept)
-
-    def scores(self, registrations: Registrations) -> np.ndarray:
-        """Return the classifier's probabilities."""
-        return self._classifier.scores(self.features(registrations))
-
-    def features(self, registrations: Registrations) -> np.ndarray:
-        """Return the classifier's features (N, F)."""
-        raise NotImplementedError
 
 
 def known_concepts(concept_N: np.ndarray, labels: tuple[str, ...] = CONCEPTS) -> list[str]:

@@ -17,6 +17,7 @@ import numpy as np
 
 from gpca.attribution.scores import Attribution
 from gpca.errors import InputError
+from gpca.explainers.classifiers import ConceptClassifier
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 
@@ -86,6 +87,25 @@ class ScoringExplainer:
 
     def scores(self, registrations: Registrations) -> np.ndarray:
         """Return the scores (N, C)."""
+        raise NotImplementedError
+
+
+class ClassifierExplainer(ScoringExplainer):
+    """Scores are the probabilities of an initially unfitted scikit-learn classifier on some features."""
+
+    def __init__(self, classifier) -> None:
+        self._classifier = ConceptClassifier(classifier, self.labels)
+
+    def fit(self, registrations: Registrations) -> None:
+        """Fit the classifier to the labeled registrations."""
+        self._classifier.fit(self.features(registrations), registrations.concept)
+
+    def scores(self, registrations: Registrations) -> np.ndarray:
+        """Return the classifier's probabilities."""
+        return self._classifier.scores(self.features(registrations))
+
+    def features(self, registrations: Registrations) -> np.ndarray:
+        """Return the classifier's features (N, F)."""
         raise NotImplementedError
 
 
