@@ -25,11 +25,9 @@ from gpca.settings import Count, PositiveShare
 
 RESULT_COLUMNS = ("scene_id", "im_id", "obj_id", "score", "R", "t")
 REMEDY = "export it again"
-# A pose's distance from the camera, relative to that of the objects annotated in its image: no single estimate is off
-# by more than this, however bad ...
-ONE_OFF = 100.0
-# ... and half of a file's are not off by more than this, unless the unit is wrong: centimeters would be by 10.
-HALF_OFF = 3.0
+# Limits of the distance from the camera, relative to that of the objects annotated in the image, for any one pose and
+# for half of the poses of a file. Poses in centimeters would be off by 10.
+ONE_OFF, HALF_OFF = 100.0, 3.0
 UNIT_OFF = 0.3  # largest distance of log10 of a ratio from a whole number that identifies a unit
 
 PosesByObject = Mapping[tuple[int, int, int], list[np.ndarray]]
