@@ -36,7 +36,7 @@ pathvars:
 
 STAGES = "objects registrations causes frames virtual_frames encoders uncertainty explainers model"
 EXPERIMENTS = [each.name for each in experiments() if each.has_rules]
-ENDS_WITH = ["collected", "results", "comparison", "targets"]
+ENDS_WITH = ["steps", "collected", "results", "comparison", "targets"]
 TOPICS = ["common", "functions", *STAGES.split(), *EXPERIMENTS, *ENDS_WITH]
 for topic in dict.fromkeys(TOPICS):
 

@@ -190,6 +190,13 @@ def read_clustered(path: str | Path) -> pd.DataFrame:
     return rows.assign(**{name: "" for name in AGAINST if name not in rows})
 
 
+def read_rows(path: str | Path) -> pd.DataFrame:
+    """Read a file of numbers of either form: :func:`read_clustered` or :func:`read_metrics`."""
+    with Path(path).open(encoding="utf-8", errors="replace") as file:
+        head = file.readline().strip().split(",")
+    return read_clustered(path) if "low" in head else read_metrics(path)
+
+
 def read_metrics(path: str | Path) -> pd.DataFrame:
     """Read a file of values by seed.
 

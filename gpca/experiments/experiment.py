@@ -50,6 +50,8 @@ class Tidy:
         files: the collector's arguments -> patterns of files below the folder of a run, with names in braces.
         arguments: its other arguments -> keys of the config.
         rule: name of the rule, if it is not that of the file.
+        others: files that the collector returns besides, each a target of its own.
+        takes_run: the collector's first argument is the run, and it has no other ones besides its files.
     """
 
     file: str
@@ -57,6 +59,13 @@ class Tidy:
     files: Mapping[str, str] = field(default_factory=dict)
     arguments: Mapping[str, str] = field(default_factory=dict)
     rule: str = ""
+    others: tuple[str, ...] = ()
+    takes_run: bool = False
+
+    @property
+    def all_files(self) -> tuple[str, ...]:
+        """All files that its rule writes."""
+        return (self.file, *self.others)
 
     @property
     def target(self) -> str:
@@ -77,7 +86,8 @@ class Experiment:
     """The declaration of an experiment. Keys of the config are paths with dots, such as ``real_world.backbones``.
 
     Attributes:
-        name: of its file of rules, if it has one, and of its folder.
+        name: of its module, and of its file of rules, if it has one.
+        beside: modules of :mod:`gpca.experiments` that declare further results, numbers and steps of it.
         sections: its sections of the config -> their types; every key has to be given.
         tidy: its files of numbers, which every run makes that has the experiment.
         needs: names that must not be empty, or a run does without it.
@@ -91,6 +101,7 @@ class Experiment:
     """
 
     name: str
+    beside: tuple[str, ...] = ()
     sections: Mapping[str, Any] = field(default_factory=dict)
     tidy: tuple[Tidy, ...] = ()
     needs: tuple[str, ...] = ()

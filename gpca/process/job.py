@@ -90,13 +90,16 @@ def call(step: str, job: Job) -> None:
 
 
 @contextmanager
-def workflow_script(snakemake: Any) -> Iterator[None]:
+def workflow_script(snakemake: Any) -> Iterator[dict]:
     """Run the block as a script of the workflow: stderr in the rule's log, provenance beside the outputs.
 
     A fault of the input ends as one line in the log and status 2.
 
     Args:
         snakemake: the object that Snakemake gives a script; the input ``code`` is no data.
+
+    Yields:
+        a mapping, empty, of what the block adds to the provenance.
     """
     from gpca.process.provenance import record_provenance
 
@@ -104,8 +107,8 @@ def workflow_script(snakemake: Any) -> Iterator[None]:
     lists = (paths if isinstance(paths, list) else [paths] for paths in files_by_name(snakemake.input).values())
     data = [path for paths in lists for path in paths]
     parameters = {name: value for name, value in snakemake.params.items() if isinstance(name, str)}
-    with _as_process() as process, record_provenance(list(snakemake.output), data, parameters):
-        yield
+    with _as_process() as process, record_provenance(list(snakemake.output), data, parameters) as added:
+        yield added
     if process.status:
         sys.exit(process.status)
 

@@ -32,7 +32,7 @@ def record_provenance(
     settings: Mapping,
     seed: int | None = None,
     folders: bool = False,
-) -> Iterator[None]:
+) -> Iterator[dict]:
     """Time the block and, when it succeeds, write ``<output>.provenance.json`` beside each output.
 
     The commit and the hash of environment.lock are null for a package outside a checkout.
@@ -42,13 +42,16 @@ def record_provenance(
         settings: all that the result depends on besides its inputs.
         folders: whether the outputs are folders.
 
+    Yields:
+        a mapping, empty, of what the block adds to the record.
+
     Raises:
         InputError: before the block, for an output that cannot be written: :func:`gpca.io.files.require_outputs`.
     """
     require_outputs(outputs, inputs, folders)
-    started = time.perf_counter()
-    yield
-    record = {
+    started, added = time.perf_counter(), {}  # type: ignore[var-annotated]
+    yield added
+    record = added | {
         "seconds": round(time.perf_counter() - started, 3),
         "peak_memory_mb": round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024, 1),
         "seed": seed,

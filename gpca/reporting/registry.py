@@ -48,6 +48,7 @@ class Result:
         needs: names that must not be empty, besides those of the inputs.
         paper: it is a table or figure of the paper.
         after: name of the result of another experiment below which it stands in their section.
+        takes_run: the builder's first argument is the run, and it has no settings.
     """
 
     name: str
@@ -62,6 +63,7 @@ class Result:
     needs: tuple[str, ...]
     paper: bool
     after: str = ""
+    takes_run: bool = False
 
     @property
     def modules(self) -> list[str]:
@@ -114,6 +116,8 @@ class Result:
         Where the result shows members of a list alone, so do the settings of all of them: ``explainers`` of its
         explainers. What others have then changes nothing of it.
         """
+        if self.takes_run:
+            return dict(self.settings)
         shown = dict(settings)
         for name, members in self.only.items():
             if isinstance(of_all := settings.get(f"{name}s"), Mapping):
@@ -131,6 +135,7 @@ class Result:
             for each in self.inputs
         )
         settings = {argument: named(place) for argument, place in self.settings.items()}
+        settings |= {"source": source} if self.takes_run else {}
         return replace(self, name=named(self.name), title=named(self.title), inputs=inputs, settings=settings)
 
     def _shown(self, names: Names) -> dict[str, Any]:
@@ -198,7 +203,13 @@ def expand(patterns: tuple[str, ...], names: Names) -> list[str] | str:
     return files if listed or len(patterns) > 1 else files[0]
 
 
-def build(builder: str, readers: Mapping[str, Mapping], files: Mapping[str, Any], arguments: Mapping[str, Any]) -> Any:
+def build(
+    builder: str,
+    readers: Mapping[str, Mapping],
+    files: Mapping[str, Any],
+    arguments: Mapping[str, Any],
+    run: Any = None,
+) -> Any:
     """Read the inputs and call the builder.
 
     Args:
@@ -206,9 +217,10 @@ def build(builder: str, readers: Mapping[str, Mapping], files: Mapping[str, Any]
         readers: as :attr:`Result.readers` has them.
         files: of each input, as :meth:`Result.files` names them.
         arguments: the builder's other arguments.
+        run: its first argument, if it takes the run.
     """
     inputs = {argument: _read(files, **reader) for argument, reader in readers.items()}
-    return load(builder)(**inputs, **arguments)
+    return load(builder)(*([] if run is None else [run]), **inputs, **arguments)
 
 
 def _read(files: Mapping[str, Any], function: str, keywords: Mapping[str, str]) -> Any:

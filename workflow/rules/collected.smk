@@ -11,7 +11,7 @@ for experiment in experiments():
                 **below_results(tidy.inputs(NAMES)),
                 code=collector_code(tidy.collector),
             output:
-                f"<results>/{tidy.file}",
+                [f"<results>/{file}" for file in tidy.all_files],
             log:
                 f"<logs>/{tidy.target}.log",
             benchmark:
@@ -22,5 +22,14 @@ for experiment in experiments():
             params:
                 **tidy.settings(config),
                 collector=tidy.collector,
+                config=token_of(tidy.file, tidy.takes_run),
             script:
                 "../scripts/collect.py"
+
+        for file in tidy.others:
+
+            rule:
+                name:
+                    file.removesuffix(".csv")
+                input:
+                    f"<results>/{file}",

@@ -9,7 +9,9 @@ from gpca.code_files import code_files
 from gpca.encoders.registry import encoders
 from gpca.objects.source import find_file
 from gpca.experiments.real_world.experiment import pretraining_of
+from gpca.experiments.plan import Run, config_token
 from gpca.experiments.run import names_of, settings_of
+from gpca.experiments.step import Plan
 from gpca.frames.source import VIRTUAL
 
 # An own kind of source is a file in sources/ that writes <results>/objects/<name>.npz and adds itself to SOURCES.
@@ -20,7 +22,10 @@ for path in sorted(Path(workflow.current_basedir, "sources").glob("*.smk")):
 
 
 SEEDS = config["seeds"]
+for name, entry in SOURCES.items():
+    config["sources"].setdefault(name, entry)  # of a rule
 NAMES = names_of(config, SOURCES)
+PLAN = Plan(Run(config), NAMES, SOURCES)
 SHOWN = settings_of(config, SOURCES)
 FRAMES = NAMES["frames"]
 EMBEDDING = NAMES["embedding"]
@@ -85,12 +90,17 @@ def collector_code(function):
 
 
 def below_results(files):
-    """Return the files of each input below the folder of the run."""
-    return {
-        name: (
-            f"<results>/{paths}"
-            if isinstance(paths, str)
-            else [f"<results>/{path}" for path in paths]
-        )
-        for name, paths in files.items()
-    }
+    """Return the files of each name below the folder of the run; functions of wildcards return such files."""
+
+    def below(paths):
+        if callable(paths):
+            return lambda wildcards: below(paths(wildcards))
+        return f"<results>/{paths}" if isinstance(paths, str) else [*map(below, paths)]
+
+    return {name: below(paths) for name, paths in files.items()}
+
+
+def token_of(file, takes_run):
+    """Return the token of the config for what is given the run (gpca/experiments/plan.py), and nothing for others."""
+    sidecar = f"results/{config['run']}/{file}.provenance.json"
+    return (lambda wildcards: config_token(config, sidecar)) if takes_run else ""

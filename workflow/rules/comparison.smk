@@ -8,7 +8,11 @@ from gpca.comparison.values import folders_behind
 from gpca.experiments.registry import experiments
 
 COLLECTED = [
-    tidy.file for each in experiments() if each.is_run(NAMES) for tidy in each.tidy
+    file
+    for each in experiments()
+    if each.is_run(NAMES)
+    for tidy in each.tidy
+    for file in tidy.all_files
 ]
 ENDS = ["model.pt", "comparison.md", "index.html"]
 PUBLISHED = read_published()

@@ -43,6 +43,8 @@ for result in RESULTS:
             builder=result.builder,
             readers=result.readers,
             arguments=result.arguments(SHOWN),
+            only=result.only,
+            config=token_of(result.main_file, result.takes_run),
             caption=result.caption,
         script:
             "../scripts/result.py"

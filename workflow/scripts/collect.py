@@ -1,10 +1,17 @@
-"""Files of all sources, methods and seeds -> one tidy CSV, by the collector that the rule names."""
+"""Files of all sources, methods and seeds -> CSV files of numbers, by the collector that the rule names."""
 
 from gpca.evaluation.measures import write_metrics
+from gpca.experiments.plan import READ, Recorded, Run
 from gpca.process.job import files_by_name, workflow_script
 from gpca.registry import load
 
-with workflow_script(snakemake):
+with workflow_script(snakemake) as added:
     arguments = dict(snakemake.params.items())
-    collect = load(arguments.pop("collector"))
-    write_metrics(collect(**files_by_name(snakemake.input), **arguments), snakemake.output[0])
+    collect, token = load(arguments.pop("collector")), arguments.pop("config")
+    config = Recorded(snakemake.config)
+    made = collect(*([Run(config)] if token else []), **files_by_name(snakemake.input), **arguments)
+    if token:
+        added[READ] = config.record(token)
+    frames = made if isinstance(made, (tuple, list)) else [made]
+    for frame, path in zip(frames, snakemake.output, strict=True):
+        write_metrics(frame, path)

@@ -2,13 +2,18 @@
 
 from pathlib import Path
 
+from gpca.experiments.plan import READ, Recorded, Run
 from gpca.process.job import files_by_name, workflow_script
 from gpca.reporting.figures.style import save_figure
 from gpca.reporting.registry import build
 
-with workflow_script(snakemake):
+with workflow_script(snakemake) as added:
     entry, out = snakemake.params, snakemake.output
-    made = build(entry.builder, entry.readers, files_by_name(snakemake.input), entry.arguments)
+    config = Recorded(snakemake.config)
+    run = Run(config, entry.only) if entry.config else None
+    made = build(entry.builder, entry.readers, files_by_name(snakemake.input), entry.arguments, run)
+    if run:
+        added[READ] = config.record(entry.config)
     if entry.kind == "tables":
         made.write(Path(out.csv).with_suffix(""))
     else:

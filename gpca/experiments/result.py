@@ -1,0 +1,106 @@
+"""Tables, figures and files of numbers as an experiment declares them: functions of a run and of some of its files.
+
+``@table`` and ``@figure`` say where a result stands on the page and what is said about it, ``@numbers`` which files
+its function writes. The function gets a :class:`gpca.experiments.plan.Run` first, and then its inputs by name:
+
+- ``intervals="causes_intervals.csv"``: a file of numbers, read by :func:`gpca.evaluation.measures.read_rows`;
+- ``seconds=(read_seconds, "timings/{source}/seed{seed}.csv")``: what the function makes of these files; several
+  arguments of the reader are given as a mapping;
+- ``files="methods/{source}/{method}/seed{seed}.csv"``: the paths, where the pattern has names in braces or names no CSV.
+
+A name in braces stands for all its values (:func:`gpca.experiments.run.names_of`); a result is left out where one of
+its names is empty. Functions must be importable without heavy packages.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from inspect import cleandoc
+from typing import Any, TypeVar
+
+from gpca.experiments.experiment import Tidy
+from gpca.reporting.registry import Input, Result
+
+READ_ROWS = "gpca.evaluation.measures:read_rows"
+Given = str | tuple[Callable, str | Sequence[str] | Mapping[str, str]]
+Function = TypeVar("Function", bound=Callable)
+
+
+def table(section: str, title: str, caption: str, **options: Any) -> Callable[[Function], Function]:
+    """Declare a table of the function's name: a function that returns a :class:`gpca.reporting.tables.table.Table`.
+
+    Args:
+        section, title, caption: where it stands, and the words above and below it.
+        options: ``name``, if not the function's, in which ``{source}`` stands for a result of each source, passed as
+            ``source``; ``needs``, names that must not be empty besides those of the inputs; ``only``, name of a list
+            -> its members that are shown; ``paper``, it is one of the paper's; ``after``, the result of another
+            experiment that it follows. All others are inputs.
+    """
+    return _declared("tables", section, title, caption, **options)
+
+
+def figure(section: str, title: str, caption: str, **options: Any) -> Callable[[Function], Function]:
+    """Declare a figure, a function that returns a matplotlib figure; arguments as of :func:`table`."""
+    return _declared("figures", section, title, caption, **options)
+
+
+def numbers(*names: str, rule: str = "", **files: str) -> Callable[[Function], Function]:
+    """Declare the function that returns the frames of these CSV files, in their order, or the one frame.
+
+    Args:
+        names: of the files. Each is a target without its suffix.
+        rule: name of the rule; that of the first file if empty.
+        files: the function's arguments -> patterns of the files that it reads.
+    """
+
+    def declare(function: Function) -> Function:
+        function.tidy = Tidy(  # type: ignore[attr-defined]
+            names[0], f"{function.__module__}:{function.__name__}", files, rule=rule, others=names[1:], takes_run=True
+        )
+        return function
+
+    return declare
+
+
+def _declared(
+    kind: str,
+    section: str,
+    title: str,
+    caption: str,
+    *,
+    name: str = "",
+    needs: tuple[str, ...] = (),
+    only: Mapping[str, tuple[str, ...]] | None = None,
+    paper: bool = False,
+    after: str = "",
+    **inputs: Given,
+) -> Callable[[Function], Function]:
+    def declare(function: Function) -> Function:
+        function.result = Result(  # type: ignore[attr-defined]
+            name=name or function.__name__,
+            kind=kind,
+            section=section,
+            title=title,
+            caption=cleandoc(caption),
+            builder=f"{function.__module__}:{function.__name__}",
+            inputs=tuple(_input(argument, given) for argument, given in inputs.items()),
+            settings={},
+            only=only or {},
+            needs=needs,
+            paper=paper,
+            after=after,
+            takes_run=True,
+        )
+        return function
+
+    return declare
+
+
+def _input(argument: str, given: Given) -> Input:
+    if isinstance(given, str):
+        is_numbers = given.endswith(".csv") and "{" not in given
+        return Input(argument, {"": (given,)}, READ_ROWS if is_numbers else "")
+    read, patterns = given
+    by_keyword = patterns if isinstance(patterns, Mapping) else {"": patterns}
+    files = {key: (each,) if isinstance(each, str) else tuple(each) for key, each in by_keyword.items()}
+    return Input(argument, files, f"{read.__module__}:{read.__name__}")

@@ -1,0 +1,247 @@
+"""A step of an experiment: from its declaration, the workflow makes the rule that runs it.
+
+In the patterns of files, a name in braces is a wildcard, with a job for each of its values; ``{*name}`` stands for all
+values in one job, which is given them as a list with an ``s`` behind the name; and a name with a single value, such as
+``{frames}``, is replaced by it. Values are those of :func:`gpca.experiments.run.names_of`.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import product
+from typing import Any
+
+from gpca.code_files import code_files
+from gpca.experiments.plan import Run
+
+BRACED = re.compile(r"{(\*?)(\w+)}")
+OUTSIDE = "outside_"  # with a name behind it, the wildcard of entries from outside the suite
+Wildcards = Any
+Settings = tuple[str, ...] | Callable[["Plan", Wildcards], Mapping[str, Any]]
+Files = str | Sequence[str] | Callable[["Plan", Wildcards], str | Sequence[str]]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What rules are made from: a run, its names, and the sources that its config and its rules define."""
+
+    run: Run
+    names: Mapping[str, Any]
+    sources: Mapping[str, Mapping]
+
+    @property
+    def config(self) -> Mapping[str, Any]:
+        """The config of the run."""
+        return self.run.config
+
+
+@dataclass(frozen=True, kw_only=True)
+class Step:
+    """The declaration of a step.
+
+    Attributes:
+        name: of its rule.
+        run: ``module:function``, or a module with a function ``run``, that gets the job.
+        inputs, outputs: argument of the job -> patterns of files below the folder of a run; an input may be a function
+            of plan and wildcards.
+        settings: keys of the config, with dots, that the job is given by these names; or a function that returns them.
+        params: further arguments of the job, or functions of plan and wildcards that return them.
+        modules: returns the modules chosen at run time, by plan, which count as code of the step.
+        where: wildcard, or name behind an asterisk -> the name of its values, if another.
+        apart: name in the outputs, and the function that returns which of its values have jobs of their own, so that an
+            edit of code from outside reruns nothing else.
+        target: name of the rule that asks for all outputs, if there is one.
+        when: tells whether a run has the step.
+        priority, threads, resources: of its jobs.
+    """
+
+    name: str
+    run: str
+    outputs: Mapping[str, str | Sequence[str]]
+    inputs: Mapping[str, Files] = field(default_factory=dict)
+    settings: Settings = ()
+    params: Mapping[str, Any] = field(default_factory=dict)
+    modules: Callable[[Plan], Iterable[str]] = lambda plan: ()
+    where: Mapping[str, str] = field(default_factory=dict)
+    apart: tuple[str, Callable[[Plan], Sequence[str]]] | None = None
+    target: str = ""
+    when: Callable[[Plan], bool] = lambda plan: True
+    priority: int = 0
+    threads: int = 1
+    resources: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Rule:
+    """A rule of the workflow, in the words of Snakemake; files are below the folder of a run."""
+
+    name: str
+    run: str
+    inputs: dict[str, Any]
+    code: Any
+    outputs: dict[str, Any]
+    settings: Any
+    params: dict[str, Any]
+    constraints: dict[str, str]
+    place: str  # of its log and its benchmark
+    priority: int
+    threads: int
+    resources: dict[str, Any]
+
+
+def rules_of(step: Step, plan: Plan) -> list[Rule]:
+    """Rules of a step: one, and a second for the entries from outside."""
+    if not step.when(plan):
+        return []
+    if step.apart is None:
+        return [_rule(step, plan, step.name)]
+    name, outside_of = step.apart
+    outside = list(outside_of(plan))
+    inside = [value for value in plan.names[_source(step, name)] if value not in outside]
+    return [
+        _rule(step, _with(plan, step, name, inside), step.name),
+        _rule_outside(step, plan, name, outside),
+    ]
+
+
+def all_files(step: Step, plan: Plan) -> list[str]:
+    """All outputs of a step, for all values of its wildcards."""
+    patterns = [each for outputs in step.outputs.values() for each in _listed(outputs)]
+    return [file for pattern in patterns for file in _expanded(step, plan, BRACED.sub(r"{*\2}", pattern))]
+
+
+def _rule(step: Step, plan: Plan, name: str) -> Rule:
+    outputs = {key: _files(step, plan, pattern) for key, pattern in step.outputs.items()}
+    in_outputs = [found for pattern in step.outputs.values() for each in _listed(pattern) for found in BRACED.findall(each)]
+    wildcards = [
+        wildcard
+        for star, wildcard in dict.fromkeys(in_outputs)
+        if not star and not isinstance(plan.names.get(_source(step, wildcard)), str)
+    ]
+    lists = {
+        f"{listed}s": list(plan.names[_source(step, listed)]) for star, listed in dict.fromkeys(in_outputs) if star
+    }
+    constraints = {
+        wildcard: "|".join(map(str, plan.names[_source(step, wildcard)])) or "none"
+        for wildcard in wildcards
+        if wildcard != "seed" and _source(step, wildcard) in plan.names
+    }
+    return Rule(
+        name=name,
+        run=step.run,
+        inputs={key: _input(step, plan, files) for key, files in step.inputs.items()},
+        code=code_files(step.run.split(":")[0], *step.modules(plan)),
+        outputs=outputs,
+        settings=_settings(step, plan),
+        params=lists | {key: _param(plan, value) for key, value in step.params.items()},
+        constraints=constraints,
+        place="/".join([name, *(f"{{{wildcard}}}" for wildcard in wildcards)]),
+        priority=step.priority,
+        threads=step.threads,
+        resources=dict(step.resources),
+    )
+
+
+def _rule_outside(step: Step, plan: Plan, name: str, outside: Sequence[str]) -> Rule:
+    """Rule with a job for each value of a name from outside."""
+    wildcard = f"{OUTSIDE}{name}"
+
+    def of(wildcards: Wildcards) -> Plan:
+        return _with(plan, step, name, [getattr(wildcards, wildcard)])
+
+    patterns = {
+        key: [each.replace(f"{{*{name}}}", f"{{{wildcard}}}") for each in _listed(pattern)]
+        for key, pattern in step.outputs.items()
+        if any(f"{{*{name}}}" in each for each in _listed(pattern))
+    }
+    empty = _with(plan, step, name, [])
+    rule = _rule(replace(step, outputs=patterns, apart=None), empty, f"{step.name}_outside")
+    inputs = {
+        key: (lambda files: lambda wildcards: _resolved(step, of(wildcards), files, wildcards))(files)
+        if callable(files)
+        else rule.inputs[key]
+        for key, files in step.inputs.items()
+    }
+    return replace(
+        rule,
+        inputs=inputs,
+        code=lambda wildcards: code_files(step.run.split(":")[0], *step.modules(of(wildcards))),
+        settings=lambda wildcards: _as_json(step, of(wildcards), wildcards),
+        params=rule.params
+        | {key: (lambda value: lambda wildcards: value(of(wildcards), wildcards))(value) for key, value in step.params.items() if callable(value)}
+        | {f"{name}s": lambda wildcards: [getattr(wildcards, wildcard)]},
+        constraints=rule.constraints | {wildcard: "|".join(outside) or "none"},
+    )
+
+
+def _with(plan: Plan, step: Step, name: str, values: Sequence[str]) -> Plan:
+    return replace(plan, names={**plan.names, _source(step, name): list(values)})
+
+
+def _source(step: Step, name: str) -> str:
+    return step.where.get(name, name)
+
+
+def _listed(patterns: str | Sequence[str]) -> Sequence[str]:
+    return [patterns] if isinstance(patterns, str) else patterns
+
+
+def _files(step: Step, plan: Plan, patterns: str | Sequence[str]) -> str | list[str]:
+    """Patterns with their lists filled in; one path where there is one pattern without a list."""
+    files = [file for pattern in _listed(patterns) for file in _expanded(step, plan, pattern)]
+    return files[0] if isinstance(patterns, str) and "{*" not in patterns else files
+
+
+def _expanded(step: Step, plan: Plan, pattern: str) -> list[str]:
+    names = list(dict.fromkeys(name for star, name in BRACED.findall(pattern) if star))
+    values = (plan.names[_source(step, name)] for name in names)
+    files = []
+    for chosen in product(*([each] if isinstance(each, str) else each for each in values)):
+        by_name = dict(zip(names, chosen, strict=True))
+
+        def filled(match: re.Match, by_name: Mapping[str, Any] = by_name) -> str:
+            star, name = match.groups()
+            value = by_name.get(name) if star else plan.names.get(_source(step, name))
+            return str(value) if star or isinstance(value, str) else match[0]
+
+        files.append(BRACED.sub(filled, pattern))
+    return files
+
+
+def _input(step: Step, plan: Plan, files: Files) -> Any:
+    if callable(files):
+        return lambda wildcards: _resolved(step, plan, files, wildcards)
+    return _files(step, plan, files)
+
+
+def _resolved(step: Step, plan: Plan, files: Callable, wildcards: Wildcards) -> list[str]:
+    patterns = _listed(files(plan, wildcards))
+    paths = [path for pattern in patterns for path in _expanded(step, plan, pattern)]
+    return [path.format(**dict(wildcards.items())) for path in paths]
+
+
+def _settings(step: Step, plan: Plan) -> Any:
+    if callable(step.settings):
+        return lambda wildcards: _as_json(step, plan, wildcards)
+    return _as_json(step, plan, None)
+
+
+def _as_json(step: Step, plan: Plan, wildcards: Wildcards) -> str:
+    if callable(step.settings):
+        settings = step.settings(plan, wildcards)
+    else:
+        settings = {key.rpartition(".")[2]: _at(plan.config, key) for key in step.settings}
+    return json.dumps(settings, sort_keys=True)
+
+
+def _at(config: Any, key: str) -> Any:
+    for name in key.split("."):
+        config = config[name]
+    return config
+
+
+def _param(plan: Plan, value: Any) -> Any:
+    return (lambda wildcards: value(plan, wildcards)) if callable(value) else value

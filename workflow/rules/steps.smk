@@ -1,0 +1,41 @@
+# The steps that experiments declare: a rule for each, of one shape, and a target for all its files.
+from gpca.experiments.registry import steps
+from gpca.experiments.step import all_files, rules_of
+
+for step in steps():
+    if step.target:
+
+        rule:
+            name:
+                step.target
+            input:
+                [f"<results>/{file}" for file in all_files(step, PLAN)] if step.when(PLAN) else [],
+
+    for made in rules_of(step, PLAN):
+
+        rule:
+            name:
+                made.name
+            input:
+                **below_results(made.inputs),
+                code=made.code,
+            output:
+                **below_results(made.outputs),
+            log:
+                f"<logs>/{made.place}.log",
+            benchmark:
+                f"<benchmarks>/{made.place}.tsv"
+            wildcard_constraints:
+                **made.constraints,
+            priority: made.priority
+            threads: made.threads
+            resources:
+                **made.resources,
+            conda:
+                "../envs/gpca.yaml"
+            params:
+                **made.params,
+                step=made.run,
+                settings=made.settings,
+            script:
+                "../scripts/step.py"
