@@ -30,6 +30,7 @@ TIDY_COLUMNS = (*KEYS, "seed", "value")
 AGAINST = ("against", "other")
 NUMBERS = ("seeds", "clusters", "samples", "value", "low", "high")
 COLUMNS = (*KEYS, *NUMBERS)
+TEST_SAMPLES = "test_samples"
 SHARE = None  # limits of a share of samples
 Parts = Mapping[str, np.ndarray]  # name -> mask of the samples (N,)
 Rivals = Callable[[str, Collection[str]], Collection[str]]  # of a method, among the methods with a value
@@ -46,6 +47,7 @@ class Measure:
         statistic: function of samples and weights (1 + B, N) that returns values (1 + B,), instead of a mean.
         counted: mask of the samples that it depends on (N,); all if None.
         least_is_best: of two values, the smaller one is better.
+        factor: from the mean to the measure's unit.
     """
 
     of: str | Callable[[pd.DataFrame], np.ndarray] = ""
@@ -54,16 +56,20 @@ class Measure:
     statistic: Callable[[pd.DataFrame, np.ndarray], np.ndarray] | None = None
     counted: Callable[[pd.DataFrame], np.ndarray] | None = None
     least_is_best: bool = False
+    factor: float = 1.0
 
     def values(self, samples: pd.DataFrame, weights_B_N: np.ndarray) -> np.ndarray:
         """Values (B,) by weights of the samples."""
         if self.statistic is not None:
             return self.statistic(samples, weights_B_N)
-        return weighted_mean(self.per_sample(samples), weights_B_N)
+        return weighted_mean(self.per_sample(samples), weights_B_N) * self.factor
 
     def per_sample(self, samples: pd.DataFrame) -> np.ndarray:
         """Value of each sample (N,)."""
         return np.asarray(samples[self.of] if isinstance(self.of, str) else self.of(samples), float)
+
+
+COUNT = Measure(statistic=lambda _samples, weights_B_N: weights_B_N.sum(axis=1), limits=ANYTHING)  # of samples
 
 
 def read_samples(files: Iterable[str | Path], read: Callable[[Path], pd.DataFrame]) -> pd.DataFrame:
@@ -96,10 +102,13 @@ def per_seed(
             once_1_n = np.ones((1, len(subset)))
             for name, measure in _taken(part, measures):
                 mean = measure.statistic is None
-                value = measure.per_sample(subset).mean() if mean else measure.values(subset, once_1_n)[0]
+                value = (
+                    measure.per_sample(subset).mean() * measure.factor if mean else measure.values(subset, once_1_n)[0]
+                )
                 if np.isfinite(value):
                     records.append((*keys, name, part, seed, float(value)))
-            records.append((*keys, "test_samples", part, seed, float(len(subset))))
+            if TEST_SAMPLES not in measures:
+                records.append((*keys, TEST_SAMPLES, part, seed, float(len(subset))))
     return tidy(records, "samples")
 
 

@@ -6,7 +6,7 @@ are the steps that run it; ``results.yaml``, its part of the registry of tables 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import reduce
 from operator import getitem
@@ -98,6 +98,7 @@ class Experiment:
         switches: keys of mappings name -> true or false, which are read as the list of the names that are true.
         lists: keys of lists and mappings -> the names that they lose where the config leaves out others: those left
             out of the mapping at a key, or what a function returns.
+        notices: lines on stderr when a run with this config begins.
     """
 
     name: str
@@ -111,6 +112,7 @@ class Experiment:
     leavable: Mapping[str, Names] = field(default_factory=dict)
     switches: Mapping[str, Names] = field(default_factory=dict)
     lists: Mapping[str, str | Callable[[LeftOut], Collection[str]]] = field(default_factory=dict)
+    notices: Callable[[Mapping[str, Any]], Iterable[str]] = lambda config: ()
 
     @property
     def results(self) -> Path:

@@ -6,7 +6,7 @@ its function writes. The function gets a :class:`gpca.experiments.plan.Run` firs
 - ``intervals="causes_intervals.csv"``: a file of numbers, read by :func:`gpca.evaluation.measures.read_rows`;
 - ``seconds=(read_seconds, "timings/{source}/seed{seed}.csv")``: what the function makes of these files; several
   arguments of the reader are given as a mapping;
-- ``files="methods/{source}/{method}/seed{seed}.csv"``: the paths, where the pattern has names in braces or names no CSV.
+- ``files="methods/{source}/{method}/seed{seed}.csv"``: the paths, if the pattern has braces or is no CSV file.
 
 A name in braces stands for all its values (:func:`gpca.experiments.run.names_of`); a result is left out where one of
 its names is empty. Functions must be importable without heavy packages.

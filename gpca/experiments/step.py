@@ -115,7 +115,9 @@ def all_files(step: Step, plan: Plan) -> list[str]:
 
 def _rule(step: Step, plan: Plan, name: str) -> Rule:
     outputs = {key: _files(step, plan, pattern) for key, pattern in step.outputs.items()}
-    in_outputs = [found for pattern in step.outputs.values() for each in _listed(pattern) for found in BRACED.findall(each)]
+    in_outputs = [
+        found for pattern in step.outputs.values() for each in _listed(pattern) for found in BRACED.findall(each)
+    ]
     wildcards = [
         wildcard
         for star, wildcard in dict.fromkeys(in_outputs)
@@ -157,22 +159,22 @@ def _rule_outside(step: Step, plan: Plan, name: str, outside: Sequence[str]) -> 
         for key, pattern in step.outputs.items()
         if any(f"{{*{name}}}" in each for each in _listed(pattern))
     }
-    empty = _with(plan, step, name, [])
-    rule = _rule(replace(step, outputs=patterns, apart=None), empty, f"{step.name}_outside")
-    inputs = {
-        key: (lambda files: lambda wildcards: _resolved(step, of(wildcards), files, wildcards))(files)
-        if callable(files)
-        else rule.inputs[key]
-        for key, files in step.inputs.items()
-    }
+    rule = _rule(replace(step, outputs=patterns, apart=None), _with(plan, step, name, []), f"{step.name}_outside")
+
+    def resolved(files: Callable) -> Callable[[Wildcards], list[str]]:
+        return lambda wildcards: _resolved(step, of(wildcards), files, wildcards)
+
+    def returned(value: Callable) -> Callable[[Wildcards], Any]:
+        return lambda wildcards: value(of(wildcards), wildcards)
+
+    dynamic = {key: resolved(files) for key, files in step.inputs.items() if callable(files)}
+    given = {key: returned(value) for key, value in step.params.items() if callable(value)}
     return replace(
         rule,
-        inputs=inputs,
+        inputs=rule.inputs | dynamic,
         code=lambda wildcards: code_files(step.run.split(":")[0], *step.modules(of(wildcards))),
         settings=lambda wildcards: _as_json(step, of(wildcards), wildcards),
-        params=rule.params
-        | {key: (lambda value: lambda wildcards: value(of(wildcards), wildcards))(value) for key, value in step.params.items() if callable(value)}
-        | {f"{name}s": lambda wildcards: [getattr(wildcards, wildcard)]},
+        params=rule.params | given | {f"{name}s": lambda wildcards: [getattr(wildcards, wildcard)]},
         constraints=rule.constraints | {wildcard: "|".join(outside) or "none"},
     )
 

@@ -107,9 +107,7 @@ class Sheet:
         """Start of the footnote on the cells' intervals, without a full stop."""
         return over_clusters(self.seeds, samples)
 
-    def table(
-        self, caption: str, across: str, notes: Iterable[str], bold: Iterable[str] = (), same: int = 0
-    ) -> Table:
+    def table(self, caption: str, across: str, notes: Iterable[str], bold: Iterable[str] = (), same: int = 0) -> Table:
         """The table; in each of the `bold` columns, rivals whose first `same` labels agree compete."""
         groups: dict[tuple, list[tuple[int, str]]] = {}
         for key in bold:
@@ -136,9 +134,7 @@ class Sheet:
         if column.frame:
             counts = next(iter(self._by_seed.values()))
             values, selected = self._by_seed[column.frame], (row.where["method"], column.where["metric"])
-            return cell_over_sources(
-                counts, values, self._sources, *selected, column.where["concept"], column.factor
-            )
+            return cell_over_sources(counts, values, self._sources, *selected, column.where["concept"], column.factor)
         rows = where(subset, {"against": ""} | dict(column.where))
         return interval_cell(rows.iloc[0], factor=column.factor) if len(rows) else None
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from gpca.alignment.rigid import exp
-from gpca.experiments.judge import Judge
+from gpca.pairs.judge import Judge
 
 
 def motion(*twist):
@@ -40,7 +40,7 @@ def test_a_symmetric_object_turned_over_is_where_it_was(brick):
 
 
 def test_an_object_without_symmetries_is_judged_by_its_own_points(objects, monkeypatch):
-    monkeypatch.setattr("gpca.experiments.judge.find_symmetries", lambda points, diameter: {})
+    monkeypatch.setattr("gpca.pairs.judge.find_symmetries", lambda points, diameter: {})
     judge = Judge(objects, 0)
     assert not judge.symmetric
     shifted = judge(motion(0, 0, 0, 0, 0.02, 0) @ TRUE, TRUE)

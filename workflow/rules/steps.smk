@@ -2,6 +2,11 @@
 from gpca.experiments.registry import steps
 from gpca.experiments.step import all_files, rules_of
 
+if workflow.is_main_process:
+    for experiment in experiments():
+        for notice in experiment.notices(config):
+            print(f"gpca: {notice}", file=sys.stderr)
+
 for step in steps():
     if step.target:
 
@@ -9,7 +14,9 @@ for step in steps():
             name:
                 step.target
             input:
-                [f"<results>/{file}" for file in all_files(step, PLAN)] if step.when(PLAN) else [],
+                [f"<results>/{file}" for file in all_files(step, PLAN)]
+                if step.when(PLAN)
+                else [],
 
     for made in rules_of(step, PLAN):
 
@@ -28,11 +35,11 @@ for step in steps():
             wildcard_constraints:
                 **made.constraints,
             priority: made.priority
+            conda:
+                "../envs/gpca.yaml"
             threads: made.threads
             resources:
                 **made.resources,
-            conda:
-                "../envs/gpca.yaml"
             params:
                 **made.params,
                 step=made.run,

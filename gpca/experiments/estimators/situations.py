@@ -20,8 +20,8 @@ from gpca.errors import InputError
 from gpca.experiments.estimators.examples import Moved, describe, example, true_twist, twists_or_none
 from gpca.experiments.estimators.references import Redraws, Reference, draw_twists
 from gpca.experiments.estimators.settings import KINDS, EstimatorPairSettings, Kind
-from gpca.experiments.judge import Judges
 from gpca.objects.canonical import ObjectClouds
+from gpca.pairs.judge import Judges
 from gpca.seeds import generator, seed_of
 from gpca.uncertainty.estimators.interface import Example, FailedEstimate, RegisteredPair
 

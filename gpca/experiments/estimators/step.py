@@ -11,9 +11,9 @@ from gpca.causes.settings import CauseSettings
 from gpca.experiments.estimators.estimation import reference_samples, try_estimators
 from gpca.experiments.estimators.settings import EstimatorPairSettings
 from gpca.experiments.estimators.situations import Situations
-from gpca.experiments.judge import Judges
 from gpca.io.csv_file import write_csv
 from gpca.objects.canonical import ObjectClouds
+from gpca.pairs.judge import Judges
 from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from gpca.evaluation.intervals import Clustered, Estimate
 from gpca.evaluation.measures import ALL, intervals, source_method_seed
-from gpca.experiments.registration_methods.metrics import row_name
+from gpca.experiments.registration_methods import row_name
 from gpca.io.csv_file import numbers, read_csv
 from gpca.scans.pair import ScanSuccess
 from gpca.scans.scene import stratum_of

@@ -12,7 +12,7 @@ from math import inf
 from typing import TYPE_CHECKING, Any
 
 from gpca.evaluation.measures import ALL
-from gpca.experiments.registration_methods.metrics import INITIAL, NO_START, row_name
+from gpca.experiments.registration_methods import row_name
 from gpca.experiments.scans.metrics import FAILED, RECALL
 from gpca.reporting.tables.builder import TableBuilder, missing_packages, over_clusters
 from gpca.reporting.tables.cells import cell_of_repeats, clustered_cell, rows_where
@@ -20,6 +20,7 @@ from gpca.reporting.tables.table import Column, Table
 from gpca.reporting.words import plural
 from gpca.scans.pair import Rung
 from gpca.scans.scene import stratum_name
+from gpca.steps.registration_trials import INITIAL, NO_START
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -42,7 +43,7 @@ def table17_scans(
 
     Args:
         intervals: what :func:`gpca.experiments.scans.metrics.collect_scans` returned.
-        seconds: what :func:`gpca.experiments.registration_methods.metrics.collect_seconds` returned.
+        seconds: what :func:`gpca.experiments.registration_methods.collect_seconds` returned.
         titles: of the data sets.
         missing: where a data set is found that is not there, by its title.
     """

@@ -11,13 +11,13 @@ from gpca.alignment.methods.interface import Pair
 from gpca.alignment.methods.registry import make_method, require_global
 from gpca.alignment.rigid import inverse, rotation_angle_rad, scale_translation
 from gpca.errors import InputError
-from gpca.experiments.registration_methods.trial import attempts, timed
 from gpca.experiments.scans.settings import TrialSettings
 from gpca.process.environment import open3d_cloud, require_open3d
 from gpca.process.progress import progress
 from gpca.scans.pair import Rung, ScanPair, disturbed, overlap_rmse, rungs_of, voxels
 from gpca.scans.scene import ScanPairs
 from gpca.seeds import generator, seed_of
+from gpca.steps.registration_trials import attempts, timed
 
 if TYPE_CHECKING:
     import pandas as pd

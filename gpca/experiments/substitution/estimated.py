@@ -16,8 +16,8 @@ from gpca.alignment.features import estimate_normals
 from gpca.alignment.methods.interface import Pair
 from gpca.alignment.methods.registry import make_method
 from gpca.experiments.estimators.examples import Moved, describe, example, twists_or_none
-from gpca.experiments.judge import Judges
 from gpca.pairs.dataset import Registrations
+from gpca.pairs.judge import Judges
 from gpca.process.progress import progress
 from gpca.seeds import generator, seed_of
 from gpca.uncertainty.designs import ADDITIVE_KNOBS, RegisteredRow

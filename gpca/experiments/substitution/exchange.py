@@ -13,14 +13,14 @@ from gpca.alignment.rigid import scale_translation, transform
 from gpca.attribution.predictions import prediction_frame
 from gpca.attribution.scores import Attribution
 from gpca.experiments.controls.rivals import Embed, Rival, described_for
-from gpca.experiments.judge import Judges
-from gpca.experiments.registration_methods.trial import pair_to_register
 from gpca.experiments.substitution.estimated import OBSERVED, Estimates, KnobbedRegistrar
 from gpca.experiments.substitution.settings import ESTIMATOR, FAILURE, LABELS, METHOD, ExchangeSettings
 from gpca.io.files import SPLITS
 from gpca.pairs.dataset import Registrations, ragged
+from gpca.pairs.judge import Judges
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.progress import progress
+from gpca.steps.registration_trials import pair_to_register
 from gpca.uncertainty.designs import ADDITIVE_KNOBS
 from gpca.uncertainty.estimators.registry import make_estimator
 from gpca.uncertainty.settings import UncertaintySettings

@@ -8,12 +8,12 @@ from gpca.encoders.registry import EncoderSettings
 from gpca.encoders.training import embed, load_model
 from gpca.experiments.controls.rivals import make_rivals
 from gpca.experiments.explained import require_exchangeable
-from gpca.experiments.judge import Judges
 from gpca.experiments.substitution.exchange import Exchange
 from gpca.experiments.substitution.settings import ExchangeSettings
 from gpca.io.csv_file import write_csv
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations
+from gpca.pairs.judge import Judges
 from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
 from gpca.settings import read_settings

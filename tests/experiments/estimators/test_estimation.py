@@ -14,7 +14,7 @@ from gpca.experiments.estimators.judging import compared, mahalanobis, predicted
 from gpca.experiments.estimators.references import Reference
 from gpca.experiments.estimators.settings import KINDS, REFERENCES, EstimatorPairSettings
 from gpca.experiments.estimators.situations import Situations
-from gpca.experiments.judge import Judges
+from gpca.pairs.judge import Judges
 from gpca.uncertainty.spread import divergence
 from tests.conftest import FEW_CAUSES
 

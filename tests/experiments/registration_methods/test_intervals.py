@@ -5,14 +5,15 @@ import dataclasses
 import numpy as np
 import pandas as pd
 import pytest
+from gpca.experiments.registration_methods.intervals import collect_intervals
 
 from gpca.errors import InputError
 from gpca.evaluation.intervals import wilson_interval
 from gpca.evaluation.measures import read_clustered
-from gpca.experiments.registration_methods.intervals import collect_intervals
-from gpca.experiments.registration_methods.metrics import MEASURED, SEVERITY_COLUMNS, collect_trials
+from gpca.experiments.registration_methods import MEASURED, collect_trials
 from gpca.io.csv_file import write_csv
 from gpca.pairs.perturbation import CONCEPTS
+from gpca.steps.registration_trials import SEVERITY_COLUMNS
 
 SUCCESS = {"error": 0.03, "curve": [0.03, 0.5]}
 RANGES = {"noise": [0.01, 0.03], "rotation_deg": [15, 60], "translation": [0.05, 0.30], "crop": [0.2, 0.6]}

@@ -6,9 +6,8 @@ import pytest
 
 from gpca.errors import InputError
 from gpca.evaluation.measures import TIDY_COLUMNS as TIDY
-from gpca.experiments.registration_methods.metrics import (
+from gpca.experiments.registration_methods import (
     MEASURED,
-    SEVERITY_COLUMNS,
     collect_seconds,
     collect_trials,
     read_trials,
@@ -17,6 +16,7 @@ from gpca.experiments.registration_methods.metrics import (
 )
 from gpca.io.csv_file import write_csv
 from gpca.pairs.perturbation import CONCEPTS
+from gpca.steps.registration_trials import SEVERITY_COLUMNS
 
 SUCCESS = {"error": 0.03, "curve": [0.005, 0.03, 0.5]}
 RANGES = {"noise": [0.01, 0.03], "rotation_deg": [15, 60], "translation": [0.05, 0.30], "crop": [0.2, 0.6]}

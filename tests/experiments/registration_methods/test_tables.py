@@ -2,10 +2,10 @@
 
 import pandas as pd
 import pytest
+from gpca.experiments.registration_methods.tables import table11_limits, table11_registration, table11_severity
 
 from gpca.errors import InputError
 from gpca.evaluation.measures import COLUMNS, tidy
-from gpca.experiments.registration_methods.tables import table11_limits, table11_registration, table11_severity
 from gpca.pairs.perturbation import CONCEPTS
 
 SOURCES = {"ycb": {"title": "YCB", "stand_in": False}, "cups": {"title": "Cups", "stand_in": True}}

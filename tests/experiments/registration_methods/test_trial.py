@@ -7,8 +7,7 @@ from gpca.alignment.methods import registry
 from gpca.alignment.methods.interface import FailedRegistration, MethodEntry, Outcome
 from gpca.alignment.methods.registry import make_method
 from gpca.errors import InputError
-from gpca.experiments.registration_methods.settings import PairSettings
-from gpca.experiments.registration_methods.trial import pair_to_register, try_methods
+from gpca.steps.registration_trials import PairSettings, pair_to_register, try_methods
 
 SETTINGS = PairSettings(samples=6, points=100, global_start="fgr")
 METHODS = {"point_to_point": {}, "fgr": {}, "point_to_plane": {"max_iterations": 1}}

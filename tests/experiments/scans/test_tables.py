@@ -5,7 +5,7 @@ import pytest
 
 from gpca.errors import InputError
 from gpca.evaluation.measures import tidy
-from gpca.experiments.registration_methods.metrics import collect_seconds
+from gpca.experiments.registration_methods import collect_seconds
 from gpca.experiments.scans.metrics import collect_scans, read_trials
 from gpca.experiments.scans.published import table17_published
 from gpca.experiments.scans.tables import table17_ladder, table17_scans

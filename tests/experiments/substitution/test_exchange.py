@@ -16,10 +16,10 @@ from gpca.errors import InputError
 from gpca.experiments.controls.rivals import Rival
 from gpca.experiments.estimators.examples import true_twist
 from gpca.experiments.explained import require_exchangeable
-from gpca.experiments.judge import Judges
 from gpca.experiments.substitution.estimated import OBSERVED, KnobbedRegistrar
 from gpca.experiments.substitution.exchange import UNTAUGHT, Exchange, registered_by
 from gpca.experiments.substitution.settings import ExchangeSettings
+from gpca.pairs.judge import Judges
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import generator
 from gpca.uncertainty.designs import ADDITIVE_KNOBS, evaluate_design

@@ -1,14 +1,15 @@
-"""Registers the test pairs of one source and seed by every method: local ones twice, from the pair's own initial pose
-and from the pose of a global method.
+"""Step ``register_methods``: the test pairs of registrations, registered by every method.
+
+Local methods start twice: at the pair's initial pose, and at the pose of a global method.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from time import perf_counter
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
@@ -16,18 +17,70 @@ from gpca.alignment.features import NEIGHBORS
 from gpca.alignment.methods.interface import Outcome, Pair
 from gpca.alignment.methods.registry import make_method, method_entry, require_global
 from gpca.errors import InputError
-from gpca.experiments.judge import Judges
-from gpca.experiments.registration_methods.metrics import INITIAL, NO_START, SEVERITY_COLUMNS
-from gpca.experiments.registration_methods.settings import PairSettings
+from gpca.io.csv_file import write_csv
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations
+from gpca.pairs.judge import Judges
+from gpca.pairs.perturbation import SEVERITIES
+from gpca.process.job import Job
 from gpca.process.progress import progress
+from gpca.process.provenance import record_provenance
 from gpca.seeds import generator, seed_of
+from gpca.settings import Bounds
 
 if TYPE_CHECKING:
     import pandas as pd
 
+INITIAL, NO_START = "initial", "none"  # where a registration starts; else, the name of a global method
+SEVERITY_COLUMNS = tuple(f"severity_{name}" for name in SEVERITIES)
 Method = Callable[[Pair], Outcome]
+Points = Annotated[int, Bounds(minimum=64, maximum=65536)]
+
+
+@dataclass(frozen=True)
+class PairSettings:
+    """The pairs that every method registers.
+
+    Attributes:
+        samples: test samples of each source and seed, balanced, at most.
+        points: of source and of target (fewer where a cloud has fewer).
+        global_start: the global method at whose pose local methods start a second time.
+        points_of: method -> its own number of points, where its authors use more than others do.
+        neighbors_of: method -> number of neighbors for its normals, where it is not the usual one.
+    """
+
+    samples: Annotated[int, Bounds(minimum=3, multipleOf=3)]
+    points: Points
+    global_start: str
+    points_of: dict[str, Points] = field(default_factory=dict)
+    neighbors_of: dict[str, Annotated[int, Bounds(minimum=3, maximum=1000)]] = field(default_factory=dict)
+
+    def points_for(self, method: str) -> int:
+        """Number of points of either cloud."""
+        return self.points_of.get(method, self.points)
+
+    def neighbors_for(self, method: str) -> int:
+        """Number of neighbors for its normals."""
+        return self.neighbors_of.get(method, NEIGHBORS)
+
+
+def run(job: Job) -> None:
+    """Register by every method, seed by seed; the one that gives the others a start runs in any case."""
+    settings = PairSettings(**job.section("method_pairs"))
+    start = [settings.global_start] if settings.global_start in job.section("methods") else []
+    methods = job.by_name("methods", dict.fromkeys([*job.methods, *start]))
+    objects = ObjectClouds.load(job.objects, job.source)
+    for i, (seed, path) in enumerate(job.per_seed("registrations")):
+        of_seed = slice(i, None, len(job.seeds))
+        outputs = job.rows[of_seed], job.timings[of_seed]
+        inputs = [job.objects, path]
+        with record_provenance([*outputs[0], *outputs[1]], inputs, job.settings, seed=seed):
+            registrations = Registrations.load(path, (job.source, seed))
+            trials = try_methods(registrations, objects, job.source, seed, methods, settings)
+            for name, out, timings in zip(job.methods, *outputs, strict=True):
+                rows = trials[name]
+                write_csv(out, rows.drop(columns="seconds"))
+                write_csv(timings, rows[["sample", "start", "seconds"]])
 
 
 def try_methods(

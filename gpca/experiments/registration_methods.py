@@ -1,0 +1,352 @@
+"""Registration methods on the same pairs, each from the initial pose and from that of a global method (Table XI)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from math import inf
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gpca.alignment.methods.registry import (
+    installed,
+    left_out,
+    method_entry,
+    method_module,
+    methods,
+    require_global,
+    require_settings,
+)
+from gpca.alignment.success import SuccessSettings, success_within
+from gpca.errors import InputError, require_names, with_key
+from gpca.evaluation.intervals import Clustered
+from gpca.evaluation.measures import (
+    ALL,
+    COUNT,
+    POOLED,
+    Measure,
+    Parts,
+    over_seeds,
+    per_seed,
+    read_samples,
+    source_method_seed,
+)
+from gpca.experiments.experiment import ByName, Experiment, LeftOut, Names
+from gpca.experiments.plan import Run
+from gpca.experiments.result import numbers, table
+from gpca.experiments.step import Plan, Step
+from gpca.io.csv_file import numbers as number_column
+from gpca.io.csv_file import read_csv
+from gpca.objects.canonical import ObjectClouds
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.plugins import is_outside
+from gpca.reporting.sheet import Row, Sheet, show
+from gpca.reporting.tables.builder import missing_packages
+from gpca.steps.registration_trials import INITIAL, NO_START, SEVERITY_COLUMNS, PairSettings
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+NAME = "registration_methods"
+TRIAL_COLUMNS = ("add_relative", "rotation_error_rad", "translation_error", "points", *SEVERITY_COLUMNS)
+BINS = ("low", "middle", "high")  # thirds of the drawn severities
+# The severities of a concept: column, range in the config, factor from that to the column's unit.
+DRAWN = {
+    "noise": (("severity_noise", "noise", 1.0),),
+    "pose": (("severity_rotation_rad", "rotation_deg", np.pi / 180), ("severity_translation", "translation", 1.0)),
+    "overlap": (("severity_crop", "crop", 1.0),),
+}
+
+
+def check(config: dict, names_left_out: LeftOut) -> None:
+    """Check that every method takes its settings, and that the global start is one that runs here."""
+    for name, settings in config["methods"].items():
+        with_key(f"methods.{name}", require_settings, name, settings or {})
+    pairs, gone = config["method_pairs"], names_left_out("methods")
+    for part in ("points_of", "neighbors_of"):
+        named = list(pairs.get(part) or {})
+        require_names(f"method_pairs.{part}", named, config["methods"], "registration method", gone)
+    key, start = "method_pairs.global_start", pairs["global_start"]
+    require_names(key, [start], config["methods"], "registration method", gone)
+    with_key(key, require_global, start)
+    if package := left_out([start]).get(start):
+        fault = f"'{start}' needs the package {package}, which is not installed"
+        raise InputError(f"config key {key}", fault, "install it or choose another global method")
+
+
+def shown(config: Mapping, sources: Mapping) -> dict:
+    """Titles of methods, for tables of scans that are not given the run."""
+    entries = {name: method_entry(name) for name in installed(config["methods"])}
+    return {
+        "methods": {name: {"title": entry.title, "is_global": entry.is_global} for name, entry in entries.items()},
+        "methods_left_out": {method_entry(name).title: of for name, of in left_out(config["methods"]).items()},
+        "global_start": config["method_pairs"]["global_start"],
+    }
+
+
+EXPERIMENT = Experiment(
+    name=NAME,
+    shown=shown,
+    sections={"method_pairs": PairSettings, "methods": ByName},
+    names=lambda config, sources: {"method": installed(config["methods"])},
+    check=check,
+    leavable={"methods": Names("registration method", methods)},
+    lists={"method_pairs.points_of": "methods", "method_pairs.neighbors_of": "methods"},
+    notices=lambda config: (
+        f"registration method '{name}' is skipped: the package {package} is not installed"
+        for name, package in left_out(config["methods"]).items()
+    ),
+)
+
+
+def _registered(plan: Plan) -> list[str]:
+    """Methods of a job, and the global one whose pose gives the others a start."""
+    return list(dict.fromkeys([*plan.names["method"], plan.config["method_pairs"]["global_start"]]))
+
+
+def _outside(plan: Plan) -> list[str]:
+    """Methods from outside, but for the global start, which all jobs run."""
+    start = plan.config["method_pairs"]["global_start"]
+    return [name for name in plan.names["method"] if is_outside(method_module(name)) and name != start]
+
+
+REGISTER = Step(
+    name="register_methods",
+    run="gpca.steps.registration_trials",
+    inputs={"objects": "objects/{source}.npz", "registrations": "registrations/{source}/seed{*seed}.npz"},
+    outputs={
+        "rows": "methods/{source}/{*method}/seed{*seed}.csv",
+        "timings": "timings/{source}/method_{*method}/seed{*seed}.csv",
+    },
+    settings=lambda plan, wildcards: {
+        "method_pairs": plan.config["method_pairs"],
+        "methods": {name: plan.config["methods"][name] for name in _registered(plan)},
+    },
+    modules=lambda plan: map(method_module, _registered(plan)),
+    apart=("method", _outside),
+    target="methods",
+    priority=2,
+)
+
+
+def row_name(method: str, start: str) -> str:
+    """E.g. ``gicp`` from the pair's initial pose, ``fgr+gicp`` from the pose of another method."""
+    return method if start in (INITIAL, NO_START) else f"{start}+{method}"
+
+
+def read_trials(path: str | Path) -> pd.DataFrame:
+    """Read a file of the step: numbers as numbers, the rest as text."""
+    columns = ("sample", "object", "concept", "start", "failure", *TRIAL_COLUMNS)
+    rows = read_csv(path, columns, others=("symmetric", "fitness", "inlier_rmse"))
+    return rows.assign(**{name: number_column(path, rows, name) for name in TRIAL_COLUMNS})
+
+
+def trials(files: Iterable[str | Path], objects: Iterable[str | Path]) -> pd.DataFrame:
+    """Rows of all files; the method is named with its start, and the cluster is the object's family in its source.
+
+    Raises:
+        InputError: no files, a missing column, an object of none of the sources.
+    """
+    families = {}
+    for path in objects:
+        clouds = ObjectClouds.load(path)
+        families[Path(path).stem] = {name: clouds.family(i) for i, name in enumerate(clouds.names)}
+
+    def read(path: Path) -> pd.DataFrame:
+        rows, (source, method, _) = read_trials(path), source_method_seed(path)
+        family_N = rows["object"].map(families.get(source, {}))
+        if family_N.isna().any():
+            fault = f"object '{rows['object'][family_N.isna()].iloc[0]}' is none of objects/{source}.npz"
+            raise InputError(path, fault, "regenerate both from the same config")
+        return rows.assign(row=[row_name(method, start) for start in rows["start"]], cluster=f"{source}/" + family_N)
+
+    rows = read_samples(files, read)
+    return rows.assign(table=NAME, method=rows["row"])
+
+
+def parts(rows: pd.DataFrame, severities: Mapping[str, Iterable[float]]) -> Parts:
+    """Masks of all rows, of each cause, and of each third of its severities."""
+    masks = {ALL: np.ones(len(rows), bool)}
+    for concept in CONCEPTS:
+        masks[concept] = mask_N = (rows["concept"] == concept).to_numpy()
+        bin_N = np.minimum(3 * share_of_milder(rows, concept, severities), len(BINS) - 1).astype(int)
+        masks |= {f"{concept}_{name}": mask_N & (bin_N == i) for i, name in enumerate(BINS)}
+    return masks
+
+
+def share_of_milder(rows: pd.DataFrame, concept: str, severities: Mapping[str, Iterable[float]]) -> np.ndarray:
+    """Share of a cause's drawn severities that is milder than each row's, in [0, 1].
+
+    A pose error has two severities, each uniform in its range; it is as severe as the mean of their quantiles.
+    """
+    quantiles = []
+    for column, name, factor in DRAWN[concept]:
+        low, high = severities[name]
+        width = max(high - low, 1e-12)  # a range may be a single value
+        quantiles.append(np.clip((rows[column].to_numpy() / factor - low) / width, 0, 1))
+    mean_S = np.mean(quantiles, axis=0)
+    if len(quantiles) == 1:
+        return mean_S
+    return np.where(mean_S < 0.5, 2 * mean_S**2, 1 - 2 * (1 - mean_S) ** 2)  # distribution of the mean of two uniforms
+
+
+def measures(success: SuccessSettings) -> dict[str, Measure]:
+    """Successes, failures and errors; a method that gave up has no success."""
+
+    def within(limit: float, *only: str) -> Measure:
+        return Measure(lambda rows: (rows["failure"] == "") & (rows["add_relative"] < limit), only=only)
+
+    return {
+        "success": within(success.error),
+        "failed": Measure(lambda rows: rows["failure"] != ""),
+        "add": Measure("add_relative", (0, inf)),
+        "rotation_deg": Measure("rotation_error_rad", (0, 180), factor=180 / np.pi),
+        "translation": Measure("translation_error", (0, inf)),
+        "test_samples": COUNT,
+        **{success_within(limit): within(limit, ALL) for limit in success.curve},
+        "points": Measure("points", (0, inf), only=(ALL,)),
+    }
+
+
+@numbers(
+    "registration_methods.csv",
+    "registration_intervals.csv",
+    files="methods/{source}/{method}/seed{seed}.csv",
+    objects="objects/{source}.npz",
+)
+def collect(run: Run, files: Iterable[str | Path], objects: Iterable[str | Path]) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Measures by seed, and over all sources and seeds with intervals over families of objects."""
+    severities = dict(run.config["registrations"]["severities"])
+    success = SuccessSettings(**run.config["success"])
+    rows, measured = trials(files, objects), measures(success)
+    by_cause = {"success": measured["success"]}
+    order = ("failed", *map(success_within, success.curve), "add", "rotation_deg", "translation")
+    by_cause |= {name: replace(measured[name], only=(ALL,)) for name in order}
+    draws = Clustered.drawn(rows["seed"], rows["cluster"], "registration intervals")
+    return (
+        per_seed(rows, lambda subset: parts(subset, severities), measured),
+        over_seeds(rows.assign(source=POOLED), lambda subset: parts(subset, severities), by_cause, draws),
+    )
+
+
+def read_seconds(files: Iterable[str | Path]) -> pd.DataFrame:
+    """Mean seconds by seed, apart from the other measures, because they differ from run to run."""
+
+    def read(path: Path) -> pd.DataFrame:
+        rows = read_csv(path, ("sample", "start", "seconds"))
+        return rows.assign(seconds=number_column(path, rows, "seconds", least=0))
+
+    rows = read_samples(files, read)
+    named = [row_name(row.method.removeprefix("method_"), row.start) for row in rows.itertuples()]
+    seconds = {"seconds": Measure("seconds", (0, inf))}
+    return per_seed(rows.assign(table=NAME, method=named), lambda subset: {ALL: np.ones(len(subset), bool)}, seconds)
+
+
+SECTION = "Beyond the paper: registration methods"
+HEADS = {"start": "Start", "method": "Method"}
+INTERVALS = {"intervals": "registration_intervals.csv"}
+CAUSES = {f"success_{cause}": show("success", f"{cause.capitalize()} (%)", cause) for cause in (ALL, *CONCEPTS)}
+ERRORS = {
+    "failed": show("failed", "Failed (%)", interval=False, least_is_best=True),
+    "add": show("add", "ADD(-S) (% d)", limits=(0, inf), least_is_best=True),
+    "rotation_deg": show("rotation_deg", "Rotation (°)", factor=1, limits=(0, 180), least_is_best=True),
+    "translation": show("translation", "Translation (% d)", limits=(0, inf), least_is_best=True),
+}
+NO_INTERVAL = {"interval": False, "limits": (0, inf)}
+COSTS = {
+    "points": show("points", "Points", factor=1, frame="metrics", decimals=0, **NO_INTERVAL),
+    "milliseconds": show("seconds", "ms", factor=1e3, frame="seconds", least_is_best=True, **NO_INTERVAL),
+}
+
+
+@table(
+    SECTION,
+    "Table XI: registration methods",
+    """How often each method registers the same pairs correctly, how far it is off and how long it takes. Local methods
+    start at the pair's own initial pose, and again at the pose of a global method. The paper uses ICP alone.
+    Compare only rows of one start: the initial pose is the true one for noise and overlap, so a local method can
+    only lose it, while a global method has to find it.""",
+    **INTERVALS,
+    metrics="registration_methods.csv",
+    seconds=(read_seconds, "timings/{source}/method_{method}/seed{seed}.csv"),
+)
+def table11_registration(run: Run, intervals, metrics, seconds):
+    """Successes in all and by cause, errors, points and milliseconds: starts × methods."""
+    by_seed = {"metrics": metrics, "seconds": seconds}
+    columns = CAUSES | ERRORS | COSTS
+    sheet = Sheet("table11_registration", HEADS, rows_of(run), columns, intervals, by_seed, list(run.sources))
+    note = (
+        "Errors are means over all registrations, at the last pose of those that failed; rotations up to the object's "
+        "symmetries. Failed: given up by the method itself, or not at rest. Points: of a cloud, on average over "
+        "sources and targets; behind a global start, the local method's. ms: of one registration, with its global "
+        "start if it has one, without the normals; the only column that differs from run to run."
+    )
+    caption = "Registrations that succeed, and how far all are off" + run.stand_ins()
+    return sheet.table(caption, "metric", [*notes(run, sheet, intervals), note], bold=CAUSES | ERRORS, same=1)
+
+
+@table(
+    SECTION,
+    "Table XI by the error that is allowed",
+    """The successes of the same registrations if other errors are allowed. A method whose row rises from left to right
+    comes near the right pose more often than it reaches it.""",
+    needs=("method",),
+    **INTERVALS,
+)
+def table11_limits(run: Run, intervals):
+    """Successes by the error below which a registration is one: starts × methods by limits."""
+    curve = run.config["success"]["curve"]
+    columns = {(name := success_within(limit)): show(name, f"{100 * limit:g} % d (%)") for limit in curve}
+    sheet = Sheet("table11_limits", HEADS, rows_of(run), columns, intervals)
+    caption = "Registrations that succeed, by the error that is allowed" + run.stand_ins()
+    return sheet.table(caption, "error below", notes(run, sheet, intervals), bold=columns, same=1)
+
+
+@table(
+    SECTION,
+    "Table XI by severity",
+    """The successes of the same registrations by cause and severity. A row that falls from low to high shows what the
+    method does not tolerate.""",
+    needs=("method",),
+    **INTERVALS,
+)
+def table11_severity(run: Run, intervals):
+    """Successes by cause and severity: starts × methods by causes × bins."""
+    columns = {
+        f"{cause}_{name}": show("success", f"{cause.capitalize()}, {name} (%)", f"{cause}_{name}", decimals=0)
+        for cause in CONCEPTS
+        for name in BINS
+    }
+    sheet = Sheet("table11_severity", HEADS, rows_of(run), columns, intervals)
+    pairs = {key: cell.test_samples for (_, key), cell in sheet.cells.items()}
+    note = (
+        "Low, middle, high: thirds of what is drawn; a pose error counts by the mean of its places in the two ranges. "
+        f"Pairs of all seeds, by column: {', '.join(str(pairs.get(key, 0)) for key in columns)}."
+    )
+    caption = "Registrations that succeed, by cause and severity (%)" + run.stand_ins()
+    return sheet.table(caption, "cause", [*notes(run, sheet, intervals), note], bold=columns, same=1)
+
+
+def rows_of(run: Run) -> Iterable[Row]:
+    """Rows start by start: local methods have one at each start, global methods none."""
+    entries = {name: method_entry(name) for name in installed(run.config["methods"])}
+    start = run.config["method_pairs"]["global_start"]
+    starts = {INITIAL: "Initial pose", NO_START: "None"} | ({start: entries[start].title} if start in entries else {})
+    for key, title in starts.items():
+        for name, entry in entries.items():
+            if entry.is_global == (key == NO_START):
+                yield Row([(key, title), (name, entry.title)], {"method": row_name(name, key)})
+
+
+def notes(run: Run, sheet: Sheet, intervals: pd.DataFrame) -> list[str]:
+    """Footnotes of all three tables."""
+    pairs = int(intervals.loc[intervals["concept"] == ALL, "samples"].max())
+    missing = {method_entry(name).title: package for name, package in left_out(run.config["methods"]).items()}
+    return [
+        f"{sheet.over(pairs // sheet.seeds)}. A success is off by less than the config's `success.error` of the "
+        "diameter d, ADD or, for symmetric objects, ADD-S. A registration that failed by the method's own account is "
+        "no success. Bold: best of a start.",
+        *missing_packages(missing),
+    ]

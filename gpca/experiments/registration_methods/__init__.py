@@ -1,1 +1,0 @@
-"""Registration methods side by side on the same pairs (Table XI)."""
