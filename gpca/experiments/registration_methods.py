@@ -19,7 +19,7 @@ from gpca.alignment.methods.registry import (
     require_global,
     require_settings,
 )
-from gpca.alignment.success import SuccessSettings, success_within
+from gpca.alignment.pose_error import SuccessSettings, success_within
 from gpca.errors import InputError, require_names, with_key
 from gpca.evaluation.intervals import Clustered
 from gpca.evaluation.measures import (
