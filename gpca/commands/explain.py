@@ -16,7 +16,6 @@ from gpca.model.clouds import read_points, read_pose, read_scan, require_format
 from gpca.model.location import model_path, require_model
 from gpca.objects.mesh_folder import METERS_PER_UNIT
 from gpca.process.arguments import length
-from gpca.uncertainty.settings import MONTE_CARLO, UncertaintySettings
 
 if TYPE_CHECKING:
     import numpy as np
@@ -98,6 +97,7 @@ def run_explain(options: Namespace) -> int:
     from gpca.model.explainer import Explainer
     from gpca.model.file import Model
     from gpca.process.compilation import say_when_compiling
+    from gpca.uncertainty.settings import MONTE_CARLO, UncertaintySettings
 
     torch.set_num_threads(options.threads)
     say_when_compiling()
