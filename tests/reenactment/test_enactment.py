@@ -6,11 +6,100 @@ import pytest
 from gpca.causes.candidate import Counterfactuals, Registrar
 from gpca.causes.dataset import LABELS
 from gpca.causes.truth import ALL, NONE
+from gpca.pairs.perturbation import NOISE, OVERLAP
 from gpca.reenactment.dataset import as_arrays, verdict
-from gpca.reenactment.enactment import reenact
+from gpca.reenactment.enactment import NoiseScale, fresh_points, observe, rebuild, reenact
+from gpca.reenactment.hypotheses import Hypothesis
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface
 from tests.reenactment.conftest import TRUTH, candidate_of, pair_of
+
+
+def hypothesis(inlier_N):
+    return Hypothesis(np.eye(4), inlier_N, 0.0, 0.02, 1.0, 0.0)
+
+
+@pytest.fixture(scope="module")
+def scale(model):
+    return NoiseScale(model, np.random.default_rng(0))
+
+
+def observed(drill, noise, count=500, seed=1):
+    return drill[400 : 400 + count] + noise * np.random.default_rng(seed).normal(size=(count, 3))
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.003, 0.01, 0.02, 0.04, 0.06, 0.08])
+def test_noise_is_found_within_a_fifth(drill, model, scale, noise):
+    points = observed(drill, noise)
+    found = observe(points, hypothesis(np.ones(len(points))), model, scale, np.random.default_rng(0))
+    assert found.noise == pytest.approx(noise, rel=0.2, abs=0.004)
+    assert (found.outliers, found.missing) == (0, 0)
+
+
+def test_outliers_neither_count_as_noise_nor_as_surface(drill, model, scale):
+    points = observed(drill, 0.01)
+    inlier_N = np.ones(len(points))
+    points[:25], inlier_N[:25] = np.random.default_rng(2).uniform(-0.5, 0.5, size=(25, 3)), 0.1
+    found = observe(points, hypothesis(inlier_N), model, scale, np.random.default_rng(0))
+    assert found.noise == pytest.approx(0.01, abs=0.004)
+    assert found.outliers == pytest.approx(0.05)
+
+
+def test_where_nearly_all_are_outliers_the_likelier_half_counts(drill, model, scale):
+    points = observed(drill, 0.01, count=40)
+    inlier_N = np.linspace(0.4, 0.0, 40)
+    found = observe(points, hypothesis(inlier_N), model, scale, np.random.default_rng(0))
+    assert np.array_equal(found.is_outlier, np.arange(40) >= 20)
+
+
+def rebuilt(candidate, model, *causes):
+    random = np.random.default_rng(0)
+    observed = candidate.observed(causes)
+    inlier_N = np.where(np.abs(model.residuals(observed)[0]) < 0.2, 1.0, 0.0)
+    hypothesis = Hypothesis(np.eye(4), inlier_N, 0.0, 0.02, 1.0, 0.0)
+    return rebuild(np.eye(4), observe(observed, hypothesis, model, NoiseScale(model, random), random), model, random)
+
+
+def test_what_was_observed_stays_as_it_is(drill, model):
+    candidate = candidate_of(drill, "noise", "overlap")
+    found = rebuilt(candidate, model, NOISE, OVERLAP)
+    assert found.applied.tolist() == [True, True, True]  # a pose error may always be there
+    assert np.array_equal(found.observed((NOISE, OVERLAP)), candidate.observed((NOISE, OVERLAP)))
+    assert np.array_equal(found.model, model.points)
+
+
+def test_without_noise_points_lie_nearer_to_the_surface(drill, model):
+    candidate = candidate_of(drill, "noise")
+    found = rebuilt(candidate, model, NOISE)
+    noisy, clean = (np.abs(model.residuals(found.observed(causes))[0]) for causes in ((NOISE,), ()))
+    assert np.sqrt((clean**2).mean()) < 0.4 * np.sqrt((noisy**2).mean())
+
+
+def test_missing_surface_is_filled_as_densely_as_the_rest(drill, model):
+    candidate = candidate_of(drill, "overlap")
+    found = rebuilt(candidate, model, OVERLAP)
+    assert len(found.clean) == pytest.approx(len(candidate.clean), rel=0.2)
+    added = found.clean[len(candidate.kept) :]
+    assert model.distances(added).max() < 2 * model.spacing
+    lost = np.delete(candidate.clean, candidate.kept, axis=0)
+    assert added.mean(axis=0) == pytest.approx(lost.mean(axis=0), abs=0.05)
+
+
+def test_a_clean_cloud_is_not_touched(drill, model):
+    random, observed = np.random.default_rng(0), drill[400:900]
+    hypothesis = Hypothesis(np.eye(4), np.ones(500), 0.0, 0.02, 1.0, 0.0)
+    quiet = observe(observed, hypothesis, model, NoiseScale(model, random), random)
+    found = rebuild(np.eye(4), quiet, model, random)
+    assert found.applied.tolist() == [False, True, False]
+    assert np.array_equal(found.clean, observed) and np.array_equal(found.noisy, observed)
+
+
+def test_fresh_points_lie_in_the_surface_around_their_rows(model):
+    rows = np.arange(10)
+    points = fresh_points(model, rows, 50, np.random.default_rng(0))
+    nearest = np.linalg.norm(points[:, None] - model.points[rows], axis=2).min(axis=1)
+    assert nearest.max() < 2 * model.spacing_M[rows].max()
+
 
 SETTINGS = ReenactmentSettings()
 

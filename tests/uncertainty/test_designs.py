@@ -6,8 +6,17 @@ import pytest
 from gpca.alignment.rigid import transform
 from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.uncertainty.designs import DESIGNS, KNOB_RANGE, STEP, RegisteredRow, sample_knobs
-from gpca.uncertainty.interventions import MIDDLE, UNTOUCHED, UPPER
+from gpca.uncertainty.designs import (
+    ADDITIVE_KNOBS,
+    DESIGNS,
+    KNOB_RANGE,
+    STEP,
+    LiveUncertainty,
+    RegisteredRow,
+    evaluate_design,
+    sample_knobs,
+)
+from gpca.uncertainty.interventions import MIDDLE, UNTOUCHED, UPPER, Knobs
 from gpca.uncertainty.settings import CONDITIONS, CORNERS, LATIN, SALTELLI, UncertaintySettings
 
 SETTINGS = UncertaintySettings(starts=13, icp_points=60)
@@ -248,3 +257,39 @@ def test_a_source_and_target_of_the_same_points_are_survived(registrations, desi
     observed = {"causal": 2, "oracle": 0}.get(design, 0)
     if design != "oracle":
         assert made[observed].residual == pytest.approx(np.log(1e-6))
+
+
+SETTINGS_LIVE = UncertaintySettings(starts=13, icp_points=60)
+
+
+@pytest.fixture(scope="module")
+def tests(registrations):
+    return registrations.subset(registrations.rows("test")[:3])
+
+
+@pytest.mark.parametrize("row", range(3))
+def test_every_condition_has_the_value_of_the_table_in_any_order(tests, row):
+    outcomes, *_ = evaluate_design("additive", tests, "tiny", 0, SETTINGS_LIVE)
+    live = LiveUncertainty(tests, row, "tiny", 0, SETTINGS_LIVE)
+    values = [live(knobs) for knobs in reversed(ADDITIVE_KNOBS)]
+    assert values[::-1] == pytest.approx(outcomes.uncertainty[row], abs=1e-9)
+    assert np.ptp(values) > 0
+    assert live(UNTOUCHED) == 0
+
+
+def test_nothing_is_kept_between_two_calls(tests):
+    live = LiveUncertainty(tests, 0, "tiny", 0, SETTINGS_LIVE)
+    assert live.icp_calls == 13  # the clean run
+    knobs = Knobs(0.02, 2.0, 0.2)
+    assert live(knobs) == live(knobs)
+    assert live.icp_calls == 3 * 13
+
+
+def test_another_seed_has_other_starts(tests):
+    one, other = (LiveUncertainty(tests, 0, "tiny", seed, SETTINGS_LIVE)(Knobs(0.02, 3.0, 0.4)) for seed in (0, 1))
+    assert one != other
+
+
+def test_a_knob_outside_its_range_is_refused(tests):
+    with pytest.raises(InputError, match=r"knob 'overlap': 0.99 is outside \[0, 0.95\]"):
+        LiveUncertainty(tests, 0, "tiny", 0, SETTINGS_LIVE)(Knobs(0.0, 1.0, 0.99))
