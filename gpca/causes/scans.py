@@ -343,9 +343,9 @@ def _table(seen: Sequence[tuple[ScanStart, DrawnScans]], causes: Causes) -> pd.D
 
     registrations, (severities, found) = causes.registrations, found_in(causes)
     starts, scans = zip(*seen, strict=True)
-    known = {"pair": [each.pair.name for each in scans], "cluster": registrations.cluster}
-    known |= {"kind": [each.pair.kind for each in scans], "overlap": [each.pair.overlap for each in scans]}
-    known |= {"start": [start.kind for start in starts], "init_from": [start.init_from for start in starts]}
-    known |= {"times": [start.times for start in starts], "sensor_noise": [each.sensor_noise for each in scans]}
+    columns = {"pair": [each.pair.name for each in scans], "cluster": registrations.cluster}
+    columns |= {"kind": [each.pair.kind for each in scans], "overlap": [each.pair.overlap for each in scans]}
+    columns |= {"start": [start.kind for start in starts], "init_from": [start.init_from for start in starts]}
+    columns |= {"times": [start.times for start in starts], "sensor_noise": [each.sensor_noise for each in scans]}
     factors = {"error_factor": [each.error_factor for each in scans]}
-    return pd.DataFrame({"sample": registrations.sample, **known, **severities, **found, **factors})
+    return pd.DataFrame({"sample": registrations.sample, **columns, **severities, **found, **factors})
