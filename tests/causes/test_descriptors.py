@@ -193,15 +193,15 @@ def test_all_remedies_together_stand_for_the_truth_and_what_they_explain_adds_up
 
 
 def test_missing_surface_is_what_aligning_the_other_way_mends(pair):
-    half = pair.observed[pair.observed[:, 2] > np.quantile(pair.observed[:, 2], 0.6)]
+    half = pair.observed[pair.observed[:, 2] > np.quantile(pair.observed[:, 2], 0.4)]
     found = remedied(registered(pair, half))
-    assert found[f"error_{1 << OVERLAP}"] > 0.05
+    assert found[f"error_{1 << OVERLAP}"] > 0.04
     assert found["phi_overlap"] == max(found[f"phi_{name}"] for name in ("noise", "pose", "overlap"))
 
 
 def test_a_bad_start_is_what_restarts_mend(pair):
     T_init = np.eye(4)
-    T_init[:3, :3] = Rotation.from_rotvec([0, np.deg2rad(75), 0]).as_matrix()
+    T_init[:3, :3] = Rotation.from_rotvec([0, 0, np.deg2rad(75)]).as_matrix()
     found = remedied(registered(pair, pair.observed, T_init))
     assert found[f"cost_{1 << POSE}"] >= found["cost_0"]
     assert found["moved_0"] > 0.05
