@@ -6,12 +6,18 @@ from graphlib import TopologicalSorter
 
 import pytest
 
+from gpca.experiments.registry import steps as declared_steps
+
 from .documents import ROOT
 
 PAGE = (ROOT / "docs/architecture.md").read_text()
 LONGEST = 400  # lines
 MOST_AT_THE_TOP = 24  # modules
 MODULES = sorted([*(ROOT / "gpca").rglob("*.py"), *(ROOT / "baselines").rglob("*.py")])
+
+
+def as_list(files):
+    return [files] if isinstance(files, str) else files
 
 
 def rows(heading):
@@ -88,6 +94,7 @@ def test_every_step_and_rule_file_has_its_stage():
     rules = ROOT / "workflow/rules"
     written = {str(path.relative_to(rules)) for path in rules.rglob("*.smk")}
     steps = {step for name in written for step in re.findall(r'step="gpca\.([\w.:]+)"', (rules / name).read_text())}
+    steps |= {step.run.removeprefix("gpca.") for step in declared_steps()}
     assert steps == {name for _, _, modules, _ in stages for name in code(modules)}
     assert files == written - {"common.smk", "functions.smk"}
 
@@ -95,6 +102,8 @@ def test_every_step_and_rule_file_has_its_stage():
 def test_every_folder_of_the_results_that_rules_write_has_its_stage():
     rules = "".join(path.read_text() for path in (ROOT / "workflow/rules").rglob("*.smk"))
     written = set(re.findall(r"<results>/([a-z_]+)/", rules)) | {"tables", "figures"}
+    patterns = [pattern for step in declared_steps() for files in step.outputs.values() for pattern in as_list(files)]
+    written |= {pattern.split("/")[0] for pattern in patterns if "/" in pattern}
     assert {f"{folder}/" for folder in written} == {
         name for files, *_ in rows("Stages") for name in code(files) if name.endswith("/") and "{" not in name
     }

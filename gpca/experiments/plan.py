@@ -25,10 +25,17 @@ class Run:
     Args:
         config: that :func:`gpca.config.check.check` has checked.
         only: name of a section -> the entries of it that are shown, by all that ask for the section.
+        names_of: function of config and sources that returns the names in the braces of paths.
     """
 
-    def __init__(self, config: Mapping[str, Any], only: Mapping[str, Iterable[str]] | None = None) -> None:
+    def __init__(
+        self,
+        config: Mapping[str, Any],
+        only: Mapping[str, Iterable[str]] | None = None,
+        names_of: Callable[[Mapping, Mapping], dict[str, Any]] = lambda config, sources: {},
+    ) -> None:
         self.config = config
+        self._names_of = names_of
         self._only = {f"{name}s": set(entries) for name, entries in (only or {}).items()}
 
     def section(self, name: str) -> dict[str, Any]:
@@ -55,9 +62,7 @@ class Run:
     @cached_property
     def names(self) -> dict[str, Any]:
         """Names in the braces of paths; reading them reads most of the config."""
-        from gpca.experiments.run import names_of
-
-        return names_of(self.config, self.sources)
+        return self._names_of(self.config, self.sources)
 
     def titles(self, entry: Callable[[str], Any], names: Iterable[str]) -> dict[str, str]:
         """Name -> title, given the function that returns the entry of a name, such as ``method_entry``."""

@@ -2,6 +2,7 @@
 
 from gpca.evaluation.measures import write_metrics
 from gpca.experiments.plan import READ, Recorded, Run
+from gpca.experiments.run import names_of
 from gpca.process.job import files_by_name, workflow_script
 from gpca.registry import load
 
@@ -9,7 +10,7 @@ with workflow_script(snakemake) as added:
     arguments = dict(snakemake.params.items())
     collect, token = load(arguments.pop("collector")), arguments.pop("config")
     config = Recorded(snakemake.config)
-    made = collect(*([Run(config)] if token else []), **files_by_name(snakemake.input), **arguments)
+    made = collect(*([Run(config, names_of=names_of)] if token else []), **files_by_name(snakemake.input), **arguments)
     if token:
         added[READ] = config.record(token)
     frames = made if isinstance(made, (tuple, list)) else [made]

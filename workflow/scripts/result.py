@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from gpca.experiments.plan import READ, Recorded, Run
+from gpca.experiments.run import names_of
 from gpca.process.job import files_by_name, workflow_script
 from gpca.reporting.figures.style import save_figure
 from gpca.reporting.registry import build
@@ -10,7 +11,7 @@ from gpca.reporting.registry import build
 with workflow_script(snakemake) as added:
     entry, out = snakemake.params, snakemake.output
     config = Recorded(snakemake.config)
-    run = Run(config, entry.only) if entry.config else None
+    run = Run(config, entry.only, names_of) if entry.config else None
     made = build(entry.builder, entry.readers, files_by_name(snakemake.input), entry.arguments, run)
     if run:
         added[READ] = config.record(entry.config)
