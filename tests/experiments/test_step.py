@@ -1,0 +1,105 @@
+"""Steps of experiments as rules of the workflow."""
+
+import json
+from types import SimpleNamespace
+
+import pytest
+
+from gpca.experiments.plan import Run
+from gpca.experiments.step import Plan, Step, all_files, rules_of
+
+NAMES = {
+    "source": ["ycb", "cups"],
+    "seed": [0, 1],
+    "method": ["icp", "fgr", "mine"],
+    "trained": ["cups"],
+    "frames": "real_rgbd",
+}
+CONFIG = {"methods": {"icp": {"reach": 0.1}}, "success": {"error": 0.03}}
+PLAN = Plan(Run(CONFIG), NAMES, {})
+
+
+class Wildcards(SimpleNamespace):
+    """Names as attributes and as items, as those of Snakemake."""
+
+    def items(self):
+        return vars(self).items()
+
+
+def step(**changes):
+    given = {
+        "name": "register",
+        "run": "gpca.seeds:generator",
+        "inputs": {"objects": "objects/{source}.npz", "pairs": "pairs/{source}/seed{*seed}.npz"},
+        "outputs": {"rows": "methods/{source}/{*method}/seed{*seed}.csv"},
+        "settings": ("methods", "success.error"),
+    }
+    return Step(**given | changes)
+
+
+def test_wildcards_have_a_job_each_and_lists_one_for_all():
+    [rule] = rules_of(step(), PLAN)
+    assert rule.inputs == {
+        "objects": "objects/{source}.npz",
+        "pairs": ["pairs/{source}/seed0.npz", "pairs/{source}/seed1.npz"],
+    }
+    assert rule.outputs["rows"] == [
+        f"methods/{{source}}/{method}/seed{seed}.csv" for method in NAMES["method"] for seed in (0, 1)
+    ]
+    assert rule.params == {"methods": NAMES["method"], "seeds": [0, 1]}
+    assert rule.constraints == {"source": "ycb|cups"}
+    assert rule.place == "register/{source}"
+    assert json.loads(rule.settings) == {"methods": {"icp": {"reach": 0.1}}, "error": 0.03}
+    assert "gpca/seeds.py" in rule.code
+    assert len(all_files(step(), PLAN)) == 2 * 3 * 2
+
+
+def test_a_name_may_stand_for_the_values_of_another_and_a_single_value_is_filled_in():
+    other = step(
+        inputs={"frames": "frames/{frames}.npz"},
+        outputs={"out": "out/{frames}/{source}.csv"},
+        where={"source": "trained"},
+    )
+    [rule] = rules_of(other, PLAN)
+    assert rule.inputs["frames"] == "frames/real_rgbd.npz"
+    assert (rule.outputs["out"], rule.constraints) == ("out/real_rgbd/{source}.csv", {"source": "cups"})
+    assert all_files(other, PLAN) == ["out/real_rgbd/cups.csv"]
+
+
+def test_functions_are_asked_for_every_job():
+    dynamic = step(
+        inputs={"others": lambda plan, wildcards: [f"objects/{name}.npz" for name in plan.names["source"]]},
+        settings=lambda plan, wildcards: {"seed": wildcards.source},
+        params={"title": lambda plan, wildcards: wildcards.source.upper(), "fixed": 3},
+    )
+    [rule] = rules_of(dynamic, PLAN)
+    job = Wildcards(source="ycb")
+    assert rule.inputs["others"](job) == ["objects/ycb.npz", "objects/cups.npz"]
+    assert json.loads(rule.settings(job)) == {"seed": "ycb"}
+    assert (rule.params["title"](job), rule.params["fixed"]) == ("YCB", 3)
+
+
+def test_names_from_outside_have_jobs_of_their_own():
+    apart = step(
+        apart=("method", lambda plan: ["mine"]),
+        settings=lambda plan, wildcards: {"methods": plan.names["method"]},
+        modules=lambda plan: ["gpca.numerals"] if "mine" in plan.names["method"] else [],
+    )
+    inside, outside = rules_of(apart, PLAN)
+    assert inside.params["methods"] == ["icp", "fgr"] and "gpca/numerals.py" not in inside.code
+    job = Wildcards(source="ycb", outside_method="mine")
+    assert outside.outputs["rows"] == [f"methods/{{source}}/{{outside_method}}/seed{seed}.csv" for seed in (0, 1)]
+    assert outside.constraints["outside_method"] == "mine"
+    assert outside.params["methods"](job) == ["mine"]
+    assert json.loads(outside.settings(job)) == {"methods": ["mine"]}
+    assert "gpca/numerals.py" in outside.code(job)
+    assert rules_of(step(apart=("method", lambda plan: [])), PLAN)[1].constraints["outside_method"] == "none"
+
+
+def test_a_step_that_a_run_does_without_has_no_rule():
+    assert rules_of(step(when=lambda plan: False), PLAN) == []
+
+
+def test_a_key_that_the_config_lacks_is_a_slip_of_the_declaration():
+    with pytest.raises(KeyError, match="nothing"):
+        rules_of(step(settings=("nothing",)), PLAN)
