@@ -135,7 +135,7 @@ def _rule(step: Step, plan: Plan, name: str) -> Rule:
         name=name,
         run=step.run,
         inputs={key: _input(step, plan, files) for key, files in step.inputs.items()},
-        code=code_files(step.run.split(":")[0], *step.modules(plan)),
+        code=code_files(step.run, *step.modules(plan)),
         outputs=outputs,
         settings=_settings(step, plan),
         params=lists | {key: _param(plan, value) for key, value in step.params.items()},
@@ -172,7 +172,7 @@ def _rule_outside(step: Step, plan: Plan, name: str, outside: Sequence[str]) -> 
     return replace(
         rule,
         inputs=rule.inputs | dynamic,
-        code=lambda wildcards: code_files(step.run.split(":")[0], *step.modules(of(wildcards))),
+        code=lambda wildcards: code_files(step.run, *step.modules(of(wildcards))),
         settings=lambda wildcards: _as_json(step, of(wildcards), wildcards),
         params=rule.params | given | {f"{name}s": lambda wildcards: [getattr(wildcards, wildcard)]},
         constraints=rule.constraints | {wildcard: "|".join(outside) or "none"},

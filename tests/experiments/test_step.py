@@ -83,16 +83,16 @@ def test_names_from_outside_have_jobs_of_their_own():
     apart = step(
         apart=("method", lambda plan: ["mine"]),
         settings=lambda plan, wildcards: {"methods": plan.names["method"]},
-        modules=lambda plan: ["gpca.numerals"] if "mine" in plan.names["method"] else [],
+        modules=lambda plan: ["gpca.portable"] if "mine" in plan.names["method"] else [],
     )
     inside, outside = rules_of(apart, PLAN)
-    assert inside.params["methods"] == ["icp", "fgr"] and "gpca/numerals.py" not in inside.code
+    assert inside.params["methods"] == ["icp", "fgr"] and "gpca/portable.py" not in inside.code
     job = Wildcards(source="ycb", outside_method="mine")
     assert outside.outputs["rows"] == [f"methods/{{source}}/{{outside_method}}/seed{seed}.csv" for seed in (0, 1)]
     assert outside.constraints["outside_method"] == "mine"
     assert outside.params["methods"](job) == ["mine"]
     assert json.loads(outside.settings(job)) == {"methods": ["mine"]}
-    assert "gpca/numerals.py" in outside.code(job)
+    assert "gpca/portable.py" in outside.code(job)
     assert rules_of(step(apart=("method", lambda plan: [])), PLAN)[1].constraints["outside_method"] == "none"
 
 
