@@ -102,6 +102,12 @@ def labels_of(truth: Truth) -> np.ndarray:
     return np.where(np.isin(named_S, LABELS), named_S, BORDERLINE)
 
 
+def observed_only(registrations: Registrations) -> Registrations:
+    """Registrations without anything that reveals what is wrong with them."""
+    hidden = registrations.without_labels()
+    return replace(hidden, attached={name: array for name, array in hidden.attached.items() if name != "causes"})
+
+
 def labeled(causes: Causes) -> Registrations:
     """Return the registrations with their labels in the place of the concepts, and the sets of causes attached.
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from gpca.attribution.predictions import read_timings, write_predictions, write_timings
 from gpca.attribution.scores import Attribution
-from gpca.causes.dataset import LABELS, Causes, labeled
+from gpca.causes.dataset import LABELS, Causes, labeled, observed_only
 from gpca.causes.descriptors import Descriptors
 from gpca.causes.settings import DescriptorSettings
 from gpca.causes.truth import BORDERLINE
@@ -75,12 +75,6 @@ def training_rows(registrations: Registrations, path: Path) -> np.ndarray:
     if not len(rows):
         raise InputError(path, "has no training samples with a label", "raise causes.train")
     return rows
-
-
-def observed_only(registrations: Registrations) -> Registrations:
-    """Return the registrations without anything that reveals what is wrong with them."""
-    hidden = registrations.without_labels()
-    return replace(hidden, attached={name: array for name, array in hidden.attached.items() if name != "causes"})
 
 
 def with_what_it_reads(registrations: Registrations, entry: ExplainerEntry, path: Path) -> Registrations:

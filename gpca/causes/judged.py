@@ -1,0 +1,354 @@
+"""Test samples with their truth and an explainer's predictions, and the measures of a diagnosis.
+
+Measures take weights (B, N) of the samples, ones or how often a bootstrap drew each, and return B values, NaN where
+there is no sample. Borderline samples are not counted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gpca.attribution.predictions import read_predictions
+from gpca.causes.dataset import LABELS, Causes, labels_of
+from gpca.causes.truth import ALL, BORDERLINE, NOMINAL, Truth, state_of_errors
+from gpca.errors import InputError
+from gpca.evaluation.measures import source_method_seed
+from gpca.io.container import require_same_samples
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.seeds import seed_of_file
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+CEILING = "ceiling"  # the truth, measured again from other starts: no explainer can be expected to do better
+RECALL = 0.9  # of the failed, at which false alarms are counted
+OF_ALARM = ("auroc_failed", "auprc_failed", "false_alarm_rate", "nominal_calibration")
+OF_STATES = ("state_accuracy", "state_accuracy_shown", "auroc_failed_shown")
+HEADLINES = ("regret", "tied_accuracy")
+OF_CAUSES = (
+    *(*HEADLINES, "named_right", "balanced_accuracy", "dominant_accuracy", "average_precision"),
+    *("spearman_attribution", "cosine_attribution", "deletion_gain"),
+)
+MEASURES = (*OF_CAUSES[:5], *OF_ALARM, *OF_STATES, *OF_CAUSES[5:])
+OF_FAILED = (*HEADLINES, "dominant_accuracy", "spearman_attribution", "cosine_attribution", "deletion_gain")
+OF_SHOWN = ("state_accuracy_shown", "auroc_failed_shown")
+# Shares of samples or of pairs of them: an interval of these is never of no width.
+SHARES = (*OF_CAUSES[1:6], *OF_ALARM[:3], *OF_STATES)
+SMALLER_IS_BETTER = ("regret", "false_alarm_rate", "nominal_calibration")
+BINS = 10  # of the calibration error
+
+
+@dataclass(frozen=True)
+class SampleTruth:
+    """N test samples with their truth, without their clouds.
+
+    Attributes:
+        truth, truth_again: as of :class:`gpca.causes.dataset.Causes`.
+        cluster, symmetric, error_shown: (N,) the same.
+    """
+
+    truth: Truth
+    truth_again: Truth
+    cluster: np.ndarray
+    symmetric: np.ndarray
+    error_shown: np.ndarray
+
+    @classmethod
+    def of(cls, causes: Causes) -> SampleTruth:
+        """Return what is kept of registrations that are all for testing."""
+        return cls(causes.truth, causes.truth_again, causes.registrations.cluster, causes.symmetric, causes.error_shown)
+
+
+@dataclass(frozen=True)
+class Judged:
+    """N test samples with an explainer's predictions.
+
+    Attributes:
+        label: one of :data:`gpca.causes.dataset.LABELS`, or ``borderline``.
+        instance: the object, views of one instance together. seed: the repeat.
+        error: (N, 8) v of every subset of the causes. phi: (N, 3). causes: (N, 3) whether each is one of them.
+        tied: (N, 3) whether each adds as much as the dominant one, up to the limit of a cause. margin: between the two
+            largest φ.
+        shown: state of the registration that the explainer sees, by its own error. symmetric: the error is ADD-S.
+        alarm: how wrong the explainer takes the registration to be, larger is worse. scores: (N, 3) of the causes.
+        named: the label that it names; empty where it names none.
+        nominal: its score of "nominal".
+    """
+
+    label: np.ndarray
+    instance: np.ndarray
+    seed: np.ndarray
+    error: np.ndarray
+    phi: np.ndarray
+    causes: np.ndarray
+    tied: np.ndarray
+    margin: np.ndarray
+    shown: np.ndarray
+    symmetric: np.ndarray
+    alarm: np.ndarray
+    scores: np.ndarray
+    named: np.ndarray
+    nominal: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.label)
+
+    def subset(self, rows: np.ndarray) -> Judged:
+        """Return the given rows, which may be a mask."""
+        return Judged(*(getattr(self, field.name)[rows] for field in fields(Judged)))
+
+    @property
+    def names_causes(self) -> bool:
+        """Whether the explainer says more than whether something is wrong."""
+        return bool((self.named != "").any())
+
+
+def read_judged(
+    prediction_files: Iterable[str | Path], causes_files: Iterable[str | Path]
+) -> dict[tuple[str, str, int], Judged]:
+    """Return the test samples of every source, explainer and seed, those of the ceiling first.
+
+    Args:
+        prediction_files: named ``…/{source}/{explainer}/seed{seed}.csv``.
+        causes_files: named ``…/{source}/seed{seed}.npz``.
+
+    Raises:
+        InputError: no files, a file that cannot be read, predictions of other samples.
+    """
+    truths, judged = {}, {}
+    for path in causes_files:
+        source, seed = Path(path).parent.name, seed_of_file(path)
+        causes = Causes.load(path, (source, seed))
+        truths[source, seed] = causes.subset(causes.rows("test"))
+        judged[source, CEILING, seed] = ceiling_of(truths[source, seed], seed)
+    for path in prediction_files:
+        source, explainer, seed = source_method_seed(path)
+        if (source, seed) not in truths:
+            raise InputError(path, "its ground truth was not given", f"give causes/{source}/seed{seed}.npz")
+        rows = read_predictions(path)
+        rows = rows[rows["split"] == "test"]
+        truth = truths[source, seed]
+        require_same_samples(path, rows, truth.registrations.arrays, "causes", ("sample",))
+        judged[source, explainer, seed] = judged_by(rows, truth, seed)
+    if not judged:
+        raise InputError("diagnoses", "no files were given", "name at least one explainer in diagnosis.explainers")
+    return judged
+
+
+def joined(parts: Iterable[Judged]) -> Judged:
+    """Return the samples of several one after the other."""
+    parts = list(parts)
+    return Judged(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Judged)))
+
+
+def judged_by(rows: pd.DataFrame, truth: Causes, seed: int) -> Judged:
+    """Return test samples with the predictions of a file whose rows are in the same order."""
+    scores_N_4 = rows[[f"score_{label}" for label in LABELS]].to_numpy(float)
+    named_N = np.where(rows["abstained"], "", rows["concept_predicted"].to_numpy(str))
+    return judged_of(SampleTruth.of(truth), seed, scores_N_4, named_N)
+
+
+def judged_of(tested: SampleTruth, seed: int, scores_N_4: np.ndarray, named_N: np.ndarray) -> Judged:
+    """Return test samples with scores of :data:`gpca.causes.dataset.LABELS` and the labels named, empty for none."""
+    return _judged(tested, seed, 1 - scores_N_4[:, 0], scores_N_4, named_N)
+
+
+def ceiling_of(causes: Causes | SampleTruth, seed: int) -> Judged:
+    """Return test samples with the truth measured from other starts as their predictions."""
+    tested = SampleTruth.of(causes) if isinstance(causes, Causes) else causes
+    again = tested.truth_again
+    error_N = again.error[:, -1]
+    shares_N_3 = np.maximum(again.phi, 0) + 1e-12
+    shares_N_3 = shares_N_3 / shares_N_3.sum(axis=1, keepdims=True)
+    # A sample that lies between the limits this time is named by the nearer one.
+    is_nominal_N = error_N < (again.nominal_limit + again.failed_limit) / 2
+    scores_N_4 = np.column_stack([is_nominal_N.astype(float), ~is_nominal_N[:, None] * shares_N_3])
+    named_N = np.where(is_nominal_N, NOMINAL, np.array(CONCEPTS)[again.phi.argmax(axis=1)])
+    return _judged(tested, seed, error_N, scores_N_4, named_N)
+
+
+def _judged(tested: SampleTruth, seed: int, alarm_N, scores_N_4: np.ndarray, named_N: np.ndarray) -> Judged:
+    truth = tested.truth
+    return Judged(
+        label=labels_of(truth),
+        instance=tested.cluster,
+        seed=np.full(len(truth), seed),
+        error=truth.error,
+        phi=truth.phi,
+        causes=truth.causes,
+        tied=truth.tied,
+        margin=truth.margin,
+        shown=state_of_errors(tested.error_shown, truth),
+        symmetric=tested.symmetric,
+        alarm=np.asarray(alarm_N, float),
+        scores=scores_N_4[:, 1:],
+        named=named_N,
+        nominal=scores_N_4[:, 0],
+    )
+
+
+def measure(samples: Judged, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
+    """Return every measure (B,) of :data:`MEASURES` that the explainer has.
+
+    - regret: of a failed sample, the error that the best single removal would take away minus that which the named
+      cause's removal takes away, as a share of the error; mean. Naming nominal, or nothing, removes nothing.
+    - tied_accuracy: as dominant_accuracy, but any cause counts whose φ is that of the dominant one up to the limit of a
+      cause.
+    - named_right: share of the nominal and the failed whose label is named, causes counted as in tied_accuracy.
+    - balanced_accuracy: mean over nominal and the three dominant causes of the share that is named rightly.
+    - dominant_accuracy: share of the failed whose dominant cause has the largest score among the causes.
+    - auroc_failed, auprc_failed: how well the alarm tells failed from nominal.
+    - false_alarm_rate: share of the nominal above the alarm that finds 90 % of the failed.
+    - state_accuracy: mean of the shares of the nominal and of the failed that are called so; of what is shown
+      (_shown), by the state of that registration alone, whatever it does from other starts.
+    - auroc_failed_shown: as auroc_failed, by the same state.
+    - nominal_calibration: expected calibration error of the score of "nominal", in ten bins.
+    - average_precision: of each cause's score for being one of the causes, mean over the causes.
+    - spearman_attribution, cosine_attribution: between scores and φ of a failed sample, mean.
+    - deletion_gain: share of the error of a failed sample that goes when the cause named first is removed, mean.
+    """
+    labeled_N = samples.label != BORDERLINE
+    failed_N = labeled_N & (samples.label != NOMINAL)
+    shown_N = samples.shown != BORDERLINE
+    called_failed_N = samples.nominal < samples.scores.max(axis=1)
+    alarms_shown = ranking(samples.alarm[shown_N], samples.shown[shown_N] != NOMINAL, weights_B_N[:, shown_N])
+    measures = {
+        "state_accuracy": _state_accuracy(samples.label, called_failed_N, weights_B_N),
+        "state_accuracy_shown": _state_accuracy(samples.shown, called_failed_N, weights_B_N),
+        "auroc_failed_shown": alarms_shown["area"],
+        **_of_alarm(samples.alarm[labeled_N], failed_N[labeled_N], weights_B_N[:, labeled_N]),
+        "nominal_calibration": _calibration_error(
+            samples.nominal[labeled_N], samples.label[labeled_N] == NOMINAL, weights_B_N[:, labeled_N]
+        ),
+    }
+    if samples.names_causes:
+        measures |= _of_causes(samples, labeled_N, failed_N, weights_B_N)
+    return measures
+
+
+def counted(samples: Judged, metric: str) -> np.ndarray:
+    """Return which samples (N,) a measure is taken over: those of a label, and of these the nominal or the failed."""
+    if metric in OF_SHOWN:
+        return samples.shown != BORDERLINE
+    labeled_N, nominal_N = samples.label != BORDERLINE, samples.label == NOMINAL
+    if metric in OF_FAILED:
+        return labeled_N & ~nominal_N
+    return nominal_N if metric == "false_alarm_rate" else labeled_N
+
+
+def _of_causes(samples: Judged, labeled_N, failed_N, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
+    right_N = samples.named == samples.label
+    recalls = [_mean(right_N[of], weights_B_N[:, of]) for of in (samples.label == label for label in LABELS)]
+    first_N = samples.scores.argmax(axis=1)
+    of_failed = weights_B_N[:, failed_N]
+    scores_F_3, phi_F_3 = samples.scores[failed_N], samples.phi[failed_N]
+    precisions = [
+        ranking(samples.scores[labeled_N, i], samples.causes[labeled_N, i], weights_B_N[:, labeled_N])["precision"]
+        for i in range(len(CONCEPTS))
+    ]
+    rows_N = np.arange(len(samples))
+    gain_N, tied_N = gains(samples)[rows_N, first_N], samples.tied[rows_N, first_N]
+    return {
+        **of_decisions(samples, weights_B_N),
+        "tied_accuracy": _mean(tied_N[failed_N], of_failed),
+        "balanced_accuracy": np.mean(recalls, axis=0),
+        "dominant_accuracy": _mean((np.array(CONCEPTS)[first_N] == samples.label)[failed_N], of_failed),
+        "average_precision": np.mean(precisions, axis=0),
+        "spearman_attribution": _mean(_correlations(_ranks(scores_F_3), _ranks(phi_F_3)), of_failed),
+        "cosine_attribution": _mean(_cosines(scores_F_3, np.maximum(phi_F_3, 0)), of_failed),
+        "deletion_gain": _mean(gain_N[failed_N], of_failed),
+    }
+
+
+def of_decisions(samples: Judged, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
+    """Return regret and named_right, which judge what is named alone, whatever the other scores are."""
+    labeled_N = samples.label != BORDERLINE
+    failed_N = labeled_N & (samples.label != NOMINAL)
+    gain_N_3, named_N_3 = gains(samples), samples.named[:, None] == np.array(CONCEPTS)
+    regret_N = np.maximum(gain_N_3.max(axis=1), 0) - np.where(named_N_3, gain_N_3, 0).sum(axis=1)
+    right_N = np.where(failed_N, (named_N_3 & samples.tied).any(axis=1), samples.named == samples.label)
+    return {
+        "regret": _mean(regret_N[failed_N], weights_B_N[:, failed_N]),
+        "named_right": _mean(right_N[labeled_N], weights_B_N[:, labeled_N]),
+    }
+
+
+def gains(samples: Judged) -> np.ndarray:
+    """Return (N, 3) the share of each sample's error that goes if a single cause is removed."""
+    all_N = np.maximum(samples.error[:, ALL], 1e-9)
+    return np.stack([1 - samples.error[:, ALL ^ 1 << cause] / all_N for cause in range(len(CONCEPTS))], axis=1)
+
+
+def _state_accuracy(state_N: np.ndarray, called_failed_N: np.ndarray, weights_B_N: np.ndarray) -> np.ndarray:
+    nominal_N = state_N == NOMINAL
+    failed_N = ~nominal_N & (state_N != BORDERLINE)
+    groups = ((nominal_N, ~called_failed_N), (failed_N, called_failed_N))
+    return np.mean([_mean(right_N[of_N], weights_B_N[:, of_N]) for of_N, right_N in groups], axis=0)
+
+
+def _of_alarm(alarm_N: np.ndarray, failed_N: np.ndarray, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
+    ranked = ranking(alarm_N, failed_N, weights_B_N)
+    return {
+        "auroc_failed": ranked["area"],
+        "auprc_failed": ranked["precision"],
+        "false_alarm_rate": ranked["false_alarms"],
+    }
+
+
+def ranking(score_N: np.ndarray, true_N: np.ndarray, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
+    """Return area under the ROC curve, average precision, and false alarms at `RECALL`; equal scores count together."""
+    if not len(score_N):
+        return dict.fromkeys(("area", "precision", "false_alarms"), np.full(len(weights_B_N), np.nan))
+    order = np.argsort(-score_N, kind="stable")
+    starts = np.flatnonzero(np.r_[True, np.diff(score_N[order]) != 0])
+    true_B_G, false_B_G = (
+        np.add.reduceat(weights_B_N[:, order] * of[order], starts, axis=1) for of in (true_N, ~true_N)
+    )
+    hits_B_G, alarms_B_G = np.cumsum(true_B_G, axis=1), np.cumsum(false_B_G, axis=1)
+    positives_B, negatives_B = hits_B_G[:, -1], alarms_B_G[:, -1]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        # A positive beats every negative that is ranked below it, and half of those beside it.
+        below_B_G = negatives_B[:, None] - alarms_B_G + false_B_G / 2
+        area_B = (true_B_G * below_B_G).sum(axis=1) / (positives_B * negatives_B)
+        share_B_G = hits_B_G / np.maximum(hits_B_G + alarms_B_G, 1e-300)
+        precision_B = (true_B_G * share_B_G).sum(axis=1) / positives_B
+        enough_B = (hits_B_G >= RECALL * positives_B[:, None] - 1e-9).argmax(axis=1)
+        alarms_B = np.take_along_axis(alarms_B_G, enough_B[:, None], axis=1)[:, 0] / negatives_B
+    return {"area": area_B, "precision": precision_B, "false_alarms": alarms_B}
+
+
+def _calibration_error(score_N: np.ndarray, true_N: np.ndarray, weights_B_N: np.ndarray) -> np.ndarray:
+    bin_N = np.minimum((score_N * BINS).astype(int), BINS - 1)
+    error_B = np.zeros(len(weights_B_N))
+    for number in range(BINS):
+        inside = bin_N == number
+        error_B += np.abs((weights_B_N[:, inside] * (score_N - true_N)[inside]).sum(axis=1))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return error_B / weights_B_N.sum(axis=1)
+
+
+def _mean(value_N: np.ndarray, weights_B_N: np.ndarray) -> np.ndarray:
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return (weights_B_N * value_N).sum(axis=1) / weights_B_N.sum(axis=1)
+
+
+def _ranks(values_N_3: np.ndarray) -> np.ndarray:
+    from scipy.stats import rankdata
+
+    return rankdata(values_N_3, axis=1) if len(values_N_3) else values_N_3
+
+
+def _correlations(a_N_3: np.ndarray, b_N_3: np.ndarray) -> np.ndarray:
+    a_N_3, b_N_3 = (x - x.mean(axis=1, keepdims=True) for x in (a_N_3, b_N_3))
+    return _cosines(a_N_3, b_N_3)
+
+
+def _cosines(a_N_3: np.ndarray, b_N_3: np.ndarray) -> np.ndarray:
+    """Return the cosine of each pair of rows, 0 where one of them is zero."""
+    lengths_N = np.sqrt((a_N_3**2).sum(axis=1) * (b_N_3**2).sum(axis=1))
+    return (a_N_3 * b_N_3).sum(axis=1) / np.where(lengths_N > 0, lengths_N, np.inf)
