@@ -127,7 +127,7 @@ STEPS = {  # module -> files that it depends on, and some that it does not
         {"gpca/classifier/gpc.py", "gpca/encoders/training.py"},
         {"gpca/explainers/interface.py", "gpca/active_learning/acquisition.py"},
     ),
-    "gpca.experiments.runtime.step": (
+    "gpca.steps.runtime": (
         {"gpca/model/explainer.py", "gpca/active_learning/acquisition.py"},
         {"gpca/explainers/interface.py"},
     ),

@@ -6,6 +6,7 @@ import pytest
 
 from gpca.__main__ import COMMANDS
 from gpca.code_files import ROOT
+from gpca.experiments.registry import steps as declared
 from tests.steps.by_words import main, module_of, run_apart
 
 from .command_lines import STEP_OPTIONS, arguments
@@ -25,7 +26,7 @@ BY_HAND = {"labels.csv", "answers.txt"}  # given by a person, not made
 
 def test_every_step_is_tested_here_or_elsewhere():
     rules = "".join(path.read_text() for path in (ROOT / "workflow/rules").glob("*.smk"))
-    modules = set(re.findall(r'step="(gpca[\w.:]+)"', rules))
+    modules = set(re.findall(r'step="(gpca[\w.:]+)"', rules)) | {step.run for step in declared()}
     steps = (set(STEP_OPTIONS) | ELSEWHERE) - set(COMMANDS)
     assert modules == {module_of(step) for step in steps}
     assert set(COMMANDS) <= set(STEP_OPTIONS) | ELSEWHERE

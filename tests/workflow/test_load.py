@@ -116,7 +116,7 @@ def test_a_step_takes_what_its_rule_gives(step, rule, unpacked):
 
 UNPACKED = {
     "gpca.steps.causes:model": {"registrations", "embeddings"},
-    "gpca.experiments.runtime.step": {"registrations", "embeddings"},
+    "gpca.steps.runtime": {"registrations", "embeddings"},
     "gpca.steps.pairs:attribute": {"input_timings"},
 }
 

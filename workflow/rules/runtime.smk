@@ -3,7 +3,7 @@ rule time_stages:
     input:
         **MODEL_INPUTS,
         model="<results>/model.pt",
-        code=code_files("gpca.experiments.runtime.step", encoder_module(MODEL_ENCODER)),
+        code=code_files("gpca.steps.runtime", encoder_module(MODEL_ENCODER)),
     output:
         out="<results>/runtime.csv",
     log:
@@ -15,7 +15,7 @@ rule time_stages:
     # It works on one thread but reserves the whole machine, since it measures times; on a cluster the profile does that.
     threads: workflow.resource_settings.cores or 1
     params:
-        step="gpca.experiments.runtime.step",
+        step="gpca.steps.runtime",
         threads=1,
         source=MODEL_SOURCE,
         seed=SEEDS[0],

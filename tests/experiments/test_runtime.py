@@ -5,8 +5,8 @@ import pytest
 
 from gpca.comparison.published import printed_seconds, read_published
 from gpca.errors import InputError
-from gpca.experiments.runtime.figure import ALL_STAGES, _stages, draw_runtime
-from gpca.experiments.runtime.tables import table7_runtime
+from gpca.experiments.plan import Run
+from gpca.experiments.runtime import ALL_STAGES, draw_runtime, stages_of, table7_runtime
 from gpca.model.runtime_file import COMPONENTS, OF_ONE_EXPLANATION, RUNTIME_COLUMNS
 
 
@@ -20,10 +20,11 @@ def rows(device="CPU", hardware="A processor, 2 cores", components=tuple(COMPONE
 RUNTIME = pd.concat([rows(), rows("GPU", "A GPU", ("features", "explanation"), 0.0001)], ignore_index=True)
 
 NUMBERS = read_published()
+RUN = Run({"sources": {"tiny": {"title": "Tiny", "stand_in": False}}, "model": {"source": "tiny"}})
 
 
 def test_every_component_stands_beside_the_printed_value():
-    table = table7_runtime(RUNTIME, "Tiny", NUMBERS)
+    table = table7_runtime(RUN, RUNTIME, NUMBERS)
     text = table.markdown()
     assert "| ICP alignment | CPU | CPU | 1.00 | 0.50 | 2.00 | 3000 |" in text
     assert "| Feature extraction | CPU | GPU | 3.00 | 0.50 | 2.00 | 1200 |" in text
@@ -37,14 +38,14 @@ def test_every_component_stands_beside_the_printed_value():
 
 
 def test_the_csv_holds_milliseconds_and_the_number_of_runs():
-    records = {(row[0], row[1], row[3]): row for row in table7_runtime(RUNTIME, "Tiny", NUMBERS).records()[1:]}
+    records = {(row[0], row[1], row[3]): row for row in table7_runtime(RUN, RUNTIME, NUMBERS).records()[1:]}
     assert records["icp", "CPU", "mean"][4] == pytest.approx(1.0)
     assert records["icp", "CPU", "mean"][8] == 100
     assert records["retraining", "CPU", "published"][4:] == (10000.0, "", "", 1, 100, True)
 
 
 def test_the_stages_add_up_to_one_explanation():
-    paper, cpu, gpu = _stages(RUNTIME, NUMBERS).values()
+    paper, cpu, gpu = stages_of(RUNTIME, NUMBERS).values()
     assert sum(stage.mean for stage in paper.values()) == pytest.approx(4225)
     assert {stage.deviation for stage in paper.values()} == {0}
     assert list(cpu) == list(gpu) == list(OF_ONE_EXPLANATION)
@@ -53,7 +54,7 @@ def test_the_stages_add_up_to_one_explanation():
 
 
 def test_all_times_are_on_one_scale_and_ours_have_their_spread():
-    [panel] = draw_runtime(RUNTIME, "Tiny", NUMBERS).axes
+    [panel] = draw_runtime(RUN, RUNTIME, NUMBERS).axes
     assert panel.get_xscale() == "log"
     assert [label.get_text() for label in panel.get_yticklabels()][-1] == ALL_STAGES
     spans = [line.get_xdata() for line in panel.get_lines() if len(line.get_xdata()) == 2 and line.get_linewidth() == 1]
@@ -62,11 +63,11 @@ def test_all_times_are_on_one_scale_and_ours_have_their_spread():
 
 
 def test_the_figure_is_the_same_bytes_each_time(same_bytes):
-    same_bytes(lambda: draw_runtime(RUNTIME, "Tiny", NUMBERS))
+    same_bytes(lambda: draw_runtime(RUN, RUNTIME, NUMBERS))
 
 
 def test_what_was_not_measured_is_named():
     with pytest.raises(InputError, match="has no row of 'scores'"):
-        _stages(RUNTIME[RUNTIME["component"] != "scores"], NUMBERS)
+        stages_of(RUNTIME[RUNTIME["component"] != "scores"], NUMBERS)
     with pytest.raises(InputError, match="has no rows"):
-        table7_runtime(RUNTIME[:0], "Tiny", NUMBERS)
+        table7_runtime(RUN, RUNTIME[:0], NUMBERS)

@@ -1,1 +1,0 @@
-"""shap's ``KernelExplainer`` on a function that registers, beside the values from a table of its outcomes."""

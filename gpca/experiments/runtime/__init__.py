@@ -1,1 +1,0 @@
-"""How long each stage of GP-CA takes (paper Table VII)."""
