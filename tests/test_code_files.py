@@ -115,7 +115,7 @@ STEPS = {  # module -> files that it depends on, and some that it does not
         {"gpca/causes/drawing.py", "gpca/causes/descriptors.py", "gpca/active_learning/rounds.py"},
         {"gpca/explainers/interface.py", "gpca/active_learning/stream.py"},
     ),
-    "gpca.experiments.frame_labels.step": (
+    "gpca.steps.frame_labels": (
         {"gpca/active_learning/retraining.py", "gpca/pairs/description.py"},
         {"gpca/explainers/interface.py", "gpca/active_learning/stream.py", "gpca/frames/synthesis.py"},
     ),

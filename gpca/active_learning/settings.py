@@ -7,7 +7,8 @@ from typing import Annotated, Literal
 
 from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
-from gpca.settings import Bounds, Count, Distinct, OpenShare, PositiveShare, fields_of
+from gpca.pairs.perturbation import Concept
+from gpca.settings import Bounds, Count, Different, Distinct, OpenShare, PositiveShare, fields_of
 
 
 @dataclass(frozen=True)
@@ -98,6 +99,7 @@ class StreamSettings:
 
 
 ALL_LABELS = "all_labels"  # the whole pool at once, an upper bound
+PAIR = "pair"  # embedding of a depth frame that consists of measurements of the pair
 NEW_CONCEPT_STRATEGIES = ("bald_kmeans", "random", ALL_LABELS)
 FROM_OTHERS = {  # embeddings by encoders of other jobs, and what they require
     "other_samples": "two seeds or more",
@@ -137,3 +139,30 @@ class NewConceptSettings:
         if missing := set(self.erring) - set(self.embeddings):
             fault = f"'{sorted(missing)[0]}' is not among the embeddings"
             raise InputError("setting erring of new_concepts", fault, f"choose from {', '.join(self.embeddings)}")
+
+
+@dataclass(frozen=True)
+class FrameLabelSettings:
+    """Learning a new concept on depth frames, where it differs from a concept that is rare on whole objects.
+
+    Attributes:
+        seeds: number of the run's seeds that are used, from the first.
+        backbones: encoders whose embeddings are learned from, if the depth frames have them.
+        held_out: the new concepts, in turn.
+        initial: labeled samples of the other concepts before the first query, balanced.
+        share: of the new concept in the pool.
+        labels: the budget of queries.
+        least: least number of labels, even if all targets are reached earlier.
+        targets: accuracies on the test samples to which labels are counted.
+        points: drawn from each cloud to describe a pair.
+    """
+
+    seeds: Count = 1
+    backbones: Annotated[tuple[str, ...], Different(fewest=0)] = ("dgcnn", "pointnet2")
+    held_out: Distinct[Concept] = ("overlap",)
+    initial: Annotated[int, Bounds(minimum=2)] = 10
+    share: OpenShare = 0.05
+    labels: Count = 60
+    least: Count = 20
+    targets: Distinct[PositiveShare] = (0.65, 0.7, 0.75)
+    points: Annotated[int, Bounds(minimum=32, maximum=65536)] = 512

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from gpca.experiments.real_world.tables import encoder_title
+from gpca.experiments.frames import encoder_title
 from gpca.experiments.registry import experiments
 from gpca.explainers.gpca import GPCA_FORMS
 from gpca.explainers.registry import explainer_entry

@@ -1,7 +1,7 @@
 """A step of an experiment: from its declaration, the workflow makes the rule that runs it.
 
 In the patterns of files, a name in braces is a wildcard, with a job for each of its values; ``{*name}`` stands for all
-values in one job, which is given them as a list with an ``s`` behind the name; and a name with a single value, such as
+values in one job, which is given them as a list under the plural of the name; and a name with a single value, such as
 ``{frames}``, is replaced by it. Values are those of :func:`gpca.experiments.run.names_of`.
 """
 
@@ -107,6 +107,11 @@ def rules_of(step: Step, plan: Plan) -> list[Rule]:
     ]
 
 
+def plural(name: str) -> str:
+    """Argument of a job that holds a list: ``methods``, ``strategies``."""
+    return f"{name[:-1]}ies" if name.endswith("y") else f"{name}s"
+
+
 def all_files(step: Step, plan: Plan) -> list[str]:
     """All outputs of a step, for all values of its wildcards."""
     patterns = [each for outputs in step.outputs.values() for each in _listed(outputs)]
@@ -124,7 +129,7 @@ def _rule(step: Step, plan: Plan, name: str) -> Rule:
         if not star and not isinstance(plan.names.get(_source(step, wildcard)), str)
     ]
     lists = {
-        f"{listed}s": list(plan.names[_source(step, listed)]) for star, listed in dict.fromkeys(in_outputs) if star
+        plural(listed): list(plan.names[_source(step, listed)]) for star, listed in dict.fromkeys(in_outputs) if star
     }
     constraints = {
         wildcard: "|".join(map(str, plan.names[_source(step, wildcard)])) or "none"
@@ -174,7 +179,7 @@ def _rule_outside(step: Step, plan: Plan, name: str, outside: Sequence[str]) -> 
         inputs=rule.inputs | dynamic,
         code=lambda wildcards: code_files(step.run, *step.modules(of(wildcards))),
         settings=lambda wildcards: _as_json(step, of(wildcards), wildcards),
-        params=rule.params | given | {f"{name}s": lambda wildcards: [getattr(wildcards, wildcard)]},
+        params=rule.params | given | {plural(name): lambda wildcards: [getattr(wildcards, wildcard)]},
         constraints=rule.constraints | {wildcard: "|".join(outside) or "none"},
     )
 

@@ -31,7 +31,7 @@ MODULES = {f: f"gpca.steps.{module}:{f}" for module, functions in SHARED.items()
     "estimate": IN + "estimators.step",
     "frame_causes": IN + "frame_causes.step",
     "diagnose_frames": IN + "frame_causes.diagnosis_step",
-    "frame_labels": IN + "frame_labels.step",
+    "frame_labels": "gpca.steps.frame_labels",
     "gradients": IN + "gradients.step",
     "guarantee": IN + "guarantee.step",
     "kernel_grid": IN + "kernel_grid.step",

@@ -139,7 +139,7 @@ rule real_world:
             strategy=NAMES["new_concept_strategy"],
             seed=NAMES["frame_label_seed"],
         ),
-        code=collector_code("gpca.experiments.frame_labels.metrics:collect"),
+        code=collector_code("gpca.experiments.real_world.metrics:collect"),
     output:
         "<results>/real_world.csv",
     log:
@@ -150,7 +150,7 @@ rule real_world:
     conda:
         "../envs/gpca.yaml"
     params:
-        collector="gpca.experiments.frame_labels.metrics:collect",
+        collector="gpca.experiments.real_world.metrics:collect",
         targets=config["frame_labels"]["targets"],
     script:
         "../scripts/collect.py"

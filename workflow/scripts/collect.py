@@ -8,7 +8,7 @@ from gpca.registry import load
 
 with workflow_script(snakemake) as added:
     arguments = dict(snakemake.params.items())
-    collect, token = load(arguments.pop("collector")), arguments.pop("config")
+    collect, token = load(arguments.pop("collector")), arguments.pop("config", "")
     config = Recorded(snakemake.config)
     made = collect(*([Run(config, names_of=names_of)] if token else []), **files_by_name(snakemake.input), **arguments)
     if token:

@@ -10,13 +10,13 @@ from gpca.encoders.registry import OPTIONS, EncoderSettings
 from gpca.errors import InputError, require_names, with_key
 from gpca.experiments.experiment import EXPLAINERS, Experiment, LeftOut, Names, Tidy
 from gpca.experiments.explained import titles
+from gpca.experiments.frames import encoder_title, frames_of
 from gpca.experiments.real_world.settings import RealWorldSettings
-from gpca.experiments.real_world.tables import CLASSIC, encoder_title
+from gpca.experiments.real_world.tables import CLASSIC
 from gpca.explainers.registry import explainer_entry, require_settings
 from gpca.frames.source import ONE_ENCODER, REAL_WORLD, conditions_of, has_estimates, resolve_datasets
 from gpca.objects import procedural
 from gpca.objects.entry import title_of
-from gpca.reporting.words import dataset_in_words
 
 POSES = {"results": "Pose estimators", "true_pose": "True pose, small error"}  # titles by form; all others:
 GLOBAL_POSE = "Global registration"
@@ -110,7 +110,7 @@ def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
 def shown(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
     """Return the titles of the frames, their initial poses, the encoders and the other explainers."""
     frames = config["real_world"]
-    source = {"title": frames["title"] or _title(config), "stand_in": not frames["datasets"]}
+    source = frames_of(config)
     poses = {REAL_WORLD: frames["initial_pose"]}
     poses |= {f"{REAL_WORLD}_{name}": entry for name, entry in conditions_of(config).items()}
     first_reduction = next(iter(frames["reductions"]))
@@ -124,7 +124,6 @@ def shown(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
         "published_encoders": {name: config["encoders"][name] for name in frames["published"].values()},
         "frame_explainers": titles(frames["explainers"]),
         "frame_sees": {name: explainer_entry(explainer).sight for name, explainer in _behind(frames).items()},
-        "frame_encoders": {name: encoder_title(name, "none") for name in frames["backbones"]},
         "unreduced_methods": unreduced_methods(frames),
         "backbones": {name: config["encoders"][name] for name in frames["backbones"]},
         "shown_backbones": [f"{backbone}-{first_reduction}" for backbone in frames["backbones"]],
@@ -137,13 +136,6 @@ def _behind(frames: Mapping) -> dict[str, str]:
     own = {name: name for name in (*CLASSIC, *frames["explainers"])}
     embedded = [*reduced_backbones(frames), *published_backbones(frames)]
     return dict.fromkeys(embedded, "gpca") | own
-
-
-def _title(config: Mapping[str, Any]) -> str:
-    """Return what the datasets of frames are called that this run has: optional ones may be absent."""
-    datasets = resolve_datasets(config["real_world"]["datasets"], config["data_dir"])
-    *others, last = [dataset_in_words(name) for name in datasets] or ["Table-top RGB-D"]
-    return f"{', '.join(others)} and {last} frames" if others else f"{last} frames"
 
 
 def reduced_backbones(frames: Mapping) -> list[str]:

@@ -14,8 +14,8 @@ from gpca.errors import InputError
 from gpca.evaluation.measures import source_method_seed
 from gpca.experiments.concept_attribution.confusions import counts_and_shares, pooled_confusions
 from gpca.experiments.diagnosis.reliability import reliability_figure
+from gpca.experiments.frames import encoder_title
 from gpca.experiments.real_world.metrics import read_together
-from gpca.experiments.real_world.tables import encoder_title
 from gpca.reporting.figures.panels import draw_percentages, panels
 from gpca.reporting.figures.style import TEXT_WIDTH_IN, write_title
 

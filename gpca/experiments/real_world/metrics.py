@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,6 +13,7 @@ from gpca.attribution.metrics import attribution_metrics
 from gpca.attribution.predictions import concepts_of, read_predictions
 from gpca.errors import InputError
 from gpca.evaluation.measures import ALL, read_metrics, source_method_seed, tidy
+from gpca.experiments.frame_labels import collect_labels
 from gpca.frames.source import REAL_WORLD
 from gpca.pairs.dataset import read_samples_of_frames
 
@@ -26,6 +27,8 @@ def collect(
     prediction_files: Iterable[str | Path],
     pose_files: Iterable[str | Path],
     one_encoder_files: Iterable[str | Path] = (),
+    label_files: Sequence[str | Path] = (),
+    targets: Sequence[float] = (),
 ) -> pd.DataFrame:
     """Return the tidy metrics of prediction files named ``…/{source}/{method}/seed{seed}.csv``.
 
@@ -37,10 +40,13 @@ def collect(
     Args:
         pose_files: named ``…/{source}/seed{seed}.csv``, of every source and seed among the predictions.
         one_encoder_files: predictions of several classifiers on one encoder's embeddings, which are not parted.
+        label_files, targets: of :func:`gpca.experiments.frame_labels.collect_labels`, whose metrics stand below.
 
     Raises:
         InputError: no files, a name of another form, files that do not belong together, what their readers refuse.
     """
+    import pandas as pd
+
     poses = {(Path(path).parts[-2], Path(path).stem): path for path in pose_files}
     records = []
     for path in prediction_files:
@@ -60,7 +66,8 @@ def collect(
         rows = read_predictions(path)
         metrics = attribution_metrics(rows[rows["split"] == "test"], concepts_of(rows))
         records += [(TOGETHER, source, method, "accuracy", ALL, seed, metrics["accuracy"][ALL])]
-    return tidy(records, "predictions")
+    metrics = tidy(records, "predictions")
+    return pd.concat([metrics, *collect_labels(label_files, targets)], ignore_index=True) if label_files else metrics
 
 
 def read_together(path: str | Path) -> pd.DataFrame:

@@ -15,6 +15,7 @@ import numpy as np
 from gpca.encoders.registry import make_encoder, parameter_count
 from gpca.evaluation.intervals import UNTRAINED
 from gpca.evaluation.measures import ALL
+from gpca.experiments.frames import BACKBONES, REDUCTIONS, encoder_title
 from gpca.experiments.real_world.metrics import DATASET, SEEN, TOGETHER, UNSEEN
 from gpca.frames.source import ONE_ENCODER, REAL_WORLD
 from gpca.pairs.perturbation import CONCEPTS
@@ -26,11 +27,7 @@ from gpca.reporting.words import dataset_in_words, plural
 if TYPE_CHECKING:
     import pandas as pd
 
-BACKBONES = {"dgcnn": "DGCNN", "pointnet": "PointNet", "pointnet2": "PointNet++", "pointnext": "PointNeXt-S"}
-BACKBONES |= {"dgcnn_1024": "DGCNN of 1024 features", "pointnet_tnet": "PointNet with T-Nets"}
-BACKBONES |= {"pointnet2_ssg": "PointNet++ as published"}
 PUBLISHED_NOTE = "readings of which architecture the paper used; they are not compared with what it prints."
-REDUCTIONS = {"none": "No reduction", "pca": "PCA", "umap": "UMAP", "autoencoder": "Autoencoder"}
 CLASSIC = {
     "analytical_gpc": "Classic features",
     "analytical_gpc_no_counts": "Classic features without point counts",
@@ -38,12 +35,6 @@ CLASSIC = {
 NOT_SHARES = ("ece", "nll", "icp_calls")  # of which there is one number for all samples
 SCENES = ("scenes", "scene")
 EVERYTHING_SEEN = {TOGETHER: "All (%)", SEEN: "Seen objects (%)", UNSEEN: "Unseen objects (%)"}
-
-
-def encoder_title(encoder: str, reduction: str) -> str:
-    """Return the name of an encoder and the reduction after it in figures."""
-    named = BACKBONES.get(encoder, encoder)
-    return named if reduction == "none" else f"{named}, {REDUCTIONS.get(reduction, reduction)}"
 
 
 def table6_of_encoders(

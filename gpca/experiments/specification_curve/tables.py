@@ -11,7 +11,7 @@ import numpy as np
 
 from gpca.comparison.readings import summarize
 from gpca.evaluation.measures import ALL
-from gpca.experiments.real_world.tables import encoder_title
+from gpca.experiments.frames import encoder_title
 from gpca.experiments.specification_curve.registry import FRAME_INPUT
 from gpca.experiments.specification_curve.words import reading_in_words
 from gpca.objects.entry import stand_in_clause
