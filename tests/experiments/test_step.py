@@ -96,6 +96,11 @@ def test_names_from_outside_have_jobs_of_their_own():
     assert rules_of(step(apart=("method", lambda plan: [])), PLAN)[1].constraints["outside_method"] == "none"
 
 
+def test_lists_have_the_plural_of_their_name():
+    [rule] = rules_of(step(outputs={"out": "curves/{*strategy}.csv"}, where={"strategy": "method"}), PLAN)
+    assert rule.params["strategies"] == ["icp", "fgr"]
+
+
 def test_a_step_that_a_run_does_without_has_no_rule():
     assert rules_of(step(when=lambda plan: False), PLAN) == []
 
