@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 UNKNOWN_STATUS = 3  # exit code; 1 is a failed check, 2 a user's fault
 FORMATS = "PLY, PCD, OBJ, STL, OFF, npy, npz, xyz, csv, KITTI's bin, LAS, E57"
-FIGURE = "gpca.reporting.figures.explanation"  # by name: only this needs matplotlib
+FIGURE = "gpca.model.explanation_figure"  # by name: only this needs matplotlib
 OBJECT_OPTIONS = ("model", "fast", "uncertainty", "estimator", "queue", "png")  # they need a model of objects
 
 

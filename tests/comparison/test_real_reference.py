@@ -6,13 +6,13 @@ import yaml
 
 from gpca.code_files import ROOT
 from gpca.comparison.claims import read_verdicts
+from gpca.comparison.claims_table import counted
+from gpca.comparison.markdown import counts_table, summary
 from gpca.comparison.published import NONE_YET, read_published, read_reasons
 from gpca.comparison.readings import READINGS, judge_readings, with_readings
 from gpca.comparison.values import read_results
 from gpca.comparison.verdicts import JUDGED, NOT_COMPARABLE, Tolerance, compare
 from gpca.experiments.specification_curve.words import ReadingWords
-from gpca.reporting.tables.claims import counted
-from gpca.reporting.tables.comparison import counts_table, summary
 
 SETTINGS = yaml.safe_load((ROOT / "config/config.yaml").read_text())["comparison"]["tolerances"]
 TOLERANCES = {unit: Tolerance(**tolerance) for unit, tolerance in SETTINGS.items()}

@@ -10,6 +10,7 @@ import yaml
 from scipy.stats import chi2
 
 from gpca.code_files import ROOT
+from gpca.comparison.markdown import comparison_markdown, summary
 from gpca.comparison.published import NONE_YET, Reason, read_published, read_reasons, reason_of
 from gpca.comparison.readings import READINGS
 from gpca.comparison.values import Reproduced, read_results, value_of_run
@@ -31,7 +32,6 @@ from gpca.comparison.verdicts import (
 )
 from gpca.errors import InputError
 from gpca.experiments.registry import experiments
-from gpca.reporting.tables.comparison import comparison_markdown, summary
 
 from .made_up import ACCURACY, OBJECTS, TIME, TOLERANCES, compared, number, runtime, tidy
 

@@ -66,7 +66,7 @@ rule comparison:
             "gpca.comparison.claims",
             "gpca.comparison.readings",
             "gpca.experiments.specification_curve.words",
-            "gpca.reporting.tables.comparison",
+            "gpca.comparison.markdown",
             "gpca.process.job",
         ),
     output:

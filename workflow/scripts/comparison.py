@@ -1,6 +1,7 @@
 """A run's collected numbers beside the printed ones and the paper's sentences -> verdicts on both, and on readings."""
 
 from gpca.comparison.claims import counterparts_of, judge, read_claims
+from gpca.comparison.markdown import comparison_markdown
 from gpca.comparison.published import read_published, read_reasons
 from gpca.comparison.readings import READINGS, judge_readings, with_readings
 from gpca.comparison.values import cluster_draws, measured_on, read_results
@@ -9,7 +10,6 @@ from gpca.experiments.specification_curve.words import ReadingWords
 from gpca.io.csv_file import write_csv
 from gpca.io.files import whole_file
 from gpca.process.job import workflow_script
-from gpca.reporting.tables.comparison import comparison_markdown
 
 with workflow_script(snakemake):
     given, params = snakemake.input, snakemake.params

@@ -2,8 +2,8 @@ import pandas as pd
 import pytest
 
 from gpca.comparison.claims import CLAIM_COLUMNS
+from gpca.comparison.claims_table import claims
 from gpca.errors import InputError
-from gpca.reporting.tables.claims import claims
 
 OF_CLAIM = {"claim": "best", "sentence": "Ours is best.", "place": "Sec. IV", "test": "greater", "unit": "%",
             "margin": "1", "ratio": "False", "table": "learners/in_distribution", "one": "a", "other": "b", "n": 5.0,
