@@ -17,11 +17,11 @@ COLLECTED = [tidy for each in experiments() for tidy in each.tidy if tidy.collec
 @pytest.mark.parametrize("tidy", COLLECTED, ids=lambda tidy: tidy.file)
 def test_a_collector_takes_its_files_and_arguments_and_the_config_has_these(tidy):
     arguments = {*tidy.files, *tidy.settings(without_false(load()))}
-    inspect.signature(load_function(tidy.collector)).bind(**dict.fromkeys(arguments))
+    inspect.signature(load_function(tidy.collector)).bind(*[None] * tidy.takes_run, **dict.fromkeys(arguments))
 
 
 def test_no_two_experiments_write_one_file_or_read_one_section():
-    files = [tidy.file for each in experiments() for tidy in each.tidy]
+    files = [file for each in experiments() for tidy in each.tidy for file in tidy.all_files]
     sections = [name for each in experiments() for name in each.sections]
     assert len(set(files)) == len(files)
     assert len(set(sections)) == len(sections)

@@ -27,7 +27,9 @@ def given(pattern, **fields):
 def test_every_builder_and_reader_takes_what_its_entry_gives(name):
     entry = ENTRIES[name]
     builder = inspect.signature(load(entry.builder))
-    builder.bind(**dict.fromkeys({each.argument for each in entry.inputs} | set(entry.settings)))
+    of_source = {"source"} if entry.takes_run and "{source}" in entry.name else set()
+    arguments = {each.argument for each in entry.inputs} | set(entry.settings) | of_source
+    builder.bind(*[None] * entry.takes_run, **dict.fromkeys(arguments))
     for each in entry.inputs:
         if each.read:
             keywords = {key: None for key in each.files if key}
