@@ -6,7 +6,7 @@ there is no sample. Borderline samples are not counted.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,7 +17,8 @@ from gpca.attribution.predictions import read_predictions
 from gpca.causes.dataset import LABELS, Causes, labels_of
 from gpca.causes.truth import ALL, BORDERLINE, NOMINAL, Truth, state_of_errors
 from gpca.errors import InputError
-from gpca.evaluation.measures import source_method_seed
+from gpca.evaluation.intervals import ANYTHING
+from gpca.evaluation.measures import SHARE, Measure, source_method_seed
 from gpca.io.container import require_same_samples
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import seed_of_file
@@ -27,19 +28,6 @@ if TYPE_CHECKING:
 
 CEILING = "ceiling"  # the truth, measured again from other starts: no explainer can be expected to do better
 RECALL = 0.9  # of the failed, at which false alarms are counted
-OF_ALARM = ("auroc_failed", "auprc_failed", "false_alarm_rate", "nominal_calibration")
-OF_STATES = ("state_accuracy", "state_accuracy_shown", "auroc_failed_shown")
-HEADLINES = ("regret", "tied_accuracy")
-OF_CAUSES = (
-    *(*HEADLINES, "named_right", "balanced_accuracy", "dominant_accuracy", "average_precision"),
-    *("spearman_attribution", "cosine_attribution", "deletion_gain"),
-)
-MEASURES = (*OF_CAUSES[:5], *OF_ALARM, *OF_STATES, *OF_CAUSES[5:])
-OF_FAILED = (*HEADLINES, "dominant_accuracy", "spearman_attribution", "cosine_attribution", "deletion_gain")
-OF_SHOWN = ("state_accuracy_shown", "auroc_failed_shown")
-# Shares of samples or of pairs of them: an interval of these is never of no width.
-SHARES = (*OF_CAUSES[1:6], *OF_ALARM[:3], *OF_STATES)
-SMALLER_IS_BETTER = ("regret", "false_alarm_rate", "nominal_calibration")
 BINS = 10  # of the calibration error
 
 
@@ -192,6 +180,45 @@ def _judged(tested: SampleTruth, seed: int, alarm_N, scores_N_4: np.ndarray, nam
     )
 
 
+def _labeled(samples: Judged) -> np.ndarray:
+    return samples.label != BORDERLINE
+
+
+def _nominal(samples: Judged) -> np.ndarray:
+    return samples.label == NOMINAL
+
+
+def _failed(samples: Judged) -> np.ndarray:
+    return _labeled(samples) & ~_nominal(samples)
+
+
+def _shown(samples: Judged) -> np.ndarray:
+    return samples.shown != BORDERLINE
+
+
+# What :func:`measure` returns: the samples that each depends on, whether it is a share, and whether least is best.
+MEASURES: Mapping[str, Measure] = {
+    "regret": Measure(counted=_failed, limits=ANYTHING, least_is_best=True),
+    "tied_accuracy": Measure(counted=_failed),
+    "named_right": Measure(counted=_labeled),
+    "balanced_accuracy": Measure(counted=_labeled),
+    "dominant_accuracy": Measure(counted=_failed),
+    "auroc_failed": Measure(counted=_labeled),
+    "auprc_failed": Measure(counted=_labeled),
+    "false_alarm_rate": Measure(counted=_nominal, least_is_best=True),
+    "nominal_calibration": Measure(counted=_labeled, limits=ANYTHING, least_is_best=True),
+    "state_accuracy": Measure(counted=_labeled),
+    "state_accuracy_shown": Measure(counted=_shown),
+    "auroc_failed_shown": Measure(counted=_shown),
+    "average_precision": Measure(counted=_labeled),
+    "spearman_attribution": Measure(counted=_failed, limits=ANYTHING),
+    "cosine_attribution": Measure(counted=_failed, limits=ANYTHING),
+    "deletion_gain": Measure(counted=_failed, limits=ANYTHING),
+}
+SHARES = tuple(name for name, each in MEASURES.items() if each.limits is SHARE)
+SMALLER_IS_BETTER = tuple(name for name, each in MEASURES.items() if each.least_is_best)
+
+
 def measure(samples: Judged, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
     """Return every measure (B,) of :data:`MEASURES` that the explainer has.
 
@@ -232,13 +259,8 @@ def measure(samples: Judged, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def counted(samples: Judged, metric: str) -> np.ndarray:
-    """Return which samples (N,) a measure is taken over: those of a label, and of these the nominal or the failed."""
-    if metric in OF_SHOWN:
-        return samples.shown != BORDERLINE
-    labeled_N, nominal_N = samples.label != BORDERLINE, samples.label == NOMINAL
-    if metric in OF_FAILED:
-        return labeled_N & ~nominal_N
-    return nominal_N if metric == "false_alarm_rate" else labeled_N
+    """Mask (N,) of the samples that a measure depends on; those with a label if it is none of `MEASURES`."""
+    return MEASURES[metric].counted(samples) if metric in MEASURES else _labeled(samples)  # type: ignore[misc]
 
 
 def _of_causes(samples: Judged, labeled_N, failed_N, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:

@@ -14,9 +14,9 @@ from tempfile import TemporaryDirectory
 from textwrap import fill
 from typing import TYPE_CHECKING
 
+from gpca.causes.judged import CEILING, RECALL
 from gpca.errors import InputError
-from gpca.experiments.diagnosis.judged import CEILING, POOLED
-from gpca.experiments.diagnosis.measures import RECALL
+from gpca.evaluation.measures import POOLED
 from gpca.experiments.diagnosis.metrics import read_intervals
 from gpca.io.files import require_outputs, whole_file
 from gpca.io.structured_text import load_own_yaml, read_json

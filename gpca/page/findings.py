@@ -11,9 +11,9 @@ import numpy as np
 
 from gpca.active_learning.curves import TABLE
 from gpca.active_learning.settings import JUDGED_SHARE, rare_setting
+from gpca.causes.judged import CEILING
 from gpca.evaluation.intervals import UNTRAINED
-from gpca.evaluation.measures import ALL, read_metrics
-from gpca.experiments.diagnosis.judged import CEILING, POOLED
+from gpca.evaluation.measures import ALL, POOLED, read_metrics
 from gpca.experiments.diagnosis.metrics import read_intervals
 from gpca.experiments.real_world.metrics import read_together
 from gpca.explainers.gpca import GPCA_FORMS

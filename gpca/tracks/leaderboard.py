@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gpca.causes.judged import CEILING, SMALLER_IS_BETTER
 from gpca.evaluation.intervals import REPEATS
-from gpca.experiments.diagnosis.judged import CEILING, POOLED
-from gpca.experiments.diagnosis.measures import SMALLER_IS_BETTER
+from gpca.evaluation.measures import POOLED
 from gpca.experiments.diagnosis.tables import AGAIN, SHOWN
 from gpca.experiments.frame_causes.metrics import STATE
 from gpca.experiments.frame_causes.tables import FEWEST_FAILURES, STARTS

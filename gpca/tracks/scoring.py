@@ -13,10 +13,10 @@ import numpy as np
 
 from gpca.attribution.scores import Attribution
 from gpca.causes.dataset import LABELS
+from gpca.causes.judged import CEILING, SHARES, Judged, ceiling_of, counted, joined, judged_of, measure, ranking
 from gpca.causes.truth import BORDERLINE, NOMINAL
 from gpca.evaluation.intervals import interval, pigeonhole_weights
-from gpca.experiments.diagnosis.judged import CEILING, POOLED, Judged, ceiling_of, joined, judged_of
-from gpca.experiments.diagnosis.measures import SHARES, counted, measure, ranking
+from gpca.evaluation.measures import POOLED
 from gpca.experiments.scan_causes.metrics import CAUSES as SCAN_MEASURE
 from gpca.experiments.scan_causes.metrics import EVERY, NATURAL, counted_of_scans, scan_measures
 from gpca.pairs.perturbation import CONCEPTS

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gpca.experiments.diagnosis.judged import CEILING, POOLED
+from gpca.causes.judged import CEILING
+from gpca.evaluation.measures import POOLED
 from gpca.experiments.diagnosis.metrics import collect_intervals
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.tracks.leaderboard import MARK, as_text, table_of

@@ -6,9 +6,9 @@ from collections.abc import Iterable, Mapping
 from math import inf
 from typing import TYPE_CHECKING
 
+from gpca.evaluation.measures import POOLED
 from gpca.experiments.controls.settings import PAPER, SEEN, TRAININGS, TRANSFER, UNSEEN, trained_otherwise
 from gpca.experiments.controls.tables import ALL_TOGETHER, BOOTSTRAP, CHANGE, TITLES, change_cell
-from gpca.experiments.diagnosis.judged import POOLED
 from gpca.explainers.gpca import GPCA_FORMS
 from gpca.objects.entry import stand_in_clause
 from gpca.reporting.tables.builder import TableBuilder, crossed, titles_of

@@ -14,13 +14,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpca.attribution.predictions import read_predictions
+from gpca.causes.judged import ranking
 from gpca.errors import InputError
 from gpca.evaluation.intervals import Difference, from_rival, from_untrained, interval, pigeonhole_weights
-from gpca.evaluation.measures import ALL, source_method_seed, tidy
+from gpca.evaluation.measures import ALL, POOLED, source_method_seed, tidy
 from gpca.experiments.controls.protocol import LABELS
 from gpca.experiments.controls.settings import PAPER, TRANSFER, plain_of
-from gpca.experiments.diagnosis.judged import POOLED
-from gpca.experiments.diagnosis.measures import ranking
 from gpca.io.csv_file import numbers, read_numbers
 from gpca.seeds import generator
 

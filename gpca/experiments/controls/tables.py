@@ -8,9 +8,9 @@ from math import inf, isfinite
 from typing import TYPE_CHECKING
 
 from gpca.evaluation.intervals import REPEATS
+from gpca.evaluation.measures import POOLED
 from gpca.experiments.controls.metrics import CALLS
 from gpca.experiments.controls.settings import HARD, PAPER, TRANSFER, UNSEEN, WRONG_LABELS
-from gpca.experiments.diagnosis.judged import POOLED
 from gpca.experiments.diagnosis.near_chance import rule_near_chance
 from gpca.objects.entry import stand_in_clause
 from gpca.reporting.tables.builder import TableBuilder, crossed, titles_of

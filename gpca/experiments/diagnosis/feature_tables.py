@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from gpca.evaluation.intervals import REPEATS
-from gpca.experiments.diagnosis.judged import POOLED
+from gpca.evaluation.measures import POOLED
 from gpca.experiments.diagnosis.tables import NOT_COMPARED, SHOWN, cells_of
 from gpca.objects.entry import stand_in_clause
 from gpca.reporting.tables.builder import TableBuilder, crossed, titles_of

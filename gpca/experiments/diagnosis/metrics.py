@@ -10,11 +10,20 @@ import numpy as np
 
 from gpca.attribution.metrics import ABSTAINED, PREDICTED_AS, confusion
 from gpca.causes.dataset import LABELS
+from gpca.causes.judged import (
+    CEILING,
+    MEASURES,
+    SHARES,
+    SMALLER_IS_BETTER,
+    Judged,
+    counted,
+    joined,
+    measure,
+    read_judged,
+)
 from gpca.causes.truth import BORDERLINE
 from gpca.evaluation.intervals import Difference, from_rival, from_untrained, interval, pigeonhole_weights
-from gpca.evaluation.measures import ALL, tidy
-from gpca.experiments.diagnosis.judged import CEILING, POOLED, Judged, joined, read_judged
-from gpca.experiments.diagnosis.measures import MEASURES, SHARES, SMALLER_IS_BETTER, counted, measure
+from gpca.evaluation.measures import ALL, POOLED, tidy
 from gpca.io.csv_file import read_numbers
 from gpca.seeds import generator
 
@@ -34,7 +43,7 @@ def collect(prediction_files: Iterable[str | Path], causes_files: Iterable[str |
     """Return tidy metrics of all test samples of a seed: the confusion, and what `measures` measures.
 
     Raises:
-        InputError: see :func:`gpca.experiments.diagnosis.judged.read_judged`.
+        InputError: see :func:`gpca.causes.judged.read_judged`.
     """
     records = []
     for (source, explainer, seed), samples in with_pooled(read_judged(prediction_files, causes_files)).items():
@@ -69,7 +78,7 @@ def by_source(
     """Return the samples of all seeds together, for every source and all of them, by explainer.
 
     Raises:
-        InputError: see :func:`gpca.experiments.diagnosis.judged.read_judged`.
+        InputError: see :func:`gpca.causes.judged.read_judged`.
     """
     parts: dict[str, dict[str, list[Judged]]] = {}
     for (source, explainer, _), samples in with_pooled(read_judged(prediction_files, causes_files)).items():

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from gpca.experiments.diagnosis.judged import POOLED
+from gpca.evaluation.measures import POOLED
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.tables.cells import interval_cell, rows_where
 

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gpca.causes.judged import BINS as BINS_OF_NOMINAL
+from gpca.causes.judged import Judged
 from gpca.causes.truth import BORDERLINE, NOMINAL
 from gpca.errors import InputError
 from gpca.evaluation.intervals import wilson_interval
-from gpca.experiments.diagnosis.judged import Judged
-from gpca.experiments.diagnosis.measures import BINS as BINS_OF_NOMINAL
 from gpca.reporting.figures.panels import MOST_PER_ROW, label_outer, legend_below, panels_in_lines
 from gpca.reporting.figures.style import BLUE, GRAY, LIGHT_GRAY, SMALL_PT, TEXT_WIDTH_IN, write_title
 
@@ -30,7 +30,7 @@ def draw_nominal_reliability(
     """Draw the share of nominal registrations over the score of "nominal", all sources and seeds together.
 
     Args:
-        judged: what :func:`gpca.experiments.diagnosis.judged.read_judged` returns; borderline samples are left out.
+        judged: what :func:`gpca.causes.judged.read_judged` returns; borderline samples are left out.
     """
     parts = {
         name: [of_seed for (source, own, _), of_seed in judged.items() if own == name and source in sources]

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gpca.causes.judged import Judged, of_decisions
 from gpca.causes.truth import ALL, BORDERLINE, FAILED, NOMINAL
 from gpca.evaluation.intervals import pigeonhole_weights
-from gpca.experiments.diagnosis.judged import POOLED, Judged
-from gpca.experiments.diagnosis.measures import of_decisions
+from gpca.evaluation.measures import POOLED
 from gpca.experiments.diagnosis.metrics import COLUMNS, NUMBERS, by_source, rows_of
 from gpca.io.csv_file import read_numbers
 from gpca.seeds import generator
@@ -55,7 +55,7 @@ def collect_strata(prediction_files: Iterable[str | Path], causes_files: Iterabl
     The columns after the first two are those of :func:`gpca.experiments.diagnosis.metrics.collect_intervals`.
 
     Raises:
-        InputError: see :func:`gpca.experiments.diagnosis.judged.read_judged`.
+        InputError: see :func:`gpca.causes.judged.read_judged`.
     """
     import pandas as pd
 

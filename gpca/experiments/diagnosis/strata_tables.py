@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from math import inf
 from typing import TYPE_CHECKING
 
+from gpca.causes.judged import CEILING
 from gpca.evaluation.intervals import REPEATS
-from gpca.experiments.diagnosis.judged import CEILING, POOLED
+from gpca.evaluation.measures import POOLED
 from gpca.experiments.diagnosis.strata import LARGE_ERROR, LARGE_MARGIN, SMALL_ERROR, SMALL_MARGIN
 from gpca.experiments.diagnosis.tables import AGAIN
 from gpca.objects.entry import stand_in_clause

@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from math import inf, isfinite
 from typing import TYPE_CHECKING
 
+from gpca.causes.judged import CEILING
 from gpca.evaluation.intervals import REPEATS
-from gpca.experiments.diagnosis.judged import CEILING, POOLED
+from gpca.evaluation.measures import POOLED
 from gpca.experiments.diagnosis.near_chance import rule_near_chance
 from gpca.experiments.frame_causes.metrics import STATE
 from gpca.explainers.interface import WORDS

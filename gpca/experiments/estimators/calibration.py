@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gpca.causes.judged import ranking
 from gpca.evaluation.intervals import interval, pigeonhole_weights
 from gpca.evaluation.measures import source_method_seed, tidy
-from gpca.experiments.diagnosis.measures import ranking
 from gpca.experiments.estimators.covariances import read_estimate_files, reference_name
 from gpca.experiments.estimators.settings import KINDS
 from gpca.io.csv_file import numbers, read_csv, read_numbers

@@ -11,11 +11,10 @@ import numpy as np
 
 from gpca.attribution.predictions import read_predictions
 from gpca.causes.dataset import LABELS, Causes, labels_of
+from gpca.causes.judged import CEILING, MEASURES, Judged, ceiling_of, joined, judged_by, measure
 from gpca.causes.truth import BORDERLINE, FAILED, GEOMETRY
 from gpca.errors import InputError
 from gpca.evaluation.intervals import Difference, pigeonhole_weights
-from gpca.experiments.diagnosis.judged import CEILING, Judged, ceiling_of, joined, judged_by
-from gpca.experiments.diagnosis.measures import MEASURES, measure
 from gpca.experiments.diagnosis.metrics import COLUMNS, rows_of
 from gpca.frames.source import REAL_WORLD
 from gpca.frames.starts import KINDS

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from math import inf
 from typing import TYPE_CHECKING
 
+from gpca.causes.judged import CEILING
 from gpca.causes.truth import BORDERLINE, GEOMETRY, NOMINAL
 from gpca.evaluation.intervals import REPEATS
-from gpca.experiments.diagnosis.judged import CEILING
 from gpca.experiments.diagnosis.tables import (
     AGAIN,
     COST_NOTE,

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gpca.errors import InputError
-from gpca.evaluation.measures import ALL
-from gpca.experiments.diagnosis.judged import POOLED
+from gpca.evaluation.measures import ALL, POOLED
 from gpca.experiments.guarantee.answers import BY_FAMILY, BY_SAMPLE, BY_STATE, CONFIDENT, FAMILIES, PLAIN
 from gpca.experiments.guarantee.metrics import COVERAGE, FALSE_ALARMS, MISSED, SHARES, SIZE
 from gpca.guarantee.guarantee import STATES

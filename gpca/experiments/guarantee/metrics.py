@@ -11,8 +11,7 @@ import numpy as np
 from gpca.causes.truth import NOMINAL
 from gpca.errors import InputError
 from gpca.evaluation.intervals import interval, pigeonhole_weights
-from gpca.evaluation.measures import ALL
-from gpca.experiments.diagnosis.judged import POOLED
+from gpca.evaluation.measures import ALL, POOLED
 from gpca.experiments.guarantee.answers import BY_FAMILY, FAMILIES, Answers, answers_of, conditions
 from gpca.experiments.guarantee.experiment import promises
 from gpca.experiments.guarantee.scored import Scored

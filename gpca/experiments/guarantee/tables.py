@@ -8,8 +8,7 @@ from math import inf
 from typing import TYPE_CHECKING, Any
 
 from gpca.evaluation.intervals import REPEATS
-from gpca.evaluation.measures import ALL
-from gpca.experiments.diagnosis.judged import POOLED
+from gpca.evaluation.measures import ALL, POOLED
 from gpca.experiments.frame_causes.tables import FEWEST_FAILURES
 from gpca.experiments.guarantee.answers import BY_FAMILY, BY_SAMPLE, BY_STATE, CONFIDENT, FAMILIES, PLAIN
 from gpca.experiments.guarantee.metrics import COVERAGE, FALSE_ALARMS, MISSED, SHARES, SINGLE, SIZE, UNSURE

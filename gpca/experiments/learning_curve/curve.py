@@ -11,10 +11,9 @@ import numpy as np
 from gpca.attribution.predictions import prediction_frame
 from gpca.attribution.scores import Attribution
 from gpca.causes.dataset import LABELS, Causes
+from gpca.causes.judged import CEILING, Judged, ceiling_of, judged_by, measure
 from gpca.errors import InputError
 from gpca.evaluation.measures import source_method_seed, tidy
-from gpca.experiments.diagnosis.judged import CEILING, Judged, ceiling_of, judged_by
-from gpca.experiments.diagnosis.measures import measure
 from gpca.experiments.learning_curve.learners import TITLES, learn
 from gpca.experiments.learning_curve.samples import Lessons
 from gpca.experiments.learning_curve.settings import CurveSettings

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+from gpca.causes.judged import CEILING
 from gpca.errors import InputError
-from gpca.experiments.diagnosis.judged import CEILING
 from gpca.experiments.learning_curve.learners import TITLES
 from gpca.reporting.figures.panels import in_lines, legend_below, panels
 from gpca.reporting.figures.style import BLUE, COLUMN_WIDTH_IN, GRAY, ORANGE

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gpca.causes.judged import SHARES, Judged, counted, measure
 from gpca.evaluation.intervals import Difference, difference, interval, pigeonhole_weights
-from gpca.experiments.diagnosis.judged import Judged
-from gpca.experiments.diagnosis.measures import SHARES, counted, measure
 from gpca.experiments.diagnosis.metrics import by_source
 from gpca.experiments.reenactment.knowledge import NOTHING
 from gpca.io.csv_file import read_numbers
@@ -32,7 +31,7 @@ def collect_oracles(prediction_files: Iterable[str | Path], causes_files: Iterab
     The difference is that from what knows nothing, on the same draws; the truth from other starts has one, too.
 
     Raises:
-        InputError: see :func:`gpca.experiments.diagnosis.judged.read_judged`.
+        InputError: see :func:`gpca.causes.judged.read_judged`.
     """
     import pandas as pd
 

@@ -7,7 +7,7 @@ from math import inf, isfinite
 from typing import TYPE_CHECKING
 
 from gpca.evaluation.intervals import REPEATS
-from gpca.experiments.diagnosis.judged import POOLED
+from gpca.evaluation.measures import POOLED
 from gpca.experiments.diagnosis.tables import AGAIN, SHOWN
 from gpca.experiments.reenactment.knowledge import KNOWN, in_words
 from gpca.objects.entry import stand_in_clause

@@ -12,12 +12,22 @@ import numpy as np
 
 from gpca.attribution.predictions import read_predictions
 from gpca.causes.dataset import LABELS, Causes, labels_of
+from gpca.causes.judged import (
+    CEILING,
+    SHARES,
+    SMALLER_IS_BETTER,
+    Judged,
+    ceiling_of,
+    counted,
+    joined,
+    judged_by,
+    measure,
+)
 from gpca.causes.scans import KINDS
 from gpca.causes.truth import BORDERLINE, FAILED, GEOMETRY
 from gpca.errors import InputError
 from gpca.evaluation.intervals import Difference, best_of, difference, interval, pigeonhole_weights
-from gpca.experiments.diagnosis.judged import CEILING, POOLED, Judged, ceiling_of, joined, judged_by
-from gpca.experiments.diagnosis.measures import SHARES, SMALLER_IS_BETTER, counted, measure
+from gpca.evaluation.measures import POOLED
 from gpca.experiments.scan_causes.settings import SCANS
 from gpca.io.container import require_same_samples
 from gpca.io.csv_file import ANY, numbers, read_csv, read_numbers

@@ -6,10 +6,11 @@ from collections.abc import Mapping
 from math import inf, isfinite
 from typing import TYPE_CHECKING
 
+from gpca.causes.judged import CEILING
 from gpca.causes.scans import GLOBAL, LADDER
 from gpca.causes.truth import BORDERLINE, GEOMETRY, NOMINAL
 from gpca.evaluation.intervals import REPEATS
-from gpca.experiments.diagnosis.judged import CEILING, POOLED
+from gpca.evaluation.measures import POOLED
 from gpca.experiments.diagnosis.tables import AGAIN, COST_NOTE, COSTS, SHOWN, reads
 from gpca.experiments.frame_causes.tables import FEWEST_FAILURES
 from gpca.experiments.scan_causes.metrics import ADDED, CAUSES, EVERY, FEWEST_OF_A_CAUSE, GATE, NATURAL, SAMPLES, TRUTH

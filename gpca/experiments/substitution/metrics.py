@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from gpca.attribution.predictions import read_predictions
 from gpca.errors import InputError
 from gpca.evaluation.intervals import Clustered
-from gpca.evaluation.measures import ALL, intervals, source_method_seed, tidy
-from gpca.experiments.diagnosis.judged import POOLED
+from gpca.evaluation.measures import ALL, POOLED, intervals, source_method_seed, tidy
 from gpca.experiments.substitution.settings import ESTIMATOR, FAILURE, LABELS, METHOD
 
 if TYPE_CHECKING:

@@ -3,10 +3,9 @@ import pytest
 
 from gpca.errors import InputError
 from gpca.evaluation.intervals import Difference
-from gpca.evaluation.measures import TIDY_COLUMNS
+from gpca.evaluation.measures import POOLED, TIDY_COLUMNS
 from gpca.experiments.controls.encoder_tables import table10_costs, table10_encoders
 from gpca.experiments.controls.metrics import COLUMNS
-from gpca.experiments.diagnosis.judged import POOLED
 
 SOURCES = {"ycb": {"title": "YCB", "stand_in": False}, "cups": {"title": "Cups", "stand_in": False}}
 EXPLAINERS = {"gpca": "GP-CA", "gpca_pair": "GP-CA on the pair"}

@@ -7,14 +7,13 @@ import pandas as pd
 import pytest
 
 from gpca.errors import InputError
-from gpca.evaluation.measures import write_metrics
+from gpca.evaluation.measures import POOLED, write_metrics
 from gpca.experiments.controls.costs import collect_costs
 from gpca.experiments.controls.metrics import collect, collect_intervals, read_controls, read_intervals
 from gpca.experiments.controls.protocol import LABELS
 from gpca.experiments.controls.samples import sample_table
 from gpca.experiments.controls.severity import REGISTRATION, read_severities
 from gpca.experiments.controls.severity import collect as collect_severities
-from gpca.experiments.diagnosis.judged import POOLED
 from gpca.io.csv_file import write_csv
 from gpca.pairs.perturbation import CONCEPTS
 

@@ -3,9 +3,9 @@ import pandas as pd
 import pytest
 
 from gpca.errors import InputError
+from gpca.evaluation.measures import POOLED
 from gpca.experiments.controls.metrics import COLUMNS
 from gpca.experiments.controls.tables import table10_controls, table10_transfer
-from gpca.experiments.diagnosis.judged import POOLED
 
 SOURCES = {"ycb": {"title": "YCB", "stand_in": True}, "cups": {"title": "Cups", "stand_in": True}}
 EXPLAINERS = {"good": "Good", "head": "Head"}

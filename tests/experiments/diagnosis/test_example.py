@@ -9,7 +9,7 @@ from gpca.experiments.diagnosis.example import CLEAR, GAP, TRUTH, _draw_scores, 
 from gpca.objects.canonical import write_objects
 from gpca.objects.procedural import surfaces
 from tests.conftest import FEW_CAUSES, FOUR
-from tests.experiments.diagnosis.files import write_run
+from tests.judged import write_run
 
 SETTINGS = FEW_CAUSES | {"points": list(FEW_CAUSES["points"]), "icp": {}}
 

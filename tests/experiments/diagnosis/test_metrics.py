@@ -2,14 +2,13 @@ import numpy as np
 import pytest
 
 from gpca.causes.dataset import LABELS, labels_of
+from gpca.causes.judged import CEILING, Judged, ceiling_of, read_judged
 from gpca.causes.truth import BORDERLINE, NOMINAL
 from gpca.errors import InputError
-from gpca.evaluation.measures import write_metrics
+from gpca.evaluation.measures import POOLED, write_metrics
 from gpca.experiments.diagnosis import metrics
-from gpca.experiments.diagnosis.judged import CEILING, POOLED, Judged, ceiling_of, read_judged
 from gpca.experiments.diagnosis.metrics import collect, collect_intervals, read_intervals
-from tests.experiments.diagnosis.conftest import random_judged
-from tests.experiments.diagnosis.files import write_run
+from tests.judged import random_judged, write_run
 
 
 def values(rows, **wanted):

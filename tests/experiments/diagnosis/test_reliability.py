@@ -2,11 +2,11 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
+from gpca.causes.judged import measure
 from gpca.errors import InputError
 from gpca.evaluation.intervals import wilson_interval
-from gpca.experiments.diagnosis.measures import measure
 from gpca.experiments.diagnosis.reliability import draw_nominal_reliability, draw_reliability_panel
-from tests.experiments.diagnosis.conftest import random_judged
+from tests.judged import random_judged
 
 SOURCES, EXPLAINERS = {"cups": "Cups"}, {"gpca_pair": "GP-CA on the pair", "absent": "Absent"}
 

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
+from gpca.causes.judged import CEILING
 from gpca.causes.truth import BORDERLINE, FAILED, NOMINAL
 from gpca.evaluation.measures import write_metrics
-from gpca.experiments.diagnosis.judged import CEILING
 from gpca.experiments.diagnosis.metrics import collect_intervals
 from gpca.experiments.diagnosis.strata import collect_strata, read_strata, strata_of
 from gpca.experiments.diagnosis.strata_tables import table9_shown, table9_strata
-from tests.experiments.diagnosis.files import write_run
+from tests.judged import write_run
 
 SOURCES = {"four": {"title": "Four", "stand_in": True}}
 EXPLAINERS = {"right": "Right", "always_pose": "Pose"}

@@ -2,9 +2,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from gpca.causes.judged import CEILING
 from gpca.errors import InputError
+from gpca.evaluation.measures import POOLED
 from gpca.experiments.diagnosis.feature_tables import table9_features
-from gpca.experiments.diagnosis.judged import CEILING, POOLED
 from gpca.experiments.diagnosis.metrics import COLUMNS
 from gpca.experiments.diagnosis.tables import table9_causes
 

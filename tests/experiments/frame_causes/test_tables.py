@@ -4,8 +4,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from gpca.causes.judged import CEILING
 from gpca.errors import InputError
-from gpca.experiments.diagnosis.judged import CEILING
 from gpca.experiments.diagnosis.metrics import COLUMNS
 from gpca.experiments.frame_causes.metrics import COUNTED, PSEUDO, TRUTH
 from gpca.experiments.frame_causes.tables import table9_frame_counts, table9_frames

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from gpca.errors import InputError
-from gpca.evaluation.measures import ALL
-from gpca.experiments.diagnosis.judged import POOLED
+from gpca.evaluation.measures import ALL, POOLED
 from gpca.experiments.guarantee.answers import BY_FAMILY, BY_SAMPLE, CONFIDENT, FAMILIES, PLAIN, answers_of, conditions
 from gpca.experiments.guarantee.figure import draw_guarantee
 from gpca.experiments.guarantee.metrics import (

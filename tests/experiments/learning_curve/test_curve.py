@@ -9,11 +9,11 @@ from gpca.alignment.icp import ICPSettings
 from gpca.causes.dataset import LABELS
 from gpca.causes.descriptors import describe_all
 from gpca.causes.drawing import draw_further
+from gpca.causes.judged import CEILING
 from gpca.causes.settings import CauseSettings, DescriptorSettings
 from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
 from gpca.evaluation.measures import TIDY_COLUMNS
-from gpca.experiments.diagnosis.judged import CEILING
 from gpca.experiments.learning_curve.curve import CURVE_COLUMNS, collect_curves, learning_curve, read_curves
 from gpca.experiments.learning_curve.figure import draw_learning_curve
 from gpca.experiments.learning_curve.learners import TITLES

@@ -8,8 +8,9 @@ import pytest
 from gpca.attribution.predictions import write_predictions
 from gpca.attribution.scores import Attribution
 from gpca.causes.dataset import LABELS, labels_of
+from gpca.causes.judged import CEILING
 from gpca.errors import InputError
-from gpca.experiments.diagnosis.judged import CEILING, POOLED
+from gpca.evaluation.measures import POOLED
 from gpca.experiments.reenactment.knowledge import EVERYTHING, NOTHING
 from gpca.experiments.reenactment.metrics import MEASURED, ORACLE_COLUMNS, collect_oracles, read_oracles
 from gpca.experiments.reenactment.tables import table9_oracle

@@ -9,9 +9,10 @@ import pytest
 from gpca.attribution.predictions import prediction_frame
 from gpca.attribution.scores import Attribution
 from gpca.causes.dataset import LABELS, labels_of
+from gpca.causes.judged import CEILING
 from gpca.causes.truth import BORDERLINE, NOMINAL
 from gpca.errors import InputError
-from gpca.experiments.diagnosis.judged import CEILING, POOLED
+from gpca.evaluation.measures import POOLED
 from gpca.experiments.scan_causes import metrics
 from gpca.experiments.scan_causes.figure import draw_scan_failures
 from gpca.experiments.scan_causes.metrics import ADDED, EVERY, NATURAL, collect, read_scan_causes

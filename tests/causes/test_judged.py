@@ -6,18 +6,19 @@ from scipy.stats import spearmanr
 from sklearn.metrics import average_precision_score, balanced_accuracy_score, roc_auc_score
 
 from gpca.causes.dataset import LABELS
+from gpca.causes.judged import MEASURES, RECALL, counted, measure, of_decisions
 from gpca.causes.truth import BORDERLINE, FAILED, NOMINAL
-from gpca.experiments.diagnosis.measures import (
-    MEASURES,
-    OF_ALARM,
-    OF_FAILED,
-    OF_SHOWN,
-    OF_STATES,
-    RECALL,
-    counted,
-    measure,
-    of_decisions,
-)
+from tests.judged import random_judged
+
+OF_FAILED = ("regret", "tied_accuracy", "dominant_accuracy", "deletion_gain")
+OF_FAILED += ("spearman_attribution", "cosine_attribution")
+OF_SHOWN = ("state_accuracy_shown", "auroc_failed_shown")
+OF_ALARM = ("auroc_failed", "auprc_failed", "false_alarm_rate", "nominal_calibration")
+
+
+@pytest.fixture
+def judged():
+    return random_judged()
 
 
 def one(samples, weights=None):
@@ -122,7 +123,7 @@ def test_the_score_of_nominal_is_calibrated_where_it_comes_true_as_often_as_it_s
 
 def test_a_gate_names_no_cause_and_has_the_measures_of_an_alarm_alone(judged):
     gate = replace(judged, named=np.full(len(judged), ""))
-    assert set(one(gate)) == {*OF_ALARM, *OF_STATES}
+    assert set(one(gate)) == {*OF_ALARM, *OF_SHOWN, "state_accuracy"}
 
 
 def test_samples_between_the_limits_count_nowhere(judged):

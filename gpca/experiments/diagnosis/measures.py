@@ -1,1 +1,0 @@
-from gpca.causes.judged import *  # noqa: F403
