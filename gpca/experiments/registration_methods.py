@@ -323,7 +323,7 @@ def table11_severity(run: Run, intervals):
     pairs = {key: cell.test_samples for (_, key), cell in sheet.cells.items()}
     note = (
         "Low, middle, high: thirds of what is drawn; a pose error counts by the mean of its places in the two ranges. "
-        f"Pairs of all seeds, by column: {', '.join(str(pairs.get(key, 0)) for key in columns)}."
+        f"Pairs of all seeds, by column: {', '.join(str(pairs[key]) for key in columns if key in pairs)}."
     )
     caption = "Registrations that succeed, by cause and severity (%)" + run.stand_ins()
     return sheet.table(caption, "cause", [*notes(run, sheet, intervals), note], bold=columns, same=1)

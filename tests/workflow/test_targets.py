@@ -85,7 +85,7 @@ EDITS = {  # a module: what is made again where it has changed, and what is not
         "registrations/ encoders/ycb embeddings/ycb predictions/ycb/gpca/ active_learning/ table2_per_concept kernels",
     ),
     "gpca/alignment/methods/teaser.py": ("methods/ycb table11_severity", "causes/ycb predictions estimates exchange"),
-    "gpca/experiments/registration_methods/tables.py": ("table11_registration table11_severity", "methods/ figures/"),
+    "gpca/experiments/registration_methods.py": ("table11_registration table11_severity", "methods/ figures/"),
     "baselines/aligned_source.py": (
         "predictions/ycb/softmax_head recovery/ controls/",
         "predictions/ycb/gpca predictions/ycb/shap_additive learners embeddings model.pt gate_rmse",

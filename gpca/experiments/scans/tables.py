@@ -43,7 +43,7 @@ def table17_scans(
 
     Args:
         intervals: what :func:`gpca.experiments.scans.metrics.collect_scans` returned.
-        seconds: what :func:`gpca.experiments.registration_methods.collect_seconds` returned.
+        seconds: what :func:`gpca.experiments.registration_methods.read_seconds` returned.
         titles: of the data sets.
         missing: where a data set is found that is not there, by its title.
     """

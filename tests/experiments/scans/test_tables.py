@@ -5,7 +5,7 @@ import pytest
 
 from gpca.errors import InputError
 from gpca.evaluation.measures import tidy
-from gpca.experiments.registration_methods import collect_seconds
+from gpca.experiments.registration_methods import read_seconds
 from gpca.experiments.scans.metrics import collect_scans, read_trials
 from gpca.experiments.scans.published import table17_published
 from gpca.experiments.scans.tables import table17_ladder, table17_scans
@@ -91,7 +91,7 @@ def test_faults_of_trials_are_one_line(files):
 def seconds(tmp_path):
     path = tmp_path / "timings/rooms/method_gicp/seed0.csv"
     write_csv(path, pd.DataFrame({"sample": [0, 0], "start": ["initial", "teaser"], "seconds": [0.5, 2.5]}))
-    return collect_seconds([path])
+    return read_seconds([path])
 
 
 def test_tables_have_a_row_for_each_start_and_method(found, tmp_path):

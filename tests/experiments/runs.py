@@ -1,0 +1,12 @@
+"""Runs that tests of experiments make tables of."""
+
+from gpca.config.layers import with_defaults
+from gpca.experiments.plan import Run
+
+YCB = {"title": "YCB", "kind": "bop"}
+SOURCES = {"ycb": YCB, "cups": {"title": "Cups", "kind": "procedural"}}  # the second one is a stand-in
+
+
+def run_with(**sections):
+    """A run with the defaults of the config and these sections."""
+    return Run(with_defaults({}) | {"sources": SOURCES} | sections)
