@@ -209,7 +209,7 @@ def _with_labeled(strategy, pool: Pool, batch: int) -> np.ndarray:
 STRATEGIES = {
     "random": Strategy("Random", random_rows, needs_scores=False),
     "random_stratified": Strategy(
-        "Stratified random (told the truth)", random_stratified, oracle=True, needs_scores=False
+        "Stratified random (knows the truth)", random_stratified, oracle=True, needs_scores=False
     ),
     "entropy": Strategy("Entropy", entropy),
     "margin": Strategy("Margin", margin),

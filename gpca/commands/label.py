@@ -164,8 +164,8 @@ def _ask(
 
 
 def _retrain(session: Session) -> None:
-    learnt = session.retrain()
-    answers = "1 answer" if learnt == 1 else f"{learnt} answers"
+    learned = session.retrain()
+    answers = "1 answer" if learned == 1 else f"{learned} answers"
     print(f"  learned {answers}; concepts: {', '.join(session.gpc.classes)}")
 
 

@@ -80,7 +80,7 @@ def claims(verdicts: pd.DataFrame, sources: Mapping[str, Mapping], titles: Mappi
             "the farther bounds of it and of one over clusters of objects or scenes. A sentence is supported if all of "
             "its comparisons are, and refuted or smaller than the margin if one is, by an interval that allows for "
             "their number. Smaller than the margin: not below 0, but below what is expected. Floor: both are at the "
-            "first labels, so that nothing can be said. Not worse and the same: the whole interval lies within the "
+            "first labels, so the difference is unknown. Not worse and the same: the whole interval lies within the "
             "margin. docs/comparison.md has the whole rule.",
             *margins_in_words(verdicts),
             *(_not_run(row) for row in open_ones.itertuples()),

@@ -107,7 +107,7 @@ def headline(explained: Mapping) -> str:
     title = {
         "nominal": "This registration succeeded",
         "failed": f"This registration failed: {' and '.join(diagnosis['named'])}",
-        UNKNOWN: "Nothing can be said of this registration",
+        UNKNOWN: "The state of this registration is unknown",
     }[diagnosis["state"]]
     line = f'<h1 class="{TONES[diagnosis["state"]]}">{escape(title)}</h1>'
     if diagnosis["state"] == UNKNOWN:

@@ -21,7 +21,7 @@ from gpca.process.progress import progress
 from gpca.seeds import generator
 
 QUANTILES = len(LEVELS)
-SMALLEST = 1e-5  # diameters; nothing is nearer that could be told from zero
+SMALLEST = 1e-5  # diameters; smaller distances are rounding
 COARSE = slice(0, QUANTILES, 3)  # five of the thirteen quantiles say as much of a relation
 WIDTHS = {"distances": 4 * QUANTILES, "relations": 35, "densities": 2}
 POINTS = "points"

@@ -76,13 +76,13 @@ class TimeLeftHandler(logging.Handler):
     ) -> None:
         super().__init__(logging.INFO)
         self._time_left, self._has_ended, self._say, self._clock = time_left, has_ended, say, clock
-        self._said_s = clock()
+        self._reported_s = clock()
 
     def emit(self, record: logging.LogRecord) -> None:
         """Handle a message of Snakemake; all but its counts of jobs are ignored."""
-        if getattr(record, "event", None) != _PROGRESS or self._clock() - self._said_s < EVERY_S:
+        if getattr(record, "event", None) != _PROGRESS or self._clock() - self._reported_s < EVERY_S:
             return
-        self._said_s = self._clock()
+        self._reported_s = self._clock()
         for job in filter(self._has_ended, self._time_left.jobs):
             self._time_left.finish(job, seconds_of(job))
         self._say(in_words(self._time_left.seconds()))

@@ -19,7 +19,7 @@ class ReenactmentSettings:
         hypotheses: enacted of each pair, at most.
         good_starts: how probable it is that the initial pose is good.
         good_rotation_deg, good_translation: root mean square angle and length (diameters) of a good start's error.
-        bad_rotation_deg, bad_translation: the same of any other's.
+        bad_rotation_deg, bad_translation: those of any other hypothesis.
         lost_starts: how probable it is that the initial pose says nothing, and any other is as likely.
     """
 

@@ -10,7 +10,7 @@ arguments alike, and do not explain these again:
     dataset: That of the objects, as the BOP benchmark calls it; their names in words follow from it.
     registrations_npz, embeddings_npz, predictions_csv: Of one source and seed.
     uncertainty_csv: The uncertainties of the design ``causal``.
-    limits: Those of the errors that states are told apart by, from the config.
+    limits: Limits of the errors that separate the states, from the config.
 
 Names stand in the order in which they are shown, and those without numbers are left out. An
 :class:`gpca.errors.InputError` says that nothing is left, or that a file is unusable or of another run.

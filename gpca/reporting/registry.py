@@ -40,7 +40,7 @@ class Result:
     Attributes:
         name: of its files, without suffix.
         kind: ``tables`` or ``figures``, the folder that it goes to.
-        section, title, caption: where it stands and what is said about it.
+        section, title, caption: its place on the page, and the words above and below it.
         builder: ``module:function`` that makes it.
         inputs: the builder's arguments that come from files.
         settings: the builder's other arguments -> place of the value among the settings of a run.

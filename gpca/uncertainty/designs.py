@@ -71,7 +71,7 @@ class RegisteredRow:
         return self.source[random.permutation(len(self.source))[:points]], self.target[:points], self.T_init, self.T_icp
 
     def clean(self, points: int, part: int = 1) -> Clouds:
-        """Return the same of a clean pair: other points of the target as source, at the true pose.
+        """Clean pair: other points of the target as source, at the true pose.
 
         `part` chooses which points, so that there are several sources: 1 or 2.
         """

@@ -100,7 +100,7 @@ def test_one_of_many_has_no_view_and_an_unknown_one_no_poses(explainer, pair):
     unknown = explainer.explain(source + 100 * np.ptp(target), target)
     assert unknown.unknown
     page = unknown.html()
-    assert "Nothing can be said of this registration" in page
+    assert "The state of this registration is unknown" in page
     assert 'data-view="pose:0"' not in page
     assert "<canvas" in page
 
