@@ -36,12 +36,12 @@ class Run:
     ) -> None:
         self.config = config
         self._names_of = names_of
-        self._only = {f"{name}s": set(entries) for name, entries in (only or {}).items()}
+        self._only = {f"{name}s": tuple(entries) for name, entries in (only or {}).items()}
 
     def section(self, name: str) -> dict[str, Any]:
         """Entries of a section of the config, or those of them that are shown."""
-        only = self._only.get(name)
-        return {key: value for key, value in self.config[name].items() if only is None or key in only}
+        entries = self.config[name]
+        return {key: entries[key] for key in self._only.get(name, entries) if key in entries}
 
     @cached_property
     def sources(self) -> dict[str, dict[str, Any]]:

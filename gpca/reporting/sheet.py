@@ -107,9 +107,23 @@ class Sheet:
         """Start of the footnote on the cells' intervals, without a full stop."""
         return over_clusters(self.seeds, samples)
 
-    def table(self, caption: str, across: str, notes: Iterable[str], bold: Iterable[str] = (), same: int = 0) -> Table:
-        """The table; in each of the `bold` columns, rivals whose first `same` labels agree compete."""
+    def table(
+        self,
+        caption: str,
+        across: str,
+        notes: Iterable[str],
+        bold: Iterable[str] = (),
+        same: int = 0,
+        bold_across: Iterable[str] = (),
+    ) -> Table:
+        """The table; in each of the `bold` columns, rivals whose first `same` labels agree compete.
+
+        Within each row, the columns of `bold_across` compete.
+        """
         groups: dict[tuple, list[tuple[int, str]]] = {}
+        for key in bold_across:
+            for number in range(len(self.rows)):
+                groups.setdefault((number,), []).append((number, key))
         for key in bold:
             for number, row in enumerate(self.rows):
                 if row.rival:

@@ -95,9 +95,9 @@ EDITS = {  # a module: what is made again where it has changed, and what is not
     "gpca/frames/synthesis.py": ("poses/ embeddings/real_rgbd model.pt", "scenes instances predictions/ycb causes/"),
     "gpca/frames/bop.py": ("scenes/ instances/ frame_causes/ recovery/", "predictions/ycb encoders/ycb causes/ycb"),
     "gpca/recovery/policy.py": ("model.pt runtime.csv recovery/ table8_recovery", "predictions encoders diagnoses/"),
-    "gpca/experiments/concept_attribution/tables.py": (
+    "gpca/experiments/concept_attribution.py": (
         "table1_extended table2_per_concept",
-        "predictions metrics.csv figures/",
+        "predictions metrics.csv figures/cause",
     ),
     "gpca/encoders/dgcnn.py": (
         "encoders/ycb embeddings/ycb predictions/ycb/gpca/ predictions/ycb/concept_vectors shifted/ cause_encoders/ycb "

@@ -50,7 +50,7 @@ def table15_new_concepts(
     """Return the labels that each new concept costs in each embedding, and the accuracy that labels can reach.
 
     Args:
-        without_labels: What :func:`gpca.experiments.concept_attribution.intervals.collect_intervals` returned of the
+        without_labels: What :func:`gpca.experiments.concept_attribution.collect_intervals` returned of the
             explainers of `NO_LABELS`, for the same seeds.
         clusters_of_causes: The same of the registrations with measured causes.
     """

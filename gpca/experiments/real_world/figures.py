@@ -12,7 +12,7 @@ from gpca.attribution.diagnostics import BINS
 from gpca.attribution.predictions import concepts_of, read_predictions
 from gpca.errors import InputError
 from gpca.evaluation.measures import source_method_seed
-from gpca.experiments.concept_attribution.confusions import counts_and_shares, pooled_confusions
+from gpca.experiments.confusions import counts_and_shares, pooled_confusions
 from gpca.experiments.diagnosis.reliability import reliability_figure
 from gpca.experiments.frames import encoder_title
 from gpca.experiments.real_world.metrics import read_together

@@ -3,18 +3,106 @@ import json
 import math
 from dataclasses import replace
 
+import numpy as np
 import pandas as pd
 import pytest
 
+from gpca.attribution.metrics import collect
 from gpca.errors import InputError
-from gpca.evaluation.measures import COLUMNS, TIDY_COLUMNS
-from gpca.experiments.concept_attribution.tables import table1_extended, table1_single_baselines, table2_per_concept
+from gpca.evaluation.intervals import wilson_interval
+from gpca.evaluation.measures import COLUMNS, TIDY_COLUMNS, read_clustered
+from gpca.experiments.concept_attribution import (
+    collect_intervals,
+    table1_extended,
+    table1_single_baselines,
+    table2_per_concept,
+)
+from gpca.experiments.plan import Run
+from gpca.io.csv_file import write_csv
 from gpca.reporting.tables.table import Cell, Column, Table
+
+CONCEPTS = ("noise", "pose", "overlap")
+TURNED = {"noise": "pose", "pose": "overlap", "overlap": "noise"}
+
+
+def predictions(seed):
+    """Samples of four families, of which one is always misnamed, and a second with the second seed."""
+    rows = []
+    for sample in range(24):
+        true, family = CONCEPTS[sample % 3], f"family {sample // 3 % 4}"
+        wrong = family == "family 0" or (family == "family 1" and seed == 1)
+        known = {"sample": sample, "split": "test", "object": family, "cluster": family, "concept_true": true}
+        named = "" if sample == 0 else TURNED[true] if wrong else true
+        scores = {f"score_{concept}": float(concept == named) for concept in CONCEPTS}
+        rows.append(known | {"concept_predicted": named, "abstained": named == "", "icp_calls": 0} | scores)
+    rows.append(rows[3] | {"sample": 99, "split": "train"})
+    return pd.DataFrame(rows)
+
+
+@pytest.fixture
+def files(tmp_path):
+    given, causal = [], []
+    for seed in range(2):
+        given.append(tmp_path / f"predictions/ycb/gpca/seed{seed}.csv")
+        write_csv(given[-1], predictions(seed))
+        causal.append(tmp_path / f"uncertainty/ycb/causal/seed{seed}.csv")
+        rows = predictions(seed)[["sample", "split"]]
+        observed = np.where(rows["sample"] % 2 == 0, 2.0, 0.0)
+        write_csv(causal[-1], rows.assign(uncertainty_observed=observed, uncertainty_clean=1.0))
+    return given, causal
+
+
+@pytest.fixture
+def collected(files, tmp_path):
+    write_csv(tmp_path / "intervals.csv", collect_intervals(*files), form=None)
+    return read_clustered(tmp_path / "intervals.csv").set_index(["metric", "concept"])
+
+
+def test_values_are_those_of_the_metrics(files, collected):
+    metrics = collect(*files).groupby(["metric", "concept"])["value"].mean()
+    assert set(collected.index) == {
+        *(("accuracy", concept) for concept in ("all", *CONCEPTS)),
+        ("permuted_accuracy", "all"),
+        ("causal_accuracy", "all"),
+    }
+    for key in collected.index:
+        assert collected.loc[key, "value"] == pytest.approx(metrics[key])
+    assert collected.loc[("causal_accuracy", "all"), "samples"] == 24
+
+
+def test_intervals_are_over_families_and_seeds(collected):
+    row = collected.loc["accuracy", "all"]
+    assert (row["seeds"], row["clusters"], row["samples"]) == (2, 4, 48)
+    assert row["high"] - row["low"] > 1.5 * np.ptp(wilson_interval(30, 48))  # far more than of independent samples
+    assert ((collected["low"] < collected["value"]) & (collected["value"] < collected["high"])).all()
+
+
+def test_faults_are_one_line(files):
+    given, causal = files
+    with pytest.raises(InputError, match="no files were given"):
+        collect_intervals([])
+    write_csv(causal[0], pd.read_csv(causal[0]).iloc[3:])
+    with pytest.raises(InputError, match="lacks samples of"):
+        collect_intervals(given, causal)
+    write_csv(given[1], predictions(1).iloc[-1:])
+    with pytest.raises(InputError, match="has no test rows"):
+        collect_intervals(given)
+
 
 REAL = {"linemod": {"title": "LINEMOD", "stand_in": False}, "ycb": {"title": "YCB", "stand_in": False}}
 STAND_INS = {name: entry | {"stand_in": True} for name, entry in REAL.items()}
-TITLES = {"gpca_paper": "GP-CA (paper)", "gpca": "GP-CA", "shap_additive": "SHAP", "shap_oracle": "SHAP (oracle)"}
-EXPLAINERS = {name: {"title": title, "oracle": name == "shap_oracle", "sees": "pair"} for name, title in TITLES.items()}
+EXPLAINERS = ("gpca_paper", "gpca", "shap_additive", "shap_oracle")
+GPCA = "GP-CA (trained longer)"
+TABLES = (
+    (table1_single_baselines,),
+    (table1_extended, pd.DataFrame(columns=list(TIDY_COLUMNS))),
+    (table2_per_concept,),
+)
+
+
+def made(table, *numbers, sources=REAL, explainers=EXPLAINERS):
+    """A table of a run with these sources and explainers."""
+    return table(Run({"sources": sources, "explainers": dict.fromkeys(explainers)}, table.result.only), *numbers)
 
 
 def tidy(accuracies, test_samples=200, seeds=3):
@@ -25,10 +113,6 @@ def tidy(accuracies, test_samples=200, seeds=3):
         own = ("attribution", source, explainer, "accuracy", concept, seeds, 11, samples)
         records.append((*own, value, value - 0.03, min(1, value + 0.02)))
     return pd.DataFrame(records, columns=list(COLUMNS))
-
-
-def extended(intervals, sources, explainers):
-    return table1_extended(intervals, pd.DataFrame(columns=list(TIDY_COLUMNS)), sources, explainers)
 
 
 @pytest.fixture
@@ -46,8 +130,8 @@ def metrics():
 
 
 def test_table1_has_the_papers_explainers_with_predictions_in_its_order(metrics):
-    markdown = table1_single_baselines(metrics, REAL, EXPLAINERS).markdown()
-    assert "| Dataset | SHAP | GP-CA |" in markdown
+    markdown = made(table1_single_baselines, metrics).markdown()
+    assert f"| Dataset | SHAP | {GPCA} |" in markdown
     # The dash stands where SHAP has no predictions.
     assert "| LINEMOD | 30.0 (27.0 to 32.0) | **97.0 (94.0 to 99.0)** |" in markdown
     assert "| YCB | – | 95.0 (92.0 to 97.0) |" in markdown
@@ -56,36 +140,40 @@ def test_table1_has_the_papers_explainers_with_predictions_in_its_order(metrics)
     )
     assert "stand-in" not in markdown
     oracle = tidy({("ycb", "shap_oracle", "all"): 0.65}, seeds=2)
-    assert table1_single_baselines(pd.concat([metrics, oracle]), REAL, EXPLAINERS).markdown() == markdown
+    assert made(table1_single_baselines, pd.concat([metrics, oracle])).markdown() == markdown
 
 
 def test_table1_says_who_explains_fewer_samples(metrics):
     both = pd.concat([metrics, tidy({("ycb", "shap_additive", "all"): 0.33}, test_samples=60)])
     both = both[(both["source"] == "ycb") | (both["method"] == "gpca")]
-    footnotes = table1_single_baselines(both, REAL, EXPLAINERS).footnotes
+    footnotes = made(table1_single_baselines, both).footnotes
     assert "60 to 200 test samples each" in footnotes[0]
-    assert footnotes[1] == "Test samples explained: 200 by GP-CA; 60 by SHAP."
+    assert footnotes[1] == f"Test samples explained: 200 by {GPCA}; 60 by SHAP."
 
 
 def test_table2_has_concepts_as_columns_and_only_gpca_as_rows(metrics):
-    markdown = table2_per_concept(metrics, REAL, EXPLAINERS).markdown()
+    markdown = made(table2_per_concept, metrics).markdown()
     assert "| Dataset | Explainer | Noise | Pose | All |" in markdown
-    assert "| LINEMOD | GP-CA | **99.7 (96.7 to 100.0)** | 92.0 (89.0 to 94.0) | 97.0 (94.0 to 99.0) |" in markdown
+    assert f"| LINEMOD | {GPCA} | **99.7 (96.7 to 100.0)** | 92.0 (89.0 to 94.0) | 97.0 (94.0 to 99.0) |" in markdown
     assert "SHAP" not in markdown
 
 
 def test_stand_ins_are_said_in_title_and_row(metrics):
-    for make in (table1_single_baselines, extended, table2_per_concept):
-        table = make(metrics, STAND_INS, EXPLAINERS)
+    for make, *numbers in (
+        (table1_single_baselines, metrics),
+        (table1_extended, metrics, NONE),
+        (table2_per_concept, metrics),
+    ):
+        table = made(make, metrics, *costs, sources=STAND_INS)
         assert "on procedural stand-ins" in table.caption
         assert "LINEMOD (procedural stand-in)" in table.latex()
-        mixed = make(metrics, STAND_INS | {"ycb": REAL["ycb"]}, EXPLAINERS)
+        mixed = made(make, metrics, *costs, sources=STAND_INS | {"ycb": REAL["ycb"]})
         assert "partly on procedural stand-ins" in mixed.caption
         assert "| YCB |" in mixed.markdown()
 
 
 def test_one_seed_has_an_interval_over_families():
-    table = table1_single_baselines(tidy({("ycb", "gpca", "all"): 0.5}, seeds=1), REAL, EXPLAINERS)
+    table = made(table1_single_baselines, tidy({("ycb", "gpca", "all"): 0.5}, seeds=1))
     assert "| YCB | 50.0 (47.0 to 52.0) |" in table.markdown()
     assert "Over 1 seed, 200 test samples each" in table.markdown()
     assert table.records()[1] == ("ycb", "gpca", 50.0, 47.0, 52.0, 1, 200, False)
@@ -93,11 +181,11 @@ def test_one_seed_has_an_interval_over_families():
 
 def test_different_numbers_of_seeds_are_told():
     both = [tidy({(source, "gpca", "all"): 0.5}, seeds=seeds) for source, seeds in (("ycb", 2), ("linemod", 3))]
-    assert "Over 2 to 3 seeds, 200 test" in table1_single_baselines(pd.concat(both), REAL, EXPLAINERS).markdown()
+    assert "Over 2 to 3 seeds, 200 test" in made(table1_single_baselines, pd.concat(both)).markdown()
 
 
 def test_csv_is_machine_readable_and_bounds_stay_possible(metrics, tmp_path):
-    table1_single_baselines(metrics, REAL, EXPLAINERS).write(tmp_path / "t")
+    made(table1_single_baselines, metrics).write(tmp_path / "t")
     with (tmp_path / "t.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     gpca = next(row for row in rows if (row["source"], row["explainer"]) == ("linemod", "gpca"))
@@ -109,7 +197,7 @@ def test_csv_is_machine_readable_and_bounds_stay_possible(metrics, tmp_path):
 
 
 def test_the_page_is_given_the_words_of_the_table(metrics, tmp_path):
-    table = table1_single_baselines(metrics, REAL, EXPLAINERS)
+    table = made(table1_single_baselines, metrics)
     table.write(tmp_path / "t")
     printed = json.loads((tmp_path / "t.json").read_text(encoding="utf-8"))
     assert (printed["caption"], printed["label_columns"], printed["footnotes"]) == (
@@ -155,7 +243,7 @@ def test_latex_needs_no_letters_that_it_lacks_and_has_minus_signs():
 
 def test_latex_is_balanced_and_escaped(metrics):
     sources = {"linemod": {"title": r"A_1 & 50 % ~ \x {b}", "stand_in": False}}
-    latex = table1_single_baselines(metrics, sources, EXPLAINERS).latex()
+    latex = made(table1_single_baselines, metrics, sources=sources).latex()
     title = r"A\_1 \& 50 \% \textasciitilde{} \textbackslash{}x \{b\}"
     assert rf"{title} & 30.0 (27.0 to 32.0) & \textbf{{97.0 (94.0 to 99.0)}} \\" in latex
     for environment in ("table*", "tabular"):
@@ -170,16 +258,18 @@ def test_latex_is_balanced_and_escaped(metrics):
 
 
 def test_latex_spans_both_columns_only_where_it_must(metrics):
-    alone = {"gpca": EXPLAINERS["gpca"]}
-    assert r"\begin{table}[t]" in table1_single_baselines(metrics, REAL, alone).latex()
-    assert r"\begin{table*}[t]" in table1_single_baselines(metrics, STAND_INS, EXPLAINERS).latex()
+    assert r"\begin{table}[t]" in made(table1_single_baselines, metrics, explainers=["gpca"]).latex()
+    assert r"\begin{table*}[t]" in made(table1_single_baselines, metrics, sources=STAND_INS).latex()
 
 
 def test_metrics_without_these_explainers_are_refused(metrics):
-    unknown = {"sa_local_additive": {"title": "SA", "oracle": False, "sees": "runs"}}
-    for make in (table1_single_baselines, extended, table2_per_concept):
+    for make, *numbers in (
+        (table1_single_baselines, metrics),
+        (table1_extended, metrics, NONE),
+        (table2_per_concept, metrics),
+    ):
         with pytest.raises(InputError, match="table '"):
-            make(metrics, REAL, unknown)
+            made(make, metrics, *costs, explainers=["sa_local_additive"])
 
 
 def test_column_text_rounds_and_shows_missing_intervals():
@@ -219,16 +309,16 @@ def everything():
 
 
 def test_extended_has_a_row_per_explainer_and_a_unit_per_column(everything):
-    table = table1_extended(*everything, REAL, EXPLAINERS)
+    table = made(table1_extended, *everything)
     lines = table.markdown().splitlines()
     assert lines[2] == (
         "| Dataset | Explainer | Reads | Accuracy (%) | Relabeled (%) | Causal (%) | n causal "
         "| Abstained (%) | ICP calls | Seconds | n |"
     )
     constant = "90.0 (87.0 to 92.0) | 50.0 (47.0 to 52.0) | 80 | 12.5"
-    assert lines[4] == f"| LINEMOD | GP-CA | pair | 80.0 (77.0 to 82.0) | {constant} | 400 | 0.250 | 200 |"
-    assert lines[5] == f"| YCB | GP-CA | pair | **90.0 (87.0 to 92.0)** | {constant} | 0 | 0.020 | 200 |"
-    assert lines[6].startswith("| YCB | SHAP | pair | 35.0 (32.0 to 37.0) |")
+    assert lines[4] == f"| LINEMOD | {GPCA} | aligned source | 80.0 (77.0 to 82.0) | {constant} | 400 | 0.250 | 200 |"
+    assert lines[5] == f"| YCB | {GPCA} | aligned source | **90.0 (87.0 to 92.0)** | {constant} | 0 | 0.020 | 200 |"
+    assert lines[6].startswith("| YCB | SHAP | further runs | 35.0 (32.0 to 37.0) |")
     assert lines[6].endswith("| 21 | 12.5 | 400 | 0.250 | 60 |")
     assert "60 to 200 test samples each" in table.footnotes[0]
     assert "the one column that differs from run to run" in table.markdown()
@@ -237,40 +327,40 @@ def test_extended_has_a_row_per_explainer_and_a_unit_per_column(everything):
 def test_extended_says_nothing_of_few_causal_samples(everything):
     intervals, metrics = everything
     few = intervals.assign(samples=29)
-    assert (1, "causal_accuracy") in table1_extended(intervals, metrics, REAL, EXPLAINERS).cells
-    assert (1, "causal_accuracy") not in table1_extended(few, metrics, REAL, EXPLAINERS).cells
+    assert (1, "causal_accuracy") in made(table1_extended, intervals, metrics).cells
+    assert (1, "causal_accuracy") not in made(table1_extended, few, metrics).cells
 
 
 def test_extended_sets_the_best_rival_in_bold_and_never_an_oracle(everything):
-    table = table1_extended(*everything, REAL, EXPLAINERS)
+    table = made(table1_extended, *everything)
     assert table.best() == {(1, "accuracy")}
-    assert [labels[1][1] for labels in table.rows if labels[0][0] == "ycb"] == ["GP-CA", "SHAP", "SHAP (oracle)"]
+    assert [labels[1][1] for labels in table.rows if labels[0][0] == "ycb"] == [GPCA, "SHAP", "SHAP (oracle)"]
     assert "oracles apart" in table.markdown()
-    rivals = {name: entry for name, entry in EXPLAINERS.items() if not entry["oracle"]}
-    assert "oracle" not in table1_extended(*everything, REAL, rivals).markdown()
+    rivals = [name for name in EXPLAINERS if "oracle" not in name]
+    assert "oracle" not in made(table1_extended, *everything, explainers=rivals).markdown()
 
 
 def test_extended_csv_is_one_line_per_number(everything):
-    records = table1_extended(*everything, REAL, EXPLAINERS).records()
+    records = made(table1_extended, *everything).records()
     heads = ("metric", "mean", "ci_low", "ci_high", "n_seeds", "n_test", "at_least")
     assert records[0] == ("source", "explainer", "reads", *heads)
     assert len(records) == 1 + 4 * 8
-    assert ("ycb", "gpca", "pair", "seconds_per_sample", 0.0204, 0.0204, 0.0204, 3, 600, False) in records
-    assert ("ycb", "shap_additive", "pair", "causal_accuracy", 50.0, 47.0, 52.0, 3, 63, False) in records
-    assert ("ycb", "shap_additive", "pair", "accuracy", 35.0, 32.0, 37.0, 3, 180, False) in records
-    assert ("ycb", "gpca", "pair", "icp_calls", 0.0, 0.0, 0.0, 3, 600, False) in records
+    assert ("ycb", "gpca", "aligned source", "seconds_per_sample", 0.0204, 0.0204, 0.0204, 3, 600, False) in records
+    assert ("ycb", "shap_additive", "further runs", "causal_accuracy", 50.0, 47.0, 52.0, 3, 63, False) in records
+    assert ("ycb", "shap_additive", "further runs", "accuracy", 35.0, 32.0, 37.0, 3, 180, False) in records
+    assert ("ycb", "gpca", "aligned source", "icp_calls", 0.0, 0.0, 0.0, 3, 600, False) in records
 
 
 def test_extended_leaves_out_what_was_not_measured(everything):
     parts = (part[~part["metric"].str.startswith(("causal", "seconds"))] for part in everything)
-    markdown = table1_extended(*parts, REAL, EXPLAINERS).markdown()
+    markdown = made(table1_extended, *parts).markdown()
     assert "Causal" not in markdown
     assert "Seconds" not in markdown
 
 
 def test_a_table_that_may_be_wider_than_the_text_is_scaled_down_in_latex(everything):
-    wide = table1_extended(*everything, STAND_INS, EXPLAINERS).latex()
+    wide = made(table1_extended, *everything, sources=STAND_INS).latex()
     assert r"\usepackage{booktabs, graphicx}" in wide.splitlines()[0]
     assert wide.count(r"\resizebox") == wide.count(r"\end{tabular}}") == 1
     assert wide.count("{") == wide.count("}")
-    assert "resizebox" not in table1_single_baselines(everything[0], REAL, EXPLAINERS).latex()
+    assert "resizebox" not in made(table1_single_baselines, everything[0]).latex()

@@ -1,10 +1,10 @@
-"""Draws the confusion matrix and the predicted classes of every explainer on every source."""
+"""Confusion matrices and predicted classes of explainers, drawn for every source."""
 
 from __future__ import annotations
 
 import textwrap
 from collections.abc import Mapping
-from pathlib import Path
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +12,6 @@ import numpy as np
 from gpca.attribution.metrics import ABSTAINED, PREDICTED_AS
 from gpca.causes.truth import NOMINAL
 from gpca.errors import InputError
-from gpca.evaluation.measures import read_metrics
 from gpca.reporting.figures.panels import draw_percentages
 from gpca.reporting.figures.style import CONCEPT_COLORS, GRAY, LIGHT_GRAY, SMALL_PT, TEXT_WIDTH_IN, use_style
 
@@ -21,22 +20,20 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 WIDEST_KEY = 3  # concepts fit into a line over the names of the explainers
-LABEL_IN = 1.45  # The explainers' titles are this wide.
+LABEL_IN = 1.45  # width of the explainers' titles
 HEAD_IN = 0.62
-CELL_IN = 0.145  # A row of a matrix is this high.
-MATRIX = 0.58  # The matrix takes this share of the room that it has with its bars.
-WIDE_IN = 0.19  # A cell that is this wide holds larger numbers.
+CELL_IN = 0.145  # height of a row of a matrix
+MATRIX = 0.58  # share of the matrix in the width of matrix and bars
+WIDE_IN = 0.19  # of a cell that holds larger numbers
 FOOT_IN = 0.04
 LEAST_SOURCE_IN = 1.4
 LARGEST_SOURCE_IN = 1.9
-LETTERS_IN = 0.14  # The letters left of a matrix take this.
-GAP_IN = 0.2  # This lies between matrix and bars, and after the bars.
-GAP_OF_ROWS_IN = 0.1
+LETTERS_IN = 0.14  # width of the letters left of a matrix
+GAP_IN = 0.2  # between matrix and bars, and after the bars
+ROW_GAP_IN = 0.1
 
 
-def draw_confusions_figure(
-    metrics_csv: str | Path, sources: Mapping[str, str], explainers: Mapping[str, str]
-) -> Figure:
+def draw_confusions_figure(metrics: pd.DataFrame, sources: Mapping[str, str], explainers: Mapping[str, str]) -> Figure:
     """Draw two panels for each explainer (rows) and source (columns), pooled over the seeds.
 
     The matrix is the share in % of each true concept that is taken for each concept; what is missing to 100 is
@@ -44,60 +41,57 @@ def draw_confusions_figure(
     samples have one where any explainer abstains.
 
     Args:
-        metrics_csv: The file that :func:`gpca.attribution.metrics.collect` makes.
+        metrics: of :func:`gpca.attribution.metrics.collect`, or of other explainers with the same confusions.
+        sources, explainers: title of each name.
     """
-    confusions = pooled_confusions(read_metrics(metrics_csv))
+    confusions = pooled_confusions(metrics)
     rows = [name for name in explainers if any((source, name) in confusions for source in sources)]
     columns = [name for name in sources if any((name, explainer) in confusions for explainer in explainers)]
     if not rows:
-        raise InputError(metrics_csv, "has no confusion of these explainers and sources", "regenerate it")
+        raise InputError("confusions", "are of none of these explainers and sources", "collect the metrics again")
     plt = use_style()
-    drawn = {(source, name): confusions[source, name] for source in columns for name in rows
-             if (source, name) in confusions}  # fmt: skip
-    concepts = len(next(iter(drawn.values())).columns) - 1
+    drawn = {key: confusions[key] for key in product(columns, rows) if key in confusions}
+    concepts = list(next(iter(drawn.values())).columns[:-1])
     abstained = any(confusion[ABSTAINED].any() for confusion in drawn.values())
     source_in = float(np.clip((TEXT_WIDTH_IN - LABEL_IN) / len(columns), LEAST_SOURCE_IN, LARGEST_SOURCE_IN))
     matrix_in = MATRIX * (source_in - LETTERS_IN - 2 * GAP_IN)
     bars_in = matrix_in / MATRIX - matrix_in
-    numbers_pt = SMALL_PT + (matrix_in / concepts >= WIDE_IN)
-    panel_in = CELL_IN * concepts
-    row_in = panel_in + GAP_OF_ROWS_IN
-    width_in = LABEL_IN + len(columns) * source_in
-    height_in = HEAD_IN + len(rows) * row_in + FOOT_IN
+    numbers_pt = SMALL_PT + (matrix_in / len(concepts) >= WIDE_IN)
+    panel_in = CELL_IN * len(concepts)
+    row_in = panel_in + ROW_GAP_IN
+    width_in, height_in = LABEL_IN + len(columns) * source_in, HEAD_IN + len(rows) * row_in + FOOT_IN
     figure = plt.figure(figsize=(width_in, height_in))
 
-    def text(x_in, y_in, words, **style):
-        figure.text(x_in / width_in, 1 - y_in / height_in, words, **style)
+    def text(x_in, y_in, words, ha="center", va="center", fontsize=SMALL_PT, **style):
+        figure.text(x_in / width_in, 1 - y_in / height_in, words, ha=ha, va=va, fontsize=fontsize, **style)
 
-    def panel(left_in, top_in, of_width_in):
+    def panel(left_in, top_in, panel_width_in):
         corner = (left_in / width_in, 1 - (top_in + panel_in) / height_in)
-        return figure.add_axes((*corner, of_width_in / width_in, panel_in / height_in))
+        return figure.add_axes((*corner, panel_width_in / width_in, panel_in / height_in))
 
     top = {source: next(name for name in rows if (source, name) in confusions) for source in columns}
     for number, explainer in enumerate(rows):
         top_in = HEAD_IN + number * row_in
         title = _wrapped(explainers[explainer], LABEL_IN, 7)
-        text(LABEL_IN - 0.04, top_in + panel_in / 2, title, ha="right", va="center", fontsize=SMALL_PT, linespacing=1.1)
-        for place, source in enumerate(columns):
+        text(LABEL_IN - 0.04, top_in + panel_in / 2, title, ha="right", linespacing=1.1)
+        for column, source in enumerate(columns):
             if (source, explainer) in drawn:
-                left_in = LABEL_IN + place * source_in + LETTERS_IN
+                left_in = LABEL_IN + column * source_in + LETTERS_IN
                 confusion, head = drawn[source, explainer], explainer == top[source]
                 draw_matrix(panel(left_in, top_in, matrix_in), confusion, head, numbers_pt)
                 draw_bars(panel(left_in + matrix_in + GAP_IN, top_in, bars_in), confusion, head, abstained)
-    for place, source in enumerate(columns):
-        left_in = LABEL_IN + place * source_in + LETTERS_IN
-        title = _wrapped(sources[source], source_in, 8)
+    for column, source in enumerate(columns):
+        left_in = LABEL_IN + column * source_in + LETTERS_IN
         middle_in = left_in + (matrix_in + GAP_IN + bars_in) / 2
-        text(middle_in, 0.03, title, ha="center", va="top", linespacing=1.1)
-        text(left_in + matrix_in / 2, 0.42, "of each true (%)", ha="center", va="center", fontsize=SMALL_PT)
-        of_bars_in = left_in + matrix_in + GAP_IN + bars_in / 2
-        text(of_bars_in, 0.42, "of all (%)", ha="center", va="center", fontsize=SMALL_PT)
-    text(0.04, 0.03, _key(next(iter(drawn.values())), abstained), ha="left", va="top", fontsize=SMALL_PT)
+        text(middle_in, 0.03, _wrapped(sources[source], source_in, 8), va="top", fontsize=None, linespacing=1.1)
+        text(left_in + matrix_in / 2, 0.42, "of each true (%)")
+        text(left_in + matrix_in + GAP_IN + bars_in / 2, 0.42, "of all (%)")
+    text(0.04, 0.03, _key(concepts, abstained), ha="left", va="top")
     return figure
 
 
 def pooled_confusions(metrics: pd.DataFrame) -> dict[tuple[str, str], pd.DataFrame]:
-    """Return (source, explainer) -> counts over all seeds: rows true concepts; columns predicted, abstained last."""
+    """(Source, explainer) -> counts over all seeds: rows true concepts; columns predicted, abstained last."""
     counts = metrics[metrics["metric"].str.startswith(PREDICTED_AS)]
     counts = counts.assign(predicted=counts["metric"].str.removeprefix(PREDICTED_AS))
     pooled = {}
@@ -108,7 +102,7 @@ def pooled_confusions(metrics: pd.DataFrame) -> dict[tuple[str, str], pd.DataFra
 
 
 def counts_and_shares(confusion: pd.DataFrame) -> tuple[np.ndarray, np.ndarray]:
-    """Return how many samples of each true concept (rows) are taken for each (columns), and what share of the row.
+    """Counts (C, C) of true concepts (rows) that are taken for each concept (columns), and shares of all of the row.
 
     Abstained samples count in the whole of a row. The shares of a concept without samples are NaN.
     """
@@ -122,8 +116,7 @@ def _wrapped(title: str, width_in: float, size_pt: float) -> str:
     return "\n".join(textwrap.wrap(title, int(width_in / letter_in), break_on_hyphens=False))
 
 
-def _key(confusion: pd.DataFrame, abstained: bool) -> str:
-    concepts = list(confusion.columns[:-1])
+def _key(concepts: list[str], abstained: bool) -> str:
     named = [f"{letter} {concept}" for letter, concept in zip(letters(concepts), concepts, strict=True)]
     last = ["– abstained"] if abstained else []
     if len(named) > WIDEST_KEY:
@@ -134,7 +127,7 @@ def _key(confusion: pd.DataFrame, abstained: bool) -> str:
 
 
 def letters(concepts: list[str]) -> list[str]:
-    """Return the shortest capitalized beginnings that tell the concepts apart; nominal becomes OK."""
+    """Shortest capitalized beginnings that distinguish the concepts; nominal becomes OK."""
     others = {concept for concept in concepts if concept != NOMINAL}
     length = next(n for n in range(1, 99) if len({concept[:n] for concept in others}) == len(others))
     return ["OK" if concept == NOMINAL else concept[:length].capitalize() for concept in concepts]
@@ -153,20 +146,16 @@ def draw_matrix(axes, confusion: pd.DataFrame, head: bool, numbers_pt: float = S
 
 
 def draw_bars(axes, confusion: pd.DataFrame, head: bool, abstained: bool = True) -> None:
-    """Draw the predicted classes' shares of all samples; a dash stands at the share that truly is of a concept.
-
-    What is abstained has a bar of its own, where such are shown.
-    """
+    """Draw the predicted classes' shares of all samples, with a dash at each concept's true share."""
     concepts = list(confusion.columns[:-1])
     names = [*letters(concepts), "–"] if abstained else letters(concepts)
     total = confusion.to_numpy().sum()
     shares = confusion.sum().iloc[: len(names)] / total
     truth = confusion.sum(axis=1) / total
-    of_abstained = LIGHT_GRAY
-    colors = [*(CONCEPT_COLORS.get(concept, GRAY) for concept in concepts), of_abstained][: len(names)]
+    colors = [*(CONCEPT_COLORS.get(concept, GRAY) for concept in concepts), LIGHT_GRAY][: len(names)]
     axes.bar(range(len(shares)), shares, color=colors, width=0.7)
-    places = np.array([concepts.index(concept) for concept in truth.index])
-    axes.hlines(truth, places - 0.45, places + 0.45, color="black", linewidth=0.6)
+    bar_C = np.array([concepts.index(concept) for concept in truth.index])
+    axes.hlines(truth, bar_C - 0.45, bar_C + 0.45, color="black", linewidth=0.6)
     axes.set(xlim=(-0.6, len(shares) - 0.4), ylim=(0, 1))
     axes.set_yticks([0, 0.5, 1], ["0", "50", "100"] if head else [])
     axes.set_xticks(range(len(shares)), names if head else [])
