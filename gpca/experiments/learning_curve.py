@@ -1,0 +1,170 @@
+"""Diagnosis of causes by the number of training samples: an estimate of what an observer can reach."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from gpca.causes.judged import CEILING
+from gpca.errors import InputError, require_names
+from gpca.evaluation.measures import source_method_seed, tidy
+from gpca.experiments.experiment import Experiment, LeftOut
+from gpca.experiments.plan import Run
+from gpca.experiments.result import figure, numbers
+from gpca.experiments.step import Plan, Step
+from gpca.io.csv_file import numbers as number_column
+from gpca.io.csv_file import read_csv
+from gpca.settings import Distinct, read_settings
+from gpca.steps.learning_curve import CURVE_COLUMNS, MEASURED, CurveSettings, labeled_samples
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+NAME = "learning_curve"
+FILES = "learning_curve/{curve_source}/seed{curve_seed}.csv"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Section(CurveSettings):
+    """The learning curve, and the sources whose objects are registered."""
+
+    sources: Distinct[str]
+
+
+def check(config: dict, left_out: LeftOut) -> None:
+    """Check the names of the sources, and that there are enough samples."""
+    section = config[NAME]
+    require_names("learning_curve.sources", section["sources"], config["sources"], "source", left_out("sources"))
+    pool = labeled_samples(config["causes"]) + section["further"]
+    if max(section["sizes"]) > pool:
+        fault = f"{max(section['sizes'])} is more than the {pool} labeled samples that there are"
+        raise InputError("config key learning_curve.sizes", fault, "lower it, or raise learning_curve.further")
+
+
+def without_sources(config: Mapping[str, Any]) -> dict[str, Any]:
+    """The config's section as jobs get it, which are of one source each."""
+    return {name: value for name, value in config[NAME].items() if name != "sources"}
+
+
+def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
+    """Sources, seeds and chunks."""
+    settings = read_settings(CurveSettings, without_sources(config))
+    return {
+        "curve_source": list(config[NAME]["sources"]),
+        "curve_seed": list(config["seeds"])[: settings.seeds],
+        "chunk": list(range(len(settings.chunks()))),
+    }
+
+
+def _drawn(plan: Plan, _wildcards: Any) -> dict[str, Any]:
+    icp = plan.config["registrations"]["icp"]
+    return {NAME: without_sources(plan.config), "causes": plan.config["causes"], "icp": icp}
+
+
+EXPERIMENT = Experiment(
+    name=NAME, sections={NAME: Section}, names=names, check=check, lists={"learning_curve.sources": "sources"}
+)
+DRAW = Step(
+    name="learning_samples",
+    run="gpca.steps.learning_curve:learning_samples",
+    inputs={"objects": "objects/{source}.npz"},
+    outputs={"samples": "learning_samples/{source}/seed{seed}/chunk{chunk}.npz"},
+    settings=_drawn,
+    priority=5,
+)
+LEARN = Step(
+    name="learn_from_more",
+    run="gpca.steps.learning_curve:learn_from_more",
+    inputs={
+        "causes": "causes/{source}/seed{seed}.npz",
+        "descriptors": "descriptors/{source}/seed{seed}.npz",
+        "samples": "learning_samples/{source}/seed{seed}/chunk{*chunk}.npz",
+    },
+    outputs={"out": "learning_curve/{source}/seed{seed}.csv"},
+    settings=lambda plan, _wildcards: {NAME: without_sources(plan.config)},
+    priority=4,
+)
+
+
+def read_curves(files: Iterable[str | Path]) -> pd.DataFrame:
+    """Read files named ``…/{source}/seed{seed}.csv`` into one frame with the further columns `source` and `seed`.
+
+    Raises:
+        InputError: no files, a missing column, a value that is not a finite number.
+    """
+    import pandas as pd
+
+    curves = []
+    for path in files:
+        _, source, seed = source_method_seed(path)
+        rows = read_csv(path, CURVE_COLUMNS)
+        columns = {name: number_column(path, rows, name) for name in CURVE_COLUMNS[1:]}
+        curves.append(rows.assign(**columns, source=source, seed=seed))
+    if not curves:
+        raise InputError("learning curves", "no files were given", "name a source in learning_curve.sources")
+    return pd.concat(curves, ignore_index=True)
+
+
+@numbers("learning_curve.csv", rule="learning_curve_metrics", files=FILES)
+def collect(_run: Run, files: Iterable[str | Path]) -> pd.DataFrame:
+    """Means over the orders; ``concept`` is the number of samples."""
+    means = read_curves(files).groupby(["source", "learner", "samples", "seed"], sort=False)[list(MEASURED)].mean()
+    records = [
+        (NAME, source, learner, metric, f"{samples:g}", seed, float(value))
+        for (source, learner, samples, seed), values in means.iterrows()
+        for metric, value in values.items()
+    ]
+    return tidy(records, "learning curves")
+
+
+@figure(
+    "Beyond the paper: what made a registration fail",
+    "What an observer may reach: learning from more samples",
+    """Balanced accuracy and regret on the test samples of Table IX, for learners of more and more registrations of the
+    training objects. Besides the runs from other starts, they read what needs no further registration: distances, local
+    planes, the motion of ICP and where the runs end. The band is the range over orders of the samples.
+
+    Where a curve is flat, more samples of these objects do not help. The dashed line is the truth measured again
+    from other starts; it knows the true pose and the clean clouds, which no observer does, so it is no bound that
+    could be reached.""",
+    after="table9_shown",
+    curves=(read_curves, FILES),
+)
+def learning_curve(run: Run, curves):
+    """Balanced accuracy and regret by number of samples: means over orders and seeds, and their range as a band."""
+    from matplotlib.ticker import NullLocator
+
+    from gpca.reporting.figures.panels import in_lines, legend_below, panels
+    from gpca.reporting.figures.style import BLUE, COLUMN_WIDTH_IN, GRAY, ORANGE
+
+    lines = {"trees": ("Extremely randomized trees", BLUE), "gpca": ("GP-CA's classifier", ORANGE)}
+    rows = {"balanced_accuracy": "balanced accuracy (%)", "regret": "regret (%)"}
+    chosen = run.config[NAME]["sources"]
+    titles = {name: title for name, title in run.source_titles.items() if name in chosen}
+    shown = [name for name in titles if (curves["source"] == name).any()]
+    if not shown:
+        raise InputError("learning curves", "have no results for these sources", "run them first")
+    page, axes = panels(len(rows), len(shown), 0.6 + 1.5 * len(rows), COLUMN_WIDTH_IN, sharex=True, sharey="row")
+    ticks = sorted(curves.loc[curves["learner"] != CEILING, "samples"].unique())
+    for column, source in enumerate(shown):
+        curve = curves[curves["source"] == source]
+        for row, (metric, label) in enumerate(rows.items()):
+            panel = axes[row, column]
+            for name, (title, color) in lines.items():
+                by_size = 100 * curve[curve["learner"] == name].groupby("samples")[metric].agg(["min", "mean", "max"])
+                panel.plot(by_size.index, by_size["mean"], "o-", color=color, markersize=3, label=title)
+                panel.fill_between(by_size.index, by_size["min"], by_size["max"], color=color, alpha=0.2, linewidth=0)
+            reached = 100 * curve.loc[curve["learner"] == CEILING, metric].mean()
+            truth = "truth from other starts (counterfactual access)"
+            panel.axhline(reached, color=GRAY, linestyle="--", label=truth)
+            panel.set_xscale("log")
+            panel.set_xticks(ticks, [f"{tick:g}" for tick in ticks], rotation=45)
+            panel.xaxis.set_minor_locator(NullLocator())
+            if column == 0:
+                panel.set_ylabel(label)
+        axes[0, column].set_title(in_lines(titles[source]))
+        axes[-1, column].set_xlabel("training samples")
+    legend_below(page, axes[0, 0].get_lines(), columns=1)
+    return page

@@ -1,1 +1,0 @@
-"""How the diagnosis of causes grows with the number of training samples."""

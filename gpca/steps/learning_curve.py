@@ -1,0 +1,199 @@
+"""Steps ``learning_samples`` and ``learn_from_more``: more labeled samples, and learners of more and more of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+
+from gpca.alignment.icp import ICPSettings
+from gpca.attribution.predictions import prediction_frame
+from gpca.attribution.scores import Attribution
+from gpca.causes.dataset import LABELS, Causes, labels_of
+from gpca.causes.descriptors import WIDTHS, Descriptors, describe_motion, describe_starts, observed_pair
+from gpca.causes.drawing import apportion, draw_further
+from gpca.causes.judged import CEILING, Judged, ceiling_of, judged_by, measure
+from gpca.causes.settings import CauseSettings
+from gpca.causes.truth import BORDERLINE, GEOMETRY
+from gpca.classifier.settings import GPCSettings
+from gpca.errors import InputError
+from gpca.io.arrays import TEXT
+from gpca.io.container import Container, array
+from gpca.io.csv_file import write_csv
+from gpca.objects.canonical import ObjectClouds
+from gpca.pairs.distances import describe_distances
+from gpca.process.job import Job
+from gpca.process.progress import progress
+from gpca.process.provenance import record_provenance
+from gpca.seeds import generator, seed_of
+from gpca.settings import Bounds, Count, Distinct, read_settings
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+FEWEST = 20  # training samples of a learner
+GROUPS = ("distances", "planes", "motion", "starts")  # of descriptors, those that need no further registration
+TREES = 300
+LEARNERS = ("trees", "gpca")
+MEASURED = ("balanced_accuracy", "regret", "tied_accuracy", "dominant_accuracy", "auroc_failed")
+CURVE_COLUMNS = ("learner", "samples", "order", *MEASURED)
+
+
+@dataclass(frozen=True)
+class CurveSettings:
+    """The training samples, and the learners of them.
+
+    Attributes:
+        seeds: how many of the run's seeds, from the first.
+        further: training samples of the same objects that are drawn besides those of the causes, all with a label.
+        chunk: how many of them a job draws, at most.
+        sizes: numbers of labeled training samples that are learned from.
+        orders: number of orders of the samples; a size takes the first samples of each.
+        classifier: of GP-CA.
+    """
+
+    seeds: Count = 1
+    further: Annotated[int, Bounds(minimum=12)] = 240
+    chunk: Annotated[int, Bounds(minimum=12)] = 600
+    sizes: Distinct[Annotated[int, Bounds(minimum=FEWEST)]] = (50, 100, 200)
+    orders: Count = 3
+    classifier: GPCSettings = field(default_factory=GPCSettings)
+
+    def chunks(self) -> list[int]:
+        """Sizes of the chunks, as even as possible."""
+        count = -(-self.further // self.chunk)
+        return [self.further // count + (number < self.further % count) for number in range(count)]
+
+
+@dataclass(frozen=True)
+class LabeledSamples(Container):
+    """N labeled registrations.
+
+    Attributes:
+        distances, planes, motion, starts: (N, F) groups of descriptors.
+        label: (N,) nominal or the dominant cause.
+    """
+
+    distances: np.ndarray = array(f"N {WIDTHS['distances']}")
+    planes: np.ndarray = array(f"N {WIDTHS['planes']}")
+    motion: np.ndarray = array(f"N {WIDTHS['motion']}")
+    starts: np.ndarray = array(f"N {WIDTHS['starts']}")
+    label: np.ndarray = array("N", TEXT, choices=LABELS)
+
+    @property
+    def features(self) -> np.ndarray:
+        """All groups side by side (N, F)."""
+        return np.hstack([getattr(self, name) for name in GROUPS])
+
+
+Scores = Callable[[LabeledSamples], np.ndarray]  # (N, 4) of the labels
+
+
+def labeled_samples(causes: Mapping[str, Any]) -> int:
+    """Number of training samples of the config's section ``causes`` that have a label."""
+    parts = apportion(causes["train"], causes["shares"])
+    return causes["train"] - parts[BORDERLINE] - parts[GEOMETRY]
+
+
+def learning_samples(job: Job) -> None:
+    """Draw, describe and label the samples of one chunk, independently of all other chunks."""
+    chunk = int(job.chunk)
+    wanted = read_settings(CurveSettings, job.section("learning_curve")).chunks()[chunk]
+    icp = job.section("icp")
+    settings = CauseSettings.from_dict(job.section("causes"), icp)
+    with record_provenance([job.samples], [job.objects], job.settings, seed=job.seed):
+        objects = ObjectClouds.load(job.objects, job.source)
+        samples = describe(draw_further(objects, job.source, job.seed, settings, chunk, wanted), ICPSettings(**icp))
+        samples.subset(np.isin(samples.label, LABELS)).save(job.samples, (job.source, job.seed))
+
+
+def describe(causes: Causes, icp: ICPSettings) -> LabeledSamples:
+    """Labels of all rows, and those descriptors that need no further registration."""
+    source, seed = causes.registrations.axes or ("", 0)
+    rows: list[tuple[np.ndarray, ...]] = []
+    for row in progress(range(len(causes)), f"descriptors of {source}, seed {seed}"):
+        pair = observed_pair(causes, row)  # nothing in these is random
+        rows.append((*describe_distances(pair), describe_motion(pair), describe_starts(pair, icp)))
+    groups: dict[str, Any] = {name: np.array([row[i] for row in rows]) for i, name in enumerate(GROUPS)}
+    return LabeledSamples(**groups, label=labels_of(causes.truth))
+
+
+def learn_from_more(job: Job) -> None:
+    """Pool the training samples, and learn from more and more of them."""
+    settings = read_settings(CurveSettings, job.section("learning_curve"))
+    axes = (job.source, job.seed)
+    with record_provenance([job.out], [job.causes, job.descriptors, *job.samples], job.settings, seed=job.seed):
+        causes = Causes.load(job.causes, axes)
+        described = Descriptors.load(job.descriptors, causes.registrations)
+        groups: dict[str, Any] = {name: described.groups[name] for name in GROUPS}
+        samples = LabeledSamples(**groups, label=labels_of(causes.truth))
+        train, test = causes.rows("train"), causes.rows("test")
+        labeled = train[np.isin(samples.label[train], LABELS)]
+        pool = LabeledSamples.joined(
+            [samples.subset(labeled), *(LabeledSamples.load(path, axes) for path in job.samples)]
+        )
+        write_csv(job.out, learning_curve(pool, samples.subset(test), causes.subset(test), settings, *axes))
+
+
+def learning_curve(
+    pool: LabeledSamples, tested: LabeledSamples, truth: Causes, settings: CurveSettings, source: str, seed: int
+) -> pd.DataFrame:
+    """Row of `CURVE_COLUMNS` for each learner, size and order, and one of the truth from other starts.
+
+    An order is a permutation of the pool; a smaller size is part of a larger one in the same order.
+
+    Args:
+        pool: all training samples.
+        tested, truth: the test samples, in the same order.
+
+    Raises:
+        InputError: fewer training samples than the largest size.
+    """
+    import pandas as pd
+
+    if len(pool) < max(settings.sizes):
+        fault = f"{len(pool)} training samples are fewer than the largest size, {max(settings.sizes)}"
+        raise InputError(f"learning curve of {source}", fault, "raise learning_curve.further or lower its sizes")
+    orders = [
+        generator(source, seed, "learning curve", "order", i).permutation(len(pool)) for i in range(settings.orders)
+    ]
+
+    def values(judged: Judged) -> list[float]:
+        measured = measure(judged, np.ones((1, len(judged))))
+        return [float(measured[name][0]) for name in MEASURED]
+
+    rows = [(CEILING, 0, 0, *values(ceiling_of(truth, seed)))]
+    fits = [(name, size, i) for size in sorted(settings.sizes) for i in range(settings.orders) for name in LEARNERS]
+    for name, size, i in progress(fits, f"learning curve of {source}, seed {seed}"):
+        fit = _fit_trees if name == "trees" else _fit_gpca
+        scores = fit(pool.subset(orders[i][:size]), settings.classifier, source, seed, name, size, i)
+        attribution = Attribution.of_scores(LABELS, scores(tested), seconds=0.0)
+        judged = judged_by(prediction_frame(truth.registrations, attribution), truth, seed)
+        rows.append((name, size, i, *values(judged)))
+    return pd.DataFrame(rows, columns=list(CURVE_COLUMNS))
+
+
+def _fit_trees(samples: LabeledSamples, _classifier: GPCSettings, source: str, seed: int, *axes: object) -> Scores:
+    """Extremely randomized trees (Geurts et al. 2006), as in the explainers of descriptors; `axes` name the draws."""
+    from sklearn.ensemble import ExtraTreesClassifier
+
+    from gpca.explainers.classifiers import ConceptClassifier
+
+    state = seed_of(source, seed, "learning curve", *axes) % 2**32
+    forest = ExtraTreesClassifier(TREES, min_samples_leaf=2, max_features=0.3, random_state=state)
+    fitted = ConceptClassifier(forest, LABELS).fit(samples.features, samples.label)
+    return lambda tested: fitted.scores(tested.features)
+
+
+def _fit_gpca(samples: LabeledSamples, classifier: GPCSettings, source: str, seed: int, *axes: object) -> Scores:
+    """The Gaussian process classifier on ranks of the descriptors, as in ``gpca_pair``."""
+    from gpca.classifier.gpc import GPC
+    from gpca.explainers.pair_classifier import NormalizedFeatures
+
+    normalized = NormalizedFeatures(source, seed, "learning curve", *axes)
+    normalized.fit(samples.features)
+    gpc = GPC(LABELS, classifier, source, seed)
+    gpc.fit(normalized(samples.features), samples.label)
+    return lambda tested: gpc.attribute(normalized(tested.features))[0]
