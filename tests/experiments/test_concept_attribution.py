@@ -159,11 +159,7 @@ def test_table2_has_concepts_as_columns_and_only_gpca_as_rows(metrics):
 
 
 def test_stand_ins_are_said_in_title_and_row(metrics):
-    for make, *numbers in (
-        (table1_single_baselines, metrics),
-        (table1_extended, metrics, NONE),
-        (table2_per_concept, metrics),
-    ):
+    for make, *costs in TABLES:
         table = made(make, metrics, *costs, sources=STAND_INS)
         assert "on procedural stand-ins" in table.caption
         assert "LINEMOD (procedural stand-in)" in table.latex()
@@ -263,11 +259,7 @@ def test_latex_spans_both_columns_only_where_it_must(metrics):
 
 
 def test_metrics_without_these_explainers_are_refused(metrics):
-    for make, *numbers in (
-        (table1_single_baselines, metrics),
-        (table1_extended, metrics, NONE),
-        (table2_per_concept, metrics),
-    ):
+    for make, *costs in TABLES:
         with pytest.raises(InputError, match="table '"):
             made(make, metrics, *costs, explainers=["sa_local_additive"])
 
