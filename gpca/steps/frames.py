@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from gpca.attribution.predictions import write_timings
 from gpca.causes.dataset import Causes
-from gpca.causes.settings import CauseSettings
+from gpca.causes.settings import CauseSettings, FrameCauseSettings
 from gpca.errors import InputError
 from gpca.io.csv_file import write_csv
 from gpca.objects.canonical import EVALUATION, ObjectClouds, sample_objects
@@ -134,6 +134,36 @@ def frame_registrations(job: Job) -> None:
         replace(registrations, axes=(name, job.seed)).save(job.registrations)
         write_csv(job.poses, poses)
         write_timings(job.timings, registrations, icp_seconds_S, icp_seconds_S)
+
+
+def frame_causes(job: Job) -> None:
+    """Choose starts, register the instances from each, and measure the causes -> ``frame_causes/seed{seed}.npz``."""
+    from gpca.causes.frames import chosen_starts, measure_frames
+    from gpca.frames.dataset import datasets_of, files_behind, meshes_of, models_of
+    from gpca.frames.instances import Instances, require_of_objects
+    from gpca.frames.starts import all_starts
+
+    frames = files_behind(job.section("datasets"), job.data_dir, job.get("scenes"))
+    inputs, outputs = [job.instances, job.objects, *frames], [job.frame_causes, job.samples, job.starts]
+    with record_provenance(outputs, inputs, job.settings, seed=job.seed):
+        instances, objects = (
+            Instances.load(job.instances, (job.source, None)),
+            ObjectClouds.load(job.objects, job.source),
+        )
+        require_of_objects(instances, objects, job.instances)
+        own = read_settings(FrameCauseSettings, job.section("frames"))
+        places = job.get("scenes"), job.get("splits"), job.settings.get("role", EVALUATION)
+        datasets = datasets_of(job.section("datasets"), job.data_dir, job.downloads, *places)
+        models = models_of(datasets)
+        starts = chosen_starts(all_starts(instances, objects, datasets, models, own.rungs), instances, job.source, own)
+        meshes = meshes_of(models, objects, instances.object_index[starts.instance].tolist())
+        settings = CauseSettings.from_dict(job.section("causes"), job.section("icp"))
+        axes = (job.source, job.seed)
+        causes, samples = measure_frames(instances, starts, objects, meshes, *axes, settings, own.points)
+        seen = zip(samples["dataset"], samples["scene"], strict=True)
+        causes.save(job.frame_causes)
+        write_csv(job.samples, samples.assign(truth=[datasets[name].place(scene).truth for name, scene in seen]))
+        starts.subset(causes.registrations.sample).save(job.starts, axes)
 
 
 def reenact_frames(job: Job) -> None:

@@ -244,7 +244,7 @@ def _frames_recipe(kind: str, seed: int, config: Mapping[str, Any], data: Mappin
     if kind != "reenactments":
         outputs = measured | {"samples": f"frame_causes/seed{seed}.csv"}
         settings |= {"frames": section["causes"]}
-        return Recipe("gpca.experiments.frame_causes.step", given | {"settings": settings}, inputs, outputs)
+        return Recipe("gpca.steps.frames:frame_causes", given | {"settings": settings}, inputs, outputs)
     settings |= {"reenactment": config["diagnosis"]["reenactment"] | section["reenactment"]}
     outputs = {"reenactments": f"reenactments/{REAL_WORLD}/seed{seed}.npz"}
     return Recipe("gpca.steps.frames:reenact_frames", given | {"settings": settings}, inputs | measured, outputs)

@@ -21,8 +21,6 @@ from gpca.errors import InputError
 from gpca.experiments.controls.protocol import ControlRun
 from gpca.experiments.controls.rivals import make_rivals
 from gpca.experiments.controls.settings import HARD, ControlSettings
-from gpca.experiments.diagnosis.step import DESCRIBED, EMBEDDED, explained, with_what_it_reads
-from gpca.experiments.frame_causes.diagnosis_step import FramesToExplain
 from gpca.experiments.scan_causes import diagnosis_step as scan_step
 from gpca.experiments.scan_causes.experiment import diagnosis_settings
 from gpca.experiments.scan_causes.settings import OBJECTS
@@ -33,6 +31,7 @@ from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.process.job import Job
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.settings import read_settings
+from gpca.steps.diagnosis import DESCRIBED, EMBEDDED, FramesToExplain, explained, with_what_it_reads
 from gpca.tracks.published import NOTHING_NAMED, Method
 from gpca.tracks.samples import Samples
 from gpca.tracks.track import CAUSES_TRACK, FRAMES_TRACK, SCANS_TRACK

@@ -18,19 +18,16 @@ IN = "gpca.experiments."
 SHARED = {  # module of gpca.steps -> the steps that it has, functions of their names
     "pairs": "objects registrations uncertainty train embed reduce attribute",
     "causes": "causes describe reenact train_on_causes model",
-    "frames": "scenes instances frame_registrations reenact_frames",
+    "frames": "scenes instances frame_registrations frame_causes reenact_frames",
     "scans": "draw_scans",
+    "diagnosis": "diagnose diagnose_by_features diagnose_frames",
 }
 MODULES = {f: f"gpca.steps.{module}:{f}" for module, functions in SHARED.items() for f in functions.split()} | {
     "active_learning": IN + "active_learning.step",
     "without": IN + "active_learning.without_step",
     "controls": IN + "controls.step",
     "train_control": IN + "controls.encoding",
-    "diagnose": IN + "diagnosis.step",
-    "diagnose_by_features": IN + "diagnosis.by_features",
     "estimate": IN + "estimators.step",
-    "frame_causes": IN + "frame_causes.step",
-    "diagnose_frames": IN + "frame_causes.diagnosis_step",
     "frame_labels": "gpca.steps.frame_labels",
     "gradients": IN + "gradients.step",
     "guarantee": IN + "guarantee.step",

@@ -23,7 +23,7 @@ rule diagnose:
             seed=SEEDS,
         ),
         code=lambda wildcards: code_files(
-            "gpca.experiments.diagnosis.step",
+            "gpca.steps.diagnosis:diagnose",
             explainer_module(wildcards.cause_explainer, CAUSES),
         ),
     output:
@@ -42,7 +42,7 @@ rule diagnose:
     conda:
         "../envs/gpca.yaml"
     params:
-        step="gpca.experiments.diagnosis.step",
+        step="gpca.steps.diagnosis:diagnose",
         explainer=lambda wildcards: wildcards.cause_explainer,
         remedies=as_json(DIAGNOSIS["descriptors"]),
         reenactment=as_json(DIAGNOSIS["reenactment"]),
@@ -62,7 +62,7 @@ rule diagnose_by_features:
             "<results>/descriptors/{{source}}/seed{seed}.npz", seed=SEEDS
         ),
         code=code_files(
-            "gpca.experiments.diagnosis.by_features",
+            "gpca.steps.diagnosis:diagnose_by_features",
             *(explainer_module(name, CAUSES) for name in DIAGNOSIS["by_features"]),
         ),
     output:
@@ -78,7 +78,7 @@ rule diagnose_by_features:
     conda:
         "../envs/gpca.yaml"
     params:
-        step="gpca.experiments.diagnosis.by_features",
+        step="gpca.steps.diagnosis:diagnose_by_features",
         settings=as_json(
             {name: DIAGNOSIS[name] for name in ("by_features", "descriptors")}
         ),

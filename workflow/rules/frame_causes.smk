@@ -17,7 +17,7 @@ rule measure_frame_causes:
         splits=split_file("scenes") if REAL_WORLD["datasets"] else [],
         instances=f"<results>/instances/{FRAMES}.npz",
         objects=f"<results>/objects/{FRAMES}.npz",
-        code=code_files("gpca.experiments.frame_causes.step"),
+        code=code_files("gpca.steps.frames:frame_causes"),
     output:
         frame_causes="<results>/frame_causes/seed{seed}.npz",
         samples="<results>/frame_causes/seed{seed}.csv",
@@ -30,7 +30,7 @@ rule measure_frame_causes:
     conda:
         "../envs/gpca.yaml"
     params:
-        step="gpca.experiments.frame_causes.step",
+        step="gpca.steps.frames:frame_causes",
         settings=as_json({"frames": REAL_WORLD["causes"], **FRAME_CAUSES}),
         source=FRAMES,
         folders=DATA_FOLDERS,
@@ -90,7 +90,7 @@ rule diagnose_frames:
             "<results>/cause_embeddings/{source}/seed{{seed}}.npz", source=SOURCES
         ),
         code=code_files(
-            "gpca.experiments.frame_causes.diagnosis_step",
+            "gpca.steps.diagnosis:diagnose_frames",
             backbone_module(DIAGNOSIS["encoder"]),
             *(explainer_module(name, CAUSES) for name in FRAME_EXPLAINERS),
         ),
@@ -103,7 +103,7 @@ rule diagnose_frames:
     conda:
         "../envs/gpca.yaml"
     params:
-        step="gpca.experiments.frame_causes.diagnosis_step",
+        step="gpca.steps.diagnosis:diagnose_frames",
         settings=frame_diagnosis(FRAME_EXPLAINERS),
         source=FRAMES,
     script:
@@ -130,7 +130,7 @@ use rule diagnose_frames as diagnose_frames_outside with:
             "<results>/cause_embeddings/{source}/seed{{seed}}.npz", source=SOURCES
         ),
         code=lambda wildcards: code_files(
-            "gpca.experiments.frame_causes.diagnosis_step",
+            "gpca.steps.diagnosis:diagnose_frames",
             backbone_module(DIAGNOSIS["encoder"]),
             explainer_module(wildcards.outside_explainer, CAUSES),
         ),

@@ -15,10 +15,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpca.attribution.predictions import read_predictions
-from gpca.causes.dataset import LABELS, Causes
+from gpca.causes.dataset import LABELS, Causes, observed_only
 from gpca.causes.truth import BORDERLINE
 from gpca.errors import InputError
-from gpca.experiments.diagnosis.step import observed_only
 from gpca.experiments.guarantee.experiment import EMBEDDINGS
 from gpca.experiments.guarantee.pool import Pool, axes_of, read_pool
 from gpca.experiments.guarantee.scored import SCORES, Scored, joined

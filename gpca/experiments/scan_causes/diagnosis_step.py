@@ -17,11 +17,10 @@ import numpy as np
 
 from gpca.attribution.predictions import prediction_frame
 from gpca.attribution.scores import Attribution
-from gpca.causes.dataset import LABELS, Causes, labeled
+from gpca.causes.dataset import LABELS, Causes, labeled, observed_only
 from gpca.causes.descriptors import Descriptors
 from gpca.causes.truth import BORDERLINE
 from gpca.errors import InputError
-from gpca.experiments.diagnosis.step import DESCRIBED, EMBEDDED, World, observed_only
 from gpca.experiments.scan_causes.settings import OBJECTS, ScanSamples
 from gpca.explainers.interface import REENACTED
 from gpca.explainers.registry import CAUSES, explainer_entry
@@ -31,6 +30,7 @@ from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
 from gpca.reenactment.dataset import Reenactments, reenactment_features
 from gpca.settings import read_settings
+from gpca.steps.diagnosis import DESCRIBED, EMBEDDED, World
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -70,7 +70,7 @@ def folds_of(cluster_S: np.ndarray, most: int) -> np.ndarray:
 
 
 class _ScansToExplain(World):
-    """Registrations of scans to be explained; see :class:`gpca.experiments.diagnosis.step.World`.
+    """Registrations of scans to be explained; see :class:`gpca.steps.diagnosis.World`.
 
     Args:
         lessons: files of all sources of objects, by what explainers read.

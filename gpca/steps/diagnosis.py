@@ -1,4 +1,4 @@
-"""Step ``diagnose``: one explainer of causes on all seeds of a source -> its predictions."""
+"""The steps of diagnoses: explainers of causes on held-out objects, on parts of what is read, and on depth frames."""
 
 from __future__ import annotations
 
@@ -10,27 +10,30 @@ from pathlib import Path
 
 import numpy as np
 
-from gpca.attribution.predictions import read_timings, write_predictions, write_timings
+from gpca.alignment.icp import ICPSettings
+from gpca.attribution.predictions import prediction_frame, read_timings, write_predictions, write_timings
 from gpca.attribution.scores import Attribution
 from gpca.causes.dataset import LABELS, Causes, labeled, observed_only
-from gpca.causes.descriptors import Descriptors
+from gpca.causes.descriptors import Descriptors, describe_all
 from gpca.causes.settings import DescriptorSettings
 from gpca.causes.truth import BORDERLINE
 from gpca.encoders.registry import EncoderSettings
 from gpca.errors import InputError
 from gpca.explainers.interface import BARE, REENACTED, ConceptExplainer, ExplainerEntry, icp_calls
 from gpca.explainers.registry import CAUSES, explainer_entry
+from gpca.io.csv_file import write_csv
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
 from gpca.reenactment.dataset import Reenactments, reenactment_features
 from gpca.reenactment.settings import ReenactmentSettings
+from gpca.seeds import seed_of_file
 
 EMBEDDED, DESCRIBED = "embeddings", "descriptors"  # `reads` of explainers; all but these and `REENACTED` need neither
 
 
-def run(job: Job) -> None:
-    """Fit on the training rows that have a label and explain every row, seed by seed."""
+def diagnose(job: Job) -> None:
+    """Fit an explainer on training rows with a label and explain every row, seed by seed -> its predictions."""
     entry = explainer_entry(job.explainer, CAUSES)
     remedies = DescriptorSettings(**json.loads(job.remedies))
     reenactment = ReenactmentSettings(**json.loads(job.reenactment))
@@ -45,6 +48,47 @@ def run(job: Job) -> None:
             attribution = explained(explainer, entry, registrations, causes, remedies, causes_file, reenactment)
             write_predictions(predictions, causes.registrations, attribution)
             write_timings(timings, registrations, seconds_S + attribution.seconds_N, icp_seconds_S)
+
+
+def diagnose_by_features(job: Job) -> None:
+    """Let learners that see more and more of a pair learn and explain, seed by seed -> their predictions.
+
+    One job has all of a source, since each learner takes less time than a job needs to start.
+    """
+    remedies = DescriptorSettings(**job.section("descriptors"))
+    own = {(path.parts[-2], seed_of_file(path)): path for path in job.predictions}
+    with record_provenance(job.predictions, [*job.causes, *job.descriptors], job.settings):
+        for seed, causes_file, descriptors in job.per_seed("causes", "descriptors"):
+            causes = Causes.load(causes_file, (job.source, seed))
+            for name, settings in job.section("by_features").items():
+                entry = explainer_entry(name, CAUSES)
+                explainer = entry.make(job.source, seed, **(settings or {}))
+                registrations = with_what_it_reads(labeled(causes), entry, descriptors)
+                attribution = explained(explainer, entry, registrations, causes, remedies, causes_file)
+                write_predictions(own[name, seed], causes.registrations, attribution)
+
+
+def diagnose_frames(job: Job) -> None:
+    """Ask every explainer about the causes of registrations of depth frames -> their predictions.
+
+    They have learned from registrations whose causes were drawn, those of all sources, and from no frame.
+    """
+    import pandas as pd
+
+    # Of each source; re-enactments only where an explainer reads them.
+    learned = {"causes": job.causes, DESCRIBED: job.descriptors, "encoders": job.encoders, EMBEDDED: job.embeddings}
+    learned |= {REENACTED: job.get("reenactments", [])}
+    enacted = job.get("frame_reenactments")
+    read = [job.frame_causes, *([enacted] if enacted else [])]
+    inputs = read + [path for paths in learned.values() for path in paths]
+    with record_provenance([job.predictions], inputs, job.settings, seed=job.seed):
+        causes = Causes.load(job.frame_causes, (job.source, job.seed))
+        frames = FramesToExplain(job, causes, enacted, learned)
+        predictions = []
+        for name, settings in job.section("explainers").items():
+            attribution = frames.attribution(name, settings or {})
+            predictions.append(prediction_frame(causes.registrations, attribution).assign(explainer=name))
+        write_csv(job.predictions, pd.concat(predictions))
 
 
 def explained(
@@ -93,7 +137,7 @@ def with_what_it_reads(registrations: Registrations, entry: ExplainerEntry, path
 class World(ABC):
     """Registrations that explainers which learned from objects are asked about: in depth frames, or of scans.
 
-    Diagnosis of held-out objects is :func:`run`: there one file has training and test rows. An implementation for
+    Diagnosis of held-out objects is :func:`diagnose`: there one file has training and test rows. An implementation for
     another world provides what its explainers read of its registrations but embeddings (:meth:`_read`), and from whom
     an explainer learns (its method ``attribution``).
 
@@ -163,3 +207,41 @@ class World(ABC):
             icp_calls=self._calls(entry.sees),
             abstained_N=np.all([each.abstained_N for each in attributions], axis=0),
         )
+
+
+class FramesToExplain(World):
+    """Registrations of frames to be explained; see :class:`World`.
+
+    Args:
+        enacted: the re-enactments of the frames.
+        learned: files of all sources, by what explainers read.
+    """
+
+    def __init__(self, job: Job, causes: Causes, enacted: Path | None, learned: dict[str, list[Path]]) -> None:
+        super().__init__(job, learned, labeled(causes), causes.T_target_source_runs.shape[1])
+        self._causes, self._enacted = causes, enacted
+        self._icp = ICPSettings(**job.section("icp"))
+
+    def prepare(self, name: str) -> None:
+        """Measure what an explainer reads, once for all that read the same."""
+        self._sets(explainer_entry(name, CAUSES))
+
+    def attribution(self, name: str, settings: dict) -> Attribution:
+        """Return the mean of the scores over all that the explainer learns from."""
+        entry = explainer_entry(name, CAUSES)
+        attributions = []
+        for learned, frames in self._sets(entry):
+            explainer = entry.make(*self._axes, **settings)
+            explainer.fit(learned)
+            attributions.append(explainer.explain(observed_only(frames)))
+        return self._mean(entry, attributions)
+
+    def _read(self, reads: str) -> Registrations:
+        if reads == DESCRIBED:
+            described, _, _ = describe_all(self._causes, *self._axes, self._descriptors, self._icp)
+            read = described.groups
+        else:
+            assert self._enacted is not None
+            enacted = Reenactments.load(self._enacted, self._registrations)
+            read = {"verdict": enacted.verdict, "reenactment": reenactment_features(enacted)}
+        return replace(self._registrations, attached={**self._registrations.attached, **read})
