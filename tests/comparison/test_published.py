@@ -19,7 +19,7 @@ from gpca.comparison.published import (
     read_reasons,
     reason_of,
 )
-from gpca.experiments.kernel_grid.grid import PRINTED, setting_name
+from gpca.experiments.kernel_grid import PRINTED, setting_name
 from gpca.model.runtime_file import COMPONENTS
 
 NUMBERS = read_published()

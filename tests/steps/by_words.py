@@ -31,7 +31,7 @@ MODULES = {f: f"gpca.steps.{module}:{f}" for module, functions in SHARED.items()
     "frame_labels": "gpca.steps.frame_labels",
     "gradients": IN + "gradients.step",
     "guarantee": IN + "guarantee.step",
-    "kernel_grid": IN + "kernel_grid.step",
+    "kernel_grid": "gpca.steps.kernel_grid",
     "learning_curve": "gpca.steps.learning_curve:learn_from_more",
     "learning_samples": "gpca.steps.learning_curve:learning_samples",
     "live_shap": "gpca.steps.live_shap",

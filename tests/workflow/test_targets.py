@@ -74,7 +74,7 @@ EDITS = {  # a module: what is made again where it has changed, and what is not
         "predictions active_learning diagnoses/ model.pt",
     ),
     "baselines/heads.py": ("learners/ table5_learners", "shifted/ predictions diagnoses/ kernels"),
-    "gpca/experiments/kernel_grid/figure.py": ("figures/kernel_learning_curves", "kernels/ kernels.csv tables/"),
+    "gpca/experiments/kernel_grid.py": ("figures/kernel_learning_curves kernels.csv table4_grid", "kernels/ figures/fig3"),
     "gpca/active_learning/acquisition.py": (
         "active_learning/ycb new_concepts/ frame_labels/ runtime.csv table6_labels",
         "predictions embeddings learners diagnoses/ model.pt kernels/",

@@ -71,7 +71,7 @@ def test_a_drawing_has_few_colors_and_keeps_them(figure, tmp_path, photograph, m
 
 
 def test_an_edit_of_the_matplotlibrc_redraws_every_figure():
-    assert "gpca/reporting/figures/matplotlibrc" in code_files("gpca.experiments.kernel_grid.figure")
+    assert "gpca/reporting/figures/matplotlibrc" in code_files("gpca.experiments.kernel_grid")
     assert "gpca/reporting/figures/matplotlibrc" not in code_files("gpca.classifier.gpc")
 
 

@@ -1,3 +1,5 @@
+"""The classifier's kernels, learning rates and iterations, as fitted and as collected."""
+
 from dataclasses import replace
 
 import numpy as np
@@ -8,22 +10,12 @@ from gpca.attribution.diagnostics import calibration_error, negative_log_likelih
 from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
-from gpca.evaluation.measures import TIDY_COLUMNS as TIDY
-from gpca.evaluation.measures import read_clustered, read_metrics, write_metrics
-from gpca.experiments.kernel_grid import grid as kernel_grid
-from gpca.experiments.kernel_grid.grid import (
-    GRID_COLUMNS,
-    SETTING,
-    KernelGrid,
-    collect_grids,
-    evaluate_grid,
-    read_grids,
-    setting_name,
-    write_grid,
-)
-from gpca.experiments.kernel_grid.intervals import collect_intervals
+from gpca.evaluation.measures import TIDY_COLUMNS, read_clustered, read_metrics, write_metrics
+from gpca.experiments.kernel_grid import collect, collect_intervals, read_grids, setting_name
 from gpca.io.csv_file import write_csv
 from gpca.pairs.perturbation import CONCEPTS
+from gpca.steps import kernel_grid
+from gpca.steps.kernel_grid import GRID_COLUMNS, SETTING, KernelGrid, evaluate_grid
 
 GRID = KernelGrid(("rbf", "polynomial"), (0.1, 0.01), (2, 6), inducing=6, draws=40)
 
@@ -83,17 +75,17 @@ def test_intervals_are_of_the_same_measures_over_families(evaluated, grid, tmp_p
     paths = [tmp_path / "kernel_predictions/tiny" / f"seed{seed}.csv" for seed in (0, 1)]
     for path in paths:
         write_csv(path, evaluated[1])
-    write_csv(tmp_path / "intervals.csv", collect_intervals(paths), form=None)
-    found = read_clustered(tmp_path / "intervals.csv").set_index(["method", "metric"])
+    write_csv(tmp_path / "intervals.csv", collect_intervals(None, paths), form=None)
+    rows = read_clustered(tmp_path / "intervals.csv").set_index(["method", "metric"])
     for row in grid.itertuples():
         name = setting_name(row.kernel, row.learning_rate, row.iterations)
         for measure in ("accuracy", "confidence", "ece", "nll"):
-            assert found.loc[(name, measure), "value"] == pytest.approx(getattr(row, measure), abs=1e-5)
-    assert len(found) == 8 * 4
-    assert (found["seeds"] == 2).all() and (found["clusters"] == 3).all()
-    assert (found["low"] < found["high"]).all()
+            assert rows.loc[(name, measure), "value"] == pytest.approx(getattr(row, measure), abs=1e-5)
+    assert len(rows) == 8 * 4
+    assert (rows["seeds"] == 2).all() and (rows["clusters"] == 3).all()
+    assert (rows["low"] < rows["high"]).all()
     with pytest.raises(InputError, match="no files were given"):
-        collect_intervals([])
+        collect_intervals(None, [])
 
 
 def test_gpytorchs_classes_give_the_printed_row_once_more(embedded, monkeypatch):
@@ -115,7 +107,7 @@ def test_a_larger_rate_raises_the_bound_further(grid):
 def test_files_are_read_back_with_source_and_seed(grid, tmp_path):
     paths = [tmp_path / "kernels/tiny" / f"seed{seed}.csv" for seed in (0, 3)]
     for path in paths:
-        write_grid(path, grid)
+        write_csv(path, grid)
     read = read_grids(paths)
     assert read["source"].unique().tolist() == ["tiny"]
     assert read["seed"].tolist() == [0] * 8 + [3] * 8
@@ -124,23 +116,21 @@ def test_files_are_read_back_with_source_and_seed(grid, tmp_path):
 
 def test_bad_files_are_named(grid, tmp_path):
     path = tmp_path / "kernels/tiny/seed0.csv"
-    write_grid(path, grid.assign(nll=np.nan))
+    write_csv(path, grid.assign(nll=np.nan))
     with pytest.raises(InputError, match="column 'nll' contains values that are not finite numbers"):
         read_grids([path])
-    write_grid(path, grid.drop(columns="ece"))
+    write_csv(path, grid.drop(columns="ece"))
     with pytest.raises(InputError, match="column 'ece' is missing"):
         read_grids([path])
-    with pytest.raises(InputError, match="no files were given"):
-        read_grids([])
+    for read in (read_grids, lambda files: collect(None, files)):
+        with pytest.raises(InputError, match="no files were given"):
+            read([])
 
 
 @pytest.mark.parametrize("split", ["train", "test"])
 def test_a_missing_split_is_a_fault(embedded, split):
     with pytest.raises(InputError, match="tiny, seed 0: lack a split"):
         evaluate_grid(embedded.subset(embedded.rows(split)), GRID, "tiny", 0)
-
-
-# --- collected ---
 
 
 def test_every_setting_and_measure_of_every_seed_becomes_a_row(tmp_path):
@@ -151,9 +141,9 @@ def test_every_setting_and_measure_of_every_seed_becomes_a_row(tmp_path):
             ("matern32", 0.001, 20, 0.8, -2, 0.4, 0.2, 0.6),
         ]
         files.append(tmp_path / f"kernels/ycb/seed{seed}.csv")
-        write_grid(files[-1], pd.DataFrame(rows, columns=list(GRID_COLUMNS)))
-    metrics = collect_grids(files)
-    assert tuple(metrics.columns) == TIDY
+        write_csv(files[-1], pd.DataFrame(rows, columns=list(GRID_COLUMNS)))
+    metrics = collect(None, files)
+    assert tuple(metrics.columns) == TIDY_COLUMNS
     assert len(metrics) == 2 * 2 * 5
     assert set(metrics["method"]) == {"rbf-0.01-100", "matern32-0.001-20"}
     of_row = metrics[(metrics["method"] == "rbf-0.01-100") & (metrics["metric"] == "accuracy")]
@@ -167,8 +157,3 @@ def test_every_setting_and_measure_of_every_seed_becomes_a_row(tmp_path):
 
 def test_a_setting_has_one_name():
     assert setting_name("polynomial", 0.001, 200) == "polynomial-0.001-200"
-
-
-def test_no_files_are_a_fault():
-    with pytest.raises(InputError, match="no files were given"):
-        collect_grids([])

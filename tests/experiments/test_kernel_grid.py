@@ -1,15 +1,30 @@
+"""Table IV and the curves over iterations."""
+
 import pandas as pd
 import pytest
 
-from gpca.comparison.published import read_published
 from gpca.errors import InputError
 from gpca.evaluation.measures import COLUMNS
-from gpca.experiments.kernel_grid.figure import COLORS, PRINTED_MARKERS, draw_kernel_curves, printed_accuracies
-from gpca.experiments.kernel_grid.grid import GRID_COLUMNS, PRINTED, setting_name
-from gpca.experiments.kernel_grid.tables import table4_grid, table4_kernels
+from gpca.experiments.kernel_grid import (
+    COLORS,
+    PRINTED_MARKERS,
+    kernel_learning_curves,
+    printed_accuracies,
+    setting_name,
+    table4_grid,
+    table4_kernels,
+)
+from gpca.experiments.plan import Run
+from gpca.steps.kernel_grid import GRID_COLUMNS, PRINTED
 
-REAL = {"linemod": {"title": "LINEMOD", "stand_in": False}, "ycb": {"title": "YCB", "stand_in": False}}
-STAND_INS = {name: entry | {"stand_in": True} for name, entry in REAL.items()}
+
+def run(stand_in=False, **titles):
+    titles = titles or {"linemod": "LINEMOD", "ycb": "YCB"}
+    sources = {name: {"title": title, "stand_in": stand_in} for name, title in titles.items()}
+    return Run({"sources": sources, "kernel_grid": {"sources": list(titles)}})
+
+
+REAL, LINEMOD = run(), run(linemod="LINEMOD")
 
 
 def grid(sources=("ycb", "linemod"), seeds=3):
@@ -38,7 +53,7 @@ def intervals(sources=("ycb", "linemod"), seeds=3):
 
 
 def test_table4_has_the_papers_rows_and_a_column_per_source():
-    table = table4_kernels(intervals(), REAL)
+    table = table4_kernels(REAL, intervals())
     assert [tuple(key for key, _ in labels) for labels in table.rows] == [
         (kernel, f"{rate:g}", str(iterations)) for kernel, rate, iterations in PRINTED
     ]
@@ -57,27 +72,27 @@ def with_gpytorch():
 
 def test_rows_in_gpytorchs_classes_stand_below_the_printed_ones():
     both, of_both = with_gpytorch()
-    table = table4_kernels(of_both, REAL)
+    table = table4_kernels(REAL, of_both)
     assert [key for key, _ in table.rows[-1]] == ["rbf_gpytorch", "0.01", "100"]
     assert len(table.rows) == len(PRINTED) + 1
     assert "| RBF, by gpytorch | 0.01 | 100 | 76.0 (71.0 to 78.0) | 86.0 (81.0 to 88.0) |" in table.markdown()
-    for made in (table, table4_grid(both, of_both, REAL)):
+    for made in (table, table4_grid(REAL, both, of_both)):
         assert "By gpytorch: " in made.markdown()
-    for made in (table4_kernels(intervals(), REAL), table4_grid(grid(), intervals(), REAL)):
+    for made in (table4_kernels(REAL, intervals()), table4_grid(REAL, grid(), intervals())):
         assert "gpytorch" not in made.markdown()
-    curves = [len(draw_kernel_curves(of, {"ycb": "YCB"}, []).axes[0].get_lines()) for of in (grid(), both)]
+    curves = [len(kernel_learning_curves(run(ycb="YCB"), of).axes[0].get_lines()) for of in (grid(), both)]
     assert curves[0] == curves[1]
 
 
 def test_rows_and_sources_that_were_not_fitted_are_left_out():
     part = intervals(("ycb",))
-    table = table4_kernels(part[~part["method"].str.endswith("-200")], REAL)
+    table = table4_kernels(REAL, part[~part["method"].str.endswith("-200")])
     assert list(table.columns) == ["ycb"]
     assert len(table.rows) == 1
 
 
 def test_the_grid_has_every_combination_with_its_calibration():
-    table = table4_grid(grid(), intervals(), REAL)
+    table = table4_grid(REAL, grid(), intervals())
     assert len(table.rows) == 2 * 18
     text = table.markdown()
     row = (
@@ -89,34 +104,29 @@ def test_the_grid_has_every_combination_with_its_calibration():
     assert ("ycb", "rbf", "0.01", "100", "elbo", -1.0, -1.0, -1.0, 3, 0, False) in table.records()
 
 
-def kernels_alone(_grid, of_sources, sources):
-    return table4_kernels(of_sources, sources)
-
-
-@pytest.mark.parametrize("make", [kernels_alone, table4_grid])
+@pytest.mark.parametrize("make", [lambda run, _grid, intervals: table4_kernels(run, intervals), table4_grid])
 def test_stand_ins_are_said_and_nothing_to_show_is_a_fault(make):
-    table = make(grid(), intervals(), STAND_INS)
+    table = make(run(stand_in=True), grid(), intervals())
     assert "on procedural stand-ins" in table.caption
     assert table.latex().count("{") == table.latex().count("}")
     with pytest.raises(InputError, match="has nothing to show"):
-        make(grid(("cups",)), intervals(("cups",)), REAL)
+        make(REAL, grid(("cups",)), intervals(("cups",)))
 
 
 def test_one_seed_has_an_interval_over_families_alone():
-    text = table4_kernels(intervals(seeds=1), REAL).markdown()
+    text = table4_kernels(REAL, intervals(seeds=1)).markdown()
     assert "85.0 (80.0 to 87.0)" in text and "Over 1 seed, 200 test samples each" in text
 
 
 def test_the_figure_is_the_same_bytes_each_time(same_bytes):
-    titles = {"ycb": "YCB", "linemod": "LINEMOD (procedural stand-in)"}
-    same_bytes(lambda: draw_kernel_curves(grid(), titles, read_published()))
+    same_bytes(lambda: kernel_learning_curves(run(ycb="YCB", linemod="LINEMOD (procedural stand-in)"), grid()))
 
 
 def test_the_figure_has_the_accuracies_that_the_paper_prints():
-    printed = printed_accuracies(read_published(), "linemod")
+    printed = printed_accuracies("linemod")
     assert set(printed) == set(PRINTED)
     assert printed["rbf", 0.001, 200] == 50.6
-    panels = draw_kernel_curves(grid(), {"linemod": "LINEMOD"}, read_published()).axes
+    panels = kernel_learning_curves(LINEMOD, grid()).axes
     drawn = [
         sorted(line.get_ydata()[0] for line in panel.get_lines() if line.get_marker() in PRINTED_MARKERS)
         for panel in panels
@@ -125,7 +135,7 @@ def test_the_figure_has_the_accuracies_that_the_paper_prints():
 
 
 def test_a_kernel_whose_curve_coincides_with_anothers_shows_below_it():
-    figure = draw_kernel_curves(grid(), {"linemod": "LINEMOD"}, [])
+    figure = kernel_learning_curves(LINEMOD, grid())
     lines = [line for line in figure.axes[0].get_lines() if len(line.get_xdata()) > 1]
     widths = {line.get_color(): line.get_linewidth() for line in lines}
     assert widths[COLORS["matern32"]] > widths[COLORS["rbf"]]
@@ -134,4 +144,4 @@ def test_a_kernel_whose_curve_coincides_with_anothers_shows_below_it():
 
 def test_without_a_grid_of_these_sources_nothing_is_drawn():
     with pytest.raises(InputError, match="have no results for these sources"):
-        draw_kernel_curves(grid(), {"cups": "Cups"}, read_published())
+        kernel_learning_curves(run(cups="Cups"), grid())

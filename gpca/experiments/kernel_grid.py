@@ -1,0 +1,332 @@
+"""The classifier's kernel, learning rate and number of iterations (Table IV)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from math import inf
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from gpca.attribution.predictions import read_predictions
+from gpca.errors import InputError, require_names
+from gpca.evaluation.intervals import Clustered
+from gpca.evaluation.measures import ALL, intervals, source_method_seed, tidy
+from gpca.experiments.experiment import Experiment, LeftOut
+from gpca.experiments.plan import Run
+from gpca.experiments.result import figure, numbers, table
+from gpca.experiments.step import Step
+from gpca.io.csv_file import numbers as number_column
+from gpca.io.csv_file import read_csv
+from gpca.reporting.figures.style import BLACK, BLUE, COLUMN_WIDTH_IN, GRAY, ORANGE
+from gpca.reporting.sheet import Row, Sheet, show
+from gpca.reporting.tables.builder import interval_over
+from gpca.reporting.tables.cells import cell_of_repeats
+from gpca.settings import Distinct
+from gpca.steps.kernel_grid import BY_GPYTORCH, GRID_COLUMNS, MEASURES, PRINTED, SETTING, KernelGrid
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+TABLE = "kernels"  # in the column `table`
+GRID_FILES = "kernels/{kernel_source}/seed{seed}.csv"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Section(KernelGrid):
+    """The grid, and the sources whose embeddings it is fitted to."""
+
+    sources: Distinct[str]
+
+
+def check(config: dict, left_out: LeftOut) -> None:
+    """Check the names of the sources."""
+    sources = config["kernel_grid"]["sources"]
+    require_names("kernel_grid.sources", sources, config["sources"], "source", left_out("sources"))
+
+
+def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
+    """The sources, and the kernels of the printed rows that are fitted."""
+    grid = config["kernel_grid"]
+    printed = [
+        kernel
+        for kernel, rate, iterations in PRINTED
+        if kernel in grid["kernels"] and rate in grid["learning_rates"] and iterations in grid["iterations"]
+    ]
+    return {"kernel_source": list(grid["sources"]), "printed_kernels": printed}
+
+
+EXPERIMENT = Experiment(
+    name="kernel_grid",
+    sections={"kernel_grid": Section},
+    names=names,
+    check=check,
+    lists={"kernel_grid.sources": "sources"},
+)
+
+FIT = Step(
+    name="fit_kernel_grid",
+    run="gpca.steps.kernel_grid",
+    inputs={
+        "registrations": "registrations/{source}/seed{*seed}.npz",
+        "embeddings": "embeddings/{source}/{embedding}/seed{*seed}.npz",
+    },
+    outputs={
+        "out": "kernels/{source}/seed{*seed}.csv",
+        "predictions": "kernel_predictions/{source}/seed{*seed}.csv",
+    },
+    settings=lambda plan, wildcards: plan.config["kernel_grid"],
+    where={"source": "kernel_source"},
+    priority=4,
+)
+
+
+def setting_name(kernel: str, learning_rate: float, iterations: int) -> str:
+    """E.g. ``rbf-0.01-100``, the column `method`."""
+    return f"{kernel}-{learning_rate:g}-{iterations}"
+
+
+def read_grids(files: Iterable[str | Path]) -> pd.DataFrame:
+    """Read files named `…/{source}/seed{seed}.csv` into one frame with the further columns `source` and `seed`.
+
+    Raises:
+        InputError: no files, a name of another form, a missing column, something that is not a finite number.
+    """
+    import pandas as pd
+
+    parts = []
+    for path in files:
+        _, source, seed = source_method_seed(path)
+        rows = read_csv(path, GRID_COLUMNS)
+        for column in GRID_COLUMNS[1:]:
+            rows[column] = number_column(path, rows, column)
+        parts.append(rows.assign(source=source, seed=seed, iterations=rows["iterations"].astype(int)))
+    if not parts:
+        raise InputError("kernels", "no files were given", "name a source in kernel_grid.sources")
+    return pd.concat(parts, ignore_index=True)
+
+
+@numbers("kernels.csv", files=GRID_FILES)
+def collect(run: Run, files: Iterable[str | Path]) -> pd.DataFrame:
+    """`MEASURES` of every setting, by seed."""
+    records = [
+        (TABLE, row.source, setting_name(row.kernel, row.learning_rate, row.iterations), measure, ALL, row.seed, value)
+        for row in read_grids(files).itertuples()
+        for measure in MEASURES
+        for value in [float(getattr(row, measure))]
+    ]
+    return tidy(records, "kernels")
+
+
+@numbers("kernel_intervals.csv", files="kernel_predictions/{kernel_source}/seed{seed}.csv")
+def collect_intervals(run: Run, files: Iterable[str | Path]) -> pd.DataFrame:
+    """All measures but the ELBO over all seeds, with intervals over families; a source's settings share the draws.
+
+    Raises:
+        InputError: no files, a name of another form, a file that cannot be read.
+    """
+    import pandas as pd
+
+    from gpca.experiments.out_of_distribution.intervals import estimates_of_scores
+
+    by_source: dict[str, list[pd.DataFrame]] = {}
+    for path in files:
+        _, source, seed = source_method_seed(path)
+        rows = read_predictions(path, SETTING)
+        setting = {name: number_column(path, rows, name) for name in SETTING[1:]}
+        by_source.setdefault(source, []).append(rows.assign(seed=seed, **setting))
+    records = []
+    for source, frames in by_source.items():
+        for (kernel, rate, iterations), rows in pd.concat(frames).groupby([*SETTING], sort=False):
+            samples = Clustered.drawn(rows["seed"], rows["cluster"], "kernel intervals", source)
+            estimates = estimates_of_scores(rows, samples)
+            keys = TABLE, source, setting_name(kernel, rate, int(iterations))
+            records += [samples.record((*keys, name, ALL), estimates[name]) for name in MEASURES if name in estimates]
+    return intervals(records, "kernels")
+
+
+SECTION = "IV-D Ablation studies"
+TITLES = {"rbf": "RBF", "matern32": "Matérn 3/2", "polynomial": "Polynomial, p = 2"}
+TITLES |= {kernel + BY_GPYTORCH: f"{title}, by gpytorch" for kernel, title in TITLES.items()}
+GPYTORCH_NOTE = "By gpytorch: the same fit in gpytorch's own classes, from the same start and random numbers."
+HEADS = {"kernel": "Kernel", "learning_rate": "Rate", "iterations": "Iterations"}
+COLUMNS = {
+    "accuracy": show("accuracy", "Accuracy (%)"),
+    "confidence": show("confidence", "Confidence (%)", of_samples=False),
+    "ece": show("ece", "ECE (share)", factor=1, decimals=3, limits=(0, 1), least_is_best=True),
+    "nll": show("nll", "NLL (nats)", factor=1, decimals=3, limits=(0, inf), least_is_best=True),
+    "elbo": show("elbo", "ELBO (nats)", decimals=3, limits=(-inf, inf)),  # over the seeds
+}
+
+
+@table(
+    SECTION,
+    "Table IV: kernel and schedule",
+    """Table IV of the paper: accuracy of the Gaussian process classifier in the paper's five combinations of kernel,
+    learning rate and iterations.""",
+    paper=True,
+    needs=("printed_kernels", "kernel_source"),
+    intervals="kernel_intervals.csv",
+)
+def table4_kernels(run: Run, intervals):
+    """Accuracy of the printed settings that were fitted: settings × sources."""
+    again = [(kernel + BY_GPYTORCH, rate, iterations) for kernel, rate, iterations in PRINTED]
+    rows = [Row(labels(setting), {"method": setting_name(*setting)}) for setting in (*PRINTED, *again)]
+    columns = {name: show("accuracy", title, where={"source": name}) for name, title in titles(run).items()}
+    sheet = Sheet("table4_kernels", HEADS, rows, columns, intervals)
+    caption = "Accuracy of the GPC by kernel and schedule (%)" + stand_ins(run, intervals)
+    note = "The rows that the paper prints; table4_grid has all, with their confidence."
+    return sheet.table(caption, "source", [f"{over(sheet)}.", note, *gpytorch_note(sheet)], bold=columns)
+
+
+@figure(
+    SECTION,
+    "Accuracy and confidence over iterations",
+    """Accuracy and mean confidence of the Gaussian process classifier over its iterations. Matérn's lines are wide so
+    that they show below those of RBF where both coincide.
+
+    Circles are the rows of Table IV, filled symbols of the same color the accuracies that the paper prints for
+    them. These stand to the right of their number of iterations, since equal ones would hide one another. The paper
+    prints no confidence.""",
+    grid=(read_grids, GRID_FILES),
+)
+def kernel_learning_curves(run: Run, grid) -> Figure:
+    """Means over the seeds; the printed accuracies stand beside those of their settings."""
+    grid = grid[grid["kernel"].isin(COLORS)]  # gpytorch's own classes would draw the same curves
+    shown = {name: title for name, title in titles(run).items() if (grid["source"] == name).any()}
+    if not shown:
+        raise InputError("kernels", "have no results for these sources", "run them first")
+    from matplotlib.lines import Line2D
+    from matplotlib.ticker import NullLocator
+
+    from gpca.reporting.figures.panels import in_lines, legend_below, panels
+
+    drawing, axes = panels(len(CURVES), len(shown), 4.05, COLUMN_WIDTH_IN, sharex=True, sharey=True)
+    rates = sorted(grid["learning_rate"].unique(), reverse=True)
+    ticks = sorted(grid["iterations"].unique())
+    for column, (source, title) in enumerate(shown.items()):
+        rows_of_source = grid[grid["source"] == source]
+        means = rows_of_source.groupby([*SETTING])[list(CURVES)].mean()
+        for row, measure in enumerate(CURVES):
+            panel = axes[row, column]
+            by_kernel = means[measure].groupby(level=["kernel", "learning_rate"])
+            for (kernel, rate), curve in sorted(by_kernel, key=lambda item: list(WIDTHS).index(item[0][0])):
+                iterations = curve.index.get_level_values("iterations")
+                line = LINES[rates.index(rate) % len(LINES)]
+                panel.plot(iterations, 100 * curve, color=COLORS[kernel], linestyle=line, linewidth=WIDTHS[kernel])
+            for setting in PRINTED:
+                if setting in means.index:
+                    marker = {"color": COLORS[setting[0]], "markerfacecolor": "white", "markersize": 5}
+                    panel.plot(setting[2], 100 * means.loc[setting, measure], "o", clip_on=False, zorder=5, **marker)
+            for (kernel, rate, iterations), value in printed_accuracies(source).items():
+                if measure == "accuracy" and (kernel, rate, iterations) in means.index:
+                    symbol = PRINTED_MARKERS[int(rate < rates[0])]
+                    filled = {"color": COLORS[kernel], "markersize": 3.5, "clip_on": False}
+                    panel.plot(BESIDE[kernel] * iterations, value, symbol, **filled)
+            panel.set_xscale("log")
+            panel.set_xticks(ticks, [f"{tick}" for tick in ticks])
+            panel.xaxis.set_minor_locator(NullLocator())
+            panel.set(xlim=(0.9 * ticks[0], 1.65 * ticks[-1]), ylim=(30, 100))
+        axes[0, column].set_title(in_lines(title))
+        axes[-1, column].set_xlabel("iterations")
+    for row, label in enumerate(CURVES.values()):
+        axes[row, 0].set_ylabel(label)
+    handles = [
+        Line2D([], [], color=COLORS[kernel], linewidth=WIDTHS[kernel], label=TITLES[kernel])
+        for kernel in COLORS
+        if (grid["kernel"] == kernel).any()
+    ]
+    handles += [
+        Line2D([], [], color=GRAY, linestyle=LINES[i % len(LINES)], label=f"rate {rate:g}")
+        for i, rate in enumerate(rates)
+    ]
+    ours: dict[str, Any] = {"color": GRAY, "marker": "o", "markerfacecolor": "white", "linestyle": ""}
+    handles.append(Line2D([], [], label="row of Table IV", **ours))
+    for symbol, rate in zip(PRINTED_MARKERS, rates, strict=False):
+        printed: dict[str, Any] = {"color": GRAY, "marker": symbol, "linestyle": "", "markersize": 3.5}
+        handles.append(Line2D([], [], label=f"paper, rate {rate:g}", **printed))
+    legend_below(drawing, handles, columns=3)
+    return drawing
+
+
+COLORS = {"rbf": BLUE, "matern32": ORANGE, "polynomial": BLACK}
+LINES: tuple[Any, ...] = ("-", (0, (4, 2)), ":", "-.")  # from the largest learning rate on
+WIDTHS = {"matern32": 2.2, "polynomial": 1.0, "rbf": 1.0}  # the first drawn is the widest, so that all remain visible
+PRINTED_MARKERS = ("D", "v")  # at the largest learning rate, and at a smaller one
+BESIDE = dict(zip(COLORS, (1.15, 1.32, 1.52), strict=True))  # factor of x; equal printed numbers would coincide
+CURVES = {"accuracy": "accuracy (%)", "confidence": "mean confidence (%)"}
+
+
+def printed_accuracies(source: str) -> dict[tuple[str, float, int], float]:
+    """Accuracies of the paper's Table IV for a source, in %, by kernel, learning rate and iterations."""
+    from gpca.comparison.published import read_published
+
+    printed = {}
+    for number in read_published():
+        if number.table == "IV" and number.counterpart and source in number.counterpart.sources:
+            kernel, rate, iterations = number.counterpart.methods[0].split("-")
+            printed[kernel, float(rate), int(iterations)] = number.value
+    return printed
+
+
+@table(
+    SECTION,
+    "Table IV, extended: every combination",
+    """All combinations of kernel, learning rate and iterations, with confidence and calibration. Accuracy and
+    confidence diverge if training stops early: such a classifier is right long before it is sure.""",
+    grid=(read_grids, GRID_FILES),
+    intervals="kernel_intervals.csv",
+)
+def table4_grid(run: Run, grid, intervals):
+    """Accuracy and calibration of every setting: sources and settings × measures."""
+    settings = list(grid[list(SETTING)].drop_duplicates().itertuples(index=False, name=None))
+    rows = [
+        Row([(source, title), *labels(setting)], {"source": source, "method": setting_name(*setting)})
+        for source, title in titles(run).items()
+        for setting in settings
+    ]
+    sheet = Sheet("table4_grid", {"source": "Dataset", **HEADS}, rows, COLUMNS, intervals)
+    by_setting = {
+        (source, setting_name(*setting)): values_R
+        for (source, *setting), values_R in grid.groupby(["source", *SETTING])["elbo"]
+    }
+    for i, row in enumerate(sheet.rows):
+        sheet.cells[i, "elbo"] = cell_of_repeats(by_setting[row.where["source"], row.where["method"]], 0)
+    notes = (
+        f"{over(sheet)}. Bold: best accuracy and NLL of a dataset.",
+        "Confidence: mean of the largest score. ECE: its gap to the accuracy over 15 equally wide bins, mean of "
+        f"each seed's own. ELBO: per training sample, mean over the seeds; {interval_over(sheet.seeds)}. If it still "
+        "rises from row to row and the confidence lies far below the accuracy, the fit was stopped before it had "
+        "converged.",
+        *gpytorch_note(sheet),
+    )
+    caption = "The GPC by kernel, learning rate and iterations" + stand_ins(run, intervals)
+    return sheet.table(caption, "measure", notes, bold=["accuracy", "nll"], same=1)
+
+
+def titles(run: Run) -> dict[str, str]:
+    """Titles of the sources of the grid."""
+    return {name: title for name, title in run.source_titles.items() if name in run.config["kernel_grid"]["sources"]}
+
+
+def labels(setting: tuple) -> list[tuple[str, str]]:
+    """Labels of a row by its kernel, learning rate and iterations."""
+    kernel, rate, iterations = setting
+    return [(kernel, TITLES[kernel]), (f"{rate:g}", f"{rate:g}"), (str(iterations), str(iterations))]
+
+
+def over(sheet: Sheet) -> str:
+    """Start of the footnote on seeds, samples and intervals, without a full stop."""
+    cell = next(cell for cell in sheet.cells.values() if cell.test_samples)
+    return sheet.over(cell.test_samples // cell.seeds)
+
+
+def stand_ins(run: Run, intervals: pd.DataFrame) -> str:
+    """Clause of a caption on stand-ins among the sources with results."""
+    return run.stand_ins([name for name in titles(run) if (intervals["source"] == name).any()], partly=False)
+
+
+def gpytorch_note(sheet: Sheet) -> list[str]:
+    """Footnote on the rows in gpytorch's own classes, if there are any."""
+    return [GPYTORCH_NOTE] if any(key.endswith(BY_GPYTORCH) for row in sheet.rows for key, _ in row.labels) else []

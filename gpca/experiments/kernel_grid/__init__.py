@@ -1,1 +1,0 @@
-"""Kernels, learning rates and numbers of iterations (paper Table IV)."""

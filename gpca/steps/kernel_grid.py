@@ -1,0 +1,128 @@
+"""Step ``fit_kernel_grid``: the classifier by kernel, learning rate and number of iterations (Table IV)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+
+from gpca.attribution.diagnostics import calibration_error, negative_log_likelihood
+from gpca.attribution.predictions import prediction_frame
+from gpca.attribution.scores import Attribution
+from gpca.classifier.settings import Draws, GPCSettings, Kernel, LearningRate
+from gpca.errors import InputError
+from gpca.io.csv_file import write_csv
+from gpca.pairs.dataset import Registrations, read_embedding
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.process.job import Job
+from gpca.process.provenance import record_provenance
+from gpca.settings import Count, Different, Distinct, fields_of
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from gpca.classifier.gpc import GPC
+    from gpca.classifier.gpytorch_classes import GpytorchGPC
+
+MEASURES = ("accuracy", "elbo", "confidence", "ece", "nll")
+SETTING = ("kernel", "learning_rate", "iterations")
+GRID_COLUMNS = (*SETTING, *MEASURES)
+PRINTED: tuple[tuple[Kernel, float, int], ...] = (  # the rows of the paper's table
+    ("rbf", 0.01, 100),
+    ("matern32", 0.01, 200),
+    ("polynomial", 0.01, 200),
+    ("rbf", 0.001, 200),
+    ("polynomial", 0.001, 200),
+)
+BY_GPYTORCH = "_gpytorch"  # suffix of a kernel that is fitted in gpytorch's own classes
+
+
+@dataclass(frozen=True)
+class KernelGrid:
+    """The kernels and learning rates that are fitted, and the iterations at which they are evaluated.
+
+    Attributes:
+        kernels, learning_rates: every kernel is fitted at every rate.
+        iterations: counts at which the classifier is evaluated; it is fitted up to the largest.
+        gpytorch: kernels that are fitted once more in gpytorch's own classes, for comparison: with the printed
+            iterations at the larger rate, where both are in the grid.
+        inducing, draws: as of :class:`gpca.classifier.settings.GPCSettings`.
+    """
+
+    kernels: Distinct[Kernel] = ("rbf", "matern32", "polynomial")
+    learning_rates: Distinct[LearningRate] = (0.01, 0.001)
+    iterations: Distinct[Count] = (10, 20, 50, 100, 200)
+    gpytorch: Annotated[tuple[Kernel, ...], Different(fewest=0)] = ()
+    inducing: Count = 64
+    draws: Draws = 1000
+
+
+def run(job: Job) -> None:
+    """Evaluate the grid, seed by seed."""
+    grid = KernelGrid(**fields_of(job.settings, KernelGrid))
+    files = job.per_seed("registrations", "embeddings", "out", "predictions")
+    for seed, registrations, embeddings, out, predictions in files:
+        with record_provenance([out, predictions], [registrations, embeddings], job.settings, seed=seed):
+            loaded = Registrations.load(registrations, (job.source, seed))
+            loaded = replace(loaded, attached=read_embedding(embeddings, loaded))
+            rows, prediction_rows = evaluate_grid(loaded, grid, job.source, seed)
+            write_csv(out, rows)
+            write_csv(predictions, prediction_rows)
+
+
+def evaluate_grid(
+    registrations: Registrations, grid: KernelGrid, source: str, seed: int
+) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Rows of :data:`GRID_COLUMNS`, and the predictions of the test samples, which have `SETTING` as first columns.
+
+    Each row equals that of a separate fit of that many iterations to the training samples alone. `elbo` is per
+    training sample in nats, `confidence` the mean of the largest score.
+
+    Raises:
+        InputError: no training or no test samples.
+    """
+    import pandas as pd
+
+    train, test = registrations.rows("train"), registrations.rows("test")
+    if not len(train) or not len(test):
+        raise InputError(f"registrations of {source}, seed {seed}", "lack a split", "give training and test samples")
+    h_S_d, concept_S = registrations.embedding, registrations.concept
+    target_N = np.array([CONCEPTS.index(concept) for concept in concept_S[test]])
+    tested, predictions, rows = registrations.subset(test), [], []
+    for name, rate, counts, gpc in _fits(grid, source, seed):
+        for iterations in gpc.fit_up_to(counts, h_S_d[train], concept_S[train]):
+            scores_N_C, variances_N_C, bald_N = gpc.attribute(h_S_d[test])
+            attribution = Attribution.of_scores(
+                CONCEPTS, scores_N_C, seconds=0.0, variances_N_C=variances_N_C, bald_N=bald_N
+            )
+            setting = dict(zip(SETTING, (name, rate, iterations), strict=True))
+            predictions.append(prediction_frame(tested, attribution).assign(**setting))
+            measured = (
+                np.mean(scores_N_C.argmax(axis=1) == target_N),
+                gpc.elbo(),
+                scores_N_C.max(axis=1).mean(),
+                calibration_error(scores_N_C, target_N),
+                negative_log_likelihood(scores_N_C, target_N),
+            )
+            rows.append((name, rate, iterations, *measured))
+    predicted = pd.concat(predictions, ignore_index=True)
+    return pd.DataFrame(rows, columns=list(GRID_COLUMNS)), predicted[[*SETTING, *predicted.columns.drop([*SETTING])]]
+
+
+def _fits(grid: KernelGrid, source: str, seed: int) -> Iterator[tuple[str, float, tuple[int, ...], GPC | GpytorchGPC]]:
+    """Name, learning rate, counts of iterations and classifier of every fit."""
+    from gpca.classifier.gpc import GPC
+    from gpca.classifier.gpytorch_classes import GpytorchGPC
+
+    for kernel in grid.kernels:
+        for rate in grid.learning_rates:
+            settings = GPCSettings(kernel, rate, max(grid.iterations), grid.inducing, grid.draws)
+            yield kernel, rate, grid.iterations, GPC(CONCEPTS, settings, source, seed)
+    largest = max(rate for _, rate, _ in PRINTED)
+    for kernel, rate, iterations in PRINTED:
+        in_grid = rate in grid.learning_rates and iterations in grid.iterations
+        if kernel in grid.gpytorch and rate == largest and in_grid:
+            settings = GPCSettings(kernel, rate, iterations, grid.inducing, grid.draws)
+            yield kernel + BY_GPYTORCH, rate, (iterations,), GpytorchGPC(CONCEPTS, settings, source, seed)
