@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
-from gpca.errors import InputError, with_key
+from gpca.errors import with_key
 from gpca.explainers.registry import explainer_entry, require_settings
-
-DESIGN = "additive"  # the design whose conditions are estimated
 
 
 def require_explained(config: Mapping[str, Any], key: str) -> Iterator[tuple[str, str]]:
@@ -23,11 +21,9 @@ def require_explained(config: Mapping[str, Any], key: str) -> Iterator[tuple[str
     section: Any = config
     for part in key.split("."):
         section = section[part]
-    for name, settings in section.items():
-        key_of_name = f"{key}.{name}"
-        own = (config["explainers"].get(name) or {}) | (settings or {})
-        with_key(key_of_name, require_settings, name, own)
-        yield key_of_name, name
+    for name, settings in explainer_settings(config, section).items():
+        with_key(f"{key}.{name}", require_settings, name, settings)
+        yield f"{key}.{name}", name
 
 
 def titles(names: Collection[str]) -> dict[str, str]:
@@ -35,12 +31,6 @@ def titles(names: Collection[str]) -> dict[str, str]:
     return {name: explainer_entry(name).title for name in names}
 
 
-def require_exchangeable(name: str) -> None:
-    """Raise an InputError unless the explainer is known and reads what is exchanged.
-
-    That is registrations, their embeddings, the conditions of design ``additive``, or of any the observed pair alone.
-    """
-    entry = explainer_entry(name)
-    if entry.design not in (None, DESIGN) and not entry.observed_only:
-        fault = f"reads design '{entry.design}', which estimators do not provide"
-        raise InputError(f"explainer '{name}'", fault, f"choose one that reads '{DESIGN}'")
+def explainer_settings(config: Mapping[str, Any], explainers: Mapping[str, Mapping | None]) -> dict[str, dict]:
+    """Settings of an experiment's explainers, added to those that they have elsewhere."""
+    return {name: (config["explainers"].get(name) or {}) | (settings or {}) for name, settings in explainers.items()}

@@ -301,7 +301,7 @@ def table11_limits(run: Run, intervals):
     columns = {(name := success_within(limit)): show(name, f"{100 * limit:g} % d (%)") for limit in curve}
     sheet = Sheet("table11_limits", HEADS, rows_of(run), columns, intervals)
     caption = "Registrations that succeed, by the error that is allowed" + run.stand_ins()
-    return sheet.table(caption, "error below", notes(run, sheet, intervals), bold=columns, same=1)
+    return sheet.table(caption, "error below", notes(run, sheet, intervals), bold=columns, same=1, keep_empty=True)
 
 
 @table(
@@ -323,10 +323,10 @@ def table11_severity(run: Run, intervals):
     pairs = {key: cell.test_samples for (_, key), cell in sheet.cells.items()}
     note = (
         "Low, middle, high: thirds of what is drawn; a pose error counts by the mean of its places in the two ranges. "
-        f"Pairs of all seeds, by column: {', '.join(str(pairs[key]) for key in columns if key in pairs)}."
+        f"Pairs of all seeds, by column: {', '.join(str(pairs.get(key, 0)) for key in columns)}."
     )
     caption = "Registrations that succeed, by cause and severity (%)" + run.stand_ins()
-    return sheet.table(caption, "cause", [*notes(run, sheet, intervals), note], bold=columns, same=1)
+    return sheet.table(caption, "cause", [*notes(run, sheet, intervals), note], bold=columns, same=1, keep_empty=True)
 
 
 def rows_of(run: Run) -> Iterable[Row]:

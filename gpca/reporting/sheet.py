@@ -115,10 +115,11 @@ class Sheet:
         bold: Iterable[str] = (),
         same: int = 0,
         bold_across: Iterable[str] = (),
+        keep_empty: bool = False,
     ) -> Table:
         """The table; in each of the `bold` columns, rivals whose first `same` labels agree compete.
 
-        Within each row, the columns of `bold_across` compete.
+        Within each row, the columns of `bold_across` compete. With `keep_empty`, columns without any number stay.
         """
         groups: dict[tuple, list[tuple[int, str]]] = {}
         for key in bold_across:
@@ -129,7 +130,7 @@ class Sheet:
                 if row.rival:
                     groups.setdefault((*row.labels[:same], key), []).append((number, key))
         filled = {key for _, key in self.cells}
-        columns = {key: column for key, column in self.columns.items() if key in filled}
+        columns = {key: column for key, column in self.columns.items() if keep_empty or key in filled}
         cells = {key: share_within_limits(cell, columns[key[1]]) for key, cell in self.cells.items()}
         widened = any(cell is not self.cells[key] and columns[key[1]].interval for key, cell in cells.items())
         return Table(

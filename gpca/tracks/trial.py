@@ -19,13 +19,13 @@ from gpca.causes.settings import DescriptorSettings
 from gpca.encoders.registry import EncoderSettings
 from gpca.errors import InputError
 from gpca.experiments.controls.protocol import ControlRun
-from gpca.experiments.controls.rivals import make_rivals
 from gpca.experiments.controls.settings import HARD, ControlSettings
 from gpca.experiments.scan_causes import diagnosis_step as scan_step
 from gpca.experiments.scan_causes.experiment import diagnosis_settings
 from gpca.experiments.scan_causes.settings import OBJECTS
 from gpca.explainers.interface import BARE, REENACTED, ExplainerEntry
 from gpca.explainers.registry import explainer_entry, require_settings
+from gpca.explainers.rivals import make_rivals
 from gpca.frames.source import REAL_WORLD
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.process.job import Job

@@ -51,7 +51,7 @@ MODULES = {f: f"gpca.steps.{module}:{f}" for module, functions in SHARED.items()
     "choose_joint": IN + "joint_reading.choose_step",
     "apply_joint": IN + "joint_reading.apply_step",
     "judge_joint": IN + "joint_reading.verdict_step",
-    "exchange": IN + "substitution.step",
+    "exchange": "gpca.steps.exchange",
 }
 LISTS = {  # which names of a step are lists, and not of one seed, file or name
     "active_learning": "strategies out",

@@ -123,7 +123,7 @@ EDITS = {  # a module: what is made again where it has changed, and what is not
         "controls.csv table10_controls transfer",
         "controls/ predictions diagnoses/",
     ),
-    "gpca/experiments/substitution/estimated.py": (
+    "gpca/uncertainty/estimators/substitute.py": (
         "exchange/ table14_method_matrix",
         "estimates/ methods/ predictions",
     ),

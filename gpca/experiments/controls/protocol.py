@@ -13,7 +13,6 @@ import numpy as np
 from gpca.attribution.predictions import prediction_frame
 from gpca.attribution.scores import Attribution
 from gpca.experiments.controls.costs import ASKED, Costs
-from gpca.experiments.controls.rivals import Embed, Rival, described_for
 from gpca.experiments.controls.settings import (
     HARD,
     PAPER,
@@ -28,6 +27,7 @@ from gpca.experiments.controls.settings import (
 from gpca.experiments.controls.variants import left_out, relabeled, shows_known_object, variant
 from gpca.explainers.gpca import GPCA_FORMS
 from gpca.explainers.interface import BARE, Describing, Encoding
+from gpca.explainers.rivals import Embed, Rival, described_for
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.uncertainty.designs import evaluate_design

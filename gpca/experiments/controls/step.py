@@ -6,10 +6,10 @@ from gpca.alignment.icp import ICPSettings
 from gpca.encoders.registry import EncoderSettings
 from gpca.encoders.training import embed, load_model
 from gpca.experiments.controls.protocol import ControlRun
-from gpca.experiments.controls.rivals import make_rivals
 from gpca.experiments.controls.samples import sample_table
 from gpca.experiments.controls.settings import HARD, PAPER, ControlSettings
 from gpca.experiments.controls.variants import left_out, variant
+from gpca.explainers.rivals import make_rivals
 from gpca.io.csv_file import write_csv
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations, read_embedding

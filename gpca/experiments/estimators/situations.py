@@ -17,12 +17,12 @@ from gpca.causes.dataset import Causes
 from gpca.causes.descriptors import observed_pair
 from gpca.causes.settings import CauseSettings
 from gpca.errors import InputError
-from gpca.experiments.estimators.examples import Moved, describe, example, true_twist, twists_or_none
 from gpca.experiments.estimators.references import Redraws, Reference, draw_twists
 from gpca.experiments.estimators.settings import KINDS, EstimatorPairSettings, Kind
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.judge import Judges
 from gpca.seeds import generator, seed_of
+from gpca.uncertainty.estimators.examples import Moved, describe, example, true_twist, twists_or_none
 from gpca.uncertainty.estimators.interface import Example, FailedEstimate, RegisteredPair
 
 MOVED: Moved = "model"  # onto the observed cloud, as the causes' track has it

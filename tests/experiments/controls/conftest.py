@@ -7,8 +7,8 @@ import pytest
 
 from gpca.attribution.scores import Attribution
 from gpca.experiments.controls.protocol import ControlRun
-from gpca.experiments.controls.rivals import Rival
 from gpca.experiments.controls.settings import ControlSettings
+from gpca.explainers.rivals import Rival
 from gpca.objects.surface import instance_of
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.uncertainty.settings import UncertaintySettings

@@ -10,9 +10,9 @@ from baselines.residuals import residuals_logistic
 from gpca.encoders.registry import EncoderSettings
 from gpca.experiments.controls.costs import ASKED
 from gpca.experiments.controls.encoding import encode
-from gpca.experiments.controls.rivals import Rival
 from gpca.experiments.controls.settings import TRAININGS, ControlSettings
 from gpca.experiments.controls.variants import of_unseen_objects, shows_known_object
+from gpca.explainers.rivals import Rival
 from tests.experiments.controls.conftest import Head, Nearest, attached, experiment, seen
 
 

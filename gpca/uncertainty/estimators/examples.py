@@ -18,7 +18,7 @@ Moved = Literal["model", "observed"]  # which cloud the source is
 
 
 def describe(pair: Pair, outcome: Outcome, moved: Moved) -> np.ndarray:
-    """Return the descriptors (F,) that need no further registration: distances, local planes, entropy.
+    """Descriptors (F,) that need no further registration: distances, local planes, entropy.
 
     Args:
         pair: the registered pair.
@@ -42,7 +42,7 @@ def describe(pair: Pair, outcome: Outcome, moved: Moved) -> np.ndarray:
 
 
 def true_twist(registered: RegisteredPair, T_true: np.ndarray, judge: Judge, moved: Moved) -> np.ndarray:
-    """Return the twist (6,) of the true pose about that of the registration, the symmetric one that is nearest.
+    """Twist (6,) of the true pose about that of the registration, the symmetric one that is nearest.
 
     Symmetries are turns of the model: before the pose where the model moves, after it where it is the target.
     """
@@ -55,7 +55,7 @@ def true_twist(registered: RegisteredPair, T_true: np.ndarray, judge: Judge, mov
 
 
 def twists_or_none(draw: Callable[[], np.ndarray], runs: int) -> np.ndarray:
-    """Return the twists (n, 6) of a few results; where too few runs have any, zeros: all are at the pose."""
+    """Twists (n, 6) of a few results; zeros where too few runs have any, as if all were at the pose."""
     try:
         return draw()
     except FailedEstimate:
@@ -65,7 +65,7 @@ def twists_or_none(draw: Callable[[], np.ndarray], runs: int) -> np.ndarray:
 def example(
     registered: RegisteredPair, T_true: np.ndarray, judge: Judge, moved: Moved, twists_n_6: np.ndarray
 ) -> Example:
-    """Return a training registration with the results (n, 6) of a few others, as twists about its pose."""
+    """Training registration with the results (n, 6) of a few others, as twists about its pose."""
     return Example(
         describe(registered.pair, registered.outcome, moved),
         twists_n_6,

@@ -1,4 +1,4 @@
-"""Explainers with other methods and estimators beneath them, on three objects."""
+"""Explainers with other methods and estimators, on three objects."""
 
 from functools import partial
 
@@ -13,18 +13,16 @@ from gpca.alignment.methods.interface import FailedRegistration, MethodEntry
 from gpca.alignment.rigid import exp, transform
 from gpca.attribution.scores import Attribution
 from gpca.errors import InputError
-from gpca.experiments.controls.rivals import Rival
-from gpca.experiments.estimators.examples import true_twist
-from gpca.experiments.explained import require_exchangeable
-from gpca.experiments.substitution.estimated import OBSERVED, KnobbedRegistrar
-from gpca.experiments.substitution.exchange import UNTAUGHT, Exchange, registered_by
-from gpca.experiments.substitution.settings import ExchangeSettings
+from gpca.explainers.rivals import Rival
 from gpca.pairs.judge import Judges
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import generator
+from gpca.steps.exchange import TOO_FEW, Exchange, ExchangeSettings, registered_by, require_exchangeable
 from gpca.uncertainty.designs import ADDITIVE_KNOBS, evaluate_design
 from gpca.uncertainty.estimators import registry as estimator_registry
+from gpca.uncertainty.estimators.examples import true_twist
 from gpca.uncertainty.estimators.interface import EstimatorEntry, FailedEstimate
+from gpca.uncertainty.estimators.substitute import OBSERVED, KnobbedRegistrar
 from gpca.uncertainty.settings import UncertaintySettings
 
 UNCERTAINTY = UncertaintySettings(starts=13, icp_points=64)
@@ -36,8 +34,8 @@ RIVALS = {
 }
 
 
-class ByPlace:
-    """Knows a training registration by where its embedding, the mean of its cloud, lies."""
+class Nearest:
+    """Answers the concept of the training registration with the nearest embedding, the mean of its cloud."""
 
     def fit(self, registrations):
         self.h, self.concept = registrations.embedding, registrations.concept
@@ -65,34 +63,32 @@ def judges(objects):
 
 
 @pytest.fixture(scope="module")
-def said(registrations, judges):
+def rows(registrations, judges):
     return exchange(estimators=("monte_carlo", "censi", "cello", "bonnabel")).run(registrations, judges)
 
 
-def test_every_explainer_has_a_row_for_each_estimator_and_test_sample(said):
-    assert (said["exchanged"] == "estimator").all() and (said["learnt_from"] == said["asked_of"]).all()
-    counts = said.groupby(["asked_of", "explainer"])["sample"].agg(list)
+def test_every_explainer_has_a_row_for_each_estimator_and_test_sample(rows):
+    assert (rows["exchanged"] == "estimator").all() and (rows["learnt_from"] == rows["asked_of"]).all()
+    counts = rows.groupby(["asked_of", "explainer"])["sample"].agg(list)
     assert len(counts) == 4 * 3
     assert all(samples == [0, 1, 2] for samples in counts)
 
 
-def test_without_an_estimate_nothing_is_named_and_the_reason_is_told(said):
-    refused = said[said["asked_of"] == "bonnabel"]
+def test_without_an_estimate_no_concept_is_named_and_the_reason_is_given(rows):
+    refused = rows[rows["asked_of"] == "bonnabel"]
     assert refused["abstained"].all() and (refused["concept_predicted"] == "").all()
     assert refused["failure"].str.startswith("the Hessian is no covariance of point-to-point").all()
-    assert (said.loc[said["asked_of"] == "monte_carlo", "failure"] == "").all()
+    assert (rows.loc[rows["asked_of"] == "monte_carlo", "failure"] == "").all()
 
 
-def test_what_reads_no_start_gives_pose_no_value(said):
+def test_an_estimator_that_reads_no_start_gives_pose_no_value(rows):
     """Censi's form is the same however far the starts spread."""
-    censi = said[(said["asked_of"] == "censi") & (said["explainer"] == "shap_additive") & (said["failure"] == "")]
+    censi = rows[(rows["asked_of"] == "censi") & (rows["explainer"] == "shap_additive") & (rows["failure"] == "")]
     assert len(censi) and censi["score_pose"].abs().max() < 1e-9
     assert (censi["score_noise"] != 0).all()
 
 
-def test_an_explainer_that_learns_is_untaught_by_an_estimator_that_failed_in_training(
-    registrations, judges, monkeypatch
-):
+def test_an_explainer_that_learns_needs_estimates_of_training_registrations(registrations, judges, monkeypatch):
     def of_test_pairs(registered):
         if registered.pair.seed not in asked:
             raise FailedEstimate("nothing")
@@ -103,7 +99,7 @@ def test_an_explainer_that_learns_is_untaught_by_an_estimator_that_failed_in_tra
     entries = {"m": {"late": EstimatorEntry("Late", "starts", of_test_pairs)}}
     monkeypatch.setattr(estimator_registry.REGISTRY, "by_module", lambda: entries)
     rows = exchange(estimators=("late",)).run(registrations, judges).set_index("explainer")
-    assert set(rows.loc["residuals_logistic", "failure"]) == {UNTAUGHT}
+    assert set(rows.loc["residuals_logistic", "failure"]) == {TOO_FEW}
     assert rows.loc["residuals_logistic", "abstained"].all()
     # One covariance whatever the knobs: nothing sets a concept apart.
     assert set(rows.loc["shap_additive", "failure"]) == {""} and rows.loc["shap_additive", "abstained"].all()
@@ -121,7 +117,7 @@ def test_the_conditions_are_those_of_the_design(registrations):
         spread = np.cov(poses[:, :3, 3], rowvar=False)
         if outcomes.degenerate[0, k]:
             continue
-        # A twist's translation is that of the origin but for half the turn: alike, not equal.
+        # The translation of a twist differs from that of the origin by half the turn, so both are only close.
         np.testing.assert_allclose(np.trace(spread), np.trace(outcomes.covariance[0, k, 3:, 3:]), rtol=0.3, atol=1e-5)
 
 
@@ -157,15 +153,13 @@ def test_each_method_is_learned_from_and_asked_about_and_a_failed_registration_c
 
     entries = {"point_to_point": registry.method_entry("point_to_point"), "blind": MethodEntry("Blind", fails)}
     monkeypatch.setattr(registry.REGISTRY, "by_module", lambda: {"m": entries})
-    rows = exchange(methods=tuple(entries), rivals={"by_place": Rival(ByPlace, "embeddings")}).run(
-        registrations, judges
-    )
+    rows = exchange(methods=tuple(entries), rivals={"nearest": Rival(Nearest, "embeddings")}).run(registrations, judges)
     assert rows.groupby(["learnt_from", "asked_of"]).size().to_dict() == {(a, b): 3 for a in entries for b in entries}
     assert set(rows.loc[rows["asked_of"] == "blind", "failure"]) == {"no match"}
     assert not rows["abstained"].any() and (rows["split"] == "test").all()
 
 
-def test_what_a_design_other_than_additive_asks_cannot_be_exchanged():
+def test_explainers_of_designs_other_than_additive_are_refused():
     for name in ("shap_additive", "residuals_forest", "gpca_pair", "gpca"):
         require_exchangeable(name)
     with pytest.raises(InputError, match=r"'shap_removal': reads design 'removal', which estimators do not provide"):

@@ -31,7 +31,7 @@ class Rival:
 
 
 def make_rivals(explainers: Mapping[str, Mapping], source: str, seed: int) -> dict[str, Rival]:
-    """Return the explainers of a config's section, name -> settings.
+    """Explainers of a section of the config, name -> settings.
 
     Raises:
         InputError: no explainer, an unknown one, or settings that it does not take.
@@ -47,7 +47,7 @@ def make_rivals(explainers: Mapping[str, Mapping], source: str, seed: int) -> di
 
 
 def described_for(rivals: Mapping[str, Rival], registrations: Registrations) -> Registrations:
-    """Return the registrations with the explainers' measurements attached, made once for all training sets."""
+    """Registrations with the explainers' measurements attached, made once for all training sets."""
     for rival in rivals.values():
         explainer = rival.make()
         if isinstance(explainer, Describing):

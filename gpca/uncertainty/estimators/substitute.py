@@ -1,7 +1,7 @@
-"""The conditions of SHAP's and sensitivity analysis' design, with any estimator's covariance in place of Monte-Carlo's.
+"""Conditions of SHAP's and sensitivity analysis' design, with any estimator's covariance in place of Monte-Carlo's.
 
-Clouds, jitter and cut are those of design ``additive`` (:mod:`gpca.uncertainty.designs`). A knob turns what it can: the
-spread of the starts is an estimator's prior, or nothing to one that reads no start.
+Clouds, jitter and cut are those of design ``additive`` (:mod:`gpca.uncertainty.designs`). The spread of the starts is
+the prior of an estimator, and has no effect on one that reads no start.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ import numpy as np
 from gpca.alignment.features import estimate_normals
 from gpca.alignment.methods.interface import Pair
 from gpca.alignment.methods.registry import make_method
-from gpca.experiments.estimators.examples import Moved, describe, example, twists_or_none
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.judge import Judges
 from gpca.process.progress import progress
 from gpca.seeds import generator, seed_of
 from gpca.uncertainty.designs import ADDITIVE_KNOBS, RegisteredRow
+from gpca.uncertainty.estimators.examples import Moved, describe, example, twists_or_none
 from gpca.uncertainty.estimators.interface import POINT_TO_POINT, Estimate, Example, RegisteredPair
 from gpca.uncertainty.estimators.starts import sample
 from gpca.uncertainty.interventions import UNTOUCHED, KnobbedSource, Knobs
@@ -43,25 +43,23 @@ class Estimates:
     covariance: np.ndarray
     failure: np.ndarray
 
-    def why_untold(self, conditions: int) -> np.ndarray:
-        """Return (S,) why one of the first `conditions` has no estimate, empty where all have one."""
+    def failures(self, conditions: int) -> np.ndarray:
+        """Why one of the first `conditions` has no estimate (S,), empty where all have one."""
         return np.array([next(filter(None, row), "") for row in self.failure[:, :conditions]])
 
     def attach_to(self, registrations: Registrations, rows: np.ndarray, conditions: int, floor: float) -> Registrations:
-        """Return the given rows with the outcomes of a design attached for explainers; its cost is not known.
+        """Rows with the outcomes of a design attached for explainers; its cost is not measured.
 
         Args:
             registrations: the S registrations.
-            rows: those that have all of the first `conditions`.
-            conditions: how many.
+            rows: those that have an estimate under each of the first `conditions`.
             floor: ε of the divergence.
         """
         covariance = self.covariance[rows, :conditions]
-        zeros = np.zeros(covariance.shape[:2])
-        own = {"covariance": covariance, "uncertainty": divergence(covariance[:, :1], covariance, floor)}
-        own |= dict.fromkeys(("icp_calls", "seconds", "icp_seconds"), zeros)
-        chosen = registrations.subset(rows)
-        return replace(chosen, attached={**chosen.attached, **own})
+        outcomes = {"covariance": covariance, "uncertainty": divergence(covariance[:, :1], covariance, floor)}
+        outcomes |= dict.fromkeys(("icp_calls", "seconds", "icp_seconds"), np.zeros(covariance.shape[:2]))
+        subset = registrations.subset(rows)
+        return replace(subset, attached={**subset.attached, **outcomes})
 
 
 class KnobbedRegistrar:
@@ -72,7 +70,7 @@ class KnobbedRegistrar:
         self._register = make_method(POINT_TO_POINT)
 
     def under(self, row: int, settings_of_knobs: Sequence[Knobs]) -> Iterator[RegisteredPair]:
-        """Yield the registration of a row under each setting."""
+        """Registration of a row under each setting."""
         registrations, settings = self._registrations, self._settings
         axes = (*self._axes, registrations.split[row], registrations.sample[row])
         random = generator(*axes, "clouds")
@@ -87,7 +85,7 @@ class KnobbedRegistrar:
             yield RegisteredPair(pair, outcome, POINT_TO_POINT, deviation_6, described)
 
     def examples(self, rows: np.ndarray, judges: Judges) -> list[Example]:
-        """Return the rows as estimators learn from them."""
+        """Rows as estimators learn from them."""
         examples = []
         for row in rows:
             [registered] = self.under(row, OBSERVED)
@@ -104,7 +102,7 @@ class KnobbedRegistrar:
         estimators: Mapping[str, Callable[[RegisteredPair], Estimate]],
         settings_of_knobs: Sequence[Knobs] = ADDITIVE_KNOBS,
     ) -> dict[str, Estimates]:
-        """Return each estimator's covariances of the rows under each setting."""
+        """Covariances of the rows under each setting, by estimator."""
         shape = len(rows), len(settings_of_knobs)
         estimates = {
             name: Estimates(np.full((*shape, 6, 6), np.nan), np.full(shape, "", object)) for name in estimators

@@ -1,1 +1,0 @@
-"""Explainers with another registration method, or another estimator of uncertainty, beneath them."""

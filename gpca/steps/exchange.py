@@ -1,0 +1,263 @@
+"""Step ``exchange``: every explainer with each registration method, or each estimator of uncertainty, in turn."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+
+from gpca.alignment.methods.registry import make_method
+from gpca.alignment.rigid import scale_translation, transform
+from gpca.attribution.predictions import prediction_frame
+from gpca.attribution.scores import Attribution
+from gpca.encoders.registry import EncoderSettings
+from gpca.errors import InputError
+from gpca.explainers.registry import explainer_entry
+from gpca.explainers.rivals import Embed, Rival, described_for, make_rivals
+from gpca.io.csv_file import write_csv
+from gpca.io.files import SPLITS
+from gpca.objects.canonical import ObjectClouds
+from gpca.pairs.dataset import Registrations, ragged
+from gpca.pairs.judge import Judges
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.process.job import Job
+from gpca.process.progress import progress
+from gpca.process.provenance import record_provenance
+from gpca.settings import Bounds, Count, Distinct, read_settings
+from gpca.steps.registration_trials import pair_to_register
+from gpca.uncertainty.designs import ADDITIVE_KNOBS
+from gpca.uncertainty.estimators.registry import make_estimator
+from gpca.uncertainty.estimators.substitute import OBSERVED, Estimates, KnobbedRegistrar
+from gpca.uncertainty.settings import UncertaintySettings
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+BALANCED = {"multipleOf": 3}  # over the concepts
+METHOD, ESTIMATOR = "method", "estimator"  # the two exchanges
+LABELS = ("exchanged", "learnt_from", "asked_of", "explainer")  # columns before those of a prediction file
+FAILURE = "failure"  # the column behind them: why the method failed, or the estimator
+TOO_FEW = "too few training registrations have an estimate"
+DESIGN = "additive"  # the design whose conditions are estimated
+
+
+@dataclass(frozen=True)
+class ExchangeSettings:
+    """The methods and estimators, and the numbers of registrations.
+
+    Attributes:
+        seeds: how many of the run's seeds are used, from the first.
+        methods: registration methods, each used for training and for test registrations in turn.
+        train, test: registrations of each source and seed, by each of them, at most.
+        points: of source and of target that are registered, at most.
+        estimators: of the covariance, each in place of Monte-Carlo.
+        estimated_train: training registrations whose covariance is estimated, and as many others from which estimators
+            learn, at most.
+        estimated_test: test registrations that are explained by their uncertainty, at most.
+    """
+
+    seeds: Count = 3
+    methods: Distinct[str] = ("point_to_point", "point_to_plane")
+    train: Annotated[int, Bounds(minimum=9, **BALANCED)] = 120
+    test: Annotated[int, Bounds(minimum=3, **BALANCED)] = 60
+    points: Annotated[int, Bounds(minimum=64, maximum=65536)] = 512
+    estimators: Distinct[str] = ("monte_carlo",)
+    estimated_train: Annotated[int, Bounds(minimum=9, **BALANCED)] = 24
+    estimated_test: Annotated[int, Bounds(minimum=3, **BALANCED)] = 9
+
+
+def run(job: Job) -> None:
+    """Train every explainer, and let it explain, with each method and each estimator, seed by seed."""
+    from gpca.encoders.training import embed, load_model
+
+    for name in job.section("explainers"):
+        require_exchangeable(name)
+    settings = read_settings(ExchangeSettings, job.section("exchange"))
+    encoder = EncoderSettings(**job.section("encoder"))
+    methods, estimators = job.by_name("methods", settings.methods), job.by_name("estimators", settings.estimators)
+    uncertainty = {name: value for name, value in job.section("uncertainty").items() if name != "samples"}
+    objects = ObjectClouds.load(job.objects, job.source)
+    for seed, registrations_path, weights, out in job.per_seed("registrations", "encoders", "out"):
+        rivals = make_rivals(job.section("explainers"), job.source, seed)
+        with record_provenance([out], [job.objects, registrations_path, weights], job.settings, seed=seed):
+            model = load_model(weights, encoder, axes=(job.source, seed))
+
+            def embedded(registrations: Registrations, source: str, model: Any = model, seed: int = seed) -> tuple:
+                return embed(model, registrations, source, seed, encoder)
+
+            sections = settings, methods, estimators, UncertaintySettings(**uncertainty)
+            exchange = Exchange(job.source, seed, *sections, rivals, embedded)
+            judges = Judges(objects, f"objects of {job.source}")
+            write_csv(out, exchange.run(Registrations.load(registrations_path, (job.source, seed)), judges))
+
+
+def require_exchangeable(name: str) -> None:
+    """Raise an InputError unless the explainer reads what is exchanged.
+
+    That is registrations, their embeddings, the conditions of design ``additive``, or the observed pair of any design.
+    """
+    entry = explainer_entry(name)
+    if entry.design not in (None, DESIGN) and not entry.observed_only:
+        fault = f"reads design '{entry.design}', which estimators do not provide"
+        raise InputError(f"explainer '{name}'", fault, f"choose one that reads '{DESIGN}'")
+
+
+@dataclass(frozen=True)
+class Exchange:
+    """The methods and estimators that are exchanged for the explainers of one source and seed.
+
+    Attributes:
+        source, seed: they name the random numbers.
+        settings: those of the exchange.
+        methods, estimators: name -> settings.
+        uncertainty: floor, points and spread of the starts, of the estimators.
+        rivals: by name. Those that read an uncertainty get each estimator's, the others each method's registrations.
+        embed: registrations and the name of their source -> embeddings and logits of the head by the run's encoder.
+    """
+
+    source: str
+    seed: int
+    settings: ExchangeSettings
+    methods: Mapping[str, Mapping]
+    estimators: Mapping[str, Mapping]
+    uncertainty: UncertaintySettings
+    rivals: Mapping[str, Rival]
+    embed: Embed
+
+    def run(self, registrations: Registrations, judges: Judges) -> pd.DataFrame:
+        """Predictions of each explainer on the test samples by each method or estimator.
+
+        Args:
+            registrations: those of the source, by the paper's protocol.
+            judges: of their objects.
+
+        Returns:
+            the columns of a prediction file after `LABELS`, and `FAILURE`. For methods, ``learnt_from`` registered the
+            training pairs and ``asked_of`` the test pairs; for estimators they are equal.
+        """
+        import pandas as pd
+
+        by_estimator = {name: rival for name, rival in self.rivals.items() if rival.reads.startswith("uncertainty/")}
+        by_method = {name: rival for name, rival in self.rivals.items() if name not in by_estimator}
+        frames = list(self._by_methods(registrations, by_method)) if by_method else []
+        if by_estimator:
+            frames += self._by_estimators(registrations, by_estimator, judges)
+        return pd.concat(frames, ignore_index=True)
+
+    def _by_methods(self, registrations: Registrations, rivals: Mapping[str, Rival]) -> Iterator[pd.DataFrame]:
+        splits = {"train": self.settings.train, "test": self.settings.test}
+        rows = np.concatenate([first(registrations, *split) for split in splits.items()])
+        axes = self.source, self.seed, self.settings.points
+        registered = {}
+        for name, (anew, failure_S) in registered_by(registrations.subset(rows), self.methods, *axes).items():
+            h_S_d, logits_S_C = self.embed(anew, self.source)
+            seen = replace(anew, attached={"embedding": h_S_d, "head_logits": logits_S_C})
+            registered[name] = described_for(rivals, seen), failure_S
+        for learnt_from, (train, _) in registered.items():
+            for explainer_name, rival in rivals.items():
+                explainer = rival.make()
+                explainer.fit(train.subset(train.rows("train")))
+                for asked_of, (tested, failure_S) in registered.items():
+                    test = tested.subset(tested.rows("test"))
+                    frame = prediction_frame(test, explainer.explain(test.without_labels()))
+                    labels = METHOD, learnt_from, asked_of, explainer_name
+                    yield labeled(frame, labels, failure_S[tested.rows("test")])
+
+    def _by_estimators(
+        self, registrations: Registrations, rivals: Mapping[str, Rival], judges: Judges
+    ) -> Iterator[pd.DataFrame]:
+        train_rows = first(registrations, "train", 2 * self.settings.estimated_train)
+        half = len(train_rows) // 2 // len(CONCEPTS) * len(CONCEPTS)  # threes of one object stay together
+        test_rows = first(registrations, "test", self.settings.estimated_test)
+        described = described_for(rivals, registrations.subset(np.concatenate([train_rows[:half], test_rows])))
+        rows = {split: described.rows(split) for split in SPLITS}
+        axes = self.source, self.seed, self.uncertainty
+        examples = KnobbedRegistrar(registrations, *axes).examples(train_rows[half:], judges)
+        estimators = {name: make_estimator(name, entry, examples) for name, entry in self.estimators.items()}
+        registrar = KnobbedRegistrar(described.without_labels(), *axes)
+        learned = rows["train"] if any(rival.observed_only for rival in rivals.values()) else np.arange(0)
+        estimates_of_train = registrar.estimates(learned, estimators, OBSERVED)
+        estimates_of_test = registrar.estimates(rows["test"], estimators)
+        train, test = (described.subset(each) for each in rows.values())
+        for estimator in estimators:
+            estimates = train, estimates_of_train[estimator], test, estimates_of_test[estimator]
+            for name, rival in rivals.items():
+                attribution, failure_S = self._attributed(rival, *estimates)
+                yield labeled(prediction_frame(test, attribution), (ESTIMATOR, estimator, estimator, name), failure_S)
+
+    def _attributed(
+        self,
+        rival: Rival,
+        train: Registrations,
+        estimates_of_train: Estimates,
+        test: Registrations,
+        estimates_of_test: Estimates,
+    ) -> tuple[Attribution, np.ndarray]:
+        """Attribution of all test samples, abstained where there is no estimate, and why there is none (S,)."""
+        floor, conditions = self.uncertainty.floor, len(OBSERVED if rival.observed_only else ADDITIVE_KNOBS)
+        explainer = rival.make()
+        failure_S = estimates_of_test.failures(conditions)
+        if rival.observed_only:
+            usable = np.flatnonzero(estimates_of_train.failures(len(OBSERVED)) == "")
+            if set(train.concept[usable]) < set(CONCEPTS):
+                failure_S = np.where(failure_S == "", TOO_FEW, failure_S)
+            else:
+                explainer.fit(estimates_of_train.attach_to(train, usable, len(OBSERVED), floor))
+        estimated = np.flatnonzero(failure_S == "")
+        scores_S_C, abstained_S = np.zeros((len(test), len(CONCEPTS))), np.ones(len(test), bool)
+        if len(estimated):
+            attached = estimates_of_test.attach_to(test.without_labels(), estimated, conditions, floor)
+            attribution = explainer.explain(attached)
+            scores_S_C[estimated], abstained_S[estimated] = attribution.scores_N_C, attribution.abstained_N
+        return Attribution.of_scores(CONCEPTS, scores_S_C, seconds=0.0, abstained_N=abstained_S), failure_S
+
+
+def first(registrations: Registrations, split: str, samples: int) -> np.ndarray:
+    """Rows of the first `samples` of a split: threes of one object, which alternate between the objects."""
+    return np.flatnonzero((registrations.split == split) & (registrations.sample < samples))
+
+
+def labeled(frame: pd.DataFrame, labels: tuple[str, ...], failure_S: np.ndarray) -> pd.DataFrame:
+    """Columns of a prediction file between `LABELS` and `FAILURE`."""
+    for column, (name, label) in enumerate(zip(LABELS, labels, strict=True)):
+        frame.insert(column, name, label)
+    frame[FAILURE] = failure_S
+    return frame
+
+
+def registered_by(
+    registrations: Registrations, methods: Mapping[str, Mapping], source: str, seed: int, points: int
+) -> dict[str, tuple[Registrations, np.ndarray]]:
+    """Registrations by each method, and why each failed (S,), empty if it did not.
+
+    All methods get the same thinned clouds and the initial pose, which global ones do not read. The whole observed
+    cloud moves to the resulting pose; a registration that failed stays where the method left it, and counts.
+
+    Raises:
+        InputError: an unknown method or setting, or a missing package.
+    """
+    made = {name: make_method(name, entry) for name, entry in methods.items()}
+    outcomes: dict[str, list] = {name: [] for name in made}
+    for row in progress(range(len(registrations)), f"registrations by other methods of {source}, seed {seed}"):
+        pair = pair_to_register(registrations, row, source, seed, points)
+        for name, method in made.items():
+            outcomes[name].append(method(pair))
+    targets = [registrations.target(row) for row in range(len(registrations))]
+    by_method = {}
+    for name, outcomes_S in outcomes.items():
+        poses = [outcome.T_target_source for outcome in outcomes_S]
+        clouds = [transform(T, registrations.source(row)).astype(np.float32) for row, T in enumerate(poses)]
+        moved: dict[str, Any] = ragged(clouds, targets)
+        scaled = [scale_translation(*each) for each in zip(poses, registrations.diameter_m, strict=True)]
+        anew = replace(
+            registrations,
+            **moved,
+            T_target_source_icp=np.array(scaled),
+            fitness=np.array([outcome.fitness for outcome in outcomes_S]),
+            inlier_rmse=np.array([outcome.inlier_rmse for outcome in outcomes_S]),
+            attached={},
+        )
+        by_method[name] = anew, np.array([outcome.failure for outcome in outcomes_S])
+    return by_method
