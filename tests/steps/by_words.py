@@ -29,7 +29,7 @@ MODULES = {f: f"gpca.steps.{module}:{f}" for module, functions in SHARED.items()
     "train_control": IN + "controls.encoding",
     "estimate": IN + "estimators.step",
     "frame_labels": "gpca.steps.frame_labels",
-    "gradients": IN + "gradients.step",
+    "gradients": "gpca.steps.gradients",
     "guarantee": IN + "guarantee.step",
     "kernel_grid": "gpca.steps.kernel_grid",
     "learning_curve": "gpca.steps.learning_curve:learn_from_more",

@@ -1,0 +1,292 @@
+"""Gradients of GP-CA's scores: saliency of points, and TCAV."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gpca.encoders.registry import DIFFERENTIABLE, DGCNNOptions, EncoderSettings, encoders
+from gpca.errors import InputError
+from gpca.evaluation.measures import ALL, source_method_seed, tidy
+from gpca.experiments.experiment import Experiment, LeftOut
+from gpca.experiments.plan import Run
+from gpca.experiments.result import figure, numbers, table
+from gpca.experiments.step import Step
+from gpca.io.arrays import REAL, WHOLE, load_arrays
+from gpca.io.csv_file import numbers as number_column
+from gpca.io.csv_file import read_csv
+from gpca.pairs.dataset import Registrations
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.reporting.figures.style import LIGHT_GRAY, SMALL_PT, blues, write_title
+from gpca.reporting.tables.builder import TableBuilder, crossed, mean_over
+from gpca.reporting.tables.cells import cell_of_repeats, rows_where
+from gpca.reporting.tables.table import Cell, Column
+from gpca.reporting.words import plural
+from gpca.steps.gradients import DELETION_COLUMNS, RANDOM, GradientSettings
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+
+def encoder_settings(config: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Section of the encoder that GP-CA reads."""
+    return config["encoders"][config["embedding"]["encoder"]]
+
+
+def check(config: dict, _left_out: LeftOut) -> None:
+    """Check that enough points are left for the encoder where most are deleted."""
+    encoder = EncoderSettings(**encoder_settings(config))
+    if encoder.backbone != "dgcnn":
+        return
+    share, neighbors = max(config["gradients"]["deleted"]), encoder.options.get("k", DGCNNOptions.k)
+    if round((1 - share) * encoder.draw_points) < neighbors:
+        fault = f"deleting {share:g} of {encoder.draw_points} points leaves fewer than the encoder's {neighbors}"
+        raise InputError("config key gradients.deleted", fault, "delete fewer")
+
+
+EXPERIMENT = Experiment(
+    name="gradients",
+    sections={"gradients": GradientSettings},
+    needs=("gradient_source",),
+    names=lambda config, sources: {
+        "gradient_source": list(sources) if encoder_settings(config)["backbone"] in DIFFERENTIABLE else [],
+        "gradient_encoder": config["embedding"]["encoder"],
+    },
+    check=check,
+)
+
+FOLLOW = Step(
+    name="follow_gradients",
+    run="gpca.steps.gradients",
+    inputs={
+        "registrations": "registrations/{source}/seed{*seed}.npz",
+        "encoders": "encoders/{source}/{gradient_encoder}/seed{*seed}.pt",
+        "embeddings": "embeddings/{source}/{gradient_encoder}/none/seed{*seed}.npz",
+    },
+    outputs={
+        "deletions": "saliency/{source}/seed{*seed}.csv",
+        "maps": "saliency/{source}/seed{*seed}.npz",
+        "tcav": "tcav/{source}/seed{*seed}.csv",
+    },
+    settings=lambda plan, wildcards: {
+        "gradients": plan.config["gradients"],
+        "encoder": encoder_settings(plan.config),
+        "gpc": plan.config["explainers"].get("gpca") or {},
+    },
+    modules=lambda plan: [encoders()[encoder_settings(plan.config)["backbone"]].split(":")[0]],
+    where={"source": "gradient_source"},
+    target="gradients",
+)
+
+SALIENCY, TCAV = "saliency", "tcav"  # the column `table`
+TCAV_VALUES = ("score", "chance", "p", "significant", "probe")
+
+
+@numbers(
+    "gradients.csv",
+    rule="gradient_metrics",
+    deletions="saliency/{gradient_source}/seed{seed}.csv",
+    tests="tcav/{gradient_source}/seed{seed}.csv",
+)
+def collect(run: Run, deletions: Iterable[str | Path], tests: Iterable[str | Path]) -> pd.DataFrame:
+    """Fall of the score by order and share of deleted points, and TCAV's tests, by source and seed.
+
+    Raises:
+        InputError: no files, one that is missing or damaged.
+    """
+    records: list[tuple] = []
+    for path in deletions:
+        _, source, seed = source_method_seed(path)
+        rows = read_csv(path, DELETION_COLUMNS)
+        for column in ("deleted", "before", "after", "changed"):
+            rows[column] = number_column(path, rows, column)
+        rows["drop"] = rows["before"] - rows["after"]
+        means = rows.groupby(["order", "deleted"], sort=False)[["drop", "changed"]].mean()
+        for (order, deleted), row in means.iterrows():
+            values = {"drop": row["drop"], "changed": row["changed"]}
+            if order != RANDOM and (RANDOM, deleted) in means.index:
+                values["excess"] = row["drop"] - means.loc[(RANDOM, deleted), "drop"]
+            records += [
+                (SALIENCY, source, order, f"{name}_{100 * deleted:g}", ALL, seed, float(value))
+                for name, value in values.items()
+            ]
+        records += [
+            (SALIENCY, source, order, "test_samples", ALL, seed, float(part["sample"].nunique()))
+            for order, part in rows.groupby("order", sort=False)
+        ]
+    for path in tests:
+        _, source, seed = source_method_seed(path)
+        rows = read_csv(path, ("tested", "concept", *TCAV_VALUES))
+        for value in TCAV_VALUES:
+            rows[value] = number_column(path, rows, value)
+        records += [
+            (TCAV, source, row["tested"], value, row["concept"], seed, float(row[value]))
+            for _, row in rows.iterrows()
+            for value in TCAV_VALUES
+        ]
+    return tidy(records, "gradients")
+
+
+SECTION = "Beyond the paper: what explainers look at, and whether it carries over"
+NEEDS = ("gradient_source",)
+
+
+@figure(
+    SECTION,
+    "Saliency maps",
+    """Which points GP-CA's score of the concept that it names reacts to most: the length of the gradient through
+    classifier and encoder, by rank among the points of the cloud. The model is gray.
+
+    For each concept, the correctly named test sample with the median score is shown.""",
+    needs=NEEDS,
+    registrations="registrations/{shown_source}/seed{first_seed}.npz",
+    maps="saliency/{shown_source}/seed{first_seed}.npz",
+    deletions="saliency/{shown_source}/seed{first_seed}.csv",
+)
+def saliency(run: Run, registrations: Path, maps: Path, deletions: Path) -> Figure:
+    """One sample of each concept: of those named correctly, if any, the one with the median score."""
+    loaded = Registrations.load(registrations)
+    shapes: dict[str, tuple[int | str, ...]] = {"sample": ("S",), "points": ("S", "N", 3), "saliency": ("S", "N")}
+    arrays = load_arrays(maps, shapes, {"sample": WHOLE, "points": REAL, "saliency": REAL})
+    rows = read_csv(deletions, DELETION_COLUMNS).drop_duplicates("sample")
+    rows["before"] = number_column(deletions, rows, "before")
+    shown = {}
+    for concept in CONCEPTS:
+        candidates = rows[rows["concept"] == concept]
+        right = candidates[candidates["named"] == concept]
+        ordered = (candidates if right.empty else right).sort_values(["before", "sample"], kind="stable")
+        if len(ordered):
+            shown[concept] = int(ordered["sample"].iloc[(len(ordered) - 1) // 2])
+    test = {int(loaded.sample[row]): row for row in loaded.rows("test")}
+    numbers_of_maps = {int(sample): i for i, sample in enumerate(arrays["sample"])}
+    if not shown or set(shown.values()) - (set(test) & set(numbers_of_maps)):
+        raise InputError(maps, f"its samples differ from those of {deletions}", "regenerate both")
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+
+    from gpca.reporting.figures.cloud_views import widest_views
+    from gpca.reporting.figures.panels import panels
+
+    drawing, [axes] = panels(1, len(CONCEPTS), HEIGHT_IN)
+    for panel, concept in zip(axes, CONCEPTS, strict=True):
+        panel.set_axis_off()
+        if concept not in shown:
+            continue
+        sample = shown[concept]
+        points_N_3, saliency_N = (arrays[name][numbers_of_maps[sample]] for name in ("points", "saliency"))
+        target_Q_3 = loaded.target(test[sample])
+        view = widest_views(target_Q_3)[0]
+        target_Q_2, points_N_2 = target_Q_3 @ view.T, points_N_3 @ view.T
+        panel.scatter(target_Q_2[:, 0], target_Q_2[:, 1], s=0.6, c=LIGHT_GRAY, linewidths=0)
+        order = np.argsort(saliency_N, kind="stable")  # the salient points in front
+        colors = {"c": np.linspace(0, 1, len(order)), "cmap": blues(), "vmin": PALEST, "vmax": 1}
+        panel.scatter(points_N_2[order, 0], points_N_2[order, 1], s=5, linewidths=0, **colors)
+        panel.set_aspect("equal", adjustable="datalim")
+        score = rows.loc[rows["sample"] == str(sample), ["named", "before"]].iloc[0]
+        panel.set_title(f"{concept}: named {score['named']}, {score['before']:.2f}", fontsize=SMALL_PT + 1)
+    bar = drawing.colorbar(ScalarMappable(Normalize(PALEST, 1), blues()), ax=axes, shrink=0.75, pad=0.01, ticks=TICKS)
+    bar.ax.set_ylim(0, 1)
+    bar.set_label("rank of the point's saliency", fontsize=SMALL_PT)
+    bar.ax.set_yticklabels(["least", "median", "most"], fontsize=SMALL_PT)
+    title = run.source_titles[run.config["figures"]["source"]]
+    write_title(drawing, f"{title}: points that GP-CA's score reacts to")
+    return drawing
+
+
+HEIGHT_IN = 2.75
+PALEST = -0.25  # rank at which the colors reach white; no point has it
+TICKS = (0, 0.5, 1)
+
+
+@table(
+    SECTION,
+    "Deleting the most salient points",
+    """How much the score of the concept that GP-CA names falls when points are deleted. A saliency map that shows what
+    matters makes it fall more than deleting as many points at random.""",
+    needs=NEEDS,
+    metrics="gradients.csv",
+)
+def saliency_deletion(run: Run, metrics):
+    """Fall of the named concept's score by share of deleted points: sources × orders."""
+    rows_of_table = rows_where(metrics, table=SALIENCY)
+    sheet = TableBuilder("saliency_deletion", {"source": "Dataset", "order": "Deleted"})
+    columns: dict[str, Column] = {}
+    for percent in [f"{100 * share:g}" for share in run.config["gradients"]["deleted"]]:
+        drop, limits = f"drop_{percent}", (-100, 100)
+        columns[drop] = Column(f"Fall without {percent} % (points)", limits=limits)
+        columns[f"excess_{percent}"] = Column(f"beyond random, {percent} %", limits=limits, beside=drop)
+        columns[f"changed_{percent}"] = Column(f"Named otherwise (%), {percent} %", interval=False)
+    for (source, order), labels in crossed(run.source_titles, ORDERS):
+        rows = rows_where(rows_of_table, source=source, method=order)
+        samples = int(rows_where(rows, metric="test_samples")["value"].sum())
+        cells = {name: cell_of_repeats(100 * rows_where(rows, metric=name)["value"], samples) for name in columns}
+        sheet.add_row(labels, cells)
+    return sheet.build(
+        caption="Fall of GP-CA's score without some of the points" + sheet.stand_in_clause(run.sources, partly=False),
+        column_head="quantity",
+        columns=columns,
+        footnotes=(
+            f"{mean_over(sheet.most_seeds(), run.config['gradients']['samples'])}; one draw of points of each sample.",
+            "Fall: of the score of the concept named on the whole draw, in hundredths; in brackets the excess over "
+            "random deletion. To the center: in the order of how much moving a point to the center changes the score "
+            "(Zheng et al. 2019). At random: mean of four orders.",
+        ),
+    )
+
+
+ORDERS = {
+    "gradient": "Most salient first",
+    "to_centre": "Most salient first (to the center)",
+    "random": "At random",
+    "least_gradient": "Least salient first",
+}
+
+
+@table(
+    SECTION,
+    "TCAV: which concepts the classes of GP-CA rely on",
+    """The share of a class's test samples (columns) for which moving the embedding along a concept (rows) raises the
+    log odds of that class, with a test against random directions. TCAV describes a whole class, not a sample; the
+    concept activation vectors of the extended Table I use the same vectors sample by sample.""",
+    needs=NEEDS,
+    metrics="gradients.csv",
+)
+def tcav(run: Run, metrics):
+    """Score of every concept for every class, and in how many seeds it differs from chance."""
+    rows_of_table = rows_where(metrics, table=TCAV)
+    classes = list(dict.fromkeys(rows_of_table["concept"]))
+    sheet = TableBuilder("tcav", {"source": "Dataset", "tested": "Concept"})
+    columns: dict[str, Column] = {}
+    for name in classes:
+        columns[f"score_{name}"] = Column(f"Class {name} (%)", of_samples=False)
+        columns[f"significant_{name}"] = Column(f"seeds, {name}", decimals=0, interval=False)
+    columns["probe"] = Column("Probes right (%)")
+    tested_concepts = {name: name for name in dict.fromkeys(rows_of_table["method"])}
+    for (source, tested), labels in crossed(run.source_titles, tested_concepts):
+        rows = rows_where(rows_of_table, source=source, method=tested)
+        cells: dict[str, Cell | None] = {}
+        for name in classes:
+            values = rows_where(rows, concept=name).groupby("metric")["value"].apply(list)
+            cells[f"score_{name}"] = cell_of_repeats(100 * np.array(values.get("score", [])), 0)
+            if significant_R := values.get("significant", []):
+                cells[f"significant_{name}"] = Cell(sum(significant_R), 0.0, len(significant_R), 0)
+        probe_R = rows_where(rows, metric="probe").groupby("seed")["value"].mean()
+        cells["probe"] = cell_of_repeats(100 * probe_R, 0)
+        sheet.add_row(labels, cells)
+    settings = run.config["gradients"]
+    return sheet.build(
+        caption="TCAV's scores for GP-CA" + sheet.stand_in_clause(run.sources, partly=False),
+        column_head="quantity",
+        columns=columns,
+        footnotes=(
+            f"Means over {plural(sheet.most_seeds(), 'seed')}; {settings['vectors']} probes for each concept.",
+            "Score: share of the test samples of the class whose log odds of it grow along the concept; about half "
+            "if there is no relation. Seeds: in how many of them it differs from the scores of random probes, at the "
+            f"level {settings['level']:g} over all tests of a seed (Bonferroni). Probes right: accuracy on training "
+            "samples that the probe did not learn, the mean of those with and without the concept.",
+        ),
+    )

@@ -1,0 +1,109 @@
+"""Saliency maps and the tables of deleted points and of TCAV."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from gpca.errors import InputError
+from gpca.experiments.gradients import collect, saliency, saliency_deletion, tcav
+from gpca.experiments.plan import Run
+from gpca.io.arrays import save_arrays
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.steps.gradients import DELETION_COLUMNS
+
+RUN = Run(
+    {
+        "sources": {"tiny": {"title": "Tiny", "stand_in": False}},
+        "figures": {"source": "tiny"},
+        "gradients": {"samples": 3, "deleted": [0.25], "vectors": 2, "level": 0.05},
+    }
+)
+DELETIONS = """sample,concept,named,order,deleted,before,after,changed
+0,noise,noise,gradient,0.25,0.9,0.5,1
+0,noise,noise,random,0.25,0.9,0.8,0.25
+3,pose,pose,gradient,0.25,0.8,0.6,0
+3,pose,pose,random,0.25,0.8,0.8,0
+"""
+TESTED = """tested,concept,score,chance,p,significant,probe
+noise,noise,1.0,0.5,0.001,1,0.9
+noise,pose,0.25,0.5,0.3,0,0.9
+"""
+
+
+@pytest.fixture
+def metrics(tmp_path):
+    files = []
+    for kind, text in (("saliency", DELETIONS), ("tcav", TESTED)):
+        for seed in (0, 1):
+            path = tmp_path / kind / "tiny" / f"seed{seed}.csv"
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text)
+            files.append(path)
+    return collect(RUN, files[:2], files[2:])
+
+
+def value(metrics, **wanted):
+    for name, entry in wanted.items():
+        metrics = metrics[metrics[name] == entry]
+    return metrics["value"].tolist()
+
+
+def test_the_fall_is_that_of_the_score_and_its_excess_against_random(metrics):
+    assert value(metrics, method="gradient", metric="drop_25") == pytest.approx([0.3, 0.3])
+    assert value(metrics, method="gradient", metric="excess_25") == pytest.approx([0.25, 0.25])
+    assert value(metrics, method="gradient", metric="changed_25") == [0.5, 0.5]
+    assert value(metrics, method="random", metric="excess_25") == []
+    assert value(metrics, method="random", metric="test_samples") == [2, 2]
+    assert value(metrics, table="tcav", method="noise", concept="pose", metric="score") == [0.25, 0.25]
+
+
+def test_the_tables_show_them(metrics):
+    text = saliency_deletion(RUN, metrics).markdown()
+    assert "| Tiny | Most salient first | 30.0 (+25.0) | 50.0 |" in text
+    text = tcav(RUN, metrics).markdown()
+    assert "| Tiny | noise | 100.0 | 2 | 25.0 | 0 | 90.0 |" in text
+
+
+def test_metrics_of_something_else_make_no_table(metrics):
+    other = pd.DataFrame(metrics).assign(source="other")
+    for make in (saliency_deletion, tcav):
+        with pytest.raises(InputError, match="has nothing to show"):
+            make(RUN, other)
+
+
+def test_a_file_without_a_column_is_refused(tmp_path):
+    path = tmp_path / "tiny" / "seed0.csv"
+    path.parent.mkdir()
+    path.write_text("sample,order\n0,random\n")
+    with pytest.raises(InputError, match="column 'concept' is missing"):
+        collect(RUN, [path], [])
+
+
+@pytest.fixture
+def files(registrations, tmp_path):
+    """Maps of two test samples of each concept, of which the second is named right; of noise neither is."""
+    test = registrations.rows("test")
+    rows = np.concatenate([test[registrations.concept[test] == concept][:2] for concept in CONCEPTS])
+    random = np.random.default_rng(0)
+    maps = {"points": random.normal(size=(6, 30, 3)), "saliency": random.uniform(size=(6, 30))}
+    save_arrays(tmp_path / "maps.npz", {"sample": registrations.sample[rows], **maps})
+    records = []
+    for place, row in enumerate(rows):
+        true = registrations.concept[row]
+        named = true if place % 2 and true != "noise" else CONCEPTS[(CONCEPTS.index(true) + 1) % 3]
+        records.append((registrations.sample[row], true, named, "gradient", 0.25, 0.9 - place / 100, 0.5, 0))
+    pd.DataFrame(records, columns=list(DELETION_COLUMNS)).to_csv(tmp_path / "rows.csv", index=False)
+    registrations.save(tmp_path / "registrations.npz")
+    return [tmp_path / name for name in ("registrations.npz", "maps.npz", "rows.csv")]
+
+
+def test_one_sample_of_each_concept_is_drawn_named_right_where_there_is_one(files):
+    titles = [axes.get_title() for axes in saliency(RUN, *files).axes]
+    assert titles[:3] == ["noise: named pose, 0.89", "pose: named pose, 0.87", "overlap: named overlap, 0.85"]
+
+
+def test_maps_of_other_samples_are_refused(files):
+    rows = pd.read_csv(files[2])
+    rows.assign(sample=rows["sample"] + 1000).to_csv(files[2], index=False)
+    with pytest.raises(InputError, match="its samples differ from"):
+        saliency(RUN, *files)
