@@ -128,7 +128,7 @@ def collect_intervals(run: Run, files: Iterable[str | Path]) -> pd.DataFrame:
     """
     import pandas as pd
 
-    from gpca.experiments.out_of_distribution.intervals import estimates_of_scores
+    from gpca.attribution.learner_predictions import estimates_of_scores
 
     by_source: dict[str, list[pd.DataFrame]] = {}
     for path in files:

@@ -21,6 +21,7 @@ SHARED = {  # module of gpca.steps -> the steps that it has, functions of their 
     "frames": "scenes instances frame_registrations frame_causes reenact_frames",
     "scans": "draw_scans",
     "diagnosis": "diagnose diagnose_by_features diagnose_frames",
+    "shift": "shift",
 }
 MODULES = {f: f"gpca.steps.{module}:{f}" for module, functions in SHARED.items() for f in functions.split()} | {
     "active_learning": IN + "active_learning.step",
@@ -36,8 +37,7 @@ MODULES = {f: f"gpca.steps.{module}:{f}" for module, functions in SHARED.items()
     "learning_samples": "gpca.steps.learning_curve:learning_samples",
     "live_shap": "gpca.steps.live_shap",
     "new_concepts": IN + "new_concepts.step",
-    "shift": IN + "out_of_distribution.shift_step",
-    "learners": IN + "out_of_distribution.learners",
+    "learners": "gpca.steps.shift:fit_learners",
     "oracles": IN + "reenactment.step",
     "recover": IN + "recovery.step",
     "register_methods": "gpca.steps.registration_trials",

@@ -69,12 +69,15 @@ EDITS = {  # a module: what is made again where it has changed, and what is not
         "registrations encoders/ embeddings/ uncertainty/ methods/ estimates/ descriptors/ shifted/ residuals_forest "
         "predictions/ycb/shap_additive predictions/ycb/softmax_head diagnoses/ycb/gate_rmse fig3_concepts",
     ),
-    "gpca/experiments/out_of_distribution/samples.py": (
+    "gpca/steps/shift.py": (
         "shifted/ learners/ reliability",
         "predictions active_learning diagnoses/ model.pt",
     ),
     "baselines/heads.py": ("learners/ table5_learners", "shifted/ predictions diagnoses/ kernels"),
-    "gpca/experiments/kernel_grid.py": ("figures/kernel_learning_curves kernels.csv table4_grid", "kernels/ figures/fig3"),
+    "gpca/experiments/kernel_grid.py": (
+        "figures/kernel_learning_curves kernels.csv table4_grid",
+        "kernels/ figures/fig3",
+    ),
     "gpca/active_learning/acquisition.py": (
         "active_learning/ycb new_concepts/ frame_labels/ runtime.csv table6_labels",
         "predictions embeddings learners diagnoses/ model.pt kernels/",

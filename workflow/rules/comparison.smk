@@ -28,7 +28,7 @@ PREDICTED = {
         for name in config["explainers"]
     ),
     *(("predictions", FRAMES, name) for name in NAMES["backbone"]),
-    *(("learners", source, name) for source in SOURCES for name in LEARNER_SETTINGS),
+    *(("learners", source, name) for source in SOURCES for name in NAMES["learner"]),
 }
 COMPARED_PREDICTIONS = [
     f"<results>/{'/'.join(folder)}/seed{seed}.csv"

@@ -1,4 +1,5 @@
 # Files of a run -> the printed numbers under every reading of what the paper leaves unstated.
+from gpca.experiments.out_of_distribution import learner_settings
 from gpca.experiments.specification_curve.registry import (
     FRAME_ENCODER,
     FRAME_INPUT,
@@ -25,7 +26,7 @@ READING_SECTIONS = {
     "encoder": config["encoders"][config["embedding"]["encoder"]],
     "active_learning": LEARNING_SETTINGS,
     **{name: config["explainers"].get(name) or {} for name in ("gpca_paper", "gpca")},
-    "gpca_matern": LEARNER_SETTINGS.get("gpca_matern", {}),
+    "gpca_matern": learner_settings(config).get("gpca_matern", {}),
 }
 FRAME_ROWS = {
     "frames": {

@@ -21,7 +21,6 @@ from gpca.classifier.settings import GPCSettings
 from gpca.evaluation.measures import ALL
 from gpca.experiments.joint_reading.choices import SCHEDULES, SEVERITIES, START, Joint, part_name
 from gpca.experiments.joint_reading.measured_samples import MeasureSettings, Subjects
-from gpca.experiments.out_of_distribution.sets import DISTANCES, ShiftedSets
 from gpca.experiments.specification_curve.diagnostics import accuracies
 from gpca.experiments.specification_curve.gpc_start import FITTED, StartedGPC, of_unit_norm, relevant
 from gpca.experiments.specification_curve.knobs import accuracies_of_magnitudes, runs_of
@@ -31,6 +30,7 @@ from gpca.experiments.specification_curve.run_files import like_the_training
 from gpca.explainers.registry import explainer_entry
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
+from gpca.pairs.shifted_sets import DISTANCES, ShiftedSets
 from gpca.process.progress import progress
 from gpca.uncertainty.interventions import MIDDLE, UPPER
 

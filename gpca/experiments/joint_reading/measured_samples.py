@@ -8,10 +8,10 @@ from typing import Any
 
 from gpca.active_learning.settings import ActiveLearningSettings
 from gpca.alignment.icp import ICPSettings
-from gpca.experiments.out_of_distribution.sets import ShiftedSets
 from gpca.experiments.specification_curve.run_files import like_the_training
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations
+from gpca.pairs.shifted_sets import ShiftedSets
 from gpca.pairs.synthesis import RegistrationSettings, make_registrations
 from gpca.process.job import Job
 from gpca.uncertainty.settings import UncertaintySettings

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpca.attribution.diagnostics import aurc, calibration_error, rank_correlation
+from gpca.attribution.learner_predictions import probabilities, read_learner_predictions, sets_of, wrong
 from gpca.attribution.metrics import accuracy, concept_accuracy
 from gpca.evaluation.measures import ALL
-from gpca.experiments.out_of_distribution.metrics import probabilities, read_learner_predictions, sets_of, wrong
 from gpca.experiments.specification_curve.run_files import Row, RunFiles
 from gpca.experiments.specification_curve.settings import Reading, ReadingSizes
 from gpca.pairs.perturbation import CONCEPTS

@@ -10,12 +10,11 @@ from dataclasses import replace
 
 from gpca.encoders.registry import EncoderSettings
 from gpca.encoders.training import embed, train_encoder
-from gpca.experiments.out_of_distribution.samples import sets_of_encoder
-from gpca.experiments.out_of_distribution.settings import ShiftSettings
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.synthesis import RegistrationSettings, make_registrations
 from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
+from gpca.steps.shift import ShiftSettings, sets_of_encoder
 
 
 def run(job: Job) -> None:

@@ -9,9 +9,9 @@ from pathlib import Path
 from gpca.alignment.icp import ICPSettings
 from gpca.errors import InputError
 from gpca.evaluation.measures import source_method_seed
-from gpca.experiments.out_of_distribution.sets import ShiftedSets
 from gpca.experiments.specification_curve.settings import Reading
 from gpca.pairs.dataset import Registrations, read_embedding
+from gpca.pairs.shifted_sets import ShiftedSets
 from gpca.uncertainty.settings import UncertaintySettings
 
 # Reading, and the value of a printed number's counterpart under it: source, method, metric, concept, seed, value.

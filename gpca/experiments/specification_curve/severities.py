@@ -10,12 +10,12 @@ from scipy.stats import rankdata
 from gpca.attribution.predictions import read_predictions
 from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
-from gpca.experiments.out_of_distribution.sets import ShiftedSets
 from gpca.experiments.specification_curve.diagnostics import accuracies, accuracies_of_named
 from gpca.experiments.specification_curve.run_files import Row, RunFiles, like_the_training
 from gpca.experiments.specification_curve.settings import Reading, ReadingSizes
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
+from gpca.pairs.shifted_sets import ShiftedSets
 
 PARTS = ("weakest", "middle", "strongest")
 CLASSIFIERS = {"paper": "gpca_paper", "converged": "gpca"}

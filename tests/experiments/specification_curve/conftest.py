@@ -7,10 +7,10 @@ import pytest
 
 from gpca.attribution.predictions import write_predictions
 from gpca.attribution.scores import Attribution
-from gpca.experiments.out_of_distribution.sets import DISTANCES, ShiftedSets
 from gpca.experiments.specification_curve.run_files import RunFiles
 from gpca.io.arrays import save_arrays
 from gpca.pairs.perturbation import CONCEPTS
+from gpca.pairs.shifted_sets import DISTANCES, ShiftedSets
 
 GPC = {"iterations": 20, "inducing": 8, "draws": 50, "learning_rate": 0.1}
 SECTIONS = {

@@ -8,10 +8,10 @@ import pytest
 
 from baselines.learners import linear_svm
 from gpca.active_learning.retraining import Retraining, learn
+from gpca.attribution.learner_predictions import read_learner_predictions
 from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
-from gpca.experiments.out_of_distribution.metrics import read_learner_predictions
 from gpca.experiments.specification_curve import (
     diagnostics,
     frame_input,
@@ -95,9 +95,9 @@ def test_another_head_trains_another_encoder_and_only_where_it_is_wanted(run_fil
 
 
 def test_diagnostics_follow_set_score_and_area(run_files, halves, tmp_path):
-    from gpca.experiments.out_of_distribution.learners import predict_sets
-    from gpca.experiments.out_of_distribution.sets import ShiftedSets
     from gpca.io.csv_file import write_csv
+    from gpca.pairs.shifted_sets import ShiftedSets
+    from gpca.steps.shift import predict_sets
 
     path = tmp_path / "tiny/learner_linear_svm/seed0.csv"
     path.parent.mkdir(parents=True)

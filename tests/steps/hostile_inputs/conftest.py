@@ -5,8 +5,8 @@ import shutil
 import numpy as np
 import pytest
 
-from gpca.experiments.out_of_distribution.sets import DISTANCES
 from gpca.io.arrays import save_arrays
+from gpca.pairs.shifted_sets import DISTANCES
 from gpca.uncertainty.designs import DESIGNS
 
 K = len(DESIGNS["removal"].conditions)

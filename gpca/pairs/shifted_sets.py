@@ -27,6 +27,11 @@ SPACES, KINDS = ("analytical", "embedding"), ("knn", "mahalanobis")
 DISTANCES = tuple(f"{kind}_{space}" for space in SPACES for kind in KINDS)
 
 
+def with_training_like(shifted: str) -> str:
+    """Name of a shifted set together with the test samples like the training's of the same encoder."""
+    return f"{TRAINED_ON[shifted]}+{shifted}"
+
+
 @dataclass(frozen=True)
 class ShiftedSets(Container):
     """S samples of all sets.
@@ -49,11 +54,11 @@ class ShiftedSets(Container):
     distance: np.ndarray = array(f"S {len(DISTANCES)}")
 
     def rows(self, name: str, split: str) -> np.ndarray:
-        """Return the row numbers of a set and split."""
+        """Row numbers of a set and split."""
         return np.flatnonzero((self.set == name) & (self.split == split))
 
     def registrations(self, rows: np.ndarray) -> Registrations:
-        """Return the rows as explainers that read embeddings take them: without clouds and poses."""
+        """Rows for explainers that read embeddings: without clouds and poses."""
         nan_S = np.full(len(rows), np.nan)
         zeros_S = np.zeros(len(rows), int)
         columns: dict[str, Any] = dict.fromkeys(REGISTRATION_COLUMNS, nan_S) | {"object_index": zeros_S}

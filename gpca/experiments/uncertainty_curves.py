@@ -1,12 +1,6 @@
-"""Draws how useful the uncertainty of learners is: risk over coverage, reliability, uncertainty over distance.
+"""How useful the uncertainty of learners is: risk over coverage, reliability, uncertainty over distance (Table V).
 
-All take the same arguments and raise the same error:
-
-    learned: The predictions that :func:`gpca.experiments.out_of_distribution.metrics.read_learner_predictions` returns.
-    sources, learners: The title of each name, in order; those without predictions are left out.
-    InputError: There are no predictions of these sources and learners.
-
-The learners of the paper have a color, as everywhere; the others take theirs in turn.
+The paper's learners have a color, as everywhere; the others take theirs in turn.
 """
 
 from __future__ import annotations
@@ -17,10 +11,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gpca.attribution.diagnostics import BINS, risk_coverage
+from gpca.attribution.learner_predictions import read_learner_predictions, sets_of, wrong
 from gpca.errors import InputError
 from gpca.experiments.diagnosis.reliability import reliability_figure
-from gpca.experiments.out_of_distribution.metrics import sets_of, with_training_like, wrong
-from gpca.experiments.out_of_distribution.sets import DISTANCES
+from gpca.experiments.out_of_distribution import SECTION, learner_titles
+from gpca.experiments.plan import Run
+from gpca.experiments.result import figure
+from gpca.pairs.shifted_sets import DISTANCES, with_training_like
 from gpca.reporting.figures.panels import legend_below, panels
 from gpca.reporting.figures.style import (
     BLACK,
@@ -38,17 +35,17 @@ from gpca.reporting.figures.style import (
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-SETS = {  # those whose ρ Table V has, alone and under shift
+SETS = {  # those of which Table V, alone or under shift, has ρ
     "in_distribution": "like the training",
     with_training_like("severity"): "+ stronger severities",
     with_training_like("source"): "+ another source",
     with_training_like("objects"): "+ unseen objects",
 }
-Titles = Mapping[str, str]
 COVERAGES = np.linspace(0, 1, 101)
-ENOUGH = 0.1  # Of a smaller share of the samples a single error decides the risk, so that the axis follows the others.
+ENOUGH = 0.1  # the axis ignores smaller shares of the samples, where a single error decides the risk
 DISTANCE_BINS = 10  # of equally many samples
 BESIDE_OTHERS = "gpca"  # stands in the panels of the learners that the paper does not have
+PREDICTIONS = "learners/{source}/{learner}/seed{seed}.csv"
 OTHER_LOOKS: tuple[tuple[str, Any, float], ...] = (
     *((color, "-", 1.1) for color in (BLACK, GREEN, PURPLE, GRAY)),
     *((color, (0, (4, 2)), 1.1) for color in (BLACK, GREEN, PURPLE, GRAY)),
@@ -56,14 +53,27 @@ OTHER_LOOKS: tuple[tuple[str, Any, float], ...] = (
 )
 
 
-def draw_coverage_risk(learned: Mapping, sources: Titles, learners: Titles) -> Figure:
-    """Draw the mean over the seeds of the risk, by the largest score, on the test samples like the training's.
+@figure(
+    SECTION,
+    "Risk over coverage",
+    """Share of errors among the most confident samples, over the share that is kept. The curve falls towards the left
+    if a classifier knows what it does not know. Of less than 10 % of the samples a single error decides the share,
+    so that the axis may cut a curve there. The paper's classifiers are above, the others below beside GP-CA.
+
+    The area under it, from the first sample on, is the AURC of Table V (the paper's AUC).""",
+    learned=(read_learner_predictions, {"prediction_files": PREDICTIONS}),
+)
+def coverage_risk(run: Run, learned: Mapping) -> Figure:
+    """Mean over the seeds of the risk, by the largest score, on the test samples like the training's.
 
     The paper's learners are above, and below are the others beside GP-CA. A panel in which no classifier errs says so.
     """
-    shown, columns = _known(learned, sources, learners)
-    lines, looks = _lines(shown), _looks(shown)
-    figure, axes = panels(len(lines), len(columns), 1.0 + 1.6 * len(lines), sharex=True, sharey=True)
+    shown, columns = _shown(run, learned)
+    paper, others = _paper_first(shown), [name for name in shown if name not in METHOD_LOOKS]
+    beside = [name for name in paper if name == BESIDE_OTHERS]
+    lines = [names for names in (paper, [*beside, *others] if others else []) if names]
+    looks = _looks(shown)
+    drawing, axes = panels(len(lines), len(columns), 1.0 + 1.6 * len(lines), sharex=True, sharey=True)
     highest = 0.0
     for line, of_line in zip(axes, lines, strict=True):
         for panel, source in zip(line, columns, strict=True):
@@ -81,47 +91,73 @@ def draw_coverage_risk(learned: Mapping, sources: Titles, learners: Titles) -> F
                 panel.text(0.5, 0.5, "no errors", transform=panel.transAxes, ha="center", va="center")
         line[0].set_ylabel("errors among\nthe covered (%)")
     for panel, source in zip(axes[0], columns, strict=True):
-        panel.set_title(sources[source])
+        panel.set_title(columns[source])
     for panel in axes[-1]:
         panel.set_xlabel("coverage (%)")
     axes[0, 0].set(xlim=(0, 100), ylim=(0, 1.05 * highest or 1))
-    _write_legend(figure, shown, learners, looks)
-    return figure
+    _write_legend(drawing, shown, looks)
+    return drawing
 
 
-def draw_reliability(learned: Mapping, sources: Titles, learners: Titles) -> Figure:
-    """Draw accuracy over confidence, in the bins of the calibration error, and the number of samples in each bin.
+@figure(
+    SECTION,
+    "Reliability",
+    """Accuracy over confidence. On the diagonal, 80 % confident means right in 80 % of the cases; above it a
+    classifier is underconfident, below it overconfident. Bars count the samples, on the axis at the right;
+    vertical lines are Wilson's intervals (95 %) of independent samples.
+
+    The number is the calibration error of the samples of all datasets and seeds together (pooled ECE). Table V has
+    the mean of each seed's own for every dataset, in which deviations of opposite sign cancel less.""",
+    learned=(read_learner_predictions, {"prediction_files": PREDICTIONS}),
+)
+def reliability(run: Run, learned: Mapping) -> Figure:
+    """Accuracy over confidence, in the bins of the calibration error, and the number of samples in each bin.
 
     The samples are those like the training's, of all sources and seeds together. Bins of very few samples have no
     point. The number in a title is the calibration error of them all.
     """
-    shown, columns = _known(learned, sources, learners)
+    shown, columns = _shown(run, learned)
     samples = {}
-    for learner in shown:
+    for learner, title in shown.items():
         parts = [rows for source in columns for rows in _of(learned, source, learner, "in_distribution")]
         confidence_S = np.concatenate([1 - rows["max_score"].to_numpy() for rows in parts])
-        samples[learners[learner]] = confidence_S, np.concatenate([~wrong(rows) for rows in parts])
-    return reliability_figure(samples, ", ".join(sources[name] for name in columns), BINS)
+        samples[title] = confidence_S, np.concatenate([~wrong(rows) for rows in parts])
+    return reliability_figure(samples, ", ".join(columns.values()), BINS)
 
 
-def draw_uncertainty_vs_distance(learned: Mapping, sources: Titles, learners: Titles) -> Figure:
-    """Draw the mean of 1 - largest score over the distance to the training samples: sources as columns, sets as rows.
+@figure(
+    SECTION,
+    "Uncertainty over distance to the training samples",
+    """Uncertainty over the distance to the training samples, the mean in ten bins of equally many: in distribution,
+    and with the samples of each shift. Bands are 95 % intervals of independent samples, and n counts those of all
+    seeds. The rank correlation ρ of the two is in Table V and in its table under shift.
+
+    The distance is the mean of those to the ten nearest training samples, in the paper's classic (analytical)
+    features, each in units of its standard deviation over the training samples.""",
+    learned=(
+        read_learner_predictions,
+        {"prediction_files": PREDICTIONS, "set_files": "shifted/{source}/seed{seed}.npz"},
+    ),
+)
+def uncertainty_vs_distance(run: Run, learned: Mapping) -> Figure:
+    """Mean of 1 - largest score over the distance to the training samples: sources as columns, sets as rows.
 
     The paper's learners are shown, or if there are none of them the others, with 95 % intervals. In each panel stands
     the number n of samples, those of all seeds together.
     """
-    known, columns = _known(learned, sources, learners)
-    shown = _paper_first(known) or known[: len(METHOD_LOOKS)]
-    looks = _looks(known)
+    learners, columns = _shown(run, learned)
+    names = _paper_first(learners) or list(learners)[: len(METHOD_LOOKS)]
+    shown = {name: learners[name] for name in names}
+    looks = _looks(learners)
     parts = {key: sets_of(rows) for key, rows in learned.items() if key[0] in columns and key[1] in shown}
     down = [name for name in SETS if any(name in of_key for of_key in parts.values())]
     from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
-    figure, axes = panels(len(down), len(columns), 0.9 + 1.2 * len(down), sharex=True, sharey=True)
+    drawing, axes = panels(len(down), len(columns), 0.9 + 1.2 * len(down), sharex=True, sharey=True)
     for row, name in enumerate(down):
         for panel, source in zip(axes[row], columns, strict=True):
             samples = 0
-            for learner in reversed(shown):
+            for learner in reversed(names):
                 of_set = [p[name] for key, p in parts.items() if key[:2] == (source, learner) and name in p]
                 if of_set:
                     distance, mean, half = distance_curve(of_set)
@@ -132,7 +168,7 @@ def draw_uncertainty_vs_distance(learned: Mapping, sources: Titles, learners: Ti
             panel.text(0.03, 0.96, f"$n$ = {samples}", transform=panel.transAxes, va="top", fontsize=SMALL_PT)
         axes[row, 0].set_ylabel(f"{SETS[name]}\n1 - largest score", fontsize=SMALL_PT)
     for panel, source in zip(axes[0], columns, strict=True):
-        panel.set_title(sources[source])
+        panel.set_title(columns[source])
     for panel in axes[-1]:
         panel.set_xlabel("distance to the training samples")
         panel.set_xscale("log")
@@ -140,13 +176,13 @@ def draw_uncertainty_vs_distance(learned: Mapping, sources: Titles, learners: Ti
         panel.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         panel.xaxis.set_minor_locator(NullLocator())
     axes[0, 0].set_ylim(bottom=0)
-    _write_legend(figure, shown, learners, looks)
-    write_title(figure, "Means in bins of equally many of the n samples, and their 95 % intervals")
-    return figure
+    _write_legend(drawing, shown, looks)
+    write_title(drawing, "Means in bins of equally many of the n samples, and their 95 % intervals")
+    return drawing
 
 
 def distance_curve(of_seeds: Sequence) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return median distance and mean of 1 - largest score of `DISTANCE_BINS` bins of equally many samples.
+    """Median distance and mean of 1 - largest score of `DISTANCE_BINS` bins of equally many samples.
 
     The third array is half the width of the means' 95 % intervals, by the normal distribution of independent samples.
     """
@@ -159,42 +195,38 @@ def distance_curve(of_seeds: Sequence) -> tuple[np.ndarray, np.ndarray, np.ndarr
     return np.array(medians), np.array(means), np.array(halves)
 
 
-def _looks(shown: Sequence[str]) -> dict[str, dict[str, Any]]:
-    """Return color, line and width of every learner; those without a look of their own take `OTHER_LOOKS` in turn."""
+def _looks(shown: Iterable[str]) -> dict[str, dict[str, Any]]:
+    """Color, line and width of every learner; those without a look of their own take `OTHER_LOOKS` in turn."""
     others = iter(OTHER_LOOKS)
     own = {name: METHOD_LOOKS[name] if name in METHOD_LOOKS else next(others, OTHER_LOOK) for name in shown}
     return {name: {"color": look[0], "linestyle": look[1], "linewidth": look[2]} for name, look in own.items()}
 
 
 def _paper_first(learners: Iterable[str]) -> list[str]:
-    """Return those that have a look of their own, in the order of the looks."""
+    """Learners with a look of their own, in the order of the looks."""
     return [name for name in METHOD_LOOKS if name in set(learners)]
 
 
-def _lines(shown: Sequence[str]) -> list[list[str]]:
-    """Return the learners of each line of panels: the paper's, then the others beside GP-CA."""
-    paper, others = _paper_first(shown), [name for name in shown if name not in METHOD_LOOKS]
-    beside = [name for name in paper if name == BESIDE_OTHERS]
-    return [names for names in (paper, [*beside, *others] if others else []) if names]
-
-
-def _write_legend(figure, shown: Sequence[str], learners: Titles, looks: Mapping[str, dict[str, Any]]) -> None:
+def _write_legend(drawing: Figure, shown: Mapping[str, str], looks: Mapping[str, dict[str, Any]]) -> None:
     """Name the line of every learner, the paper's first."""
     from matplotlib.lines import Line2D
 
     ordered = [*_paper_first(shown), *(name for name in shown if name not in METHOD_LOOKS)]
-    legend_below(figure, [Line2D([], [], label=learners[name], **looks[name]) for name in ordered])
+    legend_below(drawing, [Line2D([], [], label=shown[name], **looks[name]) for name in ordered])
 
 
-def _known(learned: Mapping, sources: Titles, learners: Titles) -> tuple[list[str], list[str]]:
-    shown = [name for name in learners if any(learner == name for _, learner, _ in learned)]
-    columns = [name for name in sources if any(source == name for source, _, _ in learned)]
-    if not shown or not columns:
+def _shown(run: Run, learned: Mapping) -> tuple[dict[str, str], dict[str, str]]:
+    """Titles of the learners and of the sources that have predictions."""
+    learners = {
+        name: title for name, title in learner_titles(run.config).items() if any(key[1] == name for key in learned)
+    }
+    sources = {name: title for name, title in run.source_titles.items() if any(key[0] == name for key in learned)}
+    if not learners or not sources:
         raise InputError("learners", "have no predictions of these sources and learners", "run them first")
-    return shown, columns
+    return learners, sources
 
 
 def _of(learned: Mapping, source: str, learner: str, of_set: str) -> list:
-    """Return the rows of a set, seed by seed."""
+    """Rows of a set, seed by seed."""
     parts = [rows[rows["set"] == of_set] for key, rows in learned.items() if key[:2] == (source, learner)]
     return [rows for rows in parts if len(rows)]

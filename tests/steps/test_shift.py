@@ -1,3 +1,5 @@
+"""Samples unlike those of the training, their distances to it, and what learners predict for them."""
+
 from dataclasses import replace
 
 import numpy as np
@@ -5,15 +7,21 @@ import pytest
 
 from gpca.encoders.registry import EncoderSettings
 from gpca.encoders.training import embed, train_encoder
-from gpca.experiments.out_of_distribution.samples import (
+from gpca.errors import InputError
+from gpca.explainers.gpca import GPCA
+from gpca.explainers.registry import explainer_entry
+from gpca.pairs.shifted_sets import TRAINED_ON
+from gpca.steps.shift import (
     PRINCIPAL_COMPONENTS,
+    ShiftSettings,
     knn_distance,
     mahalanobis_distance,
     make_sets,
+    predict_sets,
     principal_components,
 )
-from gpca.experiments.out_of_distribution.sets import TRAINED_ON
-from gpca.experiments.out_of_distribution.settings import ShiftSettings
+
+from ..pairs.test_shifted_sets import sets
 
 ENCODER = {"draw_points": 32, "draws": 1, "epochs": 1, "batch_size": 16, "options": {"k": 4, "point_features": 8}}
 SHIFT = {
@@ -38,7 +46,7 @@ def embedded(registrations):
 
 
 @pytest.fixture(scope="module")
-def sets(objects, embedded):
+def shifted(objects, embedded):
     model, registrations = embedded
     return make_sets(objects, registrations, registrations, model, EncoderSettings(**ENCODER), "tiny", 0, SETTINGS)
 
@@ -51,41 +59,41 @@ def test_settings_join_what_the_sections_say():
     assert SETTINGS.encoder == EncoderSettings(**ENCODER | {"epochs": 2})
 
 
-def test_all_sets_are_there_and_of_the_declared_size(sets, embedded):
+def test_all_sets_are_there_and_of_the_declared_size(shifted, embedded):
     _, registrations = embedded
-    assert set(sets.set) == set(TRAINED_ON)
-    assert len(sets.rows("in_distribution", "train")) == 36
-    assert len(sets.rows("in_distribution", "test")) == 18
+    assert set(shifted.set) == set(TRAINED_ON)
+    assert len(shifted.rows("in_distribution", "train")) == 36
+    assert len(shifted.rows("in_distribution", "test")) == 18
     for name in ("severity", "source", "objects"):
-        assert len(sets.rows(name, "test")) == 6
-        assert len(sets.rows(name, "train")) == 0
-    in_distribution = sets.rows("in_distribution", "test")
-    assert np.array_equal(sets.h[in_distribution], registrations.embedding[registrations.rows("test")])
+        assert len(shifted.rows(name, "test")) == 6
+        assert len(shifted.rows(name, "train")) == 0
+    in_distribution = shifted.rows("in_distribution", "test")
+    assert np.array_equal(shifted.h[in_distribution], registrations.embedding[registrations.rows("test")])
 
 
-def test_held_out_objects_are_unseen_by_that_encoder_and_its_learners(sets):
-    unseen = set(sets.object_name[sets.set == "objects"])
+def test_held_out_objects_are_unseen_by_that_encoder_and_its_learners(shifted):
+    unseen = set(shifted.object_name[shifted.set == "objects"])
     assert len(unseen) == 1
-    assert not unseen & set(sets.object_name[sets.set == "seen_objects"])
-    assert len(sets.rows("seen_objects", "train")) == 18
-    keys = list(zip(sets.split[sets.set == "objects"], sets.sample[sets.set == "objects"], strict=True))
+    assert not unseen & set(shifted.object_name[shifted.set == "seen_objects"])
+    assert len(shifted.rows("seen_objects", "train")) == 18
+    keys = list(zip(shifted.split[shifted.set == "objects"], shifted.sample[shifted.set == "objects"], strict=True))
     assert len(set(keys)) == len(keys)
 
 
-def test_distances_are_finite_zero_for_training_samples_and_larger_for_larger_severities(sets):
-    assert (sets.distance[sets.split == "train"] == 0).all()
-    assert (sets.distance[sets.split == "test"] > 0).all()
-    near, far = (np.median(sets.distance[sets.rows(name, "test"), 0]) for name in ("in_distribution", "severity"))
+def test_distances_are_finite_zero_for_training_samples_and_larger_for_larger_severities(shifted):
+    assert (shifted.distance[shifted.split == "train"] == 0).all()
+    assert (shifted.distance[shifted.split == "test"] > 0).all()
+    near, far = (np.median(shifted.distance[shifted.rows(name, "test"), 0]) for name in ("in_distribution", "severity"))
     assert far > 1.3 * near
 
 
-def test_without_another_source_that_set_is_left_out_and_the_others_are_the_same(sets, objects, embedded):
+def test_without_another_source_that_set_is_left_out_and_the_others_are_the_same(shifted, objects, embedded):
     model, registrations = embedded
     alone = make_sets(objects, registrations, None, model, EncoderSettings(**ENCODER), "tiny", 0, SETTINGS)
-    kept = sets.set != "source"
-    assert set(alone.set) == set(sets.set[kept])
-    for name, array in vars(alone).items():
-        assert array.tobytes() == getattr(sets, name)[kept].astype(array.dtype).tobytes()
+    kept = shifted.set != "source"
+    assert set(alone.set) == set(shifted.set[kept])
+    for name, array in alone.arrays.items():
+        assert array.tobytes() == getattr(shifted, name)[kept].astype(array.dtype).tobytes()
 
 
 def test_of_a_single_object_none_is_held_out_and_those_sets_are_left_out(objects, embedded):
@@ -145,3 +153,50 @@ def test_principal_components_keep_what_varies_and_learn_from_the_training_sampl
     assert query == pytest.approx(train[:7])
     assert np.abs(train[:, 3:]).max() < 1e-8
     assert principal_components(wide, 1e6 * wide[:7])[0] == pytest.approx(train)
+
+
+def quick():
+    return GPCA("tiny", 0, iterations=5, inducing=4, draws=20)
+
+
+def test_every_test_sample_of_every_set_is_explained_once():
+    frame = predict_sets(quick, sets())
+    assert frame.columns[0] == "set"
+    assert frame["set"].value_counts().to_dict() == dict.fromkeys(
+        ("in_distribution", "severity", "seen_objects", "objects"), 12
+    )
+    assert set(frame["split"]) == {"test"}
+
+
+def test_each_encoder_has_a_learner_of_its_own():
+    """What the second encoder makes of its samples changes nothing in what is said of the first one's."""
+    given = sets()
+    second = np.isin(given.set, ["seen_objects", "objects"])
+    given.h[second] **= 3
+    frame, plain = predict_sets(quick, given), predict_sets(quick, sets())
+    first = ~frame["set"].isin(["seen_objects", "objects"])
+    assert frame[first].equals(plain[first])
+    assert not frame[~first].equals(plain[~first])
+
+
+def test_the_truth_is_hidden_and_the_prediction_that_of_the_explainer():
+    given = sets()
+    learner = explainer_entry("learner_logistic").make("tiny", 0)
+    learner.fit(given.registrations(given.rows("in_distribution", "train")))
+    rows = given.rows("severity", "test")
+    expected = learner.explain(given.registrations(rows)).scores_N_C
+    frame = predict_sets(lambda: explainer_entry("learner_logistic").make("tiny", 0), given)
+    frame = frame[frame["set"] == "severity"]
+    assert frame.filter(like="score_").to_numpy() == pytest.approx(expected)
+    assert frame["concept_true"].tolist() == given.concept[rows].tolist()
+
+
+def test_a_concept_absent_from_training_keeps_its_column_and_one_concept_is_a_fault():
+    given = sets()
+    few = given.split == "train"
+    given.concept[few & (given.concept == "pose")] = "noise"
+    frame = predict_sets(lambda: explainer_entry("learner_forest").make("tiny", 0), given)
+    assert (frame["score_pose"] == 0).all()
+    given.concept[few] = "noise"
+    with pytest.raises(InputError, match="fewer than two concepts"):
+        predict_sets(lambda: explainer_entry("learner_forest").make("tiny", 0), given)

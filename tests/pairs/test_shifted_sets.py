@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gpca.errors import InputError
-from gpca.experiments.out_of_distribution.sets import DISTANCES, TRAINED_ON, ShiftedSets
+from gpca.pairs.shifted_sets import DISTANCES, TRAINED_ON, ShiftedSets
 
 
 def sets(n=12):

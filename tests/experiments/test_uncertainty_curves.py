@@ -1,29 +1,28 @@
 import pandas as pd
 import pytest
 
+from gpca.attribution.learner_predictions import read_learner_predictions, sets_of
 from gpca.errors import InputError
-from gpca.experiments.out_of_distribution.figures import (
-    distance_curve,
-    draw_coverage_risk,
-    draw_reliability,
-    draw_uncertainty_vs_distance,
-)
-from gpca.experiments.out_of_distribution.learners import predict_sets
-from gpca.experiments.out_of_distribution.metrics import read_learner_predictions, sets_of
-from gpca.experiments.out_of_distribution.sets import DISTANCES
+from gpca.experiments.uncertainty_curves import coverage_risk, distance_curve, reliability, uncertainty_vs_distance
 from gpca.explainers.registry import explainer_entry
 from gpca.io.csv_file import write_csv
+from gpca.pairs.shifted_sets import DISTANCES
 from gpca.reporting.figures import style
-from tests.experiments.out_of_distribution.test_learners import quick
-from tests.experiments.out_of_distribution.test_sets import sets
+from gpca.steps.shift import predict_sets
 
-SOURCES = {"cups": "Cups (procedural stand-in)", "parts": "Parts"}
-LEARNERS = {"gpca": "GPC", "learner_nearest": "k nearest", "mine": "Mine", "absent": "Absent"}
+from ..pairs.test_shifted_sets import sets
+from ..steps.test_shift import quick
+from .runs import run_with
+
+SOURCES = {"cups": {"title": "Cups", "kind": "procedural"}, "parts": {"title": "Parts", "kind": "bop"}}
 MAKE = {
     "gpca": quick,
     "learner_nearest": lambda: explainer_entry("learner_nearest").make("tiny", 0),
-    "mine": lambda: explainer_entry("learner_logistic").make("tiny", 0),
+    "learner_logistic": lambda: explainer_entry("learner_logistic").make("tiny", 0),
 }
+LEARNERS = dict.fromkeys([*MAKE, "learner_forest"])  # the last one has no predictions
+RUN = run_with(sources=SOURCES, learners=LEARNERS)
+DRAW = [coverage_risk, reliability, uncertainty_vs_distance]
 
 
 @pytest.fixture(scope="module")
@@ -41,20 +40,21 @@ def learned(tmp_path_factory):
     return read_learner_predictions(predictions, set_files)
 
 
-@pytest.mark.parametrize("draw", [draw_coverage_risk, draw_reliability, draw_uncertainty_vs_distance])
+@pytest.mark.parametrize("draw", DRAW)
 def test_a_figure_is_the_same_bytes_each_time(learned, draw, same_bytes):
-    same_bytes(lambda: draw(learned, SOURCES, LEARNERS))
+    same_bytes(lambda: draw(RUN, learned))
 
 
-@pytest.mark.parametrize("draw", [draw_coverage_risk, draw_reliability, draw_uncertainty_vs_distance])
+@pytest.mark.parametrize("draw", DRAW)
 def test_without_predictions_nothing_is_drawn(learned, draw):
-    for sources, learners in (({"mugs": "Mugs"}, LEARNERS), (SOURCES, {"absent": "Absent"})):
+    without = {"sources": {"mugs": SOURCES["cups"]}}, {"learners": {"learner_forest": None}}
+    for sections in without:
         with pytest.raises(InputError, match="have no predictions of these sources and learners"):
-            draw(learned, sources, learners)
+            draw(run_with(**{"sources": SOURCES, "learners": LEARNERS} | sections), learned)
 
 
 def test_a_panel_says_of_how_many_samples_it_is_and_lines_have_bands(learned):
-    figure = draw_uncertainty_vs_distance(learned, SOURCES, LEARNERS)
+    figure = uncertainty_vs_distance(RUN, learned)
     names = ("in_distribution", "in_distribution+severity", "seen_objects+objects")  # There is no other source.
     assert len(figure.axes) == len(names) * len(SOURCES)
     for row, name in enumerate(names):
@@ -63,13 +63,13 @@ def test_a_panel_says_of_how_many_samples_it_is_and_lines_have_bands(learned):
             samples = len(sets_of(learned[source, "gpca", 0])[name])
             assert [text.get_text() for text in panel.texts] == [f"$n$ = {samples}"], (name, source)
             assert len(panel.get_lines()) == len(panel.collections) == 1
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["GPC"]
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["GP-CA (trained longer)"]
 
 
 def test_every_line_of_risk_is_named_and_has_its_own_look(learned):
-    figure = draw_coverage_risk(learned, SOURCES, LEARNERS)
+    figure = coverage_risk(RUN, learned)
     named = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert named == ["GPC", "k nearest", "Mine"]
+    assert named == ["GP-CA (trained longer)", "k nearest embeddings", "Logistic regression"]
     looks = [(line.get_color(), line.get_linestyle()) for line in figure.legends[0].get_lines()]
     assert len(set(looks)) == len(looks)
     above, below = figure.axes[0], figure.axes[len(SOURCES)]
@@ -87,7 +87,7 @@ def test_curves_of_risk_start_at_zero_and_a_panel_without_errors_says_so(learned
         key: rows.assign(concept_predicted="none", abstained=False) if key[0] == "parts" else rows
         for key, rows in right.items()
     }
-    cups, parts = draw_coverage_risk(wrong, SOURCES, LEARNERS).axes[:2]
+    cups, parts = coverage_risk(RUN, wrong).axes[:2]
     assert [text.get_text() for text in cups.texts] == ["no errors"]
     assert not parts.texts
     assert all(line.get_xdata()[0] == 0 for line in parts.get_lines())

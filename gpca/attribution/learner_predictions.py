@@ -1,0 +1,124 @@
+"""Predictions of learners for samples like and unlike those of the training, and how far they can be believed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gpca.attribution import weighted
+from gpca.attribution.predictions import concepts_of, read_predictions
+from gpca.errors import InputError
+from gpca.evaluation.intervals import Clustered, Estimate
+from gpca.evaluation.measures import source_method_seed
+from gpca.io.csv_file import numbers
+from gpca.pairs.shifted_sets import DISTANCES, TRAINED_ON, ShiftedSets, with_training_like
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+SCORES = ("max_score", "entropy", "bald", "variance")  # not every learner has the last two
+LEAST_PROBABILITY = 1e-12  # of a true class, as in gpca.attribution.diagnostics
+
+
+def read_learner_predictions(prediction_files: Iterable[str | Path], set_files: Iterable[str | Path] = ()) -> dict:
+    """(source, learner, seed) -> rows of predictions, with the uncertainties `SCORES`, higher where less sure.
+
+    Args:
+        prediction_files: named `…/{source}/{learner}/seed{seed}.csv`, as the step ``fit_learners`` writes them.
+        set_files: named `…/{source}/seed{seed}.npz`; their `DISTANCES` become columns of the rows.
+
+    Raises:
+        InputError: an unusable prediction file, an unknown set, scores that are no probabilities, other samples in
+            the two kinds of files.
+    """
+    distances = {}
+    for path in set_files:
+        _, source, seed = source_method_seed(path)
+        distances[source, seed] = (path, _distances(ShiftedSets.load(path)))
+    predictions = {}
+    for path in prediction_files:
+        source, learner, seed = source_method_seed(path)
+        rows = read_predictions(path, ("set",))
+        p_S_C = rows[[f"score_{concept}" for concept in concepts_of(rows)]].to_numpy()
+        if not (p_S_C >= 0).all() or not np.allclose(p_S_C.sum(axis=1), 1, atol=1e-4):
+            raise InputError(path, "scores are negative or do not sum to one", "a learner must give probabilities")
+        rows = rows.drop(columns="bald").assign(**_uncertainties(path, rows, p_S_C))
+        if (source, seed) in distances:
+            other, measured = distances[source, seed]
+            keys = _keys(rows)
+            if not keys.isin(measured.index).all():
+                raise InputError(other, f"lacks samples of {path}", "regenerate both from the same config")
+            rows = rows.join(measured.loc[keys].set_axis(rows.index))
+        predictions[source, learner, seed] = rows
+    return predictions
+
+
+def sets_of(rows: pd.DataFrame) -> dict[str, pd.DataFrame]:
+    """Rows of every set, and of every shifted set together with those that are like the training."""
+    alone = {name: rows[rows["set"] == name] for name in TRAINED_ON if (rows["set"] == name).any()}
+    together = {
+        with_training_like(name): rows[rows["set"].isin([name, TRAINED_ON[name]])]
+        for name in alone
+        if TRAINED_ON[name] != name
+    }
+    return alone | together
+
+
+def probabilities(rows: pd.DataFrame) -> tuple[np.ndarray, np.ndarray]:
+    """p_S_C, and the numbers target_S of the true concepts."""
+    concepts = concepts_of(rows)
+    p_S_C = rows[[f"score_{concept}" for concept in concepts]].to_numpy()
+    return p_S_C, rows["concept_true"].map(concepts.index).to_numpy()
+
+
+def wrong(rows: pd.DataFrame) -> np.ndarray:
+    """Mask (S,) of the samples that were named wrongly, or not at all."""
+    return ((rows["concept_true"] != rows["concept_predicted"]) | rows["abstained"]).to_numpy()
+
+
+def scores_of(rows: pd.DataFrame) -> list[str]:
+    """Those of `SCORES` that the learner has."""
+    return [score for score in SCORES if score in rows]
+
+
+def estimates_of_scores(rows: pd.DataFrame, samples: Clustered) -> dict[str, Estimate]:
+    """Accuracy, mean confidence, ece, nll and Brier score of the samples, given their rows of predictions."""
+    p_S_C, target_S = probabilities(rows)
+
+    def calibration_error(of: np.ndarray, weights_B_n: np.ndarray) -> np.ndarray:
+        return weighted.calibration_error(p_S_C[of], target_S[of], weights_B_n)
+
+    p_true_S = np.maximum(p_S_C[np.arange(len(target_S)), target_S], LEAST_PROBABILITY)
+    squares_S = np.square(p_S_C - np.eye(p_S_C.shape[1])[target_S]).sum(axis=1)
+    return {
+        "accuracy": samples.share(~wrong(rows)),
+        "confidence": samples.mean(p_S_C.max(axis=1), (0, 1)),
+        "ece": samples.over_seeds(calibration_error, (0, 1)),
+        "nll": samples.mean(-np.log(p_true_S), (0, np.inf)),
+        "brier": samples.mean(squares_S, (0, 2)),
+    }
+
+
+def _uncertainties(path, rows: pd.DataFrame, p_S_C: np.ndarray) -> dict[str, np.ndarray]:
+    uncertainties = {"max_score": 1 - p_S_C.max(axis=1), "entropy": numbers(path, rows, "entropy")}
+    variances = [name for name in rows.columns if name.startswith("variance_")]
+    if variances and (rows["bald"] != "").all():
+        uncertainties |= {"bald": numbers(path, rows, "bald"), "variance": rows[variances].sum(axis=1)}
+    return uncertainties
+
+
+def _distances(sets: ShiftedSets) -> pd.DataFrame:
+    import pandas as pd
+
+    test = sets.split == "test"
+    keys = pd.MultiIndex.from_arrays([sets.set[test], sets.sample[test].astype(str)])
+    return pd.DataFrame(sets.distance[test], index=keys, columns=list(DISTANCES))
+
+
+def _keys(rows: pd.DataFrame) -> pd.MultiIndex:
+    import pandas as pd
+
+    return pd.MultiIndex.from_frame(rows[["set", "sample"]])

@@ -1,0 +1,283 @@
+"""Steps ``shift`` and ``fit_learners``: samples unlike those of the training, and what learners predict for them.
+
+Distances to the training samples are in a space of features that is the same for every learner.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+
+from gpca.attribution.predictions import prediction_frame
+from gpca.encoders.registry import EncoderSettings
+from gpca.errors import InputError
+from gpca.explainers.analytical_features import analytical_features
+from gpca.explainers.interface import ConceptExplainer
+from gpca.explainers.registry import explainer_entry
+from gpca.io.csv_file import write_csv
+from gpca.objects.canonical import ObjectClouds, drawn, unseen
+from gpca.pairs.dataset import Registrations, read_embedding
+from gpca.pairs.shifted_sets import SPACES, TRAINED_ON, ShiftedSets
+from gpca.pairs.synthesis import RegistrationSettings, make_registrations
+from gpca.process.job import Job
+from gpca.process.progress import progress
+from gpca.process.provenance import record_provenance
+from gpca.settings import Bounds, Count, OpenShare
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from gpca.encoders.training import Classifier
+
+PRINCIPAL_COMPONENTS = 16  # of embeddings, for their distances
+
+
+@dataclass(frozen=True)
+class ShiftSettings:
+    """Samples unlike those of the training, and how their distance to it is measured.
+
+    Attributes:
+        beyond: how the registrations with larger severities are made; their number is `beyond.test`.
+        encoder: how the encoder that never sees some objects is trained.
+        samples: the most samples of another source, and of objects that an encoder never saw.
+        held_out_share: of the objects, at least one, that this encoder and the learners on it never see.
+        train: training samples of that encoder, at most.
+        neighbours: number of nearest training samples in the mean distance.
+        shape_points: at which the local shape of a cloud is measured for the distances.
+    """
+
+    beyond: RegistrationSettings
+    encoder: EncoderSettings
+    samples: Annotated[int, Bounds(minimum=3)] = 90
+    held_out_share: OpenShare = 0.2
+    train: Annotated[int, Bounds(minimum=3)] = 300
+    neighbours: Count = 10
+    shape_points: Annotated[int, Bounds(minimum=4)] = 128
+
+    @classmethod
+    def from_dicts(cls, shift: dict, registrations: dict, encoder: dict) -> ShiftSettings:
+        """Build from the config's section ``shift``, and what it shares with the registrations and the encoder."""
+        shift = dict(shift)
+        samples = shift.get("samples", cls.samples)
+        severities = shift.pop("severities", {})
+        beyond = RegistrationSettings.from_dict(registrations | {"severities": severities, "train": 0, "test": samples})
+        trained = EncoderSettings(**encoder | shift.pop("encoder", {}))
+        return cls(beyond=beyond, encoder=trained, **shift)
+
+
+def shift(job: Job) -> None:
+    """Make the sets, seed by seed."""
+    from gpca.encoders.training import load_model
+
+    settings = ShiftSettings.from_dicts(**job.settings)
+    encoder_settings = EncoderSettings(**job.section("encoder"))
+    objects = ObjectClouds.load(job.objects, job.source)
+    others = job.get("other_registrations", [None] * len(job.seeds))
+    per_seed = job.per_seed("registrations", "embeddings", "encoders", "out")
+    for (seed, path, embeddings, weights, out), other_path in zip(per_seed, others, strict=True):
+        inputs = [each for each in (job.objects, path, other_path, embeddings, weights) if each]
+        with record_provenance([out], inputs, job.settings, seed=seed):
+            axes = (job.source, seed)
+            registrations = Registrations.load(path, axes)
+            registrations = replace(registrations, attached=read_embedding(embeddings, registrations))
+            other = Registrations.load(other_path) if other_path else None
+            if other is not None and other.axes is not None and other.axes[0] == job.source:
+                fault = f"is of source '{job.source}' itself"
+                raise InputError(other_path, fault, "give registrations of another source")
+            model = load_model(weights, encoder_settings, axes=axes)
+            make_sets(objects, registrations, other, model, encoder_settings, *axes, settings).save(out, axes)
+
+
+def fit_learners(job: Job) -> None:
+    """Fit every learner and let it explain, seed by seed."""
+    for learner in job.learners:
+        if explainer_entry(learner).reads != "embeddings":
+            raise InputError(f"learner '{learner}'", "does not read embeddings", "choose another")
+
+    for i, (seed, path) in enumerate(job.per_seed("sets")):
+        sets = ShiftedSets.load(path, (job.source, seed))
+        outputs = job.out[i :: len(job.seeds)]
+        title = f"learners on {job.source}, seed {seed}"
+        for learner, out in progress(list(zip(job.learners, outputs, strict=True)), title):
+            settings = job.section(learner)
+            with record_provenance([out], [path], settings, seed=seed):
+                make = partial(explainer_entry(learner).make, job.source, seed, **settings)
+                write_csv(out, predict_sets(make, sets))
+
+
+def predict_sets(make: Callable[[], ConceptExplainer], sets: ShiftedSets) -> pd.DataFrame:
+    """Fit a learner to the training samples of each encoder and let it explain the test samples of its sets.
+
+    Args:
+        make: returns a new learner at every call.
+        sets: the samples.
+
+    Returns:
+        columns of a prediction file, after the column ``set``.
+    """
+    import pandas as pd
+
+    frames = []
+    for home in dict.fromkeys(TRAINED_ON.values()):
+        names = [name for name, trained_on in TRAINED_ON.items() if trained_on == home]
+        rows = np.concatenate([sets.rows(name, "test") for name in names])
+        if not len(rows):
+            continue
+        learner = make()
+        learner.fit(sets.registrations(sets.rows(home, "train")))
+        test = sets.registrations(rows)
+        frame = prediction_frame(test, learner.explain(test.without_labels()))
+        frame.insert(0, "set", sets.set[rows])
+        frames.append(frame)
+    return pd.concat(frames, ignore_index=True)
+
+
+def make_sets(
+    objects: ObjectClouds,
+    registrations: Registrations,
+    other: Registrations | None,
+    encoder: Classifier,
+    encoder_settings: EncoderSettings,
+    source: str,
+    seed: int,
+    settings: ShiftSettings,
+) -> ShiftedSets:
+    """Make, embed and measure all sets of one source and seed.
+
+    Args:
+        objects: of the source.
+        registrations: of the source, with the encoder's embeddings attached.
+        other: registrations of another source, whose test samples are the set ``source``; None leaves that set out. The
+            sets of unseen objects are left out where the source has a single family.
+        encoder, encoder_settings: the source's encoder.
+    """
+    measured = [sets_of_encoder(objects, registrations, other, encoder, encoder_settings, source, seed, settings)]
+    held_out_S = held_out(registrations, settings.held_out_share, source, seed)
+    if held_out_S.any():
+        parts = _of_unseen_objects(registrations, held_out_S, source, seed, settings)
+        measured.append(_measured(parts, source, seed, settings))
+    return ShiftedSets.joined(measured)
+
+
+def sets_of_encoder(
+    objects: ObjectClouds,
+    registrations: Registrations,
+    other: Registrations | None,
+    encoder: Classifier,
+    encoder_settings: EncoderSettings,
+    source: str,
+    seed: int,
+    settings: ShiftSettings,
+) -> ShiftedSets:
+    """Make, embed and measure the sets of the source's encoder; arguments as of :func:`make_sets`."""
+    from gpca.encoders.training import embed
+
+    beyond, _ = make_registrations(objects, f"{source} severity", seed, settings.beyond)
+    parts = {"in_distribution": registrations, "severity": beyond}
+    if other is not None:
+        parts["source"] = other.subset(other.rows("test")[: settings.samples])
+    for name in [name for name in parts if name != "in_distribution"]:
+        h_S_d, _ = embed(encoder, parts[name], f"{source} {name}", seed, encoder_settings)
+        parts[name] = replace(parts[name], attached={"embedding": h_S_d})
+    return _measured(parts, source, seed, settings)
+
+
+def held_out(registrations: Registrations, share: float, source: str, seed: int) -> np.ndarray:
+    """Mask of the samples (S,) of families to be held out: the seed's fold, or a share of all; not the only one."""
+    is_unseen = unseen(registrations.fold, seed)
+    if is_unseen is None:
+        is_unseen = drawn(registrations.cluster, share, source, seed, "held-out objects")
+    return is_unseen
+
+
+def _of_unseen_objects(
+    registrations: Registrations, held_out_S: np.ndarray, source: str, seed: int, settings: ShiftSettings
+) -> dict[str, Registrations]:
+    """Samples of seen and of unseen objects, embedded by an encoder that never sees the latter."""
+    from gpca.encoders.training import embed, train_encoder
+
+    is_train_S = registrations.split == "train"
+    train = np.flatnonzero(~held_out_S & is_train_S)[: settings.train]
+    seen = registrations.subset(np.concatenate([train, np.flatnonzero(~held_out_S & ~is_train_S)]))
+    # Training samples of objects that were held out are as unseen as test samples, which are few.
+    rows = np.concatenate([np.flatnonzero(held_out_S & ~is_train_S), np.flatnonzero(held_out_S & is_train_S)])
+    unseen_objects = registrations.subset(rows[: settings.samples])
+    name = f"{source} without objects"
+    model, _ = train_encoder(seen, name, seed, settings.encoder)
+    embedded = [
+        replace(part, attached={"embedding": embed(model, part, name, seed, settings.encoder)[0]})
+        for part in (seen, unseen_objects)
+    ]
+    # Numbered anew: samples of two splits of the registrations are test samples here.
+    count = len(unseen_objects)
+    renamed: dict[str, Any] = {"split": np.full(count, "test"), "sample": np.arange(count)}
+    return {"seen_objects": embedded[0], "objects": replace(embedded[1], **renamed)}
+
+
+def _measured(parts: dict[str, Registrations], source: str, seed: int, settings: ShiftSettings) -> ShiftedSets:
+    """Join sets of one encoder, the one with its training samples first, and measure the distances to these."""
+    spaces = {
+        "analytical": {
+            name: analytical_features(part, source, seed, "distance", name, shape_points=settings.shape_points)
+            for name, part in parts.items()
+        },
+        "embedding": {name: part.embedding for name, part in parts.items()},
+    }
+    home = next(iter(parts))
+    train = parts[home].rows("train")
+    joined = []
+    for name, part in parts.items():
+        test = np.flatnonzero(part.split == "test")
+        distance_S_K = np.zeros((len(part), 2 * len(SPACES)))
+        for i, space in enumerate(SPACES):
+            features_N_F = spaces[space][home][train]
+            query_S_F = spaces[space][name][test]
+            if space == "embedding":
+                features_N_F, query_S_F = principal_components(features_N_F, query_S_F)
+            distance_S_K[test, 2 * i] = knn_distance(features_N_F, query_S_F, settings.neighbours)
+            distance_S_K[test, 2 * i + 1] = mahalanobis_distance(features_N_F, query_S_F)
+        kept = ("split", "sample", "concept", "object_name", "cluster")
+        columns = {column: getattr(part, column) for column in kept}
+        named = np.full(len(part), name)
+        joined.append(ShiftedSets(set=named, h=part.embedding, distance=distance_S_K, **columns))
+    return ShiftedSets.joined(joined)
+
+
+def knn_distance(train_N_F: np.ndarray, query_S_F: np.ndarray, neighbours: int = 10) -> np.ndarray:
+    """Mean Euclidean distance (S,) to the nearest training samples, or to all; features are standardized on these."""
+    from sklearn.neighbors import NearestNeighbors
+    from sklearn.preprocessing import StandardScaler
+
+    scaler = StandardScaler().fit(train_N_F)
+    nearest = NearestNeighbors(n_neighbors=min(neighbours, len(train_N_F))).fit(scaler.transform(train_N_F))
+    return nearest.kneighbors(scaler.transform(query_S_F))[0].mean(axis=1)
+
+
+def mahalanobis_distance(train_N_F: np.ndarray, query_S_F: np.ndarray) -> np.ndarray:
+    """Distance (S,) to the mean of the training samples in units of their scatter.
+
+    The covariance is that of the standardized features, shrunk after Ledoit & Wolf (2004).
+    """
+    from scipy.linalg import pinvh
+    from sklearn.covariance import ledoit_wolf
+    from sklearn.preprocessing import StandardScaler
+
+    scaler = StandardScaler().fit(train_N_F)
+    precision_F_F = pinvh(ledoit_wolf(scaler.transform(train_N_F))[0])
+    offsets_S_F = scaler.transform(query_S_F)
+    return np.sqrt(np.maximum(np.einsum("sf,fg,sg->s", offsets_S_F, precision_F_F, offsets_S_F), 0))
+
+
+def principal_components(train_N_d: np.ndarray, query_S_d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Both in the leading principal components of the standardized training embeddings."""
+    from sklearn.decomposition import PCA
+    from sklearn.pipeline import make_pipeline
+    from sklearn.preprocessing import StandardScaler
+
+    components = min(PRINCIPAL_COMPONENTS, *train_N_d.shape)
+    reduction = make_pipeline(StandardScaler(), PCA(components, svd_solver="full")).fit(train_N_d)
+    return reduction.transform(train_N_d), reduction.transform(query_S_d)
