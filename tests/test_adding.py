@@ -101,7 +101,8 @@ def test_an_acquisition_strategy(config, registrations, monkeypatch, tmp_path):
     from gpca.active_learning.rounds import initial_gpc, make_task, run_rounds
     from gpca.active_learning.settings import ActiveLearningSettings
     from gpca.classifier.settings import GPCSettings
-    from gpca.experiments.active_learning.tables import table3_extended
+    from gpca.experiments.active_learning import table3_extended
+    from gpca.experiments.plan import Run
 
     monkeypatch.setitem(acquisition.STRATEGIES, "bald_dense", None)  # taken out again at the end
     exec(block("gpca/active_learning/acquisition.py"), dict(vars(acquisition)))
@@ -122,10 +123,8 @@ def test_an_acquisition_strategy(config, registrations, monkeypatch, tmp_path):
         paths.append(tmp_path / f"tiny/{name}/seed0.csv")
         paths[-1].parent.mkdir(parents=True)
         write_curves(paths[-1], {("pretrained", "overlap"): steps}, POOL_COLUMNS)
-    titles = {name: acquisition.STRATEGIES[name].title for name in config["active_learning"]["strategies"]}
-    sources = {"tiny": {"title": "Tiny", "stand_in": False}}
-    conditions = config["active_learning"] | config["registrations"]
-    table = table3_extended(collect_curves(paths, 0.9), {("tiny", 0): 3}, sources, titles, conditions)
+    run = Run(config | {"sources": {"tiny": {"title": "Tiny", "stand_in": False}}})
+    table = table3_extended(run, collect_curves(paths, 0.9), {("tiny", 0): 3})
     table.write(tmp_path / "table")
     assert (tmp_path / "table.md").read_text().count("| BALD, density-weighted |") == 1
 

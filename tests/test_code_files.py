@@ -103,15 +103,15 @@ STEPS = {  # module -> files that it depends on, and some that it does not
         {"gpca/encoders/reduction.py", "gpca/seeds.py"},
         {"gpca/encoders/training.py", "gpca/pairs/dataset.py", "gpca/classifier/gpc.py"},
     ),
-    "gpca.experiments.active_learning.without_step": (
+    "gpca.steps.active_learning:embed_without": (
         {"gpca/encoders/training.py"},
         {"gpca/classifier/gpc.py", "gpca/active_learning/acquisition.py"},
     ),
-    "gpca.experiments.active_learning.step": (
+    "gpca.steps.active_learning:learn_actively": (
         {"gpca/classifier/latents.py", "gpca/active_learning/stream.py", "gpca/active_learning/retraining.py"},
         {"gpca/explainers/interface.py", "gpca/encoders/training.py"},
     ),
-    "gpca.experiments.new_concepts.step": (
+    "gpca.steps.new_concepts": (
         {"gpca/causes/drawing.py", "gpca/causes/descriptors.py", "gpca/active_learning/rounds.py"},
         {"gpca/explainers/interface.py", "gpca/active_learning/stream.py"},
     ),

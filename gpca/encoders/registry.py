@@ -28,6 +28,11 @@ def encoders() -> dict[str, str]:
     return joined_outside("ENCODERS", "backbone", str, ENCODERS)
 
 
+def encoder_module(settings: Mapping) -> str:
+    """Module of the encoder that has these settings."""
+    return encoders()[settings["backbone"]].split(":")[0]
+
+
 def require_backbone(backbone: str) -> None:
     """Raise an InputError that lists the backbones unless `backbone` is one of them."""
     require_known("backbone", backbone, encoders())

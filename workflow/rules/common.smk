@@ -2,6 +2,7 @@
 import json
 from pathlib import Path
 
+from gpca.experiments.active_learning import learning_settings
 from gpca.explainers.interface import BARE, REENACTED
 from gpca.explainers.registry import CAUSES, explainer_entry, explainer_module
 from gpca.alignment.methods.registry import method_module
@@ -26,6 +27,7 @@ for name, entry in SOURCES.items():
     config["sources"].setdefault(name, entry)  # of a rule
 NAMES = names_of(config, SOURCES)
 PLAN = Plan(Run(config), NAMES, SOURCES)
+LEARNING_SETTINGS = learning_settings(PLAN)
 SHOWN = settings_of(config, SOURCES)
 FRAMES = NAMES["frames"]
 EMBEDDING = NAMES["embedding"]

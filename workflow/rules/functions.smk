@@ -104,29 +104,6 @@ def estimator_settings(estimators):
     return as_json({name: config[name] for name in names} | icp | {"estimators": asked})
 
 
-def learning_settings(seed):
-    """Return the settings of active learning; seeds beyond the first few have one share of a rare concept."""
-    rare = LEARNING_SETTINGS.get("rare")
-    if not rare or int(seed) in SEEDS[: rare.get("beside_seeds")]:
-        return LEARNING_SETTINGS
-    return LEARNING_SETTINGS | {"rare": rare | {"shares": rare["shares"][:1]}}
-
-
-def encoders_of_others(wildcards):
-    """Return encoders that saw other samples: those of the next seed, and of the next source, where there are any."""
-    seeds, sources = [str(seed) for seed in SEEDS], list(SOURCES)
-    own = (wildcards.source, wildcards.seed)
-    following = {
-        "other_samples": (wildcards.source, following_one(seeds, wildcards.seed)),
-        "other_source": (following_one(sources, wildcards.source), wildcards.seed),
-    }
-    return {
-        name: f"<results>/encoders/{source}/{config['embedding']['encoder']}/seed{seed}.pt"
-        for name, (source, seed) in following.items()
-        if name in config["new_concepts"]["embeddings"] and (source, seed) != own
-    }
-
-
 def following_one(names, name):
     return names[(names.index(name) + 1) % len(names)]
 

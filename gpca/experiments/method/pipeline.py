@@ -11,7 +11,7 @@ import numpy as np
 from gpca.active_learning.settings import ActiveLearningSettings
 from gpca.errors import InputError
 from gpca.evaluation.measures import source_method_seed
-from gpca.experiments.active_learning.figure import STYLES, mean_curves
+from gpca.experiments.label_curves import STYLES, mean_curves
 from gpca.experiments.method.label_round import SETTING, Round, first_round
 from gpca.experiments.method.shown_sample import Stages, draw_embedding, draw_scores_with_numbers
 from gpca.pairs.perturbation import CONCEPTS
@@ -59,7 +59,7 @@ def draw_pipeline(
 
     Args:
         curve_files: The files of that source, named as for
-            :func:`gpca.experiments.active_learning.figure.draw_learning_curves`.
+            :func:`gpca.experiments.label_curves.mean_curves`.
         active_learning: The config's section; the figure repeats the first round of the run.
     """
     stages = Stages.load(registrations_npz, embeddings_npz, predictions_csv, uncertainty_csv, limits)

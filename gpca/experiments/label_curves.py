@@ -1,4 +1,4 @@
-"""Draws learning curves of active learning: accuracy over labels by strategy, sources and encoders as panels."""
+"""Learning curves: accuracy over labels, by source and encoder in panels; strategies or embeddings are lines."""
 
 from __future__ import annotations
 
@@ -32,10 +32,8 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-ROWS = {"pretrained": "encoder saw\nall concepts", "unseen": "encoder never saw\nthe new concept"}
-OVERLAP_ROWS = {**ROWS, "rare_5": "encoder saw all;\n5 % of the pool new"}
 MOST_LINES = 6  # in a panel; of more, none can be followed
-STYLES = {  # The paper's two strategies are thick, with their intervals; an unknown one has the style _OTHER.
+STYLES = {  # the paper's two strategies are thick, with their intervals; an unknown one has the style _OTHER
     "bald_kmeans": (BLUE, "-", 1.8),
     "random": (BLACK, "-", 1.8),
     "random_stratified": (BLACK, ":", 0.9),
@@ -50,34 +48,6 @@ STYLES = {  # The paper's two strategies are thick, with their intervals; an unk
 _OTHER = (GRAY, "-", 0.9)
 
 
-def draw_learning_curves(
-    curve_files: Iterable[str | Path],
-    sources: Mapping[str, str],
-    strategies: Mapping[str, str],
-    target: float,
-    rows: Mapping[str, str] = ROWS,
-    held_out: Collection[str] | None = None,
-) -> Figure:
-    """Draw the accuracy over labels: its mean over the concepts held out, then over the seeds.
-
-    Args:
-        curve_files: Files named `…/{source}/{strategy}/seed{seed}.csv`, as :mod:`gpca.active_learning.curves` says.
-        target: The accuracy that counts as reached, which a dashed line marks.
-        rows: The settings that are shown, and what stands beside their panels.
-        held_out: The concepts over which the mean is; all by default.
-    """
-    means = mean_curves(curve_files, held_out)
-    curves = {(source, setting, strategy): curve for (source, strategy, setting), curve in means.items()}
-    return draw_curves(curves, sources, rows, strategies, STYLES, target)
-
-
-def draw_overlap_curves(
-    curve_files: Iterable[str | Path], sources: Mapping[str, str], strategies: Mapping[str, str], target: float
-) -> Figure:
-    """Draw the same of the paper's experiment alone: overlap is the new concept, common in the pool or rare."""
-    return draw_learning_curves(curve_files, sources, strategies, target, rows=OVERLAP_ROWS, held_out=("overlap",))
-
-
 def draw_curves(
     curves: Mapping[tuple[str, str, str], pd.DataFrame],
     sources: Mapping[str, str],
@@ -88,14 +58,14 @@ def draw_curves(
 ) -> Figure:
     """Draw curves as lines of panels; rows share an axis of labels where they have as many of them.
 
-    A row of more than `MOST_LINES` lines is drawn as several, and those with an interval are in each of them. The title
-    says over how many seeds the means are.
+    A row of more than `MOST_LINES` lines is drawn as several, and lines with an interval are in each. The title has
+    the number of seeds.
 
     Args:
-        curves: What :func:`mean_curves` makes of them, by source, row and line.
-        sources, rows, lines: The title of each name, in order; those without curves are left out.
-        styles: Color, dashes and width of a line; an interval is drawn where the width is above 1.
-        target: The accuracy that a dashed line marks.
+        curves: of :func:`mean_curves`, by source, row and line.
+        sources, rows, lines: title of each name, in order; those without curves are left out.
+        styles: color, dashes and width of a line; it has an interval where the width is above 1.
+        target: accuracy that a dashed line marks.
     """
     shown = {key for key in curves if key[0] in sources and key[1] in rows and key[2] in lines}
     columns, settings, across = ([name for name in part if any(key[i] == name for key in shown)]
@@ -137,7 +107,7 @@ def draw_curves(
 
 
 def _groups(lines: list[str], styles: Mapping[str, tuple]) -> list[list[str]]:
-    """Return the lines of a setting as groups of at most `MOST_LINES`; lines with an interval are in each."""
+    """Lines of a setting as groups of at most `MOST_LINES`; lines with an interval are in each."""
     if len(lines) <= MOST_LINES:
         return [lines]
     always = [line for line in lines if styles.get(line, _OTHER)[2] > 1][: MOST_LINES - 1]
@@ -149,14 +119,14 @@ def _groups(lines: list[str], styles: Mapping[str, tuple]) -> list[list[str]]:
 def mean_curves(
     curve_files: Iterable[str | Path], held_out: Collection[str] | None = None
 ) -> dict[tuple[str, str, str], pd.DataFrame]:
-    """Return curves of accuracy in % by source, strategy and setting: labels, mean, low, high, number of seeds.
+    """Curves of accuracy in % by source, strategy and setting: labels, mean, low, high, number of seeds.
 
-    The intervals are over the seeds; of one seed they are NaN. Counts of labels at which not every seed has been looked
-    at are left out.
+    The mean is over the concepts held out, then over the seeds, as are the intervals; of one seed they are NaN. Numbers
+    of labels at which some seed has no accuracy are left out.
 
     Args:
-        curve_files: As for :func:`draw_learning_curves`.
-        held_out: The concepts over which the mean is; all by default.
+        curve_files: named `…/{source}/{strategy}/seed{seed}.csv`, as :mod:`gpca.active_learning.curves` says.
+        held_out: concepts over which the mean is; all by default.
     """
     import pandas as pd
 
@@ -168,12 +138,12 @@ def mean_curves(
                 continue
             parts.setdefault((source, strategy, setting), []).append(curve[["labels", "accuracy"]].assign(seed=seed))
     means = {}
-    for key, of_key in parts.items():
-        of_seed = pd.concat(of_key).groupby(["labels", "seed"])["accuracy"].mean()
-        seeds = len(of_seed.index.unique("seed"))
+    for key, curves in parts.items():
+        by_seed = pd.concat(curves).groupby(["labels", "seed"])["accuracy"].mean()
+        seeds = len(by_seed.index.unique("seed"))
         rows = [
             (labels, *(100 * np.array(mean_interval(part))), len(part))
-            for labels, part in of_seed.groupby(level="labels")
+            for labels, part in by_seed.groupby(level="labels")
             if len(part) == seeds
         ]
         means[key] = pd.DataFrame(rows, columns=["labels", "mean", "low", "high", "seeds"])

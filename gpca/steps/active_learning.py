@@ -1,4 +1,4 @@
-"""Step ``active_learning``: embeddings -> learning curves of every strategy, for one source and seed."""
+"""Steps ``embed_without`` and ``learn_actively``: encoders that never saw a concept, and learning curves of it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,9 @@ from gpca.active_learning.settings import ActiveLearningSettings, RareSettings, 
 from gpca.active_learning.stream import run_stream
 from gpca.classifier.gpc import GPC
 from gpca.classifier.latents import Projection
+from gpca.encoders.registry import EncoderSettings
 from gpca.errors import require_known
+from gpca.io.arrays import save_arrays
 from gpca.pairs.dataset import Registrations, load_embeddings, read_embedding
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.job import Job
@@ -23,13 +25,30 @@ from gpca.process.progress import progress
 from gpca.process.provenance import record_provenance
 from gpca.settings import read_settings
 
-NEW = "overlap"  # the paper's new concept, which is also learned where it is rare,
-COMPARED = ("random", "bald_kmeans")  # by the strategies that the paper's Table III compares,
-REDUNDANT = "bald"  # and, with the first share, by the one of which Sec. III-C says that its labels are redundant
+NEW = "overlap"  # the paper's new concept, also learned where it is rare
+COMPARED = ("random", "bald_kmeans")  # strategies of the paper's Table III
+REDUNDANT = "bald"  # joins them at the first share, because Sec. III-C says that its labels are redundant
 
 
-def run(job: Job) -> None:
-    """Run every strategy in every setting for every concept held out."""
+def embed_without(job: Job) -> None:
+    """Train an encoder on the training samples without each concept, and embed every cloud by it."""
+    from gpca.encoders.training import embed, train_encoder
+
+    settings = EncoderSettings(**job.settings)
+    with record_provenance([job.out], [job.registrations], job.settings, seed=job.seed):
+        registrations = Registrations.load(job.registrations, (job.source, job.seed))
+        train = registrations.rows("train")
+        arrays = {"sample": registrations.sample, "split": registrations.split}
+        for held_out in job.concepts:
+            seen = registrations.subset(train[registrations.concept[train] != held_out])
+            name = f"{job.source} without {held_out}"
+            model, _ = train_encoder(seen, name, job.seed, settings)
+            arrays[f"h_{held_out}"], _ = embed(model, registrations, name, job.seed, settings)
+        save_arrays(job.out, {name: np.asarray(array) for name, array in arrays.items()}, registrations.axes)
+
+
+def learn_actively(job: Job) -> None:
+    """Learning curves of every strategy in every setting for every concept held out."""
     for strategy in job.strategies:
         require_known("strategy", strategy, (*strategies(), *STREAMS))
     inputs = [job.registrations, job.embeddings, job.embeddings_without]
@@ -47,7 +66,7 @@ def run(job: Job) -> None:
                 else:
                     continue
                 curves[strategy][setting, task.held_out] = curve
-        for setting, strategy, curve in _of_a_rare_concept(job, settings):
+        for setting, strategy, curve in _rare_curves(job, settings):
             curves[strategy][setting, NEW] = curve
         for strategy, path in zip(job.strategies, job.out, strict=True):
             write_curves(path, curves[strategy], STREAM_COLUMNS if strategy in STREAMS else POOL_COLUMNS)
@@ -69,8 +88,8 @@ def _tasks(job: Job, settings: ActiveLearningSettings) -> Iterator[tuple[str, La
         yield setting, task.project(gpc), gpc
 
 
-def _of_a_rare_concept(job: Job, settings: ActiveLearningSettings) -> Iterator[tuple[str, str, list[Step]]]:
-    """Yield setting, strategy and learning curve of the paper's experiment, in which the new concept is rare."""
+def _rare_curves(job: Job, settings: ActiveLearningSettings) -> Iterator[tuple[str, str, list[Step]]]:
+    """Yield setting, strategy and curve of the paper's experiment, in which the new concept is rare."""
     if not (section := job.settings.get("rare")) or NEW not in job.settings.get("held_out", CONCEPTS):
         return
     rare = read_settings(RareSettings, section)
@@ -85,6 +104,6 @@ def _of_a_rare_concept(job: Job, settings: ActiveLearningSettings) -> Iterator[t
 
 
 def _embedded(job: Job) -> Registrations:
-    """Return the samples in the embedding of the encoder that saw all concepts."""
+    """Samples in the embedding of the encoder that saw all concepts."""
     registrations = Registrations.load(job.registrations, (job.source, job.seed))
     return replace(registrations, attached=read_embedding(job.embeddings, registrations))

@@ -1,4 +1,4 @@
-"""Step ``new_concepts``: learning curves of a new concept where no encoder has seen the samples, or the concept."""
+"""Step ``learn_new_concepts``: learning curves of a new concept where no encoder has seen the samples, or it."""
 
 from __future__ import annotations
 
@@ -44,8 +44,7 @@ def run(job: Job) -> None:
         work = _Work(job, own)
         curves: dict[str, dict] = {strategy: {} for strategy in job.strategies}
         for experiment in progress(work.experiments(), f"new concepts of {job.source}"):
-            learnt = run_trial(experiment, job.strategies, settings, job.source, job.seed)
-            for setting, strategy, curve in learnt:
+            for setting, strategy, curve in run_trial(experiment, job.strategies, settings, job.source, job.seed):
                 curves[strategy][setting, experiment.held_out] = curve
         for strategy, path in zip(job.strategies, job.out, strict=True):
             write_curves(path, curves[strategy], POOL_COLUMNS)
@@ -102,10 +101,8 @@ class _Work:
             yield NewConceptTrial("pair", self._normalized(seen["pair"]), NOMINAL, known)
         if GEOMETRY in self._own.causes and (drawn := self._geometry()) is not None:
             h_G_d = embed(self._cause_model, drawn.registrations, *self._axes, self._cause_encoder)[0]
-            icp, descriptors = (
-                ICPSettings(**self._job.section("icp")),
-                DescriptorSettings(**self._job.section("descriptors")),
-            )
+            icp = ICPSettings(**self._job.section("icp"))
+            descriptors = DescriptorSettings(**self._job.section("descriptors"))
             new = _seen(drawn, h_G_d, describe_all(drawn, *self._axes, descriptors, icp)[0], GEOMETRY)
             both = {name: seen[name].followed_by(new[name]) for name in new}
             yield NewConceptTrial("unseen", both["encoder"], GEOMETRY, (*known, GEOMETRY))
@@ -133,7 +130,7 @@ def _normalized(measured_S_F: np.ndarray, train_S: np.ndarray, *axes: object) ->
 
 
 def _seen(causes: Causes, h_S_d: np.ndarray, described: Descriptors, label: str | None = None) -> dict[str, Embedded]:
-    """Return the samples with a label, or all with the given one, in the encoder's embedding and as measured."""
+    """Samples with a label, or all with the given one, in the encoder's embedding and as measured."""
     label_S = labels_of(causes.truth) if label is None else np.full(len(causes), label)
     rows = np.flatnonzero(label_S != BORDERLINE)
     by = {"encoder": h_S_d, "pair": np.hstack([described.groups[group] for group in GROUPS])}

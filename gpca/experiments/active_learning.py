@@ -1,0 +1,354 @@
+"""Labels that a classifier needs for a concept that it has never seen, by every strategy (Table III)."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from gpca.active_learning.acquisition import STREAMS, require_strategy, strategies, strategy_module
+from gpca.active_learning.curves import TABLE, collect_curves
+from gpca.active_learning.settings import (
+    LOOK_EVERY,
+    ActiveLearningSettings,
+    RareSettings,
+    StreamSettings,
+    rare_setting,
+)
+from gpca.encoders.registry import EncoderChanges, encoder_module, require_draws
+from gpca.errors import require_names
+from gpca.experiments.experiment import Experiment, LeftOut, Names
+from gpca.experiments.label_counts import COUNT, Clusters, Quantity, cell_of, families
+from gpca.experiments.label_curves import STYLES, draw_curves, mean_curves
+from gpca.experiments.plan import Run
+from gpca.experiments.result import figure, numbers, table
+from gpca.experiments.step import Plan, Step
+from gpca.pairs.perturbation import Concept
+from gpca.reporting.tables.builder import TableBuilder, cautious_over, crossed
+from gpca.reporting.tables.cells import rows_where
+from gpca.reporting.tables.table import Cell, Column, Table
+from gpca.reporting.words import plural
+from gpca.settings import Distinct, PositiveShare
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+NAME = "active_learning"
+PAPERS_HELD_OUT = "overlap"  # the paper's GPC knows noise and pose (Sec. IV-C)
+SETTINGS = {"pretrained": "all concepts", "unseen": "the known concepts only"}
+ROWS = {"pretrained": "encoder saw\nall concepts", "unseen": "encoder never saw\nthe new concept"}
+OVERLAP_ROWS = {**ROWS, "rare_5": "encoder saw all;\n5 % of the pool new"}
+
+
+def titles(names: Iterable[str] | None = None) -> dict[str, str]:
+    """Title of each strategy, or of those with these names."""
+    every = {name: strategy.title for name, strategy in strategies().items()} | STREAMS
+    return every if names is None else {name: every[name] for name in names}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Section(ActiveLearningSettings):
+    """The rounds, the concepts that the classifier has never seen, and the encoder that has not seen them either."""
+
+    held_out: Distinct[Concept]
+    target: PositiveShare
+    rare: RareSettings | None = None
+    without: EncoderChanges
+    stream: StreamSettings
+    strategies: Distinct[str]
+
+
+def check(config: dict, _left_out: LeftOut) -> None:
+    """Check the names of the strategies, and the encoder that never sees the concept."""
+    learning = config["active_learning"]
+    require_names("active_learning.strategies", learning["strategies"], titles(), "strategy")
+    encoder = config["encoders"][config["embedding"]["encoder"]] | learning["without"]
+    points = config["registrations"]["cloud_points"]
+    require_draws("active_learning.without", encoder, points, "registrations.cloud_points")
+
+
+def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
+    """The strategies, and those of them that choose from a pool."""
+    chosen = list(config["active_learning"]["strategies"])
+    return {"strategy": chosen, "pool_strategy": [name for name in chosen if name not in STREAMS]}
+
+
+EXPERIMENT = Experiment(
+    name=NAME,
+    sections={"active_learning": Section},
+    names=names,
+    shown=lambda config, sources: {
+        "strategies": titles(config["active_learning"]["strategies"]),
+        "active_learning": config["active_learning"],
+    },
+    check=check,
+    switches={"active_learning.strategies": Names("strategy", titles)},
+)
+
+
+def learning_settings(plan: Plan) -> dict[str, Any]:
+    """Settings of all strategies; their names are none of these, so that another one leaves their files unchanged."""
+    return {key: value for key, value in plan.config["active_learning"].items() if key != "strategies"}
+
+
+def _seed_settings(plan: Plan, wildcards: Any) -> dict[str, Any]:
+    """Settings of a seed; seeds beyond the first few have one share of a rare concept."""
+    settings = learning_settings(plan)
+    rare = settings.get("rare")
+    if not rare or int(wildcards.seed) in plan.config["seeds"][: rare.get("beside_seeds")]:
+        return settings
+    return settings | {"rare": rare | {"shares": rare["shares"][:1]}}
+
+
+def _encoder(plan: Plan) -> dict[str, Any]:
+    return plan.config["encoders"][plan.config["embedding"]["encoder"]]
+
+
+EMBED_WITHOUT = Step(
+    name="embed_without",
+    run="gpca.steps.active_learning:embed_without",
+    inputs={"registrations": "registrations/{source}/seed{seed}.npz"},
+    outputs={"out": "embeddings/{source}/without/seed{seed}.npz"},
+    settings=lambda plan, wildcards: _encoder(plan) | plan.config["active_learning"]["without"],
+    params={"concepts": lambda plan, wildcards: plan.config["active_learning"]["held_out"]},
+    modules=lambda plan: [encoder_module(_encoder(plan))],
+    priority=7,
+)
+LEARN = Step(
+    name="learn_actively",
+    run="gpca.steps.active_learning:learn_actively",
+    inputs={
+        "registrations": "registrations/{source}/seed{seed}.npz",
+        "embeddings": "embeddings/{source}/{embedding}/seed{seed}.npz",
+        "embeddings_without": "embeddings/{source}/without/seed{seed}.npz",
+    },
+    outputs={"out": "active_learning/{source}/{*strategy}/seed{seed}.csv"},
+    settings=_seed_settings,
+    modules=lambda plan: filter(None, map(strategy_module, plan.names["strategy"])),
+    apart=("strategy", lambda plan: [name for name in plan.names["strategy"] if strategy_module(name)]),
+    priority=4,
+)
+
+
+@numbers("active_learning.csv", files="active_learning/{source}/{strategy}/seed{seed}.csv")
+def collect(run: Run, files: Iterable[str | Path]) -> pd.DataFrame:
+    """Labels to the target, accuracies and areas of all learning curves, by seed."""
+    return collect_curves(files, run.config["active_learning"]["target"])
+
+
+SECTION = "IV-C Active learning via BALD"
+INPUTS = {"metrics": "active_learning.csv", "clusters": (families, "registrations/{source}/seed{seed}.npz")}
+CURVES = {"curve_files": "active_learning/{source}/{pool_strategy}/seed{seed}.csv"}
+
+
+@table(
+    SECTION,
+    "Table III: labels needed for a new concept",
+    """Table III of the paper: how many labels, chosen by BALD with k-means, by BALD or at random, a classifier needs
+    to reach the target accuracy when it meets a concept that it has never seen; the final accuracy; and the passes
+    over the labels.
+
+    Rows differ in the share of the new concept in the pool, in the classifier, and in whether the encoder had seen
+    the concept; the paper states neither share nor encoder. The row with 5 % follows the paper. Fewer labels are
+    better; ">" marks a mean in which some repeats never reached the target.""",
+    paper=True,
+    **INPUTS,
+)
+def table3_active_learning(run: Run, metrics: pd.DataFrame, clusters: Clusters) -> Table:
+    """Labels to the target accuracy by BALD, also with k-means, and at random (Table III): sources × settings.
+
+    Settings with a rare new concept, which the paper's classifier learns, stand first.
+    """
+    learning = run.config["active_learning"]
+    rows = metrics[metrics["concept"] == PAPERS_HELD_OUT]
+    shares = learning["rare"]["shares"] if learning["rare"] else ()
+    settings = {rare_setting(share): f"all concepts; {100 * share:g} % of the pool new" for share in shares} | SETTINGS
+    quantities = {
+        "labels_bald_kmeans": Quantity(
+            "labels_to_target", Column("Labels, BALD + k-means", **COUNT), strategy="bald_kmeans"
+        ),
+        "labels_bald": Quantity("labels_to_target", Column("Labels, BALD", **COUNT), strategy="bald"),
+        "labels_random": Quantity("labels_to_target", Column("Labels, random", **COUNT), strategy="random"),
+        "accuracy_bald_kmeans": Quantity("final_accuracy", Column("Acc. BALD (%)"), strategy="bald_kmeans"),
+        "accuracy_random": Quantity("final_accuracy", Column("Acc. random (%)"), strategy="random"),
+        "epochs_bald_kmeans": Quantity("epochs_at_target", Column("Epochs", **COUNT), strategy="bald_kmeans"),
+    }
+    builder = TableBuilder("table3_active_learning", {"source": "Dataset", "setting": "Encoder saw"})
+    for (source, setting), labels in crossed(run.source_titles, settings):
+        selected = rows_where(rows, source=source, table=TABLE + setting)
+        builder.add_row(labels, _cells(run, selected, quantities, clusters))
+    builder.compare_across(["labels_bald_kmeans", "labels_bald", "labels_random"])
+    other = "Other rows: " if shares else ""
+    notes = [
+        *_rare_note(learning),
+        f"{other}{_protocol(run)} It moves the posterior alone, in at most {learning['iterations']} passes over the "
+        "labels.",
+        "Epochs: passes of the retraining that reached the target. Acc.: after all labels.",
+    ]
+    caption = f"Labels until a GPC that knew noise and pose reaches {learning['target']:.0%} on all concepts"
+    return _table(run, builder, caption, quantities, notes)
+
+
+@figure(
+    SECTION,
+    "Learning curves",
+    """Accuracy over the number of labels, by strategy: the mean over the concepts, each held out in turn, and over the
+    seeds. Table III is overlap alone, whose curves are in "Learning curves, overlap held out". The sooner a curve
+    crosses the target line, the fewer labels its strategy needs.
+
+    Bands are 95 % intervals over the seeds. Only the two thick curves have them, the paper's strategies, which stand
+    in every panel; the other strategies are shared out among the panels of a setting.""",
+    **CURVES,
+)
+def active_learning_curves(run: Run, curve_files: Iterable[str | Path]) -> Figure:
+    """Accuracy over labels, mean over the concepts held out, then over the seeds."""
+    return _draw(run, curve_files, ROWS)
+
+
+@figure(
+    SECTION,
+    "Learning curves, overlap held out",
+    """The curves behind Table III: the paper's experiment alone, in which overlap is the new concept. The last row
+    shows the paper's classifier and a pool in which the concept is rare. Bands are 95 % intervals over the seeds,
+    of the two thick curves, which stand in every panel.""",
+    **CURVES,
+)
+def active_learning_overlap(run: Run, curve_files: Iterable[str | Path]) -> Figure:
+    """Accuracy over labels in the paper's experiment, in which overlap is new, and common in the pool or rare."""
+    return _draw(run, curve_files, OVERLAP_ROWS, (PAPERS_HELD_OUT,))
+
+
+def _draw(run: Run, files: Iterable[str | Path], rows: Mapping[str, str], held_out: Collection[str] | None = None):
+    learning = run.config["active_learning"]
+    curves = {
+        (source, setting, strategy): curve
+        for (source, strategy, setting), curve in mean_curves(files, held_out).items()
+    }
+    return draw_curves(curves, run.source_titles, rows, titles(learning["strategies"]), STYLES, learning["target"])
+
+
+@table(
+    SECTION,
+    "Table III, extended: every strategy",
+    """Every acquisition strategy, for each concept held out in turn. Compare rows of one dataset and setting: they
+    start from the same labels. Area gain is the mean accuracy over the budget minus that of random choice.""",
+    **INPUTS,
+)
+def table3_extended(run: Run, metrics: pd.DataFrame, clusters: Clusters) -> Table:
+    """Every strategy, encoder and concept held out, with means over the three where one column is for all."""
+    learning = run.config["active_learning"]
+    quantities = {
+        f"labels_{c}": Quantity("labels_to_target", Column(f"Labels, {c}", **COUNT), concept=c)
+        for c in _concepts(metrics)
+    } | {
+        "reached": Quantity("reached", Column("Reached (%)", decimals=0, interval=False)),
+        "final_accuracy": Quantity("final_accuracy", Column("Accuracy (%)")),
+        "final_accuracy_new": Quantity("final_accuracy_new", Column("New (%)")),
+        "area_under_curve": Quantity("area_under_curve", Column("Area (%)")),
+        "area_gain": Quantity("area_gain", Column("Gain (%)", limits=(-100, 100))),
+    }
+    builder = TableBuilder("table3_extended", {"source": "Dataset", "setting": "Encoder saw", "strategy": "Strategy"})
+    pool = {name: title for name, title in titles(learning["strategies"]).items() if name not in STREAMS}
+    for (source, setting, strategy), labels in crossed(run.source_titles, SETTINGS, pool):
+        selected = rows_where(metrics, source=source, table=TABLE + setting, method=strategy)
+        is_rival = not require_strategy(strategy).oracle
+        builder.add_row(labels, _cells(run, selected, quantities, clusters), rival=is_rival)
+    builder.compare_down([key for key in quantities if key != "reached"], same=2)
+    notes = [
+        _protocol(run),
+        "Labels: until the target, by the concept held out. Reached: share of the runs that reached it. Accuracy: "
+        "after all labels; New: that on the concept held out. Area: mean accuracy over the budget. Gain: area "
+        "minus that of random sampling from the same start, paired by seed. All but Labels are means over the "
+        "concepts held out, then over the seeds.",
+    ]
+    caption = f"Active learning of a held-out concept by every strategy, to {learning['target']:.0%}"
+    return _table(run, builder, caption, quantities, notes)
+
+
+@table(
+    SECTION,
+    "Table III on a stream",
+    """Samples arrive one by one, and a label must be requested at once or never: the number of arrivals until the new
+    concept is recognized, and the number of labels that this costs.""",
+    **INPUTS,
+)
+def table3_stream(run: Run, metrics: pd.DataFrame, clusters: Clusters) -> Table:
+    """Labels that a stream asks for, arrivals until a new concept is recognized, accuracy: sources × learners."""
+    learning = run.config["active_learning"]
+    stream = learning["stream"]
+    quantities = {
+        f"delay_{c}": Quantity("delay", Column(f"Delay, {c}", **COUNT), concept=c) for c in _concepts(metrics)
+    } | {
+        "labels": Quantity("labels", Column("Labels", interval=False, **COUNT)),
+        "new_labels": Quantity("new_labels", Column("Labels of the new", interval=False, **COUNT)),
+        "running_accuracy": Quantity("running_accuracy", Column("Running (%)")),
+        "final_accuracy": Quantity("final_accuracy", Column("Accuracy (%)")),
+        "final_accuracy_new": Quantity("final_accuracy_new", Column("New (%)")),
+    }
+    builder = TableBuilder("table3_stream", {"source": "Dataset", "strategy": "Strategy"})
+    streams = {name: title for name, title in titles(learning["strategies"]).items() if name in STREAMS}
+    for (source, strategy), labels in crossed(run.source_titles, streams):
+        selected = rows_where(metrics, source=source, table=TABLE + "pretrained", method=strategy)
+        builder.add_row(labels, _cells(run, selected, quantities, clusters))
+    builder.compare_down([key for key in quantities if "labels" not in key], same=1)
+    notes = [
+        f"{stream['arrivals']} samples arrive one by one; the first {stream['quiet']} are of the two known "
+        f"concepts ({learning['initial']} labeled samples at the start); a third of the others is new. A label "
+        f"may be requested for {stream['budget']:.0%} of the arrivals; the GPC learns it at once, or the learner "
+        "that the row names, simplified as docs/active_learning.md says.",
+        "Delay: arrivals from the first sample of the new concept until half of its test samples are named right; "
+        "'>': some runs ended before. Running: accuracy over the last arrivals, each judged before its label is "
+        "known. Accuracy, New: on all test samples and those of the new concept, at the end. All but Delay are "
+        "means over the concepts held out, then over the seeds.",
+    ]
+    return _table(run, builder, "A new concept in a stream of registrations", quantities, notes)
+
+
+def _concepts(metrics: pd.DataFrame) -> list[str]:
+    return list(dict.fromkeys(metrics["concept"]))
+
+
+def _table(
+    run: Run, builder: TableBuilder, caption: str, quantities: Mapping[str, Quantity], notes: Iterable[str]
+) -> Table:
+    return builder.build(
+        caption=caption + run.stand_ins(partly=False),
+        column_head="quantity",
+        columns={key: quantity.column for key, quantity in quantities.items()},
+        footnotes=(f"{cautious_over(builder.most_seeds(), run.config['registrations']['test'])}.", *notes),
+    )
+
+
+def _cells(
+    run: Run, metrics: pd.DataFrame, quantities: Mapping[str, Quantity], clusters: Clusters
+) -> dict[str, Cell | None]:
+    test = run.config["registrations"]["test"]
+    return {key: cell_of(metrics, quantity, test, clusters) for key, quantity in quantities.items()}
+
+
+def _protocol(run: Run) -> str:
+    learning, train = run.config["active_learning"], run.config["registrations"]["train"]
+    return (
+        f"Start: {learning['initial']} labeled samples of the two known concepts. Pool: the other "
+        f"{train - learning['initial']} training samples, with all of the new concept, a third of {train}. "
+        f"{learning['batch']} labels a round, {learning['labels']} in all; '>': some runs did not reach the target "
+        "and count with all labels. Every strategy gets the same start, pool, test samples and retraining."
+    )
+
+
+def _rare_note(learning: Mapping) -> list[str]:
+    if not (rare := learning["rare"]):
+        return []
+    gpc = rare["gpc"]
+    few = rare.get("beside_seeds")
+    beside = f" Shares but the first: over at most the first {plural(few, 'seed')}." if few else ""
+    return [
+        "Where so many percent of the pool are new (5 % are compared with the paper), the paper's classifier "
+        f"({gpc['kernel']}, rate {gpc['learning_rate']:g}, {gpc['iterations']} passes) is fitted anew in each round of "
+        f"{rare['batch']} labels, and labels are counted one by one (docs/comparison.md). Start: "
+        f"{learning['initial']} labeled samples of the two known concepts. Labels are given until the target, at "
+        f"least {rare['least']} (then {rare['late_batch']} a round), at most {rare['labels']} or the whole pool; '>': "
+        f"some runs did not reach it. Epochs are counted in steps of {LOOK_EVERY}.{beside}"
+    ]

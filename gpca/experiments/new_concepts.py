@@ -1,0 +1,336 @@
+"""Labels that a classifier needs for a concept that no encoder has seen, of samples that none has seen (Table XV)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from gpca.active_learning.curves import TABLE, collect_curves
+from gpca.active_learning.settings import ALL_LABELS, NEW_CONCEPT_STRATEGIES, NewConceptSettings
+from gpca.causes.drawing import apportion
+from gpca.causes.truth import BORDERLINE, GEOMETRY, NOMINAL
+from gpca.encoders.registry import encoder_module
+from gpca.evaluation.measures import ALL, read_all_metrics
+from gpca.experiments.active_learning import learning_settings
+from gpca.experiments.concept_attribution import PREDICTIONS, collect_intervals
+from gpca.experiments.experiment import Experiment
+from gpca.experiments.label_counts import COUNT, Clusters, Quantity, cell_of, families, families_with_causes
+from gpca.experiments.label_curves import draw_curves, mean_curves
+from gpca.experiments.plan import Run
+from gpca.experiments.result import figure, numbers, table
+from gpca.experiments.step import Plan, Step
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.reporting.figures.style import BLUE, GRAY, GREEN, SKY_BLUE, VERMILION
+from gpca.reporting.tables.builder import TableBuilder, cautious_over, crossed
+from gpca.reporting.tables.cells import cell_of_repeats, clustered_cell, plain_cell, rows_where
+from gpca.reporting.tables.table import Cell, Column, Table
+from gpca.reporting.words import plural
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+SEEN = {
+    "pretrained": "same samples, all concepts",
+    "other_samples": "other samples, all concepts",
+    "other_source": "another dataset, all concepts",
+    "unseen": "same samples, known concepts only",
+    "pair": "nothing: measurements of the pair",
+}
+NO_LABELS = {"chance": "no labels: chance", "rule": "no labels: rule of three lines"}
+NEW_CAUSES = (NOMINAL, GEOMETRY)
+PAPERS, WITHIN = "bald_kmeans", 20  # labels that a new concept may cost
+
+
+def seeds(config: Mapping[str, Any]) -> list[int]:
+    """Seeds of this experiment."""
+    return list(config["seeds"])[: config["new_concepts"]["seeds"]]
+
+
+EXPERIMENT = Experiment(
+    name="new_concepts",
+    sections={"new_concepts": NewConceptSettings},
+    names=lambda config, sources: {
+        "new_concept_strategy": list(NEW_CONCEPT_STRATEGIES),
+        "new_concept_seed": seeds(config),
+        "erring": list(config["new_concepts"]["erring"]),  # embeddings for which the oracle also makes errors
+    },
+)
+
+
+def _other_encoders(plan: Plan, wildcards: Any) -> dict[str, str]:
+    """Encoders that saw other samples: those of the next seed, and of the next source, where there are any."""
+    section, encoder = plan.config["new_concepts"], plan.config["embedding"]["encoder"]
+
+    def following(names: Iterable[Any], name: str) -> str:
+        names = [str(each) for each in names]
+        return names[(names.index(name) + 1) % len(names)]
+
+    others = {
+        "other_samples": (wildcards.source, following(plan.config["seeds"], wildcards.seed)),
+        "other_source": (following(plan.sources, wildcards.source), wildcards.seed),
+    }
+    return {
+        name: f"encoders/{source}/{encoder}/seed{seed}.pt"
+        for name, (source, seed) in others.items()
+        if name in section["embeddings"] and (source, seed) != (wildcards.source, wildcards.seed)
+    }
+
+
+def _settings(plan: Plan, wildcards: Any) -> dict[str, Any]:
+    config = plan.config
+    return {
+        "new_concepts": config["new_concepts"],
+        "active_learning": learning_settings(plan),
+        "encoder": config["encoders"][config["embedding"]["encoder"]],
+        "cause_encoder": config["diagnosis"]["encoder"],
+        "causes": config["causes"],
+        "descriptors": config["diagnosis"]["descriptors"],
+        "icp": config["registrations"]["icp"],
+    }
+
+
+LEARN = Step(
+    name="learn_new_concepts",
+    run="gpca.steps.new_concepts",
+    inputs={
+        "registrations": "registrations/{source}/seed{seed}.npz",
+        "encoders": lambda plan, wildcards: [*_other_encoders(plan, wildcards).values()],
+        "objects": "objects/{source}.npz",
+        "causes": "causes/{source}/seed{seed}.npz",
+        "descriptors": "descriptors/{source}/seed{seed}.npz",
+        "cause_encoder": "cause_encoders/{source}/seed{seed}.pt",
+        "cause_embeddings": "cause_embeddings/{source}/seed{seed}.npz",
+    },
+    outputs={"out": "new_concepts/{source}/{*strategy}/seed{seed}.csv"},
+    where={"strategy": "new_concept_strategy"},
+    settings=_settings,
+    params={"encoders_of": lambda plan, wildcards: [*_other_encoders(plan, wildcards)]},
+    modules=lambda plan: [
+        encoder_module(plan.config["encoders"][plan.config["embedding"]["encoder"]]),
+        encoder_module(plan.config["diagnosis"]["encoder"]),
+    ],
+    priority=6,
+)
+
+
+@numbers("new_concepts.csv", files="new_concepts/{source}/{new_concept_strategy}/seed{new_concept_seed}.csv")
+def collect(run: Run, files: Iterable[str | Path]) -> pd.DataFrame:
+    """Labels to the target, accuracies and areas of all learning curves, by seed."""
+    return collect_curves(files, run.config["active_learning"]["target"])
+
+
+SECTION = "Beyond the paper: concepts that no encoder has seen"
+METRICS = (read_all_metrics, ("active_learning.csv", "new_concepts.csv"))
+CLUSTERS = (families, "registrations/{source}/seed{new_concept_seed}.npz")
+
+
+def _rows(run: Run, metrics: pd.DataFrame) -> pd.DataFrame:
+    return metrics[metrics["seed"].isin(seeds(run.config))]
+
+
+@table(
+    SECTION,
+    "Table XV: a new concept without leakage",
+    """In the paper the encoder may have seen the new concept, and even the same samples, before the classifier learns
+    it. Here the rows differ in what the encoder learned from: other samples, another dataset, no labels, or nothing,
+    with measurements of both clouds in its place. Fewer labels are better. The last columns have new concepts of
+    another kind: nothing is wrong, and the shape does not determine the pose. The last rows of all need no label.""",
+    only={"explainer": tuple(NO_LABELS)},
+    metrics=METRICS,
+    without_labels=(collect_intervals, PREDICTIONS.replace("{seed}", "{new_concept_seed}")),
+    clusters=CLUSTERS,
+    cause_clusters=(families_with_causes, "causes/{source}/seed{new_concept_seed}.npz"),
+)
+def table15_new_concepts(
+    run: Run, metrics: pd.DataFrame, without_labels: pd.DataFrame, clusters: Clusters, cause_clusters: Clusters
+) -> Table:
+    """Labels that each new concept costs in each embedding, and the accuracy that labels can reach."""
+    learning, test = run.config["active_learning"], run.config["registrations"]["test"]
+    metrics = _rows(run, metrics)
+    labels = {f"labels_{c}": Quantity("labels_to_target", Column(f"Labels, {c}", **COUNT), PAPERS, c) for c in CONCEPTS}
+    labels["labels_random"] = Quantity("labels_to_target", Column("Labels, random choice", **COUNT), "random")
+    accuracies = {"all_labels": Quantity("final_accuracy", Column("Acc., pool labeled (%)"), ALL_LABELS)}
+    within = Column(f"Within {WITHIN} labels (%)", decimals=0, interval=False)
+    tests = tests_with_causes(run)
+    with_causes = {}
+    for cause in NEW_CAUSES:
+        with_causes[cause] = Quantity("final_accuracy", Column(f"{cause.capitalize()}, BALD (%)"), PAPERS, cause)
+        with_causes[f"{cause}_all"] = Quantity(
+            "final_accuracy", Column(f"{cause.capitalize()}, pool labeled (%)", interval=False), ALL_LABELS, cause
+        )
+    builder = TableBuilder("table15_new_concepts", {"source": "Dataset", "seen": "Encoder learned from"})
+    for (source, setting), titles in crossed(run.source_titles, SEEN):
+        selected = rows_where(metrics, source=source, table=TABLE + setting)
+        rows = selected[selected["concept"].isin(CONCEPTS)]
+        cells = {key: cell_of(rows, quantity, test, clusters) for key, quantity in (labels | accuracies).items()}
+        cells["within"] = _within(rows, test)
+        cells |= {
+            key: cell_of(selected, quantity, tests[str(quantity.concept)], cause_clusters)
+            for key, quantity in with_causes.items()
+        }
+        builder.add_row(titles, cells, rival=setting != "pretrained")
+    for (source, explainer), titles in crossed(run.source_titles, NO_LABELS):
+        accuracy = clustered_cell(without_labels, source=source, method=explainer, metric="accuracy", concept=ALL)
+        cells = _without_labels(accuracy, labels, learning["target"])
+        builder.add_row(titles, cells, rival=False)
+    builder.compare_down([*labels, "within", *NEW_CAUSES], same=1)
+    columns = {key: quantity.column for key, quantity in labels.items()} | {"within": within}
+    columns |= {key: quantity.column for key, quantity in (accuracies | with_causes).items()}
+    return builder.build(
+        caption=f"Labels until a new concept is known, to {learning['target']:.0%}, by what the encoder saw before"
+        + run.stand_ins(partly=False),
+        column_head="quantity",
+        columns={key: column for key, column in columns.items() if any(shown == key for _, shown in builder.cells)},
+        footnotes=(
+            f"{cautious_over(builder.span_of_seeds(), test)}. A dash stands for what was not run. Bold: "
+            "best of a dataset, the first row apart.",
+            _protocol(learning),
+            "Labels: by BALD with k-means, for each concept as the new one, and by random choice, mean over the three. "
+            f"Within {WITHIN} labels: share of the runs that reached the target with so few. Pool labeled: accuracy "
+            "when the whole pool is labeled, mean over the three.",
+            "No labels: the accuracy that needs none, with the interval of a bootstrap over families and seeds, and 0 "
+            "labels where it reaches the target.",
+            "Nominal, Geometry: the new concept in registrations with measured causes, of objects that no method saw; "
+            "accuracy over all causes after all queries by BALD, and with the whole pool labeled. No encoder saw "
+            f"Geometry. Test samples of a seed: {tests[NOMINAL]}, with Geometry up to {tests[GEOMETRY]}, if any of its "
+            f"registrations fails by that{_fewer(builder)}.",
+        ),
+    )
+
+
+@table(
+    SECTION,
+    "Table XV with an oracle that errs",
+    """Table XV with an oracle that gives a share of wrong labels: how many more labels are needed to reach the target,
+    and the accuracy after all of them.""",
+    needs=("erring",),
+    metrics=METRICS,
+    clusters=CLUSTERS,
+)
+def table15_oracle(run: Run, metrics: pd.DataFrame, clusters: Clusters) -> Table:
+    """Labels to the target and final accuracy, by the share of wrong labels: embeddings × strategies."""
+    learning, own, test = run.config["active_learning"], run.config["new_concepts"], run.config["registrations"]["test"]
+    metrics = _rows(run, metrics)
+    shares = [0, *(round(100 * share) for share in own["errors"])]
+    labels = {f"labels_{share}": Column(f"Labels, {share} % wrong", **COUNT) for share in shares}
+    accuracies = {f"accuracy_{share}": Column(f"Acc., {share} % wrong (%)") for share in shares}
+    builder = TableBuilder(
+        "table15_oracle", {"source": "Dataset", "seen": "Encoder learned from", "strategy": "Strategy"}
+    )
+    seen = {setting: words for setting, words in SEEN.items() if setting in own["erring"]}
+    strategies = {PAPERS: "BALD + k-means", "random": "Random"}
+    for (source, setting, strategy), titles in crossed(run.source_titles, seen, strategies):
+        cells: dict[str, Cell | None] = {}
+        for share in shares:
+            name = TABLE + (f"{setting}_errors_{share}" if share else setting)
+            cell_rows = rows_where(metrics, source=source, table=name, method=strategy)
+            cell_rows = cell_rows[cell_rows["concept"].isin(CONCEPTS)]
+            for key, metric in (("labels", "labels_to_target"), ("accuracy", "final_accuracy")):
+                quantity = Quantity(metric, Column(""))
+                cells[f"{key}_{share}"] = cell_of(cell_rows, quantity, test, clusters)
+        builder.add_row(titles, cells)
+    builder.compare_down([*labels, *accuracies], same=2)
+    return builder.build(
+        caption=f"Labels until a new concept is known, to {learning['target']:.0%}, from an oracle that errs"
+        + run.stand_ins(partly=False),
+        column_head="quantity",
+        columns=labels | accuracies,
+        footnotes=(
+            f"{cautious_over(builder.most_seeds(), test)}.",
+            _protocol(learning),
+            "Means over noise, pose and overlap as the new concept, then over the seeds. A wrong answer names one of "
+            "the other two concepts; an oracle that errs more repeats the errors of one that errs less. The labels at "
+            "the start are right.",
+        ),
+    )
+
+
+FIGURE_ROWS = {"concepts": CONCEPTS, "nominal": ("nominal",), "geometry": ("geometry",)}
+FIGURE_TITLES = {"concepts": "new: noise, pose\nor overlap", "nominal": "new: nominal", "geometry": "new: geometry"}
+STYLES = {
+    "pretrained": (GRAY, "-", 0.9),
+    "other_samples": (BLUE, "-", 0.9),
+    "other_source": (SKY_BLUE, "-", 0.9),
+    "unseen": (VERMILION, "-", 1.8),
+    "pair": (GREEN, "-", 1.8),
+}
+
+
+def read_curves_by_concepts(files: Iterable[str | Path]) -> dict[tuple[str, str, str], pd.DataFrame]:
+    """Mean curves of the paper's strategy by source, kind of the new concepts, and embedding."""
+    files = list(files)
+    return {
+        (source, row, setting): curve
+        for row, concepts in FIGURE_ROWS.items()
+        for (source, strategy, setting), curve in mean_curves(files, concepts).items()
+        if strategy == PAPERS
+    }
+
+
+@figure(
+    SECTION,
+    "Learning curves without leakage",
+    """Accuracy over the number of labels chosen by BALD with k-means, by what the encoder learned from: the mean over
+    the seeds, and in the first row over three concepts. The sooner a curve crosses the target line, the fewer
+    labels the new concept costs.
+
+    Bands are 95 % intervals over the seeds. Only the two thick curves have them, the encoder that knows the other
+    concepts alone and the measurements of the pair; a thick curve without a band is of one seed.""",
+    only={"pool_strategy": (PAPERS,)},
+    curves=(
+        read_curves_by_concepts,
+        (
+            "active_learning/{source}/{pool_strategy}/seed{new_concept_seed}.csv",
+            "new_concepts/{source}/{pool_strategy}/seed{new_concept_seed}.csv",
+        ),
+    ),
+)
+def new_concept_curves(run: Run, curves: Mapping[tuple[str, str, str], pd.DataFrame]) -> Figure:
+    """Accuracy over labels: kinds of new concepts × sources, a line for each embedding."""
+    target = run.config["active_learning"]["target"]
+    return draw_curves(curves, run.source_titles, FIGURE_TITLES, SEEN, STYLES, target)
+
+
+def tests_with_causes(run: Run) -> dict[str, int]:
+    """Test samples of a seed where a cause is the new concept: those with a label, and the concept's."""
+    causes = run.config["causes"]
+    labeled = apportion(causes["test"], causes["shares"])
+    judged = causes["test"] - labeled[BORDERLINE] - labeled[GEOMETRY]
+    return {NOMINAL: judged, GEOMETRY: judged + run.config["new_concepts"]["geometry_test"]}
+
+
+def _fewer(builder: TableBuilder) -> str:
+    """Words on the datasets with fewer seeds of Geometry than of the rest, if there are any."""
+    most = builder.most_seeds()
+    fewer = {
+        builder.rows[row][0][1]: plural(cell.seeds, "seed")
+        for (row, key), cell in builder.cells.items()
+        if key == GEOMETRY and cell.seeds < most
+    }
+    return f" ({', '.join(f'{title}: {seeds}' for title, seeds in fewer.items())})" if fewer else ""
+
+
+def _within(metrics: pd.DataFrame, test: int) -> Cell | None:
+    wide = rows_where(metrics, method=PAPERS).pivot_table(index=["seed", "concept"], columns="metric", values="value")
+    if not {"labels_to_target", "reached"} <= set(wide):
+        return None
+    done = (wide["labels_to_target"] <= WITHIN) & (wide["reached"] == 1)
+    shares = 100 * done.groupby(level="seed").mean()
+    return cell_of_repeats(shares, test * len(shares))
+
+
+def _without_labels(accuracy: Cell | None, labels: Iterable[str], target: float) -> dict[str, Cell | None]:
+    """Cells of what needs no labels: its accuracy as that of the whole pool, and 0 labels where it is enough."""
+    enough = labels if accuracy and accuracy.mean >= 100 * target else ()
+    return {"all_labels": accuracy} | {
+        key: plain_cell(0, accuracy.seeds, accuracy.test_samples) for key in enough if accuracy
+    }
+
+
+def _protocol(learning: Mapping) -> str:
+    return (
+        f"Start: {learning['initial']} labeled samples of the known concepts; {learning['batch']} labels a round, "
+        f"{learning['labels']} in all; '>': some runs did not reach the target and count with all labels."
+    )
