@@ -24,8 +24,8 @@ SHARED = {  # module of gpca.steps -> the steps that it has, functions of their 
     "shift": "shift",
 }
 MODULES = {f: f"gpca.steps.{module}:{f}" for module, functions in SHARED.items() for f in functions.split()} | {
-    "active_learning": IN + "active_learning.step",
-    "without": IN + "active_learning.without_step",
+    "active_learning": "gpca.steps.active_learning:learn_actively",
+    "without": "gpca.steps.active_learning:embed_without",
     "controls": IN + "controls.step",
     "train_control": IN + "controls.encoding",
     "estimate": IN + "estimators.step",
@@ -36,7 +36,7 @@ MODULES = {f: f"gpca.steps.{module}:{f}" for module, functions in SHARED.items()
     "learning_curve": "gpca.steps.learning_curve:learn_from_more",
     "learning_samples": "gpca.steps.learning_curve:learning_samples",
     "live_shap": "gpca.steps.live_shap",
-    "new_concepts": IN + "new_concepts.step",
+    "new_concepts": "gpca.steps.new_concepts",
     "learners": "gpca.steps.shift:fit_learners",
     "oracles": IN + "reenactment.step",
     "recover": IN + "recovery.step",
