@@ -14,7 +14,7 @@ BESIDE = {  # files that a module reads from its folder
     "gpca.comparison.claims": "claims.yaml",
     "gpca.comparison.published": "*.csv",
     "gpca.reporting.figures.style": "matplotlibrc",
-    "gpca.experiments.scans.published": "published.csv",
+    "gpca.experiments.scans": "published_scans.csv",
     "gpca.page.page": "templates/*",
     "gpca.model.scene": "assets/*",
 }

@@ -113,6 +113,11 @@ class Recorded(Mapping):
         return {"token": token, "keys": {path: sha256_of_settings(value) for path, value in sorted(self.read.items())}}
 
 
+def plain(values: Any) -> Any:
+    """Mapping, and those in it, as dictionaries, of which all values count as read."""
+    return {key: plain(value) for key, value in values.items()} if isinstance(values, Mapping) else values
+
+
 def config_token(config: Mapping[str, Any], sidecar: str | Path) -> str:
     """Text that changes when a value changes that the result with this provenance has read.
 

@@ -76,19 +76,8 @@ def check(config: dict, names_left_out: LeftOut) -> None:
         raise InputError(f"config key {key}", fault, "install it or choose another global method")
 
 
-def shown(config: Mapping, sources: Mapping) -> dict:
-    """Titles of methods, for tables of scans that are not given the run."""
-    entries = {name: method_entry(name) for name in installed(config["methods"])}
-    return {
-        "methods": {name: {"title": entry.title, "is_global": entry.is_global} for name, entry in entries.items()},
-        "methods_left_out": {method_entry(name).title: of for name, of in left_out(config["methods"]).items()},
-        "global_start": config["method_pairs"]["global_start"],
-    }
-
-
 EXPERIMENT = Experiment(
     name=NAME,
-    shown=shown,
     sections={"method_pairs": PairSettings, "methods": ByName},
     names=lambda config, sources: {"method": installed(config["methods"])},
     check=check,
@@ -330,10 +319,16 @@ def table11_severity(run: Run, intervals):
 
 
 def rows_of(run: Run) -> Iterable[Row]:
+    """Rows of all methods."""
+    return method_rows(run.config["methods"], run.config["method_pairs"]["global_start"])
+
+
+def method_rows(names: Iterable[str], global_start: str, initial: str = "Initial pose") -> Iterable[Row]:
     """Rows start by start: local methods have one at each start, global methods none."""
-    entries = {name: method_entry(name) for name in installed(run.config["methods"])}
-    start = run.config["method_pairs"]["global_start"]
-    starts = {INITIAL: "Initial pose", NO_START: "None"} | ({start: entries[start].title} if start in entries else {})
+    entries = {name: method_entry(name) for name in installed(names)}
+    starts = {INITIAL: initial, NO_START: "None"}
+    if global_start in entries:
+        starts[global_start] = entries[global_start].title
     for key, title in starts.items():
         for name, entry in entries.items():
             if entry.is_global == (key == NO_START):
@@ -343,10 +338,14 @@ def rows_of(run: Run) -> Iterable[Row]:
 def notes(run: Run, sheet: Sheet, intervals: pd.DataFrame) -> list[str]:
     """Footnotes of all three tables."""
     pairs = int(intervals.loc[intervals["concept"] == ALL, "samples"].max())
-    missing = {method_entry(name).title: package for name, package in left_out(run.config["methods"]).items()}
     return [
         f"{sheet.over(pairs // sheet.seeds)}. A success is off by less than the config's `success.error` of the "
         "diameter d, ADD or, for symmetric objects, ADD-S. A registration that failed by the method's own account is "
         "no success. Bold: best of a start.",
-        *missing_packages(missing),
+        *missing_methods(run.config["methods"]),
     ]
+
+
+def missing_methods(names: Iterable[str]) -> list[str]:
+    """Footnote on the methods whose package is not installed, if there are any."""
+    return missing_packages({method_entry(name).title: package for name, package in left_out(names).items()})

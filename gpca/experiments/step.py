@@ -12,6 +12,7 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
+from pathlib import Path
 from typing import Any
 
 from gpca.code_files import code_files
@@ -47,6 +48,7 @@ class Step:
         run: ``module:function``, or a module with a function ``run``, that gets the job.
         inputs, outputs: argument of the job -> patterns of files below the folder of a run; an input may be a function
             of plan and wildcards.
+        data: function of plan and wildcards that returns files from outside the run, which the job gets as ``data``.
         settings: keys of the config, with dots, that the job is given by these names; or a function that returns them.
         params: further arguments of the job, or functions of plan and wildcards that return them.
         modules: returns the modules chosen at run time, by plan, which count as code of the step.
@@ -62,6 +64,7 @@ class Step:
     run: str
     outputs: Mapping[str, str | Sequence[str]]
     inputs: Mapping[str, Files] = field(default_factory=dict)
+    data: Callable[[Plan, Wildcards], Iterable[str | Path]] | None = None
     settings: Settings = ()
     params: Mapping[str, Any] = field(default_factory=dict)
     modules: Callable[[Plan], Iterable[str]] = lambda plan: ()
@@ -81,6 +84,7 @@ class Rule:
     name: str
     run: str
     inputs: dict[str, Any]
+    data: dict[str, Any]  # inputs from outside the run
     code: Any
     outputs: dict[str, Any]
     settings: Any
@@ -140,6 +144,7 @@ def _rule(step: Step, plan: Plan, name: str) -> Rule:
         name=name,
         run=step.run,
         inputs={key: _input(step, plan, files) for key, files in step.inputs.items()},
+        data={"data": _data(step, plan)} if step.data else {},
         code=code_files(step.run, *step.modules(plan)),
         outputs=outputs,
         settings=_settings(step, plan),
@@ -228,6 +233,10 @@ def _resolved(step: Step, plan: Plan, files: Callable, wildcards: Wildcards) -> 
     patterns = _listed(files(plan, wildcards))
     paths = [path for pattern in patterns for path in _expanded(step, plan, pattern)]
     return [path.format(**dict(wildcards.items())) for path in paths]
+
+
+def _data(step: Step, plan: Plan) -> Callable[[Wildcards], list[str]]:
+    return lambda wildcards: [str(path) for path in step.data(plan, wildcards)]  # type: ignore[misc]
 
 
 def _settings(step: Step, plan: Plan) -> Any:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gpca.alignment.methods.registry import installed, left_out, method_entry, method_module
+from gpca.alignment.methods.registry import installed, method_entry, method_module
 from gpca.attribution.predictions import read_predictions
 from gpca.encoders.registry import encoders
 from gpca.errors import InputError, require_names, with_key
@@ -18,12 +18,12 @@ from gpca.evaluation.measures import ALL, POOLED, Measure, Parts, over_seeds, pe
 from gpca.experiments.experiment import EXPLAINERS, ByName, Experiment, LeftOut
 from gpca.experiments.explained import explainer_settings, require_explained
 from gpca.experiments.plan import Run
+from gpca.experiments.registration_methods import missing_methods
 from gpca.experiments.result import numbers, table
 from gpca.experiments.step import Plan, Step, Wildcards
 from gpca.explainers.registry import explainer_entry, explainer_module
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.sheet import Sheet, Show, crossed, show, where
-from gpca.reporting.tables.builder import missing_packages
 from gpca.settings import Distinct
 from gpca.steps.exchange import ESTIMATOR, FAILURE, LABELS, METHOD, ExchangeSettings, require_exchangeable
 from gpca.uncertainty.estimators.registry import estimator_entry, estimator_module
@@ -281,7 +281,7 @@ def table14_method_matrix(run: Run, intervals):
             "another; the encoder is the run's own, which has seen point-to-point alone.",
             "Registrations that failed by the method's own account, which are explained like any other: "
             f"{', '.join(failed)}.",
-            *missing_packages({method_entry(name).title: each for name, each in left_out(exchange["methods"]).items()}),
+            *missing_methods(exchange["methods"]),
         ),
         bold=methods,
         same=1,

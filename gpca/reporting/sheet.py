@@ -8,7 +8,7 @@ from itertools import product
 from typing import TYPE_CHECKING, Any
 
 from gpca.errors import InputError
-from gpca.reporting.tables.builder import NEAR_LIMITS, over_clusters
+from gpca.reporting.tables.builder import FAMILIES, NEAR_LIMITS, over_clusters
 from gpca.reporting.tables.cells import cell_over_sources, interval_cell, share_within_limits
 from gpca.reporting.tables.table import Cell, Column, Table
 from gpca.reporting.words import span
@@ -65,7 +65,7 @@ class Sheet:
         rows, columns: what it shows; rows and columns without any number are left out.
         intervals: numbers with an interval each (:func:`gpca.evaluation.measures.read_clustered`).
         by_seed: name -> numbers by seed; the first frame counts the test samples.
-        sources: those over which numbers by seed are averaged.
+        sources: those over which numbers by seed are averaged, in rows that name no source.
         blank: tells of row and column key whether the cell stays empty.
     """
 
@@ -103,9 +103,9 @@ class Sheet:
         """Numbers of test samples of some columns' cells in a row, such as ``15 to 200``."""
         return span(self.cells[row, key].test_samples for key in keys if (row, key) in self.cells)
 
-    def over(self, samples: int | str = "") -> str:
-        """Start of the footnote on the cells' intervals, without a full stop."""
-        return over_clusters(self.seeds, samples)
+    def over(self, samples: int | str = "", clusters: tuple[str, str] = FAMILIES) -> str:
+        """Start of the footnote on the cells' intervals, without a full stop; `clusters` in the plural and singular."""
+        return over_clusters(self.seeds, samples, clusters)
 
     def table(
         self,
@@ -149,7 +149,8 @@ class Sheet:
         if column.frame:
             counts = next(iter(self._by_seed.values()))
             values, selected = self._by_seed[column.frame], (row.where["method"], column.where["metric"])
-            return cell_over_sources(counts, values, self._sources, *selected, column.where["concept"], column.factor)
+            sources = [row.where["source"]] if "source" in row.where else self._sources
+            return cell_over_sources(counts, values, sources, *selected, column.where["concept"], column.factor)
         rows = where(subset, {"against": ""} | dict(column.where))
         return interval_cell(rows.iloc[0], factor=column.factor) if len(rows) else None
 

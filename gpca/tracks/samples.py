@@ -77,7 +77,7 @@ class Samples:
     def _is_available(self, source: str, seed: int) -> bool:
         if not self.track.may_lack(source) or (self.folder / self.track.file(source, seed)).is_file():
             return True
-        from gpca.experiments.scans.experiment import present
+        from gpca.experiments.scans import present
 
         return source in present(self.config)
 

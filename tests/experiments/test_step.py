@@ -108,3 +108,9 @@ def test_a_step_that_a_run_does_without_has_no_rule():
 def test_a_key_that_the_config_lacks_is_a_slip_of_the_declaration():
     with pytest.raises(KeyError, match="nothing"):
         rules_of(step(settings=("nothing",)), PLAN)
+
+
+def test_data_comes_from_outside_the_run():
+    [rule] = rules_of(step(data=lambda plan, wildcards: [f"data/{wildcards.source}.ply"]), PLAN)
+    assert rule.data["data"](Wildcards(source="ycb")) == ["data/ycb.ply"]
+    assert rules_of(step(), PLAN)[0].data == {}

@@ -42,7 +42,7 @@ MODULES = {f: f"gpca.steps.{module}:{f}" for module, functions in SHARED.items()
     "recover": IN + "recovery.step",
     "register_methods": "gpca.steps.registration_trials",
     "runtime": "gpca.steps.runtime",
-    "register_scans": IN + "scans.step",
+    "register_scans": "gpca.steps.scan_trials",
     "scan_causes": IN + "scan_causes.step",
     "diagnose_scans": IN + "scan_causes.diagnosis_step",
     "readings": IN + "specification_curve.step",

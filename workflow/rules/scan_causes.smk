@@ -5,7 +5,15 @@ from gpca.experiments.scan_causes.experiment import (
     settings_of_explainers,
 )
 
+from gpca.experiments.scans import present
+from gpca.scans.source import data_files as files_of_scans, place_of
+
 SCAN_CAUSES = config["scan_causes"]
+SCAN_ENTRIES = present(config)
+
+
+wildcard_constraints:
+    scan_set="|".join(SCAN_ENTRIES),
 
 
 rule scan_causes:

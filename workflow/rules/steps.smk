@@ -25,6 +25,7 @@ for step in steps():
                 made.name
             input:
                 **below_results(made.inputs),
+                **made.data,
                 code=made.code,
             output:
                 **below_results(made.outputs),

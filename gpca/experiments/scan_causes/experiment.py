@@ -12,11 +12,12 @@ from gpca.causes.settings import DescriptorSettings
 from gpca.errors import with_key
 from gpca.experiments.experiment import Experiment, LeftOut, Names, Tidy
 from gpca.experiments.scan_causes.settings import ScanSamples
-from gpca.experiments.scans.settings import ChoiceSettings, TrialSettings
+from gpca.experiments.scans import ChoiceSettings
 from gpca.explainers.interface import icp_calls
 from gpca.explainers.registry import CAUSES, explainer_entry, explainers, require_settings
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.settings import Distinct, changes_of, fields_of
+from gpca.steps.scan_trials import TrialSettings
 
 Learned = Distinct[Literal["objects", "scans"]]
 

@@ -13,8 +13,6 @@ from gpca.causes.scans import ScanStart, measure_scans, motion_between
 from gpca.causes.settings import OBSERVED, CauseSettings, DescriptorSettings
 from gpca.experiments.scan_causes.samples import GlobalMethod, starts_of
 from gpca.experiments.scan_causes.settings import ScanSamples
-from gpca.experiments.scans.settings import TrialSettings, part
-from gpca.experiments.scans.trial import pair_to_register
 from gpca.io.csv_file import write_csv
 from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
@@ -23,7 +21,8 @@ from gpca.reenactment.settings import ReenactmentSettings
 from gpca.scans.pair import ScanPair, ScanSuccess
 from gpca.scans.scene import ScanPairs
 from gpca.seeds import generator
-from gpca.settings import read_settings
+from gpca.settings import fields_of, read_settings
+from gpca.steps.scan_trials import TrialSettings, pair_to_register
 from gpca.steps.scans import drawn_pairs
 
 
@@ -37,7 +36,7 @@ def run(job: Job) -> None:
         kept = np.sort(generator(*axes, "scan causes", "pairs").permutation(len(chosen))[: own.most_pairs])
         pairs = ScanPairs.of([chosen[k] for k in kept])
         truth = truth_settings(job.section("causes"), own)
-        trials = part(TrialSettings, section)
+        trials = read_settings(TrialSettings, fields_of(section, TrialSettings))
         methods = global_methods(trials, job.section("methods"), *axes) if own.global_start else {}
         starts = starts_of(pairs, *axes, own, trials.ladder, methods)
         success = read_settings(ScanSuccess, section.get("success") or {})

@@ -90,6 +90,6 @@ def test_what_is_measured_described_and_re_enacted_is_of_the_same_samples(tmp_pa
 
 
 def test_the_global_method_starts_where_it_ends_and_not_where_it_fails(pairs):
-    settings = step.part(step.TrialSettings, {"points": 200, "global_start": "fgr"})
+    settings = step.TrialSettings(points=200, global_start="fgr")
     [(name, register)] = step.global_methods(settings, {"fgr": {}}, *AXES).items()
     assert name == "fgr" and register(pairs[2]).shape == (4, 4)

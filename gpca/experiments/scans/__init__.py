@@ -1,1 +1,0 @@
-"""Registration methods on scans of rooms and objects (Table XVII)."""
