@@ -2,10 +2,10 @@
 
 import pytest
 
-from gpca.experiments.recovery.cases import register_first
 from gpca.frames.camera import Camera, DepthNoise
 from gpca.frames.initial_pose import InitialPoseSettings
 from gpca.frames.situations import Shelf, Situations, SituationSettings
+from gpca.recovery.episodes import register_first
 from gpca.recovery.settings import LoopSettings
 
 from .frames.tiny import scene_settings, surfaces

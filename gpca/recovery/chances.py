@@ -83,7 +83,7 @@ class Trial:
     """A rehearsed action.
 
     Attributes:
-        known_F: see :func:`gpca.experiments.recovery.rehearsal.known`.
+        known_F: see :func:`gpca.recovery.rehearsal.known`.
         action: its name; `NOTHING` if the registration was left as it was.
         right: whether the pose was right afterwards.
     """

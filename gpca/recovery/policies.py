@@ -36,7 +36,7 @@ class Case:
         actions: actions taken so far.
         scores_T_C, bald_T: output of the explainer at the start and after each action; None without an explainer.
         observed_F: observation at the start (:data:`gpca.recovery.actions.OBSERVED`), for the gate.
-        known_F: all features of the registration (:func:`gpca.experiments.recovery.rehearsal.known`), for trained
+        known_F: all features of the registration (:func:`gpca.recovery.rehearsal.known`), for trained
             policies.
         cause: cause of the failure, for the oracle only; otherwise empty.
         random: random numbers of the case, restarted for every decision.

@@ -7,9 +7,9 @@ import pytest
 
 from gpca.alignment.rigid import inverse, rotation_angle_rad
 from gpca.errors import InputError
-from gpca.experiments.recovery.cases import RobotIn, register_after, register_held
 from gpca.recovery import actions
 from gpca.recovery.actions import ACTIONS, OBSERVED, action_of, best_start, observe
+from gpca.recovery.episodes import RobotIn, register_after, register_held
 from tests.failures import LOOP
 
 from ..documents import block

@@ -9,11 +9,11 @@ import pytest
 from gpca.alignment.rigid import inverse, rigid_motion, scale_translation
 from gpca.causes.settings import OBSERVED, CauseSettings
 from gpca.causes.truth import ALL, NONE
-from gpca.experiments.recovery.cases import RobotIn, register_after
 from gpca.frames.camera import Camera, MeshScene
 from gpca.frames.shots import Shot
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.recovery.actions import ACTIONS
+from gpca.recovery.episodes import RobotIn, register_after
 from gpca.recovery.reenactment import Appearance, KnownModel, believe, reenact, seen_surface
 from gpca.reenactment.settings import ReenactmentSettings
 from tests.failures import LOOP

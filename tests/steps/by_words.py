@@ -39,7 +39,7 @@ MODULES = {f: f"gpca.steps.{module}:{f}" for module, functions in SHARED.items()
     "new_concepts": "gpca.steps.new_concepts",
     "learners": "gpca.steps.shift:fit_learners",
     "oracles": IN + "reenactment.step",
-    "recover": IN + "recovery.step",
+    "recover": "gpca.steps.recovery",
     "register_methods": "gpca.steps.registration_trials",
     "runtime": "gpca.steps.runtime",
     "register_scans": "gpca.steps.scan_trials",

@@ -5,7 +5,11 @@ import json
 import pandas as pd
 import pytest
 
+from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS
+from gpca.steps import recovery
+from gpca.steps.recovery import as_samples, register_situations
+from tests.failures import LOOP
 from tests.steps.by_words import main
 
 from ..config.test_check import load
@@ -87,3 +91,17 @@ def test_a_fault_is_one_line(changed, fault, tmp_path, capsys):
     assert call(tmp_path, settings(**changed)) == 2
     assert fault in capsys.readouterr().err
     assert not (tmp_path / "seed7.csv").exists()
+
+
+def test_the_classifier_learns_from_all_causes(situations):
+    registered = register_situations(situations, 6, 3, LOOP)
+    assert [episode.number for episode in registered["train"]] == list(range(6))
+    registrations = as_samples(registered)
+    assert registrations.concept.tolist() == list(CONCEPTS) * 3
+    assert registrations.split.tolist() == ["train"] * 6 + ["test"] * 3
+
+
+def test_a_camera_that_sees_too_little_is_a_fault(situations, monkeypatch):
+    monkeypatch.setattr(recovery, "register_first", lambda *_: None)
+    with pytest.raises(InputError, match=r"40 views .* fewer than 64 points of them; give recovery.camera more pixels"):
+        register_situations(situations, 1, 0, LOOP)

@@ -30,7 +30,7 @@ rule recover:
     input:
         data=data_files(STANDING),
         code=code_files(
-            "gpca.experiments.recovery.step",
+            "gpca.steps.recovery",
             encoder_module(config["embedding"]["encoder"]),
             *map(explainer_module, RECOVERY_EXPLAINERS),
             *filter(None, map(policy_module, RECOVERY["policies"])),
@@ -50,7 +50,7 @@ rule recover:
     conda:
         "../envs/gpca.yaml"
     params:
-        step="gpca.experiments.recovery.step",
+        step="gpca.steps.recovery",
         settings=as_json(RECOVERY_SETTINGS),
         folders=data_folders(STANDING, config["data_dir"], config["downloads"]),
     script:

@@ -10,7 +10,7 @@ import numpy as np
 
 from gpca.errors import InputError
 from gpca.experiments.method.shown_sample import Stages, draw_embedding, draw_scores_with_numbers
-from gpca.experiments.recovery.figures import short_action
+from gpca.experiments.recovery_example import short_action
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.recovery.policy import NOTHING, QUEUE, Decision, RecoveryPolicy
 from gpca.reporting.figures.cloud_views import draw_clouds

@@ -1,24 +1,110 @@
-"""The explainers that policies of recovery read. They learn from other scenes of the same camera."""
+"""The explainers that policies read. They learn from other scenes, and see each registration once, in batches."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from time import perf_counter
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from gpca.attribution.scores import Attribution
 from gpca.encoders.registry import EncoderSettings
 from gpca.encoders.training import embed, train_encoder
-from gpca.experiments.recovery.answers import Explain
 from gpca.explainers.registry import explainer_entry
 from gpca.pairs.dataset import Registrations
+from gpca.pairs.synthesis import as_registrations
+from gpca.recovery.episodes import Episode
 from gpca.uncertainty.designs import evaluate_design
 from gpca.uncertainty.settings import UncertaintySettings
 
+Explain = Callable[[Registrations], Attribution]
 Attach = Callable[[Registrations], Registrations]
+
+
+class CaseKey(NamedTuple):
+    """A registration to be explained: that of an episode after these actions."""
+
+    explainer: str
+    episode: int
+    actions: tuple[str, ...]
+
+
+class Answer(NamedTuple):
+    """Scores that sum to one, their variances and BALD in nats (NaN where there are none), and the seconds it took."""
+
+    scores_C: np.ndarray
+    variances_C: np.ndarray
+    bald: float
+    seconds: float
+
+
+class Answers:
+    """The answers so far.
+
+    Args:
+        episodes: each stands at the place of its number.
+        explain: for each explainer that the policies read, the function that attributes registrations.
+        actions: the names of all.
+        budget: how many actions an episode may take.
+    """
+
+    def __init__(
+        self, episodes: Sequence[Episode], explain: Mapping[str, Explain], actions: Sequence[str], budget: int
+    ) -> None:
+        self._episodes = episodes
+        self._explain = explain
+        self._actions = actions
+        self._budget = budget
+        self._answers: dict[CaseKey, Answer] = {}
+
+    def ask(self, wanted: Iterable[CaseKey]) -> None:
+        """Explain the registrations that no explainer of that name has seen yet, in a fixed order."""
+        wanted = set(wanted) - set(self._answers)
+        for explainer, explain in self._explain.items():
+            new = sorted(key for key in wanted if key.explainer == explainer)
+            if not new:
+                continue
+            records = [record_of(self._episodes[key.episode], key.actions, self._actions, self._budget) for key in new]
+            attribution = explain(as_registrations(records)[0].without_labels())
+            self._answers |= dict(zip(new, answers_of(attribution), strict=True))
+
+    def history(self, explainer: str, episode: int, actions: tuple[str, ...]) -> list[Answer]:
+        """An explainer's answers at the start and after each of these actions."""
+        return [self._answers[CaseKey(explainer, episode, actions[:n])] for n in range(len(actions) + 1)]
+
+
+def record_of(episode: Episode, taken: tuple[str, ...], actions: Sequence[str], budget: int) -> dict:
+    """A registration's row; its sample number, which names random numbers, tells episode and actions taken.
+
+    Args:
+        actions: the names of all.
+        budget: how many of them an episode may take.
+    """
+    base = len(actions) + 1
+    code = sum((1 + list(actions).index(action)) * base**place for place, action in enumerate(taken))
+    return episode.outcomes[taken].record | {"sample": base**budget * episode.number + code, "split": "test"}
+
+
+def starts_of(episodes: Sequence[Episode], actions: Sequence[str], budget: int) -> Registrations:
+    """The first registrations of episodes, with their causes, numbered as the policies' explainers see them."""
+    return as_registrations([record_of(episode, (), actions, budget) for episode in episodes])[0]
+
+
+def answers_of(attribution: Attribution) -> list[Answer]:
+    """An attribution's rows as answers."""
+    scores_N_C = as_shares(attribution.scores_N_C)
+    rows = zip(scores_N_C, attribution.variances_N_C, attribution.bald_N, attribution.seconds_N, strict=True)
+    return [Answer(scores_C, variances_C, float(bald), float(time)) for scores_C, variances_C, bald, time in rows]
+
+
+def as_shares(scores_N_C: np.ndarray) -> np.ndarray:
+    """Scores that sum to one: as they are where they do, by softmax of signed ones, e.g. Shapley values."""
+    from scipy.special import softmax
+
+    shares = (scores_N_C >= 0).all() and np.allclose(scores_N_C.sum(axis=1), 1)
+    return scores_N_C if shares else softmax(scores_N_C, axis=1)
 
 
 @dataclass(frozen=True)
@@ -40,7 +126,7 @@ class LoopExplainers:
     concepts: np.ndarray
 
     def right(self, name: str) -> np.ndarray:
-        """Return which calibration samples (N,) an explainer attributes rightly."""
+        """Which calibration samples (N,) an explainer attributes rightly."""
         return self.calibration[name].predicted_N == self.concepts
 
 

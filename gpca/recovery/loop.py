@@ -5,27 +5,95 @@ Each policy also says what it would do about registrations that did not fail; no
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from time import perf_counter
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.experiments.recovery.answers import Answer, Answers, CaseKey, Explain
-from gpca.experiments.recovery.episodes import Episode
-from gpca.experiments.recovery.reenactor import Reenactor
-from gpca.experiments.recovery.rehearsal import known
+from gpca.causes.settings import CauseSettings
+from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS
+from gpca.process.progress import progress
 from gpca.recovery.actions import Action
+from gpca.recovery.answers import Answer, Answers, CaseKey, Explain
+from gpca.recovery.chances import alarm_threshold
+from gpca.recovery.episodes import Episode, RobotIn
 from gpca.recovery.policies import Case, Decide, Means, PolicyEntry, policy_entry
+from gpca.recovery.reenactment import Belief, KnownModel, Reenacted, believe, reenact
+from gpca.recovery.rehearsal import known
 from gpca.recovery.settings import LoopSettings
+from gpca.reenactment.settings import ReenactmentSettings
 from gpca.seeds import generator
 
 if TYPE_CHECKING:
     import pandas as pd
 
+Taken = tuple[str, ...]
 NO_SCORES = np.full(len(CONCEPTS), np.nan)
 UNEXPLAINED = Answer(NO_SCORES, NO_SCORES, np.nan, 0.0)
+
+
+class Reenactor:
+    """Re-enacts registrations of episodes on the tables of one run, from what their robots hold.
+
+    Args:
+        settings: what a robot believes of its starts.
+        counterfactuals: how it registers under each hypothesis.
+    """
+
+    def __init__(self, settings: ReenactmentSettings, counterfactuals: CauseSettings) -> None:
+        self._settings = settings
+        self._counterfactuals = counterfactuals
+        self._models: dict[int, KnownModel] = {}
+        self._beliefs: dict[tuple[Episode, Taken], Belief] = {}
+        self._reenacted: dict[tuple[Episode, Taken], Reenacted] = {}
+
+    def believe(self, episode: Episode, actions: Taken = ()) -> Belief:
+        """The hypotheses after these actions, which were taken."""
+        key = episode, actions
+        if key not in self._beliefs:
+            holding, known = episode.outcomes[actions].holding, self._known(episode)
+            axes = _axes(episode, actions)
+            self._beliefs[key] = believe(holding, known, self._settings, self._counterfactuals, axes)
+        return self._beliefs[key]
+
+    def reenact(self, episode: Episode, actions: Taken = ()) -> Reenacted:
+        """The counterfactuals of the registration after these actions, which were taken."""
+        key = episode, actions
+        if key not in self._reenacted:
+            belief, holding = self.believe(episode, actions), episode.outcomes[actions].holding
+            known, axes = self._known(episode), _axes(episode, actions)
+            self._reenacted[key] = reenact(belief, holding, known, self._counterfactuals, axes)
+        return self._reenacted[key]
+
+    def _known(self, episode: Episode) -> KnownModel:
+        model = episode.situation.model
+        if model not in self._models:
+            name = episode.situation.shelf.objects.names[model]
+            self._models[model] = KnownModel.of(RobotIn(episode.situation), generator("known model", name))
+        return self._models[model]
+
+
+def calibrated_alarm(episodes: Iterable[Episode], reenactor: Reenactor, false_alarms: float) -> float:
+    """The probability of a failure that a further good registration exceeds with at most this probability.
+
+    It is set on the good ones among these episodes, which were not used for training
+    (:func:`gpca.recovery.chances.alarm_threshold`).
+
+    Raises:
+        InputError: none of them is good.
+    """
+    good = [episode for episode in episodes if not episode.failed]
+    if not good:
+        fault = "has no good registration by which the alarm of the re-enactment can be set"
+        raise InputError("recovery", fault, "raise recovery.calibration or recovery.rehearsals")
+    failures = [reenactor.believe(episode).failure for episode in progress(good, "good registrations for the alarm")]
+    return alarm_threshold(np.array(failures), false_alarms)
+
+
+def _axes(episode: Episode, actions: Taken) -> tuple:
+    return (*episode.situation.axes, "re-enactment", *actions)
 
 
 class Loop:
@@ -58,7 +126,7 @@ class Loop:
         self._answers = Answers(episodes, explain, tuple(actions), settings.budget)
 
     def run(self, policies: Sequence[str]) -> tuple[pd.DataFrame, pd.DataFrame]:
-        """Return a row per episode, policy and step, and the seconds of each, in the same order."""
+        """A row per episode, policy and step, and the seconds of each, in the same order."""
         import pandas as pd
 
         entries = {name: policy_entry(name, tuple(self._actions)) for name in policies}

@@ -2,8 +2,17 @@ import numpy as np
 import pytest
 
 from gpca.encoders.registry import EncoderSettings
-from gpca.experiments.recovery.loop_explainers import learn_explainers
+from gpca.recovery.answers import as_shares, learn_explainers
 from gpca.uncertainty.settings import UncertaintySettings
+
+
+def test_signed_scores_become_shares():
+    shares = as_shares(np.array([[0.2, 0.3, 0.5]]))
+    assert shares.tolist() == [[0.2, 0.3, 0.5]]
+    signed = as_shares(np.array([[-1.0, 0.0, 2.0]]))
+    assert signed.sum() == pytest.approx(1)
+    assert signed[0].argmax() == 2
+
 
 ENCODER = EncoderSettings(draw_points=32, draws=1, epochs=1, batch_size=12, options={"k": 4, "point_features": 16})
 SETTINGS = {"gpca": {"iterations": 5, "inducing": 4, "draws": 20}}

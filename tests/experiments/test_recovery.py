@@ -7,18 +7,21 @@ import pandas as pd
 import pytest
 
 from gpca.errors import InputError
+from gpca.evaluation.measures import AGAINST, KEYS, NUMBERS, tidy
 from gpca.evaluation.measures import COLUMNS as INTERVALS
-from gpca.evaluation.measures import tidy
-from gpca.experiments.recovery.curves import draw_recovery_costs, draw_recovery_thresholds, losses
-from gpca.experiments.recovery.differences import COLUMNS
-from gpca.experiments.recovery.example_figure import draw_recovery_example
-from gpca.experiments.recovery.figures import draw_mitigation, draw_queued_labels, draw_recovery_rates
-from gpca.experiments.recovery.tables import table8_recovery
+from gpca.experiments.recovery import table8_recovery, titles_of_policies
+from gpca.experiments.recovery_curves import (
+    losses,
+    queued_labels,
+    recovery_costs,
+    recovery_rates,
+    recovery_thresholds,
+)
+from gpca.experiments.recovery_example import fig1_recovery_example, fig6_mitigation
 from gpca.io.arrays import save_arrays
 from gpca.pairs.perturbation import CONCEPTS
+from tests.experiments.test_recovery_measures import run_of
 
-TITLE = "Tables, YCB"
-POLICIES = {"gpca": "GP-CA", "random": "Random action", "absent": "Absent"}
 POLICY = {
     "thresholds": {"uncertain": 0.25, "dominant": 0.4, "improvement": 0.1, "attempts": 3},
     "treatments": {"noise": "denoise", "pose": "reinitialize", "overlap": "new_view"},
@@ -64,7 +67,7 @@ def intervals():
                 ("recovery", "recovery", policy, metric, cause, 2, 10, samples, value, value - 0.2, value + 0.1)
                 for metric, value in values.items()
             ]
-    return pd.DataFrame(rows, columns=[*INTERVALS])
+    return pd.DataFrame(rows, columns=[*INTERVALS]).assign(against="", other="")
 
 
 @pytest.fixture
@@ -74,12 +77,15 @@ def differences():
         for metric in ("recovered_within_1", "recovered_within_3")
         for against in ("sequence", "error")
     ]
-    rows = [("gpca", *key, "random", 2, 24, 0.125 * n, -0.1, 0.4) for n, key in enumerate(keys)]
-    return pd.DataFrame(rows, columns=[*COLUMNS])
+    rows = [
+        ("recovery", "recovery", "gpca", metric, "all", against, "random", 2, 10, 24, 0.125 * n, -0.1, 0.4)
+        for n, (metric, against) in enumerate(keys)
+    ]
+    return pd.DataFrame(rows, columns=[*KEYS, *AGAINST, *NUMBERS])
 
 
 def test_table8_pools_the_seeds_and_holds_the_bounds_over_tables(metrics, intervals, differences):
-    table = table8_recovery(metrics, intervals, differences, {"gpca": 0.25}, TITLE, POLICIES, 3, 0.03)
+    table = table8_recovery(run_of(), metrics, intervals, differences, {"gpca": 0.25})
     assert [labels[0][0] for labels in table.rows] == ["gpca", "random"]
     cell = table.cells[0, "recovered_within_1"]
     assert (cell.mean, cell.test_samples) == (pytest.approx(50), 24)
@@ -99,7 +105,7 @@ def test_table8_pools_the_seeds_and_holds_the_bounds_over_tables(metrics, interv
     }
     text = table.markdown()
     assert "24 failures over 2 seeds: 8 by noise among 80 registrations" in text
-    assert TITLE in text
+    assert "Tables of the virtual camera, Tiny" in text
     assert "| GP-CA | **50.0 (30.0 to 60.0)** |" in text
     assert "| 25 (5 to 35) |" in text  # the share of good registrations that are acted on has an interval
     for told in (
@@ -109,37 +115,38 @@ def test_table8_pools_the_seeds_and_holds_the_bounds_over_tables(metrics, interv
     ):
         assert told in text
     with pytest.raises(InputError, match="has nothing to show"):
-        table8_recovery(metrics, intervals, differences, {}, TITLE, {"absent": "Absent"}, 3, 0.03)
+        table8_recovery(run_of("oracle"), metrics, intervals, differences, {})
 
 
 def test_rates_are_drawn(metrics, same_bytes):
-    image = same_bytes(lambda: draw_recovery_rates(metrics, TITLE, POLICIES, 3))
+    image = same_bytes(lambda: recovery_rates(run_of(), metrics))
     assert np.ptp(image) > 100
     with pytest.raises(InputError, match="have no recovery rates"):
-        draw_recovery_rates(metrics, TITLE, {"absent": "Absent"}, 3)
+        recovery_rates(run_of("oracle"), metrics)
 
 
 def test_thresholds_and_costs_are_drawn_for_the_policies_that_there_are(metrics, same_bytes):
-    titles = {"gpca_acting": "GP-CA, never queued", "error_only": "Error only", "always_denoise": "Always: denoise"}
+    run = run_of("gpca_acting", "error_only", "always_denoise")
+    titles = titles_of_policies(run)
     methods = {"gpca": "gpca_acting", "random": "error_only"}
     renamed = metrics.assign(method=metrics["method"].map(methods))
     fixed = renamed[renamed["method"] == "error_only"].assign(method="always_denoise")
     both = pd.concat([renamed, fixed])
-    by_limit = draw_recovery_thresholds(both, TITLE, titles, 3, (0.02, 0.1), 0.03)
+    by_limit = recovery_thresholds(run, both)
     assert [text.get_text() for text in by_limit.legends[0].get_texts()] == [
         titles["gpca_acting"],
         titles["always_denoise"],
     ]
     assert "failures: 24 at 2 %, 24 at 10 %" in by_limit.get_suptitle()
-    by_factor = draw_recovery_costs(both, TITLE, titles, 3, 0.2)
+    by_factor = recovery_costs(run, both)
     assert [text.get_text() for text in by_factor.legends[0].get_texts()] == [
         titles["error_only"],
         titles["always_denoise"],
     ]
-    assert np.ptp(same_bytes(lambda: draw_recovery_costs(both, TITLE, titles, 3, 0.2))) > 100
-    for draw, last in ((draw_recovery_thresholds, ((0.02,), 0.03)), (draw_recovery_costs, (0.2,))):
+    assert np.ptp(same_bytes(lambda: recovery_costs(run, both))) > 100
+    for draw in (recovery_thresholds, recovery_costs):
         with pytest.raises(InputError, match="have no recovery rates"):
-            draw(metrics, TITLE, {"absent": "Absent"}, 3, *last)
+            draw(run_of("oracle"), metrics)
 
 
 def test_a_loss_by_hand(metrics):
@@ -149,16 +156,16 @@ def test_a_loss_by_hand(metrics):
 
 
 def test_rates_by_cause_say_of_how_many_failures_they_are(metrics):
-    _, by_cause = draw_recovery_rates(metrics, TITLE, POLICIES, 3).axes
+    _, by_cause = recovery_rates(run_of(), metrics).axes
     assert [text.get_text() for text in by_cause.get_legend().get_texts()] == [f"{c} ($n$ = 8)" for c in CONCEPTS]
 
 
 def test_the_mapping_is_drawn_from_the_thresholds(tmp_path, same_bytes):
     path = tmp_path / "policy.json"
     path.write_text(json.dumps(POLICY))
-    first = same_bytes(lambda: draw_mitigation(TITLE, path))
+    first = same_bytes(lambda: fig6_mitigation(run_of(), path))
     path.write_text(json.dumps(POLICY | {"thresholds": POLICY["thresholds"] | {"uncertain": 0.125}}))
-    assert (same_bytes(lambda: draw_mitigation(TITLE, path)) != first).any()
+    assert (same_bytes(lambda: fig6_mitigation(run_of(), path)) != first).any()
 
 
 @pytest.fixture
@@ -174,8 +181,8 @@ def queues():
 
 
 def test_both_orders_of_queued_cases_have_a_band_and_the_axis_ends_above_them(queues):
-    figure = draw_queued_labels(queues, TITLE, POLICIES)
-    assert [text.get_text() for text in figure.texts] == [f"{TITLE}: judged on 24 failures"]
+    figure = queued_labels(run_of(), queues)
+    assert [text.get_text() for text in figure.texts] == ["Tables of the virtual camera, Tiny: judged on 24 failures"]
     assert len(figure.legends[0].get_texts()) == 2
     for panel in figure.axes:
         assert len(panel.collections) == 2
@@ -183,8 +190,8 @@ def test_both_orders_of_queued_cases_have_a_band_and_the_axis_ends_above_them(qu
 
 
 def test_what_queued_cases_teach_is_drawn(queues, same_bytes):
-    image = same_bytes(lambda: draw_queued_labels(queues, TITLE, POLICIES))
-    flat = same_bytes(lambda: draw_queued_labels(queues.assign(error=0.5), TITLE, POLICIES))
+    image = same_bytes(lambda: queued_labels(run_of(), queues))
+    flat = same_bytes(lambda: queued_labels(run_of(), queues.assign(error=0.5)))
     assert (image != flat).any()
 
 
@@ -207,8 +214,8 @@ def test_the_example_is_drawn_and_one_without_its_second_view_refused(tmp_path, 
         placed = np.roll(mask, 8 if view == "first" else 1, axis=1)
         arrays |= {f"image_{view}": image, f"mask_{view}": mask, f"true_{view}": mask, f"placed_{view}": placed}
     save_arrays(tmp_path / "example.npz", arrays)
-    shown = same_bytes(lambda: draw_recovery_example(TITLE, tmp_path / "example.npz", 0.03))
+    shown = same_bytes(lambda: fig1_recovery_example(run_of(), tmp_path / "example.npz"))
     assert np.ptp(shown) > 100
     save_arrays(tmp_path / "half.npz", {name: a for name, a in arrays.items() if not name.endswith("_next")})
     with pytest.raises(InputError, match="_next' is missing"):
-        draw_recovery_example(TITLE, tmp_path / "half.npz", 0.03)
+        fig1_recovery_example(run_of(), tmp_path / "half.npz")

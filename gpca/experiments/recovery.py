@@ -1,0 +1,279 @@
+"""Policies of recovery from failed registrations, in a closed loop on tables of a virtual camera (Table VIII)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from math import inf
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from pydantic import Field
+
+from gpca.encoders.registry import EncoderChanges
+from gpca.errors import InputError, require_names, with_key
+from gpca.experiments.experiment import Experiment, LeftOut, Names
+from gpca.experiments.plan import Run
+from gpca.experiments.recovery_measures import ERROR, SEQUENCE, pool_share
+from gpca.experiments.result import table
+from gpca.explainers.registry import explainer_entry, require_settings
+from gpca.frames.camera import Camera
+from gpca.frames.initial_pose import InitialPoseSettings
+from gpca.frames.situations import SituationSettings
+from gpca.io.csv_file import numbers as number_column
+from gpca.io.csv_file import read_csv
+from gpca.objects.entry import SurfacePoints
+from gpca.pairs.perturbation import CONCEPTS, Hidden
+from gpca.pairs.synthesis import TestSamples, TrainSamples
+from gpca.recovery.actions import ACTIONS, action_of
+from gpca.recovery.policies import named_policies, policies, policy_entry
+from gpca.recovery.policy import Thresholds
+from gpca.recovery.settings import LoopSettings
+from gpca.reporting.sheet import Row, Sheet, show
+from gpca.reporting.tables.builder import over_clusters
+from gpca.reporting.tables.cells import plain_cell
+from gpca.reporting.tables.table import Table
+from gpca.reporting.words import plural
+from gpca.settings import Bounds, Count, Distinct, Keys, NotNegative, Share, changes_of, part_of
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+SECTION = "V Robotic deployment for action recovery"
+DECLARED = ("uncertain", "dominant", "improvement")  # thresholds of the config; null leaves one to the calibration
+AGAINST = {SEQUENCE: "best sequence", ERROR: "error only"}
+SECONDS = ("explanation_seconds", "action_seconds")
+
+
+@dataclass(frozen=True)
+class DeclaredThresholds:
+    """When a policy takes which branch; without `uncertain` the calibration samples set it, by `queued_share`."""
+
+    uncertain: NotNegative | None
+    queued_share: Annotated[float, Bounds(minimum=0, exclusiveMaximum=1)]
+    dominant: Share
+    improvement: Share
+
+
+@dataclass(frozen=True)
+class Gate:
+    """How many of the good registrations gated policies may act on."""
+
+    false_alarms: Annotated[float, Bounds(exclusiveMinimum=0, exclusiveMaximum=1)]
+
+
+@dataclass(frozen=True)
+class Estimator(InitialPoseSettings):
+    """The settings of the robot's pose estimate."""
+
+    form: Literal["global_registration"] = "global_registration"
+
+
+@dataclass(frozen=True)
+class RecoverySettings:
+    """Recovery from failed registrations, in a closed loop on tables of the virtual camera."""
+
+    objects: str
+    policies: Distinct[str]
+    treatments: Annotated[dict, Keys(dict.fromkeys(CONCEPTS, str), required=CONCEPTS)]
+    actions: Annotated[dict[str, dict | None], Field(min_length=1)]  # an action checks its settings itself
+    costs: dict[str, Share]
+    needless: Share
+    thresholds: DeclaredThresholds
+    gate: Gate
+    rehearsals: Count
+    loop: Annotated[dict, part_of(LoopSettings, without=("success", "cloud_points", "icp"))]
+    train: TrainSamples
+    calibration: TestSamples
+    remedied: TestSamples
+    tables: Count
+    camera: Camera
+    noise_scale: tuple[NotNegative, NotNegative]
+    hidden: tuple[Hidden, Hidden]
+    estimator: Annotated[dict, changes_of(Estimator, without=("rotation_deg", "translation"))]
+    model_points: SurfacePoints
+    encoder: EncoderChanges
+
+
+def check(config: dict, left_out: LeftOut) -> None:
+    """Check the actions, the concepts that they treat, the policies, thresholds and ranges."""
+    section = config["recovery"]
+    require_names("recovery.objects", [section["objects"]], config["sources"], "source", left_out("sources"))
+    for name, settings in section["actions"].items():
+        with_key(f"recovery.actions.{name}", action_of, name, settings or {})
+    require_names("recovery.costs", list(section["costs"]), ACTIONS, "action")
+    for action in section["actions"]:
+        if action not in section["costs"]:
+            raise InputError("config key recovery.costs", f"lacks the action '{action}'", "give every action a cost")
+    for concept, action in section["treatments"].items():
+        key = f"recovery.treatments.{concept}"
+        require_names(key, [action], section["actions"], "action", left_out("recovery.actions"))
+    if len(set(section["treatments"].values())) < len(section["treatments"]):
+        fault = "one action treats two concepts"
+        raise InputError("config key recovery.treatments", fault, "give each concept its own")
+    for name in section["policies"]:
+        explainer = with_key("recovery.policies", policy_entry, name, tuple(section["actions"])).explainer
+        if explainer:
+            settings = config["explainers"].get(explainer) or {}
+            with_key(f"explainers.{explainer}", require_settings, explainer, settings)
+            if design := explainer_entry(explainer).design:
+                key = f"recovery.policies.{name}"
+                require_names(key, [design], config["uncertainty"], "uncertainty", left_out("uncertainty"))
+    thresholds = {name: section["thresholds"][name] for name in DECLARED}
+    thresholds = {name: value for name, value in thresholds.items() if value is not None}
+    with_key("recovery.thresholds", lambda: Thresholds(**thresholds))
+    ranges: dict[str, Any] = {name: tuple(section[name]) for name in ("noise_scale", "hidden")}
+    with_key("recovery", lambda: SituationSettings(**ranges))
+
+
+def policies_without(left_out: LeftOut) -> set[str]:
+    """Policies that go with the actions and the uncertainty that the config leaves out."""
+    designs = left_out("uncertainty")
+    reading = {name: entry.explainer for name, entry in named_policies().items() if entry.explainer}
+    actions = [action for action in ACTIONS if action not in left_out("recovery.actions")]
+    return {
+        *(policies(tuple(ACTIONS)).keys() - policies(actions).keys()),
+        *(name for name, explainer in reading.items() if explainer_entry(explainer).design in designs),
+    }
+
+
+def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
+    """Policies that learn, from rehearsals or from a person's labels."""
+    recovery = config["recovery"]
+    entries = {name: policy_entry(name, tuple(recovery["actions"])) for name in recovery["policies"]}
+    return {"learning_policy": [name for name, entry in entries.items() if entry.learns or entry.queues]}
+
+
+def shown(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
+    """Titles of policies, treatments, thresholds, and the number of actions, for results of other experiments."""
+    recovery = config["recovery"]
+    return {
+        "policies": {name: policy_entry(name, tuple(recovery["actions"])).title for name in recovery["policies"]},
+        "treatments": recovery["treatments"],
+        "policy_thresholds": recovery["thresholds"],
+        "budget": recovery["loop"]["budget"],
+    }
+
+
+EXPERIMENT = Experiment(
+    name="recovery",
+    beside=("recovery_measures", "recovery_example", "recovery_curves"),
+    sections={"recovery": RecoverySettings},
+    names=names,
+    shown=shown,
+    check=check,
+    leavable={"recovery.actions": Names("action", lambda: ACTIONS)},
+    switches={"recovery.policies": Names("policy", lambda: policies(tuple(ACTIONS)))},
+    lists={"recovery.policies": policies_without},
+)
+
+
+def mean_seconds(files: Iterable[str | Path]) -> dict[str, float]:
+    """Policy -> mean seconds of a failure, of explaining and acting, over all files of seconds."""
+    import pandas as pd
+
+    parts = []
+    for path in files:
+        rows = read_csv(path, ("episode", "failed", "policy", *SECONDS), others=("step",))
+        rows = rows[rows["failed"] == "True"]
+        rows["seconds"] = sum(number_column(path, rows, name) for name in SECONDS)
+        parts.append(rows.groupby(["policy", "episode"])["seconds"].sum())
+    if not parts:
+        raise InputError("recovery", "no timing files were given", "run the step recover")
+    return pd.concat(parts).groupby(level="policy").mean().to_dict()
+
+
+@table(
+    SECTION,
+    "Table VIII: recovery by policy",
+    """The share of failed registrations that each policy repairs with the same number of actions, and the share of good
+    registrations that it acts on: GP-CA's policies against fixed sequences of actions, a policy that knows only
+    that the pose is wrong, random ones and the oracle, on the same failures. The objects are on rendered tables,
+    seen by the virtual depth camera. The paper shows recovery only in a video.""",
+    after="fig6_mitigation",
+    metrics="recovery.csv",
+    intervals="recovery_intervals.csv",
+    differences="recovery_differences.csv",
+    seconds=(mean_seconds, "timings/recovery/seed{seed}.csv"),
+)
+def table8_recovery(
+    run: Run, metrics: pd.DataFrame, intervals: pd.DataFrame, differences: pd.DataFrame, seconds: Mapping[str, float]
+) -> Table:
+    """Recovery within 1 to `budget` actions, alone and against rivals, and the good ones acted on: policies."""
+    import pandas as pd
+
+    budget, seeds = run.config["recovery"]["loop"]["budget"], metrics["seed"].nunique()
+    within = {f"recovered_within_{k}": show(f"recovered_within_{k}", f"Within {k} (%)") for k in range(1, budget + 1)}
+    first, last = "recovered_within_1", f"recovered_within_{budget}"
+    plain: dict[str, Any] = {"decimals": 0, "interval": False}
+    apart: dict[str, Any] = {"interval": False, "limits": (0, inf)}
+    columns = {
+        **within,
+        "acted_nominal": show("acted_nominal", "Acts on good (%)", decimals=0, least_is_best=True),
+        **{
+            f"{metric}_{against}": show(
+                metric,
+                f"{metric.rpartition('_')[2]}: to {words} (points)",
+                where={"against": against},
+                limits=(-100, 100),
+            )
+            for against, words in AGAINST.items()
+            for metric in (first, last)
+        },
+        **{f"{last}_{cause}": show(last, f"{cause.capitalize()} (%)", cause, **plain) for cause in CONCEPTS},
+        "queued": show("queued", "Queued (%)", **plain),
+        "left_alone": show("left_alone", "Taken for good (%)", least_is_best=True, **plain),
+        "cost": show("cost", "Cost", decimals=3, **apart),
+        "seconds": show("seconds", "Seconds", decimals=2, **apart),
+    }
+    rows = [Row([(name, title)], {"method": name}) for name, title in titles_of_policies(run).items()]
+    sheet = Sheet("table8_recovery", {"policy": "Policy"}, rows, columns, pd.concat([intervals, differences]))
+    for i, row in enumerate(sheet.rows):
+        policy, failures = row.where["method"], sheet.cells[i, first].test_samples
+        if mean := pool_share(metrics, policy, "cost"):
+            sheet.cells[i, "cost"] = plain_cell(mean[0], seeds, failures)
+        if policy in seconds:
+            sheet.cells[i, "seconds"] = plain_cell(seconds[policy], seeds, failures)
+    failures = sheet.cells[0, first].test_samples
+    good = max((cell.test_samples for (_, key), cell in sheet.cells.items() if key == "acted_nominal"), default=0)
+    notes = (
+        f"{failures} failures over {plural(seeds, 'seed')}: {failure_counts(metrics)}. A failure is a pose off by "
+        f"{100 * run.config['success']['error']:g} % of the diameter or more (ADD; ADD-S for symmetric objects) that "
+        "is not off without "
+        f"its cause. {over_clusters(seeds, clusters=('rendered tables', 'table'))}. Bold: best of a column.",
+        f"Acts on good: of {good} registrations on the same tables whose pose is right, those that the policy "
+        "would change. Policies that are told that a pose is wrong change all; the oracle is told of these too.",
+        f"To best sequence, to error only: paired differences of the shares within 1 and within {budget} actions, "
+        "with the 95 % interval of a bootstrap over tables and seeds that draws each failure for both. The best "
+        "sequence is the fixed one, repeats of one action included, that does best on these very failures. "
+        "Error only is the order that was best on the rehearsals: it knows that the pose is wrong, not why. "
+        "Policies that recognize failures themselves are compared with its gated form, which has to as well.",
+        f"Noise, Pose, Overlap: by cause, within {budget} actions. Queued: left to a person instead. Taken for "
+        "good: failures that the policy leaves as they are. Cost: of all actions on a failure, mean; the config "
+        "sets that of each action, and a repaired pose is worth 1. Seconds: of explaining, acting and registering, "
+        "per failure; the camera's and the robot's own times are not in them.",
+    )
+    return sheet.table(f"Failed registrations recovered (%): {tables_title(run)}", "metric", notes, bold=within)
+
+
+def titles_of_policies(run: Run) -> dict[str, str]:
+    """Title of each policy of the run."""
+    recovery = run.config["recovery"]
+    actions = tuple(recovery["actions"])
+    return run.titles(lambda name: policy_entry(name, actions), recovery["policies"])
+
+
+def tables_title(run: Run) -> str:
+    """Title of the tables and of the objects on them."""
+    return f"Tables of the virtual camera, {run.source_titles[run.config['recovery']['objects']]}"
+
+
+def failure_counts(metrics: pd.DataFrame) -> str:
+    """How many failures of how many registrations there are by cause, in words."""
+    rows = metrics[metrics["method"] == metrics["method"].iloc[0]]
+    parts = []
+    for cause in CONCEPTS:
+        of_cause = rows[rows["concept"] == cause]
+        failures, tries = (of_cause[of_cause["metric"] == m]["value"].sum() for m in ("episodes", "tries"))
+        parts.append(f"{failures:.0f} by {cause} among {tries:.0f} registrations")
+    return ", ".join(parts)

@@ -1,0 +1,257 @@
+"""Measures of policies of recovery: by seed, over all seeds with intervals, and their paired differences."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gpca.evaluation.intervals import Clustered, wilson_interval
+from gpca.evaluation.measures import ALL, Measure, Parts, intervals, over_seeds, tidy
+from gpca.experiments.plan import Run
+from gpca.experiments.result import numbers
+from gpca.io.csv_file import numbers as number_column
+from gpca.io.csv_file import read_csv, read_numbers
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.recovery.policies import ERROR_ONLY, is_fixed, policy_entry
+from gpca.recovery.policy import NOTHING, QUEUE, QUEUE_COLUMNS
+from gpca.seeds import seed_of_file
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+TABLE = "recovery"  # `table` and `source` of the rows
+ERRORS = ("error_before", "error_after")
+RECOVERY_COLUMNS = ("episode", "cause", "table", "policy", "step", "action", "failed", *ERRORS, "recovered", "tries")
+CASE = ["seed", "table", "episode"]
+FIRST = "first_"  # with an action or the queue behind it, a metric of the confusion
+AT = "_at_"  # with a limit in % of the diameter behind it, by which a pose is right in place of the run's own
+WEIGHTS = {"wrong_first": "acted_first", "acted_nominal": "nominal", "cost_nominal": "nominal"}
+SEQUENCE, ERROR = "sequence", "error"  # kinds of rivals
+FILES = "recovery/seed{seed}.csv"
+
+
+def read_recovery(path: str | Path) -> pd.DataFrame:
+    """Read a file of the step ``recover``: numbers as numbers, `failed` and `recovered` as booleans, and its seed."""
+    rows = read_csv(path, RECOVERY_COLUMNS, ("object", "symmetric", "concept", "score_*", "bald"))
+    for name in ("episode", "table", "step", "tries"):
+        rows[name] = number_column(path, rows, name).astype(int)
+    for name in ERRORS:
+        rows[name] = number_column(path, rows, name)
+    booleans = {name: rows[name] == "True" for name in ("failed", "recovered")}
+    return rows.assign(**booleans, seed=seed_of_file(path))
+
+
+def is_action(rows: pd.DataFrame) -> pd.Series:
+    """Which rows are of an action, as booleans."""
+    return ~rows["action"].isin((QUEUE, NOTHING))
+
+
+@numbers("recovery.csv", files=FILES)
+def collect(run: Run, files: Iterable[str | Path]) -> pd.DataFrame:
+    """Measures by policy, cause and seed; results/README.md lists them."""
+    recovery, curve = run.config["recovery"], run.config["success"]["curve"]
+    treatments, costs, budget = dict(recovery["treatments"]), dict(recovery["costs"]), recovery["loop"]["budget"]
+    records = []
+    for path in files:
+        rows = read_recovery(path)
+        for policy, of_policy in rows.groupby("policy", sort=False):
+            for cause in (ALL, *CONCEPTS):
+                subset = of_policy if cause == ALL else of_policy[of_policy["cause"] == cause]
+                if not subset["failed"].any():
+                    continue
+                values = policy_metrics(subset, treatments, costs, budget)
+                values |= metrics_at(subset, budget, curve) if cause == ALL else {}
+                keys, seed = (TABLE, TABLE, policy), rows["seed"].iloc[0]
+                records += [(*keys, metric, cause, seed, float(value)) for metric, value in values.items()]
+    return tidy(records, "recovery")
+
+
+def policy_metrics(
+    rows: pd.DataFrame, treatments: Mapping[str, str], costs: Mapping[str, float], budget: int
+) -> dict[str, float]:
+    """Measures of one policy on the failures among the rows, and how often it acts on the others.
+
+    Args:
+        treatments: concept -> its action.
+        costs: action -> its cost, in right poses.
+        budget: actions per failure.
+    """
+
+    def mean_cost(rows: pd.DataFrame, registrations: int) -> float:
+        return float(rows["action"].map(costs).sum() / registrations)
+
+    fine, rows = rows[~rows["failed"]], rows[rows["failed"]]
+    first = rows[rows["step"] == 1]
+    acted = first[is_action(first)]
+    episodes = first["episode"].nunique()
+    values = {
+        f"recovered_within_{k}": rows[rows["recovered"] & (rows["step"] <= k)]["episode"].nunique() / episodes
+        for k in range(1, budget + 1)
+    }
+    values |= {"episodes": episodes, "acted_first": len(acted), "tries": first.groupby("cause")["tries"].first().sum()}
+    if len(acted):
+        values["wrong_first"] = float((acted["action"] != acted["cause"].map(treatments)).mean())
+    values["queued"] = rows[rows["action"] == QUEUE]["episode"].nunique() / episodes
+    values["left_alone"] = float((first["action"] == NOTHING).mean())
+    values["actions"] = float(is_action(rows).sum() / episodes)
+    values["cost"] = mean_cost(rows, episodes)
+    values["nominal"] = len(fine)
+    if len(fine):
+        values |= {"acted_nominal": float(is_action(fine).mean()), "cost_nominal": mean_cost(fine, len(fine))}
+    counts = first["action"].value_counts()
+    return values | {FIRST + action: counts.get(action, 0) for action in (*treatments.values(), QUEUE)}
+
+
+def metrics_at(rows: pd.DataFrame, budget: int, curve: Iterable[float]) -> dict[str, float]:
+    """Shares recovered by other limits of a right pose, each of the failures that are failures by it too.
+
+    A policy that stopped at a pose that is right by the run's own limit would have stopped there, or before, by a wider
+    one; by a narrower one it might have gone on, so that its share is a lower bound.
+    """
+    rows = rows[rows["failed"]]
+    first = rows[rows["step"] == 1]
+    values: dict[str, float] = {}
+    for limit in curve:
+        failures = first[first["error_before"] >= limit]["episode"]
+        values[at("failures", limit)] = len(failures)
+        if not len(failures):
+            continue
+        right = rows[rows["episode"].isin(failures) & (rows["error_after"] < limit)]
+        for k in range(1, budget + 1):
+            solved = right[right["step"] <= k]["episode"].nunique()
+            values[at(f"recovered_within_{k}", limit)] = solved / len(failures)
+    return values
+
+
+def at(metric: str, limit: float) -> str:
+    """Name of a metric by another limit of a right pose, such as ``failures_at_5`` for 5 %."""
+    return f"{metric}{AT}{100 * limit:g}"
+
+
+def pool_share(metrics: pd.DataFrame, policy: str, metric: str, concept: str = ALL) -> tuple[float, int] | None:
+    """Share over the failures of all seeds, and their number; None where the metrics hold none.
+
+    A wrong first action is a share of the failures that were acted on at all, an action on what did not fail one of
+    those registrations, and a share by another limit one of the failures by that limit.
+    """
+    limit = metric.partition(AT)[2]
+    weight = f"failures{AT}{limit}" if limit else WEIGHTS.get(metric, "episodes")
+    rows = metrics[(metrics["method"] == policy) & (metrics["concept"] == concept)]
+    share_R, count_R = (rows[rows["metric"] == name].set_index("seed")["value"] for name in (metric, weight))
+    if share_R.empty:
+        return None
+    weight_R = count_R[share_R.index]
+    return float((share_R * weight_R).sum() / weight_R.sum()), int(weight_R.sum())
+
+
+@numbers("recovery_intervals.csv", files=FILES)
+def collect_intervals(run: Run, files: Iterable[str | Path]) -> pd.DataFrame:
+    """Shares of failures, of all and by cause, and ``acted_nominal`` of the good registrations, over all seeds.
+
+    A cluster is a rendered table of a seed; the draws are the same for all policies.
+    """
+    import pandas as pd
+
+    rows = _read_all(files)
+    within = {
+        f"recovered_within_{k}": Measure(lambda cases, k=k: cases["step"] <= k)
+        for k in range(1, run.config["recovery"]["loop"]["budget"] + 1)
+    }
+    left_alone = Measure(lambda cases: cases["first"] == NOTHING)
+    shares = {"queued": Measure("queued"), **within, "left_alone": left_alone}
+    failures, good = rows[rows["failed"]], rows[~rows["failed"]].reset_index(drop=True)
+    step = failures["step"].where(failures["recovered"], np.inf)
+    cases = failures.assign(recovered=step, queued=failures["action"] == QUEUE)
+    cases = cases.groupby(["method", *CASE, "cause"], sort=False)
+    cases = cases.agg(step=("recovered", "min"), queued=("queued", "any"), first=("action", "first")).reset_index()
+
+    def by_cause(cases: pd.DataFrame) -> Parts:
+        masks = {cause: (cases["cause"] == cause).to_numpy() for cause in CONCEPTS}
+        return {ALL: np.ones(len(cases), bool)} | masks
+
+    parts = [_over_seeds(cases, by_cause, shares)]
+    if len(good):
+        parts.append(
+            _over_seeds(good, lambda rows: {ALL: np.ones(len(rows), bool)}, {"acted_nominal": Measure(is_action)})
+        )
+    order = {name: place for place, name in enumerate(rows["method"].unique())}
+    return pd.concat(parts).sort_values("method", key=lambda names: names.map(order), kind="stable")
+
+
+@numbers("recovery_differences.csv", files=FILES)
+def collect_differences(run: Run, files: Iterable[str | Path]) -> pd.DataFrame:
+    """Paired differences of the shares that policies recover: `against` the best ``sequence``, or ``error`` only.
+
+    The first is the best fixed sequence, repeats of one action included, by the same number of actions on the same
+    failures, in hindsight; the second the order that was best on the rehearsals: gated for a policy that has to
+    recognize failures itself.
+    """
+    recovery = run.config["recovery"]
+    actions = list(recovery["actions"])
+    rows = _read_all(files)
+    steps = steps_of(rows[rows["failed"]])
+    seeds, tables, _ = zip(*steps.index, strict=True)
+    draws = Clustered.drawn(seeds, _clusters(seeds, tables), "recovery differences")
+    fixed = [name for name in steps.columns if is_fixed(name, actions)]
+    records = []
+    for k in range(1, recovery["loop"]["budget"] + 1):
+        solved = {name: (steps[name] <= k).to_numpy(float) for name in steps.columns}
+        best = max(fixed, key=lambda name: solved[name].sum(), default="")
+        for name in solved:
+            rivals = {SEQUENCE: best, ERROR: ERROR_ONLY[policy_entry(name, actions).told]}
+            for against, other in rivals.items():
+                if other in solved and other != name:
+                    keys = (TABLE, TABLE, name, f"recovered_within_{k}", ALL, against, other)
+                    records.append(draws.record(keys, draws.difference(solved[name], solved[other])))
+    return intervals(records, "recovery")
+
+
+def steps_of(failures: pd.DataFrame) -> pd.DataFrame:
+    """After how many actions each failure (seed, table, episode) was recovered, or inf, by policy in columns."""
+    step = failures["step"].where(failures["recovered"], np.inf)
+    return step.groupby([*(failures[name] for name in CASE), failures["policy"]], sort=False).min().unstack()
+
+
+def read_queues(files: Iterable[str | Path]) -> pd.DataFrame:
+    """``policy, order, labels, failures, error, low, high``: shares of the failures of all seeds.
+
+    Only numbers of labels that every seed has are kept. Of random orders it is the mean; the bounds are Wilson's, as if
+    each failure were judged once.
+
+    Raises:
+        InputError: a missing column, or no rows.
+    """
+    import pandas as pd
+
+    parts = []
+    for path in files:
+        rows = read_numbers(path, QUEUE_COLUMNS, QUEUE_COLUMNS[2:])
+        mean = rows.groupby(["policy", "order", "labels"], sort=False)[["failures", "unsolved"]].mean()
+        parts.append(mean.reset_index())
+    grouped = pd.concat(parts).groupby(["policy", "order", "labels"], sort=False)
+    together = grouped[["failures", "unsolved"]].sum()[grouped.size() == len(parts)].reset_index()
+    shares = [wilson_interval(row.unsolved, int(row.failures)) for row in together.itertuples()]
+    together[["low", "high"]] = pd.DataFrame(shares, index=together.index)
+    return together.assign(error=together["unsolved"] / together["failures"]).drop(columns="unsolved")
+
+
+def _read_all(files: Iterable[str | Path]) -> pd.DataFrame:
+    import pandas as pd
+
+    parts = [read_recovery(path) for path in files]
+    if not parts:
+        return intervals([], "recovery")
+    rows = pd.concat(parts, ignore_index=True)
+    return rows.assign(method=rows["policy"])
+
+
+def _over_seeds(cases: pd.DataFrame, parts, measures: Mapping[str, Measure]) -> pd.DataFrame:
+    draws = Clustered.drawn(cases["seed"], _clusters(cases["seed"], cases["table"]), "recovery intervals")
+    return over_seeds(cases.assign(table=TABLE, source=TABLE), parts, measures, draws)
+
+
+def _clusters(seeds: Sequence, tables: Sequence) -> list[str]:
+    return [f"{seed}/{table}" for seed, table in zip(seeds, tables, strict=True)]

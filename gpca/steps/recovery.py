@@ -1,0 +1,255 @@
+"""Step ``recover``: failures on virtual tables, every policy's recovery from them, and one failure as pictures."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gpca.alignment.rigid import inverse
+from gpca.errors import InputError
+from gpca.frames.camera import MeshScene, shade
+from gpca.frames.dataset import simplified
+from gpca.frames.initial_pose import InitialPoseSettings
+from gpca.frames.rgbd_scene import TABLE_COLOR, model_color
+from gpca.frames.shots import Shot, best_viewpoint
+from gpca.frames.situations import REDRAWS, Shelf, Situation, Situations
+from gpca.io.arrays import save_arrays
+from gpca.io.csv_file import write_csv
+from gpca.io.files import Axes, whole_file
+from gpca.objects.source import data_files, resolve, surfaces
+from gpca.objects.surface import Surface
+from gpca.pairs.dataset import Registrations
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.pairs.synthesis import as_registrations
+from gpca.process.job import Job
+from gpca.process.progress import progress
+from gpca.process.provenance import record_provenance
+from gpca.recovery.actions import Action, action_of, look_around
+from gpca.recovery.answers import learn_explainers
+from gpca.recovery.chances import learn_utility
+from gpca.recovery.episodes import FEWEST_POINTS, Attempt, Episode, RobotIn, find_episodes, register_first
+from gpca.recovery.loop import Loop, Reenactor, calibrated_alarm
+from gpca.recovery.policies import Means, PolicyEntry, policy_entry
+from gpca.recovery.rehearsal import (
+    Rehearsal,
+    error_by_labels,
+    learners_of,
+    rehearse,
+    rehearsed_gate,
+    rehearsed_order,
+    robot_policy,
+    summary,
+)
+from gpca.recovery.settings import LoopSettings, RecoverySettings
+from gpca.seeds import generator
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+# Names every random number of this step, tables included. The number is that of the draw: on the tables and cases of
+# draw 1, results were seen between versions of the policies.
+SOURCE = "recovery 2"
+PARTS = ("train", "test", "rehearsals", "failures")  # no two share a table
+ACTION = "new_view"  # that the example shows
+
+
+def run(job: Job) -> None:
+    """Learn the classifier, rehearse, find failures and let every policy act on them."""
+    settings = RecoverySettings.from_sections(job.settings)
+    recovery = settings.section
+    loop = settings.loop
+    objects = resolve(dict(settings.objects), job.data_dir)
+    actions = {name: action_of(name, of_action or {}) for name, of_action in recovery["actions"].items()}
+    entries = [policy_entry(name, tuple(actions)) for name in recovery["policies"]]
+    outputs = [job.rows, job.timings, job.queue, job.policy, job.example]
+    axes = (SOURCE, job.seed)
+    with record_provenance(outputs, data_files(objects), job.settings, seed=job.seed):
+        tables = lay_tables(surfaces(objects, job.downloads), settings, *axes)
+        registered = register_situations(tables, recovery["train"], recovery["calibration"], loop)
+        explainers = learn_explainers(
+            [name for name in dict.fromkeys(entry.explainer for entry in entries) if name],
+            as_samples(registered),
+            settings.encoder,
+            settings.explainers,
+            settings.uncertainty,
+            recovery["remedied"],
+            *axes,
+        )
+        learning = any(e.learns or e.queues or e.rehearsed or e.gated or e.alarmed for e in entries)
+        rehearsals = replace(loop, failures=recovery["rehearsals"])
+        rehearsed = find_episodes(tables["rehearsals"], rehearsals) if learning else []
+        learner = next((entry.explainer for entry in entries if entry.learns or entry.queues), "")
+        explain = explainers.explain.get(learner)
+        rehearsal = rehearse(rehearsed, actions, learner, explain, loop) if explain else None
+        means = _means(recovery, entries, actions, registered, rehearsed, rehearsal, loop)
+        reenactor = Reenactor(settings.reenactment, settings.counterfactuals)
+        if any(entry.alarmed for entry in entries):
+            fresh = [*registered["train"], *registered["test"], *rehearsed]  # of which it has learned nothing
+            means = replace(means, alarm=calibrated_alarm(fresh, reenactor, recovery["gate"]["false_alarms"]))
+        content = summary(means, explainers)
+        print(json.dumps(content), file=sys.stderr)
+        with whole_file(job.policy) as partial:
+            partial.write_text(json.dumps(content, indent=1, sort_keys=True) + "\n", encoding="utf-8")
+        episodes = find_episodes(tables["failures"], loop)
+        rows, seconds = Loop(episodes, actions, explainers.explain, means, loop, axes, reenactor).run(
+            recovery["policies"]
+        )
+        judged = [episode for episode in episodes if episode.failed]
+        solved = [{name: episode.solved_by((name,), actions, loop) for name in actions} for episode in judged]
+        learners = learners_of(recovery["policies"], means, rehearsal, judged, explainers, loop.budget)
+        write_csv(job.queue, error_by_labels(learners, solved, rehearsal, axes))
+        write_csv(job.rows, rows)
+        write_csv(job.timings, seconds)
+        views = recovery["actions"].get(ACTION) or {}
+        save_example(job.example, episodes, rows, {ACTION: action_of(ACTION, views)} | actions, views, loop, axes)
+
+
+def _means(
+    recovery: Mapping,
+    entries: Sequence[PolicyEntry],
+    actions: Mapping[str, Action],
+    registered: Mapping[str, Sequence[Episode]],
+    rehearsed: Sequence[Episode],
+    rehearsal: Rehearsal | None,
+    loop: LoopSettings,
+) -> Means:
+    """What the policies are made from; what none of them needs is not learned."""
+    costs, failures = recovery["costs"], [episode for episode in rehearsed if episode.failed]
+    utility = order = gate = None
+    if rehearsal:
+        utility = learn_utility(rehearsal.trials.values(), costs, tuple(actions), recovery["needless"])
+    if any(entry.rehearsed for entry in entries):
+        order = rehearsed_order(failures, actions, costs, loop)
+    if any(entry.gated for entry in entries):
+        gate = rehearsed_gate({**registered, "rehearsals": rehearsed}, recovery["gate"]["false_alarms"])
+    return Means(robot_policy(recovery, rehearsal), tuple(actions), utility, order or (), gate)
+
+
+def lay_tables(
+    surfaces: Iterable[Surface], settings: RecoverySettings, source: str, seed: int
+) -> dict[str, Situations]:
+    """The situations of every part; source and seed name all that is random in them.
+
+    Raises:
+        InputError: an object is a cloud of points, which hides nothing.
+    """
+    surfaces = [simplified(surface) for surface in surfaces]
+    recovery = settings.section
+    shelf = Shelf(surfaces, source, recovery["model_points"], InitialPoseSettings(**recovery["estimator"]))
+    return {part: Situations(shelf, settings.situation, (source, seed, part)) for part in PARTS}
+
+
+def register_situations(
+    situations: Mapping[str, Situations], train: int, calibration: int, settings: LoopSettings
+) -> dict[str, list[Episode]]:
+    """Register situations of all causes, failed or not, from which explainers and the gate learn and are calibrated.
+
+    Episodes 3t to 3t + 2 of a split are of the three causes. The calibration samples are the split ``test``.
+
+    Args:
+        situations: those of ``train`` and ``test``, which share no table.
+
+    Raises:
+        InputError: the camera sees too little of the objects.
+    """
+    registered: dict[str, list[Episode]] = {"train": [], "test": []}
+    for split, count in (("train", train), ("test", calibration)):
+        for number in progress(range(count), f"situations of split {split}"):
+            cause = CONCEPTS[number % len(CONCEPTS)]
+            for redraw in range(REDRAWS):
+                situation, _ = situations[split].draw(cause, cause, number, redraw)
+                start = register_first(situation, settings.cloud_points, settings.icp)
+                if start is not None:
+                    break
+            else:
+                fault = f"{REDRAWS} views of its objects show fewer than {FEWEST_POINTS} points of them"
+                raise InputError("the virtual camera", fault, "give recovery.camera more pixels")
+            registered[split].append(Episode(number, situation, start, settings.success))
+    return registered
+
+
+def as_samples(registered: Mapping[str, Iterable[Episode]]) -> Registrations:
+    """The registrations of every split as samples of it."""
+    records = [
+        episode.outcomes[()].record | {"sample": episode.number, "split": split}
+        for split, of_split in registered.items()
+        for episode in of_split
+    ]
+    return as_registrations(records)[0]
+
+
+def choose_example(rows: pd.DataFrame) -> int:
+    """The episode that is shown: of overlap, by GP-CA's policy a new view solved it, its score the median.
+
+    Where there is none such, the narrower wishes are dropped from the last on.
+    """
+    shown = "gpca" if (rows["policy"] == "gpca").any() else rows["policy"].iloc[0]
+    first = rows[rows["failed"] & (rows["step"] == 1) & (rows["policy"] == shown)]
+    for wish in (first["cause"] == "overlap", first["action"] == ACTION, first["recovered"]):
+        if (wish := wish.reindex(first.index)).any():
+            first = first[wish]
+    ranked = first.sort_values(["score_overlap", "episode"])
+    return int(ranked["episode"].iloc[len(ranked) // 2])
+
+
+def save_example(
+    path: str | Path,
+    episodes: Sequence[Episode],
+    rows: pd.DataFrame,
+    actions: Mapping[str, Action],
+    views: Mapping[str, Any],
+    settings: LoopSettings,
+    axes: Axes,
+) -> None:
+    """Write the npz: of the ``first`` and the ``next`` view the image and silhouettes; scores, errors; viewpoints.
+
+    Silhouettes are those of the visible part of the object, of the whole object, and of the model where ICP put it. For
+    each viewpoint that was to choose from there is the direction to it and the share of the model's surface that was
+    expected to have been seen after it.
+
+    Args:
+        views: settings of the action that changes the viewpoint.
+        axes: the source and the seed that the file is of.
+    """
+    episode = next(e for e in episodes if e.number == choose_example(rows))
+    shown = rows[(rows["episode"] == episode.number) & (rows["step"] == 1)]
+    shown = shown[shown["policy"] == "gpca"].iloc[0] if (shown["policy"] == "gpca").any() else shown.iloc[0]
+    before, after = episode.outcomes[()], episode.take((ACTION,), actions, settings)
+    situation = episode.situation
+    random = generator(*situation.axes, "action", ACTION)  # the one that the action had
+    poses_n, seen_Q, shown_n_Q = look_around(before.holding, RobotIn(situation), random, **views)
+    arrays = {
+        "object": np.array(situation.shelf.objects.names[situation.model]),
+        "cause": np.array(situation.cause),
+        "action": np.array(shown["action"]),
+        "scores": np.nan_to_num([float(shown[f"score_{concept}"]) for concept in CONCEPTS]),
+        "errors": np.array([before.error, after.error]),
+        "viewpoints_n_3": -poses_n[:, :3, 2],
+        "viewpoint_first": -before.holding.shots[0].T_world_camera[:3, 2],
+        "surface_n": (seen_Q | shown_n_Q).mean(axis=1),
+        "surface_first": np.array(seen_Q.mean()),
+        "chosen": np.array(best_viewpoint(seen_Q, shown_n_Q)),
+    }
+    for name, shot, outcome in (("first", before.holding.shots[0], before), ("next", after.holding.shots[-1], after)):
+        arrays |= _seen(name, situation, shot, outcome)
+    save_arrays(path, arrays, axes)
+
+
+def _seen(name: str, situation: Situation, shot: Shot, outcome: Attempt) -> dict[str, np.ndarray]:
+    view = situation.meshes.look(shot.camera, shot.T_world_camera)
+    surfaces = situation.shelf.surfaces
+    colors_M_3 = np.array([*(model_color(p.model, len(surfaces)) for p in situation.standing), TABLE_COLOR])
+    model = surfaces[situation.model]
+    alone = MeshScene([(model.vertices_m, model.triangles)])
+    poses = {"true": situation.T_world_object, "placed": outcome.holding.T_world_object}
+    silhouettes = {
+        f"{pose}_{name}": alone.silhouette(shot.camera, inverse(T_world_object) @ shot.T_world_camera)
+        for pose, T_world_object in poses.items()
+    }
+    return {f"image_{name}": shade(view, colors_M_3, shot.T_world_camera), f"mask_{name}": shot.mask, **silhouettes}

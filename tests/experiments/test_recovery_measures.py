@@ -1,0 +1,264 @@
+"""Measures of policies of recovery, their intervals and paired differences."""
+
+import pandas as pd
+import pytest
+
+from gpca.errors import InputError
+from gpca.evaluation.intervals import wilson_interval
+from gpca.evaluation.measures import read_clustered
+from gpca.experiments.plan import Run
+from gpca.experiments.recovery import mean_seconds
+from gpca.experiments.recovery_measures import (
+    collect,
+    collect_differences,
+    collect_intervals,
+    metrics_at,
+    policy_metrics,
+    pool_share,
+    read_recovery,
+)
+from gpca.io.csv_file import write_csv
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.recovery.policy import NOTHING, QUEUE, TREATMENTS
+
+COSTS = {"denoise": 0.02, "reinitialize": 0.01, "new_view": 0.03}
+CURVE = (0.02, 0.05, 0.3)
+
+
+def run_of(*policies, budget=3, curve=(0.02, 0.1)):
+    recovery = {
+        "objects": "tiny", "policies": policies or ("gpca", "random", "oracle"), "actions": dict.fromkeys(COSTS),
+        "treatments": TREATMENTS, "costs": COSTS, "needless": 0.2, "loop": {"budget": budget},
+    }  # fmt: skip
+    sources = {"tiny": {"title": "Tiny", "kind": "procedural", "stand_in": False}}
+    return Run({"recovery": recovery, "sources": sources, "success": {"error": 0.03, "curve": curve}})
+
+
+def rows_of(*episodes, policy="gpca"):
+    """Rows of episodes given as (cause, actions, recovered at the end)."""
+    return pd.DataFrame(
+        {
+            "episode": number,
+            "cause": cause,
+            "policy": policy,
+            "table": number % 2,
+            "step": step,
+            "action": action,
+            "failed": True,
+            "error_before": 0.2,
+            "error_after": 0.01 if recovered and step == len(actions) else 0.04,
+            "recovered": recovered and step == len(actions),
+            "tries": {"noise": 10, "pose": 20, "overlap": 30}[cause],
+        }
+        for number, (cause, actions, recovered) in enumerate(episodes)
+        for step, action in enumerate(actions, start=1)
+    )
+
+
+EPISODES = (
+    ("noise", ["denoise"], True),
+    ("noise", ["reinitialize", "denoise"], True),
+    ("pose", ["new_view", "denoise", "reinitialize"], False),
+    ("overlap", [QUEUE], False),
+)
+
+
+@pytest.fixture
+def files(tmp_path):
+    paths = [tmp_path / f"seed{seed}.csv" for seed in (0, 1)]
+    write_csv(paths[0], rows_of(*EPISODES))
+    write_csv(paths[1], rows_of(EPISODES[0], EPISODES[0]))
+    return paths
+
+
+def test_the_metrics_of_a_policy_by_hand():
+    values = policy_metrics(rows_of(*EPISODES), TREATMENTS, COSTS, 3)
+    assert [values[f"recovered_within_{k}"] for k in (1, 2, 3)] == [0.25, 0.5, 0.5]
+    assert values["wrong_first"] == pytest.approx(2 / 3)  # of the three that acted
+    assert values["queued"] == 0.25
+    assert values["actions"] == 6 / 4
+    assert values["cost"] == pytest.approx((3 * 0.02 + 2 * 0.01 + 0.03) / 4)
+    assert values["episodes"] == 4
+    assert values["tries"] == 60
+    assert [values[f"first_{a}"] for a in ("denoise", "reinitialize", "new_view", QUEUE)] == [1, 1, 1, 1]
+
+
+def test_what_did_not_fail_counts_apart():
+    fine = rows_of(("noise", ["denoise"], False), ("pose", [NOTHING], False)).assign(failed=False)
+    values = policy_metrics(pd.concat([rows_of(*EPISODES), fine]), TREATMENTS, COSTS, 3)
+    assert (values["nominal"], values["acted_nominal"], values["episodes"]) == (2, 0.5, 4)
+    assert values["cost_nominal"] == pytest.approx(0.02 / 2)
+    left = policy_metrics(rows_of(("pose", [NOTHING], False)), TREATMENTS, COSTS, 3)
+    assert (left["left_alone"], left["queued"], left["recovered_within_3"]) == (1, 0, 0)
+
+
+def test_by_another_limit_only_failures_by_it_count():
+    values = metrics_at(rows_of(*EPISODES), 3, CURVE)
+    assert [values[f"failures_at_{limit}"] for limit in (2, 5, 30)] == [4, 4, 0]
+    assert [values[f"recovered_within_{k}_at_2"] for k in (1, 2, 3)] == [0.25, 0.5, 0.5]
+    assert [values[f"recovered_within_{k}_at_5"] for k in (1, 2, 3)] == [1, 1, 1]  # 4 % is right by that limit
+    assert "recovered_within_1_at_30" not in values
+
+
+def test_shares_are_pooled_over_the_failures_of_all_seeds(files):
+    metrics = collect(run_of(), files)
+    assert pool_share(metrics, "gpca", "recovered_within_1") == (pytest.approx(3 / 6), 6)
+    assert pool_share(metrics, "gpca", "recovered_within_2", "noise") == (pytest.approx(1), 4)
+    assert pool_share(metrics, "gpca", "recovered_within_2", "pose") == (0, 1)
+    assert pool_share(metrics, "gpca", "wrong_first") == (pytest.approx(2 / 5), 5)
+    assert pool_share(metrics, "random", "recovered_within_1") is None
+    assert "wrong_first" not in set(metrics[metrics["concept"] == "overlap"]["metric"])  # none of them acted
+
+
+def test_seconds_are_summed_over_a_failure_and_averaged_over_failures(tmp_path):
+    path = tmp_path / "seed0.csv"
+    columns = {
+        "episode": [0, 0, 1],
+        "failed": True,
+        "policy": "gpca",
+        "explanation_seconds": 0.5,
+        "action_seconds": [1.0, 2.0, 3.0],
+    }
+    write_csv(path, pd.DataFrame(columns))
+    assert mean_seconds([path]) == {"gpca": pytest.approx((4.0 + 3.5) / 2)}
+    with pytest.raises(InputError, match="no timing files were given"):
+        mean_seconds([])
+
+
+def test_faulty_files_are_refused(files, tmp_path):
+    write_csv(tmp_path / "less.csv", rows_of(EPISODES[0]).drop(columns="tries"))
+    with pytest.raises(InputError, match="column 'tries' is missing"):
+        read_recovery(tmp_path / "less.csv")
+    files[0].rename(tmp_path / "first.csv")
+    with pytest.raises(InputError, match=r"is not named …/seed\{number\}.csv"):
+        collect(run_of(), [tmp_path / "first.csv"])
+    with pytest.raises(InputError, match="no files were given"):
+        collect(run_of(), [])
+
+
+TAKEN = {  # policy -> of nine failures, its actions; one that ends with "!" recovers the pose
+    "gpca": [["denoise!"], ["queue"], ["nothing"], ["denoise", "new_view!"], *[["denoise!"]] * 5],
+    "always": [["denoise!"]] * 9,
+}
+
+
+def rows_of_taken(actions):
+    rows = []
+    for policy, cases in actions.items():
+        for episode, taken in enumerate(cases):
+            case = {"episode": episode, "cause": CONCEPTS[episode % 3], "table": episode // 3, "policy": policy}
+            for step, action in enumerate(taken, start=1):
+                entry = {
+                    "step": step,
+                    "action": action.rstrip("!"),
+                    "failed": True,
+                    "recovered": action.endswith("!"),
+                }
+                rows.append(case | entry)
+        for good in range(4):
+            case = {"episode": 9 + good, "cause": "", "table": good, "policy": policy, "step": 1}
+            action = "nothing" if policy == "gpca" and good else "denoise"
+            rows.append(case | {"action": action, "failed": False, "recovered": False})
+    return pd.DataFrame(rows).assign(error_before=0.2, error_after=0.1, tries=5)
+
+
+@pytest.fixture
+def taken_files(tmp_path):
+    paths = [tmp_path / f"seed{seed}.csv" for seed in range(2)]
+    for path in paths:
+        write_csv(path, rows_of_taken(TAKEN))
+    return paths
+
+
+@pytest.fixture
+def shares(taken_files, tmp_path):
+    write_csv(tmp_path / "intervals.csv", collect_intervals(run_of(budget=2), taken_files), form=None)
+    return read_clustered(tmp_path / "intervals.csv").set_index(["method", "metric", "concept"])
+
+
+def test_shares_are_those_of_the_metrics(taken_files, shares):
+    metrics = collect(run_of(budget=2, curve=()), taken_files)
+    for policy, metric, concept in shares.index:
+        share, samples = pool_share(metrics, policy, metric, concept)
+        row = shares.loc[policy, metric, concept]
+        assert (row["value"], row["samples"]) == (pytest.approx(share), samples)
+    assert {metric for _, metric, _ in shares.index} == {
+        "recovered_within_1", "recovered_within_2", "queued", "left_alone", "acted_nominal",
+    }  # fmt: skip
+
+
+def test_clusters_are_the_tables_of_each_seed(shares):
+    row = shares.loc["gpca", "recovered_within_1", "all"]
+    assert (row["seeds"], row["clusters"], row["samples"]) == (2, 6, 18)
+    assert 0 <= row["low"] < row["value"] < row["high"] <= 1
+    assert shares.loc["gpca", "acted_nominal", "all"]["clusters"] == 8
+
+
+def test_what_always_happens_has_wilsons_interval_of_tables(shares):
+    row = shares.loc["always", "recovered_within_1", "all"]
+    assert (row["value"], row["low"], row["high"]) == pytest.approx((1, *wilson_interval(6, 6)))
+
+
+def test_the_same_files_give_the_same_bytes_and_none_are_a_fault(taken_files, shares, tmp_path):
+    write_csv(tmp_path / "again.csv", collect_intervals(run_of(budget=2), taken_files), form=None)
+    assert (tmp_path / "again.csv").read_bytes() == (tmp_path / "intervals.csv").read_bytes()
+    with pytest.raises(InputError, match="recovery: no files were given"):
+        collect_intervals(run_of(), [])
+
+
+SOLVED = {  # policy -> of four failures, after how many actions each is recovered; 0 never
+    "gpca_acting": (1, 1, 1, 2),
+    "gpca_gated": (1, 1, 0, 0),
+    "error_only_acting": (1, 2, 2, 2),
+    "error_only": (1, 1, 0, 0),
+    "always_denoise": (1, 1, 0, 0),
+    "sequence_new_view_denoise": (2, 1, 2, 2),
+}
+
+
+def rows_solved(solved):
+    rows = []
+    for policy, steps in solved.items():
+        for episode, last in enumerate(steps):
+            for step in range(1, (last or 2) + 1):
+                row = {"episode": episode, "cause": "pose", "table": episode % 3, "policy": policy, "step": step}
+                row |= {"action": "denoise", "failed": True, "error_before": 0.2, "error_after": 0.1}
+                rows.append(row | {"recovered": step == last, "tries": 5})
+    return pd.DataFrame(rows)
+
+
+@pytest.fixture
+def measured_differences(tmp_path):
+    paths = [tmp_path / f"seed{seed}.csv" for seed in range(4)]
+    for path in paths:
+        write_csv(path, rows_solved(SOLVED))
+    write_csv(tmp_path / "differences.csv", collect_differences(run_of(budget=2), paths), form=None)
+    return read_clustered(tmp_path / "differences.csv").set_index(["method", "metric", "against"])
+
+
+def test_differences_are_paired_and_of_the_same_failures(measured_differences):
+    row = measured_differences.loc["gpca_acting", "recovered_within_1", "error"]
+    assert (row["other"], row["seeds"], row["samples"]) == ("error_only_acting", 4, 16)
+    assert row["value"] == pytest.approx(2 / 4)
+    assert 0 < row["low"] < row["value"] < row["high"] <= 1
+
+
+def test_the_best_sequence_is_the_best_by_that_number_of_actions(measured_differences):
+    for k, best in ((1, "always_denoise"), (2, "sequence_new_view_denoise")):
+        of_number = measured_differences.xs((f"recovered_within_{k}", "sequence"), level=("metric", "against"))
+        assert set(of_number["other"]) == {best}
+        assert best not in of_number.index
+    assert measured_differences.loc["gpca_acting", "recovered_within_2", "sequence"]["value"] == 0
+
+
+def test_who_must_recognize_failures_is_compared_with_who_must_as_well(measured_differences):
+    row = measured_differences.loc["gpca_gated", "recovered_within_2", "error"]
+    assert (row["other"], row["value"]) == ("error_only", 0)
+    assert row["low"] < 0 < row["high"]  # never of no width
+    assert "error_only" not in measured_differences.xs("error", level="against").index
+
+
+def test_the_same_files_give_the_same_intervals(measured_differences, tmp_path):
+    paths = [tmp_path / f"seed{seed}.csv" for seed in range(4)]
+    write_csv(tmp_path / "again.csv", collect_differences(run_of(budget=2), paths), form=None)
+    assert (tmp_path / "again.csv").read_bytes() == (tmp_path / "differences.csv").read_bytes()
