@@ -25,7 +25,7 @@ AVOIDED = {
     r"\w*(?:normal|initial|optim|regular|general|minim|maxim|summar)is(?:e|ed|es|ing|ation)": "American spelling",
 }
 # Keys of configs and of files keep their spelling, and so does a page's HTML.
-KEYS = re.compile(r"inverse_regularisation|\bneighbours\b|\"labelled\"|colour\b|id=\"said\"")
+KEYS = re.compile(r"inverse_regularisation|\bneighbours\b|\"labelled\"|colour\b|\"taught\"|id=\"said\"")
 # Names that only point at another one: no file may have more of them than it has. Lower the numbers, never raise them.
 POINTING = re.compile(r"\b(?:of_[a-zA-Z_]+|own|found|places|known)\b")
 

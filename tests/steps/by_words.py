@@ -31,7 +31,7 @@ MODULES = {f: f"gpca.steps.{module}:{f}" for module, functions in SHARED.items()
     "estimate": IN + "estimators.step",
     "frame_labels": "gpca.steps.frame_labels",
     "gradients": "gpca.steps.gradients",
-    "guarantee": IN + "guarantee.step",
+    "guarantee": "gpca.steps.guarantee",
     "kernel_grid": "gpca.steps.kernel_grid",
     "learning_curve": "gpca.steps.learning_curve:learn_from_more",
     "learning_samples": "gpca.steps.learning_curve:learning_samples",

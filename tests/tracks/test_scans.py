@@ -31,7 +31,7 @@ from gpca.tracks.track import TRACKS
 
 from ..config.configs import load
 from ..documents import block
-from ..experiments.guarantee.test_step import write_measurements
+from ..steps.test_guarantee import write_measurements
 from .conftest import knowing_scores
 
 EVERYWHERE, RARE, SEED = "virtual_scans", "threedmatch", 100

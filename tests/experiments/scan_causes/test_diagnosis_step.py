@@ -12,7 +12,7 @@ from gpca.causes.truth import BORDERLINE, NOMINAL
 from gpca.experiments.scan_causes import diagnosis_step
 from gpca.experiments.scan_causes.diagnosis_step import folds_of
 from gpca.process.job import Job
-from tests.experiments.guarantee.test_step import write_measurements
+from tests.steps.test_guarantee import write_measurements
 
 EXPLAINERS = {"chance": ["scans"], "pair_forest": ["objects", "scans"], "gate_rmse": ["scans"], "reenact": ["scans"]}
 SETTINGS = {

@@ -13,13 +13,13 @@ from gpca.causes.descriptors import WIDTHS, Descriptors
 from gpca.causes.settings import GROUPS
 from gpca.causes.truth import BORDERLINE
 from gpca.errors import InputError
-from gpca.experiments.guarantee import step
-from gpca.experiments.guarantee.pool import parts_of, read_pool
-from gpca.experiments.guarantee.scored import Scored
+from gpca.guarantee.answers import Scored
 from gpca.guarantee.guarantee import states_of
 from gpca.io.csv_file import write_csv
 from gpca.process.job import Job
 from gpca.reenactment.dataset import Reenactments
+from gpca.steps import guarantee as step
+from gpca.steps.guarantee import parts_of, read_pool
 
 AXES = [(source, seed) for source in ("cups", "tools") for seed in (100, 101)]
 EXPLAINERS = {"pair_forest": {"trees": 5}, "reenact": None, "gpca": None}
@@ -83,14 +83,14 @@ def test_models_learn_from_one_part_and_score_everything(scored, files, causes):
     assert len(of_explainer) == labeled * len(AXES) * len(models)
     for model in models:
         of_model = of_explainer.model == model
-        learned = set(of_explainer.family[of_model & of_explainer.taught].tolist())
-        asked = set(of_explainer.family[of_model & ~of_explainer.taught].tolist())
+        learned = set(of_explainer.family[of_model & of_explainer.seen].tolist())
+        asked = set(of_explainer.family[of_model & ~of_explainer.seen].tolist())
         assert learned and asked and not learned & asked
 
 
 def test_what_learns_nothing_is_one_model_that_no_sample_taught(scored, causes):
     labeled = int((states_of(causes.truth) != BORDERLINE).sum())
-    assert set(scored["reenact"].model.tolist()) == {"untrained"} and not scored["reenact"].taught.any()
+    assert set(scored["reenact"].model.tolist()) == {"untrained"} and not scored["reenact"].seen.any()
     assert len(scored["reenact"]) == labeled * len(AXES)
 
 
@@ -98,7 +98,7 @@ def test_models_of_embeddings_are_asked_as_they_are(scored):
     of_explainer = scored["gpca"]
     assert set(of_explainer.model.tolist()) == {"seed 100", "seed 101", "frames 100"}
     as_is = of_explainer.subset(np.char.startswith(of_explainer.model, "seed"))
-    assert as_is.taught.tolist() == [name.startswith("train") for name in as_is.sample]
+    assert as_is.seen.tolist() == [name.startswith("train") for name in as_is.sample]
 
 
 def test_frames_are_beside_the_test_samples_that_they_are_calibrated_on(scored, causes):
@@ -106,7 +106,7 @@ def test_frames_are_beside_the_test_samples_that_they_are_calibrated_on(scored, 
     real = of_frames.subset(of_frames.source == "real_rgbd")
     simulated = of_frames.subset(of_frames.source != "real_rgbd")
     assert len(real) and len(simulated) == 2 * len(real)
-    assert set(simulated.seed.tolist()) == {100} and not simulated.taught.any()
+    assert set(simulated.seed.tolist()) == {100} and not simulated.seen.any()
     assert set(real.weight.tolist()) <= {0.5, 1.0} and set(simulated.weight.tolist()) == {1.0}
 
 

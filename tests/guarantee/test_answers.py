@@ -6,23 +6,31 @@ import numpy as np
 import pytest
 
 from gpca.causes.truth import NOMINAL
-from gpca.experiments.guarantee.answers import (
+from gpca.errors import InputError
+from gpca.guarantee.answers import (
     BY_FAMILY,
     BY_SAMPLE,
     BY_STATE,
     CONFIDENT,
     FAMILIES,
     PLAIN,
+    GuaranteeSettings,
+    Scored,
     answers_of,
     conditions,
     plain_sets,
     plain_threshold,
 )
-from gpca.experiments.guarantee.settings import GuaranteeSettings
 from gpca.guarantee.conformal import ALARM, GOOD, NOT_SURE
 from gpca.guarantee.guarantee import STATES
+from tests.guarantee.scored import scored_samples
 
 SETTINGS = GuaranteeSettings(level=0.8)
+
+
+@pytest.fixture(scope="module")
+def scored():
+    return scored_samples()
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +46,7 @@ def answers(scored, promised):
 
 def test_every_sample_of_a_family_that_a_model_did_not_learn_from_is_answered_once(scored, promised, answers):
     assert sorted(answers.row) == np.flatnonzero(promised.tested).tolist()
-    assert not scored.taught[answers.row].any()
+    assert not scored.seen[answers.row].any()
     assert answers.families == 7  # two thirds of twelve, without the tested one
     assert set(answers.sets) == {PLAIN, BY_SAMPLE, BY_STATE, BY_FAMILY}
     assert set(answers.calls) == {PLAIN, BY_SAMPLE, CONFIDENT, BY_FAMILY}
@@ -48,7 +56,7 @@ def test_neither_the_tested_family_nor_what_was_learned_from_sets_a_threshold(sc
     own = scored.family == "family04"
     turned = own & (np.arange(len(scored)) % 2 == 0)
     asked = own[answers.row] & ~turned[answers.row]
-    for changed, same in ((turned | scored.taught, True), (~own & ~scored.taught, False)):
+    for changed, same in ((turned | scored.seen, True), (~own & ~scored.seen, False)):
         scores = np.where(changed[:, None], scored.scores[:, ::-1], scored.scores)
         again = answers_of(replace(scored, scores=scores), promised, SETTINGS)
         for name in (BY_SAMPLE, BY_STATE, BY_FAMILY):
@@ -71,14 +79,14 @@ def test_conditions_of_shift_calibrate_on_one_kind_and_test_the_other(scored):
     found = {condition.name: condition for condition in conditions(scored)}
     assert list(found) == [FAMILIES, "from_cups", "from_tools", "milder", "harder", "frames"]
     for name, condition in found.items():
-        assert not (condition.known & condition.tested).any() or name == FAMILIES
-        assert not (scored.taught & condition.known).any() or name == "frames"
-    assert set(scored.source[found["from_cups"].known]) == {"cups"}
+        assert not (condition.calibration & condition.tested).any() or name == FAMILIES
+        assert not (scored.seen & condition.calibration).any() or name == "frames"
+    assert set(scored.source[found["from_cups"].calibration]) == {"cups"}
     assert set(scored.source[found["frames"].tested]) == {"real_rgbd"}
     severity = scored.severity
     nominal = scored.state == NOMINAL
     for of_state in (nominal, ~nominal):
-        mild, hard = (severity[found["milder"].known & of_state], severity[found["milder"].tested & of_state])
+        mild, hard = (severity[found["milder"].calibration & of_state], severity[found["milder"].tested & of_state])
         assert mild.max() <= hard.min() and abs(len(mild) - len(hard)) <= 1
     one = scored.subset((scored.source == "cups") & np.char.startswith(scored.model, "part"))
     assert [condition.name for condition in conditions(one)] == [FAMILIES, "milder", "harder"]
@@ -90,3 +98,13 @@ def test_plain_sets_and_the_plain_threshold_by_hand():
     assert plain_sets(probabilities, 0.9).sum(axis=1).tolist() == [3, 1, 5]
     failure = np.arange(100.0)
     assert plain_threshold(failure, 0.05) == 5 and plain_threshold(failure[:1], 0.99) == 0
+
+
+def test_scores_survive_the_file(scored, tmp_path):
+    scored.save(tmp_path / "mine.csv")
+    read = Scored.load(tmp_path / "mine.csv")
+    assert read.family.tolist() == scored.family.tolist() and read.seen.tolist() == scored.seen.tolist()
+    assert np.abs(read.scores - scored.scores).max() < 1e-6
+    (tmp_path / "spoiled.csv").write_text((tmp_path / "mine.csv").read_text().replace(",several,", ",sundry,"))
+    with pytest.raises(InputError, match="unknown state 'sundry'; its states are nominal, noise"):
+        Scored.load(tmp_path / "spoiled.csv")

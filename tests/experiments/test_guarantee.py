@@ -3,38 +3,58 @@
 import numpy as np
 import pytest
 
+from gpca.config.check import check
+from gpca.config.layers import without_false
 from gpca.errors import InputError
 from gpca.evaluation.measures import ALL, POOLED
-from gpca.experiments.guarantee.answers import BY_FAMILY, BY_SAMPLE, CONFIDENT, FAMILIES, PLAIN, answers_of, conditions
-from gpca.experiments.guarantee.figure import draw_guarantee
-from gpca.experiments.guarantee.metrics import (
-    COLUMNS,
+from gpca.experiments.guarantee import COLUMNS, collect, guarantee, read_guarantee, table19_guarantee, table19_shift
+from gpca.experiments.plan import Run
+from gpca.explainers.registry import CAUSES, explainer_entry
+from gpca.guarantee.answers import (
+    BY_FAMILY,
+    BY_SAMPLE,
+    CONFIDENT,
     COVERAGE,
     FALSE_ALARMS,
+    FAMILIES,
     MISSED,
+    PLAIN,
     SIZE,
     UNSURE,
-    collect,
-    read_guarantee,
+    GuaranteeSettings,
+    Scored,
+    answers_of,
+    conditions,
 )
-from gpca.experiments.guarantee.scored import Scored
-from gpca.experiments.guarantee.settings import GuaranteeSettings
-from gpca.experiments.guarantee.tables import table19_guarantee, table19_shift
 from gpca.guarantee.guarantee import STATES
 from gpca.io.csv_file import write_csv
+from tests.config.configs import changed
+from tests.guarantee.scored import scored_samples
 
 SECTION = {
     **{"level": 0.8, "missed": 0.05, "false_alarms": 0.05, "family_risk": 0.2, "confidence": 0.9},
-    **{"nonconformity": "probability", "explainers": ["mine"]},
+    **{"nonconformity": "probability", "explainers": ["reenact"]},
 }
 PROMISED = {name: value for name, value in SECTION.items() if name != "explainers"}
-EXPLAINERS = {"mine": "Mine", "other": "Not asked"}
-SOURCES = {"tools": {"title": "Tools", "stand_in": False}, "cups": {"title": "Cups", "stand_in": True}}
+SOURCES = {
+    "tools": {"title": "Tools", "kind": "procedural", "stand_in": False},
+    "cups": {"title": "Cups", "kind": "procedural"},
+}
+TITLE = explainer_entry("reenact", CAUSES).title
+
+
+def run(*explainers):
+    return Run({"guarantee": SECTION | ({"explainers": list(explainers)} if explainers else {}), "sources": SOURCES})
+
+
+@pytest.fixture(scope="module")
+def scored():
+    return scored_samples()
 
 
 @pytest.fixture(scope="module")
 def files(scored, tmp_path_factory):
-    path = tmp_path_factory.mktemp("scores") / "mine.csv"
+    path = tmp_path_factory.mktemp("scores") / "reenact.csv"
     scored.save(path)
     return [path]
 
@@ -42,7 +62,7 @@ def files(scored, tmp_path_factory):
 @pytest.fixture(scope="module")
 def measured(files):
     path = files[0].with_name("guarantee.csv")
-    write_csv(path, collect(files, SECTION))
+    write_csv(path, collect(run(), files))
     return read_guarantee(path)
 
 
@@ -56,18 +76,6 @@ def value(measured, condition, source, variant, metric, concept=ALL):
     ]
     assert len(rows) == 1
     return rows.iloc[0]
-
-
-def test_scores_survive_the_file(scored, files):
-    read = Scored.load(files[0])
-    assert read.family.tolist() == scored.family.tolist() and read.taught.tolist() == scored.taught.tolist()
-    assert np.abs(read.scores - scored.scores).max() < 1e-6
-    text = files[0].read_text().replace(",several,", ",sundry,")
-    (files[0].parent / "spoiled.csv").write_text(text)
-    with pytest.raises(InputError, match="unknown state 'sundry'; its states are nominal, noise"):
-        Scored.load(files[0].parent / "spoiled.csv")
-    with pytest.raises(InputError, match="no files with scores were given; name an explainer"):
-        collect([], SECTION)
 
 
 def test_measures_are_shares_of_the_answers(files, measured):
@@ -122,31 +130,57 @@ def test_every_condition_is_measured_where_it_is_tested(measured):
 
 
 def test_the_tables_say_what_was_promised_and_measured(measured):
-    table = table19_guarantee(measured, EXPLAINERS, SOURCES, PROMISED)
+    table = table19_guarantee(run("reenact", "reenact_committee"), measured)
     text = table.markdown()
     covered = value(measured, FAMILIES, POOLED, BY_SAMPLE, COVERAGE)
     numbers = " to ".join(f"{100 * covered[name]:.1f}" for name in ("low", "high"))
-    assert f"| Mine | By sample | {100 * covered['value']:.1f} ({numbers})" in text
-    assert "| Mine | By sample, with confidence | – | – | – | – |" in text and "Not asked" not in text
+    assert f"| {TITLE} | By sample | {100 * covered['value']:.1f} ({numbers})" in text
+    assert f"| {TITLE} | By sample, with confidence | – | – | – | – |" in text
     assert "sets that hold the state in 80 % of the cases" in text and "by family 20 % each" in text
     worst = min(value(measured, FAMILIES, POOLED, PLAIN, COVERAGE, state)["value"] for state in STATES)
     assert table.cells[0, "worst_state"].mean == pytest.approx(100 * worst)
-    shift = table19_shift(measured, EXPLAINERS, SOURCES, PROMISED).markdown()
+    shift = table19_shift(run(), measured).markdown()
     heads = [line.split(" | ")[:3] for line in shift.splitlines() if line.startswith("| ")][2:]
     assert heads == [
-        ["| Other families", "Tools", "Mine"],
-        ["| Other families", "Cups (procedural stand-in)", "Mine"],
-        ["| Tools alone", "Cups (procedural stand-in)", "Mine"],
-        ["| Cups (procedural stand-in) alone", "Tools", "Mine"],
-        ["| The milder half", "All together", "Mine"],
-        ["| The harder half", "All together", "Mine"],
-        ["| Simulated pairs", "Depth frames", "Mine"],
+        ["| Other families", "Tools", TITLE],
+        ["| Other families", "Cups (procedural stand-in)", TITLE],
+        ["| Tools alone", "Cups (procedural stand-in)", TITLE],
+        ["| Cups (procedural stand-in) alone", "Tools", TITLE],
+        ["| The milder half", "All together", TITLE],
+        ["| The harder half", "All together", TITLE],
+        ["| Simulated pairs", "Depth frames", TITLE],
     ]
     with pytest.raises(InputError, match="has nothing to show"):
-        table19_guarantee(measured, {"other": "Not asked"}, SOURCES, PROMISED)
+        table19_guarantee(run("reenact_committee"), measured)
 
 
 def test_the_figure_is_drawn_the_same_way_twice(measured, same_bytes):
-    same_bytes(lambda: draw_guarantee(measured, EXPLAINERS, PROMISED))
+    same_bytes(lambda: guarantee(run(), measured))
     with pytest.raises(InputError, match="has no results for these explainers"):
-        draw_guarantee(measured, {"other": "Not asked"}, PROMISED)
+        guarantee(run("reenact_committee"), measured)
+
+
+def test_a_fault_is_one_line():
+    with pytest.raises(InputError, match="no files with scores were given; name an explainer"):
+        collect(run(), [])
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "message"),
+    [
+        ("level", 1.0, "guarantee.level: 1.0 should be less than 1"),
+        ("nonconformity", "rank", "guarantee.nonconformity: 'rank' should be "),
+        ("explainers", ["oracle"], "guarantee.explainers: no explainer 'oracle'; choose one of chance, "),
+        ("explainers", ["chance"], "guarantee.explainers: explainer 'chance' reads neither descriptors nor"),
+    ],
+)
+def test_a_fault_of_the_config_is_one_line_that_names_the_key(key, value, message):
+    with pytest.raises(InputError) as caught:
+        check(changed(f"guarantee.{key}", value))
+    assert str(caught.value).startswith(f"config key {message}")
+
+
+def test_an_explainer_that_the_diagnosis_leaves_out_has_no_guarantee():
+    config = without_false(changed("diagnosis.explainers.pair_committee", False))
+    assert "pair_committee" not in config["guarantee"]["explainers"]
+    assert "reenact_committee" in config["guarantee"]["explainers"]

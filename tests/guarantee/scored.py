@@ -1,17 +1,16 @@
-"""Scores of models that learned from one part of twelve families each, and know more or less of the others."""
+"""Scores of models that were trained on one part of twelve families each."""
 
 import numpy as np
-import pytest
 
 from gpca.causes.dataset import LABELS
-from gpca.experiments.guarantee.scored import Scored, joined
+from gpca.guarantee.answers import Scored
 from gpca.guarantee.guarantee import SEVERAL, STATES
 
 FAMILIES = np.array([f"family{number:02d}" for number in range(12)])
 
 
 def random_scored(model="part 0", seed=0, samples=20, families=FAMILIES, source=None, skill=2.0):
-    """Samples of each family, those of every third of which the model learned from, as the name of the model says."""
+    """Samples of each family; the model was trained on every third family, by the number in its name."""
     random = np.random.default_rng(seed)
     family = np.repeat(families, samples)
     n = len(family)
@@ -31,17 +30,15 @@ def random_scored(model="part 0", seed=0, samples=20, families=FAMILIES, source=
         sample=np.array([f"test {row}" for row in range(n)]),
         family=family,
         state=np.array(STATES)[number],
-        taught=part == int(model.split()[-1]),
+        seen=part == int(model.split()[-1]),
         severity=random.random(n),
         weight=np.ones(n),
         scores=scores / scores.sum(axis=1, keepdims=True),
     )
 
 
-@pytest.fixture(scope="session")
-def scored():
-    """Three models, and one that was asked about frames."""
+def scored_samples():
+    """Three models, and one that scored frames."""
     simulated = random_scored("frames 9", 3, 10)
     frames = random_scored("frames 9", 4, 5, source="real_rgbd", skill=0.5)
-    parts = [random_scored(f"part {part}", part) for part in range(3)]
-    return joined([*parts, simulated, frames])
+    return Scored.joined([*(random_scored(f"part {part}", part) for part in range(3)), simulated, frames])

@@ -1,0 +1,387 @@
+"""Guarantees for statements about causes: nominal and measured errors of sets of states and an alarm (Table XIX)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from itertools import product
+from math import inf
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gpca.errors import InputError, require_names
+from gpca.evaluation.intervals import interval, pigeonhole_weights
+from gpca.evaluation.measures import ALL, POOLED
+from gpca.experiments.experiment import Experiment, LeftOut
+from gpca.experiments.frame_causes.tables import FEWEST_FAILURES
+from gpca.experiments.plan import Run
+from gpca.experiments.result import figure, numbers, table
+from gpca.experiments.step import Plan, Step
+from gpca.explainers.interface import REENACTED
+from gpca.explainers.registry import CAUSES, explainer_entry, explainer_module
+from gpca.frames.source import REAL_WORLD
+from gpca.guarantee.answers import (
+    BY_FAMILY,
+    BY_SAMPLE,
+    BY_STATE,
+    CONFIDENT,
+    COVERAGE,
+    FALSE_ALARMS,
+    FAMILIES,
+    MISSED,
+    PLAIN,
+    SHARES,
+    SINGLE,
+    SIZE,
+    UNSURE,
+    Answers,
+    GuaranteeSettings,
+    Scored,
+    answers_of,
+    conditions,
+    measures,
+)
+from gpca.guarantee.guarantee import STATES
+from gpca.io.csv_file import read_numbers
+from gpca.reporting.sheet import Row, Sheet, Show, crossed, show, where
+from gpca.seeds import generator
+from gpca.settings import Distinct, read_settings
+from gpca.steps.guarantee import EMBEDDINGS
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+NAME = "guarantee"
+TRAINED_AGAIN = ("descriptors", REENACTED)  # inputs of explainers that are trained again, on one part of the families
+ROWS = ("condition", "source", "method", "variant")  # columns that distinguish the rows of tables
+COLUMNS = (
+    *("table", *ROWS, "metric", "concept", "promised"),
+    *("families", "samples", "clusters", "seeds", "value", "low", "high"),
+)
+NUMBERS = COLUMNS[7:]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Section(GuaranteeSettings):
+    """The guarantees, and the explainers of causes that they are made for."""
+
+    explainers: Distinct[str]
+
+
+def check(config: dict, left_out: LeftOut) -> None:
+    """Check that the explainers are among those of the diagnosis, and that files hold their inputs."""
+    chosen, diagnosed = config[NAME]["explainers"], config["diagnosis"]["explainers"]
+    require_names("guarantee.explainers", chosen, diagnosed, "explainer", left_out("diagnosis.explainers"))
+    for name in chosen:
+        if explainer_entry(name, CAUSES).reads not in (*TRAINED_AGAIN, EMBEDDINGS):
+            fault = f"explainer '{name}' reads neither descriptors nor re-enactments nor embeddings"
+            raise InputError("config key guarantee.explainers", fault, "leave it out")
+
+
+EXPERIMENT = Experiment(
+    name=NAME,
+    sections={NAME: Section},
+    names=lambda config, sources: {"guaranteed": list(config[NAME]["explainers"])},
+    check=check,
+    lists={"guarantee.explainers": "diagnosis.explainers"},
+)
+
+
+def _explainers(plan: Plan, _wildcards: Any) -> dict[str, Any]:
+    return {"explainers": {name: plan.config["diagnosis"]["explainers"][name] for name in plan.names["guaranteed"]}}
+
+
+SCORE = Step(
+    name="guarantee_scores",
+    run="gpca.steps.guarantee",
+    inputs={
+        "causes": "causes/{*source}/seed{*seed}.npz",
+        "descriptors": "descriptors/{*source}/seed{*seed}.npz",
+        "reenactments": "reenactments/{*source}/seed{*seed}.npz",
+        "diagnoses": "diagnoses/{*source}/{*guaranteed}/seed{*seed}.csv",
+        "frame_causes": "frame_causes/seed{*frame_cause_seed}.npz",
+        "frame_samples": "frame_causes/seed{*frame_cause_seed}.csv",
+        "frame_predictions": "frame_diagnoses/seed{*frame_cause_seed}.csv",
+    },
+    outputs={"scores": "guarantee/{*guaranteed}.csv"},
+    settings=_explainers,
+    modules=lambda plan: (explainer_module(name, CAUSES) for name in plan.names["guaranteed"]),
+    priority=3,
+)
+
+
+@numbers("guarantee.csv", rule="guarantee_metrics", score_files="guarantee/{guaranteed}.csv")
+def collect(run: Run, score_files: Iterable[str | Path]) -> pd.DataFrame:
+    """Values with 95 % intervals of a bootstrap over families and seeds, from files named ``…/{explainer}.csv``."""
+    import pandas as pd
+
+    section = {name: value for name, value in run.config[NAME].items() if name != "explainers"}
+    settings = read_settings(GuaranteeSettings, section)
+    rows: list[tuple] = []
+    for path in score_files:
+        scored = Scored.load(path)
+        for condition in conditions(scored):
+            answers = answers_of(scored, condition, settings)
+            if answers is not None:
+                asked = scored.subset(answers.row)
+                rows += _rows_of_condition(condition.name, Path(path).stem, asked, answers, settings)
+    if not rows:
+        raise InputError(NAME, "no files with scores were given", "name an explainer in guarantee.explainers")
+    return pd.DataFrame(rows, columns=list(COLUMNS))
+
+
+def read_guarantee(path: str | Path) -> pd.DataFrame:
+    """Read the rows of :func:`collect`; a value that has no nominal limit has no `promised`.
+
+    Raises:
+        InputError: missing, empty or unreadable file, missing column, a value that is not a finite number.
+    """
+    return read_numbers(path, COLUMNS, NUMBERS, optional=("promised", "low", "high"))
+
+
+def _rows_of_condition(
+    name: str, explainer: str, asked: Scored, answers: Answers, settings: GuaranteeSettings
+) -> Iterator[tuple]:
+    # All samples of a family and a seed are drawn together, so sums over them are enough.
+    keys_A = np.char.add(np.char.add(asked.seed.astype(str), " "), asked.family)
+    _, first_C, group_A = np.unique(keys_A, return_index=True, return_inverse=True)
+    random = generator("guarantee intervals", name)
+    drawn_B_C = pigeonhole_weights(random, asked.seed[first_C], asked.family[first_C])
+    sources = list(dict.fromkeys(asked.source.tolist()))
+    masks = {source: asked.source == source for source in sources}
+    if len(sources) > 1:
+        masks = {POOLED: np.ones(len(asked), bool)} | masks
+    measured = list(measures(asked, answers, settings))
+    for source, inside_A in masks.items():
+        by_state = name == FAMILIES and source == next(iter(masks))
+        for variant, metric, concept, promised, value_A, counted_A in measured:
+            mask_A = inside_A & counted_A
+            if not mask_A.any() or (concept != ALL and not by_state):
+                continue
+            weight_C = np.bincount(group_A[mask_A], asked.weight[mask_A], len(first_C))
+            sum_C = np.bincount(group_A[mask_A], asked.weight[mask_A] * value_A[mask_A], len(first_C))
+            with np.errstate(invalid="ignore"):
+                values_B = (drawn_B_C * sum_C).sum(axis=1) / (drawn_B_C * weight_C).sum(axis=1)
+            value_B = np.append(float(sum_C.sum() / weight_C.sum()), values_B)
+            # Several models may have scored a sample, which counts once.
+            samples = len(set(zip(asked.source[mask_A], asked.seed[mask_A], asked.sample[mask_A], strict=True)))
+            drawn_B_c = drawn_B_C[:, weight_C > 0] if metric in SHARES else None
+            counts = (len(set(column[mask_A].tolist())) for column in (asked.family, asked.seed))
+            yield (
+                *(NAME, name, source, explainer, variant, metric, concept, promised, answers.families),
+                *(samples, *counts, *interval(value_B, drawn_B_c, samples=samples)),
+            )
+
+
+SECTION = "Beyond the paper: what made a registration fail"
+INPUT = {"measured": (read_guarantee, "guarantee.csv")}
+CALIBRATED = {
+    PLAIN: "None: scores as they are",
+    BY_SAMPLE: "By sample",
+    BY_STATE: "By sample, each state",
+    CONFIDENT: "By sample, with confidence",
+    BY_FAMILY: "By family",
+}
+WORST = "worst_state"
+NUMBER = {"interval": False, "decimals": 0, "limits": (0.0, inf), "factor": 1}
+SIZES = {"decimals": 2, "limits": (0.0, float(len(STATES))), "factor": 1, "least_is_best": True}
+COLUMNS_OF_ALL = {
+    COVERAGE: show(COVERAGE, "Coverage (%)"),
+    WORST: show(WORST, "Of the worst state (%)"),
+    SIZE: show(SIZE, "States in a set", **SIZES),
+    SINGLE: show(SINGLE, "One state alone (%)", interval=False),
+    MISSED: show(MISSED, "Missed failures (%)", least_is_best=True),
+    FALSE_ALARMS: show(FALSE_ALARMS, "False alarms (%)", least_is_best=True),
+    UNSURE: show(UNSURE, "Not sure (%)", least_is_best=True),
+    "families": show("families", "Families", **NUMBER),
+    "samples": show("samples", "n", **NUMBER),
+}
+
+
+def _by(variant: str, metric: str, title: str = "") -> Show:
+    column = COLUMNS_OF_ALL[metric]
+    return replace(column, title=title or column.title, where={**column.where, "variant": variant})
+
+
+COLUMNS_OF_SHIFT = {
+    COVERAGE: _by(BY_SAMPLE, COVERAGE),
+    SIZE: _by(BY_SAMPLE, SIZE),
+    "each_state_coverage": _by(BY_STATE, COVERAGE, "Each state: coverage (%)"),
+    "each_state_set_size": _by(BY_STATE, SIZE, "Each state: states in a set"),
+    **{name: _by(BY_SAMPLE, name) for name in (MISSED, FALSE_ALARMS, UNSURE, "samples")},
+}
+
+
+@table(
+    SECTION,
+    "Table XIX: a guarantee for what is stated about causes",
+    """A set that holds the true state, which is nominal, one cause, or several, as often as is guaranteed; and an alarm
+    that reports good, failed or not sure, and seldom errs either way. Explainers are trained on some families of
+    shapes, calibrated on others, and tested on a family that is among neither.
+
+    A guarantee holds where the interval does not lie wholly on the wrong side of it. Samples of a family are alike, and
+    families differ, so a guarantee by sample may break for a new family; that by family cannot, if families are
+    exchangeable, but with few families the sets are larger.""",
+    **INPUT,
+)
+def table19_guarantee(run: Run, measured):
+    """Coverage and size of the sets and the risks of the alarm: explainers × ways of calibration."""
+    pooled = where(measured, {"condition": FAMILIES})
+    pooled = where(pooled, {"source": _all_sources(pooled)})
+    heads = {"explainer": "Explainer", "calibrated": "Calibrated"}
+    rows = crossed(("method", _titles(run)), ("variant", CALIBRATED))
+    sheet = Sheet("table19_guarantee", heads, rows, COLUMNS_OF_ALL, _with_counts(pooled))
+    level, missed, false_alarms, family_risk, confidence = _limits(run)
+    return sheet.table(
+        "Sets of states that hold the true one, and an alarm with bounded errors, on families of shapes that nothing "
+        "was trained or calibrated on" + _stand_ins(run),
+        "metric",
+        [
+            f"Guaranteed: sets that hold the state in {level} % of the cases (Coverage); at most {missed} % of the "
+            f"failed called good (Missed failures) and {false_alarms} % of the nominal called failed (False alarms), "
+            f"by family {family_risk} % each. With confidence: the two risks hold for these very thresholds, in "
+            f"{confidence} % of the draws of the samples that they were set on.",
+            "States: nominal, one cause, or several. None: the most probable states until their scores add up to the "
+            "guaranteed share, and one threshold that misses as many of the failed in training as is guaranteed, or "
+            "0.5 where nothing is trained. By sample: the guarantee holds if single samples are exchangeable. By "
+            f"family: if families are. A set of {len(STATES)} states, or an alarm that is never sure, states nothing.",
+            "Families: smallest number of calibration families of a tested one. n: tested samples without borderline "
+            f"ones, of {int(pooled['clusters'].max())} families. {sheet.over()}.",
+        ],
+    )
+
+
+@table(
+    SECTION,
+    "Table XIX where calibrated and tested samples differ",
+    """The same measures on each dataset; calibrated on one dataset and tested on the others; on samples of less or more
+    severity than are tested; and on simulated pairs for depth frames. No guarantee covers these.""",
+    **INPUT,
+)
+def table19_shift(run: Run, measured):
+    """Sets and alarm on single sources, and calibrated on other samples: conditions × sources × explainers."""
+    titles = run.source_titles
+    others = {f"from_{name}": f"{title} alone" for name, title in titles.items()}
+    shifts = {"milder": "The milder half", "harder": "The harder half", "frames": "Simulated pairs"}
+    measured = measured[(measured["source"] != REAL_WORLD) | (measured["samples"] >= FEWEST_FAILURES)]
+    rows = []
+    for condition, explainer in product({FAMILIES: "Other families", **others, **shifts}.items(), _titles(run).items()):
+        entries = {"condition": condition[0], "method": explainer[0]}
+        every = {POOLED: "All others" if condition[0] in others else "All together"}
+        sources = every if (where(measured, entries)["source"] == POOLED).any() else titles
+        sources = titles if condition[0] == FAMILIES else {**sources, REAL_WORLD: "Depth frames"}
+        rows += [Row([condition, source, explainer], {**entries, "source": source[0]}) for source in sources.items()]
+    heads = {"calibrated_on": "Calibrated on", "source": "Tested on", "explainer": "Explainer"}
+    sheet = Sheet("table19_shift", heads, rows, COLUMNS_OF_SHIFT, _with_counts(measured))
+    level, missed, false_alarms, *_ = _limits(run)
+    return sheet.table(
+        "Guarantees for causes on single datasets, and where calibrated and tested samples differ" + _stand_ins(run),
+        "metric",
+        [
+            f"The limits are those of Table XIX, by sample: {level} % coverage, at most {missed} % missed failures and "
+            f"{false_alarms} % false alarms. They are guaranteed for new families of all datasets together. Nothing "
+            "guarantees them here: the numbers show what is left.",
+            "Each state: limits for each state by itself. Severity: the largest of the severities of noise, rotation, "
+            "translation and crop, as shares of the largest in any sample; nominal and failed samples are halved "
+            "separately. All starts of an instance in depth frames have the weight of one sample, intervals are over "
+            f"scenes, and fewer than {FEWEST_FAILURES} samples of a kind are not shown.",
+        ],
+    )
+
+
+@figure(
+    SECTION,
+    "Guaranteed and measured",
+    """Coverage and size of the sets, and both risks of the alarm, of Table XIX, with 95 % intervals. Lines mark what is
+    guaranteed, the dashed one for families.""",
+    **INPUT,
+)
+def guarantee(run: Run, measured):
+    """Coverage, set size and the two risks in a panel each, with a row for each explainer."""
+    from matplotlib.lines import Line2D
+
+    from gpca.reporting.figures.panels import in_lines, legend_below, panels
+    from gpca.reporting.figures.style import BLUE, COLUMN_WIDTH_IN, GRAY, GREEN, ORANGE, PURPLE, SMALL_PT, VERMILION
+
+    looks = {  # variant -> label, color, marker
+        PLAIN: ("not calibrated", VERMILION, "x"),
+        BY_SAMPLE: ("by sample", BLUE, "o"),
+        BY_STATE: ("by sample, each state", PURPLE, "s"),
+        CONFIDENT: ("by sample, with confidence", ORANGE, "D"),
+        BY_FAMILY: ("by family", GREEN, "^"),
+    }
+    limits = {name: 100 * run.config[NAME][name] for name in ("level", "missed", "false_alarms", "family_risk")}
+    shown = {  # metric -> label, and lines
+        COVERAGE: ("sets that hold\nthe state (%)", [(limits["level"], "-")]),
+        SIZE: ("states in a set", []),
+        MISSED: ("failed called\ngood (%)", [(limits["missed"], "-"), (limits["family_risk"], "--")]),
+        FALSE_ALARMS: ("good called\nfailed (%)", [(limits["false_alarms"], "-"), (limits["family_risk"], "--")]),
+    }
+    rows = where(measured, {"condition": FAMILIES, "concept": ALL})
+    rows = where(rows, {"source": _all_sources(rows)})
+    titles = {name: title for name, title in _titles(run).items() if (rows["method"] == name).any()}
+    if not titles:
+        raise InputError(NAME, "has no results for these explainers", "run them first")
+    page, grid = panels(2, 2, 2.1 + 0.68 * len(titles), COLUMN_WIDTH_IN, sharey=True)
+    offsets = dict(zip(looks, np.linspace(-0.35, 0.35, len(looks)), strict=True))
+    for panel, (metric, (label, lines)) in zip(grid.flat, shown.items(), strict=True):
+        scale = 100 if metric in SHARES else 1
+        for variant, (_, color, marker) in looks.items():
+            points = where(rows, {"metric": metric, "variant": variant}).set_index("method")
+            for number, name in enumerate(titles):
+                if name in points.index:
+                    low, value, high = (scale * points.loc[name, column] for column in ("low", "value", "high"))
+                    y = number + offsets[variant]
+                    panel.plot([low, high], [y, y], color=color, linewidth=0.8)
+                    panel.plot(value, y, marker, color=color, markersize=3)
+        for line, style in lines:
+            panel.axvline(line, color=GRAY, linewidth=0.8, linestyle=style, zorder=0)
+        panel.set_xlabel(label, fontsize=SMALL_PT)
+        panel.tick_params(labelsize=SMALL_PT)
+        if metric == SIZE:
+            panel.set_xlim(0.8, len(STATES) + 0.2)
+            panel.set_xticks(range(1, len(STATES) + 1))
+        else:
+            panel.set_xlim((None, 101) if metric == COVERAGE else (-1, None))
+    grid[0, 0].set_yticks(range(len(titles)), [in_lines(title, 18) for title in titles.values()])
+    grid[0, 0].set_ylim(len(titles) - 0.45, -0.55)
+    handles = [
+        Line2D([], [], color=color, marker=marker, markersize=3, linewidth=0.8, label=label)
+        for label, color, marker in looks.values()
+    ]
+    handles.append(Line2D([], [], color=GRAY, linewidth=0.8, label="promised (dashed: by family)"))
+    legend_below(page, handles, columns=2, fontsize=SMALL_PT)
+    return page
+
+
+def _with_counts(measured: pd.DataFrame) -> pd.DataFrame:
+    """The rows, and further ones for numbers of samples and of families, and for the state with the least coverage."""
+    import pandas as pd
+
+    states = measured[(measured["metric"] == COVERAGE) & (measured["concept"] != ALL)]
+    worst = states.loc[states.groupby(list(ROWS))["value"].idxmin()].assign(metric=WORST, concept=ALL)
+    most = (
+        measured[measured["concept"] == ALL].groupby(list(ROWS), as_index=False)[["families", "samples", "seeds"]].max()
+    )
+    counts = [most.assign(metric=name, concept=ALL, value=most[name]) for name in ("families", "samples")]
+    return pd.concat([measured, worst, *counts])
+
+
+def _all_sources(rows: pd.DataFrame) -> str:
+    """All sources together, or the only one."""
+    return POOLED if (rows["source"] == POOLED).any() else rows["source"].iloc[:1].sum()
+
+
+def _limits(run: Run) -> list[str]:
+    names = ("level", "missed", "false_alarms", "family_risk", "confidence")
+    return [f"{100 * run.config[NAME][name]:g}" for name in names]
+
+
+def _titles(run: Run) -> dict[str, str]:
+    return run.titles(lambda name: explainer_entry(name, CAUSES), run.config[NAME]["explainers"])
+
+
+def _stand_ins(run: Run) -> str:
+    return ", procedural stand-ins among them" if run.stand_ins() else ""

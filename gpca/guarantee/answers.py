@@ -1,0 +1,287 @@
+"""Scores of samples by models that were trained on other families, and sets and calls calibrated on yet other ones."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, fields
+from math import floor
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from gpca.causes.dataset import LABELS
+from gpca.causes.truth import NOMINAL
+from gpca.errors import InputError
+from gpca.evaluation.measures import ALL
+from gpca.frames.source import REAL_WORLD
+from gpca.guarantee.conformal import ALARM, GOOD, NOT_SURE
+from gpca.guarantee.guarantee import STATES, calibrate, state_scores
+from gpca.io.csv_file import read_numbers, write_csv
+from gpca.settings import OpenShare
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+SCORES = tuple(f"score_{label}" for label in LABELS)
+TEXTS = ("model", "source", "sample", "family", "state")
+NUMBERS = ("seed", "taught", "severity", "weight")  # columns
+FAMILIES = "families"  # the condition under which the guarantee holds
+PLAIN, BY_SAMPLE, BY_STATE, CONFIDENT, BY_FAMILY = VARIANTS = (
+    *("plain", "by_sample", "by_state", "confident", "by_family"),
+)
+WITH_SETS = (PLAIN, BY_SAMPLE, BY_STATE, BY_FAMILY)
+WITH_ALARM = (PLAIN, BY_SAMPLE, CONFIDENT, BY_FAMILY)
+SHIFTED = (BY_SAMPLE, BY_STATE)  # variants under shift
+COVERAGE, SIZE, SINGLE = ("coverage", "set_size", "single_state")
+MISSED, FALSE_ALARMS, UNSURE = RISKS = ("missed_failures", "false_alarms", "not_sure")
+SHARES = (COVERAGE, SINGLE, *RISKS)
+Measured = tuple[str, str, str, float, np.ndarray, np.ndarray]  # variant, metric, concept, promised, value_A, counted_A
+EVEN = 0.5  # failure score of an alarm for explainers that are not trained
+
+
+@dataclass(frozen=True)
+class GuaranteeSettings:
+    """What is guaranteed.
+
+    Attributes:
+        level: probability that a set holds the true state.
+        missed, false_alarms: largest probabilities that a failed registration is called good, and a good one failed.
+        family_risk: both for calibration by family; there are too few families for a smaller one.
+        confidence: with which both hold for the thresholds themselves, in a row of its own.
+        nonconformity: score of how badly a state fits (:func:`gpca.guarantee.conformal.nonconformity`).
+    """
+
+    level: OpenShare = 0.9
+    missed: OpenShare = 0.05
+    false_alarms: OpenShare = 0.05
+    family_risk: OpenShare = 0.1
+    confidence: OpenShare = 0.9
+    nonconformity: Literal["probability", "cumulative"] = "probability"
+
+
+@dataclass(frozen=True)
+class Scored:
+    """N scored samples: a sample occurs once for each model that scored it. Borderline samples are left out.
+
+    Attributes:
+        model: (N,) name of the model. Scores of different models are never mixed.
+        source, seed, sample: (N,) the sample.
+        family: (N,) of shapes, or the scene of a depth frame.
+        state: (N,) the true one, of :data:`gpca.guarantee.guarantee.STATES`.
+        seen: (N,) the model was trained on this sample.
+        severity: (N,) of its perturbations, as a share of the largest in any sample.
+        weight: (N,) of the sample in means.
+        scores: (N, 4) of nominal and of the causes.
+    """
+
+    model: np.ndarray
+    source: np.ndarray
+    seed: np.ndarray
+    sample: np.ndarray
+    family: np.ndarray
+    state: np.ndarray
+    seen: np.ndarray
+    severity: np.ndarray
+    weight: np.ndarray
+    scores: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.model)
+
+    def subset(self, rows: np.ndarray) -> Scored:
+        """The given rows, or those of a mask."""
+        return Scored(*(getattr(self, field.name)[rows] for field in fields(Scored)))
+
+    @classmethod
+    def joined(cls, parts: Iterable[Scored]) -> Scored:
+        """The rows of several one after the other."""
+        parts = list(parts)
+        return cls(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(cls)))
+
+    def save(self, path: str | Path) -> None:
+        """Write the CSV described in results/README.md."""
+        import pandas as pd
+
+        columns = {name: getattr(self, name) for name in TEXTS}
+        columns |= {"seed": self.seed, "taught": self.seen.astype(int), "severity": self.severity}
+        columns |= {"weight": self.weight} | dict(zip(SCORES, self.scores.T, strict=True))
+        write_csv(path, pd.DataFrame(columns))
+
+    @classmethod
+    def load(cls, path: str | Path) -> Scored:
+        """Read the CSV.
+
+        Raises:
+            InputError: the file is missing or damaged, or has an unknown state.
+        """
+        rows: pd.DataFrame = read_numbers(path, (*TEXTS, *NUMBERS, *SCORES), (*NUMBERS, *SCORES))
+        if unknown := set(rows["state"]) - set(STATES):
+            raise InputError(path, f"unknown state '{min(unknown)}'", f"its states are {', '.join(STATES)}")
+        return cls(
+            **{name: rows[name].to_numpy(str) for name in TEXTS},
+            seed=rows["seed"].to_numpy().astype(int),
+            seen=rows["taught"].to_numpy() == 1,
+            severity=rows["severity"].to_numpy(),
+            weight=rows["weight"].to_numpy(),
+            scores=rows[list(SCORES)].to_numpy(float),
+        )
+
+
+@dataclass(frozen=True)
+class Condition:
+    """The samples of calibration and test.
+
+    Attributes:
+        name: ``families``, ``from_{source}``, ``milder``, ``harder`` or ``frames``: the calibration samples.
+        calibration, tested: (N,) masks of the rows that may be calibrated on, and of those that are tested.
+        variants: the ways of calibration that are compared.
+    """
+
+    name: str
+    calibration: np.ndarray
+    tested: np.ndarray
+    variants: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Answers:
+    """Sets and calls for A tested rows.
+
+    Attributes:
+        row: (A,) numbers of the rows.
+        sets: variant -> (A, 5) which states are in the set.
+        calls: variant -> (A,) of :data:`gpca.guarantee.conformal.OUTCOMES`.
+        families: the smallest number of families that any was calibrated on.
+    """
+
+    row: np.ndarray
+    sets: dict[str, np.ndarray]
+    calls: dict[str, np.ndarray]
+    families: int
+
+
+def conditions(scored: Scored) -> list[Condition]:
+    """The condition with a guarantee, and those without, as far as there are samples for them.
+
+    - from_{source}: calibrated on one source and tested on the others;
+    - milder, harder: calibrated on the half of the samples with less, or more, severity, and tested on the other half;
+      nominal and failed samples are halved separately;
+    - frames: calibrated on simulated registrations and tested on those of depth frames.
+    """
+    for_frames_N = np.char.startswith(scored.model, "frames")
+    asked_N, real_N = ~scored.seen & ~for_frames_N, scored.source == REAL_WORLD
+    listed = [Condition(FAMILIES, asked_N, asked_N, VARIANTS)]
+    sources = list(dict.fromkeys(scored.source[asked_N].tolist()))
+    for source in sources if len(sources) > 1 else []:
+        inside_N = scored.source == source
+        listed.append(Condition(f"from_{source}", asked_N & inside_N, asked_N & ~inside_N, SHIFTED))
+    hard_N = np.zeros(len(scored), bool)
+    for half_N in (scored.state == NOMINAL, scored.state != NOMINAL):
+        if (half_N & asked_N).any():
+            hard_N |= half_N & (scored.severity > np.median(scored.severity[half_N & asked_N]))
+    listed += [
+        Condition("milder", asked_N & ~hard_N, asked_N & hard_N, SHIFTED),
+        Condition("harder", asked_N & hard_N, asked_N & ~hard_N, SHIFTED),
+    ]
+    if real_N.any():
+        listed.append(Condition("frames", for_frames_N & ~real_N, real_N, SHIFTED))
+    return listed
+
+
+def answers_of(scored: Scored, condition: Condition, settings: GuaranteeSettings) -> Answers | None:
+    """Sets and calls for all tested rows, or None where there are none.
+
+    Every family is tested with thresholds that were calibrated on scores of the same model for other families, none of
+    which it was trained on.
+    """
+    probabilities_N_5 = state_scores(scored.scores)
+    family_N = np.unique(scored.family, return_inverse=True)[1]
+    rows, sets, calls, counts = [], [], [], []
+    for model in dict.fromkeys(scored.model[condition.tested].tolist()):
+        model_N = scored.model == model
+        seen = np.flatnonzero(model_N & scored.seen)
+        for family in np.unique(family_N[model_N & condition.tested]):
+            tested = np.flatnonzero(model_N & condition.tested & (family_N == family))
+            calibration = np.flatnonzero(model_N & condition.calibration & (family_N != family))
+            sets_n, calls_n = _sets_and_calls(
+                probabilities_N_5, scored.state, family_N, calibration, seen, tested, condition, settings
+            )
+            rows.append(tested)
+            sets.append(sets_n)
+            calls.append(calls_n)
+            counts.append(len(np.unique(family_N[calibration])))
+    if not rows:
+        return None
+    return Answers(
+        np.concatenate(rows),
+        {name: np.concatenate([part[name] for part in sets]) for name in sets[0]},
+        {name: np.concatenate([part[name] for part in calls]) for name in calls[0]},
+        min(counts),
+    )
+
+
+def _sets_and_calls(
+    probabilities_N_5, state_N, family_N, calibration, seen, tested, condition: Condition, settings: GuaranteeSettings
+):
+    """Sets and calls (n, …) of the tested rows by variant; the other arguments in lower case are row numbers."""
+    tested_n_5 = probabilities_N_5[tested]
+    failure_n = 1 - tested_n_5[:, 0]
+    samples = (probabilities_N_5[calibration], state_N[calibration])
+    limits = {name: getattr(settings, name) for name in ("level", "missed", "false_alarms", "nonconformity")}
+    risks = {"missed": settings.family_risk, "false_alarms": settings.family_risk}
+    made = {
+        BY_SAMPLE: lambda: calibrate(*samples, **limits),
+        BY_STATE: lambda: calibrate(*samples, **limits, by_state=True),
+        CONFIDENT: lambda: calibrate(*samples, **limits, confidence=settings.confidence),
+        BY_FAMILY: lambda: calibrate(*samples, family_N[calibration], **limits | risks),
+    }
+    guarantees = {name: make() for name, make in made.items() if name in condition.variants}
+    sets = {name: guarantee.sets(tested_n_5) for name, guarantee in guarantees.items() if name in WITH_SETS}
+    calls = {name: guarantee.alarm(failure_n) for name, guarantee in guarantees.items() if name in WITH_ALARM}
+    if PLAIN in condition.variants:
+        sets[PLAIN] = plain_sets(tested_n_5, settings.level)
+        failed = seen[state_N[seen] != NOMINAL]
+        threshold = plain_threshold(1 - probabilities_N_5[failed, 0], settings.missed) if len(failed) else EVEN
+        calls[PLAIN] = np.where(failure_n >= threshold, ALARM, GOOD)
+    return sets, calls
+
+
+def plain_sets(probabilities_N_K: np.ndarray, level: float) -> np.ndarray:
+    """The most probable states (N, K) until their uncalibrated probabilities add up to the level."""
+    order_N_K = np.argsort(-probabilities_N_K, axis=1, kind="stable")
+    ranked_N_K = np.take_along_axis(probabilities_N_K, order_N_K, axis=1)
+    before_N_K = np.cumsum(ranked_N_K, axis=1) - ranked_N_K
+    inside_N_K = np.zeros(probabilities_N_K.shape, bool)
+    np.put_along_axis(inside_N_K, order_N_K, before_N_K < level - 1e-9, axis=1)
+    return inside_N_K
+
+
+def plain_threshold(failure_M: np.ndarray, missed: float) -> float:
+    """Largest threshold below which at most this share of the failed samples lie."""
+    return float(np.sort(failure_M)[min(floor(missed * len(failure_M) + 1e-9), len(failure_M) - 1)])
+
+
+def measures(asked: Scored, answers: Answers, settings: GuaranteeSettings) -> Iterator[Measured]:
+    """Yield every measure of every variant.
+
+    - coverage: share of the sets that hold the true state, over all samples and over those of each state;
+    - set_size: mean number of states in a set; single_state: share of the sets of one state alone;
+    - missed_failures: share of the failed that are called good; false_alarms: of the nominal that are called failed;
+    - not_sure: share that is called neither.
+    """
+    everything_A, nominal_A = np.ones(len(asked), bool), asked.state == NOMINAL
+    true_A_5 = asked.state[:, None] == np.array(STATES)
+    for variant, inside_A_5 in answers.sets.items():
+        holds_A, size_A = (inside_A_5 & true_A_5).any(axis=1).astype(float), inside_A_5.sum(axis=1).astype(float)
+        for concept, counted_A in {ALL: everything_A, **dict(zip(STATES, true_A_5.T, strict=True))}.items():
+            yield variant, COVERAGE, concept, settings.level, holds_A, counted_A
+            yield variant, SIZE, concept, np.nan, size_A, counted_A
+        yield variant, SINGLE, ALL, np.nan, (size_A == 1).astype(float), everything_A
+    for variant, called_A in answers.calls.items():
+        missed, false_alarms = (
+            (settings.family_risk,) * 2 if variant == BY_FAMILY else (settings.missed, settings.false_alarms)
+        )
+        yield variant, MISSED, ALL, missed, (called_A == GOOD).astype(float), ~nominal_A
+        yield variant, FALSE_ALARMS, ALL, false_alarms, (called_A == ALARM).astype(float), nominal_A
+        yield variant, UNSURE, ALL, np.nan, (called_A == NOT_SURE).astype(float), everything_A
