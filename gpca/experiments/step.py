@@ -52,6 +52,7 @@ class Step:
         settings: keys of the config, with dots, that the job is given by these names; or a function that returns them.
         params: further arguments of the job, or functions of plan and wildcards that return them.
         modules: returns the modules chosen at run time, by plan, which count as code of the step.
+        modules_of_job: returns those that a job chooses, by plan and wildcards.
         where: wildcard, or name behind an asterisk -> the name of its values, if another.
         apart: name in the outputs, and the function that returns which of its values have jobs of their own, so that an
             edit of code from outside reruns nothing else.
@@ -68,6 +69,7 @@ class Step:
     settings: Settings = ()
     params: Mapping[str, Any] = field(default_factory=dict)
     modules: Callable[[Plan], Iterable[str]] = lambda plan: ()
+    modules_of_job: Callable[[Plan, Wildcards], Iterable[str]] | None = None
     where: Mapping[str, str] = field(default_factory=dict)
     apart: tuple[str, Callable[[Plan], Sequence[str]]] | None = None
     target: str = ""
@@ -145,7 +147,7 @@ def _rule(step: Step, plan: Plan, name: str) -> Rule:
         run=step.run,
         inputs={key: _input(step, plan, files) for key, files in step.inputs.items()},
         data={"data": _data(step, plan)} if step.data else {},
-        code=code_files(step.run, *step.modules(plan)),
+        code=_code(step, plan),
         outputs=outputs,
         settings=_settings(step, plan),
         params=lists | {key: _param(plan, value) for key, value in step.params.items()},
@@ -171,7 +173,7 @@ def _rule_outside(step: Step, plan: Plan, name: str, outside: Sequence[str]) -> 
     }
     rule = _rule(replace(step, outputs=patterns, apart=None), _with(plan, step, name, []), f"{step.name}_outside")
 
-    def resolved(files: Callable) -> Callable[[Wildcards], list[str]]:
+    def resolved(files: Callable) -> Callable[[Wildcards], str | list[str]]:
         return lambda wildcards: _resolved(step, of(wildcards), files, wildcards)
 
     def returned(value: Callable) -> Callable[[Wildcards], Any]:
@@ -229,10 +231,10 @@ def _input(step: Step, plan: Plan, files: Files) -> Any:
     return _files(step, plan, files)
 
 
-def _resolved(step: Step, plan: Plan, files: Callable, wildcards: Wildcards) -> list[str]:
-    patterns = _listed(files(plan, wildcards))
-    paths = [path for pattern in patterns for path in _expanded(step, plan, pattern)]
-    return [path.format(**dict(wildcards.items())) for path in paths]
+def _resolved(step: Step, plan: Plan, files: Callable, wildcards: Wildcards) -> str | list[str]:
+    given, by_name = files(plan, wildcards), dict(wildcards.items())
+    paths = [path.format(**by_name) for pattern in _listed(given) for path in _expanded(step, plan, pattern)]
+    return paths[0] if isinstance(given, str) and "{*" not in given else paths
 
 
 def _data(step: Step, plan: Plan) -> Callable[[Wildcards], list[str]]:
@@ -257,6 +259,13 @@ def _at(config: Any, key: str) -> Any:
     for name in key.split("."):
         config = config[name]
     return config
+
+
+def _code(step: Step, plan: Plan) -> Any:
+    of_job, modules = step.modules_of_job, (step.run, *step.modules(plan))
+    if of_job is None:
+        return code_files(*modules)
+    return lambda wildcards: code_files(*modules, *of_job(plan, wildcards))
 
 
 def _param(plan: Plan, value: Any) -> Any:

@@ -6,7 +6,7 @@ import pytest
 from gpca.comparison.readings import chance_of, judge_readings, read_judged, summarize, with_readings
 from gpca.errors import InputError
 from gpca.evaluation.measures import TIDY_COLUMNS
-from gpca.experiments.specification_curve.words import ReadingWords
+from gpca.experiments.reading_words import ReadingWords
 
 from .made_up import ACCURACY, LABELS, TOLERANCES, compared, number, tidy
 

@@ -12,7 +12,7 @@ from gpca.comparison.published import NONE_YET, read_published, read_reasons
 from gpca.comparison.readings import READINGS, judge_readings, with_readings
 from gpca.comparison.values import read_results
 from gpca.comparison.verdicts import JUDGED, NOT_COMPARABLE, Tolerance, compare
-from gpca.experiments.specification_curve.words import ReadingWords
+from gpca.experiments.reading_words import ReadingWords
 
 SETTINGS = yaml.safe_load((ROOT / "config/config.yaml").read_text())["comparison"]["tolerances"]
 TOLERANCES = {unit: Tolerance(**tolerance) for unit, tolerance in SETTINGS.items()}

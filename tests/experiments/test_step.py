@@ -71,12 +71,14 @@ def test_functions_are_asked_for_every_job():
         inputs={"others": lambda plan, wildcards: [f"objects/{name}.npz" for name in plan.names["source"]]},
         settings=lambda plan, wildcards: {"seed": wildcards.source},
         params={"title": lambda plan, wildcards: wildcards.source.upper(), "fixed": 3},
+        modules_of_job=lambda plan, wildcards: ["gpca.portable"] if wildcards.source == "ycb" else [],
     )
     [rule] = rules_of(dynamic, PLAN)
     job = Wildcards(source="ycb")
     assert rule.inputs["others"](job) == ["objects/ycb.npz", "objects/cups.npz"]
     assert json.loads(rule.settings(job)) == {"seed": "ycb"}
     assert (rule.params["title"](job), rule.params["fixed"]) == ("YCB", 3)
+    assert [("gpca/portable.py" in rule.code(Wildcards(source=name))) for name in ("ycb", "cups")] == [True, False]
 
 
 def test_names_from_outside_have_jobs_of_their_own():

@@ -45,12 +45,12 @@ MODULES = {f: f"gpca.steps.{module}:{f}" for module, functions in SHARED.items()
     "register_scans": "gpca.steps.scan_trials",
     "scan_causes": IN + "scan_causes.step",
     "diagnose_scans": IN + "scan_causes.diagnosis_step",
-    "readings": IN + "specification_curve.step",
-    "retrain": IN + "specification_curve.retrain_step",
-    "measure_joint": IN + "joint_reading.measure_step",
-    "choose_joint": IN + "joint_reading.choose_step",
-    "apply_joint": IN + "joint_reading.apply_step",
-    "judge_joint": IN + "joint_reading.verdict_step",
+    "readings": "gpca.steps.readings.files:run",
+    "join_repeats": "gpca.steps.readings.files:join",
+    "retrain": "gpca.steps.readings.severities:retrain",
+    "measure_joint": "gpca.steps.joint_readings:measure",
+    "choose_joint": "gpca.steps.joint_readings:choose",
+    "apply_joint": "gpca.steps.joint_readings:apply",
     "exchange": "gpca.steps.exchange",
 }
 LISTS = {  # which names of a step are lists, and not of one seed, file or name
@@ -76,7 +76,7 @@ LISTS = {  # which names of a step are lists, and not of one seed, file or name
     "readings": "registrations sets predictions embeddings retrained",
     "choose_joint": "measured",
     "apply_joint": "sets other_sets",
-    "judge_joint": "values",
+    "join_repeats": "paths",
     "scan_causes": "data",
     "diagnose_scans": (
         "scan_causes scan_descriptors scan_reenactments causes descriptors reenactments encoders embeddings"

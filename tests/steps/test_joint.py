@@ -7,13 +7,12 @@ import pytest
 import yaml
 
 from gpca.code_files import ROOT
+from gpca.comparison.joint_reading import CHOICES, numbers_asked, read_choices, read_verdicts
 from gpca.comparison.published import read_published
 from gpca.comparison.readings import READING_COLUMNS
-from gpca.evaluation.measures import TIDY_COLUMNS, read_metrics
-from gpca.experiments.joint_reading.choices import CHOICES
-from gpca.experiments.joint_reading.judgement import read_choices, read_verdicts
-from gpca.experiments.joint_reading.search import asked
-from gpca.experiments.joint_reading.tables import table16_joint_reading
+from gpca.evaluation.measures import TIDY_COLUMNS, read_metrics, write_metrics
+from gpca.experiments.joint_reading import judge_joint, table16_joint_reading
+from gpca.experiments.plan import Run
 from gpca.objects.canonical import write_objects
 from gpca.objects.procedural import surfaces
 from tests.steps.by_words import main
@@ -51,7 +50,7 @@ def folder(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         folder = tmp_path_factory.mktemp("joint")
         patch.chdir(folder)
-        patch.setattr("gpca.experiments.joint_reading.joint_values.gpc_settings", hardly_trained)
+        patch.setattr("gpca.steps.joint_readings.gpc_settings", hardly_trained)
         for source in ("shapes", "ycb"):
             write_objects(list(surfaces("coffee_cup"))[:2], source, folder / f"{source}.npz", 1024)
             for severities in ("protocol", "weaker"):
@@ -95,15 +94,24 @@ def test_a_reading_of_every_choice_is_found(folder):
 
 def test_the_reading_gives_every_number_of_its_source_a_value(folder, monkeypatch):
     monkeypatch.chdir(folder)
-    numbers = asked(read_published(), ["ycb"])
+    numbers = numbers_asked(read_published(), ["ycb"])
     rows = [(*number.key, number.value, "False") for number in numbers[:-1]] + [(*numbers[-1].key, "", "False")]
     pd.DataFrame(rows, columns=["table", "row", "column", "reproduced", "at_least"]).to_csv("comparison.csv")
     first = (*numbers[0].key, "%", 30.0, 30.0, 30.0, "close", "shap", "x", 30.0, False, 1, 0.0, True, 0.5)
     pd.DataFrame([first], columns=list(READING_COLUMNS)).to_csv("reading_verdicts.csv", index=False)
-    files = {"values": "ycb.csv", "comparison": "comparison.csv", "readings": "reading_verdicts.csv"}
-    outputs = {"verdicts": "verdicts.csv", "scores": "scores.csv"}
-    settings = {"deals": 10, "tolerances": TOLERANCES}
-    assert run("judge_joint", settings, **files, development="development.csv", **outputs) == 0
+    objects = {"title": "Shapes", "kind": "procedural", "stand_in": False}
+    judged = Run(
+        {
+            "joint_reading": {"deals": 10, "objects": objects},
+            "comparison": {"tolerances": TOLERANCES},
+            "sources": {"ycb": {"title": "YCB", "stand_in": True}},
+            "real_world": {"title": "", "datasets": []},
+            "data_dir": None,
+        }
+    )
+    frames = judge_joint(judged, ["ycb.csv"], "comparison.csv", "reading_verdicts.csv", "development.csv")
+    for frame, name in zip(frames, ("verdicts.csv", "scores.csv"), strict=True):
+        write_metrics(frame, name)
     verdicts = read_verdicts(folder / "verdicts.csv")
     assert len(verdicts) == len(numbers)
     assert verdicts["close"].tolist() == [True] * (len(numbers) - 1) + [False]
@@ -112,8 +120,7 @@ def test_the_reading_gives_every_number_of_its_source_a_value(folder, monkeypatc
     scores = read_metrics(folder / "scores.csv")
     assert list(scores.columns) == list(TIDY_COLUMNS)
     assert set(scores["source"]) == {"development", "evaluation"}
-    choice, sources = read_choices(folder / "choice.csv"), {"ycb": {"stand_in": True}}
-    table = table16_joint_reading(verdicts, scores, choice, "Shapes", sources)
+    table = table16_joint_reading(judged, verdicts, scores, read_choices(folder / "choice.csv"))
     assert len(table.rows) == len(numbers)
     assert "found on Shapes" in table.footnotes[0]
 

@@ -65,7 +65,7 @@ rule comparison:
         code=code_files(
             "gpca.comparison.claims",
             "gpca.comparison.readings",
-            "gpca.experiments.specification_curve.words",
+            "gpca.experiments.reading_words",
             "gpca.comparison.markdown",
             "gpca.process.job",
         ),

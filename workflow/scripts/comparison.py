@@ -6,7 +6,7 @@ from gpca.comparison.published import read_published, read_reasons
 from gpca.comparison.readings import READINGS, judge_readings, with_readings
 from gpca.comparison.values import cluster_draws, measured_on, read_results
 from gpca.comparison.verdicts import Tolerance, compare
-from gpca.experiments.specification_curve.words import ReadingWords
+from gpca.experiments.reading_words import ReadingWords
 from gpca.io.csv_file import write_csv
 from gpca.io.files import whole_file
 from gpca.process.job import workflow_script

@@ -1,0 +1,349 @@
+"""Joint readings: a value of every choice that touches several of the paper's tables, and which numbers they fit.
+
+A printed number depends on some choices alone, those of its *part*, so that a grid of joint readings takes far fewer
+values than it has readings. The values of a part become an array with an axis for every choice, of length 1 where they
+do not depend on it; so the share of close numbers of every reading is a sum of such arrays, and so it is for every
+permutation of the printed numbers.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import numpy as np
+
+from gpca.active_learning.curves import CENSORED_BY
+from gpca.comparison.chance import WITHIN, is_close, p_value, permuted, weights
+from gpca.comparison.published import UNITS, Number
+from gpca.comparison.verdicts import Tolerance
+from gpca.errors import InputError
+from gpca.io.csv_file import numbers as number_column
+from gpca.io.csv_file import read_csv
+from gpca.settings import Distinct, Keys, OpenShare
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+SEVERITIES = "severities"
+PROTOCOL = "protocol"  # the severities of the protocol
+# Severities of training and test samples; of the classifier, the scale of its inputs, where inducing inputs and
+# lengthscale start, the samples of an iteration, kernel and schedule; the share of the new concept in the pool; how far
+# SHAP and SA turn the knobs; the samples and the distance of ρ, and these samples of AUC and ECE.
+CHOICES: Mapping[str, Any] = {
+    SEVERITIES: Literal["protocol", "weaker", "stronger"],
+    "inputs": Literal["standardised", "unit_norm", "raw"],
+    "inducing": Literal["kmeans", "random"],
+    "lengthscale": Literal["median", "default"],
+    "batch": Literal["full", "minibatch"],
+    "kernel": Literal["rbf", "matern32"],
+    "new_share": OpenShare,
+    "knobs": Literal["middle", "low", "high"],
+    "set": Literal["in_distribution", "severity", "in_distribution+severity"],
+    "distance": Literal["knn_analytical", "mahalanobis_analytical", "knn_embedding", "mahalanobis_embedding"],
+}
+Grid = Annotated[dict, Keys({name: Distinct[kind] for name, kind in CHOICES.items()}, required=CHOICES)]  # type: ignore[valid-type]
+START = ("inputs", "inducing", "lengthscale", "batch")
+PARTS = {  # part -> the choices that its numbers depend on
+    "knobs": (SEVERITIES, "knobs"),  # Table I, SHAP and SA
+    "schedules": (SEVERITIES, *START),  # Table IV
+    "classifier": (SEVERITIES, *START, "kernel"),  # GP-CA of Tables I and II, accuracies of the GPC in V
+    "labels": (SEVERITIES, *START, "kernel", "new_share"),  # Table III
+    "learners": (SEVERITIES, "inputs"),  # accuracies of forest and SVM in Table V
+    "diagnostics": (SEVERITIES, *START, "kernel", "set", "distance"),  # of the GPC in Table V
+    "learner_diagnostics": (SEVERITIES, "inputs", "set", "distance"),  # of forest and SVM
+}
+TABLES = ("I", "II", "III", "IV", "V")
+DEVELOPMENT, EVALUATION = "development", "evaluation"  # the samples that scores are of
+EVALUATED, JUDGED = "joint_reading", "protocol"  # the joint reading, and the protocol that is judged
+VERDICT_COLUMNS = (
+    *("table", "row", "column", "unit", "published", "upper", "reproduced", "at_least", "close"),
+    *("joint", "joint_at_least", "joint_close", "n", "readings", "readings_close"),
+)
+FLAGS = ("at_least", "close", "joint_at_least", "joint_close")
+Joint = dict[str, Any]  # a value of every choice
+Record = tuple[str, str, str, float]  # table or "all", method, metric, value
+
+
+def part_name(part: str, joint: Joint) -> str:
+    """Name of a part under a joint reading, as `table` of its tidy rows has it: ``knobs/weaker/low``."""
+    return "/".join([part, *(text_of(joint[choice]) for choice in PARTS[part])])
+
+
+def text_of(value: Any) -> str:
+    """A value of a choice as names and files have it."""
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def numbers_asked(numbers: Sequence[Number], sources: Sequence[str] | None = None) -> list[Number]:
+    """The means of Tables I to V, each value of ours once; of these sources alone, if any are given."""
+    return [
+        number
+        for number in numbers
+        if number.table in TABLES
+        and number.counterpart
+        and number.counterpart.statistic == "mean"
+        and not number.same_as
+        and (sources is None or set(number.counterpart.sources) <= set(sources))
+    ]
+
+
+@dataclass(frozen=True)
+class Found:
+    """Result of a search.
+
+    Attributes:
+        joint: the first of the readings with the largest share, in the order of the grid.
+        share: that share, between 0 and 1.
+        close: (K,) which numbers are close under it.
+        best: the readings with the largest shares, first to last, each with its share.
+        equals: number of readings with the largest share.
+        readings: number of all readings.
+        protocol: the share of the grid's first reading, in which every choice has the protocol's value.
+        by_chance: way of permuting -> (D,) the largest share for each permutation of the printed numbers.
+    """
+
+    joint: Joint
+    share: float
+    close: np.ndarray
+    best: list[tuple[Joint, float]]
+    equals: int
+    readings: int
+    protocol: float
+    by_chance: Mapping[str, np.ndarray]
+
+
+def search(
+    numbers: Sequence[Number],
+    printed: Sequence[Number],
+    measured: pd.DataFrame,
+    grid: Mapping[str, Sequence[Any]],
+    tolerances: Mapping[str, Tolerance],
+    deals: int,
+    shown: int = 20,
+) -> Found:
+    """Search every joint reading of a grid.
+
+    Args:
+        numbers: those whose values are measured.
+        printed: these and others, which take their places in permutations.
+        measured: tidy rows of one source that stands for theirs, with `table` as :func:`part_name` has it.
+        grid: the values of every choice, the protocol's first.
+        tolerances: of each unit.
+        deals: number of permutations of the printed numbers.
+        shown: number of readings in `best`.
+
+    Raises:
+        InputError: a number without values, or a value that the grid needs and the rows lack.
+    """
+    shape = tuple(len(grid[choice]) for choice in CHOICES)
+    closes = [_closes(number, printed, measured, grid, tolerances) for number in numbers]
+    weight_K = weights(numbers)
+    index_K = np.array([printed.index(number) for number in numbers])
+    share_G = _shares(closes, index_K, weight_K, shape)
+    order = np.argsort(-np.round(share_G.ravel(), 9), kind="stable")
+    largest, best_at = float(share_G.ravel()[order[0]]), np.unravel_index(order[0], shape)
+    best = []
+    for index in order[:shown]:
+        at = np.unravel_index(index, shape)
+        joint = {choice: grid[choice][int(i)] for choice, i in zip(CHOICES, at, strict=True)}
+        best.append((joint, float(share_G.ravel()[index])))
+    close_K = [
+        bool(np.broadcast_to(close[index], shape)[best_at]) for close, index in zip(closes, index_K, strict=True)
+    ]
+    by_chance = {
+        within: np.array(
+            [
+                _shares(closes, permuted_P[index_K], weight_K, shape).max()
+                for permuted_P in permuted(printed, within, deals)
+            ]
+        )
+        for within in WITHIN
+    }
+    equals = int((share_G >= largest - 1e-9).sum())
+    return Found(
+        best[0][0], largest, np.array(close_K), best, equals, share_G.size, float(share_G.ravel()[0]), by_chance
+    )
+
+
+def values_of(number: Number, measured: pd.DataFrame) -> dict[str, tuple[float, bool]]:
+    """Name of a part -> mean over the seeds in the number's unit, and whether some of it is a lower bound."""
+    counterpart = number.counterpart
+    assert counterpart
+    [method], [metric] = counterpart.methods, counterpart.metrics
+    rows = measured[(measured["method"] == method) & (measured["concept"] == counterpart.concept)]
+    means = rows[rows["metric"] == metric].groupby("table", sort=False)["value"].mean()
+    reached = rows[rows["metric"] == CENSORED_BY.get(metric)].groupby("table")["value"].min()
+    factor = UNITS[number.unit].factor
+    return {name: (factor * value, bool(reached.get(name, 1) < 1)) for name, value in means.items()}
+
+
+def _closes(
+    number: Number,
+    printed: Sequence[Number],
+    measured: pd.DataFrame,
+    grid: Mapping[str, Sequence[Any]],
+    tolerances: Mapping[str, Tolerance],
+) -> np.ndarray:
+    """Whether a number's values are close to each printed one (P, …), with an axis for every choice.
+
+    None is close to printed numbers that never take its place.
+    """
+    values = values_of(number, measured)
+    if not values:
+        raise InputError("joint reading", f"has no value of {' / '.join(number.key)}", "measure it again")
+    part = next(iter(values)).partition("/")[0]
+    shape = [len(grid[choice]) if choice in PARTS[part] else 1 for choice in CHOICES]
+    close = np.zeros((len(printed), *shape), dtype=bool)
+    comparable = [i for i, other in enumerate(printed) if (other.table, other.unit) == (number.table, number.unit)]
+    for at in product(*map(range, shape)):
+        name = part_name(part, {choice: grid[choice][i] for choice, i in zip(CHOICES, at, strict=True)})
+        if name not in values:
+            raise InputError("joint reading", f"has no value of {' / '.join(number.key)} under {name}", "measure it")
+        value, at_least = values[name]
+        for other in comparable:
+            close[(other, *at)] = is_close(printed[other], value, at_least, tolerances[number.unit])
+    return close
+
+
+def _shares(
+    closes: Sequence[np.ndarray], printed_K: np.ndarray, weight_K: np.ndarray, shape: tuple[int, ...]
+) -> np.ndarray:
+    """Share of close numbers of every joint reading, if these printed numbers stand in the places of the numbers.
+
+    Numbers that depend on the same choices are added up before the whole grid is.
+    """
+    by_shape: dict[tuple[int, ...], np.ndarray] = {}
+    for k, close in enumerate(closes):
+        weighted = weight_K[k] * close[printed_K[k]]
+        by_shape[weighted.shape] = by_shape.get(weighted.shape, 0) + weighted
+    share_G = np.zeros(shape)
+    for part in by_shape.values():
+        share_G += part
+    return share_G
+
+
+def scores(
+    numbers: Sequence[Number],
+    close_K: np.ndarray,
+    share: float,
+    by_chance: Mapping[str, np.ndarray],
+    method: str = EVALUATED,
+) -> list[Record]:
+    """Numbers and close ones of each table and of all; the share of close ones with equal weights of the tables.
+
+    Of the permutations of the printed numbers, the mean share and p.
+    """
+    records: list[Record] = []
+    tables = np.array([number.table for number in numbers])
+    for table in dict.fromkeys(tables):
+        in_table_k = close_K[tables == table]
+        records += [(table, method, "numbers", len(in_table_k)), (table, method, "close", in_table_k.sum())]
+    records += [("all", method, "numbers", len(numbers)), ("all", method, "close", close_K.sum())]
+    records.append(("all", method, "share", share))
+    for within, share_D in by_chance.items():
+        records.append(("all", method, f"expected_{within}", share_D.mean()))
+        records.append(("all", method, f"p_{within}", p_value(share, share_D)))
+    return records
+
+
+def scores_of_values(
+    numbers: Sequence[Number],
+    value_K: Sequence[tuple[float, bool]],
+    tolerances: Mapping[str, Tolerance],
+    deals: int,
+    method: str,
+) -> list[Record]:
+    """:func:`scores` of a value for each number, with whether it is a lower bound."""
+    close_K_K = np.array(
+        [
+            [printed.unit == number.unit and is_close(printed, *value, tolerances[number.unit]) for printed in numbers]
+            for number, value in zip(numbers, value_K, strict=True)
+        ]
+    )
+    index_K, weight_K = np.arange(len(numbers)), weights(numbers)
+    by_chance = {
+        within: np.array([close_K_K[index_K, printed_K] @ weight_K for printed_K in permuted(numbers, within, deals)])
+        for within in WITHIN
+    }
+    close_K = close_K_K.diagonal()
+    return scores(numbers, close_K, float(close_K @ weight_K), by_chance, method)
+
+
+def judge(
+    numbers: Sequence[Number],
+    joint: pd.DataFrame,
+    comparison: pd.DataFrame,
+    readings: pd.DataFrame,
+    tolerances: Mapping[str, Tolerance],
+    deals: int,
+) -> tuple[list[tuple], list[Record]]:
+    """A row of `VERDICT_COLUMNS` for each number, and the scores of the joint reading and of the protocol.
+
+    Args:
+        numbers: those that are judged.
+        joint: tidy rows of the joint reading.
+        comparison: text of the run's comparison: `reproduced`, `at_least`.
+        readings: as :func:`gpca.comparison.readings.read_judged` reads them.
+        tolerances: of each unit.
+        deals: number of permutations of the printed numbers.
+
+    Raises:
+        InputError: a number without a value of the joint reading.
+    """
+    of_run = comparison.set_index(["table", "row", "column"])[["reproduced", "at_least"]]
+    counts = readings.groupby(["table", "row", "column"])["close"].agg(["size", "sum"])
+    rows, joint_values, run_values = [], [], []
+    for number in numbers:
+        tolerance, sources = tolerances[number.unit], number.counterpart.sources if number.counterpart else ()
+        measured = joint[joint["source"].isin(sources)]
+        values = list(values_of(number, measured).values())
+        if len(values) != 1:
+            fault = f"has {len(values)} values of {' / '.join(number.key)}"
+            raise InputError("joint reading", fault, "make it again")
+        [value] = values
+        reproduced, at_least = of_run.loc[number.key]
+        run_value = (float(reproduced or "nan"), at_least == "True")  # empty where the run has no such value
+        upper = number.upper if number.upper > number.value else math.nan
+        rows.append(
+            (
+                *(*number.key, number.unit, number.value, upper),
+                *(*run_value, is_close(number, *run_value, tolerance)),
+                *(round(value[0], 6), value[1], is_close(number, *value, tolerance), measured["seed"].nunique()),
+                *([int(count) for count in counts.loc[number.key]] if number.key in counts.index else [0, 0]),
+            )
+        )
+        joint_values.append(value)
+        run_values.append(run_value)
+    records = scores_of_values(numbers, joint_values, tolerances, deals, EVALUATED)
+    return rows, records + scores_of_values(numbers, run_values, tolerances, deals, JUDGED)
+
+
+def read_verdicts(path: str | Path) -> pd.DataFrame:
+    """Read the rows that :func:`judge` returned.
+
+    Raises:
+        InputError: missing, empty or unreadable file, missing column, something that is not a number.
+    """
+    rows = read_csv(path, VERDICT_COLUMNS)
+    for column in ("published", "joint", "n", "readings", "readings_close"):
+        rows[column] = number_column(path, rows, column)
+    for column in ("upper", "reproduced"):
+        rows[column] = number_column(path, rows, column, needed=rows[column] != "")
+    return rows.assign(**{column: rows[column] == "True" for column in FLAGS})
+
+
+def read_choices(path: str | Path) -> pd.DataFrame:
+    """Read the values of the joint reading's choices: `choice`, `value`.
+
+    Raises:
+        InputError: missing, empty or unreadable file, missing column, other choices than there are.
+    """
+    rows = read_csv(path, ("choice", "value"))
+    if rows["choice"].tolist() != list(CHOICES):
+        raise InputError(path, f"has the choices {', '.join(rows['choice'])}", "make it again")
+    return rows

@@ -1,0 +1,303 @@
+"""One joint reading of all that the paper leaves open: what one consistent protocol reproduces (Table XVI)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from gpca.comparison.joint_reading import (
+    DEVELOPMENT,
+    EVALUATED,
+    EVALUATION,
+    JUDGED,
+    PROTOCOL,
+    SEVERITIES,
+    VERDICT_COLUMNS,
+    Grid,
+    judge,
+    numbers_asked,
+    read_choices,
+    read_verdicts,
+)
+from gpca.comparison.published import read_published
+from gpca.comparison.readings import read_judged
+from gpca.comparison.verdicts import Tolerance
+from gpca.errors import InputError
+from gpca.evaluation.measures import read_all_metrics, read_metrics, tidy
+from gpca.experiments.active_learning import learning_settings
+from gpca.experiments.experiment import Experiment, LeftOut
+from gpca.experiments.plan import Run
+from gpca.experiments.reading_steps import retrained_on
+from gpca.experiments.reading_words import words_of
+from gpca.experiments.result import numbers, table
+from gpca.experiments.specification_curve import Plain, stand_ins
+from gpca.experiments.step import Plan, Step
+from gpca.explainers.registry import explainer_module
+from gpca.io.csv_file import ANY, read_csv
+from gpca.objects.entry import Name, NamedSource, title_of
+from gpca.reporting.tables.builder import TableBuilder
+from gpca.reporting.tables.cells import plain_cell, rows_where
+from gpca.settings import Bounds, Count
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+DevelopmentSeed = Annotated[int, Bounds(minimum=100)]  # no other run has them
+
+
+@dataclass(frozen=True, kw_only=True)
+class Section:
+    """How a joint reading is searched.
+
+    Attributes:
+        source: name of the development objects, in no row of any table.
+        objects: where they come from, as an entry of `sources`.
+        stands_for: the source whose printed numbers it is compared with.
+        seeds: those of development; none for a run without a joint reading.
+        samples: test samples of each source and seed on which Monte-Carlo ICP is run, balanced, at most.
+        batch, labels: labels of a round, and in all.
+        deals: number of permutations of the printed numbers, for the chance.
+        choices: the values of each choice, the protocol's first.
+    """
+
+    source: Name
+    objects: NamedSource
+    stands_for: Name
+    seeds: tuple[DevelopmentSeed, ...]
+    samples: Annotated[int, Bounds(minimum=3, multipleOf=3)]
+    batch: Count
+    labels: Count
+    deals: Count
+    choices: Grid
+
+
+def check(config: dict, _left_out: LeftOut) -> None:
+    """Check that there are encoders of all severities, and that the development objects are nobody else's."""
+    section = config["joint_reading"]
+    if not section["seeds"]:
+        return
+    if section["source"] in config["sources"]:
+        fault = f"'{section['source']}' is a source of the run too"
+        raise InputError("config key joint_reading.source", fault, "set joint_reading.seeds: []")
+    if set(section["choices"][SEVERITIES]) - {PROTOCOL} and not config["readings"]["encoders"]:
+        fault = "needs encoders that learn from other severities"
+        raise InputError("config key joint_reading.choices.severities", fault, "raise readings.encoders")
+
+
+def names(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str, Any]:
+    """Seeds, source and severities of development; none where the source that they stand for is left out."""
+    section = config["joint_reading"]
+    is_run = section["stands_for"] in sources and bool(section["seeds"])
+    development = section["source"] if is_run else ""
+    return {
+        "development_seed": list(section["seeds"]) if is_run else [],
+        "development_source": development,
+        "joint_severities": list(section["choices"][SEVERITIES]) if is_run else [],
+        "retrained_source": [*sources, *filter(None, [development])],
+    }
+
+
+EXPERIMENT = Experiment(
+    name="joint_reading", sections={"joint_reading": Section}, needs=("development_seed",), names=names, check=check
+)
+
+
+def _is_run(plan: Plan) -> bool:
+    return bool(plan.names["development_seed"])
+
+
+def _sections(plan: Plan) -> dict[str, Any]:
+    """What joint readings leave as it is."""
+    config, section = plan.config, plan.config["joint_reading"]
+    return {
+        "sizes": {"samples": section["samples"]},
+        "gpca_paper": config["explainers"].get("gpca_paper") or {},
+        "active_learning": learning_settings(plan),
+        "labels": {name: section[name] for name in ("batch", "labels")},
+        "uncertainty": config["uncertainty"].get("additive", {}),
+        "icp": config["registrations"]["icp"],
+    }
+
+
+def _modules(_plan: Plan) -> list[str]:
+    return [explainer_module("learner_forest")]
+
+
+MEASURE = Step(
+    name="measure_joint",
+    run="gpca.steps.joint_readings:measure",
+    inputs={
+        "objects": "objects/{development_source}.npz",
+        "sets": "retrained/{severities}/{development_source}/seed{seed}.npz",
+    },
+    outputs={"out": "joint_measures/{severities}/seed{seed}.csv"},
+    where={"severities": "joint_severities"},
+    settings=lambda plan, wildcards: {
+        "choices": plan.config["joint_reading"]["choices"],
+        "registrations": retrained_on(plan.config, wildcards.severities),
+        **_sections(plan),
+    },
+    params={"source": lambda plan, wildcards: plan.names["development_source"]},
+    modules=_modules,
+    when=_is_run,
+    priority=9,
+)
+CHOOSE = Step(
+    name="choose_joint",
+    run="gpca.steps.joint_readings:choose",
+    inputs={"measured": "joint_measures/{*joint_severities}/seed{*development_seed}.csv"},
+    outputs={name: f"joint_choice/{name}.csv" for name in ("choice", "best", "scores")},
+    settings=("joint_reading.choices", "joint_reading.stands_for", "joint_reading.deals", "comparison.tolerances"),
+    when=_is_run,
+    priority=9,
+)
+
+
+def _sets(plan: Plan, _wildcards: object) -> list[str]:
+    return [f"shifted/{{source}}/seed{seed}.npz" for seed in plan.config["seeds"][: plan.config["readings"]["seeds"]]]
+
+
+def _other_sets(plan: Plan, _wildcards: object) -> list[str]:
+    return [
+        f"retrained/{severities}/{{source}}/seed{seed}.npz"
+        for severities in plan.names["joint_severities"]
+        if severities != PROTOCOL
+        for seed in plan.config["seeds"][: plan.config["readings"]["encoders"]]
+    ]
+
+
+APPLY = Step(
+    name="apply_joint",
+    run="gpca.steps.joint_readings:apply",
+    inputs={
+        "choice": "joint_choice/choice.csv",
+        "objects": "objects/{source}.npz",
+        "sets": _sets,
+        "other_sets": _other_sets,
+    },
+    outputs={"out": "joint_readings/{source}.csv"},
+    settings=lambda plan, wildcards: {
+        "registrations": plan.config["registrations"],
+        "severities": {
+            name: {"severities": severities} for name, severities in plan.config["readings"]["severities"].items()
+        },
+        **_sections(plan),
+    },
+    modules=_modules,
+    when=_is_run,
+    priority=9,
+)
+
+
+@numbers(
+    "joint_verdicts.csv",
+    "joint_scores.csv",
+    rule="judge_joint",
+    values="joint_readings/{source}.csv",
+    comparison="comparison.csv",
+    readings="reading_verdicts.csv",
+    development="joint_choice/scores.csv",
+)
+def judge_joint(
+    run: Run, values: Iterable[str | Path], comparison: Path, readings: Path, development: Path
+) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Values of the joint reading, of the run and of all readings beside the printed ones; scores of all samples."""
+    import pandas as pd
+
+    tolerances = {unit: Tolerance(**given) for unit, given in run.config["comparison"]["tolerances"].items()}
+    joint = read_all_metrics(values)
+    asked = numbers_asked(read_published(), joint["source"].unique())
+    of_run = read_csv(comparison, ("table", "row", "column", "reproduced", "at_least"), others=ANY)
+    deals = run.config["joint_reading"]["deals"]
+    rows, records = judge(asked, joint, of_run, read_judged(readings), tolerances, deals)
+    scores = [(table, EVALUATION, method, metric, "all", 0, float(value)) for table, method, metric, value in records]
+    return (
+        pd.DataFrame(rows, columns=list(VERDICT_COLUMNS)),
+        pd.concat([read_metrics(development), tidy(scores, "joint reading")]),
+    )
+
+
+COLUMNS = {"published": "Paper", "reproduced": "Protocol", "joint": "Joint reading"}
+HEADS = {
+    **{"number": "Number", "unit": "Unit", "close": "Protocol close", "joint_close": "Joint reading close"},
+    "readings": "Other readings that are close",
+}
+KNOBS = {"low": "knobs at the lower ends", "middle": "knobs at the middles", "high": "knobs at the upper ends"}
+
+
+@table(
+    "What the paper leaves unstated",
+    "Table XVI: one reading of all tables",
+    """The choices that the paper leaves open and that touch several tables, searched together: the reading with the
+    largest share of printed means that come close, found on other objects and seeds and then run once. It says
+    what one consistent protocol reproduces. Nobody knows whether it is what the paper did.""",
+    verdicts=(read_verdicts, "joint_verdicts.csv"),
+    scores="joint_scores.csv",
+    choice=(read_choices, "joint_choice/choice.csv"),
+    needs=("development_seed",),
+)
+def table16_joint_reading(run: Run, verdicts: pd.DataFrame, scores: pd.DataFrame, choice: pd.DataFrame):
+    """A row per printed mean of Tables I to V, each value of ours once."""
+    table = TableBuilder("table16_joint_reading", HEADS)
+    for row in verdicts.itertuples():
+        key = (row.table, row.row, row.column)
+        count = f"{row.readings_close:.0f} of {row.readings:.0f}" if row.readings else "none was run"
+        labels = (
+            (" / ".join(key), ", ".join(key)),
+            (row.unit, row.unit),
+            *(("yes" if is_close else "no",) * 2 for is_close in (row.close, row.joint_close)),
+            (f"{row.readings_close:.0f}/{row.readings:.0f}", count),
+        )
+        values = {name: float(getattr(row, name)) for name in COLUMNS}
+        cells = {
+            name: None if math.isnan(value) else plain_cell(value, int(row.n), 0) for name, value in values.items()
+        }
+        table.add_row(labels, cells)
+    never = ~(verdicts["close"] | verdicts["joint_close"] | (verdicts["readings_close"] > 0))
+    entry = run.config["joint_reading"]["objects"]
+    development = title_of({"title": entry["title"], "stand_in": entry.get("stand_in", entry["kind"] == "procedural")})
+    here = _measures(scores, DEVELOPMENT, EVALUATED)
+    return table.build(
+        "The paper's Tables I to V under one reading of all that they leave open" + stand_ins(run),
+        "value",
+        {name: Plain(title, interval=False, limits=(-math.inf, math.inf)) for name, title in COLUMNS.items()},
+        (
+            f"The joint reading: {_in_words(choice)}. It was found on {development}; the paper states none.",
+            _sentence(scores, DEVELOPMENT, EVALUATED, "There, of what is printed of the source that they stand for"),
+            f"Of {here['readings']:.0f} readings, {here['equals']:.0f} have that share there, and the first of them is "
+            f"taken; the protocol's own has {100 * here['share_of_protocol']:.0f} %.",
+            _sentence(scores, EVALUATION, EVALUATED, "Here"),
+            _sentence(scores, EVALUATION, JUDGED, "The protocol that is judged"),
+            f"No reading of ours, alone or joint, comes close to {int(never.sum())} of the {len(verdicts)} numbers.",
+            "Close: the mean is within the second tolerance (docs/comparison.md), whatever its interval. Of a range, "
+            "Paper is the lower end. Values are in the row's unit.",
+        ),
+    )
+
+
+def _in_words(choice: pd.DataFrame) -> str:
+    chosen = dict(zip(choice["choice"], choice["value"], strict=True))
+    name = chosen[SEVERITIES]
+    severities = "the protocol's perturbations" if name == PROTOCOL else f"{name} perturbations"
+    words = [words_of(name, value) for name, value in chosen.items() if name not in (SEVERITIES, "knobs")]
+    return ", ".join([severities, *words, KNOBS[chosen["knobs"]]])
+
+
+def _measures(scores: pd.DataFrame, samples: str, method: str) -> dict[str, float]:
+    rows = rows_where(scores, source=samples, method=method, table="all")
+    return dict(zip(rows["metric"], rows["value"], strict=True))
+
+
+def _sentence(scores: pd.DataFrame, samples: str, method: str, subject: str) -> str:
+    """Sentence with the close numbers, their share, and the share by chance."""
+    score = _measures(scores, samples, method)
+    largest = "the largest share would be" if samples == DEVELOPMENT else "it would be"
+    return (
+        f"{subject}: {score['close']:.0f} of {score['numbers']:.0f} numbers are close, {100 * score['share']:.0f} % "
+        f"with each table weighted once; {largest} {100 * score['expected_unit']:.0f} % if printed numbers changed "
+        f"places within the unit of a table (p = {score['p_unit']:.2f}), {100 * score['expected_column']:.0f} % within "
+        f"its columns (p = {score['p_column']:.2f})."
+    )

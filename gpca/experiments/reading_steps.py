@@ -1,0 +1,252 @@
+"""Steps of the readings: what a group reads, encoders that learn from other severities or see other clouds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from gpca.encoders.registry import encoder_module
+from gpca.experiments.active_learning import learning_settings
+from gpca.experiments.out_of_distribution import learner_settings
+from gpca.experiments.step import Files, Plan, Step
+from gpca.explainers.registry import explainer_module
+from gpca.frames.source import REAL_WORLD, VIRTUAL
+from gpca.steps.readings.groups import (
+    FRAME_ENCODER,
+    FRAME_INPUT,
+    FRAME_REPEATS,
+    FRAME_START,
+    GROUPS,
+    SEVERITIES_RETRAINED,
+)
+
+
+def retrained_on(config: Mapping, severities: str) -> dict[str, Any]:
+    """The section `registrations` with the severities of that name; the protocol's where there are none."""
+    other = config["readings"]["severities"].get(severities)
+    return config["registrations"] | ({"severities": other} if other else {})
+
+
+def _files(plan: Plan, name: str) -> dict[str, list[str]]:
+    """Files that a group of readings reads, by kind."""
+    config, group, readings = plan.config, GROUPS[name], plan.config["readings"]
+    if name == FRAME_INPUT:
+        backbone, seeds = plan.names["clouded_backbone"], config["seeds"][: readings["frame_seeds"]]
+        return {
+            "registrations": [f"registrations/{REAL_WORLD}/seed{seed}.npz" for seed in seeds],
+            "predictions": [f"predictions/{REAL_WORLD}/{backbone}-none/seed{seed}.csv" for seed in seeds],
+            "embeddings": [
+                f"other_clouds/{REAL_WORLD}/{backbone}/{cloud}/seed{seed}.npz"
+                for cloud in plan.names["cloud"]
+                for seed in seeds
+            ],
+        }
+    if name in (FRAME_ENCODER, FRAME_START):
+        backbones, published = plan.names["backbone"], plan.names["published"]
+        methods = {REAL_WORLD: [*backbones, *published]}
+        if name == FRAME_START:
+            methods = {REAL_WORLD: backbones, plan.names["estimated"]: plan.names["condition_backbone"]}
+        return {
+            "registrations": [f"registrations/{s}/seed{seed}.npz" for s in methods for seed in config["seeds"]],
+            "predictions": [
+                f"predictions/{source}/{method}/seed{seed}.csv"
+                for source, of_source in methods.items()
+                for method in of_source
+                for seed in (plan.names["published_seed"] if method in published else config["seeds"])
+            ],
+        }
+    sources = [source for source in group.sources if source in plan.names["source"]]
+    seeds, ranges = config["seeds"][: 1 if group.costly else readings["seeds"]], []
+    if name == SEVERITIES_RETRAINED:
+        seeds, ranges = config["seeds"][: readings["encoders"]], readings["groups"][name]["range"]
+    folder, section = ("learners", "learners") if name == "diagnostics" else ("predictions", "explainers")
+    methods = [method for method in group.methods if method in config[section]]
+    by_seed = [(source, seed) for source in sources for seed in seeds]
+    files = {
+        "registrations": [f"registrations/{source}/seed{seed}.npz" for source, seed in by_seed],
+        "sets": [f"shifted/{source}/seed{seed}.npz" for source, seed in by_seed],
+        "predictions": [
+            f"{folder}/{s}/{method}/seed{seed}.csv" for s in sources for method in methods for seed in seeds
+        ],
+        "retrained": [f"retrained/{name}/{s}/seed{seed}.npz" for s in sources for name in ranges for seed in seeds],
+    }
+    return {kind: files[kind] for kind in group.reads}
+
+
+def _of_kind(kind: str) -> Callable[[Plan, Any], list[str]]:
+    return lambda plan, wildcards: _files(plan, wildcards.whole_group).get(kind, [])
+
+
+def _sections(plan: Plan) -> dict[str, Any]:
+    """What a reading leaves as it is."""
+    config = plan.config
+    return {
+        "sizes": {name: config["readings"][name] for name in ("seeds", "encoders", "samples")},
+        "uncertainty": config["uncertainty"].get("additive", {}),
+        "icp": config["registrations"]["icp"],
+        "encoder": config["encoders"][config["embedding"]["encoder"]],
+        "active_learning": learning_settings(plan),
+        **{name: config["explainers"].get(name) or {} for name in ("gpca_paper", "gpca")},
+        "gpca_matern": learner_settings(config).get("gpca_matern", {}),
+    }
+
+
+def _settings(plan: Plan, wildcards: Any) -> dict[str, Any]:
+    group, sections = wildcards.whole_group, _sections(plan)
+    if group in (FRAME_ENCODER, FRAME_START):
+        frames = {"source": REAL_WORLD, "methods": plan.names["backbone"], "estimated": plan.names["estimated"]}
+        published = plan.config["real_world"]["published"]
+        sections = {"sizes": sections["sizes"], "frames": frames, "published": published}
+    return {"choices": plan.config["readings"]["groups"][group], **sections}
+
+
+def _encoder_module(plan: Plan, name: str) -> str:
+    return encoder_module(plan.config["encoders"][name])
+
+
+def _modules(plan: Plan, wildcards: Any) -> list[str]:
+    group = GROUPS[wildcards.whole_group]
+    encoder = [plan.config["embedding"]["encoder"]] if wildcards.whole_group == "encoder_head" else []
+    return [group.code, *map(explainer_module, group.explainers), *(_encoder_module(plan, name) for name in encoder)]
+
+
+READ = Step(
+    name="reading",
+    run="gpca.steps.readings.files:run",
+    inputs={kind: _of_kind(kind) for kind in ("registrations", "sets", "predictions", "embeddings", "retrained")},
+    outputs={"out": "readings/{whole_group}.csv"},
+    settings=_settings,
+    params={"group": lambda plan, wildcards: wildcards.whole_group},
+    modules_of_job=_modules,
+    priority=9,
+    resources={"mem_mb": 4000, "runtime": 120},
+)
+# Repeats on depth frames fit a classifier for each row and seed, so each kind of repeat and backbone has a job.
+REPEAT = Step(
+    name="repeat_on_frames",
+    run="gpca.steps.readings.files:run",
+    inputs={
+        "registrations": "registrations/{frames}/seed{*seed}.npz",
+        "predictions": lambda plan, wildcards: [
+            f"predictions/{{frames}}/{wildcards.repeated_backbone}-{reduction}/seed{{*seed}}.csv"
+            for reduction in plan.config["real_world"]["reductions"]
+        ],
+        "embeddings": lambda plan, wildcards: [
+            f"embeddings/{{frames}}/{wildcards.repeated_backbone}/{reduction}/seed{{first_seed}}.npz"
+            for reduction in plan.config["real_world"]["reductions"]
+        ],
+    },
+    outputs={"out": f"readings/{FRAME_REPEATS}/{{repeats}}/{{repeated_backbone}}.csv"},
+    settings=lambda plan, wildcards: {
+        "choices": plan.config["readings"]["groups"][FRAME_REPEATS] | {"repeats": [wildcards.repeats]},
+        **_sections(plan),
+    },
+    params={"group": FRAME_REPEATS},
+    modules=lambda plan: [GROUPS[FRAME_REPEATS].code],
+    priority=9,
+    resources={"mem_mb": 4000, "runtime": 120},
+)
+JOIN = Step(
+    name="join_repeats",
+    run="gpca.steps.readings.files:join",
+    inputs={"paths": f"readings/{FRAME_REPEATS}/{{*repeats}}/{{*repeated_backbone}}.csv"},
+    outputs={"out": f"readings/{FRAME_REPEATS}.csv"},
+)
+RETRAIN = Step(
+    name="retrain",
+    run="gpca.steps.readings.severities:retrain",
+    inputs={"objects": "objects/{source}.npz"},
+    outputs={"out": "retrained/{severities}/{source}/seed{seed}.npz"},
+    where={"source": "retrained_source"},
+    settings=lambda plan, wildcards: {
+        "shift": plan.config["shift"],
+        "registrations": retrained_on(plan.config, wildcards.severities),
+        "encoder": plan.config["encoders"][plan.config["embedding"]["encoder"]],
+    },
+    modules=lambda plan: [_encoder_module(plan, plan.config["embedding"]["encoder"])],
+    priority=10,
+)
+
+
+def _pretrained_on(plan: Plan) -> list[str]:
+    return [*plan.names["source"], *([VIRTUAL] if plan.config["real_world"]["virtual"] else [])]
+
+
+def _pretraining_files(plan: Plan, _wildcards: Any) -> list[str]:
+    return [f"registrations/{source}/seed{{first_seed}}.npz" for source in _pretrained_on(plan)]
+
+
+def _start(plan: Plan, _wildcards: Any) -> str | list[str]:
+    """Weights that the training on frames starts from, if any are pretrained."""
+    return "other_clouds/pretrained/{clouded_backbone}/{cloud}.pt" if plan.config["real_world"]["pretraining"] else []
+
+
+def _training(plan: Plan) -> Mapping | None:
+    return (plan.config["real_world"]["training"] or {}).get(plan.names["clouded_backbone"])
+
+
+def _other_cloud(
+    name: str,
+    run: str,
+    inputs: Mapping[str, Files],
+    outputs: Mapping[str, str],
+    changes: Callable[[Plan], Mapping | None] = _training,
+    **options: Any,
+) -> Step:
+    """Step of an encoder of depth frames that sees another cloud, with changes of its section of the config."""
+
+    def settings(plan: Plan, wildcards: Any) -> dict[str, Any]:
+        encoder = plan.config["encoders"][plan.names["clouded_backbone"]]
+        icp = {"icp": plan.config["registrations"]["icp"]}
+        return encoder | (changes(plan) or {}) | icp | {"reading": wildcards.cloud}
+
+    def modules(plan: Plan) -> list[str]:
+        return [_encoder_module(plan, plan.names["clouded_backbone"])]
+
+    options = {"params": {"source": REAL_WORLD}, "priority": 11} | options
+    return Step(name=name, run=run, inputs=inputs, outputs=outputs, settings=settings, modules=modules, **options)
+
+
+PRETRAIN = _other_cloud(
+    "pretrain_on_other_cloud",
+    "gpca.steps.pairs:train",
+    {"registrations": _pretraining_files},
+    {
+        "weights": "other_clouds/pretrained/{clouded_backbone}/{cloud}.pt",
+        "curve": "other_clouds/pretrained/{clouded_backbone}/{cloud}.csv",
+    },
+    changes=lambda plan: plan.config["real_world"]["pretraining"],
+    params={
+        "source": "pretraining",
+        "seed": lambda plan, wildcards: plan.config["seeds"][0],
+        "registrations_of": lambda plan, wildcards: _pretrained_on(plan),
+    },
+    priority=12,  # the longest jobs, with many cores to be started early
+    resources={"mem_mb": 3000, "runtime": 180},
+)
+TRAIN = _other_cloud(
+    "train_on_other_cloud",
+    "gpca.steps.pairs:train",
+    {
+        "start": _start,
+        "registrations": "registrations/{frames}/seed{seed}.npz",
+        "poses": "poses/{frames}/seed{seed}.csv",
+    },
+    {
+        "weights": "other_clouds/{frames}/{clouded_backbone}/{cloud}/seed{seed}.pt",
+        "curve": "other_clouds/{frames}/{clouded_backbone}/{cloud}/seed{seed}.csv",
+    },
+)
+EMBED = _other_cloud(
+    "embed_other_cloud",
+    "gpca.steps.pairs:embed",
+    {
+        "registrations": "registrations/{frames}/seed{seed}.npz",
+        "registration_timings": "timings/{frames}/icp/seed{seed}.csv",
+        "encoder": "other_clouds/{frames}/{clouded_backbone}/{cloud}/seed{seed}.pt",
+    },
+    {
+        "embeddings": "other_clouds/{frames}/{clouded_backbone}/{cloud}/seed{seed}.npz",
+        "timings": "timings/{frames}/{clouded_backbone}_{cloud}/seed{seed}.csv",
+    },
+)

@@ -1,0 +1,126 @@
+"""Readings in words: the values of each group's choices."""
+
+from __future__ import annotations
+
+from gpca.steps.readings.groups import GROUPS
+
+_INPUTS = {
+    "pool": "inputs scaled by the pool too",
+    "labeled": "inputs scaled by the labeled samples alone",
+    "standardised": "standardized inputs",
+    "unit_norm": "inputs of unit norm",
+    "raw": "raw inputs",
+}
+_SETS = {
+    "in_distribution": "samples as in training",
+    "severity": "severer perturbations",
+    "source": "another dataset",
+    "objects": "unseen objects",
+    "seen_objects": "seen objects",
+}
+WORDS = {  # field of a group's choices -> what its values are called
+    "quantity": {
+        "divergence": "KL divergence",
+        "divergence_reversed": "reversed KL divergence",
+        "log_determinant": "log determinant",
+        "trace": "trace",
+        "residual": "residual",
+        "inlier_rmse": "inlier RMSE",
+        "inlier_rmse_of_one": "inlier RMSE of one run",
+    },
+    "sign": {"signed": "largest value", "absolute": "largest magnitude", "lowest": "smallest value"},
+    "unit": {"range": "knobs in units of their range", "own": "knobs in their own units"},
+    "step": {"small": "small step", "middle": "step to the middle"},
+    "background": {"observed": "from the observed pair", "clean": "from the clean pair"},
+    "part": {
+        "all": "all severities",
+        "weakest": "weakest third",
+        "middle": "middle third",
+        "strongest": "strongest third",
+    },
+    "range": {"weaker": "weaker perturbations", "stronger": "stronger perturbations"},
+    "classifier": {"paper": "the paper's setting", "converged": "trained longer"},
+    "inputs": _INPUTS,
+    "inducing": {"kmeans": "inducing inputs by k-means", "random": "random inducing inputs"},
+    "lengthscale": {"median": "lengthscale from the median distance", "default": "default lengthscale"},
+    "batch": {"full": "all samples at once", "minibatch": "minibatches"},
+    "kernel": {"rbf": "RBF", "matern32": "Matérn 3/2", "polynomial": "polynomial"},
+    "start": {"warm": "warm start", "cold": "cold start", "posterior": "the posterior alone moves"},
+    "machine": {"svc": "SVC", "linear_svc": "LinearSVC"},
+    "probability": {"platt": "Platt scaling", "softmax": "softmax of the decision values"},
+    "head": {"linear": "linear head", "two_layer": "head of two layers"},
+    "set": _SETS,
+    "distance": {
+        "knn_analytical": "distance to neighbors in classic features",
+        "mahalanobis_analytical": "Mahalanobis distance in classic features",
+        "knn_embedding": "distance to neighbors in the embedding",
+        "mahalanobis_embedding": "Mahalanobis distance in the embedding",
+    },
+    "score": {"max_score": "1 - largest score", "entropy": "entropy", "bald": "BALD"},
+    "area": {"aurc": "AURC", "auroc_error": "1 - AUROC of errors"},
+    "labels": {"at_target": "labels at the target", "all": "all labels"},
+    "repeats": {
+        "everything": "everything varies",
+        "classifiers": "only the classifier varies",
+        "samples": "classifier and training samples vary",
+    },
+    "objects": {"all": "all objects", "seen": "seen objects", "unseen": "unseen objects"},
+    "input": {
+        "aligned": "cloud aligned by ICP",
+        "observed": "cloud before ICP",
+        "reversed": "ICP from the model to the cloud",
+    },
+    "architecture": {"judged": "judged encoder", "published": "encoder as published"},
+    "initial_pose": {"true_pose": "ICP from near the true pose", "estimated": "ICP from estimators' poses"},
+    "features": {
+        "all": "all features",
+        "no_counts": "without point counts",
+        "no_residual": "without residuals",
+        "residual": "residuals alone",
+        "counts": "point counts alone",
+    },
+}
+NUMBERS = {  # field -> the words around a number
+    "starts": "{} starts",
+    "noise": "noise of {}",
+    "spread": "starts spread × {}",
+    "overlap": "{} cut off",
+    "floor": "variances of at least {}",
+    "iterations": "{} iterations",
+    "batch": "batches of {}",
+    "new_share": "{} of the pool is new",
+    "initial": "{} labels at the start",
+    "learning_rate": "rate {}",
+}
+
+
+def reading_in_words(group: str, reading: str) -> str:
+    """A reading as words: ``RBF, 100 iterations`` for ``rbf/100`` of the group ``kernel``.
+
+    Unknown values stay as they are.
+    """
+    values = reading.split("/")
+    names = list(GROUPS[group].choices) if group in GROUPS else []
+    if len(names) != len(values):
+        return ", ".join(values)
+    return ", ".join(words_of(name, value) for name, value in zip(names, values, strict=True))
+
+
+def words_of(name: str, value: str) -> str:
+    """A value of a choice as words."""
+    words = WORDS.get(name, {})
+    if value not in words and name in NUMBERS:
+        return NUMBERS[name].format(value)
+    return " and ".join(words.get(part, part) for part in value.split("+"))
+
+
+def group_in_words(name: str) -> str:
+    """What a group leaves open: ``How the GPC starts``; an unknown name stays as it is."""
+    return GROUPS[name].title if name in GROUPS else name
+
+
+class ReadingWords:
+    """Names of groups and readings for readers (:class:`gpca.comparison.readings.Words`)."""
+
+    group = staticmethod(group_in_words)
+    reading = staticmethod(reading_in_words)

@@ -1,0 +1,304 @@
+"""The printed numbers under every reading of the choices that the paper leaves unstated (Table XIII)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from textwrap import shorten
+from typing import TYPE_CHECKING, Annotated, Any, get_args
+
+import numpy as np
+
+from gpca.comparison.readings import read_judged, summarize, unresolved
+from gpca.errors import InputError
+from gpca.evaluation.measures import ALL
+from gpca.experiments.experiment import Experiment, Names, Tidy
+from gpca.experiments.frames import encoder_title, frames_of, title_of_frames
+from gpca.experiments.plan import Run
+from gpca.experiments.reading_words import group_in_words, reading_in_words
+from gpca.experiments.result import figure, table
+from gpca.frames.source import REAL_WORLD, conditions_of
+from gpca.objects.entry import stand_in_clause
+from gpca.pairs.perturbation import CONCEPTS, Severities
+from gpca.reporting.tables.builder import TableBuilder, crossed, interval_over
+from gpca.reporting.tables.cells import cell_of_repeats, plain_cell, rows_where
+from gpca.reporting.tables.table import Cell, Column
+from gpca.reporting.words import plural
+from gpca.settings import Bounds, Keys
+from gpca.steps.readings.groups import (
+    ALIGNED,
+    FRAME_ENCODER,
+    FRAME_INPUT,
+    FRAME_REPEATS,
+    FRAME_START,
+    GROUPS,
+    SEVERITIES_RETRAINED,
+    OtherSeverities,
+    ReadingSizes,
+)
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from gpca.reporting.tables.table import Table
+
+RANGES = get_args(OtherSeverities)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Section(ReadingSizes):
+    """The choices that the paper leaves unstated, by group, and how much of the data the readings see.
+
+    Attributes:
+        frame_seeds: number of the run's seeds, from the first, for which encoders that see other clouds of depth
+            frames are trained.
+        severities: ranges that encoders learn from instead of the protocol's, for as many seeds as `encoders`.
+    """
+
+    frame_seeds: Annotated[int, Bounds(minimum=0)]
+    severities: Annotated[dict, Keys(dict.fromkeys(RANGES, Severities), required=RANGES)]
+    groups: Annotated[dict, Keys({name: group.values for name, group in GROUPS.items()})]
+
+
+def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
+    """Groups of readings, some of which are run only where there is what they read, and the parts of their jobs.
+
+    Those that train encoders for each reading need seeds, and others rows of encoders as published, or from poses of
+    estimators.
+    """
+    readings, frames = config["readings"], config["real_world"]
+    estimated = [name for name, entry in conditions_of(config).items() if entry.get("form") == "results"]
+    readable = {
+        FRAME_INPUT: readings["frame_seeds"] and "none" in frames["reductions"],
+        FRAME_ENCODER: frames["published"],
+        FRAME_START: estimated and frames["condition_backbones"],
+        SEVERITIES_RETRAINED: readings["encoders"],
+    }
+    groups = [name for name in readings["groups"] if readable.get(name, True)]
+    return {
+        "reading_group": groups,
+        "whole_group": [name for name in readings["groups"] if name != FRAME_REPEATS],
+        "frame_input": [name for name in groups if name == FRAME_INPUT],
+        "estimated": f"{REAL_WORLD}_{estimated[0]}" if estimated else "",
+        "repeats": list(readings["groups"].get(FRAME_REPEATS, {}).get("repeats", [])),
+        "repeated_backbone": list(frames["backbones"]),
+        "clouded_backbone": frames["backbones"][0],  # whose encoder sees other clouds
+        "cloud": [name for name in readings["groups"].get(FRAME_INPUT, {}).get("input", []) if name != ALIGNED],
+    }
+
+
+EXPERIMENT = Experiment(
+    name="specification_curve",
+    beside=("reading_steps",),
+    sections={"readings": Section},
+    tidy=(
+        Tidy(
+            "readings.csv",
+            "gpca.evaluation.measures:read_all_metrics",
+            {"paths": "readings/{reading_group}.csv"},
+            rule="reading_values",
+        ),
+    ),
+    names=names,
+    leavable={"readings.groups": Names("group of readings", lambda: GROUPS)},
+)
+
+
+@dataclass(frozen=True)
+class Plain(Column):
+    """Column of numbers with three digits, whatever their unit."""
+
+    def text(self, cell: Cell) -> str:
+        """E.g. ``0.592``."""
+        return f"{cell.mean:.3g}"
+
+
+def stand_ins(run: Run) -> str:
+    """Clause of a caption on stand-ins among the sources and the depth frames."""
+    return stand_in_clause([*run.sources.values(), frames_of(run.config)])
+
+
+INPUTS = {
+    "aligned": "observed cloud, aligned by ICP",
+    "observed": "observed cloud before ICP",
+    "reversed": "observed cloud, ICP from the model to it",
+}
+OBJECTS = {"all": "All (%)", "seen": "Seen objects (%)", "unseen": "Unseen objects (%)"}
+CONFUSED = {"pose": "overlap", "overlap": "pose"}
+
+
+@table(
+    "IV-D Ablation studies",
+    "Depth frames: what the encoder sees",
+    """The first backbone of Table VI once more, trained anew on other clouds: the observed one before ICP, and aligned
+    by ICP the other way round. The paper has the encoder see the aligned source.""",
+    metrics="readings/frame_input.csv",
+    needs=("frame_input",),
+)
+def table6_inputs(run: Run, metrics: pd.DataFrame) -> Table:
+    """Accuracy on depth frames by the cloud that the encoder sees."""
+    methods = {method: encoder_title(*method.split("-")) for method in metrics["method"].unique()}
+    table = TableBuilder("table6_inputs", {"backbone": "Backbone", "input": "The encoder sees"})
+    for (method, cloud), labels in crossed(methods, INPUTS):
+        rows = {name: rows_where(metrics, table=f"{FRAME_INPUT}/{cloud}/{name}", method=method) for name in OBJECTS}
+        cells = {name: _share(subset, "accuracy") for name, subset in rows.items()}
+        cells |= {concept: _share(rows["all"], "accuracy", concept) for concept in CONCEPTS}
+        for one, other in CONFUSED.items():
+            cells[f"{one}_as_{other}"] = _share(rows["all"], f"predicted_as_{other}", one, is_count=True)
+        table.add_row(labels, cells)
+    table.compare_down(OBJECTS, same=1)
+    columns = {name: Column(head) for name, head in OBJECTS.items()}
+    columns |= {concept: Column(f"{concept.capitalize()} (%)", interval=False) for concept in CONCEPTS}
+    for one, other in CONFUSED.items():
+        columns[f"{one}_as_{other}"] = Column(f"{one.capitalize()} taken for {other} (%)", interval=False)
+    counts = [f"{name} {table.cells[0, name].test_samples}" for name in OBJECTS if (0, name) in table.cells]
+    seeds = table.most_seeds()
+    return table.build(
+        caption=f"Accuracy (%) on {title_of_frames(run.config)} by the cloud that the encoder sees",
+        column_head="samples",
+        columns=columns,
+        footnotes=(
+            f"Mean over {plural(seeds, 'seed')}, the first of the run; {interval_over(seeds)}. Test samples: "
+            f"{', '.join(counts)}. The share of seen objects differs from seed to seed, so that All need not lie "
+            "between Seen and Unseen.",
+            "Each cloud has an encoder of its own, pretrained and trained as that of the first row, which is Table "
+            "VI's, on the same samples.",
+        ),
+    )
+
+
+def _share(rows: pd.DataFrame, metric: str, concept: str = ALL, is_count: bool = False) -> Cell | None:
+    """Mean of a metric over the seeds, in percent of the test samples where it is a count."""
+    rows = rows_where(rows, concept=concept).sort_values("seed")
+    value_R, samples_R = (rows_where(rows, metric=name)["value"].to_numpy(float) for name in (metric, "test_samples"))
+    return cell_of_repeats(100 * (np.divide(value_R, samples_R) if is_count else value_R), int(samples_R.sum()))
+
+
+SECTION = "What the paper leaves unstated"
+VERDICTS = {"judged": (read_judged, "reading_verdicts.csv")}
+BEST = "Reading that is close to the most numbers"
+HEADS = {
+    **{"number": "Number", "unit": "Unit", "group": "What is open", "where": "Printed number"},
+    **{"nearest": "Nearest reading", "close": "Readings that are close", "joint": BEST},
+}
+COLUMNS = {"published": "Paper", "reproduced": "Here", "least": "Least", "most": "Most", "value": "Nearest"}
+CHANCE = "chance"
+
+
+@table(
+    SECTION,
+    "Table XIII: readings of the unstated",
+    """Each number of the paper that is not reproduced, and what it would be under other choices that the paper leaves
+    open (readings): the least and the largest value, the nearest reading, how many are close, and which reading of
+    the same choices is close to the most printed numbers.
+
+    "Produced": a reading is close. "Between": none is, but some lie below and some above. "Outside": the number
+    lies beyond all readings. The choices were fixed before they were run, and no reading counts as the
+    reproduction. Times are not included.""",
+    **VERDICTS,
+)
+def table13_readings(run: Run, judged: pd.DataFrame) -> Table:
+    """A row per missed number and group of readings that touches it; of stand-ins, per number that is touched."""
+    table = TableBuilder("table13_readings", HEADS)
+    summaries = summarize(judged)
+    for key, by_group in summaries.items():
+        rows = rows_where(judged, **dict(zip(NUMBER, key, strict=True)))
+        first = rows.iloc[0]
+        for group, of in by_group.items():
+            seeds = int(rows.loc[rows["group"] == group, "n"].max())
+            labels = (
+                (" / ".join(key), ", ".join(key)),
+                (first["unit"], first["unit"]),
+                (group, group_in_words(group)),
+                (of.where, of.where),
+                (of.nearest, reading_in_words(group, of.nearest)),
+                (f"{of.close}/{of.readings}", f"{of.close} of {of.readings}"),
+                (of.joint, f"{reading_in_words(group, of.joint)} ({of.fitted} of {of.touched})"),
+            )
+            values = {"published": first["published"], "reproduced": first["reproduced"]}
+            values |= {"least": of.least, "most": of.most, "value": of.value, CHANCE: 100 * of.chance}
+            cells = {name: None if math.isnan(x) else plain_cell(float(x), seeds, 0) for name, x in values.items()}
+            table.add_row(labels, cells)
+    every = [of for by_group in summaries.values() for of in by_group.values()]
+    inside = [of for of in every if of.inside]
+    return table.build(
+        "The numbers that are not reproduced, under other readings of what the paper leaves unstated" + stand_ins(run),
+        "value",
+        {
+            **{name: Plain(title, interval=False, limits=(-math.inf, math.inf)) for name, title in COLUMNS.items()},
+            CHANCE: Column("Chance (%)", decimals=0, interval=False),
+        },
+        (
+            "Chance: the share of the span of a group's values, from Least to Most, that is close to one of its "
+            "readings: how likely a number from anywhere in it would be produced (docs/comparison.md). Of the "
+            f"{len(every)} rows, {len(inside)} lie within the span of their group; "
+            f"{sum(of.chance for of in inside):.1f} of these would be produced by chance. Produced are "
+            f"{sum(of.close > 0 for of in every)}, also by readings beside the span.",
+            "Paper to Nearest are in the row's unit; Least, Most and Nearest are means over the seeds of single "
+            "readings. Of a range, Paper is the lower end. No reading is the reproduction.",
+            f"{BEST}: of all printed numbers that the same choices touch, also those that are reproduced; in brackets "
+            "to how many of how many it is close.",
+        ),
+    )
+
+
+ROW_IN, HEAD_IN = 0.165, 0.85  # height of a line, and of title and axis
+FARTHEST = 30.0  # times the close tolerance
+NUMBER = ["table", "row", "column"]  # what names a printed number
+LETTERS = 52  # of a number's name, which there is room for
+
+
+@figure(
+    SECTION,
+    "Readings of the unstated",
+    """Every reading of each group of choices, as its difference from the printed number that is not reproduced: a
+    line of dots per number. In the gray band a reading is close. The axis is linear in this band, logarithmic
+    beyond it, and cut at 30 times what is close.""",
+    name="readings",
+    **VERDICTS,
+)
+def draw_readings(run: Run, judged: pd.DataFrame) -> Figure:
+    """Readings of each number that is not reproduced as dots in a line, the lines of a group below its name.
+
+    At the right stands how many of a number's readings are close.
+    """
+    from gpca.reporting.figures.panels import panels
+    from gpca.reporting.figures.style import BLUE, GRAY, LIGHT_GRAY, SMALL_PT, write_title
+
+    missed = unresolved(judged)
+    by_group = {
+        name: list(missed[missed["group"] == name].groupby(NUMBER, sort=False))
+        for name in GROUPS
+        if (missed["group"] == name).any()
+    }
+    if not by_group:
+        raise InputError("reading_verdicts.csv", "has no readings of these groups", "run the readings first")
+    figure, [[panel]] = panels(1, 1, HEAD_IN + ROW_IN * sum(len(lines) + 1 for lines in by_group.values()))
+    panel.axvspan(-1, 1, color=LIGHT_GRAY, alpha=0.6, linewidth=0)
+    panel.axvline(0, color=GRAY, linewidth=0.6)
+    names: list[str] = []
+    headings = []
+    for group, lines in by_group.items():
+        headings.append(len(names))
+        names.append(group_in_words(group))
+        for (of_table, row, column), rows in lines:
+            y = len(names)
+            distance_R = np.sort(rows["distance"].to_numpy(float).clip(-FARTHEST, FARTHEST))
+            panel.plot(distance_R[[0, -1]], [y, y], color=GRAY, linewidth=0.6)
+            panel.scatter(distance_R, np.full(len(rows), y), s=9, color=BLUE, alpha=0.45, linewidths=0, zorder=3)
+            count = f"{rows['close'].sum():.0f} of {len(rows)}"
+            panel.text(1.01, y, count, transform=panel.get_yaxis_transform(), va="center", fontsize=SMALL_PT)
+            names.append(shorten(f"{of_table}: {row}, {column}", LETTERS, placeholder=" …"))
+    panel.set_yticks(range(len(names)), names, fontsize=SMALL_PT)
+    for heading in headings:
+        panel.get_yticklabels()[heading].set_fontweight("bold")
+    panel.tick_params(axis="y", length=0)
+    panel.set_ylim(len(names) - 0.4, -0.6)
+    panel.set_xscale("symlog", linthresh=1)
+    panel.set_xlim(-1.1 * FARTHEST, 1.1 * FARTHEST)
+    panel.set_xticks([-10, -1, 0, 1, 10], ["-10", "-1", "0", "1", "10"])
+    panel.set_xlabel("distance from the printed number (times what is close; linear up to it, logarithmic beyond)")
+    write_title(figure, f"Every reading of the unstated{stand_ins(run)}; right: how many are close")
+    return figure

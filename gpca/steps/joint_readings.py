@@ -1,0 +1,351 @@
+"""The printed numbers of Tables I to V under joint readings: measured on development samples, searched, then run once.
+
+Each value is named by its part, under the choices that it depends on (:mod:`gpca.comparison.joint_reading`), and by
+method, metric and concept of its counterpart in published.csv.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gpca.active_learning.rounds import LabelingTask, make_task, rounds
+from gpca.active_learning.settings import LOOK_EVERY, ActiveLearningSettings
+from gpca.alignment.icp import ICPSettings
+from gpca.classifier.gpc import GPC
+from gpca.classifier.settings import GPCSettings
+from gpca.comparison.joint_reading import (
+    CHOICES,
+    DEVELOPMENT,
+    EVALUATED,
+    PROTOCOL,
+    SEVERITIES,
+    START,
+    Joint,
+    numbers_asked,
+    part_name,
+    read_choices,
+    scores,
+    search,
+    text_of,
+)
+from gpca.comparison.published import read_published
+from gpca.comparison.verdicts import Tolerance
+from gpca.errors import InputError
+from gpca.evaluation.measures import ALL, read_all_metrics, tidy, write_metrics
+from gpca.explainers.registry import explainer_entry
+from gpca.io.csv_file import finite_number, write_csv
+from gpca.objects.canonical import ObjectClouds
+from gpca.pairs.dataset import Registrations
+from gpca.pairs.shifted_sets import DISTANCES, ShiftedSets
+from gpca.pairs.synthesis import RegistrationSettings, make_registrations
+from gpca.process.job import Job
+from gpca.process.progress import progress
+from gpca.process.provenance import record_provenance
+from gpca.seeds import seed_of_file
+from gpca.steps.readings.files import accuracies, diagnostics_of_scores, like_the_training, train_and_test
+from gpca.steps.readings.gpc_start import FITTED, StartedGPC, of_unit_norm, relevant
+from gpca.steps.readings.knobs import accuracies_of_magnitudes, runs_of
+from gpca.steps.readings.labels import NEW
+from gpca.steps.readings.learners import FOREST, SVM, svm_scores
+from gpca.uncertainty.interventions import MIDDLE, UPPER
+from gpca.uncertainty.settings import UncertaintySettings
+
+TABLE = "joint_reading"  # `table` of the tidy rows of the reading that was found
+LOWER = (0.01, 1.5, 0.20)  # the knobs at the lower ends of the severities
+KNOBS = {"low": LOWER, "middle": MIDDLE, "high": UPPER}
+SCHEDULES = {"rbf": ("rbf", 0.01, 100), "matern32": ("matern32", 0.01, 200)}  # of a kernel in all tables but IV
+PRINTED = (*FITTED, ("polynomial", 0.01, 200))  # kernel, rate and iterations of Table IV's rows
+RANDOM_ROUND = 25  # random choice is the same in rounds of any size, and needs many labels
+Choices = Mapping[str, Sequence]
+Value = tuple[str, str, str, str, float]  # part, method, metric, concept, value
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Samples of a source and seed.
+
+    Attributes:
+        sets: with embeddings by an encoder that learned from samples of the same severities.
+        pairs: some of the test samples like the training's, for Monte-Carlo ICP.
+        axes: source and seed.
+    """
+
+    sets: ShiftedSets
+    pairs: Registrations
+    axes: tuple[str, int]
+
+    @classmethod
+    def load(cls, objects: ObjectClouds, sets: Path, axes: tuple[str, int], registrations: dict, pairs: int):
+        """Read the sets, and make some of their pairs anew.
+
+        Args:
+            objects: of the source.
+            sets: file of the step ``shift`` or ``retrain``.
+            axes: source and seed.
+            registrations: the config's section of that name, with the severities of the sets.
+            pairs: number of test samples for Monte-Carlo ICP, a multiple of 3.
+        """
+        settings = RegistrationSettings.from_dict(registrations)
+        few = replace(settings, train=0, test=min(pairs, settings.test))
+        return cls(ShiftedSets.load(sets, axes), make_registrations(objects, *axes, few)[0], axes)
+
+    def train_and_test(self) -> list[Registrations]:
+        """The training samples, and the test samples like them, with their embeddings."""
+        return train_and_test(like_the_training(self.sets))
+
+    def test_sets(self) -> Iterator[tuple[str, Registrations, np.ndarray]]:
+        """Yield name, test samples and their rows of the sets whose samples are embedded by the encoder itself."""
+        for name in ("in_distribution", "severity"):
+            rows = self.sets.rows(name, "test")
+            yield name, self.sets.registrations(rows), rows
+
+
+@dataclass(frozen=True)
+class MeasureSettings:
+    """What joint readings leave as it is.
+
+    Attributes:
+        gpc: the paper's setting, of which the reading changes kernel, rate and iterations.
+        labels, target: the rounds of labels, and the accuracy that counts as reached.
+        uncertainty: Monte-Carlo ICP under the knobs.
+    """
+
+    gpc: dict[str, Any]
+    labels: ActiveLearningSettings
+    target: float
+    uncertainty: UncertaintySettings
+
+    @classmethod
+    def of_job(cls, job: Job) -> MeasureSettings:
+        """Read the sections of the config that a rule gives; ``labels`` changes those of ``active_learning``."""
+        active = job.section("active_learning")
+        additive = {name: value for name, value in job.section("uncertainty").items() if name != "samples"}
+        return cls(
+            job.section("gpca_paper"),
+            ActiveLearningSettings.from_dict(active | job.section("labels")),
+            active["target"],
+            UncertaintySettings(**additive, icp=ICPSettings(**job.section("icp"))),
+        )
+
+
+def measure(job: Job) -> None:
+    """Values on development samples of some severities under every combination of the other choices."""
+    axes, settings = (job.source, job.seed), MeasureSettings.of_job(job)
+    with record_provenance([job.out], [job.objects, job.sets], job.settings, seed=job.seed):
+        objects = ObjectClouds.load(job.objects, job.source)
+        samples = Samples.load(objects, job.sets, axes, job.section("registrations"), job.section("sizes")["samples"])
+        measured = values(samples, job.severities, job.section("choices"), settings)
+        records = [(part, job.source, *named, job.seed, value) for part, *named, value in measured]
+        write_metrics(tidy(records, "joint readings"), job.out)
+
+
+def choose(job: Job) -> None:
+    """Find the joint reading with the largest share of close numbers, the best ones, and the share by chance."""
+    import pandas as pd
+
+    tolerances = {unit: Tolerance(**tolerance) for unit, tolerance in job.section("tolerances").items()}
+    published = read_published()
+    numbers, printed = numbers_asked(published, [job.settings["stands_for"]]), numbers_asked(published)
+    files = job.files("measured")
+    with record_provenance([job.choice, job.best, job.scores], files, job.settings):
+        measured = read_all_metrics(files)
+        found = search(numbers, printed, measured, job.section("choices"), tolerances, job.settings["deals"])
+        chosen = [(choice, text_of(found.joint[choice])) for choice in CHOICES]
+        write_csv(job.choice, pd.DataFrame(chosen, columns=["choice", "value"]))
+        best = [{"share": share, **{c: text_of(joint[c]) for c in CHOICES}} for joint, share in found.best]
+        write_csv(job.best, pd.DataFrame(best), form=None)
+        records = scores(numbers, found.close, found.share, found.by_chance)
+        counts = {"readings": found.readings, "equals": found.equals, "share_of_protocol": found.protocol}
+        records += [("all", EVALUATED, name, value) for name, value in counts.items()]
+        rows = [(table, DEVELOPMENT, method, metric, "all", 0, float(v)) for table, method, metric, v in records]
+        write_metrics(tidy(rows, "joint reading"), job.scores)
+
+
+def apply(job: Job) -> None:
+    """Values that the joint reading gives on a source's test samples of its severities, seed by seed."""
+    joint = dict(read_choices(job.choice).itertuples(index=False, name=None))
+    joint["new_share"] = finite_number(job.choice, "new_share", joint["new_share"])
+    severities = joint[SEVERITIES]
+    files = job.files("sets")
+    if severities != PROTOCOL:
+        files = [path for path in job.get("other_sets", []) if path.parts[-3] == severities]
+        if not files:
+            fault = f"needs encoders of {severities} perturbations"
+            raise InputError("joint reading", fault, "raise readings.encoders")
+    settings, pairs = MeasureSettings.of_job(job), job.section("sizes")["samples"]
+    registrations = job.section("registrations") | job.section("severities").get(severities, {})
+    choices = {name: [value] for name, value in joint.items()}
+    with record_provenance([job.out], [job.choice, job.objects, *files], job.settings):
+        objects, records = ObjectClouds.load(job.objects, job.source), []
+        for path in files:
+            axes = (job.source, seed_of_file(path))
+            samples = Samples.load(objects, path, axes, registrations, pairs)
+            measured = values(samples, severities, choices, settings)
+            records += [(TABLE, job.source, *named, axes[1], value) for _, *named, value in measured]
+        write_metrics(tidy(records, "joint reading"), job.out)
+
+
+def values(samples: Samples, severities: str, choices: Choices, settings: MeasureSettings) -> Iterator[Value]:
+    """Yield the values under every combination of these choices that matters to a part, with these severities."""
+    choices = dict(choices) | {SEVERITIES: [severities]}
+    yield from _knob_values(samples, choices, settings)
+    yield from _learner_values(samples, choices)
+    train, test = samples.train_and_test()
+    fits: dict[tuple, GPC] = {}  # starts share those whose relevant choices agree
+    starts = list(_combinations(choices, (SEVERITIES, *START)))
+    for start in progress(starts, f"joint readings of {' '.join(map(str, samples.axes))}, {severities}"):
+        fitted = {}
+        for schedule in PRINTED:
+            key = (schedule, *relevant(start, schedule[0]).values())
+            if key not in fits:
+                gpc = StartedGPC(gpc_settings(settings, schedule), start, *samples.axes)
+                fits[key] = gpc.fit(train.embedding, train.concept)
+            fitted[schedule] = fits[key]
+        for (kernel, rate, iterations), gpc in fitted.items():
+            right = accuracies(test.concept, gpc.attribute(test.embedding)[0])
+            method = f"{kernel}-{rate:g}-{iterations}"
+            yield part_name("schedules", start), method, "accuracy", ALL, right["accuracy", ALL]
+        for kernel in choices["kernel"]:
+            joint = start | {"kernel": kernel}
+            yield from _classifier_values(samples, joint, choices, fitted[SCHEDULES[kernel]])
+            yield from _label_values(samples, joint, choices, settings)
+
+
+def _knob_values(samples: Samples, choices: Choices, settings: MeasureSettings) -> Iterator[Value]:
+    """Yield the accuracies of SHAP and SA by how far the knobs are turned."""
+    uncertainty, title = settings.uncertainty, f"knobs of {samples.axes[0]}, seed {samples.axes[1]}"
+    pairs = runs_of(samples.pairs, *samples.axes, uncertainty, uncertainty.starts, title)
+    turned_R_3 = np.array([KNOBS[name] for name in choices["knobs"]])
+    for method, value_R in accuracies_of_magnitudes(pairs, turned_R_3, uncertainty.floor).items():
+        for joint, value in zip(_combinations(choices, (SEVERITIES, "knobs")), value_R, strict=True):
+            yield part_name("knobs", joint), method, "accuracy", ALL, float(value)
+
+
+def _classifier_values(samples: Samples, joint: Joint, choices: Choices, gpc: GPC) -> Iterator[Value]:
+    """Yield the accuracies of GP-CA in Tables I and II and of the GPC in V, and the diagnostics of the latter."""
+    _, test = samples.train_and_test()
+    right = accuracies(test.concept, gpc.attribute(test.embedding)[0])
+    for (metric, concept), value in right.items():
+        yield part_name("classifier", joint), "gpca_paper", metric, concept, value
+    yield part_name("classifier", joint), "gpca_matern", "accuracy", ALL, right["accuracy", ALL]
+    scored = {name: (gpc.attribute(part.embedding)[0], part, rows) for name, part, rows in samples.test_sets()}
+    for asked in _combinations(choices, ("set", "distance")):
+        for metric, value in _diagnostics(scored, samples.sets, asked).items():
+            yield part_name("diagnostics", joint | asked), "gpca_matern", metric, ALL, value
+
+
+def _learner_values(samples: Samples, choices: Choices) -> Iterator[Value]:
+    """Yield accuracies and diagnostics of the forest and the linear SVM, by the scale of their inputs."""
+    for joint in _combinations(choices, (SEVERITIES, "inputs")):
+        inputs = joint["inputs"]
+
+        def scaled(registrations: Registrations, inputs: str = inputs) -> Registrations:
+            h_S_d = of_unit_norm(registrations.embedding) if inputs == "unit_norm" else registrations.embedding
+            return replace(registrations, attached={"embedding": h_S_d})
+
+        train = scaled(samples.train_and_test()[0])
+        forest = explainer_entry(FOREST).make(*samples.axes)
+        forest.fit(train)
+        parts = [(name, scaled(part), rows) for name, part, rows in samples.test_sets()]
+        h_S_d = np.concatenate([part.embedding for _, part, _ in parts])
+        ends = np.cumsum([len(part) for _, part, _ in parts])[:-1]
+        standardized = "standardised" if inputs == "standardised" else "raw"
+        by_svm = np.split(svm_scores(train, h_S_d, "svc", standardized, "platt"), ends)
+        scored_by = {
+            FOREST: {name: (forest.explain(part).scores_N_C, part, rows) for name, part, rows in parts},
+            SVM: {name: (scores_S_C, part, rows) for scores_S_C, (name, part, rows) in zip(by_svm, parts, strict=True)},
+        }
+        for method, scored in scored_by.items():
+            scores_S_C, part, _ = scored["in_distribution"]
+            right = accuracies(part.concept, scores_S_C)["accuracy", ALL]
+            yield part_name("learners", joint), method, "accuracy", ALL, right
+            for asked in _combinations(choices, ("set", "distance")):
+                for metric, value in _diagnostics(scored, samples.sets, asked).items():
+                    yield part_name("learner_diagnostics", joint | asked), method, metric, ALL, value
+
+
+def _diagnostics(
+    scored: Mapping[str, tuple[np.ndarray, Registrations, np.ndarray]], sets: ShiftedSets, asked: Joint
+) -> dict[str, float]:
+    """ρ, AUC and ECE on the set and by the distance of a reading."""
+    parts = [scored[name] for name in asked["set"].split("+")]
+    rows = np.concatenate([rows for _, _, rows in parts])
+    return diagnostics_of_scores(
+        np.concatenate([part.concept for _, part, _ in parts]),
+        np.concatenate([scores_S_C for scores_S_C, _, _ in parts]),
+        sets.distance[rows, DISTANCES.index(asked["distance"])],
+    )
+
+
+def _label_values(samples: Samples, joint: Joint, choices: Choices, settings: MeasureSettings) -> Iterator[Value]:
+    """Yield Table III's numbers, by the share of the new concept in the pool."""
+    with_kernel = gpc_settings(settings, SCHEDULES[joint["kernel"]])
+    for new_share in choices["new_share"]:
+        registrations = like_the_training(samples.sets)
+        task = make_task(registrations, NEW, settings.labels, *samples.axes, new_share=new_share)
+        gpc = StartedGPC(with_kernel, joint, *samples.axes, "reading", NEW)
+        gpc.fit(task.initial.h, task.initial.concept_N, np.concatenate([task.initial.h, task.pool.h]))
+        gpc.level()
+        # Random choice has the whole pool, and ends at the target.
+        budgets = {
+            "bald_kmeans": (settings.labels, np.inf),
+            "random": (replace(settings.labels, batch=RANDOM_ROUND, labels=len(task.pool)), settings.target),
+        }
+        for strategy, (budget, end) in budgets.items():
+            steps: list[dict[str, float]] = []
+            at_target: list[int] = []  # rows of the pool that are labeled at the target
+            for step, rows in rounds(task.project(gpc), gpc, strategy, budget, *samples.axes, "reading"):
+                if all(before["accuracy"] < settings.target for before in steps):
+                    at_target = list(rows)
+                steps.append(step)
+                if step["accuracy"] >= end:
+                    break
+            hits = [step["accuracy"] >= settings.target for step in steps]
+            last = hits.index(True) if any(hits) else len(steps) - 1  # a lower bound where the target is missed
+            metrics = {
+                "labels_to_target": float(steps[last]["labels"]),
+                "reached": float(any(hits)),
+                "final_accuracy": float(steps[-1]["accuracy"]),
+            }
+            if strategy == "bald_kmeans":
+                metrics["epochs_at_target"] = _passes(
+                    task, at_target, with_kernel, joint, settings.target, samples.axes
+                )
+            for metric, value in metrics.items():
+                yield part_name("labels", joint | {"new_share": new_share}), strategy, metric, NEW, value
+
+
+def _passes(
+    task: LabelingTask[np.ndarray],
+    rows: list[int],
+    settings: GPCSettings,
+    start: Joint,
+    target: float,
+    axes: tuple[str, int],
+) -> float:
+    """Passes over these labels, a multiple of `LOOK_EVERY` or all, to a new classifier's target accuracy."""
+    gpc, most = StartedGPC(settings, start, *axes, "epochs", NEW), settings.iterations
+    labeled_L_d = np.concatenate([task.initial.h, task.pool.h[rows]])
+    concept_L = np.concatenate([task.initial.concept_N, task.pool.concept_N[rows]])
+    for done in gpc.fit_up_to([*range(LOOK_EVERY, most, LOOK_EVERY), most], labeled_L_d, concept_L):
+        if accuracies(task.test.concept_N, gpc.attribute(task.test.h)[0])["accuracy", ALL] >= target:
+            return float(done)
+    return float(most)
+
+
+def gpc_settings(settings: MeasureSettings, schedule: tuple[str, float, int]) -> GPCSettings:
+    """The paper's setting with a row of Table IV's kernel, rate and iterations."""
+    kernel, rate, iterations = schedule
+    return GPCSettings(**settings.gpc | {"kernel": kernel, "learning_rate": rate, "iterations": iterations})
+
+
+def _combinations(choices: Choices, names: Sequence[str]) -> Iterator[dict[str, Any]]:
+    """Yield every combination of the values of these choices."""
+    for chosen in product(*(choices[name] for name in names)):
+        yield dict(zip(names, chosen, strict=True))

@@ -1,0 +1,147 @@
+"""The joint reading with the most close numbers is found, and its chance is that of a search on dealt numbers."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from gpca.comparison.chance import is_close, p_value, permuted, weights
+from gpca.comparison.joint_reading import CHOICES, PARTS, numbers_asked, part_name, scores_of_values, search, values_of
+from gpca.comparison.published import Counterpart, Number, read_published
+from gpca.errors import InputError
+from gpca.evaluation.measures import TIDY_COLUMNS
+from gpca.experiments.joint_reading import names
+from tests.comparison.made_up import TOLERANCES
+
+GRID = {choice: ["only"] for choice in CHOICES} | {
+    "severities": ["protocol", "weaker"],
+    "knobs": ["middle", "low"],
+    "new_share": [0.33, 0.02],
+}
+
+
+def number(table, value, method, column="GP-CA", unit="%", metric="accuracy", upper=None):
+    counterpart = Counterpart("a.csv", "a", ("ycb",), (method,), (metric,), "all", "mean")
+    return Number(table, "YCB", column, value, upper or value, 1, unit, "", "", counterpart, "")
+
+
+def measured(values):
+    rows = [(name, "shapes", method, metric, "all", 0, value) for (name, method, metric), value in values.items()]
+    return pd.DataFrame(rows, columns=list(TIDY_COLUMNS))
+
+
+SHAP, LABELS = number("I", 30.0, "shap"), number("III", 14.0, "bald", unit="labels", metric="labels_to_target")
+KNOBS = {("protocol", "middle"): 0.5, ("protocol", "low"): 0.31, ("weaker", "middle"): 0.29, ("weaker", "low"): 0.9}
+POOLS = {("protocol", 0.33): 100, ("protocol", 0.02): 90, ("weaker", 0.33): 4, ("weaker", 0.02): 20}
+
+
+@pytest.fixture
+def rows():
+    joint = dict.fromkeys(CHOICES, "only")
+    values = {}
+    for (severities, knobs), value in KNOBS.items():
+        name = part_name("knobs", joint | {"severities": severities, "knobs": knobs})
+        values[name, "shap", "accuracy"] = value
+    for (severities, new_share), value in POOLS.items():
+        name = part_name("labels", joint | {"severities": severities, "new_share": new_share})
+        values |= {(name, "bald", "labels_to_target"): value, (name, "bald", "reached"): float(value != 20)}
+    return measured(values)
+
+
+def test_one_reading_has_to_fit_all_tables(rows):
+    found = search([SHAP, LABELS], [SHAP, LABELS], rows, GRID, TOLERANCES, deals=5)
+    # Under weaker perturbations 20 labels would be close, but were stopped before the target.
+    assert (found.joint["severities"], found.joint["knobs"], found.joint["new_share"]) == ("protocol", "low", 0.33)
+    assert found.share == 0.5
+    assert found.close.tolist() == [True, False]
+    assert (found.readings, found.equals, found.protocol) == (8, 4, 0)
+    assert [share for _, share in found.best] == [0.5] * 4 + [0] * 4
+    reached = rows.assign(value=rows["value"].where(rows["metric"] != "reached", 1.0))
+    found = search([SHAP, LABELS], [SHAP, LABELS], reached, GRID, TOLERANCES, deals=5)
+    assert (found.joint["severities"], found.joint["knobs"], found.joint["new_share"]) == ("weaker", "middle", 0.02)
+    assert (found.share, found.equals) == (1, 1)
+
+
+def test_by_chance_other_numbers_of_the_same_unit_come_into_a_place(rows):
+    other = number("I", 91.0, "gpca_paper", column="SHAP")
+    found = search([SHAP], [SHAP, other], rows, GRID, TOLERANCES, deals=200)
+    assert found.share == 1
+    assert set(found.by_chance["unit"]) == {1.0}  # 91 is close to a reading too
+    far = number("I", 70.0, "gpca_paper", column="SHAP")
+    found = search([SHAP], [SHAP, far], rows, GRID, TOLERANCES, deals=200)
+    assert found.by_chance["unit"].mean() == pytest.approx(0.5, abs=0.15)
+    assert set(found.by_chance["column"]) == {1.0}  # it stands in another column
+
+
+def test_what_was_not_measured_is_refused(rows):
+    with pytest.raises(InputError, match="has no value of I / YCB / GP-CA"):
+        search([SHAP], [SHAP], rows[rows["method"] == "bald"], GRID, TOLERANCES, deals=1)
+    with pytest.raises(InputError, match="under knobs/weaker/low"):
+        search([SHAP], [SHAP], rows[rows["table"] != "knobs/weaker/low"], GRID, TOLERANCES, deals=1)
+
+
+def test_deals_stay_within_their_group_and_are_the_same_every_time():
+    printed = numbers_asked(read_published())
+    for within, of in (("unit", lambda n: (n.table, n.unit)), ("column", lambda n: (n.table, n.column, n.unit))):
+        dealt_D_K = permuted(printed, within, 50)
+        np.testing.assert_array_equal(np.sort(dealt_D_K, axis=1), np.tile(np.arange(len(printed)), (50, 1)))
+        assert all(
+            of(printed[place]) == of(number) for row in dealt_D_K for place, number in zip(row, printed, strict=True)
+        )
+        np.testing.assert_array_equal(dealt_D_K, permuted(printed, within, 50))
+        assert len(np.unique(dealt_D_K, axis=0)) > 10
+
+
+def test_each_table_weighs_the_same_and_each_value_counts_once():
+    printed = numbers_asked(read_published())
+    weight_K = weights(printed)
+    assert weight_K.sum() == pytest.approx(1)
+    tables = {table: sum(w for w, n in zip(weight_K, printed, strict=True) if n.table == table) for table in PARTS_OF}
+    assert list(tables.values()) == pytest.approx([0.2] * 5)
+    assert len(printed) == 54
+    assert len(numbers_asked(read_published(), ["ycb"])) == 25
+    assert not [number for number in printed if number.same_as]
+
+
+PARTS_OF = ("I", "II", "III", "IV", "V")
+
+
+def test_close_is_within_the_second_tolerance_and_no_lower_bound():
+    assert is_close(SHAP, 33.05, False, TOLERANCES["%"])
+    assert not is_close(SHAP, 33.06, False, TOLERANCES["%"])
+    assert not is_close(SHAP, 30, True, TOLERANCES["%"])
+    assert not is_close(SHAP, float("nan"), False, TOLERANCES["%"])
+    assert is_close(LABELS, 42, False, TOLERANCES["labels"])
+    assert p_value(0.5, np.array([0.5, 0.4, 0.6])) == 3 / 4
+
+
+def test_fixed_values_are_scored_beside_dealt_ones():
+    far = number("I", 70.0, "gpca_paper", column="SHAP")
+    records = {
+        (table, metric): value
+        for table, _, metric, value in scores_of_values(
+            [SHAP, far], [(31, False), (71, False)], TOLERANCES, 100, "mine"
+        )
+    }
+    assert records["all", "share"] == 1
+    assert records["I", "close"] == records["all", "close"] == 2
+    assert records["all", "expected_column"] == 1
+    assert records["all", "expected_unit"] == pytest.approx(0.5, abs=0.2)
+    assert records["all", "p_unit"] == pytest.approx(0.5, abs=0.2)
+
+
+def test_values_are_means_over_the_seeds_and_bounds_where_any_is(rows):
+    more = pd.concat([rows, rows.assign(seed=1, value=rows["value"] * 1.1)])
+    assert values_of(SHAP, more)["knobs/protocol/middle"] == (pytest.approx(52.5), False)
+    assert values_of(LABELS, rows)["labels/weaker/only/only/only/only/only/0.02"] == (20, True)
+
+
+def test_every_part_depends_on_known_choices_and_every_choice_matters():
+    assert {choice for of_part in PARTS.values() for choice in of_part} == set(CHOICES)
+
+
+@pytest.mark.parametrize(
+    ("seeds", "sources", "expected"), [([100], ["ycb"], [100]), ([], ["ycb"], []), ([100], ["linemod"], [])]
+)
+def test_a_run_without_seeds_or_without_the_source_has_no_joint_reading(seeds, sources, expected):
+    section = {"seeds": seeds, "stands_for": "ycb", "source": "shapes", "choices": {"severities": ["protocol"]}}
+    assert names({"joint_reading": section}, {source: {} for source in sources})["development_seed"] == expected
