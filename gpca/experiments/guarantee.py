@@ -19,7 +19,7 @@ from gpca.experiments.frame_causes.tables import FEWEST_FAILURES
 from gpca.experiments.plan import Run
 from gpca.experiments.result import figure, numbers, table
 from gpca.experiments.step import Plan, Step
-from gpca.explainers.interface import REENACTED
+from gpca.explainers.interface import EMBEDDINGS, REENACTED
 from gpca.explainers.registry import CAUSES, explainer_entry, explainer_module
 from gpca.frames.source import REAL_WORLD
 from gpca.guarantee.answers import (
@@ -48,7 +48,6 @@ from gpca.io.csv_file import read_numbers
 from gpca.reporting.sheet import Row, Sheet, Show, crossed, show, where
 from gpca.seeds import generator
 from gpca.settings import Distinct, read_settings
-from gpca.steps.guarantee import EMBEDDINGS
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -40,6 +40,7 @@ WORDS = {  # in tables
 NOTHING = "nothing"
 BARE = "registrations"  # `reads` of an explainer that needs nothing attached
 REENACTED = "reenactments"  # `reads` of an explainer that needs the re-enactments of each pair
+EMBEDDINGS = "embeddings"  # of trained encoders
 
 
 class ConceptExplainer(Protocol):

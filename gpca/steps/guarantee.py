@@ -20,6 +20,7 @@ from gpca.causes.dataset import LABELS, Causes, labeled, observed_only
 from gpca.causes.descriptors import Descriptors
 from gpca.causes.truth import BORDERLINE
 from gpca.errors import InputError
+from gpca.explainers.interface import EMBEDDINGS
 from gpca.explainers.registry import CAUSES, explainer_entry
 from gpca.frames.source import REAL_WORLD
 from gpca.guarantee.answers import SCORES, Scored
@@ -38,7 +39,6 @@ from gpca.seeds import generator, seed_of_file
 if TYPE_CHECKING:
     import pandas as pd
 
-EMBEDDINGS = "embeddings"  # explainers that read these are not trained again
 FRAME_COLUMNS = ("sample", "instance", "truth")
 PARTS = 3  # of families that no file deals into folds
 SEVERITIES = ("severity_noise", "severity_rotation_rad", "severity_translation", "severity_crop")
