@@ -43,20 +43,20 @@ def _files(plan: Plan, name: str) -> dict[str, list[str]]:
         }
     if name in (FRAME_ENCODER, FRAME_START):
         backbones, published = plan.names["backbone"], plan.names["published"]
-        methods = {REAL_WORLD: [*backbones, *published]}
+        methods_of = {REAL_WORLD: [*backbones, *published]}
         if name == FRAME_START:
-            methods = {REAL_WORLD: backbones, plan.names["estimated"]: plan.names["condition_backbone"]}
+            methods_of = {REAL_WORLD: backbones, plan.names["estimated"]: plan.names["condition_backbone"]}
         return {
-            "registrations": [f"registrations/{s}/seed{seed}.npz" for s in methods for seed in config["seeds"]],
+            "registrations": [f"registrations/{s}/seed{seed}.npz" for s in methods_of for seed in config["seeds"]],
             "predictions": [
                 f"predictions/{source}/{method}/seed{seed}.csv"
-                for source, of_source in methods.items()
-                for method in of_source
+                for source, methods in methods_of.items()
+                for method in methods
                 for seed in (plan.names["published_seed"] if method in published else config["seeds"])
             ],
         }
     sources = [source for source in group.sources if source in plan.names["source"]]
-    seeds, ranges = config["seeds"][: 1 if group.costly else readings["seeds"]], []
+    seeds, ranges = config["seeds"][: 1 if group.costly else readings["seeds"]], list[str]()
     if name == SEVERITIES_RETRAINED:
         seeds, ranges = config["seeds"][: readings["encoders"]], readings["groups"][name]["range"]
     folder, section = ("learners", "learners") if name == "diagnostics" else ("predictions", "explainers")
@@ -203,7 +203,8 @@ def _other_cloud(
     def modules(plan: Plan) -> list[str]:
         return [_encoder_module(plan, plan.names["clouded_backbone"])]
 
-    options = {"params": {"source": REAL_WORLD}, "priority": 11} | options
+    options.setdefault("params", {"source": REAL_WORLD})
+    options.setdefault("priority", 11)
     return Step(name=name, run=run, inputs=inputs, outputs=outputs, settings=settings, modules=modules, **options)
 
 

@@ -204,8 +204,8 @@ def values(samples: Samples, severities: str, choices: Choices, settings: Measur
         for schedule in PRINTED:
             key = (schedule, *relevant(start, schedule[0]).values())
             if key not in fits:
-                gpc = StartedGPC(gpc_settings(settings, schedule), start, *samples.axes)
-                fits[key] = gpc.fit(train.embedding, train.concept)
+                started = StartedGPC(gpc_settings(settings, schedule), start, *samples.axes)
+                fits[key] = started.fit(train.embedding, train.concept)
             fitted[schedule] = fits[key]
         for (kernel, rate, iterations), gpc in fitted.items():
             right = accuracies(test.concept, gpc.attribute(test.embedding)[0])
