@@ -137,7 +137,6 @@ EXPERIMENT = Experiment(
     sections={"scans": ScanSettings},
     needs=("scan_set", "scan_method"),
     names=names,
-    shown=lambda config, _sources: {"scan_titles": titles_of_scans(config)},
     check=check,
     leavable={"scans.datasets": Names("data set of scans")},
     lists={"scans.methods": "methods"},

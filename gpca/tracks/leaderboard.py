@@ -15,8 +15,8 @@ from gpca.evaluation.measures import POOLED
 from gpca.experiments.diagnosis.tables import AGAIN, SHOWN
 from gpca.experiments.frame_causes.metrics import STATE
 from gpca.experiments.frame_causes.tables import FEWEST_FAILURES, STARTS
-from gpca.experiments.scan_causes.tables import COLUMNS as SCAN_COLUMNS
-from gpca.experiments.scan_causes.tables import NOT_COMPARED
+from gpca.experiments.scan_failures import COLUMNS as SCAN_COLUMNS
+from gpca.experiments.scan_failures import NOT_COMPARED
 from gpca.io.files import whole_file
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.tables.builder import TableBuilder

@@ -221,7 +221,7 @@ def recipe_of(file: str, config: Mapping[str, Any]) -> Recipe:
     source = rest[-2]
     name_and_seed = {"source": source, "seed": seed}
     if kind in ("scan_causes", "scan_descriptors", "scan_reenactments"):
-        from gpca.experiments.scan_causes.experiment import measurement_settings
+        from gpca.experiments.scan_causes import measurement_settings
         from gpca.scans.source import entry_of, place_of
 
         place = place_of(entry_of(config["scans"]["datasets"][source]), config["data_dir"])
@@ -230,7 +230,7 @@ def recipe_of(file: str, config: Mapping[str, Any]) -> Recipe:
         arguments |= {"reenactments": "scan_reenactments"}
         outputs = {argument: f"{folder}/{source}/seed{seed}.npz" for argument, folder in arguments.items()}
         outputs |= {"samples": f"scan_causes/{source}/seed{seed}.csv"}
-        return Recipe("gpca.experiments.scan_causes.step", given, {}, outputs)
+        return Recipe("gpca.steps.scan_causes:measure", given, {}, outputs)
     return _objects_recipe(file, kind, name_and_seed, config)
 
 

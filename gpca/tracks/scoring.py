@@ -17,8 +17,8 @@ from gpca.causes.judged import CEILING, SHARES, Judged, ceiling_of, counted, joi
 from gpca.causes.truth import BORDERLINE, NOMINAL
 from gpca.evaluation.intervals import interval, pigeonhole_weights
 from gpca.evaluation.measures import POOLED
-from gpca.experiments.scan_causes.metrics import CAUSES as SCAN_MEASURE
-from gpca.experiments.scan_causes.metrics import EVERY, NATURAL, counted_of_scans, scan_measures
+from gpca.experiments.scan_causes import CAUSES as SCAN_MEASURE
+from gpca.experiments.scan_causes import EVERY, NATURAL, counted_of_scans, scan_measures
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import generator
 from gpca.tracks.published import Method, Published

@@ -15,7 +15,7 @@ from gpca.errors import InputError
 from gpca.experiments.controls.settings import HARD
 from gpca.experiments.diagnosis.experiment import shown as titles_and_costs
 from gpca.experiments.frame_causes.metrics import SAMPLE_COLUMNS
-from gpca.experiments.scan_causes.metrics import SAMPLE_COLUMNS as SCAN_COLUMNS
+from gpca.experiments.scan_causes import SAMPLE_COLUMNS as SCAN_COLUMNS
 from gpca.explainers.registry import explainer_entry
 from gpca.io.container import require_same_samples
 from gpca.io.csv_file import ANY, numbers, read_csv

@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from gpca.causes.dataset import LABELS
+from gpca.causes.settings import OBJECTS, SCANS
 from gpca.causes.truth import NOMINAL
 from gpca.code_files import ROOT
 from gpca.errors import InputError, require_known
-from gpca.experiments.scan_causes.settings import OBJECTS, SCANS
 from gpca.explainers.registry import CAUSES, CONCEPTS
 from gpca.frames.source import REAL_WORLD
 from gpca.pairs.perturbation import CONCEPTS as PERTURBATIONS

@@ -15,14 +15,12 @@ from gpca.alignment.icp import ICPSettings
 from gpca.attribution.predictions import read_predictions
 from gpca.attribution.scores import Attribution
 from gpca.causes.dataset import Causes, labeled
-from gpca.causes.settings import DescriptorSettings
+from gpca.causes.settings import OBJECTS, DescriptorSettings
 from gpca.encoders.registry import EncoderSettings
 from gpca.errors import InputError
 from gpca.experiments.controls.protocol import ControlRun
 from gpca.experiments.controls.settings import HARD, ControlSettings
-from gpca.experiments.scan_causes import diagnosis_step as scan_step
-from gpca.experiments.scan_causes.experiment import diagnosis_settings
-from gpca.experiments.scan_causes.settings import OBJECTS
+from gpca.experiments.scan_causes import diagnosis_settings
 from gpca.explainers.interface import BARE, REENACTED, ExplainerEntry
 from gpca.explainers.registry import explainer_entry, require_settings
 from gpca.explainers.rivals import make_rivals
@@ -32,6 +30,7 @@ from gpca.process.job import Job
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.settings import read_settings
 from gpca.steps.diagnosis import DESCRIBED, EMBEDDED, FramesToExplain, explained, with_what_it_reads
+from gpca.steps.scan_causes import diagnose as diagnose_scans
 from gpca.tracks.published import NOTHING_NAMED, Method
 from gpca.tracks.samples import Samples
 from gpca.tracks.track import CAUSES_TRACK, FRAMES_TRACK, SCANS_TRACK
@@ -208,7 +207,7 @@ def _predict_scans(trial: Trial, seed: int, sets: list[str]):
         files |= _training_files(samples, folders, seed)
         job = Job(source="scans", seed=seed, settings=settings, predictions=path, **files)
         started = perf_counter()
-        scan_step.run(job)
+        diagnose_scans(job)
         seconds = perf_counter() - started
         rows = read_predictions(path, labels=samples.track.labeled_by)
     return rows, seconds / len(rows)

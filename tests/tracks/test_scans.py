@@ -17,9 +17,11 @@ from gpca.causes.dataset import LABELS
 from gpca.config.check import check, with_success
 from gpca.config.layers import without_false
 from gpca.errors import InputError
-from gpca.experiments.scan_causes import metrics, step
+from gpca.experiments import scan_causes
+from gpca.experiments.plan import Run
 from gpca.io.csv_file import write_csv
 from gpca.process.job import Job
+from gpca.steps.scan_causes import measure
 from gpca.tracks import published as module
 from gpca.tracks import scoring
 from gpca.tracks.leaderboard import MARK
@@ -118,11 +120,12 @@ def test_what_is_shipped_is_of_the_data_sets_of_the_run_and_says_where_methods_l
 
 
 def test_published_rows_have_the_numbers_of_table_18(shipped, folder, monkeypatch):
-    monkeypatch.setattr(metrics, "FEWEST_OF_A_CAUSE", 1)
+    monkeypatch.setattr(scan_causes, "FEWEST_OF_A_CAUSE", 1)
     scores, _ = score(shipped, {})
     files = [folder / f"scan_causes/{name}/seed{SEED}.npz" for name in (EVERYWHERE, RARE)]
     tables = [path.with_suffix(".csv") for path in files]
-    wanted = metrics.collect(files, tables, [folder / f"scan_diagnoses/seed{SEED}.csv"], (0.1, 1.0))
+    run = Run({"scans": {"strata": (0.1, 1.0)}})
+    wanted = scan_causes.collect(run, files, tables, [folder / f"scan_diagnoses/seed{SEED}.csv"])
     wanted = wanted[(wanted["condition"] == "natural") & (wanted["method"] != "truth") & (wanted["stratum"] == "all")]
     assert set(wanted["source"]) == {"pooled", EVERYWHERE, RARE} and "cause_accuracy" in set(wanted["metric"])
     own = scores.set_index(["group", "method", "metric"])
@@ -223,7 +226,7 @@ def test_the_virtual_set_is_made_by_its_recipe_and_loaded_as_an_object(full, shi
     paths = {name: tmp_path / path for name, path in recipe.outputs.items()}
     for path in paths.values():
         path.parent.mkdir(parents=True, exist_ok=True)
-    step.run(Job(**json.loads(json.dumps(recipe.given)), **paths))
+    measure(Job(**json.loads(json.dumps(recipe.given)), **paths))
     n = len(pd.read_csv(paths["samples"]))
     own = replace(shipped.rows, **{name: getattr(shipped.rows, name)[:1] for name in vars(shipped.rows)})
     methods = tuple(replace(each, scores=each.scores[:1], named=each.named[:1]) for each in shipped.methods)
@@ -241,4 +244,4 @@ def test_the_virtual_set_is_made_by_its_recipe_and_loaded_as_an_object(full, shi
 
 
 def test_measures_of_scans_are_those_that_an_interval_is_made_for():
-    assert metrics.CAUSES in scoring.SHARES_OF_SAMPLES
+    assert scan_causes.CAUSES in scoring.SHARES_OF_SAMPLES

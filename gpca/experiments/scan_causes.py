@@ -1,15 +1,21 @@
-"""How well explainers tell failed registrations of scans, and name their causes; and how many there are of each."""
+"""Causes of failed registrations of scans to scans, and which explainers name them (Table XVIII).
+
+The tables and the figure stand in :mod:`gpca.experiments.scan_failures`.
+"""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
+from pydantic import Field
 
+from gpca.alignment.methods.registry import method_module
 from gpca.attribution.predictions import read_predictions
 from gpca.causes.dataset import LABELS, Causes, labels_of
 from gpca.causes.judged import (
@@ -24,19 +30,157 @@ from gpca.causes.judged import (
     measure,
 )
 from gpca.causes.scans import KINDS
+from gpca.causes.settings import SCANS, ScanSamples
 from gpca.causes.truth import BORDERLINE, FAILED, GEOMETRY
-from gpca.errors import InputError
+from gpca.encoders.registry import encoders
+from gpca.errors import InputError, with_key
 from gpca.evaluation.intervals import Difference, best_of, difference, interval, pigeonhole_weights
 from gpca.evaluation.measures import POOLED
-from gpca.experiments.scan_causes.settings import SCANS
+from gpca.experiments.experiment import Experiment, LeftOut, Names
+from gpca.experiments.plan import Run
+from gpca.experiments.result import numbers
+from gpca.experiments.scans import EACH_SET, ChoiceSettings, files_of_set, place_of_set
+from gpca.experiments.step import Plan, Step
+from gpca.explainers.registry import CAUSES as CAUSE_EXPLAINERS
+from gpca.explainers.registry import explainer_module, explainers, require_settings
 from gpca.io.container import require_same_samples
-from gpca.io.csv_file import ANY, numbers, read_csv, read_numbers
+from gpca.io.csv_file import ANY, read_csv, read_numbers
+from gpca.io.csv_file import numbers as number_column
 from gpca.pairs.perturbation import CONCEPTS
+from gpca.reenactment.settings import ReenactmentSettings
 from gpca.scans.scene import stratum_of
 from gpca.seeds import generator, seed_of_file
+from gpca.settings import Distinct, changes_of, fields_of
+from gpca.steps.scan_trials import TrialSettings
 
 if TYPE_CHECKING:
     import pandas as pd
+
+Learned = Distinct[Literal["objects", "scans"]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Section(ScanSamples):
+    """Which registrations are measured, and which explainers are asked.
+
+    Attributes:
+        reenactment: ``diagnosis.reenactment`` with these changes.
+        explainers: name -> where it has learned; its settings are those of ``diagnosis.explainers``.
+    """
+
+    reenactment: Annotated[dict, changes_of(ReenactmentSettings)] = field(default_factory=dict)
+    explainers: Annotated[dict[str, Learned], Field(min_length=1)]
+
+
+def check(config: dict, _left_out: LeftOut) -> None:
+    """Check that every explainer exists, and takes the settings that it has in the diagnosis."""
+    for name, settings in settings_of_explainers(config).items():
+        with_key(f"scan_causes.explainers.{name}", require_settings, name, settings, CAUSE_EXPLAINERS)
+
+
+def settings_of_explainers(config: Mapping[str, Any]) -> dict[str, dict]:
+    """Settings of each explainer of scans."""
+    of_diagnosis = config["diagnosis"]["explainers"]
+    return {name: of_diagnosis.get(name) or {} for name in config["scan_causes"]["explainers"]}
+
+
+def reenactment_settings(config: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings of re-enactments of scans: those of objects, with changes."""
+    return config["diagnosis"]["reenactment"] | (config["scan_causes"].get("reenactment") or {})
+
+
+def measurement_settings(config: Mapping[str, Any], scan_set: str) -> dict[str, Any]:
+    """Settings of the step that measures the causes of a data set of scans."""
+    scans = config["scans"]
+    first = scans["global_start"]
+    return {
+        "samples": fields_of(config["scan_causes"], ScanSamples),
+        "entry": scans["datasets"][scan_set],
+        "role": config["splits"]["role"],
+        "scans": fields_of(scans, ChoiceSettings, TrialSettings) | {"success": scans["success"]},
+        "methods": {first: scans["methods"].get(first) or config["methods"].get(first)},
+        "causes": config["causes"],
+        "descriptors": config["diagnosis"]["descriptors"],
+        "reenactment": reenactment_settings(config),
+    }
+
+
+def diagnosis_settings(
+    config: Mapping[str, Any], explainers: Mapping[str, Sequence[str]], settings: Mapping[str, Mapping]
+) -> dict[str, Any]:
+    """Settings of the step that explains scans.
+
+    Args:
+        explainers: name -> where it learns.
+        settings: of each.
+    """
+    return {
+        "samples": fields_of(config["scan_causes"], ScanSamples),
+        "explainers": explainers,
+        "settings": settings,
+        "causes": {"starts": config["causes"]["starts"]},
+        "descriptors": config["diagnosis"]["descriptors"],
+        "reenactment": reenactment_settings(config),
+        "encoder": config["diagnosis"]["encoder"],
+    }
+
+
+EXPERIMENT = Experiment(
+    name="scan_causes",
+    beside=("scan_failures",),
+    sections={"scan_causes": Section},
+    needs=("scan_set",),
+    names=lambda config, _sources: {"scan_explainer": list(config["scan_causes"]["explainers"])},
+    check=check,
+    leavable={"scan_causes.explainers": Names("explainer", lambda: explainers(CAUSE_EXPLAINERS))},
+)
+
+MEASURE = Step(
+    name="measure_scan_causes",
+    run="gpca.steps.scan_causes:measure",
+    data=files_of_set,
+    outputs={
+        "scan_causes": "scan_causes/{source}/seed{seed}.npz",
+        "samples": "scan_causes/{source}/seed{seed}.csv",
+        "descriptors": "scan_descriptors/{source}/seed{seed}.npz",
+        "reenactments": "scan_reenactments/{source}/seed{seed}.npz",
+    },
+    settings=lambda plan, wildcards: measurement_settings(plan.config, wildcards.source),
+    params={"place": place_of_set},
+    modules=lambda plan: [method_module(plan.config["scans"]["global_start"])],
+    where=EACH_SET,
+    target="scan_causes",
+    priority=10,
+)
+
+
+def _modules(plan: Plan) -> list[str]:
+    backbone = plan.config["diagnosis"]["encoder"]["backbone"]
+    named = plan.config["scan_causes"]["explainers"]
+    return [encoders()[backbone].split(":")[0], *(explainer_module(name, CAUSE_EXPLAINERS) for name in named)]
+
+
+DIAGNOSE = Step(
+    name="diagnose_scans",
+    run="gpca.steps.scan_causes:diagnose",
+    inputs={
+        "scan_causes": "scan_causes/{*scan_set}/seed{seed}.npz",
+        "scan_descriptors": "scan_descriptors/{*scan_set}/seed{seed}.npz",
+        "scan_reenactments": "scan_reenactments/{*scan_set}/seed{seed}.npz",
+        "causes": "causes/{*source}/seed{seed}.npz",
+        "descriptors": "descriptors/{*source}/seed{seed}.npz",
+        "reenactments": "reenactments/{*source}/seed{seed}.npz",
+        "encoders": "cause_encoders/{*source}/seed{seed}.pt",
+        "embeddings": "cause_embeddings/{*source}/seed{seed}.npz",
+    },
+    outputs={"predictions": "scan_diagnoses/seed{seed}.csv"},
+    settings=lambda plan, _wildcards: diagnosis_settings(
+        plan.config, plan.config["scan_causes"]["explainers"], settings_of_explainers(plan.config)
+    ),
+    params={"source": "scans"},
+    modules=_modules,
+    where={"seed": "scan_seed"},
+)
 
 SAMPLE_COLUMNS = ("sample", "cluster", "overlap", "start", "times", "missed")
 COLUMNS = (
@@ -44,7 +188,7 @@ COLUMNS = (
     *("value", "low", "high", "gate", "difference", "difference_low", "difference_high"),
 )
 NUMBERS = tuple(name for name in COLUMNS[6:] if name != "gate")
-TRUTH = "truth"  # in the place of an explainer: how many there are of a kind, ``count_<kind>``
+TRUTH = "truth"  # instead of an explainer, in rows of counts, ``count_<kind>``
 EVERY = "all"  # strata
 NATURAL, ADDED = "natural", "noise_added"  # conditions of what is measured; counts are of kinds of start as well
 COUNTED = ("registrations", "pairs", "clusters", *LABELS, BORDERLINE, GEOMETRY, "missed")
@@ -55,27 +199,34 @@ MEASURED = (SAMPLES, "auroc_failed", "false_alarm_rate", "state_accuracy", CAUSE
 FEWEST_OF_A_CAUSE = 5  # failures, or the cause counts in no mean over causes
 
 
+@numbers(
+    "scan_causes.csv",
+    rule="scan_cause_metrics",
+    causes_files="scan_causes/{scan_set}/seed{scan_seed}.npz",
+    sample_files="scan_causes/{scan_set}/seed{scan_seed}.csv",
+    prediction_files="scan_diagnoses/seed{scan_seed}.csv",
+)
 def collect(
+    run: Run,
     causes_files: Iterable[str | Path],
     sample_files: Iterable[str | Path],
     prediction_files: Iterable[str | Path],
-    overlaps: Sequence[float],
 ) -> pd.DataFrame:
-    """Return values with 95 % intervals of a bootstrap over clusters of scenes and seeds, and counts.
+    """Measures with intervals over clusters of scenes and seeds, and counts.
 
-    Sources are data sets of scans, and all of them together. ``difference`` is how far an explainer lies above the best
-    gate, on the same draws.
+    Sources are data sets of scans, and all of them together. ``difference`` is the paired difference from the best
+    gate.
 
     Args:
         causes_files, sample_files: of each data set and seed, in the same order, named ``…/{scans}/seed{seed}.…``.
         prediction_files: one of each seed.
-        overlaps: edges of the strata.
 
     Raises:
         InputError: files that cannot be read, or are of different samples.
     """
     import pandas as pd
 
+    overlaps = list(run.config["scans"]["strata"])
     seen, judged = _read(causes_files, sample_files, prediction_files)
     seen["stratum"] = [stratum_of(overlap, overlaps) or "" for overlap in seen["overlap"]]
     rows: list[tuple] = []
@@ -94,7 +245,7 @@ def collect(
 
 
 def read_scan_causes(path: str | Path) -> pd.DataFrame:
-    """Read what :func:`collect` returned; a value may lack an interval, and a distance from a gate.
+    """Read what :func:`collect` returned; a value may lack an interval, and a difference from a gate.
 
     Raises:
         InputError: missing, empty or unreadable file, missing column, a value that is no finite number.
@@ -108,7 +259,7 @@ def _sources(seen: pd.DataFrame) -> list[str]:
 
 
 def _conditions(seen: pd.DataFrame) -> dict[str, np.ndarray]:
-    """Return which registrations (N,) each condition has: natural ones of all starts or of a kind, and the noisy."""
+    """Masks (N,) of the conditions: natural registrations of all starts or of a kind, and those with noise added."""
     added_N = seen["times"].to_numpy() > 0
     of_kind = {f"{NATURAL}_{kind}": ~added_N & (seen["start"] == kind).to_numpy() for kind in KINDS}
     of_times = {
@@ -118,21 +269,21 @@ def _conditions(seen: pd.DataFrame) -> dict[str, np.ndarray]:
 
 
 def _read(causes_files, sample_files, prediction_files) -> tuple[pd.DataFrame, dict[tuple[str, str], Judged]]:
-    """Return a row for each registration, and what each explainer said of all, by where it learned and its name."""
+    """A row for each registration, and the answers of each explainer, by where it learned and its name."""
     import pandas as pd
 
-    said_of = {seed_of_file(path): _by_explainer(path) for path in prediction_files}
+    answers = {seed_of_file(path): _by_explainer(path) for path in prediction_files}
     seen: list[pd.DataFrame] = []
     judged: dict[tuple[str, str], list[Judged]] = {}
     for causes_file, sample_file in zip(causes_files, sample_files, strict=True):
         source, seed = Path(causes_file).parent.name, seed_of_file(causes_file)
         causes = Causes.load(causes_file, (source, seed))
         samples = read_csv(sample_file, SAMPLE_COLUMNS, others=ANY)
-        samples = samples.assign(**{name: numbers(sample_file, samples, name) for name in ("overlap", "times")})
-        said = {key: rows[rows["scans"] == source] for key, rows in said_of.get(seed, {}).items()}
-        for path, rows in ((sample_file, samples), *((causes_file, rows) for rows in said.values())):
+        samples = samples.assign(**{name: number_column(sample_file, samples, name) for name in ("overlap", "times")})
+        predicted = {key: rows[rows["scans"] == source] for key, rows in answers.get(seed, {}).items()}
+        for path, rows in ((sample_file, samples), *((causes_file, rows) for rows in predicted.values())):
             require_same_samples(path, rows, causes.registrations.arrays, "causes or the predictions", ("sample",))
-        for key, rows in said.items():
+        for key, rows in predicted.items():
             judged.setdefault(key, []).append(judged_by(rows, causes, seed))
         judged.setdefault(("", CEILING), []).append(ceiling_of(causes, seed))
         truth = causes.truth
@@ -178,7 +329,7 @@ def _measures(
 
 
 def scan_measures(samples: Judged, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the measures (B,) of a diagnosis, those of scans alone among them, by weights of the samples (B, N)."""
+    """Measures (B,) of a diagnosis, with those of scans alone, by weights of the samples (B, N)."""
     measures = measure(samples, weights_B_N)
     measures[SAMPLES] = np.full(len(weights_B_N), float((samples.label != BORDERLINE).sum()))
     if samples.names_causes:
@@ -187,7 +338,7 @@ def scan_measures(samples: Judged, weights_B_N: np.ndarray) -> dict[str, np.ndar
 
 
 def _cause_accuracy(samples: Judged, weights_B_N: np.ndarray) -> np.ndarray:
-    """Return (B,) the mean, over the causes by which enough failed, of the share whose cause has the largest score."""
+    """Mean (B,) over the causes with enough failures of the share whose cause has the largest score."""
     named_N = np.array(CONCEPTS)[samples.scores.argmax(axis=1)]
     recalls = []
     for concept in _frequent(samples):
@@ -203,12 +354,12 @@ def _frequent(samples: Judged) -> list[str]:
 
 
 def counted_of_scans(samples: Judged, metric: str) -> np.ndarray:
-    """Return which samples (N,) a measure is taken over."""
+    """Mask (N,) of the samples over which a measure is taken."""
     return np.isin(samples.label, _frequent(samples)) if metric == CAUSES else counted(samples, metric)
 
 
 def _counts(place: tuple[str, str, str], samples: pd.DataFrame) -> list[tuple]:
-    """Return how many there are of each of `COUNTED`, with no interval."""
+    """Numbers of each of `COUNTED`, without an interval."""
     counts = Counter(samples["label"].tolist())
     counts |= Counter({f"{name}s": samples[name].nunique() for name in ("pair", "cluster")})
     counts |= Counter(registrations=len(samples), missed=int((samples["missed"] == "True").sum()))

@@ -13,18 +13,27 @@ from gpca.causes.judged import CEILING
 from gpca.causes.truth import BORDERLINE, NOMINAL
 from gpca.errors import InputError
 from gpca.evaluation.measures import POOLED
-from gpca.experiments.scan_causes import metrics
-from gpca.experiments.scan_causes.figure import draw_scan_failures
-from gpca.experiments.scan_causes.metrics import ADDED, EVERY, NATURAL, collect, read_scan_causes
-from gpca.experiments.scan_causes.tables import counted, table18_scan_causes, table18_scan_counts
+from gpca.experiments import scan_causes
+from gpca.experiments.scan_causes import ADDED, EVERY, NATURAL, collect, read_scan_causes
+from gpca.experiments.scan_failures import counted, scan_failures, table18_scan_causes, table18_scan_counts
 from gpca.io.csv_file import write_csv
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.tables.cells import rows_where
+from tests.experiments.runs import run_with
 
-EDGES = (0.1, 0.5, 1.0)
+KNOWING, GUESSING = "pair_forest", "chance"  # explainers under whose names made-up answers stand
+EXPLAINERS = (KNOWING, GUESSING, "gate_rmse")
 TITLES = {"rooms": "Rooms", "things": "Things"}
-EXPLAINERS = {"knowing": "Knowing", "guessing": "Guessing", "gate_rmse": "Inlier RMSE (gate)"}
-COSTS = {name: {"sees": "pair", "icp_calls": 12} for name in EXPLAINERS}
+
+
+def run_of(*names):
+    """A run with these data sets."""
+    datasets = {name: {"title": TITLES.get(name, "Other"), "kind": "virtual", "rooms": 1} for name in names or TITLES}
+    return run_with(
+        scans={"datasets": datasets, "strata": [0.1, 0.5, 1.0]},
+        scan_causes={"explainers": {name: ["objects", "scans"] for name in EXPLAINERS}},
+        data_dir=None,
+    )
 
 
 def answers(causes, random):
@@ -36,8 +45,8 @@ def answers(causes, random):
     guessed = random.dirichlet(np.ones(4), size=len(label))
     none = np.ones(len(label), bool)
     return {
-        ("scans", "knowing"): Attribution.of_scores(LABELS, known, seconds=0.0),
-        ("objects", "guessing"): Attribution.of_scores(LABELS, guessed, seconds=0.0),
+        ("scans", KNOWING): Attribution.of_scores(LABELS, known, seconds=0.0),
+        ("objects", GUESSING): Attribution.of_scores(LABELS, guessed, seconds=0.0),
         ("scans", "gate_rmse"): Attribution.of_scores(LABELS, gate, seconds=0.0, abstained_N=none),
     }
 
@@ -71,8 +80,8 @@ def files(causes, tmp_path_factory):
 def measured(files, tmp_path_factory):
     path = tmp_path_factory.mktemp("tidy") / "scan_causes.csv"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(metrics, "FEWEST_OF_A_CAUSE", 1)
-        write_csv(path, collect(**files, overlaps=EDGES))
+        patch.setattr(scan_causes, "FEWEST_OF_A_CAUSE", 1)
+        write_csv(path, collect(run_of(), **files))
     return read_scan_causes(path)
 
 
@@ -82,13 +91,13 @@ def value(measured, **wanted):
 
 
 def test_who_knows_the_labels_has_no_false_alarm_and_leads_the_gate(measured):
-    of = {"source": POOLED, "condition": NATURAL, "learned": "scans", "method": "knowing"}
+    of = {"source": POOLED, "condition": NATURAL, "learned": "scans", "method": KNOWING}
     auroc = value(measured, metric="auroc_failed", **of)
     assert auroc["value"] == 1 and auroc["gate"] == "scans/gate_rmse"
     assert 0 < auroc["difference_low"] <= auroc["difference"] <= auroc["difference_high"]
     assert value(measured, metric="false_alarm_rate", **of)["value"] == 0
     assert value(measured, metric="cause_accuracy", **of)["value"] == 1
-    guessing = of | {"learned": "objects", "method": "guessing"}
+    guessing = of | {"learned": "objects", "method": GUESSING}
     assert value(measured, metric="auroc_failed", **guessing)["difference"] < 0
     assert value(measured, metric="cause_accuracy", **guessing)["value"] < 0.7
 
@@ -118,13 +127,16 @@ def test_counts_are_of_data_sets_conditions_and_strata(measured, causes):
 
 
 def test_the_tables_show_every_row_and_count_what_they_are_of(measured):
-    text = table18_scan_causes(measured, TITLES, EXPLAINERS, COSTS).markdown()
-    assert "| All together (" in text and "| Knowing | other scenes | pair |" in text
-    assert "| Guessing | objects | pair |" in text and "| Inlier RMSE (gate) | other scenes | pair |" in text
-    assert "Rooms: " in text and " registrations of " in text and "in 3 scenes" in text
-    counts = table18_scan_counts(measured, TITLES).markdown()
-    assert "| Rooms | Natural: ladder of errors | 0.1 to 0.5 |" in counts
-    assert "| Things | 2 times the sensor's noise added | all |" in counts
+    text = table18_scan_causes(run_of(), measured).markdown()
+    assert (
+        "| All together (" in text
+        and "| Distances of the pair (forest) | other scenes | pair + motion + further runs |" in text
+    )
+    assert "| Chance | objects | nothing |" in text and "| Inlier RMSE (gate) | other scenes | pair |" in text
+    assert "Rooms (procedural stand-in): " in text and " registrations of " in text and "in 3 scenes" in text
+    counts = table18_scan_counts(run_of(), measured).markdown()
+    assert "| Rooms (procedural stand-in) | Natural: ladder of errors | 0.1 to 0.5 |" in counts
+    assert "| Things (procedural stand-in) | 2 times the sensor's noise added | all |" in counts
 
 
 @pytest.mark.parametrize(
@@ -136,20 +148,20 @@ def test_below_thirty_failed_or_nominal_no_row_is_bold(counts, words, measured):
     few = measured.copy()
     for label, count in counts.items():
         few.loc[few["metric"] == f"count_{label}", "value"] = count
-    text = table18_scan_causes(few, TITLES, EXPLAINERS, COSTS).markdown()
+    text = table18_scan_causes(run_of(), few).markdown()
     assert f"({words})" in text and "**" not in text.split("| Scans |")[1].split("\n\n")[0]
 
 
 def test_the_figure_has_a_panel_for_each_data_set_and_kind_of_start(measured):
-    figure = draw_scan_failures(measured, TITLES)
+    figure = scan_failures(run_of(), measured)
     titles = [panel.get_title() for panel in figure.axes]
-    assert titles[0] == "Rooms, started on the ladder" and len(titles) == 4
+    assert titles[0].replace("\n", " ") == "Rooms (procedural stand-in), started on the ladder" and len(titles) == 4
     of = counted(measured, "rooms", f"{NATURAL}_ladder", "overlap_0.1_0.5")
     widths = [patch.get_width() for patch in figure.axes[0].patches if patch.get_y() < 0.3]
     assert sum(widths) == pytest.approx(100)
     assert any(width == pytest.approx(100 * of[NOMINAL] / of["registrations"]) for width in widths)
     with pytest.raises(InputError, match="has no natural registrations of these data sets"):
-        draw_scan_failures(measured, {"other": "Other"})
+        scan_failures(run_of("other"), measured)
 
 
 def test_files_of_other_samples_and_missing_predictions_are_one_line(files, tmp_path):
@@ -157,10 +169,10 @@ def test_files_of_other_samples_and_missing_predictions_are_one_line(files, tmp_
     write_csv(tmp_path / "others.csv", rows.assign(sample=rows["sample"] + 50))
     swapped = files | {"sample_files": [tmp_path / "others.csv", files["sample_files"][1]]}
     with pytest.raises(InputError, match="its samples differ from those of the causes or the predictions"):
-        collect(**swapped, overlaps=EDGES)
+        collect(run_of(), **swapped)
     said = pd.read_csv(files["prediction_files"][0])
     write_csv(tmp_path / "seed100.csv", said[said["scans"] == "rooms"])
     with pytest.raises(InputError, match="its samples differ"):
-        collect(**files | {"prediction_files": [tmp_path / "seed100.csv"]}, overlaps=EDGES)
+        collect(run_of(), **files | {"prediction_files": [tmp_path / "seed100.csv"]})
     with pytest.raises(InputError, match="no files were given"):
-        collect([], [], [], EDGES)
+        collect(run_of(), [], [], [])

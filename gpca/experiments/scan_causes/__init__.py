@@ -1,1 +1,0 @@
-"""Causes of failed registrations of scans to scans."""
