@@ -3,12 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from gpca.frames.source import resolve_datasets
+from gpca.evaluation.measures import read_metrics
+from gpca.experiments.explained import titles
+from gpca.frames.source import REAL_WORLD, resolve_datasets
 from gpca.objects.entry import title_of
 from gpca.reporting.words import dataset_in_words
 
+if TYPE_CHECKING:
+    import pandas as pd
+
+TOGETHER = "attribution"  # all test samples, in the column `table`
+CLASSIC = {
+    "analytical_gpc": "Classic features",
+    "analytical_gpc_no_counts": "Classic features without point counts",
+}
 BACKBONES = {"dgcnn": "DGCNN", "pointnet": "PointNet", "pointnet2": "PointNet++", "pointnext": "PointNeXt-S"}
 BACKBONES |= {"dgcnn_1024": "DGCNN of 1024 features", "pointnet_tnet": "PointNet with T-Nets"}
 BACKBONES |= {"pointnet2_ssg": "PointNet++ as published"}
@@ -35,3 +46,35 @@ def frames_of(config: Mapping[str, Any]) -> dict[str, Any]:
 def title_of_frames(config: Mapping[str, Any]) -> str:
     """Title of a run's depth frames, which says so where they are a stand-in."""
     return title_of(frames_of(config))
+
+
+def reduced_backbones(frames: Mapping) -> list[str]:
+    """Rows of Table VI that read embeddings: every encoder with every reduction."""
+    return [f"{backbone}-{reduction}" for backbone in frames["backbones"] for reduction in frames["reductions"]]
+
+
+def published_backbones(frames: Mapping) -> list[str]:
+    """Rows beside those whose encoders are as published, with every reduction."""
+    return [f"{encoder}-{name}" for encoder in frames["published"].values() for name in frames["reductions"]]
+
+
+def pretraining_of(frames: Mapping, encoder: str) -> dict[str, Any]:
+    """How an encoder of frames is pretrained; those as published have changes of their own."""
+    own = frames.get("published_pretraining", {}) if encoder in frames["published"].values() else {}
+    return {**frames["pretraining"], **own} if frames["pretraining"] else {}
+
+
+def unreduced_methods(frames: Mapping) -> dict[str, str]:
+    """Titles of the explainers that read a whole embedding of a frame, or none."""
+    backbones = [name for name in reduced_backbones(frames) if name.endswith("-none")]
+    return {name: encoder_title(*name.split("-")) for name in backbones} | titles(frames["explainers"])
+
+
+def read_together(path: str | Path) -> pd.DataFrame:
+    """Rows of ``real_world.csv`` that Table VI shows: all test samples of the frames, by seed.
+
+    Raises:
+        InputError: as :func:`gpca.evaluation.measures.read_metrics` raises it.
+    """
+    metrics = read_metrics(path)
+    return metrics[(metrics["table"] == TOGETHER) & (metrics["source"] == REAL_WORLD)]

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 from gpca.comparison.published import HARDWARE, Number, printed_seconds, read_published
 from gpca.errors import InputError
 from gpca.experiments.experiment import Experiment, Tidy
+from gpca.experiments.frames import title_of_frames
 from gpca.experiments.plan import Run
 from gpca.experiments.result import figure, table
 from gpca.model.runtime_file import COMPONENTS, OF_ONE_EXPLANATION, read_runtime
-from gpca.objects.entry import title_of
 from gpca.reporting.figures.panels import legend_below, panels
 from gpca.reporting.figures.style import BLUE, GRAY, GREEN, ORANGE, SMALL_PT, write_title
 from gpca.reporting.tables.builder import TableBuilder
@@ -170,6 +170,4 @@ def model_title(run: Run) -> str:
     source = run.config["model"]["source"]
     if source in run.sources:
         return run.source_titles[source]
-    from gpca.experiments.real_world.experiment import shown
-
-    return title_of(shown(run.config, run.sources)["frames"])
+    return title_of_frames(run.config)

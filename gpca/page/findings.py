@@ -15,7 +15,7 @@ from gpca.causes.judged import CEILING
 from gpca.evaluation.intervals import UNTRAINED
 from gpca.evaluation.measures import ALL, POOLED, read_metrics
 from gpca.experiments.diagnosis.metrics import read_intervals
-from gpca.experiments.real_world.metrics import read_together
+from gpca.experiments.frames import read_together
 from gpca.explainers.gpca import GPCA_FORMS
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.words import plural

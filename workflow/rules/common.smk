@@ -9,7 +9,7 @@ from gpca.alignment.methods.registry import method_module
 from gpca.code_files import code_files
 from gpca.encoders.registry import encoders
 from gpca.objects.source import find_file
-from gpca.experiments.real_world.experiment import pretraining_of
+from gpca.experiments.frames import pretraining_of
 from gpca.experiments.plan import Run, config_token
 from gpca.experiments.run import names_of, settings_of
 from gpca.experiments.step import Plan

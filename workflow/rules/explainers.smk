@@ -1,5 +1,6 @@
 # Every explainer -> its predictions, one schema for all; the tidy metrics and timings of these.
 from gpca.experiments.run import explainer_of, files_behind
+from gpca.frames.source import ONE_ENCODER
 
 
 rule predictions:

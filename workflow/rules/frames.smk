@@ -1,5 +1,5 @@
 # Depth frames, of datasets or rendered in their place -> partial clouds -> registrations.
-from gpca.frames.source import ONE_ENCODER, conditions_of, frame_files
+from gpca.frames.source import conditions_of, frame_files
 
 REAL_WORLD = config["real_world"]
 CONDITIONS = {FRAMES: REAL_WORLD["initial_pose"]} | {
@@ -15,24 +15,8 @@ DATA_FOLDERS = (
     if REAL_WORLD["datasets"]
     else {}
 )
-# What is asked about frames: source -> methods.
-ASKED = {
-    FRAMES: [
-        *NAMES["backbone"],
-        *NAMES["published"],
-        *NAMES["classic"],
-        *NAMES["frame_explainer"],
-    ],
-    **{
-        condition: [*NAMES["condition_backbone"], *NAMES["frame_explainer"]]
-        for condition in NAMES["condition"]
-    },
-}
 FRAME_PREDICTIONS = [
-    f"<results>/predictions/{source}/{method}/seed{seed}.csv"
-    for source, methods in ASKED.items()
-    for method in methods
-    for seed in seeds_of_frame_row(method)
+    f"<results>/predictions/{name}.csv" for name in NAMES["frame_prediction"]
 ]
 
 
@@ -121,59 +105,3 @@ rule register_frames:
         name="{frames}",
     script:
         "../scripts/step.py"
-
-
-rule real_world:
-    input:
-        prediction_files=FRAME_PREDICTIONS,
-        one_encoder_files=collect(
-            f"<results>/predictions/{ONE_ENCODER}/{{method}}/seed{{seed}}.csv",
-            method=NAMES["backbone"] if REAL_WORLD["one_encoder"] else [],
-            seed=SEEDS,
-        ),
-        pose_files=collect(
-            "<results>/poses/{source}/seed{seed}.csv", source=CONDITIONS, seed=SEEDS
-        ),
-        label_files=collect(
-            f"<results>/frame_labels/{FRAMES}/{{strategy}}/seed{{seed}}.csv",
-            strategy=NAMES["new_concept_strategy"],
-            seed=NAMES["frame_label_seed"],
-        ),
-        code=collector_code("gpca.experiments.real_world.metrics:collect"),
-    output:
-        "<results>/real_world.csv",
-    log:
-        "<logs>/real_world.log",
-    benchmark:
-        "<benchmarks>/real_world.tsv"
-    localrule: True
-    conda:
-        "../envs/gpca.yaml"
-    params:
-        collector="gpca.experiments.real_world.metrics:collect",
-        targets=config["frame_labels"]["targets"],
-    script:
-        "../scripts/collect.py"
-
-
-rule real_world_intervals:
-    input:
-        prediction_files=FRAME_PREDICTIONS,
-        pose_files=collect(
-            "<results>/poses/{source}/seed{seed}.csv", source=CONDITIONS, seed=SEEDS
-        ),
-        code=collector_code("gpca.experiments.real_world.intervals:collect_intervals"),
-    output:
-        "<results>/real_world_intervals.csv",
-    log:
-        "<logs>/real_world_intervals.log",
-    benchmark:
-        "<benchmarks>/real_world_intervals.tsv"
-    localrule: True
-    conda:
-        "../envs/gpca.yaml"
-    params:
-        collector="gpca.experiments.real_world.intervals:collect_intervals",
-        first=NAMES["first_backbone"],
-    script:
-        "../scripts/collect.py"

@@ -16,8 +16,8 @@ from gpca.attribution.predictions import concepts_of, read_predictions
 from gpca.causes.settings import Limits
 from gpca.causes.truth import BORDERLINE, FAILED, NOMINAL
 from gpca.errors import InputError
+from gpca.experiments.frame_views import draw_scores
 from gpca.experiments.method.concepts import severity_text
-from gpca.experiments.real_world.frame_views import draw_scores
 from gpca.io.container import require_same_samples
 from gpca.io.csv_file import numbers
 from gpca.pairs.dataset import Registrations, read_embedding

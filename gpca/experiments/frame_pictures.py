@@ -1,53 +1,91 @@
-"""Draws Fig. 5 of the paper: from a depth frame to an attribution, in four panels."""
+"""Pictures of depth frames: a frame explained (Fig. 5), confusions, the most confident mistakes, and reliability."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from gpca.alignment.rigid import inverse, transform
+from gpca.attribution.diagnostics import BINS
+from gpca.attribution.predictions import concepts_of, read_predictions
 from gpca.errors import InputError
+from gpca.evaluation.measures import source_method_seed
+from gpca.experiments.confusions import counts_and_shares, pooled_confusions
+from gpca.experiments.diagnosis.reliability import reliability_figure
+from gpca.experiments.frame_views import draw_over_model, draw_scores, read_samples
+from gpca.experiments.frames import encoder_title, read_together, title_of_frames, unreduced_methods
 from gpca.experiments.method.concepts import source_before_icp
-from gpca.experiments.real_world.frame_views import draw_scores, read_samples
+from gpca.experiments.plan import Run
+from gpca.experiments.result import figure
 from gpca.frames.instances import Instances
 from gpca.frames.synthesis import HALF_SPACE, OCCLUDER
 from gpca.io.files import read_image
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations
 from gpca.reporting.figures.cloud_views import legend_of_clouds
-from gpca.reporting.figures.panels import panels, write_below
-from gpca.reporting.figures.style import BLACK, SOURCE_COLOR, TARGET_COLOR, YELLOW, write_title
+from gpca.reporting.figures.panels import draw_percentages, panels, write_below
+from gpca.reporting.figures.style import (
+    BLACK,
+    SMALL_PT,
+    SOURCE_COLOR,
+    TARGET_COLOR,
+    TEXT_WIDTH_IN,
+    YELLOW,
+    use_style,
+    write_title,
+)
 from gpca.reporting.words import BOP_TITLES, object_of_frames
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
+SECTION = "IV-E Real-world validation"
 LOST_TO = {OCCLUDER: "an occluder", HALF_SPACE: "a half-space"}
 HEIGHT_IN = 2.4
 SMALLEST_PART = 0.02  # Smaller parts of an object's pixels lie at its rim, where no point was drawn.
 AROUND = (2.5, 1.2)  # The first picture, and the two others, show this many times the object's extent.
+SHOWN = 10
+PANELS_PER_ROW = 5
 
 
+@figure(
+    SECTION,
+    "Figure 5: from a depth frame to an attribution",
+    """After Figure 5 of the paper: the object's region in a depth frame with what an occluder covers of it in black,
+    its points at the initial pose, after ICP, and GP-CA's scores beside the true cause. Errors are in % of the
+    object's diameter d. The occluder is the silhouette of another object of the dataset, moved over this one.
+
+    Shown is a failure: of the test samples that an occluder covers, that GP-CA names correctly, and that ICP moved
+    from a right pose to a wrong one, the one with the median score among the larger half by size in the image.""",
+    name="fig5_real_world_example",
+    paper=True,
+    instances_npz="instances/{frames}.npz",
+    objects_npz="objects/{frames}.npz",
+    registrations_npz="registrations/{frames}/seed{first_seed}.npz",
+    poses_csv="poses/{frames}/seed{first_seed}.csv",
+    predictions_csv="predictions/{frames}/{first_backbone}/seed{first_seed}.csv",
+)
 def draw_real_world_example(
+    run: Run,
     instances_npz: str | Path,
     objects_npz: str | Path,
     registrations_npz: str | Path,
     poses_csv: str | Path,
     predictions_csv: str | Path,
-    title: str,
-    success: float,
 ) -> Figure:
-    """Draw (a) a part of the frame with the object's region and what of it is covered, (b) its points at the initial
+    """(a) A part of the frame with the object's region and what of it is covered, (b) its points at the initial
     pose over the model as the camera sees both, (c) after ICP, with the estimated axes, and (d) the concept scores.
 
     The figure shows a failure that missing overlap caused: a test sample that an occluder covers and that is attributed
     rightly, whose initial pose was right and whose pose after ICP is not, and of the half of such samples that are the
     largest in their images the one with the median score. Where there is none such, the wishes are dropped from the
-    last on. A pose is right whose error is below `success`, in diameters.
+    last on. A pose is right whose error is below the config's `success.error`, in diameters.
     """
+    title, success = title_of_frames(run.config), run.config["success"]["error"]
     instances = Instances.load(instances_npz)
     objects = ObjectClouds.load(objects_npz)
     registrations = Registrations.load(registrations_npz)
@@ -61,7 +99,7 @@ def draw_real_world_example(
     from matplotlib.patheffects import withStroke
 
     image = read_image(str(instances.colour[i]), "fetch the frames anew")
-    figure, [drawn] = panels(1, 4, HEIGHT_IN, width_ratios=(3, 3, 3, 2.2))
+    drawing, [drawn] = panels(1, 4, HEIGHT_IN, width_ratios=(3, 3, 3, 2.2))
     model_m = objects.points(int(instances.object_index[i]))[:3000]
     observed_m = registrations.diameter_m[row] * registrations.cloud(row)
     initial_m = registrations.diameter_m[row] * source_before_icp(registrations, row)
@@ -112,9 +150,9 @@ def draw_real_world_example(
     drawn[3].set_xlabel("(d) Scores, the truth bold", labelpad=1)
     lost = f"{100 * registrations.severity_crop[row]:.0f} % of the points lost to {LOST_TO[sample['lost_to']]}"
     name = str(registrations.object_name[row])
-    write_title(figure, f"{title_of_frame(name, title)}: {object_of_frames(name)}, {lost}")
-    legend_of_clouds(figure, "model", "measured", gap=0.1)
-    return figure
+    write_title(drawing, f"{title_of_frame(name, title)}: {object_of_frames(name)}, {lost}")
+    legend_of_clouds(drawing, "model", "measured", gap=0.1)
+    return drawing
 
 
 def choose_sample(samples: pd.DataFrame, path: str | Path, pixels_I: np.ndarray, success: float) -> int:
@@ -206,3 +244,135 @@ def _inside(panel) -> tuple[np.ndarray, np.ndarray]:
     ends = np.sort([panel.get_xlim(), panel.get_ylim()], axis=1)
     margin = 0.06 * np.ptp(ends, axis=1)
     return ends[:, 0] + margin, ends[:, 1] - margin
+
+
+@figure(
+    SECTION,
+    "Confusions on depth frames",
+    """What GP-CA takes each concept for on depth frames. The paper reports that pose and overlap are confused most
+    (Sec. IV-E).""",
+    name="confusion_real_world",
+    metrics=(read_together, "real_world.csv"),
+)
+def draw_real_world_confusions(run: Run, metrics: pd.DataFrame) -> Figure:
+    """A matrix for each backbone with the first reduction: shares of each true concept in %, and counts."""
+    frames = run.config["real_world"]
+    first = next(iter(frames["reductions"]))
+    methods = [f"{backbone}-{first}" for backbone in frames["backbones"]]
+    pooled = {method: counts for (_, method), counts in pooled_confusions(metrics).items()}
+    shown = {method: pooled[method] for method in methods if method in pooled}
+    if not shown:
+        raise InputError("real_world.csv", "has no confusion of these backbones", "regenerate it")
+    width_in = min(TEXT_WIDTH_IN, max(3.2, 0.6 + 1.62 * len(shown)))
+    drawing, [axes] = panels(1, len(shown), (width_in - 0.6) / len(shown) + 0.6, width_in, sharey=True)
+    for panel, (method, confusion) in zip(axes, shown.items(), strict=True):
+        concepts = list(confusion.columns[:-1])
+        counts_C_C, shares_C_C = counts_and_shares(confusion)
+        draw_percentages(panel, 100 * shares_C_C, "{:.1f} %\nn = {:.0f}", counts_C_C, linespacing=1.2)
+        panel.set_title(encoder_title(*method.split("-")), pad=3)
+        panel.set_xticks(range(len(concepts)), concepts)
+        panel.set_yticks(range(len(concepts)), concepts, rotation=90, va="center")
+        panel.tick_params(length=0, pad=2)
+        panel.spines[:].set(visible=True, linewidth=0.4)
+    axes[0].set_ylabel("true", labelpad=1)
+    drawing.supxlabel("attributed to", fontsize=8)
+    write_title(drawing, title_of_frames(run.config))
+    return drawing
+
+
+@figure(
+    SECTION,
+    "Most confident mistakes on depth frames",
+    """The ten most confident mistakes of GP-CA on depth frames, over all seeds: cloud over model, true and named
+    cause, and scores.""",
+    name="real_world_failures",
+    objects_npz="objects/{frames}.npz",
+    registrations_npz="registrations/{frames}/seed{seed}.npz",
+    poses_csv="poses/{frames}/seed{seed}.csv",
+    predictions_csv="predictions/{frames}/{first_backbone}/seed{seed}.csv",
+)
+def draw_real_world_failures(
+    run: Run,
+    objects_npz: str | Path,
+    registrations_npz: Sequence[str | Path],
+    poses_csv: Sequence[str | Path],
+    predictions_csv: Sequence[str | Path],
+) -> Figure:
+    """The test samples of all seeds that were attributed wrongly with the highest score, one of each instance.
+
+    The three lists of files run through the seeds in the same order.
+    """
+    objects = ObjectClouds.load(objects_npz)
+    mistakes = _mistakes(poses_csv, predictions_csv)
+    shown = list(mistakes.head(SHOWN).iterrows())
+    rows = max(1, -(-len(shown) // PANELS_PER_ROW))
+    drawing = use_style().figure(figsize=(TEXT_WIDTH_IN, 0.22 + 2.1 * rows), layout="constrained")
+    parts = drawing.subfigures(rows, PANELS_PER_ROW, squeeze=False).flat
+    loaded = {file: Registrations.load(registrations_npz[file]) for file in sorted({m["file"] for _, m in shown})}
+    for part, (_, mistake) in zip(parts, shown, strict=False):
+        registrations = loaded[mistake["file"]]
+        row = int(mistake["row"])
+        above, below = part.subplots(2, 1, height_ratios=(2.5, 1))
+        index = int(registrations.object_index[row])
+        model = objects.points(index)[:2048] / objects.diameters_m[index]
+        draw_over_model(above, model, registrations.cloud(row))
+        draw_scores(below, mistake)
+        name = object_of_frames(registrations.object_name[row])
+        taken = f"{mistake['concept_true']} taken for {mistake['concept_predicted']}"
+        words = f"{name}\n{taken}\npose {100 * mistake['icp_error']:.0f} % $d$ off"
+        part.suptitle(words, fontsize=SMALL_PT, linespacing=1.15)
+    none = "" if shown else ": no mistake in any seed"
+    write_title(drawing, f"{title_of_frames(run.config)}{none}")
+    return drawing
+
+
+def _mistakes(poses_csv: Sequence[str | Path], predictions_csv: Sequence[str | Path]) -> pd.DataFrame:
+    """Wrongly attributed test samples, the most confident first, one of each instance and concept."""
+    import pandas as pd
+
+    parts = []
+    for file, (poses, predictions) in enumerate(zip(poses_csv, predictions_csv, strict=True)):
+        samples = read_samples(poses, predictions).rename_axis("row").reset_index()
+        wrong = (samples["split"] == "test") & (samples["concept_predicted"] != samples["concept_true"])
+        scores = samples[[name for name in samples.columns if name.startswith("score_")]].max(axis=1)
+        parts.append(samples.assign(file=file, score=scores, seed=source_method_seed(predictions)[2])[wrong])
+    if not parts:
+        raise InputError("real_world_failures", "has no files", "name at least one seed")
+    mistakes = pd.concat(parts).sort_values(["score", "seed", "row"], ascending=[False, True, True])
+    return mistakes.drop_duplicates(["instance", "concept_true"]).reset_index(drop=True)
+
+
+@figure(
+    SECTION,
+    "Reliability on depth frames",
+    """Accuracy over confidence of GP-CA on depth frames, backbone by backbone without reduction, and on the pair. On
+    the diagonal, 80 % confident means right in 80 % of the cases; below it, a classifier is overconfident. The
+    number is the calibration error of the samples of all seeds together (pooled ECE); the tables have the mean of
+    each seed's own, in which deviations of opposite sign cancel less. Vertical lines are Wilson's intervals (95 %) of
+    independent samples.""",
+    name="frame_reliability",
+    needs=("compared_backbone",),
+    prediction_files="predictions/{frames}/{unreduced}/seed{seed}.csv",
+)
+def draw_frame_reliability(run: Run, prediction_files: Iterable[str | Path]) -> Figure:
+    """Accuracy over confidence on the test samples of depth frames, all seeds together.
+
+    Args:
+        prediction_files: named ``…/{source}/{method}/seed{seed}.csv``, of one source.
+    """
+    methods = unreduced_methods(run.config["real_world"])
+    parts: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {}
+    for path in prediction_files:
+        rows = read_predictions(path)
+        rows = rows[(rows["split"] == "test") & ~rows["abstained"]]
+        scores_N_C = rows[[f"score_{concept}" for concept in concepts_of(rows)]].to_numpy(float)
+        hit_N = (rows["concept_predicted"] == rows["concept_true"]).to_numpy()
+        parts.setdefault(source_method_seed(path)[1], []).append((scores_N_C.max(axis=1), hit_N))
+    shown = [method for method in methods if method in parts]
+    if not shown:
+        raise InputError("predictions on depth frames", "cover none of these methods", "run them first")
+    samples = {}
+    for method in shown:
+        confidence_N, hit_N = (np.concatenate(columns) for columns in zip(*parts[method], strict=True))
+        samples[methods[method]] = confidence_N, hit_N
+    return reliability_figure(samples, title_of_frames(run.config), BINS, least=1 / 3)

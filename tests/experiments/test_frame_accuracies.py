@@ -1,4 +1,4 @@
-"""Accuracies on depth frames with intervals over scenes."""
+"""Accuracies on depth frames, by seed and with intervals over scenes."""
 
 import numpy as np
 import pandas as pd
@@ -6,16 +6,69 @@ import pytest
 
 from gpca.errors import InputError
 from gpca.evaluation.intervals import wilson_interval
-from gpca.evaluation.measures import read_clustered
-from gpca.experiments.real_world.intervals import collect_intervals
-from gpca.experiments.real_world.metrics import collect
-from gpca.frames.source import REAL_WORLD
+from gpca.evaluation.measures import ALL, read_clustered, write_metrics
+from gpca.experiments.frame_accuracies import collect, collect_intervals
+from gpca.experiments.frames import read_together
+from gpca.experiments.plan import Run
+from gpca.frames.source import ONE_ENCODER, REAL_WORLD
 from gpca.io.csv_file import write_csv
+
+RUN = Run({"real_world": {"backbones": ["dgcnn", "pointnet"], "reductions": ["none"]}})
+TRUE = ["noise", "pose", "overlap", "noise"]
+NAMED = ["noise", "pose", "noise", "pose"]
+
+
+def predictions(folder, source, method="dgcnn-none"):
+    rows = {"sample": range(4), "split": "test", "object": ["a", "a", "b", "b"], "cluster": "lm 6"}
+    rows |= {"concept_true": TRUE, "concept_predicted": NAMED, "abstained": False, "icp_calls": 0}
+    rows |= {f"score_{c}": [0.8 if name == c else 0.1 for name in NAMED] for c in ("noise", "pose", "overlap")}
+    return written(folder / "predictions" / source / method / "seed0.csv", rows)
+
+
+def poses(folder, source=REAL_WORLD, **changes):
+    rows = {"sample": range(4), "split": "test", "instance": range(4), "dataset": ["lm", "lm", "lm", "ycbv"]}
+    rows |= {"in_training": [True, True, False, False]}
+    return written(folder / "poses" / source / "seed0.csv", rows | changes)
+
+
+def written(path, rows):
+    path.parent.mkdir(parents=True, exist_ok=True)
+    pd.DataFrame(rows).to_csv(path, index=False)
+    return path
+
+
+def test_seen_unseen_and_datasets_are_judged_apart(tmp_path):
+    one = predictions(tmp_path, ONE_ENCODER)
+    metrics = collect(RUN, [predictions(tmp_path, REAL_WORLD)], [poses(tmp_path)], [one])
+    accuracy = metrics[(metrics["metric"] == "accuracy") & (metrics["concept"] == ALL)]
+    of_table = accuracy[accuracy["source"] == REAL_WORLD].set_index("table")["value"].to_dict()
+    assert of_table == {
+        "attribution": 0.5, "seen": 1.0, "unseen": 0.0, "dataset/lm": pytest.approx(2 / 3), "dataset/ycbv": 0.0
+    }  # fmt: skip
+    assert accuracy[accuracy["source"] == ONE_ENCODER]["table"].tolist() == ["attribution"]
+    ece = metrics[(metrics["metric"] == "ece") & (metrics["table"] == "seen")]["value"]
+    assert ece.tolist() == [pytest.approx(0.2)]
+    proper = metrics[metrics["table"] == "unseen"].set_index("metric")["value"]
+    assert proper["nll"] == pytest.approx(-np.log(0.1))
+    assert proper["brier"] == pytest.approx(0.8**2 + 0.9**2 + 0.1**2)
+    write_metrics(metrics, tmp_path / "real_world.csv")
+    together = read_together(tmp_path / "real_world.csv")
+    assert set(together["table"]) == {"attribution"}
+    assert set(together["source"]) == {REAL_WORLD}
+
+
+def test_files_that_do_not_belong_together_are_refused(tmp_path):
+    said = predictions(tmp_path, REAL_WORLD)
+    with pytest.raises(InputError, match="has no pose file beside it"):
+        collect(RUN, [said], [poses(tmp_path, source="other")])
+    with pytest.raises(InputError, match="lacks samples of"):
+        collect(RUN, [said], [poses(tmp_path, sample=[0, 1, 2, 7])])
+
 
 CONCEPTS = ("noise", "pose", "overlap")
 
 
-def predictions(wrong):
+def twelve(wrong):
     """Twelve samples in four scenes, of which some are named wrongly."""
     rows = []
     for sample in range(12):
@@ -33,7 +86,7 @@ def files(tmp_path):
     for seed in range(2):
         for method, wrong in {"dgcnn-none": {0, 1, 2, 3}, "pointnet-none": {0, 1, 2, 3, 6, 7}}.items():
             said.append(tmp_path / f"predictions/{REAL_WORLD}/{method}/seed{seed}.csv")
-            write_csv(said[-1], predictions(wrong))
+            write_csv(said[-1], twelve(wrong))
         poses.append(tmp_path / f"poses/{REAL_WORLD}/seed{seed}.csv")
         number = np.arange(12)
         rows = {"sample": number, "split": "test", "instance": number, "in_training": number < 6}
@@ -43,12 +96,12 @@ def files(tmp_path):
 
 @pytest.fixture
 def found(files, tmp_path):
-    write_csv(tmp_path / "intervals.csv", collect_intervals(*files, "dgcnn-none"), form=None)
+    write_csv(tmp_path / "intervals.csv", collect_intervals(RUN, *files), form=None)
     return read_clustered(tmp_path / "intervals.csv").set_index(["table", "method", "metric", "concept"])
 
 
 def test_values_are_those_of_the_metrics(files, found):
-    metrics = collect(*files)
+    metrics = collect(RUN, *files)
     metrics = metrics[(metrics["metric"] == "accuracy")].groupby(["table", "method", "metric", "concept"])["value"]
     accuracies = found.xs("accuracy", level="metric", drop_level=False)
     for key in accuracies.index:
@@ -74,8 +127,8 @@ def test_differences_are_paired_with_the_first_method(found):
 
 def test_a_method_of_fewer_seeds_is_compared_in_these(files):
     said, poses = files
-    first_alone = collect_intervals(said[:2], poses[:1], "dgcnn-none")
-    fewer = collect_intervals([path for path in said if path != said[3]], poses, "dgcnn-none")
+    first_alone = collect_intervals(RUN, said[:2], poses[:1])
+    fewer = collect_intervals(RUN, [path for path in said if path != said[3]], poses)
     of = {"method": "pointnet-none", "table": "attribution", "concept": "all"}
     for rows in (first_alone, fewer):
         told = rows[(rows[list(of)] == list(of.values())).all(axis=1)].set_index("metric")
@@ -86,6 +139,6 @@ def test_a_method_of_fewer_seeds_is_compared_in_these(files):
 def test_faults_are_one_line(files):
     said, poses = files
     with pytest.raises(InputError, match="no files were given"):
-        collect_intervals([], poses, "dgcnn-none")
+        collect_intervals(RUN, [], poses)
     with pytest.raises(InputError, match="has no pose file beside it"):
-        collect_intervals(said, poses[1:], "dgcnn-none")
+        collect_intervals(RUN, said, poses[1:])

@@ -8,16 +8,16 @@ from gpca.config.check import check
 from gpca.config.layers import without_false
 from gpca.encoders.registry import make_encoder
 from gpca.errors import InputError
-from gpca.experiments.real_world.experiment import pretraining_of
-from gpca.experiments.run import explainer_of, files_behind, names_of, settings_of
+from gpca.experiments.frames import pretraining_of
+from gpca.experiments.run import explainer_of, files_behind, names_of
 
-from ...config.configs import changed, load
+from ..config.configs import changed, load
 
 
 def test_the_full_protocol_has_them_with_every_reduction_and_the_default_has_none():
     config = without_false(load("full"))
     sources = check(deepcopy(config))
-    names, settings = names_of(config, sources), settings_of(config, sources)
+    names = names_of(config, sources)
     assert names["published"][0] == "dgcnn_1024-none" and len(names["published"]) == 12
     assert explainer_of("pointnet_tnet-umap", names) == "gpca"
     behind = files_behind("pointnet2_ssg-pca", names)["embeddings"]
@@ -25,7 +25,7 @@ def test_the_full_protocol_has_them_with_every_reduction_and_the_default_has_non
     assert names["condition_backbone"] == names["backbone"] and len(names["backbone"]) == 16
     assert {"frame_encoder", "frame_start"} <= set(names["reading_group"])
     assert names["estimated"] == "real_rgbd_estimated"
-    assert list(settings["published_encoders"]) == ["dgcnn_1024", "pointnet_tnet", "pointnet2_ssg"]
+    assert list(config["real_world"]["published"].values()) == ["dgcnn_1024", "pointnet_tnet", "pointnet2_ssg"]
     assert names["published_seed"] == config["seeds"][:2]
     usual = names_of(without_false(load()), sources)
     for name, epochs in {"dgcnn": 8, "dgcnn_1024": 4}.items():

@@ -9,14 +9,38 @@ from gpca.attribution.predictions import write_predictions
 from gpca.attribution.scores import Attribution
 from gpca.errors import InputError
 from gpca.evaluation.measures import write_metrics
-from gpca.experiments.real_world.example import choose_sample, covered, draw_real_world_example, title_of_frame
-from gpca.experiments.real_world.failures import _mistakes, draw_real_world_failures
-from gpca.experiments.real_world.figures import draw_frame_reliability, draw_real_world_confusions
-from gpca.experiments.real_world.frame_views import draw_scores, read_samples
+from gpca.experiments.frame_pictures import (
+    _mistakes,
+    choose_sample,
+    covered,
+    draw_frame_reliability,
+    draw_real_world_confusions,
+    draw_real_world_example,
+    draw_real_world_failures,
+    title_of_frame,
+)
+from gpca.experiments.frame_views import draw_scores, read_samples
+from gpca.experiments.frames import read_together
+from gpca.experiments.plan import Run
+from gpca.explainers.registry import explainer_entry
 from gpca.frames.synthesis import OCCLUDER, FrameSettings, make_frame_registrations
 from gpca.io.csv_file import write_csv
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.pairs.synthesis import RegistrationSettings
+
+
+def run_of(*backbones, explainers=()):
+    frames = {
+        "title": "Frames",
+        "datasets": {"lm": {}},
+        "backbones": backbones,
+        "reductions": ["none"],
+        "explainers": explainers,
+    }
+    return Run({"real_world": frames, "success": {"error": 0.03}})
+
+
+RUN = run_of("dgcnn")
 
 
 @pytest.fixture(scope="module")
@@ -122,9 +146,9 @@ def test_a_picture_is_drawn_and_drawing_again_changes_no_byte(picture, results, 
     instances, objects, registrations = (results / f"{name}.npz" for name in ("instances", "objects", "registrations"))
     of_example = instances, objects, registrations, poses, predictions
     draw = {
-        "example": lambda: draw_real_world_example(*of_example, "Frames", 0.03),
-        "failures": lambda: draw_real_world_failures(objects, [registrations], [poses], [predictions], "Frames"),
-        "confusions": lambda: draw_real_world_confusions(results / "metrics.csv", "Frames", ["dgcnn-none"]),
+        "example": lambda: draw_real_world_example(RUN, *of_example),
+        "failures": lambda: draw_real_world_failures(RUN, objects, [registrations], [poses], [predictions]),
+        "confusions": lambda: draw_real_world_confusions(RUN, read_together(results / "metrics.csv")),
     }
     assert same_bytes(draw[picture]).std() > 5
 
@@ -138,7 +162,7 @@ def test_files_of_other_samples_are_refused(results, tmp_path):
 
 def test_metrics_of_other_methods_are_refused(results):
     with pytest.raises(InputError, match="has no confusion of these backbones"):
-        draw_real_world_confusions(results / "metrics.csv", "Frames", ["pointnet-none"])
+        draw_real_world_confusions(run_of("pointnet"), read_together(results / "metrics.csv"))
 
 
 def test_scores_are_bars_with_their_deviation_and_the_truth_in_bold():
@@ -172,8 +196,11 @@ def predictions(folder, method, seed, confidence):
 def test_a_panel_is_a_method_with_all_seeds_and_its_calibration_error(tmp_path):
     files = [predictions(tmp_path, "dgcnn-none", seed, 0.8) for seed in (0, 1)]
     files += [predictions(tmp_path, "gpca_pair", 0, 0.9)]
-    figure = draw_frame_reliability(files, {"dgcnn-none": "DGCNN", "lost-none": "Lost", "gpca_pair": "Pair"}, "Frames")
+    figure = draw_frame_reliability(run_of("dgcnn", "pointnet", explainers=["gpca_pair"]), files)
     titles = [axes.get_title() for axes in figure.axes]
-    assert [title for title in titles if title] == ["DGCNN\npooled ECE 0.000", "Pair\npooled ECE 0.100"]
+    assert [title for title in titles if title] == [
+        "DGCNN\npooled ECE 0.000",
+        f"{explainer_entry('gpca_pair').title}\npooled ECE 0.100",
+    ]
     with pytest.raises(InputError, match="cover none of these methods"):
-        draw_frame_reliability(files, {"lost-none": "Lost"}, "Frames")
+        draw_frame_reliability(run_of("pointnet"), files)

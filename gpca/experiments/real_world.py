@@ -3,23 +3,109 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from dataclasses import dataclass, field
+from typing import Annotated, Any, Literal
 
+from pydantic import Field
+
+from gpca.causes.settings import FrameCauseSettings
 from gpca.encoders.reduction import make_reduction, require_room
 from gpca.encoders.registry import OPTIONS, EncoderSettings
 from gpca.errors import InputError, require_names, with_key
-from gpca.experiments.experiment import EXPLAINERS, Experiment, LeftOut, Names, Tidy
-from gpca.experiments.explained import titles
-from gpca.experiments.frames import encoder_title, frames_of
-from gpca.experiments.real_world.settings import RealWorldSettings
-from gpca.experiments.real_world.tables import CLASSIC
-from gpca.explainers.registry import explainer_entry, require_settings
+from gpca.experiments.experiment import EXPLAINERS, Experiment, LeftOut, Names
+from gpca.experiments.frames import (
+    CLASSIC,
+    frames_of,
+    pretraining_of,
+    published_backbones,
+    reduced_backbones,
+    unreduced_methods,
+)
+from gpca.explainers.registry import require_settings
+from gpca.frames.initial_pose import InitialPoseSettings
+from gpca.frames.rgbd_scene import SceneSettings
 from gpca.frames.source import ONE_ENCODER, REAL_WORLD, conditions_of, has_estimates, resolve_datasets
 from gpca.objects import procedural
-from gpca.objects.entry import title_of
+from gpca.objects.entry import Checksums, Name, Place, Text, Unit, Urls, title_of
+from gpca.pairs.synthesis import TestSamples, TrainSamples
+from gpca.reenactment.settings import ReenactmentSettings
+from gpca.settings import Bounds, Count, Distinct, OpenShare, Share, changes_of
 
-POSES = {"results": "Pose estimators", "true_pose": "True pose, small error"}  # titles by form; all others:
-GLOBAL_POSE = "Global registration"
+Pretraining = Annotated[dict, changes_of(EncoderSettings, without=("backbone", "options", "reading", "draws"))]
+# The encoder then embeds draws of the size that it was last trained on.
+Training = Annotated[
+    dict, changes_of(EncoderSettings, without=("backbone", "options", "reading", "draw_points", "draws"))
+]
+
+Reduction = Literal["none", "pca", "umap", "autoencoder"]
+
+# The same hypotheses cost the same everywhere.
+Reenactment = Annotated[dict, changes_of(ReenactmentSettings, without=("hypotheses",))]
+
+
+@dataclass(frozen=True)
+class FrameDataset:
+    """A dataset of depth frames in BOP format, in a folder or at the addresses that it is downloaded from."""
+
+    location: Place
+    urls: Urls = field(default_factory=list)
+    sha256: Checksums = None
+    unit: Unit = "mm"
+    split: Text = "test"
+    optional: bool = False
+    results: Place | Annotated[list[Place], Field(min_length=1)] | None = None
+    errors: Place | None = None
+    models: Place | None = None
+    most_frames: Count = 1
+
+
+@dataclass(frozen=True)
+class VirtualFrames:
+    """Frames rendered of the datasets' own models: numbers of scenes, of views of each, and of training samples.
+
+    Attributes:
+        objects: ``training``: those that no frame shows which may be tested; ``all``: those of all frames.
+    """
+
+    objects: Literal["training", "all"]
+    count: Annotated[int, Bounds(minimum=2)]
+    views: Count
+    train: TrainSamples
+
+
+@dataclass(frozen=True)
+class RealWorldSettings:
+    """Registrations of depth frames, every backbone with every reduction.
+
+    Attributes:
+        published: judged backbone -> encoder of its published architecture, whose rows stand beside the judged ones.
+        published_seeds: how many of the run's seeds, from the first, these rows have; null: all.
+        published_pretraining: changes of `pretraining` for these encoders.
+    """
+
+    title: Text | None
+    scenes: SceneSettings
+    datasets: dict[Name, FrameDataset] | None
+    initial_pose: InitialPoseSettings
+    conditions: dict[Name, InitialPoseSettings] | None
+    condition_backbones: list[str]
+    condition_reductions: Distinct[Reduction]
+    train: TrainSamples
+    test: TestSamples
+    test_share: OpenShare
+    occluders: Share
+    backbones: Distinct[str]
+    reductions: Distinct[Reduction]
+    pretraining: Pretraining | None
+    virtual: VirtualFrames | None
+    published: dict[str, str]
+    training: dict[str, Training] | None
+    explainers: dict[str, dict | None] | None
+    one_encoder: bool
+    causes: FrameCauseSettings
+    reenactment: Reenactment
+    published_seeds: Count | None = None
+    published_pretraining: Pretraining = field(default_factory=dict)
 
 
 def check(config: dict, left_out: LeftOut) -> None:
@@ -84,97 +170,55 @@ def _check_reductions(config: dict) -> None:
 
 
 def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
-    """Return the rows of Table VI, the conditions of the initial pose, and those that are shown and compared."""
+    """Rows of Table VI, conditions of the initial pose, and the files of their predictions."""
     frames = config["real_world"]
-    backbones = reduced_backbones(frames)
+    backbones, published = reduced_backbones(frames), published_backbones(frames)
+    seeds, published_seeds = list(config["seeds"]), list(config["seeds"])[: frames.get("published_seeds")]
+    conditions = [f"{REAL_WORLD}_{name}" for name in conditions_of(config)]
+    condition_backbones = [
+        f"{name}-{reduction}" for name in frames["condition_backbones"] for reduction in frames["condition_reductions"]
+    ]
+    classic = [name for name in CLASSIC if name in config["explainers"]]
+    others = list(frames["explainers"])
+    methods_of = {REAL_WORLD: [*backbones, *published, *classic, *others]}
+    methods_of |= {condition: [*condition_backbones, *others] for condition in conditions}
     return {
         "frames": REAL_WORLD,
         "backbone": backbones,
         "first_backbone": backbones[0],
-        "published": published_backbones(frames),
-        "published_seed": list(config["seeds"])[: frames.get("published_seeds")],
-        "classic": [name for name in CLASSIC if name in config["explainers"]],
-        "frame_explainer": list(frames["explainers"]),
+        "published": published,
+        "published_seed": published_seeds,
+        "classic": classic,
+        "frame_explainer": others,
         "compared_backbone": list(frames["backbones"])[1:],
         "unreduced": list(unreduced_methods(frames)),
-        "condition": [f"{REAL_WORLD}_{name}" for name in conditions_of(config)],
-        "condition_backbone": [
-            f"{name}-{reduction}"
-            for name in frames["condition_backbones"]
-            for reduction in frames["condition_reductions"]
-        ],
+        "condition": conditions,
+        "posed_frames": [REAL_WORLD, *conditions],
+        "condition_backbone": condition_backbones,
         "one_encoder": ONE_ENCODER if frames["one_encoder"] else "",
+        "frame_prediction": [
+            f"{source}/{method}/seed{seed}"
+            for source, methods in methods_of.items()
+            for method in methods
+            for seed in (published_seeds if method in published else seeds)
+        ],
+        "one_encoder_prediction": [
+            f"{ONE_ENCODER}/{method}/seed{seed}" for method in backbones for seed in seeds if frames["one_encoder"]
+        ],
     }
 
 
 def shown(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
-    """Return the titles of the frames, their initial poses, the encoders and the other explainers."""
-    frames = config["real_world"]
+    """Title of the frames, and settings of the encoders."""
     source = frames_of(config)
-    poses = {REAL_WORLD: frames["initial_pose"]}
-    poses |= {f"{REAL_WORLD}_{name}": entry for name, entry in conditions_of(config).items()}
-    first_reduction = next(iter(frames["reductions"]))
-    return {
-        "frames": source,
-        "frames_title": title_of(source),
-        "frames_pretrained_on": _pretrained_on(frames),
-        "frames_rendered": (frames["virtual"] or {}).get("objects") == "all",
-        "frame_conditions": {name: POSES.get(entry.get("form", ""), GLOBAL_POSE) for name, entry in poses.items()},
-        "frame_methods": [*reduced_backbones(frames), *published_backbones(frames)],
-        "published_encoders": {name: config["encoders"][name] for name in frames["published"].values()},
-        "frame_explainers": titles(frames["explainers"]),
-        "frame_sees": {name: explainer_entry(explainer).sight for name, explainer in _behind(frames).items()},
-        "unreduced_methods": unreduced_methods(frames),
-        "backbones": {name: config["encoders"][name] for name in frames["backbones"]},
-        "shown_backbones": [f"{backbone}-{first_reduction}" for backbone in frames["backbones"]],
-        "backbone_reductions": list(frames["reductions"]),
-    }
-
-
-def _behind(frames: Mapping) -> dict[str, str]:
-    """Return the explainer behind each method: itself, or GP-CA for a ``{backbone}-{reduction}``."""
-    own = {name: name for name in (*CLASSIC, *frames["explainers"])}
-    embedded = [*reduced_backbones(frames), *published_backbones(frames)]
-    return dict.fromkeys(embedded, "gpca") | own
-
-
-def reduced_backbones(frames: Mapping) -> list[str]:
-    """Return the rows of Table VI that read embeddings: every encoder with every reduction."""
-    return [f"{backbone}-{reduction}" for backbone in frames["backbones"] for reduction in frames["reductions"]]
-
-
-def published_backbones(frames: Mapping) -> list[str]:
-    """Return the rows beside them whose encoders are as published, with every reduction."""
-    return [f"{encoder}-{name}" for encoder in frames["published"].values() for name in frames["reductions"]]
-
-
-def pretraining_of(frames: Mapping, encoder: str) -> dict[str, Any]:
-    """Return how an encoder of frames is pretrained; those as published have changes of their own."""
-    own = frames.get("published_pretraining", {}) if encoder in frames["published"].values() else {}
-    return {**frames["pretraining"], **own} if frames["pretraining"] else {}
-
-
-def unreduced_methods(frames: Mapping) -> dict[str, str]:
-    """Return the titles of the explainers that read a whole embedding of a frame, or none."""
-    backbones = [name for name in reduced_backbones(frames) if name.endswith("-none")]
-    return {name: encoder_title(*name.split("-")) for name in backbones} | titles(frames["explainers"])
-
-
-def _pretrained_on(frames: Mapping) -> str:
-    """Return the data that the encoders of frames are trained on before the frames; empty where there is none."""
-    if not frames["pretraining"]:
-        return ""
-    if not frames["virtual"]:
-        return "whole objects"
-    tested = frames["virtual"]["objects"] == "all"
-    of = "the models of all objects" if tested else "models of objects that no tested frame shows"
-    return f"whole objects and on frames rendered of {of}"
+    encoders = {name: config["encoders"][name] for name in config["real_world"]["backbones"]}
+    return {"frames": source, "frames_title": title_of(source), "backbones": encoders}
 
 
 EXPERIMENT = Experiment(
     name="real_world",
     sections={"real_world": RealWorldSettings},
-    tidy=(Tidy("real_world.csv"), Tidy("real_world_intervals.csv")),
+    beside=("frame_accuracies", "frame_tables", "frame_pictures"),
     names=names,
     shown=shown,
     check=check,

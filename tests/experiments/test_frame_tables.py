@@ -3,7 +3,7 @@ import pytest
 
 from gpca.errors import InputError
 from gpca.evaluation.measures import ALL, COLUMNS, TIDY_COLUMNS
-from gpca.experiments.real_world.tables import table6_backbones, table6_seen_unseen
+from gpca.experiments.frame_tables import table6_backbones, table6_seen_unseen
 
 BACKBONES = {"dgcnn": 600_000, "pointnet": 150_000}
 CONDITIONS = {"real_rgbd": "True pose", "real_rgbd_estimated": "Pose estimators"}

@@ -1,0 +1,176 @@
+"""Accuracies on depth frames by seed and with intervals over scenes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gpca.attribution.diagnostics import brier_score, calibration_error, negative_log_likelihood
+from gpca.attribution.metrics import attribution_metrics
+from gpca.attribution.predictions import concepts_of, read_predictions
+from gpca.errors import InputError
+from gpca.evaluation.intervals import Clustered, Estimate
+from gpca.evaluation.measures import ALL, intervals, source_method_seed, tidy
+from gpca.experiments.frame_labels import collect_labels
+from gpca.experiments.frames import (
+    TOGETHER,
+    reduced_backbones,
+)
+from gpca.experiments.plan import Run
+from gpca.experiments.result import numbers
+from gpca.pairs.dataset import read_samples_of_frames
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+SEEN, UNSEEN, DATASET = "seen", "unseen", "dataset/"  # beside `TOGETHER` in the column `table`
+SAMPLE = ["seed", "sample"]
+FRAME_FILES = {
+    "prediction_files": "predictions/{frame_prediction}.csv",
+    "pose_files": "poses/{posed_frames}/seed{seed}.csv",
+}
+
+
+@numbers(
+    "real_world.csv",
+    **FRAME_FILES,
+    one_encoder_files="predictions/{one_encoder_prediction}.csv",
+    label_files="frame_labels/{frames}/{new_concept_strategy}/seed{frame_label_seed}.csv",
+)
+def collect(
+    run: Run,
+    prediction_files: Iterable[str | Path],
+    pose_files: Iterable[str | Path],
+    one_encoder_files: Iterable[str | Path] = (),
+    label_files: Sequence[str | Path] = (),
+) -> pd.DataFrame:
+    """Metrics by seed of prediction files named ``…/{source}/{method}/seed{seed}.csv``.
+
+    The column `table` says of which test samples: ``attribution`` is all of them, ``seen`` those of objects that a
+    training sample shows, ``unseen`` the others, ``dataset/{name}`` those of one dataset's frames. What has no sample
+    has no row. Beside the metrics of :func:`gpca.attribution.metrics.collect` stand the calibration error `ece`, the
+    number of `objects`, and the proper scores `nll` (nats) and `brier`.
+
+    Args:
+        pose_files: named ``…/{source}/seed{seed}.csv``, of every source and seed among the predictions.
+        one_encoder_files: predictions of several classifiers on one encoder's embeddings, which are not parted.
+        label_files: of :func:`gpca.experiments.frame_labels.collect_labels`, whose metrics stand below.
+
+    Raises:
+        InputError: no files, a name of another form, files that do not belong together, what their readers refuse.
+    """
+    import pandas as pd
+
+    poses = {(Path(path).parts[-2], Path(path).stem): path for path in pose_files}
+    records = []
+    for path in prediction_files:
+        source, method, seed = source_method_seed(path)
+        if (of_source := poses.get((source, f"seed{seed}"))) is None:
+            raise InputError(path, "has no pose file beside it", "regenerate both from the same config")
+        rows = read_predictions(path)
+        for name, test in parts_of_frames(path, rows[rows["split"] == "test"], of_source):
+            metrics = attribution_metrics(test, concepts_of(rows))
+            scores = _scores(test, concepts_of(rows))
+            metrics |= {"ece": {ALL: calibration_error(*scores)}, "objects": {ALL: test["object"].nunique()}}
+            metrics |= {"nll": {ALL: negative_log_likelihood(*scores)}, "brier": {ALL: brier_score(*scores)}}
+            for metric, of_concept in metrics.items():
+                records += [(name, source, method, metric, c, seed, float(v)) for c, v in of_concept.items()]
+    for path in one_encoder_files:
+        source, method, seed = source_method_seed(path)
+        rows = read_predictions(path)
+        metrics = attribution_metrics(rows[rows["split"] == "test"], concepts_of(rows))
+        records += [(TOGETHER, source, method, "accuracy", ALL, seed, metrics["accuracy"][ALL])]
+    metrics = tidy(records, "predictions")
+    if not label_files:
+        return metrics
+    labels = collect_labels(label_files, run.config["frame_labels"]["targets"])
+    return pd.concat([metrics, *labels], ignore_index=True)
+
+
+def parts_of_frames(path, test: pd.DataFrame, pose_file: str | Path) -> Iterator[tuple[str, pd.DataFrame]]:
+    """Yield the test rows of a file of predictions: all together, and by what the column `table` of the metrics names.
+
+    Raises:
+        InputError: no test rows, or other samples than in the file of poses.
+    """
+    if test.empty:
+        raise InputError(path, "has no test rows", "regenerate it")
+    samples = read_samples_of_frames(pose_file)
+    samples = samples[samples["split"] == "test"].set_index("sample")
+    if not set(test["sample"]) <= set(samples.index):
+        raise InputError(pose_file, f"lacks samples of {path}", "regenerate both from the same config")
+    shown = samples.loc[test["sample"]]
+    in_training, dataset = shown["in_training"].to_numpy(bool), shown["dataset"].to_numpy()
+    yield TOGETHER, test
+    chosen = {SEEN: in_training, UNSEEN: ~in_training}
+    chosen |= {f"{DATASET}{name}": dataset == name for name in np.unique(dataset)}
+    yield from ((name, test[rows]) for name, rows in chosen.items() if rows.any())
+
+
+def _scores(test: pd.DataFrame, concepts: list[str]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the scores (N, C) and the numbers of the true concepts (N,)."""
+    scores_N_C = test[[f"score_{concept}" for concept in concepts]].to_numpy(float)
+    return scores_N_C, np.array([concepts.index(concept) for concept in test["concept_true"]])
+
+
+@numbers("real_world_intervals.csv", **FRAME_FILES)
+def collect_intervals(
+    run: Run, prediction_files: Iterable[str | Path], pose_files: Iterable[str | Path]
+) -> pd.DataFrame:
+    """Return accuracies of `real_world.csv` over all seeds, with 95 % intervals (:mod:`gpca.evaluation.measures`).
+
+    - accuracy: of every part of the test samples that the column `table` names; of all of them by concept as well.
+    - difference: of that of all from the first method's in the same seeds, on the same draws, where both have the same
+      samples.
+
+    Clusters are scenes; the draws of a source are the same for all methods.
+
+    Args:
+        prediction_files, pose_files: as for :func:`collect`.
+
+    Raises:
+        InputError: see there.
+    """
+    import pandas as pd
+
+    first = reduced_backbones(run.config["real_world"])[0]
+
+    poses = {(Path(path).parts[-2], Path(path).stem): path for path in pose_files}
+    frames: dict[tuple[str, str], list[pd.DataFrame]] = {}
+    for path in prediction_files:
+        source, method, seed = source_method_seed(path)
+        if (of_source := poses.get((source, f"seed{seed}"))) is None:
+            raise InputError(path, "has no pose file beside it", "regenerate both from the same config")
+        rows = read_predictions(path)
+        parts = dict(parts_of_frames(path, rows[rows["split"] == "test"], of_source))
+        test = parts.pop(TOGETHER)
+        is_in = {name: test.index.isin(part.index) for name, part in parts.items()}
+        right = (test["concept_true"] == test["concept_predicted"]) & ~test["abstained"]
+        frames.setdefault((source, method), []).append(test.assign(seed=seed, right=right, **is_in))
+    together = {key: pd.concat(of_seeds, ignore_index=True) for key, of_seeds in frames.items()}
+    records = []
+    for (source, method), rows in together.items():
+        samples = Clustered.drawn(rows["seed"], rows["cluster"], "frame intervals", source)
+        for table, metric, concept, own, estimate in _estimates(rows, samples):
+            records.append(own.record((table, source, method, metric, concept), estimate))
+        other = together.get((source, first), rows.iloc[:0])
+        other = other[other["seed"].isin(rows["seed"])].reset_index(drop=True)  # some methods have fewer seeds
+        if method != first and rows[SAMPLE].equals(other[SAMPLE]):
+            apart = samples.difference(rows["right"].to_numpy(), other["right"].to_numpy())
+            records.append(samples.record((TOGETHER, source, method, "difference", ALL), apart))
+    return intervals(records, "predictions")
+
+
+def _estimates(rows: pd.DataFrame, samples: Clustered) -> Iterator[tuple[str, str, str, Clustered, Estimate]]:
+    """Yield table, metric, concept, the samples that it is over, and the estimate of each accuracy."""
+    right_N = rows["right"].to_numpy(bool)
+    of_parts = {(TOGETHER, ALL): np.ones(len(rows), bool)}
+    of_parts |= {(TOGETHER, name): rows["concept_true"].eq(name).to_numpy() for name in rows["concept_true"].unique()}
+    parts = rows.columns[rows.columns.get_loc("right") + 1 :]
+    of_parts |= {(name, ALL): rows[name].eq(True).to_numpy() for name in parts}
+    for (name, concept), of_N in of_parts.items():
+        own = samples.subset(of_N)
+        yield name, "accuracy", concept, own, own.share(right_N[of_N])

@@ -1,1 +1,0 @@
-"""GP-CA on depth frames, by backbone and reduction (paper Table VI)."""
