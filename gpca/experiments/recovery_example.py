@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gpca.experiments.frame_views import draw_score_bars
 from gpca.experiments.plan import Run
-from gpca.experiments.real_world.frame_views import draw_score_bars
 from gpca.experiments.recovery import SECTION, tables_title
 from gpca.experiments.result import figure
 from gpca.io.arrays import load_arrays
