@@ -79,10 +79,7 @@ EXPERIMENT = Experiment(
     name=NAME,
     sections={"active_learning": Section},
     names=names,
-    shown=lambda config, sources: {
-        "strategies": titles(config["active_learning"]["strategies"]),
-        "active_learning": config["active_learning"],
-    },
+    shown=lambda config, sources: {"strategies": titles(config["active_learning"]["strategies"])},
     check=check,
     switches={"active_learning.strategies": Names("strategy", titles)},
 )

@@ -17,8 +17,8 @@ from gpca.experiments.confusions import counts_and_shares, pooled_confusions
 from gpca.experiments.diagnosis.reliability import reliability_figure
 from gpca.experiments.frame_views import draw_over_model, draw_scores, read_samples
 from gpca.experiments.frames import encoder_title, read_together, title_of_frames, unreduced_methods
-from gpca.experiments.method.concepts import source_before_icp
 from gpca.experiments.plan import Run
+from gpca.experiments.registration_stages import source_before_icp
 from gpca.experiments.result import figure
 from gpca.frames.instances import Instances
 from gpca.frames.synthesis import HALF_SPACE, OCCLUDER

@@ -12,7 +12,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from gpca.objects.entry import stand_in_clause, title_of
+from gpca.objects.entry import dataset_of, stand_in_clause, title_of
 from gpca.process.provenance import sha256_of_settings
 
 KEYS = "*"  # at the end of a path: the keys of a mapping, whatever their values
@@ -58,6 +58,11 @@ class Run:
     def source_titles(self) -> dict[str, str]:
         """Name -> title, which says so where the source is a stand-in."""
         return {name: title_of(entry) for name, entry in self.sources.items()}
+
+    @cached_property
+    def datasets(self) -> dict[str, str]:
+        """Name of a source -> name of its dataset in the BOP benchmark; empty for other kinds of source."""
+        return {name: dataset_of(entry) for name, entry in self.config["sources"].items()}
 
     @cached_property
     def names(self) -> dict[str, Any]:

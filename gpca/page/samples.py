@@ -14,7 +14,7 @@ from gpca.causes.dataset import Causes
 from gpca.causes.settings import CauseSettings, Limits
 from gpca.causes.truth import BY_SIZE, FAILED
 from gpca.errors import InputError
-from gpca.experiments.method.shown_sample import observed_uncertainties, registration_error, state_of_error
+from gpca.experiments.registration_stages import observed_uncertainties, registration_error, state_of_error
 from gpca.model.scene import flat, packed, packed_pair, taken_out
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations

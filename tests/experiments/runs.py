@@ -6,6 +6,12 @@ from gpca.experiments.plan import Run
 YCB = {"title": "YCB", "kind": "bop"}
 SOURCES = {"ycb": YCB, "cups": {"title": "Cups", "kind": "procedural"}}  # the second one is a stand-in
 
+SOLIDS = {  # parts of a config whose figures show one source
+    "figures": {"source": "solids"},
+    "sources": {"solids": {"title": "Solids", "kind": "procedural"}},
+    "embedding": {"encoder": "dgcnn", "reduction": "none"},
+}
+
 
 def run_with(**sections):
     """A run with the defaults of the config and these sections."""

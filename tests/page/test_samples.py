@@ -9,7 +9,7 @@ from gpca.alignment.rigid import inverse, transform
 from gpca.causes.settings import CauseSettings, Limits
 from gpca.causes.truth import ALL, BY_SIZE
 from gpca.errors import InputError
-from gpca.experiments.method.concepts import source_before_icp
+from gpca.experiments.registration_stages import source_before_icp
 from gpca.model.scene import unpacked
 from gpca.page.samples import (
     OF_EACH_CONCEPT,

@@ -1,19 +1,29 @@
-"""Draws Fig. 4 of the paper, online inference (top) and active learning (bottom), from what a run wrote."""
+"""Figure 4: online inference (top) and one round of active learning (bottom), from the files of a run."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gpca.active_learning.acquisition import EXPANSION, select, top
 from gpca.active_learning.settings import ActiveLearningSettings
 from gpca.errors import InputError
 from gpca.evaluation.measures import source_method_seed
+from gpca.experiments.frames import encoder_title
 from gpca.experiments.label_curves import STYLES, mean_curves
-from gpca.experiments.method.label_round import SETTING, Round, first_round
-from gpca.experiments.method.shown_sample import Stages, draw_embedding, draw_scores_with_numbers
+from gpca.experiments.plan import Run
+from gpca.experiments.registration_stages import (
+    FILES,
+    Stages,
+    draw_embedding,
+    draw_scores_with_numbers,
+    title_of_sample,
+)
+from gpca.experiments.result import figure
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.figures.cloud_views import draw_clouds, thinned
 from gpca.reporting.figures.diagram import Canvas
@@ -31,60 +41,118 @@ from gpca.reporting.figures.style import (
     blues,
     write_title,
 )
-from gpca.reporting.words import object_in_words
+from gpca.seeds import generator
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-# Above stands a sample of the first of these of which a registration failed, below the first that was held out.
-ORDER = ("overlap", "pose", "noise")
-TITLES = {"bald_kmeans": "BALD + $k$-means", "random": "random"}  # The figure draws the curves of these strategies.
-THUMBNAILS = 6  # The figure shows this many clouds of the pool.
+ORDER = ("overlap", "pose", "noise")  # shown is the first with a failed registration, learned the first held out
+TITLES = {"bald_kmeans": "BALD + $k$-means", "random": "random"}  # strategies whose curves are drawn
+STRATEGY = "bald_kmeans"  # the paper's
+SETTING = "pretrained"  # the encoder knows all concepts, and the classifier all but one
+THUMBNAILS = 6  # number of clouds of the pool that are drawn
 
 
-def draw_pipeline(
-    registrations_npz: str | Path,
-    embeddings_npz: str | Path,
-    predictions_csv: str | Path,
-    uncertainty_csv: str | Path,
-    limits: Mapping[str, float],
-    curve_files: Iterable[str | Path],
-    title: str,
-    encoder: str,
-    active_learning: Mapping,
-    dataset: str = "",
+@figure(
+    "III Gaussian process concept attribution",
+    "Figure 4: pipeline",
+    """After Figure 4 of the paper: what happens to one registration (online inference), and how a batch of labels is
+    chosen and learned (active learning). The error, the resulting state, and the uncertainty u are printed below
+    the aligned clouds, beside the value of u below which 95 % of the unperturbed pairs lie.
+
+    The test sample above is chosen as in Figure 2: one that lacks overlap if such a registration failed, otherwise
+    one with a pose error. Below is the first round of the run in which overlap is new; its pool is the training
+    samples without a label.""",
+    paper=True,
+    only={"pool_strategy": tuple(TITLES)},
+    **FILES,
+    curve_files="active_learning/{shown_source}/{pool_strategy}/seed{seed}.csv",
+)
+def fig4_pipeline(
+    run: Run,
+    registrations: Path,
+    embeddings: Path,
+    predictions: Path,
+    uncertainties: Path,
+    curve_files: Sequence[Path],
 ) -> Figure:
-    """Draw the stages from clouds to scores of one sample, and one round of active learning with its learning curve.
-
-    Args:
-        curve_files: The files of that source, named as for
-            :func:`gpca.experiments.label_curves.mean_curves`.
-        active_learning: The config's section; the figure repeats the first round of the run.
-    """
-    stages = Stages.load(registrations_npz, embeddings_npz, predictions_csv, uncertainty_csv, limits)
-    row = stages.choose(ORDER[0], registrations_npz, *ORDER[1:])
-    files = list(curve_files)
-    new, curves = _curves(files)
-    source, _, seed = source_method_seed(files[0])
-    labeling = first_round(stages, new, ActiveLearningSettings.from_dict(dict(active_learning)), source, seed)
+    """Stages from clouds to scores of one sample, and one round of active learning with its learning curve."""
+    stages = Stages.load(registrations, embeddings, predictions, uncertainties, run.config["causes"]["limits"])
+    row = stages.choose(ORDER[0], registrations, *ORDER[1:])
+    new, curves = _curves(curve_files)
+    source, _, seed = source_method_seed(curve_files[0])
+    labeling = first_round(
+        stages, new, ActiveLearningSettings.from_dict(dict(run.config["active_learning"])), source, seed
+    )
     canvas = Canvas(TEXT_WIDTH_IN, 3.5)
     canvas.box(0.03, 1.9, 7.1, 1.4, color=LIGHT_GRAY)
     canvas.box(0.03, 0.03, 7.1, 1.6, color=LIGHT_GRAY)
-    _draw_inference(canvas, stages, row, encoder, labeling)
+    _draw_inference(canvas, stages, row, encoder_title(**run.config["embedding"]), labeling)
     _draw_active_learning(canvas, stages, labeling, new, curves)
     canvas.arrow((6.4, 1.97), (6.4, 1.63))
     canvas.text(6.36, 1.765, "uncertain cases", ha="right", va="center")
     canvas.arrow((0.9, 1.63), (0.9, 1.74), (4.62, 1.74), (4.62, 2.0))
     canvas.text(2.76, 1.775, "retrained classifier", va="bottom")
-    write_title(canvas.figure, f"{title}: {object_in_words(stages.predictions['object'][row], dataset)}")
+    write_title(canvas.figure, title_of_sample(run, stages.predictions["object"][row]))
     canvas.dot(6.15, 3.4, TARGET_COLOR, r"target $\mathcal{Q}$", gap_in=0.05)
     canvas.dot(6.63, 3.4, SOURCE_COLOR, r"source $\mathcal{P}$", gap_in=0.05)
     return canvas.figure
 
 
-def _curves(files: list[str | Path]) -> tuple[str, dict[str, pd.DataFrame]]:
-    """Return the concept that was new, and the learning curves of that experiment by strategy."""
+@dataclass(frozen=True)
+class Round:
+    """The first round of labels, with the pool's N training samples.
+
+    Attributes:
+        rows_N: rows of the pool.
+        labeled: rows of the samples that were labeled at the start, none of the new concept.
+        map_S_2: principal components of all embeddings, fitted to the standardized ones of the training samples.
+        bald_N: BALD of the pool in nats, by the classifier that knows all concepts but the new one.
+        candidates, chosen: indices into `rows_N` of the B·K largest BALD, and of the B of them that k-means keeps.
+    """
+
+    rows_N: np.ndarray
+    labeled: np.ndarray
+    map_S_2: np.ndarray
+    bald_N: np.ndarray
+    candidates: np.ndarray
+    chosen: np.ndarray
+
+
+def first_round(stages: Stages, held_out: str, settings: ActiveLearningSettings, source: str, seed: int) -> Round:
+    """Fit the classifier that does not know a concept yet, and let the paper's strategy choose from the pool.
+
+    Start, pool and classifier are those of the run's learning curves with this source and seed.
+
+    Raises:
+        InputError: see :func:`gpca.active_learning.rounds.make_task`.
+    """
+    from sklearn.decomposition import PCA
+    from sklearn.preprocessing import StandardScaler
+
+    from gpca.active_learning.rounds import Embedded, initial_gpc, make_task, pool_of
+
+    samples = stages.registrations
+    row_S_1 = np.arange(len(samples))[:, None]
+    row_task, task = (
+        make_task(Embedded(each, samples.concept, samples.split), held_out, settings, source, seed)
+        for each in (row_S_1, stages.h_S_d)
+    )
+    gpc = initial_gpc(task, settings, source, seed, SETTING)
+    rows_N, labeled = row_task.pool.h[:, 0], row_task.initial.h[:, 0]
+    pool = pool_of(task.project(gpc), gpc, np.arange(len(rows_N)), [])
+    random = generator(source, seed, SETTING, "active_learning", held_out, STRATEGY)
+    chosen = select(STRATEGY, pool, settings.batch, random)
+    train = samples.rows("train")
+    scaler = StandardScaler().fit(stages.h_S_d[train])
+    h_S_d = scaler.transform(stages.h_S_d)
+    map_S_2 = PCA(2, svd_solver="full").fit(h_S_d[train]).transform(h_S_d)
+    return Round(rows_N, labeled, map_S_2, pool.bald_N, top(pool.bald_N, settings.batch * EXPANSION), chosen)
+
+
+def _curves(files: Sequence[Path]) -> tuple[str, dict[str, pd.DataFrame]]:
+    """Concept that was new, and the learning curves of that experiment by strategy."""
     for concept in ORDER:
         curves = {name: one for (_, name, setting), one in mean_curves(files, [concept]).items() if setting == SETTING}
         if any(name in curves for name in TITLES):
@@ -126,9 +194,9 @@ def _draw_inference(canvas: Canvas, stages: Stages, row: int, encoder: str, labe
 
 def _draw_labeled(axes, stages: Stages, row: int, labeling: Round) -> None:
     """Scatter the training samples by concept, and the sample that is shown."""
-    of = stages.registrations
+    train = stages.registrations.rows("train")
     for concept in CONCEPTS:
-        rows = of.rows("train")[of.concept[of.rows("train")] == concept]
+        rows = train[stages.registrations.concept[train] == concept]
         look = {"marker": CONCEPT_MARKERS[concept], "color": CONCEPT_COLORS[concept], "alpha": 0.6, "linewidths": 0}
         axes.scatter(*labeling.map_S_2[rows].T, s=5, **look)
     axes.scatter(*labeling.map_S_2[row], s=45, marker="*", color=BLACK, zorder=5)
@@ -144,9 +212,9 @@ def _draw_active_learning(canvas: Canvas, stages: Stages, labeling: Round, new: 
 
     canvas.text(6.4, heads_in, r"Unlabeled pool $\mathcal{D}_U$", va="top")
     canvas.text(6.4, captions_in, f"{len(labeling.rows_N)} training samples", va="bottom")
-    for place, of_pool in enumerate(thinned(labeling.rows_N, THUMBNAILS)):
-        corner = (5.9 + 0.36 * (place % 3), 0.86 - 0.56 * (place // 3))
-        _draw_thumbnail(canvas.panel(*corner, 0.34, 0.5), stages, of_pool)
+    for i, row in enumerate(thinned(labeling.rows_N, THUMBNAILS)):
+        corner = (5.9 + 0.36 * (i % 3), 0.86 - 0.56 * (i // 3))
+        _draw_thumbnail(canvas.panel(*corner, 0.34, 0.5), stages, row)
     canvas.arrow((5.84, middle_in), (5.62, middle_in))
 
     canvas.text(5.04, heads_in, "Score: BALD", va="top")
@@ -176,10 +244,10 @@ def _draw_active_learning(canvas: Canvas, stages: Stages, labeling: Round, new: 
     canvas.arrow((3.08, middle_in), (2.88, middle_in))
 
     canvas.text(2.4, heads_in, "Annotate", va="top")
-    for place, i in enumerate(labeling.chosen[:4]):
-        corner = (1.98 + 0.44 * (place % 2), 0.94 - 0.6 * (place // 2))
-        _draw_thumbnail(canvas.panel(*corner, 0.4, 0.46), stages, labeling.rows_N[i])
-        concept = stages.predictions["concept_true"][labeling.rows_N[i]]
+    for i, row in enumerate(labeling.rows_N[labeling.chosen[:4]]):
+        corner = (1.98 + 0.44 * (i % 2), 0.94 - 0.6 * (i // 2))
+        _draw_thumbnail(canvas.panel(*corner, 0.4, 0.46), stages, row)
+        concept = stages.predictions["concept_true"][row]
         canvas.text(corner[0] + 0.2, corner[1] - 0.01, concept, va="top")
     canvas.arrow((1.92, middle_in), (1.72, middle_in))
 
@@ -192,7 +260,7 @@ def _draw_active_learning(canvas: Canvas, stages: Stages, labeling: Round, new: 
                 curves[name]["labels"], curves[name]["mean"], line, color=color, linewidth=width, label=TITLES[name]
             )
     low, high = panel.get_ylim()
-    panel.set_ylim(bottom=low - 0.5 * (high - low))  # The legend needs room.
+    panel.set_ylim(bottom=low - 0.5 * (high - low))  # room for the legend
     panel.locator_params(axis="x", nbins=4, integer=True)
     panel.set_ylabel("accuracy (%)", fontsize=SMALL_PT, labelpad=1)
     panel.set_xlabel("labels", fontsize=SMALL_PT, labelpad=0)

@@ -1,10 +1,12 @@
+"""Registrations with the results of all stages."""
+
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from gpca.errors import InputError
-from gpca.experiments.method.shown_sample import Stages
+from gpca.experiments.registration_stages import Stages
 
 
 @pytest.fixture(scope="module")

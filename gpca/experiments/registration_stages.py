@@ -1,4 +1,4 @@
-"""Reads one registration of a run with the results of all stages, for the figures of the method."""
+"""Registrations of a run with the results of all stages, one of which the figures of the method show."""
 
 from __future__ import annotations
 
@@ -10,20 +10,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpca.alignment.pose_error import adds_error
-from gpca.alignment.rigid import inverse, transform
+from gpca.alignment.rigid import inverse, scale_translation, transform
 from gpca.attribution.metrics import read_uncertainties
 from gpca.attribution.predictions import concepts_of, read_predictions
 from gpca.causes.settings import Limits
 from gpca.causes.truth import BORDERLINE, FAILED, NOMINAL
 from gpca.errors import InputError
 from gpca.experiments.frame_views import draw_scores
-from gpca.experiments.method.concepts import severity_text
+from gpca.experiments.plan import Run
 from gpca.io.container import require_same_samples
 from gpca.io.csv_file import numbers
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.figures.cloud_views import widest_views
 from gpca.reporting.figures.style import GRAY, SMALL_PT, blues
+from gpca.reporting.words import object_in_words
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -31,15 +32,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Stages:
-    """Holds S registrations of one source and seed, with the results of all stages.
+    """S registrations of one source and seed, with the results of all stages.
 
     Attributes:
-        registrations: The registrations.
-        h_S_d: Their embeddings.
-        predictions: What GP-CA said of each.
-        u_S: Their uncertainty in nats, NaN where it is not known.
-        u_clean: What 95 % of the clean pairs stay below, in nats.
-        limits: The limits of the errors that their states are told apart by.
+        h_S_d: embeddings.
+        predictions: of GP-CA.
+        u_S: uncertainty in nats, NaN where it is not known.
+        u_clean: uncertainty that 95 % of the clean pairs stay below, in nats.
+        limits: of the errors, which decide the states.
     """
 
     registrations: Registrations
@@ -77,13 +77,15 @@ class Stages:
         return cls(registrations, h_S_d, predictions, *uncertain, Limits(**limits))
 
     def choose(self, concept: str, path: str | Path, *others: str) -> int:
-        """Return the row that is shown, a test sample of the concept whose registration is really uncertain.
+        """Row of the sample that is shown: a test sample of the concept whose registration is uncertain.
 
-        Of those named right after a registration that failed and is more uncertain than 95 % of the clean pairs, it is
-        the one with the median score. Where the concept has none such, one of the `others` may have; where they have
-        none either, the wishes are dropped one by one: first that it failed, then that it is uncertain (the half that
-        ICP fits worst is kept), then that it is named right. Where there is no test sample of the concept, an
-        InputError names `path`.
+        Candidates are named right after a registration that failed and is more uncertain than 95 % of the clean pairs;
+        the one with the median score is shown. If the concept has no candidate, the `others` are tried. If they have
+        none either, conditions are dropped one by one: first that it failed, then that it is uncertain (the half that
+        ICP fits worst stays), then that it is named right.
+
+        Raises:
+            InputError: no test sample of the concept; it names `path`.
         """
         for other in (concept, *others):
             if len(failures := self._uncertain_failures(other)):
@@ -104,23 +106,23 @@ class Stages:
         return uncertain[[self.state(row) == FAILED for row in uncertain.index]]
 
     def error(self, row: int) -> float:
-        """Return how far off a row is after ICP, in diameters."""
+        """Error of a row after ICP, in diameters."""
         return registration_error(self.registrations, row)
 
     def state(self, row: int) -> str:
-        """Return the name of the state of a row after ICP, by its error."""
+        """State of a row after ICP, by its error."""
         return state_of_error(self.error(row), self.limits)
 
     def clouds(self, row: int, which: str) -> tuple[np.ndarray, np.ndarray]:
-        """Return target and source (·, 3) of a row, the source where the pose ``init`` or ``icp`` puts it."""
+        """Target and source (·, 3) of a row, the source at the pose ``init`` or ``icp``."""
         registrations = self.registrations
         moved = registrations.T_target_source(which, row) @ inverse(registrations.T_target_source("icp", row))
         return registrations.target(row), transform(moved, registrations.cloud(row))
 
     def seen(self, row: int) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-        """Return the clouds before (``init``) and after ICP (``icp``) in the axes of the view that shows most.
+        """Clouds before (``init``) and after ICP (``icp``) in the axes of one view.
 
-        It is that of the views that show the target widest in which ICP moves the source most.
+        Of the views that show the target widest, it is the one in which ICP moves the source most.
         """
         pairs = {which: self.clouds(row, which) for which in ("init", "icp")}
         target, source = pairs["icp"]
@@ -129,28 +131,58 @@ class Stages:
         return {which: (target @ view.T, source @ view.T) for which, (target, source) in pairs.items()}
 
     def words(self, row: int, which: str) -> str:
-        """Return what is known of a pose: of ``init`` what was perturbed, of ``icp`` how far off it is, and u."""
+        """Words on a pose: for ``init`` the perturbation, for ``icp`` the error and u."""
         if which == "init":
             return severity_text(self.registrations, row, str(self.registrations.concept[row]))
         uncertain = "" if np.isnan(self.u_S[row]) else f"\n$u$ = {self.u_S[row]:.1f} nats (clean: < {self.u_clean:.1f})"
         return f"{self.state(row)}, ADD-S {100 * self.error(row):.1f} % $d${uncertain}"
 
 
+FILES = {
+    "registrations": "registrations/{shown_source}/seed{first_seed}.npz",
+    "embeddings": "embeddings/{shown_source}/{embedding}/seed{first_seed}.npz",
+    "predictions": "predictions/{shown_source}/{gpca}/seed{first_seed}.csv",
+    "uncertainties": "uncertainty/{shown_source}/causal/seed{first_seed}.csv",
+}
+
+
+def title_of_sample(run: Run, object_name: str) -> str:
+    """Title of the source that figures show, and the object's name in words."""
+    source = run.config["figures"]["source"]
+    return f"{run.source_titles[source]}: {object_in_words(object_name, run.datasets[source])}"
+
+
+def source_before_icp(registrations: Registrations, sample: int) -> np.ndarray:
+    """Points (P, 3) of a sample in its initial pose, in the target's frame, relative to the diameter."""
+    T_init_icp = registrations.T_target_source_init[sample] @ inverse(registrations.T_target_source_icp[sample])
+    return transform(scale_translation(T_init_icp, 1 / registrations.diameter_m[sample]), registrations.cloud(sample))
+
+
+def severity_text(registrations: Registrations, sample: int, concept: str) -> str:
+    """A sample's severity as it is printed under its panel, with lengths relative to the diameter d."""
+    if concept == "noise":
+        return f"$\\sigma$ = {100 * registrations.severity_noise[sample]:.1f} % $d$"
+    if concept == "pose":
+        angle_deg = np.degrees(registrations.severity_rotation_rad[sample])
+        return f"{angle_deg:.0f}° and {100 * registrations.severity_translation[sample]:.0f} % $d$"
+    return f"{100 * registrations.severity_crop[sample]:.0f} % cut off"
+
+
 def registration_error(registrations: Registrations, row: int) -> float:
-    """Return the ADD-S of a row's pose after ICP in diameters; of clouds this sparse it is about 0.01 at best."""
+    """ADD-S of a row's pose after ICP in diameters; of clouds this sparse it is about 0.01 at best."""
     T_icp, T_true = (registrations.T_target_source(which, row) for which in ("icp", "true"))
     return adds_error(transform(inverse(T_true), registrations.target(row)), T_icp, T_true)
 
 
 def state_of_error(error: float, limits: Limits) -> str:
-    """Return ``nominal``, ``borderline`` or ``failed`` by the limits of docs/causes.md, without the uncertainty's."""
+    """``nominal``, ``borderline`` or ``failed`` by the limits of docs/causes.md, without the uncertainty's."""
     if error < limits.nominal:
         return NOMINAL
     return FAILED if error > limits.failed else BORDERLINE
 
 
 def observed_uncertainties(path: str | Path, registrations: Registrations) -> tuple[np.ndarray, float]:
-    """Return u (S,) of the registrations in nats, NaN where the file has none, and the limit of the clean ones.
+    """u (S,) of the registrations in nats, NaN where the file has none, and the limit of the clean ones.
 
     Raises:
         InputError: see :func:`gpca.attribution.metrics.read_uncertainties`; also a file without any of the samples.
@@ -164,7 +196,7 @@ def observed_uncertainties(path: str | Path, registrations: Registrations) -> tu
 
 
 def _median(rows: pd.DataFrame, concept: str) -> int:
-    """Return the row of the median score of a concept."""
+    """Row of the median score of a concept."""
     ranked = rows.sort_values([f"score_{concept}", "sample"], kind="stable")
     return int(ranked.index[(len(ranked) - 1) // 2])
 

@@ -1,3 +1,5 @@
+"""Figure 4."""
+
 from dataclasses import replace
 
 import numpy as np
@@ -8,14 +10,22 @@ from gpca.active_learning.curves import POOL_COLUMNS, write_curves
 from gpca.active_learning.rounds import initial_gpc, make_task, rounds
 from gpca.active_learning.settings import ActiveLearningSettings
 from gpca.errors import InputError
-from gpca.experiments.method.concepts import severity_text
-from gpca.experiments.method.label_round import first_round
-from gpca.experiments.method.pipeline import draw_pipeline
-from gpca.experiments.method.shown_sample import Stages
+from gpca.experiments.pipeline import fig4_pipeline, first_round
+from gpca.experiments.plan import Run
+from gpca.experiments.registration_stages import Stages, severity_text
 from tests.figures import assert_words_are_large_enough_and_inside, words_of
+
+from .runs import SOLIDS
 
 BATCH = 3
 LEARNING = {"initial": 8, "labels": 6, "batch": BATCH, "gpc": {"inducing": 8, "iterations": 20, "draws": 50}}
+
+
+def pipeline(stage_files, curve_files, encoder="dgcnn"):
+    *files, limits = stage_files
+    embedding = {"encoder": encoder, "reduction": "none"}
+    run = Run(SOLIDS | {"causes": {"limits": limits}, "embedding": embedding, "active_learning": LEARNING})
+    return fig4_pipeline(run, *files, curve_files)
 
 
 @pytest.fixture(scope="module")
@@ -66,7 +76,7 @@ def test_the_map_separates_what_the_embedding_separates(asked, stage_files):
 
 def test_the_numbers_are_those_of_the_files_and_the_bytes_the_same_again(stage_files, curve_files, asked, same_bytes):
     def draw():
-        return draw_pipeline(*stage_files, curve_files, "Solids (procedural stand-in)", "PointNet", LEARNING)
+        return pipeline(stage_files, curve_files, "pointnet")
 
     same_bytes(draw)
     written = words_of(draw())
@@ -85,7 +95,7 @@ def test_the_numbers_are_those_of_the_files_and_the_bytes_the_same_again(stage_f
 
 
 def test_letters_are_large_enough_inside_and_apart(stage_files, curve_files):
-    figure = draw_pipeline(*stage_files, curve_files, "Solids", "DGCNN", LEARNING)
+    figure = pipeline(stage_files, curve_files)
     assert_words_are_large_enough_and_inside(figure)
     on_canvas = figure.axes[0].texts
     boxes = {text.get_text(): text.get_window_extent().shrunk(0.98, 0.8) for text in on_canvas if text.get_text()}
@@ -100,4 +110,4 @@ def test_letters_are_large_enough_inside_and_apart(stage_files, curve_files):
 def test_curves_of_other_strategies_alone_are_refused(stage_files, curve_files):
     others = [path for path in curve_files if "entropy" in str(path)]
     with pytest.raises(InputError, match=r"active learning: has no curve of bald_kmeans or random; run"):
-        draw_pipeline(*stage_files, others, "Solids", "DGCNN", LEARNING)
+        pipeline(stage_files, others)

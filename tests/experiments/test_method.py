@@ -1,3 +1,5 @@
+"""Figures 2 and 3."""
+
 from dataclasses import replace
 
 import numpy as np
@@ -6,20 +8,21 @@ import trimesh
 
 from gpca.alignment.rigid import scale_translation, transform
 from gpca.errors import InputError
-from gpca.experiments.method.concepts import (
-    choose_samples,
-    choose_view,
-    draw_concepts_figure,
-    severity_text,
-    source_before_icp,
-)
+from gpca.experiments.method import choose_samples, choose_view, decide, fig2_overview, fig3_concepts
+from gpca.experiments.plan import Run
+from gpca.experiments.registration_stages import Stages, severity_text, source_before_icp
 from gpca.io.arrays import save_arrays
 from gpca.objects.canonical import DRAWN
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS, PERTURBATIONS, SEVERITIES, SEVERITIES_OF, Severities
+from gpca.recovery.policy import NOTHING, QUEUE, RecoveryPolicy, Thresholds
+from tests.figures import assert_words_are_large_enough_and_inside, words_of
+
+from .runs import SOLIDS
 
 DIAMETERS_M = np.array([0.2, 0.5])
 NAMES = np.array(["block", "bar"])
+BOXES = Run({"figures": {"source": "boxes"}, "sources": {"boxes": {"title": "Boxes", "kind": "bop"}}})
 
 
 def rigid(rotvec, translation):
@@ -103,8 +106,8 @@ def test_samples_are_of_one_object_and_of_medium_severity(files):
             severity_S = getattr(registrations, f"severity_{name}")
             drawn = np.sort(severity_S[registrations.concept == concept])
             assert drawn[0] < severity_S[sample] < drawn[-1]
-    named = choose_samples(registrations, "registrations.npz", "bar")
-    assert {registrations.object_name[sample] for sample in named.values()} == {"bar"}
+    bars = registrations.subset(np.flatnonzero(registrations.object_name == "bar"))
+    assert {bars.object_name[sample] for sample in choose_samples(bars, "registrations.npz").values()} == {"bar"}
 
 
 def test_training_samples_are_not_shown(files):
@@ -118,9 +121,7 @@ def test_training_samples_are_not_shown(files):
 
 def test_an_object_without_all_concepts_is_refused(files):
     _, registrations, _ = files
-    with pytest.raises(InputError, match=r"r\.npz.*object 'cat'"):
-        choose_samples(registrations, "r.npz", "cat")
-    with pytest.raises(InputError, match="any object"):
+    with pytest.raises(InputError, match=r"r\.npz.*any object"):
         choose_samples(registrations.subset(np.flatnonzero(registrations.concept != "pose")), "r.npz")
 
 
@@ -146,7 +147,7 @@ def test_severities_are_worded_with_their_units(files):
 def test_draws_red_and_blue_in_three_panels_and_the_same_bytes_again(files, same_bytes):
     folder, _, _ = files
     paths = folder / "objects.npz", folder / "registrations.npz"
-    image = same_bytes(lambda: draw_concepts_figure(*paths, "Boxes"))[..., :3] / 255
+    image = same_bytes(lambda: fig3_concepts(BOXES, *paths))[..., :3] / 255
     head = image.shape[0] // 6
     red, blue = image[head:, :, 0] - image[head:, :, 2], image[head:, :, 2] - image[head:, :, 0]
     for color in (red, blue):
@@ -159,4 +160,63 @@ def test_objects_of_another_run_are_refused(files, tmp_path):
     with np.load(folder / "objects.npz") as arrays:
         save_arrays(tmp_path / "objects.npz", dict(arrays) | {"names": np.array(["cat", "duck"])})
     with pytest.raises(InputError, match="has no object"):
-        draw_concepts_figure(tmp_path / "objects.npz", folder / "registrations.npz", "Boxes")
+        fig3_concepts(BOXES, tmp_path / "objects.npz", folder / "registrations.npz")
+
+
+TREATMENTS = {"noise": "denoise", "pose": "reinitialize", "overlap": "new_view"}
+THRESHOLDS = {"uncertain": None, "queued_share": 0.05, "dominant": 0.4, "improvement": 0.3}
+
+
+def overview(stage_files, treatments=TREATMENTS, thresholds=THRESHOLDS):
+    *files, limits = stage_files
+    recovery = {"treatments": treatments, "thresholds": thresholds}
+    return fig2_overview(Run(SOLIDS | {"causes": {"limits": limits}, "recovery": recovery}), *files)
+
+
+def test_the_numbers_are_those_of_the_files_and_the_bytes_the_same_again(stage_files, same_bytes):
+    def draw():
+        return overview(stage_files)
+
+    same_bytes(draw)
+    written = words_of(draw())
+    stages = Stages.load(*stage_files)
+    row = stages.choose("pose", stage_files[0])
+    sample, of = stages.predictions.iloc[row], stages.registrations
+    assert f"{sample['score_pose']:.2f}±0.12" in written
+    assert f"{sample['score_noise']:.2f}±0.10" in written
+    assert f"{sample['score_overlap']:.2f}±0.05" in written
+    assert stages.u_S[row] > stages.u_clean
+    assert "nats (clean: < 1.0)" in stages.words(row, "icp")
+    assert f"aligned: {stages.words(row, 'icp')}" in written
+    assert any(f"{100 * of.severity_translation[row]:.0f} % $d$" in words for words in written)
+    assert f"Solids (procedural stand-in): {of.object_name[row]}" in written
+    assert "Act on pose:\nReinitialize ICP" in written
+    assert r"$\mathbf{h} \in \mathbb{R}^{12}$" in written
+
+
+def test_the_branch_follows_from_what_gpca_knows_and_not_from_the_true_error(stage_files, monkeypatch):
+    monkeypatch.setattr(Stages, "error", lambda self, row: 0.012)  # It did not fail, which GP-CA cannot know
+    stages = Stages.load(*stage_files)
+    row = stages.choose("pose", stage_files[0])
+    policy = RecoveryPolicy(Thresholds(uncertain=1.0, dominant=0.4, improvement=0.3), TREATMENTS)
+    assert decide(stages, row, policy).action == "reinitialize"
+    assert decide(stages, row, RecoveryPolicy(Thresholds(uncertain=0.0), TREATMENTS)).action == QUEUE
+    assert decide(replace(stages, u_clean=np.inf), row, policy).action == NOTHING
+
+
+def test_the_threshold_of_bald_is_drawn_and_named(stage_files):
+    figure = overview(stage_files, thresholds=THRESHOLDS | {"uncertain": 0.25})
+    assert "BALD: ask above 0.25 nats" in words_of(figure)
+    lines = [line.get_xdata()[0] for panel in figure.axes for line in panel.get_lines()]
+    assert {0.25, 0.4} <= set(lines)
+
+
+def test_no_letter_is_smaller_than_7_pt_and_none_leaves_the_figure(stage_files):
+    figure = overview(stage_files)
+    assert len(words_of(figure)) > 15
+    assert_words_are_large_enough_and_inside(figure)
+
+
+def test_a_concept_without_treatment_is_refused(stage_files):
+    with pytest.raises(InputError, match=r"recovery\.treatments: has no action for 'pose'"):
+        overview(stage_files, {"noise": "denoise"})

@@ -1,0 +1,249 @@
+"""The method in figures: overview, concepts and objects (Figures 2 and 3); the pipeline stands apart (Figure 4)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gpca.errors import InputError
+from gpca.experiments.experiment import Experiment
+from gpca.experiments.frames import encoder_title
+from gpca.experiments.plan import Run
+from gpca.experiments.recovery_example import short_action
+from gpca.experiments.registration_stages import (
+    FILES,
+    Stages,
+    draw_embedding,
+    draw_scores_with_numbers,
+    severity_text,
+    source_before_icp,
+    title_of_sample,
+)
+from gpca.experiments.result import figure
+from gpca.objects.canonical import ObjectClouds
+from gpca.pairs.dataset import Registrations
+from gpca.pairs.perturbation import CONCEPTS, SEVERITIES_OF
+from gpca.recovery.policy import NOTHING, QUEUE, Decision, RecoveryPolicy
+from gpca.reporting.figures.cloud_views import draw_clouds, legend_of_clouds, widest_views
+from gpca.reporting.figures.diagram import Canvas
+from gpca.reporting.figures.panels import panels, write_below
+from gpca.reporting.figures.style import (
+    BLACK,
+    BLUE,
+    COLUMN_WIDTH_IN,
+    CONCEPT_COLORS,
+    GRAY,
+    LIGHT_GRAY,
+    SOURCE_COLOR,
+    TARGET_COLOR,
+    TEXT_WIDTH_IN,
+    write_title,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+EXPERIMENT = Experiment(name="method", beside=("pipeline",))
+SECTION = "IV-A Datasets and controlled perturbations"
+CONCEPT = "pose"  # of the sample that Fig. 2 shows, because before and after ICP differ to the eye
+CAPTIONS = {"init": "initial", "icp": "aligned"}
+CONCEPT_TITLES = {"noise": "Noise", "pose": "Pose error", "overlap": "Overlap"}
+THRESHOLD: dict[str, Any] = {"color": BLACK, "linestyle": (0, (3, 2)), "linewidth": 0.8}  # the look of its line
+
+
+@figure(
+    "III Gaussian process concept attribution",
+    "Figure 2: overview",
+    """After Figure 2 of the paper: ICP refines the pose, the encoder turns the aligned cloud into an embedding, the
+    Gaussian process classifier gives every concept a score and a variance, and active learning asks for labels
+    where it is uncertain. The error, the resulting state, and the uncertainty u by Monte-Carlo ICP are printed
+    below the aligned clouds, beside the value of u below which 95 % of the unperturbed pairs lie.
+
+    What follows is decided by what GP-CA knows: nothing is done where u is below that value; a person is asked where
+    BALD is above its threshold or no score reaches theirs (dashed); else the dominant concept is acted on. The
+    threshold of BALD is what the config declares, or what its share of the test samples exceeds.
+
+    The sample shown has the median score among the test samples with a pose error that failed, are more uncertain
+    than that, and are named correctly.""",
+    paper=True,
+    **FILES,
+)
+def fig2_overview(run: Run, registrations: Path, embeddings: Path, predictions: Path, uncertainties: Path) -> Figure:
+    """Results of all stages for one registration, from its clouds to the decision that follows.
+
+    The figure shows the clouds before and after ICP, the embedding, the scores ± their deviations, BALD among all test
+    samples, and the decision: the action against the named concept, or a question to a person and a new training.
+    """
+    treatments = dict(run.config["recovery"]["treatments"])
+    stages = Stages.load(registrations, embeddings, predictions, uncertainties, run.config["causes"]["limits"])
+    row = stages.choose(CONCEPT, registrations)
+    sample = stages.predictions.iloc[row]
+    if (named := sample["concept_predicted"]) not in treatments:
+        raise InputError("recovery.treatments", f"has no action for '{named}'", "name one in the config")
+    canvas = Canvas(COLUMN_WIDTH_IN, 2.95)
+
+    seen = stages.seen(row)
+    corners = np.concatenate([np.concatenate(pair) for pair in seen.values()])
+    for left_in, (which, pair) in zip((0.02, 1.42), seen.items(), strict=True):
+        draw_clouds(canvas.panel(left_in, 1.78, 1.08, 0.92), *pair, 1.0, (corners.min(axis=0), corners.max(axis=0)))
+        canvas.text(left_in + 0.54, 1.74, f"{CAPTIONS[which]}: {stages.words(row, which)}", va="top")
+    canvas.arrow((1.12, 2.24), (1.40, 2.24), words="ICP")
+    canvas.arrow((2.52, 2.24), (2.96, 2.24), words=encoder_title(**run.config["embedding"]))
+    draw_embedding(canvas.panel(3.02, 1.86, 0.42, 0.76), stages.h_S_d[row])
+    canvas.text(3.23, 1.74, rf"$\mathbf{{h}} \in \mathbb{{R}}^{{{stages.h_S_d.shape[1]}}}$", va="top")
+
+    canvas.box(2.22, 1.14, 1.26, 0.25, "GP classifier", BLUE)
+    canvas.arrow((3.23, 1.56), (3.23, 1.39))
+    canvas.arrow((2.79, 1.14), (2.79, 0.97))
+    scores = canvas.panel(2.58, 0.36, 0.42, 0.56)
+    draw_scores_with_numbers(scores, sample)
+    canvas.text(2.79, 0.02, r"scores $\hat{s}_c \pm \sqrt{v_c}$", va="bottom")
+
+    bald_N = stages.predictions.loc[stages.predictions["split"] == "test", "bald"].to_numpy()
+    policy = RecoveryPolicy.of_settings(dict(run.config["recovery"]["thresholds"]), treatments, 1, bald_N)
+    limit, action = policy.thresholds.uncertain, decide(stages, row, policy).action
+    scores.axvline(policy.thresholds.dominant, **THRESHOLD)
+    _draw_bald(canvas.panel(1.26, 0.36, 0.72, 0.48), bald_N, float(sample["bald"]), limit)
+    canvas.text(1.58, 0.02, f"BALD: ask above {limit:.2f} nats", va="bottom")
+    canvas.arrow((2.2, 0.6), (2.02, 0.6))
+    acts, asks = action not in (NOTHING, QUEUE), action == QUEUE
+    canvas.arrow((1.22, 0.6), (0.96, 0.6), words="low", color=GRAY if asks else BLUE)
+    follows = f"Act on {named}:\n{short_action(treatments[named])}"
+    if action == NOTHING:
+        follows = "No action:\n$u$ is that of\na clean pair"
+    canvas.box(0.02, 0.32, 0.92, 0.56, follows, CONCEPT_COLORS[named] if acts else GRAY, dashed=asks)
+    canvas.arrow((1.62, 0.88), (1.62, 1.08), color=BLUE if asks else GRAY)
+    canvas.text(1.66, 0.97, "high", ha="left", va="center")
+    question, color = "Ask a person for the concept\nof a few such cases", BLUE if asks else GRAY
+    canvas.box(0.02, 1.08, 1.9, 0.37, question, color, dashed=not asks)
+    canvas.arrow((1.92, 1.265), (2.22, 1.265), words="retrain")
+
+    write_title(canvas.figure, title_of_sample(run, sample["object"]))
+    for x_in, color, words in ((0.06, TARGET_COLOR, "target"), (0.5, SOURCE_COLOR, "source")):
+        canvas.dot(x_in, 2.74, color, words)
+    return canvas.figure
+
+
+def decide(stages: Stages, row: int, policy: RecoveryPolicy) -> Decision:
+    """Decision on a row from what GP-CA knows, never from the true error of its pose.
+
+    Nothing is done where the uncertainty u is below that of 95 % of the clean pairs; else the policy decides.
+    """
+    if stages.u_S[row] <= stages.u_clean:
+        return Decision(NOTHING, "", f"u {stages.u_S[row]:.1f} is that of a clean pair")
+    sample = stages.predictions.iloc[row]
+    return policy.decide(np.array([float(sample[f"score_{name}"]) for name in CONCEPTS]), float(sample["bald"]))
+
+
+def _draw_bald(axes, bald_N: np.ndarray, value: float, limit: float) -> None:
+    """Draw the distribution of BALD over the test samples, with the sample's value and the threshold."""
+    axes.hist(bald_N, bins=12, color=LIGHT_GRAY)
+    axes.axvline(value, color=BLUE, linewidth=1.2)
+    axes.axvline(limit, **THRESHOLD)
+    axes.set(yticks=[])
+    axes.set_xlim(left=0)
+    axes.spines["left"].set_visible(False)
+    axes.tick_params(pad=1.5, length=2)
+    axes.locator_params(axis="x", nbins=3)
+    axes.margins(y=0)
+
+
+@figure(
+    SECTION,
+    "Figure 3: the three concepts",
+    """After Figure 3 of the paper: one object's clean target (orange) and its perturbed source before ICP (blue), for
+    noise, pose error and partial overlap.
+
+    The object shown is the one whose test samples come nearest to the medium severity of all three. Every training
+    and test sample has one such perturbation, and its name is the label that explainers have to find.""",
+    paper=True,
+    objects_file="objects/{shown_source}.npz",
+    registrations_file=FILES["registrations"],
+)
+def fig3_concepts(run: Run, objects_file: Path, registrations_file: Path) -> Figure:
+    """Target (vermilion) and perturbed source in its initial pose (blue) of one object, a panel for each concept.
+
+    All panels have one view, which shows the pose error and the cut from the side.
+    """
+    objects, registrations = ObjectClouds.load(objects_file), Registrations.load(registrations_file)
+    samples = choose_samples(registrations, registrations_file)
+    name = str(registrations.object_name[samples["noise"]])
+    if name not in objects.names:
+        raise InputError(
+            objects_file, f"has no object '{name}'", f"regenerate it and {registrations_file} from the same config"
+        )
+    sources = {concept: source_before_icp(registrations, sample) for concept, sample in samples.items()}
+    row = objects.names.index(name)
+    points_shown = max(len(source) for source in sources.values())  # so that both clouds are equally dense
+    target = objects.points(row)[:points_shown] / objects.diameters_m[row]
+    view = choose_view(target, sources)
+
+    clouds = {concept: (target @ view.T, source @ view.T) for concept, source in sources.items()}
+    corners = np.concatenate([np.concatenate(pair) for pair in clouds.values()])
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    height_in = TEXT_WIDTH_IN / len(clouds) * (high[1] - low[1]) / (high[0] - low[0]) + 0.45  # title and captions
+    drawing, [drawn] = panels(1, len(clouds), height_in)
+    for letter, panel, (concept, (target_view, source_view)) in zip("abc", drawn, clouds.items(), strict=True):
+        draw_clouds(panel, target_view, source_view, corners=(low, high))
+        severity = severity_text(registrations, samples[concept], concept)
+        write_below(panel, f"({letter}) {CONCEPT_TITLES[concept]}: {severity}")
+    legend_of_clouds(drawing, "target", "perturbed source, before ICP", gap=0.2)
+    write_title(drawing, title_of_sample(run, name))
+    return drawing
+
+
+def choose_samples(registrations: Registrations, path: str | Path) -> dict[str, int]:
+    """Row of the test sample of one object that is nearest to the medium severity, for each concept.
+
+    Severities are compared by their ranks within the test samples of the concept, so that no unit or range matters.
+    The object is the one whose farthest sample is nearest.
+
+    Raises:
+        InputError: no object has a test sample of each concept; it names `path`.
+    """
+    from scipy.stats import rankdata
+
+    distance_S = np.full(len(registrations), np.inf)  # of ranks from the middle rank; infinite: is not shown
+    for concept, names in SEVERITIES_OF.items():
+        rows = np.flatnonzero((registrations.split == "test") & (registrations.concept == concept))
+        ranks = [rankdata(getattr(registrations, f"severity_{name}")[rows]) / (len(rows) + 1) for name in names]
+        distance_S[rows] = np.abs(np.array(ranks) - 0.5).max(axis=0)
+    is_shown_S = np.isfinite(distance_S)
+    object_names = list(dict.fromkeys(registrations.object_name.tolist()))
+    choices = []
+    for name in object_names:
+        is_object_S = is_shown_S & (registrations.object_name == name)
+        by_concept = {c: np.flatnonzero(is_object_S & (registrations.concept == c)) for c in SEVERITIES_OF}
+        if all(len(rows) for rows in by_concept.values()):
+            choices.append({concept: int(rows[np.argmin(distance_S[rows])]) for concept, rows in by_concept.items()})
+    if not choices:
+        raise InputError(path, "has no test sample of each concept for any object", "generate more")
+    return min(choices, key=lambda samples: max(distance_S[sample] for sample in samples.values()))
+
+
+def choose_view(target: np.ndarray, sources: dict[str, np.ndarray]) -> np.ndarray:
+    """Rotation (3, 3) to a view's right, up and towards-the-viewer axes, with z up in the world.
+
+    It keeps the 8 of 24 directions around the object that show it widest (a mug with its handle at the side), and
+    picks the one of them that shows best how pose error and cut shift the centroid: the product of the visible shares
+    is largest there.
+    """
+    shifts = [sources[concept].mean(axis=0) - target.mean(axis=0) for concept in ("pose", "overlap")]
+    return max(widest_views(target), key=lambda view: np.prod([np.linalg.norm(view[:2] @ shift) for shift in shifts]))
+
+
+@figure(
+    SECTION,
+    "Objects: {source}",
+    """Every object of the source, drawn from its canonical cloud: the registrations are made from these. The paper has
+    no such figure.""",
+    name="objects_{source}",
+    objects_npz="objects/{source}.npz",
+)
+def objects_of_source(run: Run, objects_npz: Path, source: str) -> Figure:
+    """All objects of one source."""
+    from gpca.reporting.figures.contact_sheet import draw_contact_sheet
+
+    return draw_contact_sheet(objects_npz, run.source_titles[source], run.datasets[source])
