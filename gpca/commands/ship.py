@@ -16,14 +16,14 @@ from typing import TYPE_CHECKING
 
 from gpca.causes.judged import CEILING, RECALL
 from gpca.errors import InputError
-from gpca.evaluation.measures import POOLED
-from gpca.experiments.diagnosis.metrics import read_intervals
+from gpca.evaluation.measures import POOLED, read_clustered
 from gpca.io.files import require_outputs, whole_file
 from gpca.io.structured_text import load_own_yaml, read_json
 from gpca.model.diagnoser import REENACTED, Diagnoser
 from gpca.model.file import DIAGNOSED, VERSION, Model
 from gpca.objects.canonical import LARGEST_DIAMETER_M, SMALLEST_DIAMETER_M, ObjectClouds
 from gpca.pairs.perturbation import CONCEPTS
+from gpca.reporting.sheet import where
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -167,7 +167,7 @@ def card(name: str, content: bytes, model: Model, diagnoser: Diagnoser, origin: 
     Args:
         name, content: of the shipped file.
         model, diagnoser, origin: described by the card.
-        scores: :func:`gpca.experiments.diagnosis.metrics.collect_intervals` of the run.
+        scores: :func:`gpca.experiments.diagnosis.collect` of the run: values with intervals.
 
     Raises:
         InputError: no scores of a classifier like the model's, or incomplete settings of the run.
@@ -243,7 +243,8 @@ def _scores(origin: Origin, scores: pd.DataFrame) -> list[str]:
     rows, committees = [], 0
     for source, title in titles.items():
         for explainer, words in EXPLAINERS.items():
-            metrics = scores[(scores["source"] == source) & (scores["method"] == explainer)].set_index("metric")
+            entries = {"source": source, "method": explainer, "against": ""}
+            metrics = where(scores, entries).set_index("metric")
             if len(metrics):
                 committees += explainer == COMMITTEE
                 samples, seeds = metrics["samples"].reindex(list(MEASURES)).dropna(), metrics["seeds"].iloc[0]
@@ -349,7 +350,7 @@ def run_ship(options: Namespace) -> None:
         fault = f"has {len(content) / 1e6:.1f} MB, more than the {LARGEST_BYTES / 1e6:g} MB allowed in the package"
         raise InputError(options.model, fault, "lower causes.train, causes.test or real_world.train")
     origin = Origin.of(options.model, model.title)
-    text = card(options.out.name, content, model, model.diagnoser, origin, read_intervals(scores))
+    text = card(options.out.name, content, model, model.diagnoser, origin, read_clustered(scores))
     with whole_file(options.out) as partial:
         partial.write_bytes(content)
     with whole_file(options.card) as partial:

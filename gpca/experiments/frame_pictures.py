@@ -14,7 +14,6 @@ from gpca.attribution.predictions import concepts_of, read_predictions
 from gpca.errors import InputError
 from gpca.evaluation.measures import source_method_seed
 from gpca.experiments.confusions import counts_and_shares, pooled_confusions
-from gpca.experiments.diagnosis.reliability import reliability_figure
 from gpca.experiments.frame_views import draw_over_model, draw_scores, read_samples
 from gpca.experiments.frames import encoder_title, read_together, title_of_frames, unreduced_methods
 from gpca.experiments.plan import Run
@@ -27,6 +26,7 @@ from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations
 from gpca.reporting.figures.cloud_views import legend_of_clouds
 from gpca.reporting.figures.panels import draw_percentages, panels, write_below
+from gpca.reporting.figures.reliability import reliability_figure
 from gpca.reporting.figures.style import (
     BLACK,
     SMALL_PT,

@@ -15,7 +15,7 @@ from gpca.errors import InputError, require_names
 from gpca.evaluation.intervals import interval, pigeonhole_weights
 from gpca.evaluation.measures import ALL, POOLED
 from gpca.experiments.experiment import Experiment, LeftOut
-from gpca.experiments.frame_causes.tables import FEWEST_FAILURES
+from gpca.experiments.frame_causes import FEWEST_FAILURES
 from gpca.experiments.plan import Run
 from gpca.experiments.result import figure, numbers, table
 from gpca.experiments.step import Plan, Step

@@ -15,8 +15,8 @@ from gpca.causes.truth import BORDERLINE, GEOMETRY, NOMINAL
 from gpca.errors import InputError
 from gpca.evaluation.intervals import REPEATS
 from gpca.evaluation.measures import POOLED
-from gpca.experiments.diagnosis.tables import AGAIN, COST_NOTE, COSTS, SHOWN, reads
-from gpca.experiments.frame_causes.tables import FEWEST_FAILURES
+from gpca.experiments.cause_tables import AGAIN, COST_NOTE, COSTS, SHOWN, reads
+from gpca.experiments.frame_causes import FEWEST_FAILURES
 from gpca.experiments.plan import Run, plain
 from gpca.experiments.result import figure, table
 from gpca.experiments.scan_causes import (

@@ -13,12 +13,12 @@ import numpy as np
 from gpca.attribution.diagnostics import BINS, risk_coverage
 from gpca.attribution.learner_predictions import read_learner_predictions, sets_of, wrong
 from gpca.errors import InputError
-from gpca.experiments.diagnosis.reliability import reliability_figure
 from gpca.experiments.out_of_distribution import SECTION, learner_titles
 from gpca.experiments.plan import Run
 from gpca.experiments.result import figure
 from gpca.pairs.shifted_sets import DISTANCES, with_training_like
 from gpca.reporting.figures.panels import legend_below, panels
+from gpca.reporting.figures.reliability import reliability_figure
 from gpca.reporting.figures.style import (
     BLACK,
     GRAY,

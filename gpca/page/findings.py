@@ -13,8 +13,7 @@ from gpca.active_learning.curves import TABLE
 from gpca.active_learning.settings import JUDGED_SHARE, rare_setting
 from gpca.causes.judged import CEILING
 from gpca.evaluation.intervals import UNTRAINED
-from gpca.evaluation.measures import ALL, POOLED, read_metrics
-from gpca.experiments.diagnosis.metrics import read_intervals
+from gpca.evaluation.measures import ALL, POOLED, read_clustered, read_metrics
 from gpca.experiments.frames import read_together
 from gpca.explainers.gpca import GPCA_FORMS
 from gpca.pairs.perturbation import CONCEPTS
@@ -56,7 +55,7 @@ def findings_of(folder: Path, titles: Titles, shown: Collection[str]) -> list[Fi
     """
     readers: dict[str, tuple[Callable, list[Callable]]] = {
         "metrics.csv": (read_metrics, [_untrained, _protocol, _rival, _uncertain]),
-        "cause_intervals.csv": (read_intervals, [_causes, _regret]),
+        "cause_intervals.csv": (read_clustered, [_causes, _regret]),
         "real_world.csv": (read_together, [_frames]),
         "active_learning.csv": (read_metrics, [_labels]),
         "recovery.csv": (read_metrics, [_recovery]),
@@ -134,13 +133,15 @@ def _causes(intervals: pd.DataFrame, titles: Titles) -> Finding | None:
     text = (
         "Where the truth is measured, on objects that no explainer has seen, the best tells nominal registrations and "
         f"the dominant causes of failed ones apart with a balanced accuracy of {_percent(row['value'])} "
-        f"(95 % interval {_bounds(row, 'low', 'high')} %): {titles.cause_explainers[best]}."
+        f"(95 % interval {_bounds(row)} %): {titles.cause_explainers[best]}."
     )
-    if row["untrained"] in titles.cause_explainers:
-        text += (
-            f" The best untrained rival, {titles.cause_explainers[row['untrained']]}, is "
-            f"{100 * row['gain']:.0f} points behind ({_bounds(row, 'gain_low', 'gain_high')})."
-        )
+    gains = intervals[(intervals["metric"] == "balanced_accuracy") & (intervals["against"] == "untrained")]
+    for gain in gains[(gains["source"] == row["source"]) & (gains["method"] == best)].to_dict("records"):
+        if gain["other"] in titles.cause_explainers:
+            text += (
+                f" The best untrained rival, {titles.cause_explainers[gain['other']]}, is "
+                f"{100 * gain['value']:.0f} points behind ({_bounds(gain)})."
+            )
     if "gpca" in trained and best != "gpca":
         text += f" {titles.cause_explainers['gpca']} has {_percent(rows.loc['gpca', 'value'])}."
     if CEILING in rows.index:
@@ -163,7 +164,7 @@ def _regret(intervals: pd.DataFrame, titles: Titles) -> Finding | None:
 
 def _pooled(intervals: pd.DataFrame, titles: Titles, metric: str) -> tuple[pd.DataFrame, list[str]]:
     """Return the rows of a metric for all sources together, by explainer, and the trained explainers."""
-    rows = intervals[intervals["metric"] == metric]
+    rows = intervals[(intervals["metric"] == metric) & (intervals["against"] == "")]
     source = POOLED if (rows["source"] == POOLED).any() else next(iter(rows["source"]), POOLED)
     if source != POOLED and rows["source"].nunique() != 1:
         rows = rows[:0]
@@ -226,8 +227,8 @@ def _median_labels(metrics: pd.DataFrame, strategy: str) -> str | None:
     return f"{median:g} labels" if np.isfinite(median) else f"more than {labels.median():g} labels"
 
 
-def _bounds(row: pd.Series, low: str, high: str) -> str:
-    return f"{100 * row[low]:.0f} to {100 * row[high]:.0f}"
+def _bounds(row: Mapping) -> str:
+    return f"{100 * row['low']:.0f} to {100 * row['high']:.0f}"
 
 
 def _percent(share: float, decimals: int = 0) -> str:

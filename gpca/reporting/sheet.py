@@ -67,6 +67,7 @@ class Sheet:
         by_seed: name -> numbers by seed; the first frame counts the test samples.
         sources: those over which numbers by seed are averaged, in rows that name no source.
         blank: tells of row and column key whether the cell stays empty.
+        more: function of a row and its numbers, if it has any, that returns further cells by column.
     """
 
     def __init__(
@@ -74,11 +75,12 @@ class Sheet:
         name: str,
         heads: Mapping[str, str],
         rows: Iterable[Row],
-        columns: Mapping[str, Show],
+        columns: Mapping[str, Column],
         intervals: pd.DataFrame,
         by_seed: Mapping[str, pd.DataFrame] | None = None,
         sources: Sequence[str] = (),
         blank: Callable[[Row, str], bool] = lambda row, key: False,
+        more: Callable[[Row, pd.DataFrame], Mapping[str, Cell]] = lambda row, subset: {},
     ) -> None:
         self.name, self.heads, self.columns = name, heads, columns
         self._by_seed, self._sources = dict(by_seed or {}), sources
@@ -86,7 +88,9 @@ class Sheet:
         self.cells: dict[tuple[int, str], Cell] = {}
         for row in rows:
             subset = where(intervals, row.where)
-            cells = {key: self._cell(subset, row, column) for key, column in columns.items() if not blank(row, key)}
+            shows = {key: column for key, column in columns.items() if isinstance(column, Show) and not blank(row, key)}
+            cells = {key: self._cell(subset, row, column) for key, column in shows.items()}
+            cells |= more(row, subset) if len(subset) else {}
             if shown := {key: cell for key, cell in cells.items() if cell is not None}:
                 self.cells |= {(len(self.rows), key): cell for key, cell in shown.items()}
                 self.rows.append(row)

@@ -12,9 +12,8 @@ import numpy as np
 from gpca.causes.judged import CEILING, SMALLER_IS_BETTER
 from gpca.evaluation.intervals import REPEATS
 from gpca.evaluation.measures import POOLED
-from gpca.experiments.diagnosis.tables import AGAIN, SHOWN
-from gpca.experiments.frame_causes.metrics import STATE
-from gpca.experiments.frame_causes.tables import FEWEST_FAILURES, STARTS
+from gpca.experiments.cause_tables import AGAIN, SHOWN
+from gpca.experiments.frame_causes import FEWEST_FAILURES, STARTS, STATE
 from gpca.experiments.scan_failures import COLUMNS as SCAN_COLUMNS
 from gpca.experiments.scan_failures import NOT_COMPARED
 from gpca.io.files import whole_file

@@ -13,8 +13,8 @@ from gpca.attribution.predictions import read_predictions
 from gpca.causes.dataset import Causes
 from gpca.errors import InputError
 from gpca.experiments.controls.settings import HARD
-from gpca.experiments.diagnosis.experiment import shown as titles_and_costs
-from gpca.experiments.frame_causes.metrics import SAMPLE_COLUMNS
+from gpca.experiments.diagnosis import cause_costs
+from gpca.experiments.frame_causes import SAMPLE_COLUMNS
 from gpca.experiments.scan_causes import SAMPLE_COLUMNS as SCAN_COLUMNS
 from gpca.explainers.registry import explainer_entry
 from gpca.io.container import require_same_samples
@@ -154,7 +154,7 @@ def _method(key: Key, track: Track, config: Mapping[str, Any], parts: list[pd.Da
     named_N = np.array([numbers_of.get(label, NOTHING_NAMED) for label in named])
     name, training = key
     entry = explainer_entry(name, track.kind)
-    costs = titles_and_costs(config, {})["cause_costs"]
+    costs = cause_costs(config, [*config["diagnosis"]["explainers"], *config["diagnosis"]["by_features"]])
     calls = costs[name]["icp_calls"] if name in costs else NO_CALLS
     if track.name in (HARD_TRACK, SCANS_TRACK):  # their files have a column of calls
         calls = round(rows["icp_calls"].mean())

@@ -3,7 +3,7 @@
 import pytest
 
 from gpca.errors import InputError
-from gpca.experiments.diagnosis.metrics import COLUMNS
+from gpca.evaluation.measures import AGAINST, KEYS, NUMBERS
 from gpca.page.findings import Titles, findings_of
 
 TITLES = Titles(
@@ -56,19 +56,21 @@ def folder(tmp_path):
         for metric, value in zip(("labels_to_target", "reached", "labels"), values, strict=True)
     ]
     write_metrics(tmp_path / "active_learning.csv", labels, "active_learning/rare_5", "overlap")
-    lines = [
-        f"pooled,{method},balanced_accuracy,90,1,{value},{value - 0.05},{value + 0.05},,,,,{gain}"
-        for method, value, gain in (
-            ("ceiling", 0.9, ",,,"),
-            ("rule", 0.4, "chance,0.15,0.1,0.2"),
-            ("gpca", 0.5, "rule,0.1,0.0,0.2"),
-            ("pair", 0.7, "rule,0.3,0.2,0.4"),
-        )
-    ]
+    lines = []
+    for method, value, gain in (
+        ("ceiling", 0.9, ""),
+        ("rule", 0.4, "chance,1,9,90,0.15,0.1,0.2"),
+        ("gpca", 0.5, "rule,1,9,90,0.1,0.0,0.2"),
+        ("pair", 0.7, "rule,1,9,90,0.3,0.2,0.4"),
+    ):
+        keys = f"causes,pooled,{method},balanced_accuracy,all"
+        lines.append(f"{keys},,,1,9,90,{value},{value - 0.05},{value + 0.05}")
+        lines += [f"{keys},untrained,{gain}"] if gain else []
     lines += [
-        f"pooled,{method},regret,60,1,{value},0.0,1.0,,,,,,,," for method, value in (("rule", 0.6), ("pair", 0.25))
+        f"causes,pooled,{method},regret,all,,,1,9,60,{value},0.0,1.0"
+        for method, value in (("rule", 0.6), ("pair", 0.25))
     ]
-    head = ",".join(COLUMNS)
+    head = ",".join((*KEYS, *AGAINST, *NUMBERS))
     (tmp_path / "cause_intervals.csv").write_text("\n".join([head, *lines, ""]))
     return tmp_path
 

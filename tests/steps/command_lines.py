@@ -2,7 +2,7 @@
 
 import json
 
-from gpca.experiments.reenactment.knowledge import KNOWN
+from gpca.reenactment.settings import KNOWN
 
 ENCODER = {"draw_points": 64, "draws": 2, "epochs": 2, "batch_size": 12, "options": {"k": 8, "point_features": 16}}
 POLICY = {

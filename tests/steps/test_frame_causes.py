@@ -7,9 +7,10 @@ import pytest
 
 from gpca.causes.dataset import LABELS, Causes
 from gpca.causes.truth import BORDERLINE, GEOMETRY
+from gpca.config.layers import with_defaults
 from gpca.errors import InputError
-from gpca.experiments.frame_causes.metrics import STATE, TRUTH, collect
-from gpca.experiments.frame_causes.tables import table9_frames
+from gpca.experiments.frame_causes import STATE, TRUTH, collect, table9_frames
+from tests.experiments.runs import run_with
 from tests.steps.by_words import main
 
 from ..hostile import refusal
@@ -63,7 +64,7 @@ def test_every_explainer_is_judged_on_the_frames(asked):
     causes = Causes.load(asked[0][0])
     assert len(causes) == 6
     assert set(causes.registrations.split) == {"test"}
-    rows = collect(*asked)
+    rows = collect(None, *asked)
     counts = rows[(rows["method"] == TRUTH) & (rows["source"] == "real_rgbd/ladder")]
     counts = dict(zip(counts["metric"], counts["value"], strict=True))
     assert sum(counts[f"count_{state}"] for state in (*LABELS, BORDERLINE, GEOMETRY)) == 6
@@ -75,13 +76,13 @@ def test_every_explainer_is_judged_on_the_frames(asked):
 
 def test_a_scene_counts_as_one_and_an_instance_once(asked, tmp_path):
     """Each sample a second time, as the start of another estimator: values and intervals stay."""
-    once = collect(*asked)
+    once = collect(None, *asked)
     again = [tmp_path / path.name for [path] in asked]
     for [path], copy in zip(asked, again, strict=True):
         copy.write_bytes(path.read_bytes())
-    twice = collect(*([path, copy] for [path], copy in zip(asked, again, strict=True)))
+    twice = collect(None, *([path, copy] for [path], copy in zip(asked, again, strict=True)))
     measured = [rows[rows["method"] != TRUTH].reset_index(drop=True) for rows in (once, twice)]
-    columns = ["value", "low", "high", "difference", "difference_low", "difference_high"]
+    columns = ["against", "other", "value", "low", "high"]
     kept = measured[0]["metric"] != "test_samples"
     pd.testing.assert_frame_equal(measured[0].loc[kept, columns], measured[1].loc[kept, columns])
 
@@ -89,7 +90,7 @@ def test_a_scene_counts_as_one_and_an_instance_once(asked, tmp_path):
 def test_scenes_whose_truth_icp_made_are_counted_and_measure_nothing(asked, tmp_path):
     samples = tmp_path / "seed100.csv"
     samples.write_text(asked[1][0].read_text().replace("annotated", "icp"))
-    rows = collect(asked[0], [samples], asked[2])
+    rows = collect(None, asked[0], [samples], asked[2])
     assert set(rows["method"]) == {TRUTH}
     assert set(rows["source"]) == {"real_rgbd/pseudo_truth", "real_rgbd/pseudo_truth/tiny"}
 
@@ -102,16 +103,16 @@ def test_explainers_from_outside_have_files_of_their_own_and_rows_beside_the_oth
     for path, own in zip(parts, (~outside, outside), strict=True):
         path.parent.mkdir()
         rows[own].to_csv(path, index=False)
-    order = ["source", "method", "metric"]
-    both = [collect(*asked), collect(asked[0], asked[1], parts[:1], parts[1:])]
+    order = ["source", "method", "metric", "against"]
+    both = [collect(None, *asked), collect(None, asked[0], asked[1], parts[:1], parts[1:])]
     together, apart = (found.sort_values(order).reset_index(drop=True) for found in both)
     pd.testing.assert_frame_equal(together, apart)
 
 
 def test_the_table_says_how_few_there_are(asked):
-    titles = {name: name for name in SETTINGS["explainers"]}
-    costs = {name: {"sees": "pair", "icp_calls": 0} for name in titles}
-    table = table9_frames(collect(*asked), {"title": "Tiny", "stand_in": True}, titles, costs)
+    frames = with_defaults({})["real_world"] | {"title": "Tiny", "datasets": {}}
+    diagnosis = with_defaults({})["diagnosis"] | {"explainers": SETTINGS["explainers"]}
+    table = table9_frames(run_with(real_world=frames, diagnosis=diagnosis), collect(None, *asked))
     assert "6 starts of" in table.footnotes[0]
     assert "too few" in table.rows[0][0][1]
     assert "procedural stand-in" in table.caption
@@ -121,9 +122,9 @@ def test_files_of_other_samples_are_refused(asked, tmp_path):
     fewer = tmp_path / "seed100.csv"
     fewer.write_text("".join(asked[1][0].open().readlines()[:-1]))
     with pytest.raises(InputError, match="its samples differ from those of the causes"):
-        collect(asked[0], [fewer], asked[2])
+        collect(None, asked[0], [fewer], asked[2])
     with pytest.raises(InputError, match="need files of every seed"):
-        collect([], [], [])
+        collect(None, [], [], [])
 
 
 @pytest.mark.parametrize(

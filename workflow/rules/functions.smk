@@ -70,32 +70,6 @@ def other_sources(wildcards):
     return [name for name in NAMES["transfer_source"] if name != wildcards.source]
 
 
-def read_by(cause_explainer):
-    """Return the folder of what an explainer of causes reads."""
-    folders = {
-        "embeddings": "cause_embeddings",
-        REENACTED: "reenactments",
-        BARE: "causes",
-    }
-    return folders.get(explainer_entry(cause_explainer, CAUSES).reads, "descriptors")
-
-
-def if_enacted(files):
-    """Return files of re-enactments where an explainer of causes reads any."""
-    read = [
-        explainer_entry(name, CAUSES).reads
-        for name in config["diagnosis"]["explainers"]
-    ]
-    return files if REENACTED in read else []
-
-
-def frame_diagnosis(explainers):
-    """Return the settings of a job that asks some explainers of causes about depth frames."""
-    asked = {name: config["diagnosis"]["explainers"][name] for name in explainers}
-    icp = {"icp": config["registrations"]["icp"]}
-    return as_json(config["diagnosis"] | icp | {"explainers": asked})
-
-
 def estimator_settings(estimators):
     """Return the settings of a job that asks some estimators about registrations with measured causes."""
     names = ("estimator_pairs", "causes", "success")

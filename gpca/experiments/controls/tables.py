@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 from gpca.evaluation.intervals import REPEATS
 from gpca.evaluation.measures import POOLED
+from gpca.experiments.cause_tables import rule_near_chance
 from gpca.experiments.controls.metrics import CALLS
 from gpca.experiments.controls.settings import HARD, PAPER, TRANSFER, UNSEEN, WRONG_LABELS
-from gpca.experiments.diagnosis.near_chance import rule_near_chance
 from gpca.objects.entry import stand_in_clause
 from gpca.reporting.tables.builder import TableBuilder, crossed, titles_of
 from gpca.reporting.tables.cells import interval_cell, plain_cell, rows_where

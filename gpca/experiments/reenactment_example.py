@@ -1,4 +1,4 @@
-"""Draws one re-enactment: the hypotheses of the true pose, the rebuilt clouds, and the errors beside the true ones."""
+"""Drawing of one re-enactment: hypotheses of the true pose, rebuilt clouds, and errors beside the measured ones."""
 
 from __future__ import annotations
 
@@ -10,13 +10,10 @@ import numpy as np
 
 from gpca.alignment.rigid import transform
 from gpca.causes.dataset import Causes
-from gpca.causes.descriptors import observed_pair
 from gpca.causes.settings import CauseSettings
 from gpca.causes.truth import ALL, BY_SIZE, FAILED, SUBSETS
 from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS, NOISE, OVERLAP
-from gpca.reenactment.dataset import Reenactments
-from gpca.reenactment.enactment import Enactment, reenact
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.reporting.figures.cloud_views import draw_clouds, legend_of_clouds, widest_views
 from gpca.reporting.figures.panels import write_below
@@ -33,10 +30,12 @@ from gpca.reporting.figures.style import (
 )
 from gpca.reporting.words import object_in_words
 from gpca.seeds import seed_of_file
-from gpca.settings import read_settings
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from gpca.reenactment.dataset import Reenactments
+    from gpca.reenactment.enactment import Enactment
 
 PER_ROW = 4
 PANEL_IN, HEAD_IN, CAPTION_IN, ERRORS_IN = 0.85, 0.17, 0.15, 2.1
@@ -49,8 +48,8 @@ AGREE = 1e-6  # diameters; numbers of a file and of the same re-enactment made a
 def draw_reenactment(
     causes_npz: str | Path,
     reenactments_npz: str | Path,
-    truth: Mapping,
-    settings: Mapping,
+    truth: CauseSettings,
+    settings: ReenactmentSettings,
     title: str,
     dataset: str = "",
 ) -> Figure:
@@ -61,18 +60,18 @@ def draw_reenactment(
     hypothesis, it is the one whose margin, by which its largest φ exceeds the next one, is the median.
 
     Args:
-        causes_npz, reenactments_npz: Of the shown source and seed, which their paths name.
-        truth: The config's section ``causes`` with ``icp``.
-        settings: The config's ``diagnosis.reenactment``.
+        causes_npz, reenactments_npz: of the shown source and seed, which their paths name.
     """
+    from gpca.causes.descriptors import observed_pair
+    from gpca.reenactment.dataset import Reenactments
+    from gpca.reenactment.enactment import reenact
+
     source, seed = Path(causes_npz).parent.name, seed_of_file(causes_npz)
     causes = Causes.load(causes_npz, (source, seed))
     enacted = Reenactments.load(reenactments_npz, causes.registrations)
     row = choose_sample(causes, enacted, causes_npz)
     pair = observed_pair(causes, row, source, seed, "reenactment")
-    sections = dict(truth)
-    icp = sections.pop("icp", None)
-    again = reenact(pair, read_settings(ReenactmentSettings, dict(settings)), CauseSettings.from_dict(sections, icp))
+    again = reenact(pair, settings, truth)
     weight_K = enacted.weight[row][: len(again)]
     _require_same(again, enacted, row, reenactments_npz)
 
@@ -100,7 +99,7 @@ def draw_reenactment(
 
 
 def choose_sample(causes: Causes, enacted: Reenactments, path: str | Path) -> int:
-    """Return the row that is shown; see :func:`draw_reenactment`.
+    """Row that is shown; see :func:`draw_reenactment`.
 
     Where no failed test sample has several causes or several hypotheses, that is not asked for.
     """

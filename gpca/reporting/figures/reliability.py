@@ -7,10 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.causes.judged import BINS as BINS_OF_NOMINAL
-from gpca.causes.judged import Judged
-from gpca.causes.truth import BORDERLINE, NOMINAL
-from gpca.errors import InputError
 from gpca.evaluation.intervals import wilson_interval
 from gpca.reporting.figures.panels import MOST_PER_ROW, label_outer, legend_below, panels_in_lines
 from gpca.reporting.figures.style import BLUE, GRAY, LIGHT_GRAY, SMALL_PT, TEXT_WIDTH_IN, write_title
@@ -22,32 +18,6 @@ FEWEST = 5  # A bin with fewer samples has no point.
 HEADROOM = 2.0  # The axis of the numbers is this many times as high as the highest bar.
 BESIDE_IN, ABOVE_IN = 0.42, 0.42  # what stands beside a square panel, and above and below it
 WIDEST_IN = 1.6  # of a panel
-
-
-def draw_nominal_reliability(
-    judged: Mapping[tuple[str, str, int], Judged], sources: Mapping[str, str], explainers: Mapping[str, str]
-) -> Figure:
-    """Draw the share of nominal registrations over the score of "nominal", all sources and seeds together.
-
-    Args:
-        judged: what :func:`gpca.causes.judged.read_judged` returns; borderline samples are left out.
-    """
-    parts = {
-        name: [of_seed for (source, own, _), of_seed in judged.items() if own == name and source in sources]
-        for name in explainers
-    }
-    shown = [name for name in explainers if parts[name]]
-    if not shown:
-        raise InputError("diagnoses", "have no predictions of these sources and explainers", "run them first")
-    samples = {}
-    for name in shown:
-        label_S = np.concatenate([of_seed.label for of_seed in parts[name]])
-        score_S = np.concatenate([of_seed.nominal for of_seed in parts[name]])
-        clear_S = label_S != BORDERLINE
-        samples[explainers[name]] = score_S[clear_S], label_S[clear_S] == NOMINAL
-    drawn = {source for source, own, _ in judged if own in shown}
-    title = ", ".join(title for name, title in sources.items() if name in drawn)
-    return reliability_figure(samples, title, BINS_OF_NOMINAL, 'score of "nominal"', "share", "share that is nominal")
 
 
 def reliability_figure(

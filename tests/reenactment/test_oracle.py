@@ -10,13 +10,12 @@ from gpca.causes.dataset import LABELS
 from gpca.causes.settings import CauseSettings
 from gpca.causes.truth import ALL, SUBSETS
 from gpca.errors import InputError
-from gpca.experiments.reenactment.knowledge import EVERYTHING, KNOWN, NOTHING, in_words
-from gpca.experiments.reenactment.oracle import ask_oracles, informed
 from gpca.pairs.perturbation import NOISE, OVERLAP, POSE
 from gpca.reenactment.dataset import reenact_all
 from gpca.reenactment.enactment import NoiseScale, observe, rebuild
 from gpca.reenactment.hypotheses import Hypothesis
-from gpca.reenactment.settings import ReenactmentSettings
+from gpca.reenactment.oracle import ask_oracles, informed
+from gpca.reenactment.settings import EVERYTHING, KNOWN, NOTHING, ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface
 from tests.conftest import FEW_CAUSES
 from tests.reenactment.conftest import candidate_of, surface_of
@@ -54,12 +53,9 @@ def told(candidate, *known):
     return informed(rebuilt_at_the_truth(candidate), np.eye(4), candidate, known, np.random.default_rng(1))
 
 
-def test_every_set_of_causes_may_be_known_and_has_its_words():
+def test_every_set_of_causes_may_be_known():
     assert set(KNOWN.values()) == set(SUBSETS) and len(KNOWN) == len(SUBSETS)
     assert KNOWN[NOTHING] == () and KNOWN[EVERYTHING] == SUBSETS[ALL]
-    words = {name: in_words(name) for name in KNOWN}
-    assert len(set(words.values())) == len(KNOWN)
-    assert words["noise_pose"] == "true pose + points without noise"
 
 
 def test_who_knows_nothing_says_what_the_re_enactment_says_and_who_knows_more_says_something_else(four, some, asked):

@@ -3,12 +3,9 @@ import numpy as np
 import pytest
 
 from gpca.causes.judged import measure
-from gpca.errors import InputError
 from gpca.evaluation.intervals import wilson_interval
-from gpca.experiments.diagnosis.reliability import draw_nominal_reliability, draw_reliability_panel
+from gpca.reporting.figures.reliability import draw_reliability_panel
 from tests.judged import random_judged
-
-SOURCES, EXPLAINERS = {"cups": "Cups"}, {"gpca_pair": "GP-CA on the pair", "absent": "Absent"}
 
 
 def test_the_error_in_the_title_is_the_one_of_the_tables(tmp_path):
@@ -44,13 +41,6 @@ def test_the_panel_is_square_and_counts_the_samples_of_each_bin():
     assert panel.get_box_aspect() == counts.get_box_aspect() == 1
     assert panel.get_xlim() == panel.get_ylim()
     plt.close()
-
-
-def test_the_figure_is_the_same_bytes_each_time(same_bytes):
-    judged = {("cups", "gpca_pair", seed): random_judged(seed=seed) for seed in (100, 101)}
-    same_bytes(lambda: draw_nominal_reliability(judged, SOURCES, EXPLAINERS))
-    with pytest.raises(InputError, match="have no predictions of these sources and explainers"):
-        draw_nominal_reliability(judged, {"mugs": "Mugs"}, EXPLAINERS)
 
 
 def test_every_point_has_its_wilson_interval():

@@ -14,7 +14,6 @@ from gpca.causes.dataset import LABELS, Causes
 from gpca.causes.descriptors import observed_pair
 from gpca.causes.settings import CauseSettings
 from gpca.errors import InputError
-from gpca.experiments.reenactment.knowledge import KNOWN
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.distances import ObservedPair
 from gpca.pairs.perturbation import NOISE, OVERLAP, POSE
@@ -22,7 +21,7 @@ from gpca.process.progress import progress
 from gpca.reenactment.dataset import verdict
 from gpca.reenactment.enactment import Enactment, NoiseScale, enact, reenact, register, start_twists
 from gpca.reenactment.hypotheses import hypothesis_at, weights_of
-from gpca.reenactment.settings import ReenactmentSettings
+from gpca.reenactment.settings import KNOWN, ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface
 from gpca.seeds import generator
 
@@ -32,7 +31,7 @@ SAME = 1e-3  # diameters; points that were drawn again lie no farther from those
 def ask_oracles(
     objects: ObjectClouds, causes: Causes, source: str, seed: int, settings: ReenactmentSettings, truth: CauseSettings
 ) -> dict[str, Attribution]:
-    """Return what a re-enactment says of every row, by what it knows (:data:`KNOWN`).
+    """Diagnose every row by a re-enactment, for each thing that it may know (:data:`gpca.reenactment.settings.KNOWN`).
 
     Args:
         objects: that the rows show.
@@ -57,20 +56,20 @@ def ask_oracles(
 def verdicts(
     pair: ObservedPair, true: Candidate, settings: ReenactmentSettings, truth: CauseSettings
 ) -> dict[str, np.ndarray]:
-    """Return the verdict (4,) of :func:`gpca.reenactment.dataset.verdict` on one pair, by what is known.
+    """Verdict (4,) of :func:`gpca.reenactment.dataset.verdict` on one pair, by what is known.
 
     Args:
         true: the candidate that the pair is.
     """
     enacting = _Enacting(pair, true, truth, ModelSurface(pair.model), start_twists(pair.axes, truth))
     estimated, at_truth = reenact(pair, settings, truth, enacting.surface), [enacting.at_the_true_pose(settings)]
-    found = {}
+    by_name = {}
     for name, known in KNOWN.items():
         enactments = at_truth if POSE in known else estimated
         error_K_8 = np.array([enacting.errors(enactment, known) for enactment in enactments])
         weight_K = weights_of(enactment.hypothesis for enactment in enactments)
-        found[name] = verdict(error_K_8[None], weight_K[None], truth.limits)[0]
-    return found
+        by_name[name] = verdict(error_K_8[None], weight_K[None], truth.limits)[0]
+    return by_name
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from gpca.causes.candidate import replay
 from gpca.causes.settings import CauseSettings
 from gpca.causes.truth import ALL, FAILED
 from gpca.errors import InputError
-from gpca.experiments.diagnosis.example import CLEAR, GAP, TRUTH, _draw_scores, choose_sample, draw_causes_example
+from gpca.experiments.causes_example import CLEAR, GAP, TRUTH, _draw_scores, choose_sample, draw_causes_example
 from gpca.objects.canonical import write_objects
 from gpca.objects.procedural import surfaces
 from tests.conftest import FEW_CAUSES, FOUR

@@ -1,20 +1,20 @@
-"""Step ``oracles``: objects and causes of a seed -> what re-enactments say that know parts of the truth."""
+"""The step of oracles: objects and causes of a seed -> diagnoses by re-enactments that know parts of the truth."""
 
 from __future__ import annotations
 
 from gpca.attribution.predictions import write_predictions
 from gpca.causes.dataset import Causes
 from gpca.causes.settings import CauseSettings
-from gpca.experiments.reenactment.oracle import ask_oracles
 from gpca.objects.canonical import ObjectClouds
 from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
+from gpca.reenactment.oracle import ask_oracles
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.settings import read_settings
 
 
 def run(job: Job) -> None:
-    """Ask about the test samples; the predictions of each oracle go to the folder of its name."""
+    """Diagnose the test samples; the predictions of each oracle go to the folder of its name."""
     settings = read_settings(ReenactmentSettings, job.section("reenactment"))
     truth = CauseSettings.from_dict(job.section("causes"), job.section("icp"))
     own = {path.parts[-2]: path for path in job.predictions}

@@ -6,33 +6,40 @@ import pytest
 
 from gpca.causes.judged import CEILING
 from gpca.errors import InputError
-from gpca.experiments.diagnosis.metrics import COLUMNS
-from gpca.experiments.frame_causes.metrics import COUNTED, PSEUDO, TRUTH
-from gpca.experiments.frame_causes.tables import table9_frame_counts, table9_frames
+from gpca.evaluation.measures import AGAINST, KEYS, NUMBERS
+from gpca.experiments import frame_causes
+from gpca.experiments.frame_causes import COUNTED, PSEUDO, TRUTH, table9_frame_counts, table9_frames
+from tests.experiments.runs import run_with
 
-FRAMES = {"title": "Frames", "stand_in": False}
-EXPLAINERS = {"good": "Good", "poor": "Poor"}
-COSTS = {name: {"sees": "pair", "icp_calls": 0} for name in EXPLAINERS}
-APART, NONE = (0.2, 0.15, 0.3), (np.nan,) * 3
+RUN = run_with()
+APART = (0.2, 0.15, 0.3)
 MANY = {"starts": 90, "instances": 30, "scenes": 3, "nominal": 20, "borderline": 29, "pose": 30, "noise": 6}
 MANY |= {"overlap": 4, "geometry": 1, "missed": 5}
 FEW = MANY | {"starts": 60, "pose": 19, "nominal": 1}
 
 
 def counts(source, values):
-    nothing = (np.nan, np.nan, "", np.nan, np.nan, np.nan, "", np.nan, np.nan, np.nan)
-    return [(source, TRUTH, f"count_{name}", 90, 1, values.get(name, 0), *nothing) for name in COUNTED]
-
-
-def measures(source, method, rival, **values):
-    others = (rival, *(APART if rival else NONE), "rule", *NONE)
     return [
-        (source, method, metric, 60, 1, value, value - 0.1, value + 0.05, *others) for metric, value in values.items()
+        ("causes", source, TRUTH, f"count_{name}", "all", "", "", 1, 3, 90, values.get(name, 0), np.nan, np.nan)
+        for name in COUNTED
     ]
 
 
+def measures(source, method, rival, **values):
+    records = []
+    for metric, value in values.items():
+        keys, sizes = ("causes", source, method, metric, "all"), (1, 3, 60)
+        records.append((*keys, "", "", *sizes, value, value - 0.1, value + 0.05))
+        records += [(*keys, "rival", rival, *sizes, *APART)] if rival else []
+    return records
+
+
 @pytest.fixture
-def intervals():
+def intervals(monkeypatch):
+    titles = {"good": "Good", "poor": "Poor"}
+    monkeypatch.setattr(frame_causes, "cause_titles", lambda config: titles)
+    costs = {name: {"sees": "pair", "icp_calls": 0} for name in titles}
+    monkeypatch.setattr(frame_causes, "cause_costs", lambda config, names: costs)
     rows = []
     for kind, values in {"native": FEW, "ladder": MANY}.items():
         source = f"real_rgbd/{kind}"
@@ -41,13 +48,13 @@ def intervals():
         rows += measures(source, "poor", "good", test_samples=60, state_accuracy=0.6, dominant_accuracy=0.4)
         rows += measures(source, CEILING, "", state_accuracy=0.95)
     rows += counts(f"real_rgbd/{PSEUDO}", {"starts": 7, "pose": 7}) + counts(f"real_rgbd/{PSEUDO}/icbin", {"starts": 7})
-    return pd.DataFrame(rows, columns=list(COLUMNS))
+    return pd.DataFrame(rows, columns=[*KEYS, *AGAINST, *NUMBERS])
 
 
 def test_kinds_of_starts_stand_apart_and_few_failures_make_no_best(intervals):
-    text = table9_frames(intervals, FRAMES, EXPLAINERS, COSTS).markdown()
+    text = table9_frames(RUN, intervals).markdown()
     assert (
-        "| Estimated in the image (29 failed, too few) | Good | pair | 80.0 (70.0 to 85.0) | – | 20.0 (15.0 to 30.0) |"
+        "| Estimated in the image (29 failed, too few) | Good | pair | 80.0 (70.0 to 85.0) | 20.0 (15.0 to 30.0) |"
         in text
     )
     assert "| Ladder of errors (40 failed) | Good | pair | **80.0 (70.0 to 85.0)** |" in text
@@ -57,7 +64,7 @@ def test_kinds_of_starts_stand_apart_and_few_failures_make_no_best(intervals):
 
 
 def test_the_failures_are_counted_below_by_cause(intervals):
-    text = table9_frames(intervals, FRAMES, EXPLAINERS, COSTS).markdown()
+    text = table9_frames(RUN, intervals).markdown()
     assert "Ladder of errors: 90 starts of 30 instances in 3 scenes; 20 nominal, 29 borderline, 1 off without" in text
     assert (
         "40 failed: 6 mostly by noise, 30 mostly by pose, 4 mostly by overlap. One constant answer names 75 %" in text
@@ -65,7 +72,7 @@ def test_the_failures_are_counted_below_by_cause(intervals):
 
 
 def test_counts_are_of_kinds_and_datasets_and_truth_by_icp_is_apart(intervals):
-    text = table9_frame_counts(intervals, FRAMES).markdown()
+    text = table9_frame_counts(RUN, intervals).markdown()
     assert "| Ladder of errors | All | 90 | 30 | 3 | 20 | 29 | 40 | 6 | 30 | 4 | 1 | 5 |" in text
     assert "| Ladder of errors | YCB-Video | 90 |" in text
     assert "| Truth made by ICP | All | 7 |" in text
@@ -74,6 +81,6 @@ def test_counts_are_of_kinds_and_datasets_and_truth_by_icp_is_apart(intervals):
 
 def test_no_counts_make_no_table(intervals):
     other = intervals.assign(source="ycb")
-    for build in (lambda: table9_frames(other, FRAMES, EXPLAINERS, COSTS), lambda: table9_frame_counts(other, FRAMES)):
+    for build in (lambda: table9_frames(RUN, other), lambda: table9_frame_counts(RUN, other)):
         with pytest.raises(InputError, match="has nothing to show"):
             build()

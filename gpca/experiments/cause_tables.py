@@ -1,0 +1,261 @@
+"""Tables IX and their figures: whether explainers say that a registration failed, and why, by the measured truth."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
+from math import inf
+from typing import TYPE_CHECKING, Any
+
+from gpca.causes.judged import (
+    BINS,
+    CEILING,
+    joined,
+    read_judged,
+)
+from gpca.causes.truth import BORDERLINE, NOMINAL
+from gpca.errors import InputError
+from gpca.evaluation.intervals import REPEATS
+from gpca.evaluation.measures import POOLED
+from gpca.experiments.causes_example import draw_causes_example
+from gpca.experiments.confusions import draw_confusions_figure
+from gpca.experiments.diagnosis import CAUSES_FILES, DIAGNOSES, cause_costs, cause_titles
+from gpca.experiments.plan import Run
+from gpca.experiments.result import figure, table
+from gpca.explainers.interface import WORDS
+from gpca.objects.entry import dataset_of
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.reporting.figures.reliability import reliability_figure
+from gpca.reporting.sheet import Row, Sheet, show, where
+from gpca.reporting.tables.cells import interval_cell, plain_cell, rows_where
+from gpca.reporting.tables.table import Cell, Column
+from gpca.reporting.words import plural
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+NEAR = 10  # points above chance up to which the untrained rule is near it
+SECTION = "Beyond the paper: what made a registration fail"
+POINTS = {"limits": (-100.0, 100.0)}
+COUNTS = {"decimals": 0, "interval": False, "limits": (0.0, inf)}
+SHOWN = {
+    "regret": show("regret", "Regret (%)", limits=(0.0, inf), least_is_best=True),
+    "tied_accuracy": show("tied_accuracy", "With ties (%)"),
+    "balanced_accuracy": show("balanced_accuracy", "Balanced (%)"),
+    "gain": show("balanced_accuracy", "Over untrained (points)", where={"against": "untrained"}, **POINTS),
+    "lead": show("balanced_accuracy", "Lead (points)", where={"against": "rival"}, **POINTS),
+    "dominant_accuracy": show("dominant_accuracy", "Dominant (%), chance 33.3"),
+    "false_alarm_rate": show("false_alarm_rate", "False alarms (%)", least_is_best=True),
+    "auroc_failed": show("auroc_failed", "AUROC", factor=1, decimals=3, limits=(0.0, 1.0)),
+    "average_precision": show("average_precision", "mAP (%)", interval=False),
+    "spearman_attribution": show(
+        "spearman_attribution", "Spearman", factor=1, decimals=2, interval=False, limits=(-1.0, 1.0)
+    ),
+    "nominal_calibration": show(
+        "nominal_calibration",
+        "ECE (share)",
+        **{"factor": 1, "decimals": 3, "interval": False, "limits": (0.0, 1.0), "least_is_best": True},
+    ),
+    "icp_calls": Column("ICP calls", **COUNTS),
+    "samples": Column("n", **COUNTS),
+}
+NOT_COMPARED = ("gain", "lead", "icp_calls", "samples")
+AGAIN = {CEILING: "Truth from other starts (counterfactual access)"}
+COSTS: dict[str, dict[str, Any]] = {CEILING: {"sees": WORDS["truth"], "icp_calls": None}}
+COST_NOTE = "Reads: what an explainer sees of a registration. ICP calls: runs beyond the one that it explains."
+
+
+def reads(cost: Mapping) -> tuple[str, str]:
+    """Label of what an explainer sees."""
+    return cost["sees"], cost["sees"]
+
+
+def counts_and_calls(costs: Mapping[str, Mapping]) -> Callable[[Row, pd.DataFrame], dict[str, Cell]]:
+    """Return the function that gives a row of a sheet its most samples, and the runs of ICP of its explainer."""
+
+    def cells(row: Row, subset: pd.DataFrame) -> dict[str, Cell]:
+        judged, seeds = subset["samples"].max(), int(subset["seeds"].iloc[0])
+        calls = costs.get(row.where["method"], {}).get("icp_calls")
+        shown = {"samples": plain_cell(judged, seeds, int(judged))}
+        return shown if calls is None else shown | {"icp_calls": plain_cell(calls, seeds, int(judged))}
+
+    return cells
+
+
+@figure(
+    SECTION,
+    "One failed registration and its counterfactuals",
+    """A failed registration of a test object, registered again with every subset of its causes from the same starts.
+    The errors give each cause its exact share φ in the failure, its Shapley value. On the right are these shares
+    and below them the scores of every explainer, which saw only the registration with all causes; the largest of
+    each row is bold. Scores are no shares: those of a multi-label explainer need not add up to 1.
+
+    Shown is a usual case with a clear cause: of the failed test samples with several causes whose largest φ is at
+    least 0.6 of the sum, the one whose margin over the next φ is the median. The last column says who names the
+    dominant cause (right), one that adds nearly as much (tie) or something else (wrong). The error in the title is
+    that of the one registration that the explainers see.""",
+    objects_npz="objects/{shown_source}.npz",
+    causes_npz="causes/{shown_source}/seed{first_seed}.npz",
+    predictions_csv="diagnoses/{shown_source}/{cause_explainer}/seed{first_seed}.csv",
+)
+def causes_example(run: Run, objects_npz, causes_npz, predictions_csv):
+    """The counterfactuals, the measured shares and the scores of every explainer."""
+    source = run.config["figures"]["source"]
+    truth = run.config["causes"] | {"icp": dict(run.config["registrations"]["icp"])}
+    shown = run.source_titles[source], dataset_of(run.config["sources"][source])
+    return draw_causes_example(objects_npz, causes_npz, predictions_csv, truth, cause_titles(run.config), *shown)
+
+
+@table(
+    SECTION,
+    "Table IX: what is wrong, and why",
+    """Every explainer on registrations whose true causes are measured: does it say whether anything is wrong and which
+    cause did most, and how much of the error would vanish without the cause that it names first? No explainer was
+    trained on a test object, and borderline registrations are not judged.
+
+    The last row of a dataset is the truth measured again from other starts. It has the true pose and the clean
+    clouds: counterfactual access, which no observer has. What an observer may reach is estimated by the learning
+    curve.""",
+    intervals="cause_intervals.csv",
+)
+def table9_causes(run: Run, intervals):
+    """Every measure of every explainer, by source and pooled, the ceiling last."""
+    explainers, titles = cause_titles(run.config), run.source_titles | {POOLED: "All together"}
+    costs = cause_costs(run.config, explainers) | COSTS
+    rows = [
+        Row([source, explainer, reads(costs[explainer[0]])], {"source": source[0], "method": explainer[0]}, rival)
+        for source in titles.items()
+        for explainer in (explainers | AGAIN).items()
+        for rival in (explainer[0] != CEILING,)
+    ]
+    heads = {"source": "Dataset", "explainer": "Explainer", "reads": "Reads"}
+    sheet = Sheet("table9_causes", heads, rows, SHOWN, intervals, more=counts_and_calls(costs))
+    stand_ins = any(entry["stand_in"] for entry in run.sources.values())
+    notes = (
+        f"n: test samples that are judged, over {plural(sheet.seeds, 'seed')}; borderline ones are left "
+        f"out. Of them, {_states(intervals, titles)}. In brackets: the 95 % interval of a bootstrap over objects "
+        f"and seeds ({REPEATS} draws). Bold: best explainer on a dataset.",
+        "Regret: of the failed, the share of the error that removing the best single cause would take away and "
+        "removing the named one does not; who names nominal removes nothing. With ties: as Dominant, but any cause "
+        "counts whose φ is within the limit of a cause (1 % of the diameter by default) of the largest.",
+        "Balanced: mean share named rightly of nominal and of the three dominant causes. Over untrained: balanced "
+        "accuracy minus that of the best of chance, the most frequent label and the rule; lead: minus that of the "
+        "best other explainer; both on the same draws, so that it is better where the interval is above 0. "
+        "Dominant: of the failed alone, the share whose main cause has the highest score among the causes. No gate "
+        "of nominal helps with that, and guessing is right in 33.3 %."
+        + rule_near_chance(intervals, run.sources, metric="dominant_accuracy", against=""),
+        "False alarms: share of the nominal above the alarm that finds 90 % of the failed. AUROC: of failed "
+        "against nominal. mAP: mean average precision of the sets of causes. Spearman: of scores and measured "
+        "attributions of the failed. ECE: expected calibration error of the score of nominal.",
+        "Gates only say whether something is wrong. The last row is the truth measured again from other starts; it "
+        "has the true pose and the clean clouds, which no observer has: nothing says that it can be reached.",
+        COST_NOTE,
+    )
+    caption = "What is wrong with a registration, if anything: objects that no explainer was trained on"
+    caption += ", procedural stand-ins among them" if stand_ins else ""
+    return sheet.table(caption, "metric", notes, bold=[key for key in SHOWN if key not in NOT_COMPARED], same=1)
+
+
+def _states(intervals: pd.DataFrame, titles: Mapping[str, str]) -> str:
+    """How many samples of each source are nominal and how many failed, in words."""
+    parts = {}
+    for source, title in titles.items():
+        samples = where(intervals, {"source": source}).groupby("metric")["samples"].max()
+        nominal, judged = samples.get("false_alarm_rate"), samples.max()
+        if source != POOLED and nominal is not None:
+            parts[title] = f"{nominal:.0f} are nominal and {judged - nominal:.0f} failed"
+    if len(parts) > 1 and len(set(parts.values())) == 1:
+        return f"{next(iter(parts.values()))} on each dataset"
+    return "; ".join(f"{words} on {title}" for title, words in parts.items())
+
+
+def rule_near_chance(intervals: pd.DataFrame, sources: Iterable[str], **wanted: object) -> str:
+    """Sentence on the untrained rule's share, its distance from chance, and whether its interval ends near that.
+
+    Args:
+        intervals: rows with source, method, value, low and high.
+        sources: those after all together; the first that has the rule counts.
+        wanted: further entries of the row.
+    """
+    rule, chance = rows_where(intervals, method="rule", **wanted), 100 / len(CONCEPTS)
+    for source in (POOLED, *sources):
+        rows = rows_where(rule, source=source)
+        if len(rows) and (bounds := (cell := interval_cell(rows.iloc[0])).bounds):
+            low, high = bounds
+            ends = "ends within" if high <= chance + NEAR else "reaches beyond"
+            return (
+                f" There the untrained rule is right in {cell.mean:.1f} % ({low:.1f} to {high:.1f}), which is "
+                f"{cell.mean - chance:+.1f} points from chance; the interval {ends} {NEAR} points above chance."
+            )
+    return ""
+
+
+@table(
+    SECTION,
+    "Table IX by what is read",
+    """A forest and GP-CA's classifier on more and more of a registration: the observed cloud alone, both clouds, how
+    far ICP moved them, further runs from other starts, and runs with remedies. Beside each is what it costs in runs of
+    ICP.""",
+    intervals="feature_intervals.csv",
+)
+def table9_features(run: Run, intervals):
+    """Measures of learners that see more and more, pooled and by source."""
+    titles, explainers = {POOLED: "All together"} | run.source_titles, cause_titles(run.config, "by_features")
+    keys = ("icp_calls", "regret", "tied_accuracy", "balanced_accuracy", "lead", "dominant_accuracy")
+    columns = {key: SHOWN[key] for key in (*keys, "false_alarm_rate", "auroc_failed", "samples")}
+    columns["lead"] = replace(columns["lead"], title="To the best other (points)")
+    rows = [
+        Row([source, explainer], {"source": source[0], "method": explainer[0]})
+        for source in titles.items()
+        for explainer in explainers.items()
+    ]
+    more = counts_and_calls(cause_costs(run.config, explainers))
+    heads = {"source": "Dataset", "explainer": "Learner and what it reads"}
+    sheet = Sheet("table9_features", heads, rows, columns, intervals, more=more)
+    notes = (
+        "ICP calls: runs beyond the one that is explained. Rows with as many compare what the same price buys. "
+        "Aligned source: thickness, spacing, extent and number of points of the observed cloud. Remedies with few "
+        "calls: those without a restart.",
+        "To the best other: balanced accuracy minus that of the best other row of the dataset, on the same draws. "
+        f"The measures are those of Table IX. Over {plural(sheet.seeds, 'seed')}; in brackets the 95 % "
+        f"interval of a bootstrap over objects and seeds ({REPEATS} draws). Bold: best of a dataset.",
+    )
+    caption = "What each part of a registration tells of its causes" + run.stand_ins()
+    return sheet.table(caption, "metric", notes, bold=[key for key in columns if key not in NOT_COMPARED], same=1)
+
+
+@figure(
+    SECTION,
+    "What each explainer takes a cause for",
+    """What each explainer (rows) takes a nominal registration and each dominant cause for, by dataset (columns),
+    pooled over test samples and seeds, without borderline registrations.""",
+    metrics="causes.csv",
+)
+def cause_confusions(run: Run, metrics):
+    """Matrix of each explainer on each source."""
+    return draw_confusions_figure(metrics, run.source_titles, cause_titles(run.config))
+
+
+@figure(
+    SECTION,
+    "When it says that nothing is wrong",
+    """Share of the test registrations that are nominal, over each explainer's score of "nominal", for all datasets and
+    seeds together and without borderline registrations. On the diagonal, a score of 0.8 means that nothing is wrong
+    in 80 % of the cases. The number is the calibration error of them all (pooled ECE), and vertical lines are Wilson's
+    intervals (95 %) of independent samples.""",
+    judged=(read_judged, {"prediction_files": DIAGNOSES, "causes_files": CAUSES_FILES}),
+)
+def nominal_reliability(run: Run, judged):
+    """Share of nominal registrations over the score of "nominal", all sources and seeds together."""
+    titles, samples, sources = run.source_titles, {}, set()
+    for explainer, title in cause_titles(run.config).items():
+        parts = {key: each for key, each in judged.items() if key[1] == explainer and key[0] in titles}
+        if parts:
+            together = joined(parts.values())
+            labeled_S = together.label != BORDERLINE
+            samples[title] = together.nominal[labeled_S], together.label[labeled_S] == NOMINAL
+            sources |= {source for source, _, _ in parts}
+    if not samples:
+        raise InputError("diagnoses", "have no predictions of these sources and explainers", "run them first")
+    title = ", ".join(title for name, title in titles.items() if name in sources)
+    return reliability_figure(samples, title, BINS, 'score of "nominal"', "share", "share that is nominal")

@@ -1,0 +1,259 @@
+"""Causes of failed registrations: explainers against the measured shares of each cause in the error (Table IX)."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+
+from gpca.attribution.metrics import ABSTAINED, PREDICTED_AS, confusion
+from gpca.causes.dataset import LABELS
+from gpca.causes.judged import (
+    CEILING,
+    MEASURES,
+    Judged,
+    counted,
+    joined,
+    measure,
+    read_judged,
+)
+from gpca.causes.settings import DescriptorSettings
+from gpca.causes.truth import BORDERLINE
+from gpca.encoders.registry import NamedEncoder, require_backbone, require_draws
+from gpca.errors import InputError, with_key
+from gpca.evaluation.intervals import ANYTHING, UNTRAINED, Clustered
+from gpca.evaluation.measures import ALL, POOLED, Rivals, compared, intervals, tidy
+from gpca.experiments.experiment import ByName, Experiment, LeftOut, Names
+from gpca.experiments.plan import Run
+from gpca.experiments.result import numbers
+from gpca.experiments.step import Step
+from gpca.explainers.interface import BARE, REENACTED, icp_calls
+from gpca.explainers.registry import CAUSES, explainer_entry, explainer_module, explainers, require_settings
+from gpca.reenactment.settings import ReenactmentSettings
+from gpca.settings import part_of
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+NAME = "diagnosis"
+TABLE = "causes"
+
+
+@dataclass(frozen=True)
+class Section:
+    """The settings by which explainers of causes describe, re-enact, encode and explain a pair."""
+
+    descriptors: Annotated[dict, part_of(DescriptorSettings)]
+    reenactment: Annotated[dict, part_of(ReenactmentSettings)]
+    encoder: NamedEncoder
+    explainers: ByName
+    by_features: ByName
+
+
+def check(config: dict, _left_out: LeftOut) -> None:
+    """Check the explainers, and the encoder, for whose draws the clouds need points enough."""
+    encoder = config[NAME]["encoder"]
+    with_key("diagnosis.encoder.backbone", require_backbone, encoder["backbone"])
+    require_draws("diagnosis.encoder", encoder, config["causes"]["points"][1], "causes.points")
+    for key in ("explainers", "by_features"):
+        for name, settings in config[NAME][key].items():
+            with_key(f"diagnosis.{key}.{name}", require_settings, name, settings or {}, CAUSES)
+    for name in config[NAME]["by_features"]:
+        if explainer_entry(name, CAUSES).reads != "descriptors":
+            fault = "reads no descriptors, by whose parts the explainers of this table differ"
+            raise InputError(f"config key diagnosis.by_features.{name}", fault, "move it to diagnosis.explainers")
+
+
+def cause_titles(config: Mapping[str, Any], key: str = "explainers") -> dict[str, str]:
+    """Titles of the explainers of causes, or of those that differ in what they read."""
+    return {name: explainer_entry(name, CAUSES).title for name in config[NAME][key]}
+
+
+def cause_costs(config: Mapping[str, Any], names: Iterable[str]) -> dict[str, dict[str, Any]]:
+    """What each explainer ``sees``, in words, and its number of ``icp_calls`` beyond the one that it explains."""
+    starts, descriptors = config["causes"]["starts"], DescriptorSettings(**config[NAME]["descriptors"])
+    reenactment = ReenactmentSettings(**config[NAME]["reenactment"]).calls(starts)
+    entries = {name: explainer_entry(name, CAUSES) for name in names}
+    return {
+        name: {"sees": entry.sight, "icp_calls": icp_calls(entry.sees, starts, descriptors, reenactment)}
+        for name, entry in entries.items()
+    }
+
+
+EXPERIMENT = Experiment(
+    name=NAME,
+    beside=("cause_tables", "sample_strata"),
+    sections={NAME: Section},
+    names=lambda config, sources: {
+        "cause_explainer": list(config[NAME]["explainers"]),
+        "feature_explainer": list(config[NAME]["by_features"]),
+    },
+    shown=lambda config, sources: {"cause_explainers": cause_titles(config)},
+    check=check,
+    leavable={
+        f"diagnosis.{key}": Names("explainer", lambda: explainers(CAUSES)) for key in ("explainers", "by_features")
+    },
+)
+
+
+def read_by(explainer: str) -> str:
+    """Folder of what an explainer of causes reads."""
+    folders = {"embeddings": "cause_embeddings", REENACTED: "reenactments", BARE: "causes"}
+    return folders.get(explainer_entry(explainer, CAUSES).reads, "descriptors")
+
+
+DIAGNOSE = Step(
+    name="diagnose",
+    run="gpca.steps.diagnosis:diagnose",
+    inputs={
+        "causes": "causes/{source}/seed{*seed}.npz",
+        "read": lambda plan, wildcards: f"{read_by(wildcards.cause_explainer)}/{{source}}/seed{{*seed}}.npz",
+        "read_timings": lambda plan, wildcards: (
+            f"timings/{{source}}/{read_by(wildcards.cause_explainer)}/seed{{*seed}}.csv"
+        ),
+    },
+    outputs={
+        "predictions": "diagnoses/{source}/{cause_explainer}/seed{*seed}.csv",
+        "timings": "timings/{source}/diagnoses_{cause_explainer}/seed{*seed}.csv",
+    },
+    settings=lambda plan, wildcards: plan.config[NAME]["explainers"][wildcards.cause_explainer] or {},
+    params={
+        "explainer": lambda plan, wildcards: wildcards.cause_explainer,
+        "remedies": lambda plan, wildcards: json.dumps(plan.config[NAME]["descriptors"], sort_keys=True),
+        "reenactment": lambda plan, wildcards: json.dumps(plan.config[NAME]["reenactment"], sort_keys=True),
+    },
+    modules_of_job=lambda plan, wildcards: [explainer_module(wildcards.cause_explainer, CAUSES)],
+    target="diagnoses",
+)
+DIAGNOSE_BY_FEATURES = Step(
+    name="diagnose_by_features",
+    run="gpca.steps.diagnosis:diagnose_by_features",
+    inputs={
+        "causes": "causes/{source}/seed{*seed}.npz",
+        "descriptors": "descriptors/{source}/seed{*seed}.npz",
+    },
+    outputs={"predictions": "feature_diagnoses/{source}/{*feature_explainer}/seed{*seed}.csv"},
+    settings=("diagnosis.by_features", "diagnosis.descriptors"),
+    modules=lambda plan: [explainer_module(name, CAUSES) for name in plan.names["feature_explainer"]],
+)
+CAUSES_FILES = "causes/{source}/seed{seed}.npz"
+DIAGNOSES = "diagnoses/{source}/{cause_explainer}/seed{seed}.csv"
+
+
+@numbers(
+    "causes.csv", "cause_intervals.csv", rule="cause_metrics", prediction_files=DIAGNOSES, causes_files=CAUSES_FILES
+)
+def collect(
+    run: Run, prediction_files: Iterable[str | Path], causes_files: Iterable[str | Path]
+) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Confusions and measures of all test samples by seed, and the measures over all seeds with intervals."""
+    judged, records = with_pooled(read_judged(prediction_files, causes_files)), []
+    for (source, explainer, seed), samples in judged.items():
+        values = {metric: value_1[0] for metric, value_1 in measure(samples, np.ones((1, len(samples)))).items()}
+        values["test_samples"] = len(samples)
+        records += [
+            (TABLE, source, explainer, metric, ALL, seed, float(value))
+            for metric, value in values.items()
+            if np.isfinite(value)
+        ]
+        records += [(TABLE, source, explainer, *row[:2], seed, row[2]) for row in _confusion(samples)]
+    return tidy(records, "diagnoses"), compared_by_source(by_source(judged))
+
+
+@numbers(
+    "feature_intervals.csv",
+    prediction_files="feature_diagnoses/{source}/{feature_explainer}/seed{seed}.csv",
+    causes_files=CAUSES_FILES,
+)
+def collect_by_features(
+    run: Run, prediction_files: Iterable[str | Path], causes_files: Iterable[str | Path]
+) -> pd.DataFrame:
+    """Measures over all seeds with intervals, of learners that differ in what they read."""
+    return compared_by_source(by_source(with_pooled(read_judged(prediction_files, causes_files))))
+
+
+def with_pooled(judged: dict[tuple[str, str, int], Judged]) -> dict[tuple[str, str, int], Judged]:
+    """Samples by source, explainer and seed, and those of all sources together where there are several."""
+    sources = list(dict.fromkeys(source for source, _, _ in judged))
+    if len(sources) < 2:
+        return judged
+    rest = list(dict.fromkeys((explainer, seed) for _, explainer, seed in judged))
+    return judged | {
+        (POOLED, explainer, seed): joined(judged[source, explainer, seed] for source in sources)
+        for explainer, seed in rest
+        if all((source, explainer, seed) in judged for source in sources)
+    }
+
+
+def by_source(judged: Mapping[tuple[str, str, int], Judged]) -> dict[str, dict[str, Judged]]:
+    """Samples of all seeds together, by source and explainer."""
+    parts: dict[str, dict[str, list[Judged]]] = {}
+    for (source, explainer, _), samples in judged.items():
+        parts.setdefault(source, {}).setdefault(explainer, []).append(samples)
+    return {
+        source: {explainer: joined(seeds) for explainer, seeds in by_explainer.items()}
+        for source, by_explainer in parts.items()
+    }
+
+
+def _confusion(samples: Judged) -> list[tuple[str, str, float]]:
+    """Metric, true label and count of every label that is taken for another, without borderline samples."""
+    if not samples.names_causes:
+        return []
+    labeled = samples.label != BORDERLINE
+    counts = confusion(samples.label[labeled], samples.named[labeled], (samples.named == "")[labeled], LABELS)
+    return [
+        (PREDICTED_AS + predicted, true, float(count))
+        for true, row in zip(LABELS, counts, strict=True)
+        for predicted, count in zip((*LABELS, ABSTAINED), row, strict=True)
+        if row.sum()
+    ]
+
+
+# The ceiling is no rival, and none of it.
+AGAINST: Mapping[str, Rivals] = {
+    "rival": lambda name, names: () if name == CEILING else [other for other in names if other != CEILING],
+    "untrained": lambda name, names: () if name == CEILING else UNTRAINED,
+}
+
+
+def compared_by_source(samples_of: Mapping[str, Mapping[str, Judged]], axis: str = "cause intervals") -> pd.DataFrame:
+    """Measures of every source and explainer with intervals over objects and seeds, and differences from rivals."""
+    records: list[tuple] = []
+    for source, by_explainer in samples_of.items():
+        samples = next(iter(by_explainer.values()))
+        draws = Clustered.drawn(samples.seed, samples.instance, axis, source)
+        records += compared_samples(source, by_explainer, draws, measure, MEASURES)
+    return intervals(records, "diagnoses")
+
+
+def compared_samples(
+    source: str,
+    samples_of: Mapping[str, Judged],
+    draws: Clustered,
+    measured: Callable[[Judged, np.ndarray], dict[str, np.ndarray]],
+    metrics: Iterable[str],
+    part: str = ALL,
+    against: Mapping[str, Rivals] = AGAINST,
+) -> list[tuple]:
+    """Rows of :func:`gpca.evaluation.measures.compared`; the ``samples`` are those that a measure depends on.
+
+    Args:
+        samples_of: explainer -> the same N samples beside its predictions.
+        measured: returns the measures of samples by weights of these.
+    """
+    samples = next(iter(samples_of.values()))
+    values = {explainer: measured(each, draws.weights) for explainer, each in samples_of.items()}
+    rows: list[tuple] = []
+    for metric in metrics:
+        of_metric = {explainer: each[metric] for explainer, each in values.items() if metric in each}
+        limits, least = ANYTHING, False
+        if metric in MEASURES:
+            limits, least = MEASURES[metric].limits, MEASURES[metric].least_is_best
+        subset = draws.subset(counted(samples, metric))
+        rows += compared((TABLE, source), metric, part, of_metric, subset, limits, against, least)
+    return rows

@@ -1,1 +1,0 @@
-"""How well explainers name the measured causes of failed registrations (Table IX)."""

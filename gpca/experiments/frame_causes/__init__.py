@@ -1,1 +1,0 @@
-"""Causes of failed registrations of depth frames, measured and explained (Table IX on frames)."""

@@ -1,0 +1,171 @@
+"""Re-enactments: one of them as a figure, and what each part of the truth would add to them (docs/reenactment.md)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from math import inf
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gpca.causes.judged import measure, read_judged
+from gpca.causes.settings import CauseSettings
+from gpca.errors import require_names
+from gpca.evaluation.intervals import REPEATS, Clustered
+from gpca.evaluation.measures import POOLED, intervals
+from gpca.experiments.cause_tables import AGAIN, SECTION, SHOWN
+from gpca.experiments.diagnosis import by_source, compared_samples, with_pooled
+from gpca.experiments.experiment import Experiment, LeftOut
+from gpca.experiments.plan import Run
+from gpca.experiments.reenactment_example import draw_reenactment
+from gpca.experiments.result import figure, numbers, table
+from gpca.experiments.step import Step
+from gpca.objects.entry import dataset_of
+from gpca.pairs.perturbation import NOISE, OVERLAP, POSE
+from gpca.reenactment.settings import EVERYTHING, KNOWN, NOTHING, ReenactmentSettings
+from gpca.reporting.sheet import Row, Sheet, crossed, show
+from gpca.reporting.tables.cells import plain_cell
+from gpca.reporting.tables.table import Cell
+from gpca.reporting.words import plural
+from gpca.settings import Count, Distinct, read_settings
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+MEASURED = ("balanced_accuracy", "dominant_accuracy", "auroc_failed", "regret", "false_alarm_rate")
+IN_WORDS = {POSE: "true pose", NOISE: "points without noise", OVERLAP: "missing surface"}  # truth about each cause
+
+
+@dataclass(frozen=True)
+class Section:
+    """Sources whose test samples are re-enacted with parts of the truth, and the number of seeds."""
+
+    sources: Distinct[str]
+    seeds: Count
+
+
+def check(config: dict, left_out: LeftOut) -> None:
+    """Check the names of the sources."""
+    chosen = config["oracles"]["sources"]
+    require_names("oracles.sources", chosen, config["sources"], "source", left_out("sources"))
+
+
+EXPERIMENT = Experiment(
+    name="reenactment",
+    sections={"oracles": Section},
+    names=lambda config, sources: {
+        "known": list(KNOWN),
+        "oracle_source": list(config["oracles"]["sources"]),
+        "oracle_seed": list(config["seeds"])[: config["oracles"]["seeds"]],
+    },
+    check=check,
+    lists={"oracles.sources": "sources"},
+)
+ORACLES = Step(
+    name="oracles",
+    run="gpca.steps.oracles",
+    inputs={"objects": "objects/{source}.npz", "causes": "causes/{source}/seed{seed}.npz"},
+    outputs={"predictions": "oracles/{source}/{*known}/seed{seed}.csv"},
+    settings=lambda plan, wildcards: {
+        "reenactment": plan.config["diagnosis"]["reenactment"],
+        "causes": plan.config["causes"],
+        "icp": plan.config["registrations"]["icp"],
+    },
+)
+
+
+@numbers(
+    "oracle_intervals.csv",
+    prediction_files="oracles/{oracle_source}/{known}/seed{oracle_seed}.csv",
+    causes_files="causes/{oracle_source}/seed{oracle_seed}.npz",
+)
+def collect_oracles(
+    run: Run, prediction_files: Iterable[str | Path], causes_files: Iterable[str | Path]
+) -> pd.DataFrame:
+    """`MEASURED` by source and by what is known, and differences from the estimate, with intervals."""
+    rows: list[tuple] = []
+    for source, samples_of in by_source(with_pooled(read_judged(prediction_files, causes_files))).items():
+        samples = next(iter(samples_of.values()))
+        draws = Clustered.drawn(samples.seed, samples.instance, "oracle intervals", source)
+        against = {"estimate": lambda name, names: [NOTHING]}
+        rows += compared_samples(source, samples_of, draws, measure, MEASURED, against=against)
+    return intervals(rows, "oracles")
+
+
+def in_words(name: str) -> str:
+    """Words for what is known, such as ``true pose + missing surface``."""
+    known = [words for cause, words in IN_WORDS.items() if cause in KNOWN[name]]
+    return {NOTHING: "nothing: the estimate", EVERYTHING: "all three"}.get(name) or " + ".join(known)
+
+
+@figure(
+    SECTION,
+    "One failed registration, re-enacted by an observer",
+    """Above, the observed cloud where each hypothesis of the true pose puts it in the model, with the probability of
+    the hypothesis. In the middle, the clouds that the first hypothesis rebuilds: without noise, with the surface that
+    is missing, and with both. Below, the mean error of registrations with each subset of the causes: measured, with the
+    truth (bars), and re-enacted under each hypothesis (marks, the larger the more probable).
+
+    Shown is the failed test sample with several causes and several hypotheses whose margin, by which its largest φ
+    exceeds the next one, is the median.""",
+    after="causes_example",
+    causes_npz="causes/{shown_source}/seed{first_seed}.npz",
+    reenactments_npz="reenactments/{shown_source}/seed{first_seed}.npz",
+)
+def reenactment(run: Run, causes_npz, reenactments_npz):
+    """Hypotheses, rebuilt clouds and errors of a usual case in doubt."""
+    source = run.config["figures"]["source"]
+    truth = CauseSettings.from_dict(dict(run.config["causes"]), dict(run.config["registrations"]["icp"]))
+    settings = read_settings(ReenactmentSettings, dict(run.config["diagnosis"]["reenactment"]))
+    shown = run.source_titles[source], dataset_of(run.config["sources"][source])
+    return draw_reenactment(causes_npz, reenactments_npz, truth, settings, *shown)
+
+
+def _gain(metric: str, limit: float = 100.0):
+    return show(metric, "Over the estimate (points)", where={"against": "estimate"}, limits=(-limit, limit))
+
+
+def _counts(row: Row, subset: pd.DataFrame) -> dict[str, Cell]:
+    samples = int(subset["samples"].max())
+    return {"samples": plain_cell(samples, int(subset["seeds"].iloc[0]), samples)}
+
+
+@table(
+    SECTION,
+    "Table IX by what a re-enactment knows",
+    """The untrained re-enactment as it is, and with parts of the truth: the true pose, the observed points without
+    their noise, the surface that was missing. What a row gains over the estimate is what a better estimate of that part
+    could gain at most, with everything else as it is.""",
+    after="table9_features",
+    oracles="oracle_intervals.csv",
+)
+def table9_oracle(run: Run, oracles):
+    """What the untrained re-enactment would reach if it knew parts of the truth, pooled and by source."""
+    titles = {POOLED: "All together"} | run.source_titles
+    columns = {
+        "balanced_accuracy": SHOWN["balanced_accuracy"],
+        "balanced_accuracy_gain": _gain("balanced_accuracy"),
+        "dominant_accuracy": SHOWN["dominant_accuracy"],
+        "dominant_accuracy_gain": _gain("dominant_accuracy"),
+        "auroc_failed": SHOWN["auroc_failed"],
+        "regret": SHOWN["regret"],
+        "regret_gain": _gain("regret", inf),
+        "false_alarm_rate": SHOWN["false_alarm_rate"],
+        "samples": SHOWN["samples"],
+    }
+    rows = crossed(("source", titles), ("method", {name: in_words(name) for name in KNOWN} | AGAIN))
+    heads = {"source": "Dataset", "known": "Known"}
+    sheet = Sheet("table9_oracle", heads, rows, columns, oracles, more=_counts)
+    notes = (
+        "Known: the hypothesis of the true pose is right; or each observed point is known without its noise, and "
+        "how noisy it was; or the surface that was missing is known. The rest is estimated as ever, without any "
+        "training. No observer knows any of this.",
+        "n: test samples that are judged; borderline ones are left out. The measures are those of Table IX. Over "
+        "the estimate: minus the first row of the dataset, on the same draws; regret is the better, the smaller. "
+        f"Over {plural(sheet.seeds, 'seed')}; in brackets the 95 % interval of a bootstrap over objects and "
+        f"seeds ({REPEATS} draws).",
+        "The last row is the truth measured again from other starts, on the whole surface of the object: the rows "
+        "above know the model's points alone.",
+    )
+    caption = "What a re-enactment would say if it knew parts of the truth" + run.stand_ins()
+    return sheet.table(caption, "metric", notes)

@@ -1,0 +1,188 @@
+"""Diagnoses of parts of the test samples: by margin, number of causes, symmetry, error, state and what is shown."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from math import inf
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gpca.causes.judged import CEILING, Judged, of_decisions, read_judged
+from gpca.causes.truth import ALL, BORDERLINE, FAILED, NOMINAL
+from gpca.evaluation.intervals import REPEATS, Clustered
+from gpca.evaluation.measures import POOLED, intervals
+from gpca.experiments.cause_tables import AGAIN, SECTION
+from gpca.experiments.diagnosis import (
+    CAUSES_FILES,
+    DIAGNOSES,
+    by_source,
+    cause_titles,
+    compared_samples,
+    with_pooled,
+)
+from gpca.experiments.plan import Run
+from gpca.experiments.result import numbers, table
+from gpca.reporting.sheet import Row, Sheet, Show, show, where
+from gpca.reporting.tables.cells import plain_cell
+from gpca.reporting.tables.table import Column
+from gpca.reporting.words import plural
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+DECISIONS = ("named_right", "regret")
+SMALL_MARGIN, LARGE_MARGIN = 0.01, 0.03  # diameters
+SMALL_ERROR, LARGE_ERROR = 0.05, 0.10
+SIMPLE = ("chance", "most_frequent", "rule", "reenact")  # explainers that are not trained
+PAPER = "gpca"  # GP-CA on the paper's input
+
+
+def strata_of(samples: Judged) -> dict[tuple[str, str], np.ndarray]:
+    """Kind and stratum -> mask (N,) of its samples; all but the states divide the failed."""
+    nominal_N = samples.label == NOMINAL
+    failed_N = ~nominal_N & (samples.label != BORDERLINE)
+    margin_N, error_N, number_N = samples.margin, samples.error[:, ALL], samples.causes.sum(axis=1)
+    parts = {
+        ("margin", "small"): margin_N < SMALL_MARGIN,
+        ("margin", "middle"): (margin_N >= SMALL_MARGIN) & (margin_N < LARGE_MARGIN),
+        ("margin", "large"): margin_N >= LARGE_MARGIN,
+        ("causes", "one"): number_N <= 1,
+        ("causes", "two"): number_N == 2,
+        ("causes", "three"): number_N == 3,
+        ("symmetry", "symmetric"): samples.symmetric,
+        ("symmetry", "other"): ~samples.symmetric,
+        ("error", "small"): error_N < SMALL_ERROR,
+        ("error", "middle"): (error_N >= SMALL_ERROR) & (error_N < LARGE_ERROR),
+        ("error", "large"): error_N >= LARGE_ERROR,
+        ("shown", "failed"): samples.shown == FAILED,
+        ("shown", "other"): samples.shown != FAILED,
+    }
+    states = {("state", "nominal"): nominal_N, ("state", "failed"): failed_N}
+    return states | {stratum: mask_N & failed_N for stratum, mask_N in parts.items()}
+
+
+@numbers("cause_strata.csv", prediction_files=DIAGNOSES, causes_files=CAUSES_FILES)
+def collect_strata(
+    run: Run, prediction_files: Iterable[str | Path], causes_files: Iterable[str | Path]
+) -> pd.DataFrame:
+    """Decisions of every explainer in every stratum that has samples, over all sources and seeds, with intervals."""
+    samples_of = by_source(with_pooled(read_judged(prediction_files, causes_files)))
+    source = POOLED if POOLED in samples_of else next(iter(samples_of))
+    samples = next(iter(samples_of[source].values()))
+    draws = Clustered.drawn(samples.seed, samples.instance, "cause strata", source)
+    naming = {explainer: each for explainer, each in samples_of[source].items() if each.names_causes}
+    rows: list[tuple] = []
+    for (kind, stratum), mask_N in strata_of(samples).items():
+        if mask_N.any() and naming:
+            inside = {explainer: each.subset(mask_N) for explainer, each in naming.items()}
+            part = f"{kind}_{stratum}"
+            rows += compared_samples(source, inside, draws.subset(mask_N), of_decisions, DECISIONS, part)
+    return intervals(rows, "diagnoses")
+
+
+def _between(small: float, large: float) -> dict[str, str]:
+    low, high = f"{100 * small:g}", f"{100 * large:g}"
+    return {"small": f"below {low} % d", "middle": f"{low} to {high} % d", "large": f"{high} % d or more"}
+
+
+KINDS = {
+    "state": ("State", {"nominal": "nominal", "failed": "failed"}),
+    "margin": ("Failed: the largest φ exceeds the next by", _between(SMALL_MARGIN, LARGE_MARGIN)),
+    "causes": ("Failed: number of causes", {"one": "one", "two": "two", "three": "three"}),
+    "symmetry": ("Failed: object", {"symmetric": "symmetric (ADD-S)", "other": "other (ADD)"}),
+    "error": ("Failed: mean error", _between(SMALL_ERROR, LARGE_ERROR)),
+    "shown": ("Failed: the registration shown", {"failed": "failed itself", "other": "did not fail itself"}),
+}
+SHOWN_STATES = {
+    "state_accuracy": show("state_accuracy", "State, mean (%)"),
+    "state_accuracy_shown": show("state_accuracy_shown", "State, shown (%)"),
+    "auroc_failed": show("auroc_failed", "AUROC, mean", factor=1, decimals=3, limits=(0.0, 1.0)),
+    "auroc_failed_shown": show("auroc_failed_shown", "AUROC, shown", factor=1, decimals=3, limits=(0.0, 1.0)),
+}
+
+
+@table(
+    SECTION,
+    "Table IX by parts of the samples",
+    """The same answers by how clear the case is: whether one cause adds more than the others, how many there are,
+    whether the object is symmetric, how far the registration is off, and whether the one that is shown failed.""",
+    after="table9_causes",
+    strata="cause_strata.csv",
+)
+def table9_strata(run: Run, strata):
+    """How often a few explainers are right in every stratum, and what their answer leaves on the table."""
+    chosen = _chosen(strata, cause_titles(run.config))
+    columns: dict[str, Column] = {"samples": Column("n", decimals=0, interval=False, limits=(0.0, inf))}
+    for name, title in chosen.items():
+        columns[f"{name}_named_right"] = Show(
+            f"{title}: right (%)", interval=name != CEILING, where={"method": name, "metric": "named_right"}
+        )
+        columns[f"{name}_regret"] = Show(
+            f"{title}: regret (%)",
+            **{"interval": False, "limits": (0.0, inf), "where": {"method": name, "metric": "regret"}},
+        )
+    rows = [
+        Row([(kind, title), stratum], {"concept": f"{kind}_{stratum[0]}"})
+        for kind, (title, strata_of_kind) in KINDS.items()
+        for stratum in strata_of_kind.items()
+    ]
+
+    def counts(row: Row, subset: pd.DataFrame) -> dict:
+        last = subset[subset["method"] == list(chosen)[-1]].iloc[-1]
+        return {"samples": plain_cell(int(last["samples"]), int(last["seeds"]), int(last["samples"]))}
+
+    sheet = Sheet("table9_strata", {"kind": "Part", "stratum": "of the samples"}, rows, columns, strata, more=counts)
+    notes = (
+        f"All datasets and {plural(sheet.seeds, 'seed')} together, without borderline samples. In brackets: "
+        f"the 95 % interval of {REPEATS} bootstrap draws over objects and seeds.",
+        "Right: share whose label is named, where for a failure any cause counts whose φ is within the limit of a "
+        "cause of the largest. Regret: of the failed, the share of the error that removing the best single cause "
+        "would take away and removing the named one does not; who names nominal removes nothing.",
+        f"Shown are {', '.join(chosen.values())}: what is not trained, GP-CA on the paper's input, the trained one "
+        "with the least regret, and the truth from other starts, which no observer has.",
+    )
+    caption = "Parts of the registrations with measured causes" + run.stand_ins()
+    return sheet.table(caption, "explainer", notes)
+
+
+def _chosen(strata: pd.DataFrame, explainers: Mapping[str, str]) -> dict[str, str]:
+    """Titles of those shown: untrained, the paper's, the trained one of least regret, the ceiling."""
+    failed = where(strata, {"concept": "state_failed", "metric": "regret", "against": ""})
+    regret = failed.set_index("method")["value"]
+    trained = [name for name in explainers if name in regret.index and name not in (*SIMPLE, PAPER)]
+    names = [name for name in (*SIMPLE, PAPER) if name in explainers and name in regret.index]
+    names += sorted(trained, key=lambda name: regret[name])[:1]
+    return {name: explainers[name] for name in names} | AGAIN
+
+
+@table(
+    SECTION,
+    "Table IX by the registration that is shown",
+    """The truth is a mean over many starts, but an explainer is shown a single registration, which may be right where
+    the mean is not. Both are failures in their own right: of the pair, and of this registration.""",
+    after="table9_strata",
+    intervals="cause_intervals.csv",
+)
+def table9_shown(run: Run, intervals):
+    """How well explainers tell the state by the mean over starts, and that of the registration shown."""
+    present = set(intervals["source"])
+    pooled = POOLED if POOLED in present else next(name for name in run.sources if name in present)
+    rows = [
+        Row([explainer], {"source": pooled, "method": explainer[0]}, rival=explainer[0] != CEILING)
+        for explainer in (cause_titles(run.config) | AGAIN).items()
+    ]
+    sheet = Sheet("table9_shown", {"explainer": "Explainer"}, rows, SHOWN_STATES, intervals)
+    counts = where(intervals, {"source": pooled}).groupby("metric")["samples"].max()
+    notes = (
+        f"Mean: {counts['state_accuracy']:.0f} test samples whose mean error over starts is nominal or failed. "
+        f"Shown: {counts['state_accuracy_shown']:.0f} whose registration, the one that the explainer sees, has an "
+        "error of its own below the nominal limit or above that of failures. The share of the failed whose own "
+        "registration did not fail stands in `table9_strata`.",
+        "State: mean share of the nominal and of the failed that is called so. AUROC: of failed against nominal. "
+        f"All datasets and {plural(sheet.seeds, 'seed')} together. In brackets: the 95 % interval of "
+        f"{REPEATS} bootstrap draws over objects and seeds. Bold: best explainer.",
+    )
+    caption = "Who says that a registration failed: by the mean over starts, and by the registration that is shown"
+    return sheet.table(caption + run.stand_ins(), "metric", notes, bold=SHOWN_STATES)
