@@ -13,9 +13,9 @@ import pytest
 import yaml
 
 from gpca.__main__ import COMMANDS, load_command
-from gpca.experiments.controls.settings import CONTROLS
 from gpca.experiments.registry import registered
 from gpca.objects.entry import Source
+from gpca.steps.control_samples import CONTROLS
 
 from .documents import PAGES, ROOT, anchor_of, commands, our_files, relative
 

@@ -22,9 +22,9 @@ import numpy as np
 
 from gpca.code_files import ROOT
 from gpca.errors import InputError
-from gpca.experiments.controls.settings import HARD
 from gpca.frames.source import REAL_WORLD
 from gpca.plugins import named
+from gpca.steps.control_samples import HARD
 from gpca.tracks.published import Published, require_clone, sha256_of_arrays
 from gpca.tracks.track import DEFAULT, Track
 
@@ -282,7 +282,7 @@ def _objects_recipe(file: str, kind: str, name_and_seed: dict[str, Any], config:
         folder = f"{kind}/{HARD}"
         given = name_and_seed | {"control": HARD, "settings": settings}
         outputs = {"embeddings": path(folder), "curve": path(folder, "csv")}
-        return Recipe("gpca.experiments.controls.encoding", given, {"registrations": path(HARD)}, outputs)
+        return Recipe("gpca.steps.control_samples:train", given, {"registrations": path(HARD)}, outputs)
     else:
         raise InputError(file, "is not a file of samples", "name one of a track")
     return Recipe(f"gpca.steps.causes:{step}", name_and_seed | {"settings": settings}, inputs, outputs)

@@ -18,9 +18,15 @@ from gpca.causes.dataset import Causes, labeled
 from gpca.causes.settings import OBJECTS, DescriptorSettings
 from gpca.encoders.registry import EncoderSettings
 from gpca.errors import InputError
+<<<<<<< HEAD
 from gpca.experiments.controls.protocol import ControlRun
 from gpca.experiments.controls.settings import HARD, ControlSettings
 from gpca.experiments.scan_causes import diagnosis_settings
+=======
+from gpca.experiments.scan_causes import diagnosis_step as scan_step
+from gpca.experiments.scan_causes.experiment import diagnosis_settings
+from gpca.experiments.scan_causes.settings import OBJECTS
+>>>>>>> a4ec3b10 (Controls are three files and the steps that draw their samples and explain under them; changes, leads and gains are rows with what they are against)
 from gpca.explainers.interface import BARE, REENACTED, ExplainerEntry
 from gpca.explainers.registry import explainer_entry, require_settings
 from gpca.explainers.rivals import make_rivals
@@ -29,6 +35,8 @@ from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.process.job import Job
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.settings import read_settings
+from gpca.steps.control_samples import HARD, ControlSettings
+from gpca.steps.controls import ControlRun
 from gpca.steps.diagnosis import DESCRIBED, EMBEDDED, FramesToExplain, explained, with_what_it_reads
 from gpca.steps.scan_causes import diagnose as diagnose_scans
 from gpca.tracks.published import NOTHING_NAMED, Method
@@ -151,7 +159,7 @@ def _hard(trial: Trial, source: str, seed: int) -> Answer:
         embeddings={HARD: embeddings},
         hard=hard,
     )
-    attribution, seconds = run.of_hard(trial.name)
+    attribution, seconds = run.explain_hard(trial.name)
     return Answer.of(attribution, np.arange(len(attribution.scores_N_C)), seconds)
 
 

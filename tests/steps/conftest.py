@@ -7,6 +7,7 @@ import pytest
 from tests.steps.by_words import main
 
 from .command_lines import every_step
+from .six_objects import six  # noqa: F401
 
 
 @pytest.fixture(scope="session")

@@ -10,8 +10,8 @@ from gpca.causes.dataset import Causes, labels_of
 from gpca.config.check import check, with_success
 from gpca.config.layers import without_false
 from gpca.errors import InputError
-from gpca.experiments.controls.settings import HARD
 from gpca.frames.source import REAL_WORLD
+from gpca.steps.control_samples import HARD
 from gpca.tracks import samples as module
 from gpca.tracks.loading import NO_LABEL
 from gpca.tracks.samples import Samples, recipe_of, sha256_of_arrays

@@ -74,10 +74,14 @@ EDITS = {  # a module: what is made again where it has changed, and what is not
         "predictions active_learning diagnoses/ model.pt",
     ),
     "baselines/heads.py": ("learners/ table5_learners", "shifted/ predictions diagnoses/ kernels"),
+<<<<<<< HEAD
     "gpca/experiments/kernel_grid.py": (
         "figures/kernel_learning_curves kernels.csv table4_grid",
         "kernels/ figures/fig3",
     ),
+=======
+    "gpca/experiments/kernel_grid.py": ("figures/kernel_learning_curves kernels.csv table4_grid", "kernels/"),
+>>>>>>> a4ec3b10 (Controls are three files and the steps that draw their samples and explain under them; changes, leads and gains are rows with what they are against)
     "gpca/active_learning/acquisition.py": (
         "active_learning/ycb new_concepts/ frame_labels/ runtime.csv table6_labels",
         "predictions embeddings learners diagnoses/ model.pt kernels/",
@@ -118,11 +122,11 @@ EDITS = {  # a module: what is made again where it has changed, and what is not
     ),
     "gpca/uncertainty/estimators/analytic.py": ("estimates/ exchange/ estimators.csv", "uncertainty/ causes/ methods/"),
     "baselines/descriptors.py": ("diagnoses/ycb/pair_forest table9_causes", "predictions"),
-    "gpca/experiments/controls/variants.py": (
+    "gpca/steps/control_samples.py": (
         "controls/ control_embeddings/ transfer",
         "predictions embeddings encoders",
     ),
-    "gpca/experiments/controls/metrics.py": (
+    "gpca/experiments/controls.py": (
         "controls.csv table10_controls transfer",
         "controls/ predictions diagnoses/",
     ),

@@ -27,6 +27,7 @@ def explainer_settings(wildcards):
     return config["explainers"].get(name) or REAL_WORLD["explainers"].get(name) or {}
 
 
+<<<<<<< HEAD
 def controls_of(seed):
     """Return the controls of a seed: all, but those that need a further encoder for the first seeds alone."""
     further = int(seed) in CONTROL_SEEDS[: CONTROLS["encoder_seeds"]]
@@ -68,6 +69,32 @@ def hard_samples(wildcards):
 def other_sources(wildcards):
     """Return the sources that explainers of this one are asked about besides, where there is transfer."""
     return [name for name in NAMES["transfer_source"] if name != wildcards.source]
+=======
+def read_by(cause_explainer):
+    """Return the folder of what an explainer of causes reads."""
+    folders = {
+        "embeddings": "cause_embeddings",
+        REENACTED: "reenactments",
+        BARE: "causes",
+    }
+    return folders.get(explainer_entry(cause_explainer, CAUSES).reads, "descriptors")
+
+
+def if_enacted(files):
+    """Return files of re-enactments where an explainer of causes reads any."""
+    read = [
+        explainer_entry(name, CAUSES).reads
+        for name in config["diagnosis"]["explainers"]
+    ]
+    return files if REENACTED in read else []
+
+
+def frame_diagnosis(explainers):
+    """Return the settings of a job that asks some explainers of causes about depth frames."""
+    asked = {name: config["diagnosis"]["explainers"][name] for name in explainers}
+    icp = {"icp": config["registrations"]["icp"]}
+    return as_json(config["diagnosis"] | icp | {"explainers": asked})
+>>>>>>> a4ec3b10 (Controls are three files and the steps that draw their samples and explain under them; changes, leads and gains are rows with what they are against)
 
 
 def estimator_settings(estimators):

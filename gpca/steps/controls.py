@@ -1,20 +1,36 @@
-"""Runs every explainer under every control on the test samples of one source and seed."""
+"""Step ``explain_controls``: registrations and embeddings -> predictions of every explainer under every control."""
 
 from __future__ import annotations
 
 import sys
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import reduce
-from typing import TYPE_CHECKING
+from time import perf_counter
 
 import numpy as np
+import pandas as pd
 
+from gpca.alignment.icp import ICPSettings
 from gpca.attribution.predictions import prediction_frame
 from gpca.attribution.scores import Attribution
-from gpca.experiments.controls.costs import ASKED, Costs
-from gpca.experiments.controls.settings import (
+from gpca.encoders.registry import EncoderSettings
+from gpca.encoders.training import embed, load_model
+from gpca.explainers.gpca import GPCA_FORMS
+from gpca.explainers.interface import BARE, Describing, Encoding
+from gpca.explainers.rivals import Embed, Rival, described_for, make_rivals
+from gpca.io.csv_file import write_csv
+from gpca.objects.canonical import ObjectClouds
+from gpca.pairs.dataset import Registrations, read_embedding
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.process.job import Job
+from gpca.process.provenance import record_provenance
+from gpca.settings import read_settings
+from gpca.steps.control_samples import (
     HARD,
+    LABELS,
     PAPER,
     RELABELED,
     RETRAINED,
@@ -22,23 +38,100 @@ from gpca.experiments.controls.settings import (
     TRANSFER,
     UNSEEN,
     ControlSettings,
+    left_out,
+    relabeled,
+    sample_table,
+    shows_known_object,
     trained_otherwise,
+    variant,
 )
-from gpca.experiments.controls.variants import left_out, relabeled, shows_known_object, variant
-from gpca.explainers.gpca import GPCA_FORMS
-from gpca.explainers.interface import BARE, Describing, Encoding
-from gpca.explainers.rivals import Embed, Rival, described_for
-from gpca.pairs.dataset import Registrations
-from gpca.pairs.perturbation import CONCEPTS
 from gpca.uncertainty.designs import evaluate_design
 from gpca.uncertainty.settings import UncertaintySettings
 
-if TYPE_CHECKING:
-    import pandas as pd
-
 PARTS, FEWEST_OF_PART = 5, 60  # of the training samples whose labels are shuffled
-LABELS = ("control", "tested", "explainer")  # columns before those of a prediction file
+ASKED = 12  # registrations that are described once more, for the time that it takes
+COSTS = ("explainer", "learning_seconds", "seconds")
 Attach = Callable[[Registrations], Registrations]
+
+
+def explain(job: Job) -> None:
+    """Let every explainer learn and explain under the paper's protocol and under each control."""
+    rivals = make_rivals(job.section("explainers"), job.source, job.seed)
+    settings = read_settings(ControlSettings, job.section("controls"))
+    encoder = EncoderSettings(**job.section("encoder"))
+    icp = ICPSettings(**job.section("icp"))
+    runs = {name: value for name, value in job.section("uncertainty").items() if name != "samples"}
+    retrained = dict(zip(job.retrained, job.retrained_embeddings, strict=True))
+    others = dict(zip(job.others, job.other_registrations, strict=True))
+    axes = (job.source, job.seed)
+    inputs = [job.objects, job.registrations, job.encoder, job.embeddings]
+    inputs += [*retrained.values(), *others.values(), *job.get("hard", [])]
+    with record_provenance([job.predictions, job.samples, job.timings], inputs, job.settings, seed=job.seed):
+        registrations = Registrations.load(job.registrations, axes)
+        [hard] = [Registrations.load(path, axes) for path in job.get("hard", [])] or [None]
+        model = load_model(job.encoder, encoder, axes=axes)
+        embeddings = {PAPER: read_embedding(job.embeddings, registrations, logits=True)}
+        for control, path in retrained.items():
+            if control == HARD and hard:
+                embeddings[control] = read_embedding(path, hard, logits=True)
+            elif not left_out(control, registrations, settings, encoder.backbone):
+                changed = variant(control, registrations, job.source, job.seed, settings, icp)
+                embeddings[control] = read_embedding(path, changed, logits=True)
+        experiment = ControlRun(
+            source=job.source,
+            seed=job.seed,
+            settings=settings,
+            backbone=encoder.backbone,
+            uncertainty=UncertaintySettings(**runs, icp=icp),
+            rivals=rivals,
+            embed=lambda others, source: embed(model, others, source, job.seed, encoder),
+            embeddings=embeddings,
+            hard=hard,
+        )
+        rows = experiment.run(
+            registrations, {name: Registrations.load(path, (name, job.seed)) for name, path in others.items()}
+        )
+        tested = {PAPER: registrations} | ({HARD: hard} if hard else {})
+        samples = sample_table(tested, ObjectClouds.load(job.objects, job.source))
+        write_csv(job.predictions, rows)
+        write_csv(job.samples, samples)
+        write_csv(job.timings, experiment.costs.rows())
+
+
+@dataclass
+class Costs:
+    """Seconds of the explainers under the paper's protocol."""
+
+    _learning: dict[str, float] = field(default_factory=lambda: defaultdict(float))
+    _asking: dict[str, float] = field(default_factory=dict)
+    _explaining: dict[str, float] = field(default_factory=dict)
+
+    @contextmanager
+    def learning(self, control: str, explainer: str) -> Iterator[None]:
+        """Count the seconds of the body as learning, of the explainer or of its encoder."""
+        started = perf_counter()
+        yield
+        if control == PAPER:
+            self._learning[explainer] += perf_counter() - started
+
+    @contextmanager
+    def asking(self, explainer: str, count: int) -> Iterator[None]:
+        """Count the seconds of the body as measuring and embedding `count` registrations."""
+        started = perf_counter()
+        yield
+        self._asking[explainer] = (perf_counter() - started) / count
+
+    def explained(self, control: str, explainer: str, seconds_N: np.ndarray) -> None:
+        """Count the mean seconds of explaining, with all measurements made."""
+        if control == PAPER:
+            self._explaining[explainer] = float(seconds_N.mean())
+
+    def rows(self) -> pd.DataFrame:
+        """`COSTS` of each explainer that reads bare registrations."""
+        records = [
+            (name, self._learning[name], asking + self._explaining[name]) for name, asking in self._asking.items()
+        ]
+        return pd.DataFrame(records, columns=list(COSTS))
 
 
 @dataclass(frozen=True)
@@ -70,18 +163,14 @@ class ControlRun:
     costs: Costs = field(default_factory=Costs)
 
     def run(self, registrations: Registrations, others: Mapping[str, Registrations]) -> pd.DataFrame:
-        """Return a row for each control, explainer and test sample.
+        """Rows of a prediction file after `LABELS`, by control, explainer and test sample; ``tested`` is its source.
+
+        A control that the registrations do not admit has no rows, and is named on stderr.
 
         Args:
             registrations: those of the source, by the paper's protocol.
             others: those of the other sources, for transfer.
-
-        Returns:
-            the columns of a prediction file after ``control``, ``tested`` (the source of the sample) and ``explainer``.
-            A control that the registrations do not admit has no rows, and is named on stderr.
         """
-        import pandas as pd
-
         plain = self._described(replace(registrations, attached=dict(self.embeddings[PAPER])), self.source)
         embeds = self._learned(PAPER, plain)
         plain = _attached(embeds, plain)
@@ -101,8 +190,8 @@ class ControlRun:
                     frames += self._trained_otherwise(changed)
         return pd.concat(frames, ignore_index=True)
 
-    def of_hard(self, name: str) -> tuple[Attribution, float]:
-        """Return what one explainer says of the hard test samples, and its seconds for each of them."""
+    def explain_hard(self, name: str) -> tuple[Attribution, float]:
+        """Attribution of the hard test samples by one explainer, and its seconds for each of them."""
         assert self.hard is not None
         changed = self._changed(HARD, self.hard, {})
         explainer, test = self.rivals[name].make(), changed.subset(changed.rows("test"))
@@ -121,12 +210,12 @@ class ControlRun:
         return not why
 
     def _asked(self, source: str, registrations: Registrations) -> Registrations:
-        """Return the test samples of another source as the paper's encoder of this one sees them."""
+        """Test samples of another source with embeddings by the paper's encoder of this one."""
         test = registrations.subset(registrations.rows("test"))
         return self._described(self._embedded(test, source), source)
 
     def _changed(self, control: str, plain: Registrations, embeds: Mapping[str, Attach]) -> Registrations:
-        """Return the registrations under a control, with all that explainers read attached."""
+        """Registrations under a control, with all that explainers read attached."""
         if control == HARD and self.hard is not None:
             changed = self.hard
         else:
@@ -140,7 +229,7 @@ class ControlRun:
         return _attached(self._learned(control, changed), changed) if control in RETRAINED else changed
 
     def _learned(self, control: str, registrations: Registrations) -> dict[str, Attach]:
-        """Return functions that attach embeddings by the rivals' own encoders, trained on the training samples."""
+        """Functions that attach embeddings by the rivals' encoders, trained on the training samples."""
         train = registrations.subset(registrations.rows("train"))
         embeds = {}
         for name, rival in self.rivals.items():
@@ -161,16 +250,16 @@ class ControlRun:
                     _attached({name: embeds[name]} if name in embeds else {}, described)
 
     def _tests(self, control: str, changed: Registrations) -> dict[tuple[str, str], Registrations]:
-        """Return the test samples by control and source, with those of known objects apart."""
+        """Test samples by control and source; those of training objects are apart."""
         test = changed.subset(changed.rows("test"))
         if control != UNSEEN:
             return {(control, self.source): test}
         known = shows_known_object(changed)[changed.split == "test"]
-        of_rows = {UNSEEN: np.flatnonzero(~known), SEEN: np.flatnonzero(known)}
-        return {(name, self.source): test.subset(rows) for name, rows in of_rows.items() if len(rows)}
+        by_name = {UNSEEN: np.flatnonzero(~known), SEEN: np.flatnonzero(known)}
+        return {(name, self.source): test.subset(rows) for name, rows in by_name.items() if len(rows)}
 
     def _trained_otherwise(self, changed: Registrations) -> Iterator[pd.DataFrame]:
-        """Yield GP-CA's predictions for known and unseen objects with encoders that are trained in other ways."""
+        """Yield GP-CA's predictions of training and unseen objects with encoders that are trained in other ways."""
         for way in self.settings.encoders:
             if way in self.embeddings:
                 own = replace(changed, attached={**changed.attached, **self.embeddings[way]})
@@ -197,28 +286,28 @@ class ControlRun:
         rivals: Mapping[str, Rival],
     ) -> Iterator[pd.DataFrame]:
         """Yield each explainer's predictions for the test samples after it has learned from the training samples."""
-        for train, of_lesson in self._lessons(control, learned.subset(learned.rows("train")), tests):
+        for train, parts in self._trainings(control, learned.subset(learned.rows("train")), tests):
             for name, rival in rivals.items():
                 explainer = rival.make()
                 if control in RELABELED and getattr(explainer, "trained_with_encoder", False):
                     continue
                 with self.costs.learning(control, name):
                     explainer.fit(train)
-                for of_test, test in of_lesson.items():
+                for (name_of_test, source), test in parts.items():
                     attribution = explainer.explain(test.without_labels())
-                    self.costs.explained(of_test[0], name, attribution.seconds_N)
+                    self.costs.explained(name_of_test, name, attribution.seconds_N)
                     frame = prediction_frame(test, attribution)
-                    for place, entry in enumerate(zip(LABELS, (*of_test, name), strict=True)):
-                        frame.insert(place, *entry)
+                    for i, entry in enumerate(zip(LABELS, (name_of_test, source, name), strict=True)):
+                        frame.insert(i, *entry)
                     yield frame
 
-    def _lessons(
+    def _trainings(
         self, control: str, train: Registrations, tests: Mapping[tuple[str, str], Registrations]
     ) -> Iterator[tuple[Registrations, Mapping[tuple[str, str], Registrations]]]:
         """Yield training samples, each with the test samples that are explained after learning from them.
 
-        Labels that carry no information make an explainer name a whole cluster by chance. So they are shuffled in
-        parts; an explainer learns from one part alone and explains one part of the test samples.
+        Labels without information make an explainer name a whole cluster by chance. So they are shuffled in parts: an
+        explainer learns from one part and explains one part of the test samples.
         """
         if control not in RELABELED:
             yield train, tests
@@ -227,8 +316,8 @@ class ControlRun:
         else:
             parts = max(1, min(PARTS, len(train) // FEWEST_OF_PART))
             for part in range(parts):
-                of_part = relabeled(control, _dealt(train, part, parts), self.source, self.seed, part)
-                yield of_part, {name: _dealt(test, part, parts) for name, test in tests.items()}
+                learned = relabeled(control, _dealt(train, part, parts), self.source, self.seed, part)
+                yield learned, {name: _dealt(test, part, parts) for name, test in tests.items()}
 
 
 def _attached(embeds: Mapping[str, Attach], registrations: Registrations) -> Registrations:
@@ -236,5 +325,5 @@ def _attached(embeds: Mapping[str, Attach], registrations: Registrations) -> Reg
 
 
 def _dealt(registrations: Registrations, part: int, parts: int) -> Registrations:
-    """Return one part of the samples, which are dealt out in threes: one object under every concept."""
+    """One part of the samples, which are dealt out in threes: one object under every concept."""
     return registrations.subset(np.flatnonzero(np.arange(len(registrations)) // len(CONCEPTS) % parts == part))

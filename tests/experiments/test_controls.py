@@ -7,17 +7,24 @@ import pandas as pd
 import pytest
 
 from gpca.errors import InputError
-from gpca.evaluation.measures import POOLED, write_metrics
-from gpca.experiments.controls.costs import collect_costs
-from gpca.experiments.controls.metrics import collect, collect_intervals, read_controls, read_intervals
-from gpca.experiments.controls.protocol import LABELS
-from gpca.experiments.controls.samples import sample_table
-from gpca.experiments.controls.severity import REGISTRATION, read_severities
-from gpca.experiments.controls.severity import collect as collect_severities
+from gpca.evaluation.measures import POOLED, read_clustered, write_metrics
+from gpca.experiments import severity_curves
+from gpca.experiments.control_tables import read_costs
+from gpca.experiments.controls import collect, collect_intervals, read_controls
+from gpca.experiments.plan import Run
+from gpca.experiments.severity_curves import REGISTRATION, read_severities
 from gpca.io.csv_file import write_csv
 from gpca.pairs.perturbation import CONCEPTS
+from gpca.steps.control_samples import LABELS, sample_table
 
 SEVERITIES = {"noise": [0.01, 0.03], "rotation_deg": [15, 60], "translation": [0.05, 0.30], "crop": [0.2, 0.6]}
+RUN = Run({"registrations": {"severities": SEVERITIES}, "controls": {"bins": 2}, "success": {"error": 0.02}})
+
+
+def rows_of(files, path):
+    """Values by control, source, concept, method, metric and rival, and the same of their differences."""
+    write_metrics(collect_intervals(RUN, files), path)
+    return read_clustered(path).set_index(["table", "source", "concept", "method", "metric", "against"]).sort_index()
 
 
 def said(source, tested, control, explainer, wrong, samples=30):
@@ -54,7 +61,7 @@ def files(tmp_path):
 
 
 def test_the_column_table_is_the_control_and_concept_the_source_of_a_transfer(files):
-    rows = collect(files).set_index(["table", "source", "method", "metric", "concept", "seed"])["value"]
+    rows = collect(RUN, files).set_index(["table", "source", "method", "metric", "concept", "seed"])["value"]
     assert rows["density", "a", "gpca", "accuracy", "all", 100] == pytest.approx(0.7)
     assert rows["transfer", "b", "gpca", "accuracy", "a", 101] == pytest.approx(0.5)
     assert rows["paper", "a", "gpca", "auroc_error", "all", 100] == 1
@@ -65,64 +72,64 @@ def test_the_column_table_is_the_control_and_concept_the_source_of_a_transfer(fi
 
 
 def test_a_change_is_that_of_the_same_draws_of_objects_and_seeds(files, tmp_path):
-    write_metrics(collect_intervals(files), tmp_path / "control_intervals.csv")
-    rows = read_intervals(tmp_path / "control_intervals.csv").set_index(
-        ["control", "source", "trained_on", "method", "metric"]
-    )
-    density = rows.loc["density", "a", "a", "gpca", "accuracy"]
-    assert (density["samples"], density["seeds"]) == (60, 2)
-    assert (density["value"], density["change"]) == pytest.approx((0.7, -0.2))
-    assert density["low"] < density["value"] < density["high"]
+    rows = rows_of(files, tmp_path / "control_intervals.csv")
+    density = rows.loc["density", "a", "all", "gpca", "accuracy"]
+    value, change = density.loc[""], density.loc["usual"]
+    assert (value["samples"], value["seeds"], value["clusters"]) == (60, 2, 5)
+    assert (value["value"], change["value"], change["other"]) == (pytest.approx(0.7), pytest.approx(-0.2), "paper")
+    assert value["low"] < value["value"] < value["high"]
     # Both seeds and all objects err alike but for the first samples, so that the change hardly varies.
-    assert density["change_low"] == pytest.approx(-0.2, abs=0.1)
-    assert rows.loc["paper", "a", "a", "gpca", "accuracy"]["change_high"] == 0
-    assert rows.loc["transfer", POOLED, POOLED, "gpca", "accuracy"]["value"] == pytest.approx(0.5)
-    assert rows.loc["transfer", "b", "a", "gpca", "accuracy"]["samples"] == 60
-    assert rows.loc["paper", POOLED, POOLED, "gpca", "accuracy"]["samples"] == 120
+    assert change["low"] == pytest.approx(-0.2, abs=0.1)
+    assert ("paper", "a", "all", "gpca", "accuracy", "usual") not in rows.index  # it would be compared with itself
+    assert rows.loc[("transfer", POOLED, POOLED, "gpca", "accuracy", ""), "value"] == pytest.approx(0.5)
+    assert rows.loc[("transfer", "b", "a", "gpca", "accuracy", ""), "samples"] == 60
+    assert rows.loc[("paper", POOLED, "all", "gpca", "accuracy", ""), "samples"] == 120
 
 
-def test_what_an_explainer_adds_is_that_of_the_same_control_and_draws(files):
+def test_what_an_explainer_adds_is_that_of_the_same_control_and_draws(files, tmp_path):
     for path in files:
         known = pd.read_csv(path, keep_default_na=False)
         source = path.parent.name
         guesses = [said(source, source, control, "rule", 18).assign(icp_calls=4) for control in ("paper", "density")]
         write_csv(path, pd.concat([known, *guesses]))
-    rows = collect_intervals(files).set_index(["control", "source", "method", "metric"])
-    density = rows.loc["density", "a", "gpca", "accuracy"]
-    assert (density["untrained"], density["rival"]) == ("rule", "rule")
-    assert density["gain"] == density["lead"] == pytest.approx(0.3)
-    assert 0 < density["gain_low"] <= 0.3 <= density["gain_high"]
-    of_rule = rows.loc["paper", POOLED, "rule", "accuracy"]
-    assert (of_rule["untrained"], of_rule["rival"]) == ("", "head")
-    assert np.isnan(of_rule["gain"]) and of_rule["lead"] == pytest.approx(-0.6)
-    assert rows.loc["paper", "a", "rule", "icp_calls"]["value"] == 4
-    assert ("density", "a", "rule", "icp_calls") not in rows.index
+    rows = rows_of(files, tmp_path / "control_intervals.csv")
+    density = rows.loc["density", "a", "all", "gpca", "accuracy"]
+    gain, lead = density.loc["untrained"], density.loc["rival"]
+    assert (gain["other"], lead["other"]) == ("rule", "rule")
+    assert gain["value"] == lead["value"] == pytest.approx(0.3)
+    assert 0 < gain["low"] <= 0.3 <= gain["high"]
+    rule = rows.loc["paper", POOLED, "all", "rule", "accuracy"]
+    assert "untrained" not in rule.index and rule.loc["rival", "other"] == "head"
+    assert rule.loc["rival", "value"] == pytest.approx(-0.6)
+    assert rows.loc[("paper", "a", "all", "rule", "icp_calls", ""), "value"] == 4
+    assert ("density", "a", "all", "rule", "icp_calls", "") not in rows.index
 
 
-def test_a_control_of_some_seeds_is_compared_with_the_same_seeds_of_the_papers_protocol(files):
+def test_a_control_of_some_seeds_is_compared_with_the_same_seeds_of_the_papers_protocol(files, tmp_path):
     parts = [said("a", "a", "paper", "gpca", 27)]
     write_csv(files[1], pd.concat(parts))  # another seed, in which all goes wrong
-    rows = collect_intervals(files).set_index(["control", "source", "method", "metric"])
-    density = rows.loc["density", "a", "gpca", "accuracy"]
-    assert (density["seeds"], density["value"], density["change"]) == pytest.approx((1, 0.7, -0.2))
+    density = rows_of(files, tmp_path / "control_intervals.csv").loc["density", "a", "all", "gpca", "accuracy"]
+    assert density.loc["", "seeds"] == 1
+    assert density["value"][["", "usual"]].tolist() == pytest.approx([0.7, -0.2])
 
 
-def test_the_change_of_an_encoder_trained_otherwise_is_against_the_papers_training_on_the_same_samples(files):
+def test_the_change_of_an_encoder_trained_otherwise_is_against_the_papers_training_on_the_same_samples(files, tmp_path):
     frame = pd.read_csv(files[0], keep_default_na=False)  # of one seed alone
     added = [("seen_objects", "gpca", 3), ("seen_objects", "gpca_random_draws", 6)]
-    write_csv(files[0], pd.concat([frame, *(said("a", "a", *of[:2], of[2]) for of in added)]))
+    write_csv(files[0], pd.concat([frame, *(said("a", "a", *names) for names in added)]))
     second = pd.read_csv(files[1], keep_default_na=False)
     write_csv(files[1], pd.concat([second, said("a", "a", "seen_objects", "gpca", 30)]))
-    rows = collect_intervals(files).set_index(["control", "source", "method", "metric"])
-    otherwise = rows.loc["seen_objects", "a", "gpca_random_draws", "accuracy"]
-    assert (otherwise["value"], otherwise["change"]) == pytest.approx((0.8, -0.1))
-    assert rows.loc["seen_objects", "a", "gpca", "accuracy"]["value"] == pytest.approx(0.45)
+    rows = rows_of(files, tmp_path / "control_intervals.csv")
+    otherwise = rows.loc["seen_objects", "a", "all", "gpca_random_draws", "accuracy"]
+    assert otherwise["value"][["", "usual"]].tolist() == pytest.approx([0.8, -0.1])
+    assert otherwise.loc["usual", "other"] == "gpca"
+    assert rows.loc[("seen_objects", "a", "all", "gpca", "accuracy", ""), "value"] == pytest.approx(0.45)
 
 
 def test_seconds_are_tidy_by_source_and_explainer(tmp_path):
     path = tmp_path / "timings" / "a" / "controls" / "seed100.csv"
     write_csv(path, pd.DataFrame({"explainer": ["gpca_pair"], "learning_seconds": [2.5], "seconds": [0.01]}))
-    rows = collect_costs([path]).set_index(["source", "method", "metric", "seed"])["value"]
+    rows = read_costs([path]).set_index(["source", "method", "metric", "seed"])["value"]
     assert rows.to_dict() == {
         ("a", "gpca_pair", "learning_seconds", 100): 2.5,
         ("a", "gpca_pair", "seconds", 100): 0.01,
@@ -130,7 +137,7 @@ def test_seconds_are_tidy_by_source_and_explainer(tmp_path):
 
 
 def test_intervals_are_over_clusters(files):
-    assert set(read_controls(files)["instance"]) == {f"{source}/part_{n}" for source in "ab" for n in range(5)}
+    assert set(read_controls(files)["cluster"]) == {f"{source}/part_{n}" for source in "ab" for n in range(5)}
 
 
 def test_no_files_are_refused():
@@ -156,7 +163,7 @@ def severity_files(folder, paths, **changed):
 
 
 def test_success_and_accuracy_stand_in_the_same_bins(files, tmp_path):
-    found = collect_severities(files, severity_files(tmp_path, files), SEVERITIES, bins=2, success=0.02)
+    found = severity_curves.collect(RUN, files, severity_files(tmp_path, files))
     write_metrics(found, tmp_path / "severities.csv")
     rows = read_severities(tmp_path / "severities.csv").set_index(["concept", "method"])
     assert rows.loc[("pose", REGISTRATION)]["value"].tolist() == [0, 0]
@@ -171,7 +178,7 @@ def test_success_and_accuracy_stand_in_the_same_bins(files, tmp_path):
 def test_severities_of_other_samples_are_refused(files, tmp_path):
     others = severity_files(tmp_path, files, sample=np.arange(30) + 1)
     with pytest.raises(InputError, match="lack test samples"):
-        collect_severities(files, others, SEVERITIES, bins=2, success=0.02)
+        severity_curves.collect(RUN, files, others)
 
 
 def test_a_perfect_pose_has_no_error(registrations, objects):

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from gpca.attribution.scores import Attribution
-from gpca.experiments.controls.protocol import ControlRun
-from gpca.experiments.controls.settings import ControlSettings
 from gpca.explainers.rivals import Rival
 from gpca.objects.surface import instance_of
 from gpca.pairs.perturbation import CONCEPTS
+from gpca.steps.control_samples import ControlSettings
+from gpca.steps.controls import ControlRun
 from gpca.uncertainty.settings import UncertaintySettings
 
 NAMES = ("brick", "cone", "capsule", "ball", "mug_1_1_1", "mug_1_1_2")  # two views of one mug

@@ -6,17 +6,18 @@ import pytest
 from gpca.alignment.icp import ICPSettings
 from gpca.alignment.rigid import inverse, transform
 from gpca.errors import InputError
-from gpca.experiments.controls.settings import RELABELED, ControlSettings
-from gpca.experiments.controls.variants import (
+from gpca.objects.surface import instance_of
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.pairs.synthesis import registered_backwards
+from gpca.steps.control_samples import (
+    RELABELED,
+    ControlSettings,
     left_out,
     of_unseen_objects,
-    registered_backwards,
     relabeled,
     shows_known_object,
     thinned,
 )
-from gpca.objects.surface import instance_of
-from gpca.pairs.perturbation import CONCEPTS
 
 
 def test_a_thinned_cloud_has_a_random_number_of_its_own_points(six):

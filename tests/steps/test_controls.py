@@ -8,12 +8,11 @@ import pytest
 from baselines.pair import PairGPCA
 from baselines.residuals import residuals_logistic
 from gpca.encoders.registry import EncoderSettings
-from gpca.experiments.controls.costs import ASKED
-from gpca.experiments.controls.encoding import encode
-from gpca.experiments.controls.settings import TRAININGS, ControlSettings
-from gpca.experiments.controls.variants import of_unseen_objects, shows_known_object
 from gpca.explainers.rivals import Rival
-from tests.experiments.controls.conftest import Head, Nearest, attached, experiment, seen
+from gpca.steps.control_samples import TRAININGS, ControlSettings, encode, of_unseen_objects, shows_known_object
+from gpca.steps.controls import ASKED
+
+from .six_objects import Head, Nearest, attached, experiment, seen
 
 
 def share_right(rows, **wanted):
@@ -67,7 +66,7 @@ def test_what_a_source_does_not_admit_is_left_out_and_named(registrations, capsy
 
 
 def test_shuffled_labels_are_learned_in_parts_and_every_test_sample_is_asked_about_once(six, monkeypatch):
-    monkeypatch.setattr("gpca.experiments.controls.protocol.FEWEST_OF_PART", 12)
+    monkeypatch.setattr("gpca.steps.controls.FEWEST_OF_PART", 12)
     learned = []
 
     class Counting(Nearest):
@@ -168,10 +167,8 @@ def test_encoders_that_are_trained_otherwise_are_asked_about_known_and_unseen_ob
 )
 def test_an_encoder_is_trained_as_its_control_says(six, monkeypatch, control, head, fewest_points):
     given = []
-    monkeypatch.setattr(
-        "gpca.experiments.controls.encoding.train_encoder", lambda *given_: given.append(given_) or (None, [])
-    )
-    monkeypatch.setattr("gpca.experiments.controls.encoding.embed", lambda model, asked, *_: seen(asked))
+    monkeypatch.setattr("gpca.encoders.training.train_encoder", lambda *given_: given.append(given_) or (None, []))
+    monkeypatch.setattr("gpca.encoders.training.embed", lambda model, asked, *_: seen(asked))
     arrays, _ = encode(control, six, "tiny", 100, ControlSettings(draw_points=(32, 64)), EncoderSettings())
     learned, settings = given[0][0], given[0][3]
     assert (settings.head, settings.fewest_points) == (head, fewest_points)

@@ -5,19 +5,21 @@ import pandas as pd
 import pytest
 
 from gpca.errors import InputError
-from gpca.evaluation.intervals import Difference
-from gpca.experiments.controls.figures import SAMPLES, SUCCEEDS, draw_severity_curves, draw_transfer
-from gpca.experiments.controls.metrics import COLUMNS as INTERVALS
-from gpca.experiments.controls.severity import COLUMNS as SEVERITIES
-from gpca.experiments.controls.severity import REGISTRATION
+from gpca.evaluation.measures import AGAINST, KEYS, NUMBERS
+from gpca.experiments.control_tables import transfer
+from gpca.experiments.plan import Run
+from gpca.experiments.severity_curves import COLUMNS as SEVERITIES
+from gpca.experiments.severity_curves import REGISTRATION, SAMPLES, SUCCEEDS, severity_curves
+from gpca.explainers.registry import explainer_entry
 
-EXPLAINERS = {"good": "Good", "poor": "Poor (forest)"}
-SOURCES = {"ycb": "YCB", "cups": "Cups"}
+EXPLAINERS = {name: explainer_entry(name).title for name in ("gpca", "rule")}
+SOURCES = {"ycb": {"title": "YCB", "stand_in": False}, "cups": {"title": "Cups", "stand_in": True}}
+RUN = Run({"sources": SOURCES, "controls": {"explainers": dict.fromkeys(EXPLAINERS)}})
 
 
 def severities():
     rows = []
-    for method, value in ((REGISTRATION, 0.9), ("good", 0.8), ("poor", 0.4)):
+    for method, value in ((REGISTRATION, 0.9), ("gpca", 0.8), ("rule", 0.4)):
         for low in (0.0, 0.5):
             rows += [(c, method, low, low + 0.5, np.nan, np.nan, 9, value) for c in ("noise", "overlap")]
             rows.append(("pose", method, 15 + low, 15.5 + low, 0.1, 0.2, 9, value))
@@ -26,28 +28,19 @@ def severities():
 
 def intervals():
     rows = [
-        (
-            "paper" if one == other else "transfer",
-            one,
-            other,
-            method,
-            "accuracy",
-            9,
-            1,
-            0.5,
-            *[np.nan] * 5,
-            *Difference().cells * 2,
-        )
+        ("paper", one, method, "accuracy", "all", "", "", 1, 1, 9, 0.5, np.nan, np.nan)
+        if one == other
+        else ("transfer", one, method, "accuracy", other, "", "", 1, 1, 9, 0.5, np.nan, np.nan)
         for one in SOURCES
         for other in SOURCES
         for method in EXPLAINERS
     ]
-    return pd.DataFrame(rows, columns=list(INTERVALS))
+    return pd.DataFrame(rows, columns=[*KEYS, *AGAINST, *NUMBERS])
 
 
 DRAWN = [
-    (lambda frame: draw_severity_curves(frame, EXPLAINERS, "Title"), severities),
-    (lambda frame: draw_transfer(frame, SOURCES, EXPLAINERS), intervals),
+    (lambda frame: severity_curves(RUN, frame), severities),
+    (lambda frame: transfer(RUN, frame), intervals),
 ]
 
 
@@ -57,9 +50,10 @@ def test_a_figure_is_the_same_bytes_each_time(draw, numbers, same_bytes):
 
 
 def test_severities_are_numbers_with_their_samples_and_edges():
-    figure = draw_severity_curves(severities(), EXPLAINERS, "Title")
+    figure = severity_curves(RUN, severities())
     noise, _, rotation, translation = figure.axes
-    assert [label.get_text() for label in noise.get_yticklabels()] == [SAMPLES, SUCCEEDS, "Good", "Poor (forest)"]
+    labels = [label.get_text().replace("\n", " ") for label in noise.get_yticklabels()]
+    assert labels == [SAMPLES, SUCCEEDS.replace("\n", " "), *EXPLAINERS.values()]
     assert [label.get_text() for label in noise.get_xticklabels()] == ["0", "50", "100"]
     assert [label.get_text() for label in rotation.get_xticklabels()] == ["15", "15.5", "16"]
     assert [label.get_text() for label in translation.get_xticklabels()] == ["10", "20"]
@@ -69,14 +63,14 @@ def test_severities_are_numbers_with_their_samples_and_edges():
 
 def test_bins_of_one_severity_are_weighted_by_their_samples():
     rows = severities()
-    many = (rows["method"] == "good") & (rows["concept"] == "pose") & (rows["low"] == 15)
+    many = (rows["method"] == "gpca") & (rows["concept"] == "pose") & (rows["low"] == 15)
     rows.loc[many, ["samples", "value"]] = [27, 0.4]
-    translation = draw_severity_curves(rows, EXPLAINERS, "Title").axes[3]
+    translation = severity_curves(RUN, rows).axes[3]
     assert "50" in [text.get_text() for text in translation.texts]  # (27 * 40 + 9 * 80) / 36
 
 
 def test_sources_are_named_on_the_axes_of_transfer():
-    figure = draw_transfer(intervals(), {"ycb": "YCB", "cups": "Cups (procedural stand-in)"}, EXPLAINERS)
+    figure = transfer(RUN, intervals())
     assert [label.get_text() for label in figure.axes[0].get_yticklabels()] == ["YCB", "Cups"]
     assert figure.axes[-1].get_ylabel() == "accuracy (%)"
 

@@ -1,0 +1,358 @@
+"""Table X: accuracy under the controls, from each source to each other, with encoders trained otherwise, and costs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from math import inf
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from gpca.errors import InputError
+from gpca.evaluation.intervals import REPEATS
+from gpca.evaluation.measures import ALL, POOLED, source_method_seed, tidy
+from gpca.experiments.controls import AUROC, CALLS, NO_TRAINING, RIVAL, SECTION, USUAL
+from gpca.experiments.diagnosis.near_chance import rule_near_chance
+from gpca.experiments.explained import titles
+from gpca.experiments.plan import Run
+from gpca.experiments.result import figure, table
+from gpca.explainers.gpca import GPCA_FORMS
+from gpca.explainers.registry import explainer_entry
+from gpca.io.csv_file import numbers, read_csv
+from gpca.reporting.figures.style import SMALL_PT
+from gpca.reporting.sheet import Row, Sheet, Show, show
+from gpca.reporting.tables.builder import TableBuilder, crossed
+from gpca.reporting.tables.cells import cell_of_repeats, interval_cell, plain_cell, rows_where
+from gpca.reporting.tables.table import Cell, Column
+from gpca.reporting.words import plural, span
+from gpca.steps.control_samples import (
+    HARD,
+    PAPER,
+    SEEN,
+    TRAININGS,
+    TRANSFER,
+    UNSEEN,
+    WRONG_LABELS,
+    trained_otherwise,
+)
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+INTERVALS = {"intervals": "control_intervals.csv"}
+TITLES = {
+    PAPER: "Paper's protocol (%)",
+    "density": "Matched density",
+    UNSEEN: "Unseen objects",
+    HARD: "Hard",
+    TRANSFER: "Other sources",
+    "reversed": "ICP reversed",
+    **{name: f"{100 * share:g} % wrong labels" for name, share in WRONG_LABELS.items()},
+    "shuffled": "Shuffled labels",
+}
+CHANGE = "_change"  # suffix of a control: the column of differences from the paper's protocol
+DIFFERENCES = {"_gain": (NO_TRAINING, "over untrained (points)"), "_lead": (RIVAL, "lead (points)")}
+WRONG = "_wrong"  # suffix of an AUROC: the column of the answers that it has to detect
+AUROCS = {PAPER: "AUROC, paper's", UNSEEN: "AUROC, unseen"}
+BOOTSTRAP = f"the 95 % interval of a bootstrap over objects and seeds ({REPEATS} draws)"
+ALL_TOGETHER = {POOLED: "All together"}
+POINTS = (-100.0, 100.0)
+
+
+@dataclass(frozen=True)
+class Count(Show):
+    """A number of test samples, and their total."""
+
+    def text(self, cell: Cell) -> str:
+        """E.g. ``24 of 1800``."""
+        return f"{cell.mean:.0f} of {cell.test_samples}"
+
+
+@table(
+    SECTION,
+    "Table X: with the shortcuts closed",
+    """Every explainer with a shortcut closed: clouds whose density says nothing, unseen objects and sources, reversed
+    ICP, and wrong labels. In brackets is the paired change against the paper's protocol with its interval.
+
+    With shuffled labels the accuracy has to be a third, up to chance; otherwise something other than the labels was
+    learned.""",
+    **INTERVALS,
+)
+def table10_controls(run: Run, intervals):
+    """Accuracy under every control with its change against the paper's protocol: all and single sources × controls."""
+    explainers = titles(run.config["controls"]["explainers"])
+    names = [PAPER, *(name for name in TITLES if name in run.config["controls"]["controls"])]
+
+    def accuracy(name: str, title: str, against: str = "", **options: Any) -> Show:
+        trained_on = POOLED if name == TRANSFER else ALL
+        return show("accuracy", title, trained_on, {"table": name, "against": against}, **options)
+
+    columns = {name: accuracy(name, TITLES[name], interval=False) for name in names}
+    for name in names[1:]:
+        columns[name + CHANGE] = accuracy(name, f"{TITLES[name]}: change", USUAL, limits=POINTS, beside=name)
+    for name in [name for name in (PAPER, UNSEEN, HARD) if name in names]:
+        for suffix, (against, words) in DIFFERENCES.items():
+            title = f"{TITLES[name].removesuffix(' (%)')}: {words}"
+            columns[name + suffix] = accuracy(name, title, against, limits=POINTS)
+    columns[CALLS] = show(
+        CALLS, "ICP calls", ALL, {"table": PAPER}, factor=1, decimals=0, interval=False, limits=(0, inf)
+    )
+    for name, words in AUROCS.items() if UNSEEN in names else ():
+        key, options = f"{name}_auroc", {"factor": 1, "decimals": 2, "interval": False, "limits": (0, 1)}
+        columns[key] = show(AUROC, words, ALL, {"table": name}, **options)
+        where = columns[name].where
+        columns[key + WRONG] = Count(f"{words}: wrong", 0, False, (0, inf), beside=key, where=where, factor=1)
+    rows = [
+        Row([source, explainer, (sight, sight)], {"source": source[0], "method": explainer[0]})
+        for source in (ALL_TOGETHER | run.source_titles).items()
+        for explainer in explainers.items()
+        for sight in [explainer_entry(explainer[0]).sight]
+    ]
+    heads = {"source": "Dataset", "explainer": "Explainer", "reads": "Reads"}
+    sheet = Sheet("table10_controls", heads, rows, columns, intervals)
+    for (i, key), cell in list(sheet.cells.items()):
+        if key == CALLS:
+            sheet.cells[i, key] = plain_cell(cell.mean, cell.seeds, cell.test_samples)
+        elif key.endswith(WRONG):
+            if (i, key.removesuffix(WRONG)) in sheet.cells:
+                wrong = round((1 - cell.mean) * cell.test_samples)
+                sheet.cells[i, key] = plain_cell(wrong, cell.seeds, cell.test_samples)
+            else:
+                del sheet.cells[i, key]
+    seeds = {
+        name: span(cell.seeds for (_, key), cell in sheet.cells.items() if key == name)
+        for name in names
+        if any(key == name for _, key in sheet.cells)
+    }
+    usual = seeds.pop(PAPER, str(sheet.seeds))
+    fewer = ", ".join(f"{TITLES[name]}: {plural(number, 'seed')}" for name, number in seeds.items() if number != usual)
+    notes = (
+        f"Over {plural(usual, 'seed')}{f' ({fewer})' if fewer else ''}. In brackets: points gained or lost against the "
+        f"paper's protocol, and {BOOTSTRAP}. The change is paired: it is taken over the seeds and objects that the "
+        "control has, so that it differs from the difference of the two levels where the control has fewer seeds. "
+        "Bold: best of a dataset under a control.",
+        "Matched density: every cloud has a random number of points, in training and test. Unseen objects: encoder "
+        "and explainer learned from other objects. Other sources: they learned from one other source. Wrong "
+        "labels: among the explainer's training samples. Shuffled labels teach nothing: guessing gives "
+        "33.3, although in a single source and seed whole clusters of samples may be named by chance.",
+        "Over untrained: accuracy minus that of the best of chance, the most frequent label and the rule under the "
+        "same control; lead: minus that of the best other explainer; both on the same draws, so that it is better "
+        "where the interval is above 0. Reads: what an explainer sees of a registration. ICP calls: runs beyond "
+        "the one that it explains.",
+        "Hard: samples of unseen objects with one to three perturbations, labeled with the one that adds most to "
+        "the error by counterfactuals. No start is right, no sensor free of noise, no surface whole, and the "
+        "number of points tells nothing. Guessing is right in 33.3 %."
+        + rule_near_chance(intervals, run.sources, table=HARD, metric="accuracy", against=""),
+        "AUROC: how well the entropy of the scores separates wrong from right answers; in brackets how many of the "
+        "test samples are wrong, and a dash where none is. Elsewhere a dash marks a head that is trained with the "
+        "encoder and learns no labels, and a source that does not admit a control.",
+    )
+    caption = "Accuracy (%) of single-concept attribution with a shortcut closed (change in brackets)" + run.stand_ins()
+    return sheet.table(caption, "control", notes, bold=[name for name in names if name != "shuffled"], same=1)
+
+
+def transfers(intervals: pd.DataFrame) -> pd.DataFrame:
+    """Accuracies by the source tested and, in the column ``concept``, the source trained on, which may be the same."""
+    rows = rows_where(intervals, metric="accuracy", against="")
+    same = rows_where(rows, table=PAPER)
+    same = same[same["source"] != POOLED]
+    import pandas as pd
+
+    return pd.concat([same.assign(concept=same["source"]), rows_where(rows, table=TRANSFER)])
+
+
+@table(
+    SECTION,
+    "Table X: from each source to each other",
+    """Accuracy of every explainer on the source that it learned from and on the others. If the rows of one explainer
+    are alike, it does not matter where it learned.""",
+    needs=("transfer_source",),
+    **INTERVALS,
+)
+def table10_transfer(run: Run, intervals):
+    """Accuracy of every explainer, by the source that it learned from × the source tested."""
+    rows = [
+        Row([explainer, trained_on], {"method": explainer[0], "concept": trained_on[0]})
+        for explainer in titles(run.config["controls"]["explainers"]).items()
+        for trained_on in (run.source_titles | {POOLED: "another (mean)"}).items()
+    ]
+    columns = {name: Show(f"on {title}", where={"source": name}) for name, title in run.source_titles.items()}
+    columns[POOLED] = Show("mean", where={"source": POOLED})
+    heads = {"explainer": "Explainer", "trained_on": "Learned from"}
+    sheet = Sheet("table10_transfer", heads, rows, columns, transfers(intervals))
+    note = (
+        "Encoder and explainer learned from one source and are asked about the test samples of another; what they "
+        f"learned from is the paper's protocol. Over {plural(sheet.seeds, 'seed')}; in brackets {BOOTSTRAP}."
+    )
+    return sheet.table("Accuracy (%) from each source to each other" + run.stand_ins(), "tested", [note])
+
+
+@figure(
+    SECTION,
+    "From each source to each other",
+    """Accuracy of every explainer by the source that it learned from (rows) and the source of the test samples
+    (columns). The diagonal is the paper's protocol.""",
+    needs=("transfer_source",),
+    after="severity_curves",
+    **INTERVALS,
+)
+def transfer(run: Run, intervals) -> Figure:
+    """A matrix for each explainer: sources that it learned from × sources that it explains."""
+    accuracy, sources = transfers(intervals), run.source_titles
+    moved = set(accuracy["method"][accuracy["table"] == TRANSFER])
+    shown = {name: title for name, title in titles(run.config["controls"]["explainers"]).items() if name in moved}
+    if not shown:
+        raise InputError("intervals", "have no transfer", "run the controls of two sources first")
+    from gpca.reporting.figures.panels import draw_percentages, in_lines, label_outer, panels_in_lines
+
+    drawing, drawn = panels_in_lines(len(shown), 1.5)
+    short = [title.split(" (")[0] for title in sources.values()]
+    names = short if len(set(short)) == len(short) else list(sources.values())
+    for panel, (name, title) in zip(drawn, shown.items(), strict=True):
+        matrix = rows_where(accuracy, method=name).pivot(index="concept", columns="source", values="value")
+        shares = 100 * matrix.reindex(index=list(sources), columns=list(sources)).to_numpy(float)
+        draw_percentages(panel, shares, "{:.0f}")
+        panel.set_title(in_lines(title), fontsize=SMALL_PT)
+        panel.set_xticks(range(len(names)), names, rotation=40, ha="right", rotation_mode="anchor")
+        panel.set_yticks(range(len(names)), names)
+        panel.tick_params(length=0, labelsize=SMALL_PT)
+        panel.set_box_aspect(1)
+    label_outer(drawn, "tested on", "learned from")
+    bar = drawing.colorbar(drawn[0].images[0], ax=drawing.axes, shrink=0.5, aspect=30, pad=0.01)
+    bar.set_label("accuracy (%)", fontsize=SMALL_PT)
+    return drawing
+
+
+TRAINED = {"random_draws": "draws of random size"}
+SAME_SEEDS = "paper_same_seeds"  # the paper's training, over the seeds of the encoders trained in other ways
+OBJECTS = {PAPER: TITLES[PAPER], SEEN: "Objects that it learned from (%)", UNSEEN: "Unseen objects (%)"}
+
+
+@table(
+    SECTION,
+    "Table X: encoders trained otherwise",
+    """GP-CA on three encoders: the paper's, one trained on random numbers of points so that density says nothing, and
+    one trained with a head of two layers. Each is tested on new samples of the objects that it learned from, and on
+    unseen objects; the paper's is also shown over the seeds of the others, which are fewer.""",
+    needs=("control_encoder",),
+    **INTERVALS,
+)
+def table10_encoders(run: Run, intervals):
+    """Accuracy of GP-CA with encoders that are trained in other ways: sources and trainings × objects."""
+    builder = TableBuilder("table10_encoders", {"source": "Dataset", "training": "Encoder"})
+    explainers = titles(run.config["controls"]["explainers"])
+    forms = {name: words for name, words in explainers.items() if name in GPCA_FORMS}
+    accuracy = rows_where(intervals, metric="accuracy")
+
+    def by_objects(source: str, method: str, against: str = "") -> dict[str, pd.Series]:
+        rows = rows_where(accuracy, source=source, method=method, against=against).set_index("table")
+        return {objects: rows.loc[objects] for objects in OBJECTS if objects in rows.index}
+
+    for (source, explainer), (dataset, (_, words)) in crossed(ALL_TOGETHER | run.source_titles, forms):
+        paper = by_objects(source, explainer)
+        ways = {
+            way: [by_objects(source, trained_otherwise(explainer, way), against) for against in ("", USUAL)]
+            for way in TRAININGS
+        }
+        cells = {objects: interval_cell(row) for objects, row in paper.items()}
+        builder.add_row([dataset, (PAPER, _with_seeds(words, paper.values()))], cells)
+        # The paper's training over the seeds of the other trainings, where these are fewer: their values less changes.
+        fewer = {
+            objects: (row, changes[objects])
+            for rows, changes in ways.values()
+            for objects, row in rows.items()
+            if objects in paper and row["seeds"] < paper[objects]["seeds"]
+        }
+        same = {
+            objects: plain_cell(100 * (row["value"] - change["value"]), int(row["seeds"]), int(row["samples"]))
+            for objects, (row, change) in fewer.items()
+        }
+        builder.add_row([dataset, (SAME_SEEDS, _with_seeds(words, (row for row, _ in fewer.values())))], same)
+        for way, (rows, changes) in ways.items():
+            cells = {objects: interval_cell(row) for objects, row in rows.items()}
+            cells |= {objects + CHANGE: interval_cell(row) for objects, row in changes.items()}
+            builder.add_row([dataset, (way, _with_seeds(f"{words}, {TRAINED[way]}", rows.values()))], cells)
+    return builder.build(
+        caption="Accuracy (%) on encoders that are trained otherwise" + run.stand_ins(),
+        column_head="objects",
+        columns={name: Column(words, interval=False) for name, words in OBJECTS.items()}
+        | {
+            name + CHANGE: Column(f"{words}: change", limits=POINTS, beside=name)
+            for name, words in OBJECTS.items()
+            if name != PAPER
+        },
+        footnotes=(
+            "Except under the paper's protocol, all learn from the same training samples of some of the objects, and "
+            "are asked about new samples of these objects and about the others. In brackets: points gained or lost by "
+            "the training, on the same seeds and test samples, and " + BOOTSTRAP + ".",
+        ),
+    )
+
+
+def _with_seeds(words: str, rows: Iterable[pd.Series]) -> str:
+    seeds = [row["seeds"] for row in rows]
+    return f"{words}, {plural(span(seeds), 'seed')}" if seeds else words
+
+
+SECONDS = {"learning_seconds": 1, "seconds": 1e3}  # column of the files -> factor to the table's unit
+
+
+def read_costs(files: Iterable[str | Path]) -> pd.DataFrame:
+    """Seconds to learn, and of one registration, by source, explainer and seed; they differ from run to run.
+
+    Args:
+        files: named ``…/{source}/controls/seed{seed}.csv``.
+
+    Raises:
+        InputError: a file that cannot be read, or holds seconds that are none.
+    """
+    records = []
+    for path in files:
+        source, _, seed = source_method_seed(path)
+        rows = read_csv(path, ("explainer", *SECONDS))
+        for metric in SECONDS:
+            by_explainer = zip(rows["explainer"], numbers(path, rows, metric, least=0), strict=True)
+            records += [("costs", source, name, metric, ALL, seed, float(value)) for name, value in by_explainer]
+    return tidy(records, "costs of the controls")
+
+
+@table(
+    SECTION,
+    "Table X: what seeing the pair costs",
+    """Explainers that see the registrations themselves, through measurements of the pair or an encoder that learns
+    them: seconds to learn, milliseconds per registration, and accuracy.""",
+    needs=("timed_control",),
+    costs=(read_costs, "timings/{source}/controls/seed{control_seed}.csv"),
+    **INTERVALS,
+)
+def table10_costs(run: Run, intervals, costs):
+    """Cost of explainers that see the registrations themselves, and their accuracy."""
+    builder = TableBuilder("table10_costs", {"explainer": "Explainer"})
+    gains = {name: TITLES[name] for name in (PAPER, UNSEEN, TRANSFER)}
+    pooled = POOLED if len(run.sources) > 1 else next(iter(run.sources))
+    for explainer, words in titles(run.config["controls"]["explainers"]).items():
+        cells: dict[str, Cell | None] = {}
+        for metric, factor in SECONDS.items():
+            seconds_R = rows_where(costs, method=explainer, metric=metric).groupby("seed")["value"].mean()
+            cells[metric] = cell_of_repeats((seconds_R * factor).to_numpy(), 0)
+        if cells["seconds"] is None:
+            continue
+        accuracy = rows_where(intervals, source=pooled, method=explainer, metric="accuracy", against="")
+        cells |= {row["table"]: interval_cell(row) for _, row in accuracy.iterrows() if row["table"] in gains}
+        builder.add_row([(explainer, words)], cells)
+    return builder.build(
+        caption="What explainers of the pair cost and gain" + run.stand_ins(),
+        column_head="metric",
+        columns={
+            "learning_seconds": Column("Learning (s)", interval=False, limits=(0, inf)),
+            "seconds": Column("One registration (ms)", interval=False, limits=(0, inf)),
+            **{name: Column(words) for name, words in gains.items()},
+        },
+        footnotes=(
+            "Learning: classifier, and encoder if it has its own, from the measured training samples of a source. One "
+            "registration: to measure, embed and explain it. Times are means over sources and seeds, on one core; "
+            "they differ from run to run.",
+            f"In brackets: {BOOTSTRAP}.",
+        ),
+    )

@@ -1,0 +1,352 @@
+"""Explanations with a shortcut closed: clouds of one density, unseen objects, wrong labels and others (Table X)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+
+from gpca.attribution.predictions import read_predictions
+from gpca.causes.settings import NOT_OF_CAUSES, CauseSettings
+from gpca.encoders.registry import encoders
+from gpca.errors import InputError, with_key
+from gpca.evaluation.intervals import UNTRAINED, Clustered, best_of, interval, weighted_mean
+from gpca.evaluation.measures import ALL, POOLED, TEST_SAMPLES, intervals, source_method_seed, tidy
+from gpca.experiments.experiment import EXPLAINERS, ByName, Experiment, LeftOut
+from gpca.experiments.explained import require_explained
+from gpca.experiments.plan import Run
+from gpca.experiments.result import numbers
+from gpca.experiments.step import Plan, Step, Wildcards
+from gpca.explainers.gpca import GPCA_FORMS
+from gpca.explainers.interface import BARE
+from gpca.explainers.registry import explainer_entry, explainer_module
+from gpca.io.csv_file import numbers as number_column
+from gpca.settings import changes_of
+from gpca.steps.control_samples import (
+    HARD,
+    LABELS,
+    OF_EVERY_SEED,
+    PAPER,
+    RETRAINED,
+    TRAININGS,
+    TRANSFER,
+    UNSEEN,
+    ControlSettings,
+    plain_of,
+)
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+CALLS, AUROC = "icp_calls", "auroc_error"
+SECTION = "Beyond the paper: what explainers look at, and whether it carries over"
+USUAL, RIVAL, NO_TRAINING = "usual", "rival", "untrained"  # kinds of differences, the column `against`
+
+
+@dataclass(frozen=True, kw_only=True)
+class Section(ControlSettings):
+    """The controls, and the explainers under them, with settings beyond those that they have elsewhere.
+
+    Attributes:
+        hard: how the hard samples are drawn: as the causes, with these changes.
+    """
+
+    explainers: ByName
+    hard: Annotated[dict, changes_of(CauseSettings, without=NOT_OF_CAUSES)]
+
+
+def check(config: dict, _left_out: LeftOut) -> None:
+    """Check that every explainer finds what it reads under a control, and that hard samples can be drawn."""
+    hard = config["causes"] | config["controls"]["hard"]
+    with_key("controls.hard", CauseSettings.from_dict, hard, config["registrations"]["icp"])
+    for key, name in require_explained(config, "controls.explainers"):
+        entry = explainer_entry(name)
+        if entry.design and not entry.observed_only:
+            fault = "needs more Monte-Carlo ICP than that of the observed pair, which is all that a control runs"
+            raise InputError(f"config key {key}", fault, "leave it out")
+
+
+def names(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str, Any]:
+    """Seeds, encoders that are compared, explainers that are timed, and sources between which there is transfer.
+
+    Encoders are compared on the samples that the unseen objects need; one source alone admits no transfer.
+    """
+    controls = config["controls"]
+    explains_by_gpca = any(name in GPCA_FORMS for name in controls["explainers"])
+    return {
+        "control_seed": list(config["seeds"])[: controls["seeds"]],
+        "control": [*RETRAINED, *TRAININGS],
+        "control_embedding": config["embedding"]["encoder"],
+        "control_encoder": list(controls["encoders"]) if explains_by_gpca and UNSEEN in controls["controls"] else [],
+        "timed_control": [name for name in controls["explainers"] if explainer_entry(name).reads == BARE],
+        "transfer_source": list(sources) if TRANSFER in controls["controls"] and len(sources) > 1 else [],
+    }
+
+
+EXPERIMENT = Experiment(
+    name="controls",
+    beside=("control_tables", "severity_curves"),
+    sections={"controls": Section},
+    names=names,
+    check=check,
+    leavable={"controls.explainers": EXPLAINERS},
+)
+
+
+def _has_further_encoders(plan: Plan, wildcards: Wildcards) -> bool:
+    seeds = plan.names["control_seed"][: plan.config["controls"]["encoder_seeds"]]
+    return int(wildcards.seed) in seeds
+
+
+def _controls_of(plan: Plan, wildcards: Wildcards) -> list[str]:
+    """Controls of a seed; those that need a further encoder are only in the first seeds."""
+    every = _has_further_encoders(plan, wildcards)
+    chosen = plan.config["controls"]["controls"]
+    return [name for name in chosen if every or name in OF_EVERY_SEED or name not in RETRAINED]
+
+
+def _retrained(plan: Plan, wildcards: Wildcards) -> list[str]:
+    """Controls and ways of training for which a seed has other encoders."""
+    controls = [name for name in _controls_of(plan, wildcards) if name in RETRAINED]
+    return controls + (plan.names["control_encoder"] if _has_further_encoders(plan, wildcards) else [])
+
+
+def _other_sources(plan: Plan, wildcards: Wildcards) -> list[str]:
+    return [name for name in plan.names["transfer_source"] if name != wildcards.source]
+
+
+def _explainers(plan: Plan) -> dict[str, dict]:
+    given = plan.config["controls"]["explainers"]
+    return {name: (plan.config["explainers"].get(name) or {}) | (added or {}) for name, added in given.items()}
+
+
+def _settings(plan: Plan, wildcards: Wildcards) -> dict[str, Any]:
+    controls = {key: value for key, value in plan.config["controls"].items() if key not in ("explainers", "hard")}
+    controls["controls"] = _controls_of(plan, wildcards)
+    return {"controls": controls, "encoder": plan.config["encoders"][plan.names["control_embedding"]]}
+
+
+def _encoder_module(plan: Plan) -> str:
+    return encoders()[plan.config["encoders"][plan.names["control_embedding"]]["backbone"]].split(":")[0]
+
+
+HARD_FILE, SEED_FILE = "hard/{source}/seed{seed}.npz", "registrations/{source}/seed{seed}.npz"
+SAMPLE = Step(
+    name="sample_hard",
+    run="gpca.steps.causes:causes",
+    inputs={"objects": "objects/{source}.npz"},
+    outputs={
+        "causes": HARD_FILE,
+        "candidates": "hard/{source}/seed{seed}.csv",
+        "timings": "timings/{source}/hard/seed{seed}.csv",
+    },
+    settings=lambda plan, wildcards: {
+        **plan.config["causes"],
+        **plan.config["controls"]["hard"],
+        "icp": plan.config["registrations"]["icp"],
+    },
+)
+TRAIN = Step(
+    name="train_control",
+    run="gpca.steps.control_samples:train",
+    inputs={"registrations": lambda plan, wildcards: [HARD_FILE if wildcards.control == HARD else SEED_FILE]},
+    outputs={
+        "embeddings": "control_embeddings/{control}/{source}/seed{seed}.npz",
+        "curve": "control_embeddings/{control}/{source}/seed{seed}.csv",
+    },
+    settings=_settings,
+    modules=lambda plan: [_encoder_module(plan)],
+    priority=10,
+)
+EXPLAIN = Step(
+    name="explain_controls",
+    run="gpca.steps.controls:explain",
+    inputs={
+        "objects": "objects/{source}.npz",
+        "registrations": SEED_FILE,
+        "other_registrations": lambda plan, wildcards: [
+            f"registrations/{name}/seed{{seed}}.npz" for name in _other_sources(plan, wildcards)
+        ],
+        "hard": lambda plan, wildcards: [HARD_FILE] if HARD in _controls_of(plan, wildcards) else [],
+        "encoder": "encoders/{source}/{control_embedding}/seed{seed}.pt",
+        "embeddings": "embeddings/{source}/{control_embedding}/none/seed{seed}.npz",
+        "retrained_embeddings": lambda plan, wildcards: [
+            f"control_embeddings/{name}/{{source}}/seed{{seed}}.npz" for name in _retrained(plan, wildcards)
+        ],
+    },
+    outputs={
+        "predictions": "controls/{source}/seed{seed}.csv",
+        "samples": "control_samples/{source}/seed{seed}.csv",
+        "timings": "timings/{source}/controls/seed{seed}.csv",
+    },
+    settings=lambda plan, wildcards: (
+        _settings(plan, wildcards)
+        | {
+            "explainers": _explainers(plan),
+            "uncertainty": plan.config["uncertainty"].get("removal", {}),
+            "icp": plan.config["registrations"]["icp"],
+        }
+    ),
+    params={"retrained": _retrained, "others": _other_sources},
+    modules=lambda plan: [_encoder_module(plan), *map(explainer_module, _explainers(plan))],
+    where={"seed": "control_seed"},
+    target="controls",
+    priority=5,
+)
+
+
+def read_controls(files: Iterable[str | Path]) -> pd.DataFrame:
+    """Control, source (that is tested), trained_on, explainer, seed, sample, cluster, concept, right, scores and calls.
+
+    ``cluster`` names the family with its source. An abstained sample is wrong. ``bald`` is NaN where there is none.
+
+    Args:
+        files: named ``…/{source trained on}/seed{seed}.csv``.
+
+    Raises:
+        InputError: no files, or a file that cannot be read.
+    """
+    import pandas as pd
+
+    frames = []
+    for path in files:
+        _, trained_on, seed = source_method_seed(path)
+        rows = read_predictions(path, LABELS)
+        columns = {
+            "control": rows["control"],
+            "source": rows["tested"],
+            "trained_on": trained_on,
+            "explainer": rows["explainer"],
+            "seed": seed,
+            "sample": rows["sample"],
+            "cluster": rows["tested"] + "/" + rows["cluster"],
+            "concept": rows["concept_true"],
+            "right": (rows["concept_true"] == rows["concept_predicted"]) & ~rows["abstained"],
+            "entropy": number_column(path, rows, "entropy"),
+            "bald": number_column(path, rows, "bald", needed=rows["bald"] != ""),
+            CALLS: rows[CALLS],
+        }
+        frames.append(pd.DataFrame(columns))
+    if not frames:
+        raise InputError("controls", "no files were given", "name at least one explainer in controls.explainers")
+    return pd.concat(frames, ignore_index=True)
+
+
+def auroc_error(rows: pd.DataFrame, score: str, weights_B_N: np.ndarray) -> np.ndarray:
+    """Area (B,) under the ROC curve by which a score separates wrong from right; NaN where it cannot."""
+    from gpca.causes.judged import ranking
+
+    if rows[score].isna().any():
+        return np.full(len(weights_B_N), np.nan)
+    return ranking(rows[score].to_numpy(), ~rows["right"].to_numpy(), weights_B_N)["area"]
+
+
+@numbers("controls.csv", rule="control_metrics", files="controls/{source}/seed{control_seed}.csv")
+def collect(run: Run, files: Iterable[str | Path]) -> pd.DataFrame:
+    """Accuracy, and AUROC of errors by entropy and by BALD, by seed; ``table`` is the control.
+
+    The column ``concept`` is ``all``, and for transfer the source that was trained on.
+    """
+    records = []
+    keys = ["control", "source", "trained_on", "explainer", "seed"]
+    for (control, source, trained_on, explainer, seed), rows in read_controls(files).groupby(keys, sort=False):
+        concept = trained_on if control == TRANSFER else ALL
+        values = {"accuracy": rows["right"].mean(), TEST_SAMPLES: len(rows)}
+        for metric, score in ((AUROC, "entropy"), ("auroc_error_bald", "bald")):
+            values[metric] = auroc_error(rows, score, np.ones((1, len(rows))))[0]
+        records += [
+            (control, source, explainer, metric, concept, seed, float(value))
+            for metric, value in values.items()
+            if np.isfinite(value)
+        ]
+    return tidy(records, "controls")
+
+
+Values = dict[str, np.ndarray]  # metric -> values (1 + B,)
+
+
+@numbers("control_intervals.csv", files="controls/{source}/seed{control_seed}.csv")
+def collect_intervals(run: Run, files: Iterable[str | Path]) -> pd.DataFrame:
+    """Accuracy and AUROC of every control and explainer over all seeds, with differences, by source and over all.
+
+    Of transfer there is a row for each source trained on, and one for all others together. Draws of families and seeds
+    are the same for all explainers and controls of a source, so that differences are paired. Against ``usual``: the
+    paper's protocol, or the paper's training of the encoder, on the same seeds. Against ``rival`` and ``untrained``:
+    the best other explainer, and the best that needs no training, under the same control. ICP calls are those under
+    the paper's protocol.
+    """
+    predictions = read_controls(files)
+    sources = list(dict.fromkeys(predictions["source"]))
+    records: list[tuple] = []
+    for source in (*sources, POOLED) if len(sources) > 1 else sources:
+        subset = predictions if source == POOLED else predictions[predictions["source"] == source]
+        measured: dict[tuple[str, str], dict[str, tuple[Values, Clustered, str, Values]]] = {}
+        for explainer, rows in subset.groupby("explainer", sort=False):
+            draws, usual, usual_draws = _drawn(source, rows), rows, None
+            if plain := plain_of(str(explainer)):
+                usual = subset[(subset["explainer"] == plain) & subset["seed"].isin(rows["seed"])]
+                usual_draws = _drawn(source, usual)
+            for (control, trained_on), mask_N in _groups(rows, source).items():
+                same = (usual["control"] == (control if plain else PAPER)) & usual["seed"].isin(rows["seed"][mask_N])
+                usual_values = _values(usual[same], (usual_draws or draws).subset(same.to_numpy()))
+                values = _values(rows[mask_N], draws.subset(mask_N))
+                group = measured.setdefault((control, trained_on), {})
+                group[str(explainer)] = values, draws.subset(mask_N), plain or PAPER, usual_values
+        for explainer in dict.fromkeys(subset["explainer"]):
+            for (control, trained_on), group in measured.items():
+                if explainer in group:
+                    records += _records((control, source), trained_on, explainer, group)
+    return intervals(records, "controls")
+
+
+def _drawn(source: str, rows: pd.DataFrame) -> Clustered:
+    return Clustered.drawn(rows["seed"], rows["cluster"], "control intervals", source)
+
+
+def _groups(rows: pd.DataFrame, source: str) -> dict[tuple[str, str], np.ndarray]:
+    """Control, and ``all`` or the source trained on -> mask of the rows."""
+    control_N, trained_on_N = rows["control"].to_numpy(str), rows["trained_on"].to_numpy(str)
+    groups = {}
+    for name in dict.fromkeys(control_N.tolist()):
+        mask_N = control_N == name
+        if name == TRANSFER and source != POOLED:
+            for other in dict.fromkeys(trained_on_N[mask_N].tolist()):
+                groups[name, other] = mask_N & (trained_on_N == other)
+        groups[name, POOLED if name == TRANSFER else ALL] = mask_N
+    return groups
+
+
+def _values(rows: pd.DataFrame, draws: Clustered) -> Values:
+    values = {
+        "accuracy": weighted_mean(rows["right"].to_numpy(), draws.weights),
+        AUROC: auroc_error(rows, "entropy", draws.weights),
+    }
+    if (rows["control"] == PAPER).all():
+        values[CALLS] = np.full(len(draws.weights), rows[CALLS].mean())
+    return values
+
+
+def _records(keys: tuple[str, str], trained_on: str, explainer: str, group: Mapping) -> Iterable[tuple]:
+    """Rows of an explainer: each measure, and its differences."""
+    values, draws, usual, usual_values = group[explainer]
+    accuracies = {name: measured["accuracy"] for name, (measured, *_) in group.items()}
+    rivals = sorted(name for name in accuracies if name != explainer and not plain_of(name))
+    for metric, value_B in values.items():
+        if not np.isfinite(value_B[0]):
+            continue
+        row = (*keys, explainer, metric, trained_on)
+        drawn_B_N = None if metric == CALLS else draws.weights[1:]
+        yield draws.record((*row, "", ""), interval(value_B, drawn_B_N))
+        others = {}
+        if keys[0] != PAPER or usual != PAPER:
+            others[USUAL] = usual, usual_values[metric]
+        if metric == "accuracy":
+            for kind, candidates in ((RIVAL, rivals), (NO_TRAINING, [name for name in UNTRAINED if name in rivals])):
+                if other := best_of(accuracies, candidates):
+                    others[kind] = other, accuracies[other]
+        for kind, (other, other_B) in others.items():
+            if np.isfinite(value_B[0] - other_B[0]):
+                yield draws.record((*row, kind, other), interval(value_B - other_B, drawn_B_N, difference=True))

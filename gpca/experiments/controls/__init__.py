@@ -1,1 +1,0 @@
-"""Explanations when a shortcut is closed: other draws, unseen objects, other labels, other sources."""

@@ -1,0 +1,269 @@
+"""Samples of the controls: registrations as each control changes them, their severities, and encoders trained on them.
+
+Step ``train_control``: registrations -> embeddings by an encoder that is trained under a control.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
+
+import numpy as np
+
+from gpca.alignment.icp import ICPSettings
+from gpca.alignment.rigid import inverse
+from gpca.encoders.registry import OF_ANY_SIZE, EncoderSettings
+from gpca.errors import InputError
+from gpca.io.arrays import save_arrays
+from gpca.io.csv_file import write_csv
+from gpca.objects.canonical import ObjectClouds, unseen
+from gpca.objects.surface import instance_of
+from gpca.pairs.dataset import Registrations, ragged
+from gpca.pairs.perturbation import CONCEPTS
+from gpca.process.job import Job
+from gpca.process.provenance import record_provenance
+from gpca.seeds import generator
+from gpca.settings import Bounds, Count, Different, Distinct, read_settings
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+PAPER = "paper"  # the protocol itself, which every control is compared with
+Control = Literal["density", "unseen_objects", "hard", "reversed", "label_noise_30", "shuffled", "transfer"]
+CONTROLS: tuple[str, ...] = get_args(Control)
+UNSEEN = "unseen_objects"
+SEEN = "seen_objects"  # the explainers for unseen objects, tested on new samples of training objects
+HARD = "hard"  # other samples, in which no state is perfect and the label is measured
+RETRAINED = ("density", UNSEEN, HARD)  # have another encoder
+OF_EVERY_SEED = (UNSEEN, HARD)  # with another encoder for every seed
+Training = Literal["random_draws"]
+TRAININGS: tuple[str, ...] = get_args(Training)  # other ways to train the encoder, on the samples for unseen objects
+WRONG_LABELS = {"label_noise_30": 0.3}  # share of the training labels
+RELABELED = (*WRONG_LABELS, "shuffled")
+TRANSFER = "transfer"
+FEWEST_OBJECTS = 5  # instances; with fewer, too few objects are left to learn from
+SEVERITIES = ("noise", "rotation_deg", "translation", "crop")
+SAMPLE_COLUMNS = ("control", "sample", "object", "concept", *SEVERITIES, "error")
+LABELS = ("control", "tested", "explainer")  # columns before those of a prediction file
+CURVE = ("epoch", "learning_rate", "loss", "accuracy")  # of training
+Points = Annotated[int, Bounds(minimum=32, maximum=65536)]
+
+
+@dataclass(frozen=True)
+class ControlSettings:
+    """The controls, and their sizes.
+
+    Attributes:
+        controls: their names.
+        encoders: other ways to train GP-CA's encoder, compared on training objects and on unseen ones.
+        encoder_seeds: how many of `seeds`, from the first, train more encoders than those of `OF_EVERY_SEED`.
+        seeds: how many of the run's seeds are used, from the first.
+        draw_points: range of the random number of points of a cloud where density is matched.
+        folds: the number of folds of a source's objects, of which one is unseen.
+        bins: the number of equally wide bins of each severity.
+    """
+
+    controls: Distinct[Control] = ("density", "unseen_objects", "label_noise_30", "shuffled", "transfer")
+    encoders: Annotated[tuple[Training, ...], Different(fewest=0)] = ()
+    encoder_seeds: Count = 1
+    seeds: Count = 3
+    draw_points: tuple[Points, Points] = (200, 512)
+    folds: Annotated[int, Bounds(minimum=2, maximum=5)] = 3
+    bins: Annotated[int, Bounds(minimum=1, maximum=20)] = 4
+
+    def __post_init__(self) -> None:
+        if self.draw_points[0] > self.draw_points[1]:
+            fault = f"{list(self.draw_points)} is in descending order"
+            raise InputError("setting draw_points of controls", fault, "swap the two")
+
+
+def trained_otherwise(explainer: str, way: str) -> str:
+    """Name of an explainer whose encoder is trained in another way."""
+    return f"{explainer}_{way}"
+
+
+def plain_of(explainer: str) -> str | None:
+    """Explainer that :func:`trained_otherwise` gave this name; None for one with the paper's training."""
+    return next((explainer.removesuffix(f"_{way}") for way in TRAININGS if explainer.endswith(f"_{way}")), None)
+
+
+def left_out(control: str, registrations: Registrations, settings: ControlSettings, backbone: str) -> str | None:
+    """Reason why these registrations, or the backbone of their encoder, do not admit a control; None where they do."""
+    if control in (UNSEEN, *TRAININGS):
+        objects = len({instance_of(name) for name in registrations.object_name.tolist()})
+        if objects < FEWEST_OBJECTS:
+            return f"it needs at least {FEWEST_OBJECTS} objects, but there are {objects}"
+    if control in ("density", "random_draws"):
+        fewest, least = int(np.diff(registrations.offsets).min()), settings.draw_points[0]
+        if fewest < least:
+            return f"its smallest draw has {least} points, but a cloud has only {fewest}"
+        if backbone not in OF_ANY_SIZE:
+            return f"backbone '{backbone}' accepts clouds of one size only"
+    return None
+
+
+def variant(
+    control: str, registrations: Registrations, source: str, seed: int, settings: ControlSettings, icp: ICPSettings
+) -> Registrations:
+    """Training and test samples under a control; those of labels and transfer leave the registrations as they are."""
+    if control == "density":
+        return thinned(registrations, settings.draw_points, source, seed)
+    if control in (UNSEEN, *TRAININGS):
+        return of_unseen_objects(registrations, settings.folds, source, seed)
+    if control == "reversed":
+        from gpca.pairs.synthesis import registered_backwards
+
+        return registered_backwards(registrations, icp)
+    return registrations
+
+
+def thinned(registrations: Registrations, points: tuple[int, int], *axes: object) -> Registrations:
+    """Registrations with a random number of points of each source cloud, whatever its concept.
+
+    A fixed number of points makes a cropped cloud denser than the others, and all points make it the smallest; a random
+    number hides both.
+    """
+    clouds = []
+    for row in range(len(registrations)):
+        cloud = registrations.cloud(row)
+        random = generator(*axes, "thinned", registrations.split[row], registrations.sample[row])
+        count = min(int(random.integers(points[0], points[1] + 1)), len(cloud))
+        clouds.append(cloud[np.sort(random.permutation(len(cloud))[:count])])
+    targets = [registrations.target(row) for row in range(len(registrations))]
+    thin: dict[str, Any] = ragged(clouds, targets)
+    return replace(registrations, **thin)
+
+
+def of_unseen_objects(registrations: Registrations, folds: int, source: str, seed: int) -> Registrations:
+    """Training samples of most objects; test samples are those of the same objects, and all of the other objects.
+
+    The families of a source's objects are in folds that a file names, or are dealt into `folds` once for all seeds. A
+    seed leaves out the fold of its number, so that as many seeds as folds test every object once.
+    """
+    is_unseen = unseen(registrations.fold, seed)
+    if is_unseen is None:
+        families = generator(source, "folds").permutation(np.unique(registrations.cluster))
+        is_unseen = np.isin(registrations.cluster, families[seed % folds :: folds])
+    train = np.flatnonzero(~is_unseen & (registrations.split == "train"))
+    test = np.concatenate([np.flatnonzero(~is_unseen & (registrations.split == "test")), np.flatnonzero(is_unseen)])
+    chosen = registrations.subset(np.concatenate([train, test]))
+    # Numbered anew, since the test samples come from both splits.
+    split = np.repeat(["train", "test"], [len(train), len(test)])
+    sample = np.concatenate([chosen.sample[: len(train)], np.arange(len(test))])
+    return replace(chosen, split=split, sample=sample)
+
+
+def shows_known_object(registrations: Registrations) -> np.ndarray:
+    """Mask of the samples (S,) that show an object of a family that the training samples show."""
+    return np.isin(registrations.cluster, registrations.cluster[registrations.split == "train"])
+
+
+def relabeled(control: str, train: Registrations, *axes: object) -> Registrations:
+    """Training samples with the labels of a control.
+
+    With label noise, that share of the labels names one of the other concepts. Where labels are shuffled, each
+    concept's samples get every label equally often, so that only chance can be learned; in a free shuffle, a cluster
+    of samples would keep a most frequent label.
+    """
+    random = generator(*axes, "labels", control)
+    concept = train.concept.copy()
+    if control == "shuffled":
+        for name in CONCEPTS:
+            rows = random.permutation(np.flatnonzero(train.concept == name))
+            concept[rows] = np.resize(random.permutation(CONCEPTS), len(rows))
+    else:
+        rows = random.permutation(len(train))[: round(WRONG_LABELS[control] * len(train))]
+        steps = random.integers(1, len(CONCEPTS), size=len(rows))
+        numbers = np.array([CONCEPTS.index(name) for name in concept[rows]], int)
+        concept[rows] = np.array(CONCEPTS)[(numbers + steps) % len(CONCEPTS)]
+    return replace(train, concept=concept)
+
+
+def sample_table(tested: Mapping[str, Registrations], objects: ObjectClouds) -> pd.DataFrame:
+    """`SAMPLE_COLUMNS` of the test samples; the error is the final ADD, or ADD-S where symmetric, in diameters.
+
+    Args:
+        tested: registrations of each control that has other samples, and of the paper's protocol.
+    """
+    import pandas as pd
+
+    from gpca.causes.measuring import read_subjects
+
+    subjects = {subject.name: subject for subject in read_subjects(objects)}
+    frames = []
+    for control, registrations in tested.items():
+        rows = registrations.rows("test")
+        errors = []
+        for row in rows:
+            left = registrations.T_target_source("icp", row) @ inverse(registrations.T_target_source("true", row))
+            errors.append(subjects[str(registrations.object_name[row])].errors(left[None])[0])
+        columns = {
+            "control": control,
+            "sample": registrations.sample[rows],
+            "object": registrations.object_name[rows],
+            "concept": registrations.concept[rows],
+            "noise": registrations.severity_noise[rows],
+            "rotation_deg": np.rad2deg(registrations.severity_rotation_rad[rows]),
+            "translation": registrations.severity_translation[rows],
+            "crop": registrations.severity_crop[rows],
+            "error": errors,
+        }
+        frames.append(pd.DataFrame(columns))
+    return pd.concat(frames, ignore_index=True)
+
+
+def encode(
+    control: str,
+    registrations: Registrations,
+    source: str,
+    seed: int,
+    settings: ControlSettings,
+    encoder: EncoderSettings,
+    checkpoint: Path | None = None,
+) -> tuple[dict[str, np.ndarray], list[dict[str, float]]]:
+    """Arrays of embeddings by an encoder that is trained like the paper's except for the control, and its curve.
+
+    With matched density every draw from a cloud has a random number of points; the clouds are whole, as each epoch
+    draws anew. An encoder for unseen objects, or one that is trained in another way, sees no sample of them. Hard
+    samples are of unseen objects already.
+    """
+    from gpca.encoders.training import embed, train_encoder
+
+    if control in ("density", "random_draws"):
+        fewest, most = settings.draw_points
+        encoder = replace(encoder, fewest_points=fewest, draw_points=most)
+    if control not in ("density", HARD):
+        registrations = of_unseen_objects(registrations, settings.folds, source, seed)
+    name = f"{source} under {control}"
+    model, curve = train_encoder(registrations, name, seed, encoder, checkpoint)
+    h_S_d, logits_S_C = embed(model, registrations, name, seed, encoder)
+    return {
+        "h": h_S_d,
+        "head_logits": logits_S_C,
+        "sample": registrations.sample,
+        "split": registrations.split,
+    }, curve
+
+
+def train(job: Job) -> None:
+    """Train, keeping a checkpoint, and embed every sample; none where the registrations do not admit the control."""
+    import pandas as pd
+
+    settings = read_settings(ControlSettings, job.section("controls"))
+    encoder = EncoderSettings(**job.section("encoder"))
+    checkpoint = job.embeddings.with_suffix(".checkpoint")
+    with record_provenance([job.embeddings, job.curve], [job.registrations], job.settings, seed=job.seed):
+        registrations = Registrations.load(job.registrations, (job.source, job.seed))
+        if why := left_out(job.control, registrations, settings, encoder.backbone):
+            print(f"control '{job.control}' of {job.source} is skipped: {why}", file=sys.stderr)
+            empty = {name: np.zeros((0, 1), np.float32) for name in ("h", "head_logits")}
+            arrays, curve = {**empty, "sample": np.zeros(0, int), "split": np.zeros(0, "U5")}, []
+        else:
+            axes = (job.source, job.seed, settings, encoder, checkpoint)
+            arrays, curve = encode(job.control, registrations, *axes)
+        save_arrays(job.embeddings, arrays, registrations.axes)
+        write_csv(job.curve, pd.DataFrame(curve, columns=list(CURVE)), form="%.6g")
+        checkpoint.unlink(missing_ok=True)
