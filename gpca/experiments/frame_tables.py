@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 PUBLISHED_NOTE = "readings of which architecture the paper used; they are not compared with what it prints."
 NOT_SHARES = ("ece", "nll", "icp_calls")  # of which there is one number for all samples
-SCENES = ("scenes", "scene")
+SCENES = "scenes"  # the clusters
 EVERYTHING_SEEN = {TOGETHER: "All (%)", SEEN: "Seen objects (%)", UNSEEN: "Unseen objects (%)"}
 
 POSES = {"results": "Pose estimators", "true_pose": "True pose, small error"}  # titles by form; all others:

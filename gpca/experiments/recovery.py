@@ -240,7 +240,7 @@ def table8_recovery(
         f"{failures} failures over {plural(seeds, 'seed')}: {failure_counts(metrics)}. A failure is a pose off by "
         f"{100 * run.config['success']['error']:g} % of the diameter or more (ADD; ADD-S for symmetric objects) that "
         "is not off without "
-        f"its cause. {over_clusters(seeds, clusters=('rendered tables', 'table'))}. Bold: best of a column.",
+        f"its cause. {over_clusters(seeds, clusters='rendered tables')}. Bold: best of a column.",
         f"Acts on good: of {good} registrations on the same tables whose pose is right, those that the policy "
         "would change. Policies that are told that a pose is wrong change all; the oracle is told of these too.",
         f"To best sequence, to error only: paired differences of the shares within 1 and within {budget} actions, "

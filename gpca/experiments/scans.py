@@ -261,7 +261,7 @@ def collect(run: Run, files: Iterable[str | Path]) -> pd.DataFrame:
 
 
 SECTION = "Beyond the paper: scans registered to scans"
-SCENES = ("scenes", "scene")  # the clusters
+SCENES = "scenes"  # the clusters
 INTERVALS = {"intervals": "scans.csv"}
 
 

@@ -17,7 +17,7 @@ NEAR_LIMITS = (
     "In brackets, where that is 0 or reaches beyond 0 or 100 %: the farther bounds of it and of Wilson's interval, for "
     "which a cluster of objects or scenes counts once in each seed (docs/comparison.md)."
 )
-FAMILIES = ("families of objects", "family")  # what clusters are in most tables, and one of them
+FAMILIES = "families of objects"  # the clusters of most tables
 Label = tuple[str, str]  # key for the CSV, title for the reader
 
 
@@ -141,24 +141,22 @@ def interval_over(seeds: int | str) -> str:
     return INTERVAL if fewest >= LEAST_SEEDS else f"{INTERVAL} (none for fewer than {LEAST_SEEDS})"
 
 
-def over_clusters(seeds: int | str, samples: int | str = "", clusters: tuple[str, str] = FAMILIES) -> str:
-    """Return the same of values with intervals over clusters (:mod:`gpca.evaluation.measures`), without a full stop.
+def over_clusters(seeds: int | str, samples: int | str = "", clusters: str = FAMILIES) -> str:
+    """Footnote on values with intervals over clusters and seeds, without a full stop.
 
     Args:
-        seeds, samples: how many, the latter of each seed; empty where the note says it elsewhere.
-        clusters: what they are, and one of them.
+        seeds, samples: their numbers, the latter of each seed; empty where another note gives it.
+        clusters: the plural of what they are.
     """
-    several, one = clusters
-    of_each = f", {samples} test samples each" if samples else ""
+    each = f", {samples} test samples each" if samples else ""
     return (
-        f"Over {plural(seeds, 'seed')}{of_each}; in brackets: the 95 % interval of a bootstrap over {several} and "
-        f"seeds ({REPEATS} draws), of a share at least Wilson's of independent samples, and where all draws agree that "
-        f"for which a {one} counts once in each seed (docs/comparison.md)"
+        f"Over {plural(seeds, 'seed')}{each}; in brackets: the 95 % interval of a bootstrap over {clusters} and seeds "
+        f"({REPEATS} draws), for shares the farther bounds of it and of Wilson's interval (docs/comparison.md)"
     )
 
 
 def cautious_over(seeds: int | str, samples: int | str) -> str:
-    """Return the same of means of which no single answers are kept (:func:`cautious_cell`), without a full stop."""
+    """Footnote on means over seeds whose single answers are not kept (:func:`cautious_cell`), without a full stop."""
     over = f"Mean over {plural(seeds, 'seed')}, {samples} test samples each"
     of_accuracies = "In brackets, of accuracies, of which no single answers are kept:"
     wilson = "Wilson's interval, for which a family of objects counts once in each seed (docs/comparison.md)"
