@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 from gpca.errors import InputError
 from gpca.evaluation.intervals import REPEATS
 from gpca.evaluation.measures import ALL, POOLED, source_method_seed, tidy
+from gpca.experiments.cause_tables import rule_near_chance
 from gpca.experiments.controls import AUROC, CALLS, NO_TRAINING, RIVAL, SECTION, USUAL
-from gpca.experiments.diagnosis.near_chance import rule_near_chance
 from gpca.experiments.explained import titles
 from gpca.experiments.plan import Run
 from gpca.experiments.result import figure, table

@@ -12,16 +12,9 @@ import numpy as np
 from gpca.attribution.predictions import read_predictions
 from gpca.causes.dataset import Causes
 from gpca.errors import InputError
-<<<<<<< HEAD
-from gpca.experiments.controls.settings import HARD
 from gpca.experiments.diagnosis import cause_costs
 from gpca.experiments.frame_causes import SAMPLE_COLUMNS
 from gpca.experiments.scan_causes import SAMPLE_COLUMNS as SCAN_COLUMNS
-=======
-from gpca.experiments.diagnosis.experiment import shown as titles_and_costs
-from gpca.experiments.frame_causes.metrics import SAMPLE_COLUMNS
-from gpca.experiments.scan_causes.metrics import SAMPLE_COLUMNS as SCAN_COLUMNS
->>>>>>> a4ec3b10 (Controls are three files and the steps that draw their samples and explain under them; changes, leads and gains are rows with what they are against)
 from gpca.explainers.registry import explainer_entry
 from gpca.io.container import require_same_samples
 from gpca.io.csv_file import ANY, numbers, read_csv

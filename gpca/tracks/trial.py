@@ -18,15 +18,7 @@ from gpca.causes.dataset import Causes, labeled
 from gpca.causes.settings import OBJECTS, DescriptorSettings
 from gpca.encoders.registry import EncoderSettings
 from gpca.errors import InputError
-<<<<<<< HEAD
-from gpca.experiments.controls.protocol import ControlRun
-from gpca.experiments.controls.settings import HARD, ControlSettings
 from gpca.experiments.scan_causes import diagnosis_settings
-=======
-from gpca.experiments.scan_causes import diagnosis_step as scan_step
-from gpca.experiments.scan_causes.experiment import diagnosis_settings
-from gpca.experiments.scan_causes.settings import OBJECTS
->>>>>>> a4ec3b10 (Controls are three files and the steps that draw their samples and explain under them; changes, leads and gains are rows with what they are against)
 from gpca.explainers.interface import BARE, REENACTED, ExplainerEntry
 from gpca.explainers.registry import explainer_entry, require_settings
 from gpca.explainers.rivals import make_rivals

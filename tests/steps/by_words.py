@@ -24,17 +24,10 @@ SHARED = {  # module of gpca.steps -> the steps that it has, functions of their 
     "shift": "shift",
 }
 MODULES = {f: f"gpca.steps.{module}:{f}" for module, functions in SHARED.items() for f in functions.split()} | {
-<<<<<<< HEAD
     "active_learning": "gpca.steps.active_learning:learn_actively",
     "without": "gpca.steps.active_learning:embed_without",
-    "controls": IN + "controls.step",
-    "train_control": IN + "controls.encoding",
-=======
-    "active_learning": IN + "active_learning.step",
-    "without": IN + "active_learning.without_step",
     "controls": "gpca.steps.controls:explain",
     "train_control": "gpca.steps.control_samples:train",
->>>>>>> a4ec3b10 (Controls are three files and the steps that draw their samples and explain under them; changes, leads and gains are rows with what they are against)
     "estimate": IN + "estimators.step",
     "frame_labels": "gpca.steps.frame_labels",
     "gradients": "gpca.steps.gradients",

@@ -74,14 +74,10 @@ EDITS = {  # a module: what is made again where it has changed, and what is not
         "predictions active_learning diagnoses/ model.pt",
     ),
     "baselines/heads.py": ("learners/ table5_learners", "shifted/ predictions diagnoses/ kernels"),
-<<<<<<< HEAD
     "gpca/experiments/kernel_grid.py": (
         "figures/kernel_learning_curves kernels.csv table4_grid",
         "kernels/ figures/fig3",
     ),
-=======
-    "gpca/experiments/kernel_grid.py": ("figures/kernel_learning_curves kernels.csv table4_grid", "kernels/"),
->>>>>>> a4ec3b10 (Controls are three files and the steps that draw their samples and explain under them; changes, leads and gains are rows with what they are against)
     "gpca/active_learning/acquisition.py": (
         "active_learning/ycb new_concepts/ frame_labels/ runtime.csv table6_labels",
         "predictions embeddings learners diagnoses/ model.pt kernels/",
