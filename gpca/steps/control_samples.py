@@ -255,8 +255,9 @@ def train(job: Job) -> None:
     settings = read_settings(ControlSettings, job.section("controls"))
     encoder = EncoderSettings(**job.section("encoder"))
     checkpoint = job.embeddings.with_suffix(".checkpoint")
-    with record_provenance([job.embeddings, job.curve], [job.registrations], job.settings, seed=job.seed):
-        registrations = Registrations.load(job.registrations, (job.source, job.seed))
+    [path] = job.files("registrations")
+    with record_provenance([job.embeddings, job.curve], [path], job.settings, seed=job.seed):
+        registrations = Registrations.load(path, (job.source, job.seed))
         if why := left_out(job.control, registrations, settings, encoder.backbone):
             print(f"control '{job.control}' of {job.source} is skipped: {why}", file=sys.stderr)
             empty = {name: np.zeros((0, 1), np.float32) for name in ("h", "head_logits")}
