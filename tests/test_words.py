@@ -25,8 +25,14 @@ AVOIDED = {
     r"\w*(?:normal|initial|optim|regular|general|minim|maxim|summar)is(?:e|ed|es|ing|ation)": "American spelling",
 }
 # Keys of configs and of files keep their spelling, and so does a page's HTML.
-KEYS = re.compile(r"inverse_regularisation|\bneighbours\b|\"labelled\"|colour\b|\"taught\"|id=\"said\"")
-# Names that only point at another one: no file may have more of them than it has. Lower the numbers, never raise them.
+KEYS = re.compile(
+    r"inverse_regularisation|\bneighbours\b|\"labelled\"|colour\b|\"taught\"|id=\"said\"|\blearnt_from\b|\bto_centre\b"
+    r"|\"told the cause\""
+)
+    r"inverse_regularisation|\bneighbours\b|\"labelled\"|colour\b|\"taught\"|id=\"said\"|\blearnt_from\b|\bto_centre\b|\"told the cause\""
+)
+# Names that only point at another one. Lower this number, never raise it.
+MOST_POINTING = 
 POINTING = re.compile(r"\b(?:of_[a-zA-Z_]+|own|found|places|known)\b")
 
 
@@ -49,5 +55,3 @@ def test_names_that_only_point_at_others_get_fewer():
         counts[path.parent.relative_to(ROOT).parts[:2]] += len(POINTING.findall(names))
     assert sum(counts.values()) <= MOST_POINTING, counts.most_common()
 
-
-MOST_POINTING = 10_000

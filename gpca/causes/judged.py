@@ -222,7 +222,7 @@ SMALLER_IS_BETTER = tuple(name for name, each in MEASURES.items() if each.least_
 def measure(samples: Judged, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
     """Return every measure (B,) of :data:`MEASURES` that the explainer has.
 
-    - regret: of a failed sample, the error that the best single removal would take away minus that which the named
+    - regret: of a failed sample, the error that the best single removal would take away minus what the named
       cause's removal takes away, as a share of the error; mean. Naming nominal, or nothing, removes nothing.
     - tied_accuracy: as dominant_accuracy, but any cause counts whose φ is that of the dominant one up to the limit of a
       cause.

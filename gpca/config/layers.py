@@ -28,7 +28,7 @@ OPTIONAL: dict[str, Names] = {  # mappings whose entries may be false -> their p
     "reductions": Names("reduction", lambda: [field.name for field in fields(Reductions)]),
     "uncertainty": Names("uncertainty", lambda: DESIGNS),
     "explainers": EXPLAINERS,
-    **{key: names for each in experiments() for key, names in each.leavable.items()},
+    **{key: names for each in experiments() for key, names in each.optional_entries.items()},
 }
 # Mappings name -> true or false, or lists of the names that are true.
 SWITCHES = {key: names for each in experiments() for key, names in each.switches.items()}

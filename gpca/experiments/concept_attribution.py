@@ -129,7 +129,7 @@ EXTENDED = {
 NOTES = {
     "permuted_accuracy": (
         "Relabeled: accuracy under the best one-to-one renaming of the predicted concepts, which takes the truth "
-        "to find; where it is far above the accuracy, concepts are told apart but named wrongly."
+        "to find; where it is far above the accuracy, concepts are separated but named wrongly."
     ),
     "causal_accuracy": (
         "Causal: accuracy on the n causal samples whose uncertainty lies above the 95th percentile of the clean "

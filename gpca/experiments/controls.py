@@ -92,7 +92,7 @@ EXPERIMENT = Experiment(
     sections={"controls": Section},
     names=names,
     check=check,
-    leavable={"controls.explainers": EXPLAINERS},
+    optional_entries={"controls.explainers": EXPLAINERS},
 )
 
 

@@ -94,7 +94,7 @@ EXPERIMENT = Experiment(
     },
     shown=lambda config, sources: {"cause_explainers": cause_titles(config)},
     check=check,
-    leavable={
+    optional_entries={
         f"diagnosis.{key}": Names("explainer", lambda: explainers(CAUSES)) for key in ("explainers", "by_features")
     },
 )

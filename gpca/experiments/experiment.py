@@ -94,7 +94,7 @@ class Experiment:
         names: what it adds to the names in the braces of paths (:func:`gpca.experiments.run.names_of`).
         shown: what it adds to the settings that results show (:func:`gpca.experiments.run.settings_of`).
         check: refuses, with an InputError, sections that their types allow and that no run can use.
-        leavable: keys of mappings of which any entry may be false -> names that they have.
+        optional_entries: keys of mappings of which any entry may be false -> names that they have.
         switches: keys of mappings name -> true or false, which are read as the list of the names that are true.
         lists: keys of lists and mappings -> the names that they lose where the config leaves out others: those left
             out of the mapping at a key, or what a function returns.
@@ -109,7 +109,7 @@ class Experiment:
     names: ByRun = lambda config, sources: {}
     shown: ByRun = lambda config, sources: {}
     check: Callable[[dict, LeftOut], None] = lambda config, left_out: None
-    leavable: Mapping[str, Names] = field(default_factory=dict)
+    optional_entries: Mapping[str, Names] = field(default_factory=dict)
     switches: Mapping[str, Names] = field(default_factory=dict)
     lists: Mapping[str, str | Callable[[LeftOut], Collection[str]]] = field(default_factory=dict)
     notices: Callable[[Mapping[str, Any]], Iterable[str]] = lambda config: ()

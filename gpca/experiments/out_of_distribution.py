@@ -87,7 +87,7 @@ EXPERIMENT = Experiment(
     names=lambda config, sources: {"learner": list(config["learners"])},
     shown=lambda config, sources: {"learners": learner_titles(config)},
     check=check,
-    leavable={"learners": Names("learner", explainers)},
+    optional_entries={"learners": Names("learner", explainers)},
 )
 
 

@@ -222,7 +222,7 @@ EXPERIMENT = Experiment(
     names=names,
     shown=shown,
     check=check,
-    leavable={"real_world.datasets": Names("dataset"), "real_world.explainers": EXPLAINERS},
+    optional_entries={"real_world.datasets": Names("dataset"), "real_world.explainers": EXPLAINERS},
     lists={
         "real_world.backbones": "encoders",
         "real_world.condition_backbones": "encoders",

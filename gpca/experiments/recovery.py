@@ -162,7 +162,7 @@ EXPERIMENT = Experiment(
     names=names,
     shown=shown,
     check=check,
-    leavable={"recovery.actions": Names("action", lambda: ACTIONS)},
+    optional_entries={"recovery.actions": Names("action", lambda: ACTIONS)},
     switches={"recovery.policies": Names("policy", lambda: policies(tuple(ACTIONS)))},
     lists={"recovery.policies": policies_without},
 )
@@ -242,7 +242,7 @@ def table8_recovery(
         "is not off without "
         f"its cause. {over_clusters(seeds, clusters='rendered tables')}. Bold: best of a column.",
         f"Acts on good: of {good} registrations on the same tables whose pose is right, those that the policy "
-        "would change. Policies that are told that a pose is wrong change all; the oracle is told of these too.",
+        "would change. Policies that know that a pose is wrong change all; the oracle knows of these too.",
         f"To best sequence, to error only: paired differences of the shares within 1 and within {budget} actions, "
         "with the 95 % interval of a bootstrap over tables and seeds that draws each failure for both. The best "
         "sequence is the fixed one, repeats of one action included, that does best on these very failures. "

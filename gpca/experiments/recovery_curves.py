@@ -70,7 +70,7 @@ LOSSES = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)  # that the
     SECTION,
     "Recovery over actions",
     """The share of failures that each policy recovers within one, two and more actions, with its Wilson interval (95
-    %). On the right, the share within all actions, by cause, of n failures each. The oracle is told the cause.""",
+    %). On the right, the share within all actions, by cause, of n failures each. The oracle knows the cause.""",
     **METRICS,
 )
 def recovery_rates(run: Run, metrics: pd.DataFrame) -> Figure:

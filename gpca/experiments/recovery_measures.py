@@ -201,7 +201,7 @@ def collect_differences(run: Run, files: Iterable[str | Path]) -> pd.DataFrame:
         solved = {name: (steps[name] <= k).to_numpy(float) for name in steps.columns}
         best = max(fixed, key=lambda name: solved[name].sum(), default="")
         for name in solved:
-            rivals = {SEQUENCE: best, ERROR: ERROR_ONLY[policy_entry(name, actions).told]}
+            rivals = {SEQUENCE: best, ERROR: ERROR_ONLY[policy_entry(name, actions).informed]}
             for against, other in rivals.items():
                 if other in solved and other != name:
                     keys = (TABLE, TABLE, name, f"recovered_within_{k}", ALL, against, other)

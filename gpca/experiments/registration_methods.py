@@ -81,7 +81,7 @@ EXPERIMENT = Experiment(
     sections={"method_pairs": PairSettings, "methods": ByName},
     names=lambda config, sources: {"method": installed(config["methods"])},
     check=check,
-    leavable={"methods": Names("registration method", methods)},
+    optional_entries={"methods": Names("registration method", methods)},
     lists={"method_pairs.points_of": "methods", "method_pairs.neighbors_of": "methods"},
     notices=lambda config: (
         f"registration method '{name}' is skipped: the package {package} is not installed"

@@ -1,6 +1,6 @@
 """Tables, figures and files of numbers as an experiment declares them: functions of a run and of some of its files.
 
-``@table`` and ``@figure`` say where a result stands on the page and what is said about it, ``@numbers`` which files
+``@table`` and ``@figure`` give a result's place on the page and the words beside it, ``@numbers`` which files
 its function writes. The function gets a :class:`gpca.experiments.plan.Run` first, and then its inputs by name:
 
 - ``intervals="causes_intervals.csv"``: a file of numbers, read by :func:`gpca.evaluation.measures.read_rows`;

@@ -132,7 +132,7 @@ EXPERIMENT = Experiment(
     needs=("scan_set",),
     names=lambda config, _sources: {"scan_explainer": list(config["scan_causes"]["explainers"])},
     check=check,
-    leavable={"scan_causes.explainers": Names("explainer", lambda: explainers(CAUSE_EXPLAINERS))},
+    optional_entries={"scan_causes.explainers": Names("explainer", lambda: explainers(CAUSE_EXPLAINERS))},
 )
 
 MEASURE = Step(

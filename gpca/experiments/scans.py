@@ -138,7 +138,7 @@ EXPERIMENT = Experiment(
     needs=("scan_set", "scan_method"),
     names=names,
     check=check,
-    leavable={"scans.datasets": Names("data set of scans")},
+    optional_entries={"scans.datasets": Names("data set of scans")},
     lists={"scans.methods": "methods"},
 )
 

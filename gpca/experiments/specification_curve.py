@@ -102,7 +102,7 @@ EXPERIMENT = Experiment(
         ),
     ),
     names=names,
-    leavable={"readings.groups": Names("group of readings", lambda: GROUPS)},
+    optional_entries={"readings.groups": Names("group of readings", lambda: GROUPS)},
 )
 
 

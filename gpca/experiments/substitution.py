@@ -70,7 +70,7 @@ EXPERIMENT = Experiment(
     sections={"exchange": Section},
     names=names,
     check=check,
-    leavable={"exchange.explainers": EXPLAINERS},
+    optional_entries={"exchange.explainers": EXPLAINERS},
     lists={f"exchange.{name}": name for name in ("sources", "methods", "estimators")},
 )
 

@@ -266,7 +266,7 @@ class PolicyEntry:
         gated: whether it asks the gate first.
         reenacts: whether it reads the re-enactment of the registration.
         alarmed: whether it asks the re-enactment for an alarm first.
-        told: whether it is given that the pose is wrong, and so would act on every good registration too.
+        informed: it is given that the pose is wrong, so it would act on every good registration too.
         oracle: whether it is given the cause.
     """
 
@@ -279,24 +279,24 @@ class PolicyEntry:
     gated: bool = False
     reenacts: bool = False
     alarmed: bool = False
-    told: bool = True
+    informed: bool = True
     oracle: bool = False
 
 
 POLICIES = {
-    "gpca": PolicyEntry("GP-CA", follow_scores, explainer="gpca", queues=True, told=False),
+    "gpca": PolicyEntry("GP-CA", follow_scores, explainer="gpca", queues=True, informed=False),
     "gpca_acting": PolicyEntry("GP-CA, never queued", never_queue, explainer="gpca"),
-    "gpca_gated": PolicyEntry("GP-CA, gated", gated(never_queue), explainer="gpca", gated=True, told=False),
-    "utility": PolicyEntry("Expected utility, learned", weigh_chances, explainer="gpca", learns=True, told=False),
+    "gpca_gated": PolicyEntry("GP-CA, gated", gated(never_queue), explainer="gpca", gated=True, informed=False),
+    "utility": PolicyEntry("Expected utility, learned", weigh_chances, explainer="gpca", learns=True, informed=False),
     "utility_acting": PolicyEntry("Expected utility, alarmed", weigh_alarmed, explainer="gpca", learns=True),
     "utility_gated": PolicyEntry(
-        "Expected utility, gated", gated(weigh_alarmed), explainer="gpca", learns=True, gated=True, told=False
+        "Expected utility, gated", gated(weigh_alarmed), explainer="gpca", learns=True, gated=True, informed=False
     ),
-    "error_only": PolicyEntry("Error only, gated", gated(follow_rehearsed), rehearsed=True, gated=True, told=False),
+    "error_only": PolicyEntry("Error only, gated", gated(follow_rehearsed), rehearsed=True, gated=True, informed=False),
     "error_only_acting": PolicyEntry("Error only, alarmed", follow_rehearsed, rehearsed=True),
     "reenact": PolicyEntry("Re-enactment", follow_reenactment, reenacts=True),
     "reenact_gated": PolicyEntry(
-        "Re-enactment, gated", gated_by_reenactment(follow_reenactment), reenacts=True, alarmed=True, told=False
+        "Re-enactment, gated", gated_by_reenactment(follow_reenactment), reenacts=True, alarmed=True, informed=False
     ),
     "error_only_reenact": PolicyEntry(
         "Error only, re-enactment's gate",
@@ -304,7 +304,7 @@ POLICIES = {
         rehearsed=True,
         reenacts=True,
         alarmed=True,
-        told=False,
+        informed=False,
     ),
     "shap_removal": PolicyEntry("SHAP, remedies, residual", never_queue, explainer="shap_removal_residual"),
     "softmax_head": PolicyEntry("Softmax head", never_queue, explainer="softmax_head"),

@@ -162,7 +162,7 @@ def measure(rows: pd.DataFrame, weights_B_N: np.ndarray) -> dict[str, np.ndarray
 
 
 def trimmed_mean(values: pd.Series, weights_B_N: np.ndarray, trimmed: float = TRIMMED) -> np.ndarray:
-    """Return the means (B,) over the middle of the weight, a share left out at either end; what is NaN counts not."""
+    """Return the means (B,) over the middle of the weight, a share left out at either end; NaNs are ignored."""
     values_N = values.to_numpy(float)
     known_n = np.flatnonzero(np.isfinite(values_N))
     order_n = known_n[np.argsort(values_N[known_n], kind="stable")]

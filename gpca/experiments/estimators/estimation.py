@@ -2,7 +2,7 @@
 
 The registrations are test samples of the causes' track: objects that no training sample shows, and failures of every
 kind. They are held against references of three kinds (:mod:`gpca.experiments.estimators.references`), and against the
-error of the pose. Estimators that learn are taught three times: with training samples of the same source, with those of
+error of the pose. Estimators that learn are trained three times: with training samples of the same source, with those of
 another source, and with the mild half of the own; the latter two show what a shift does to them.
 """
 
@@ -38,7 +38,7 @@ def try_estimators(
     """Return for each reference and estimator a row per registration; and the registrations.
 
     Rows have the seconds of an estimate, with those of the descriptors that it reads, without those of learning. Those
-    that are taught otherwise have rows of the method with the most registrations alone.
+    that are trained otherwise have rows of the method with the most registrations alone.
 
     Args:
         situations: with test samples.
@@ -54,9 +54,9 @@ def try_estimators(
     cases = []
     for method, wanted in settings.methods.items():
         registering = Registering(situations, method, settings)
-        taught = _taught(registering, estimators, settings)
+        trained = _trained(registering, estimators, settings)
         if method == most_tested(settings):
-            taught |= _taught_otherwise(registering, other, estimators, settings)
+            trained |= _trained_otherwise(registering, other, estimators, settings)
         rows = spaced(situations.causes.rows("test"), wanted)
         if not len(rows):
             raise InputError(f"causes of {situations.source}", "have no test samples", "raise causes.test")
@@ -66,7 +66,7 @@ def try_estimators(
             for kind in KINDS:
                 answer = _of_reference(case, kind), case.references[kind].seconds
                 records.setdefault(reference_name(kind), []).append(_row(case, *answer, settings.floor))
-            for name, estimate in taught.items():
+            for name, estimate in trained.items():
                 started = perf_counter()
                 estimated = estimate(case.registered)
                 answer = estimated, perf_counter() - started
@@ -92,35 +92,35 @@ def most_tested(settings: EstimatorPairSettings) -> str:
     return min(settings.methods, key=lambda method: (-settings.methods[method], method))
 
 
-def _taught(
+def _trained(
     registering: Registering, estimators: Mapping[str, Mapping], settings: EstimatorPairSettings
 ) -> dict[str, Answers]:
-    """Return every estimator by name; those that learn are taught with training samples of the own source."""
-    lessons: list[Example] = []
+    """Return every estimator by name; those that learn are trained with training samples of the own source."""
+    examples: list[Example] = []
     if _learners(estimators):
         train = registering.situations.causes.rows("train")
-        lessons = [registering.example(row) for row in spaced(train, settings.train)]
-    return {name: make_estimator(name, entry, lessons) for name, entry in estimators.items()}
+        examples = [registering.example(row) for row in spaced(train, settings.train)]
+    return {name: make_estimator(name, entry, examples) for name, entry in estimators.items()}
 
 
-def _taught_otherwise(
+def _trained_otherwise(
     registering: Registering,
     other: Situations | None,
     estimators: Mapping[str, Mapping],
     settings: EstimatorPairSettings,
 ) -> dict[str, Answers]:
-    """Return what learns, by a name that says what it is taught with."""
+    """Return what learns, by a name that says what it is trained with."""
     if not (learners := _learners(estimators)):
         return {}
     own = registering.situations
     rows = {MILD: (registering, mild(own, own.causes.rows("train")))}
     if other is not None:
         rows[OTHER_SOURCE] = Registering(other, registering.method, settings), other.causes.rows("train")
-    lessons = {shift: [by.example(row) for row in spaced(of, settings.train)] for shift, (by, of) in rows.items()}
+    examples = {shift: [by.example(row) for row in spaced(of, settings.train)] for shift, (by, of) in rows.items()}
     return {
         f"{name}_{shift}": make_estimator(name, estimators[name], of_shift)
         for name in learners
-        for shift, of_shift in lessons.items()
+        for shift, of_shift in examples.items()
     }
 
 

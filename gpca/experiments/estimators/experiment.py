@@ -26,17 +26,17 @@ def check(config: dict, _left_out: LeftOut) -> None:
 def names(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str, Any]:
     """Return the estimators, and with them and the references before them all that have files of estimates."""
     compared = list(config["estimators"])
-    return {"estimator": compared, "estimate": [*REFERENCES, *compared, *_taught_otherwise(config, sources)]}
+    return {"estimator": compared, "estimate": [*REFERENCES, *compared, *_trained_otherwise(config, sources)]}
 
 
 def shown(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str, Any]:
     """Return the titles of the estimators and of the methods whose registrations they see, and the conditions.
 
-    Of `estimates`, those that are taught otherwise among them, also what they model.
+    Of `estimates`, those that are trained otherwise among them, also what they model.
     """
     entries = {name: estimator_entry(name) for name in config["estimators"]}
     estimates = {name: {"title": entry.title, "models": entry.models} for name, entry in entries.items()}
-    for name, (learner, shift) in _taught_otherwise(config, sources).items():
+    for name, (learner, shift) in _trained_otherwise(config, sources).items():
         estimates[name] = estimates[learner] | {"title": f"{entries[learner].title}, {SHIFTS[shift]}"}
     return {
         "estimators": {name: entry.title for name, entry in entries.items()},
@@ -47,12 +47,12 @@ def shown(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str
 
 
 def estimates_of(estimator: str, config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> list[str]:
-    """Return the names under which an estimator has files: its own, and those by which it is taught otherwise."""
-    others = _taught_otherwise(config, sources)
+    """Return the names under which an estimator has files: its own, and those by which it is trained otherwise."""
+    others = _trained_otherwise(config, sources)
     return [estimator, *(name for name, (learner, _) in others.items() if learner == estimator)]
 
 
-def _taught_otherwise(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str, tuple[str, str]]:
+def _trained_otherwise(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str, tuple[str, str]]:
     """Return name -> what learns, and with what else than the training samples of its own source."""
     shifts = (MILD, OTHER_SOURCE) if len(sources) > 1 else (MILD,)
     learners = [name for name in config["estimators"] if estimator_entry(name).learn]
@@ -79,7 +79,7 @@ EXPERIMENT = Experiment(
     names=names,
     shown=shown,
     check=check,
-    leavable={
+    optional_entries={
         "estimators": Names("estimator", estimators),
         "estimator_pairs.methods": Names("registration method", methods),
     },

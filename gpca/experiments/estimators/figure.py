@@ -182,7 +182,7 @@ def _draw_coverage(panel, pooled: Mapping, names: Sequence[str]) -> None:
         shares = 100 * coverages(pooled[name]["mahalanobis"].to_numpy()[succeeded])
         panel.plot(100 * LEVELS, shares, color=color, linestyle=line, linewidth=width)
     panel.set(xlim=(0, 100), ylim=(0, 100))
-    panel.set_xlabel("said to hold (%)", fontsize=SMALL_PT, labelpad=1)
+    panel.set_xlabel("predicted to contain (%)", fontsize=SMALL_PT, labelpad=1)
     panel.set_ylabel("true poses within (%)", fontsize=SMALL_PT, labelpad=1)
     panel.set_title("Coverage, succeeded", fontsize=8, pad=3)
     panel.tick_params(pad=1.5, length=2)

@@ -19,8 +19,8 @@ REFERENCE_OF: dict[str, Kind] = {
     **{"starts": "starts", "data": "data", "posterior": "data"},
     **{"starts and data": "all", "error": "all"},
 }
-OTHER_SOURCE, MILD = "other_source", "mild"  # what a learner is taught with, for its name
-SHIFTS = {OTHER_SOURCE: "taught on another dataset", MILD: "taught on mild severities"}
+OTHER_SOURCE, MILD = "other_source", "mild"  # what a learner is trained with, for its name
+SHIFTS = {OTHER_SOURCE: "trained on another dataset", MILD: "trained on mild severities"}
 
 
 @dataclass(frozen=True)

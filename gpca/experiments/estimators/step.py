@@ -19,7 +19,7 @@ from gpca.process.provenance import record_provenance
 
 
 def run(job: Job) -> None:
-    """Ask every estimator, seed by seed; those that learn also after lessons of another source, if one is given."""
+    """Ask every estimator, seed by seed; those that learn also after examples of another source, if one is given."""
     settings = EstimatorPairSettings(**job.section("estimator_pairs"), failed=job.section("success")["error"])
     for name in settings.methods:
         require_local(name)

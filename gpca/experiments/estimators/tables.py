@@ -76,7 +76,7 @@ def table12_uncertainty(
             "as wide as the results of these.",
             "KL: from the covariance of those results. NNE, NEES / 6 and coverage: of those results about their mean. "
             "The first two are near 1 and the coverage is 95 % if the covariance is theirs; above 1, or below 95 %, an "
-            "estimator is overconfident. KL, NNE and NEES are trimmed means (10 to 90 %). True pose: the same of the "
+            "estimator is overconfident. KL, NNE and NEES are trimmed means (10 to 90 %). True pose: these of the "
             "error, which also has what moves all runs alike. Bold: least divergence of a method and state.",
             *_without(intervals, estimates, methods),
         ),
