@@ -26,13 +26,12 @@ AVOIDED = {
 }
 # Keys of configs and of files keep their spelling, and so does a page's HTML.
 KEYS = re.compile(
-    r"inverse_regularisation|\bneighbours\b|\"labelled\"|colour\b|\"taught\"|id=\"said\"|\blearnt_from\b|\bto_centre\b"
-    r"|\"told the cause\""
+    r"inverse_regularisation|\bneighbours\b|\"labelled\"|colour\b|\"taught\"|id=\"said\"|\blearnt_from\b"
+    r"|\bto_centre\b|\"told the cause\""
 )
-    r"inverse_regularisation|\bneighbours\b|\"labelled\"|colour\b|\"taught\"|id=\"said\"|\blearnt_from\b|\bto_centre\b|\"told the cause\""
-)
-# Names that only point at another one. Lower this number, never raise it.
+# Number of names that only point at another one. Lower it, never raise it.
 MOST_POINTING = 
+POINTING = 
 POINTING = re.compile(r"\b(?:of_[a-zA-Z_]+|own|found|places|known)\b")
 
 
