@@ -30,8 +30,7 @@ KEYS = re.compile(
     r"|\bto_centre\b|\"told the cause\""
 )
 # Number of names that only point at another one. Lower it, never raise it.
-MOST_POINTING = 
-POINTING = 
+MOST_POINTING = 633
 POINTING = re.compile(r"\b(?:of_[a-zA-Z_]+|own|found|places|known)\b")
 
 
@@ -53,4 +52,3 @@ def test_names_that_only_point_at_others_get_fewer():
         names = re.sub(r'"""(?:.|\n)*?"""|#[^\n]*|"[^"\n]*"', "", path.read_text(encoding="utf-8"))
         counts[path.parent.relative_to(ROOT).parts[:2]] += len(POINTING.findall(names))
     assert sum(counts.values()) <= MOST_POINTING, counts.most_common()
-
