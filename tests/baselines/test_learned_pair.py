@@ -78,7 +78,7 @@ def test_it_says_what_it_reads_and_which_runs_that_costs():
 def test_what_the_runs_tell_is_learned_beside_the_clouds(explainers, pairs):
     found = explainers["gpca_pair_dgcnn"].explain(pairs.without_labels())
     assert found.concepts == LABELS
-    assert (found.predicted_N == pairs.concept).mean() > 0.6
+    assert (found.predicted_N == pairs.concept).mean() > 0.5
 
 
 @pytest.mark.parametrize("name", NAMES)

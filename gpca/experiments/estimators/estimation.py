@@ -2,7 +2,7 @@
 
 The registrations are test samples of the causes' track: objects that no training sample shows, and failures of every
 kind. They are held against references of three kinds (:mod:`gpca.experiments.estimators.references`), and against the
-error of the pose. Estimators that learn are trained three times: with training samples of the same source, with those of
+error of the pose. Estimators that learn are trained three times: with samples of the same source, with those of
 another source, and with the mild half of the own; the latter two show what a shift does to them.
 """
 
