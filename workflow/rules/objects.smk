@@ -36,7 +36,8 @@ rule sample_objects:
     params:
         step="gpca.steps.pairs:objects",
         settings=lambda wildcards: as_json(
-            config["sources"].get(wildcards.source) or config["joint_reading"]["objects"]
+            config["sources"].get(wildcards.source)
+            or config["joint_reading"]["objects"]
         ),
         folders=lambda wildcards: data_folders(
             SAMPLED_OBJECTS[wildcards.source], config["data_dir"], config["downloads"]
