@@ -36,8 +36,8 @@ if TYPE_CHECKING:
 
 NEAR = 10  # points above chance up to which the untrained rule is near it
 SECTION = "Beyond the paper: what made a registration fail"
-POINTS = {"limits": (-100.0, 100.0)}
-COUNTS = {"decimals": 0, "interval": False, "limits": (0.0, inf)}
+POINTS: dict[str, Any] = {"limits": (-100.0, 100.0)}
+COUNTS: dict[str, Any] = {"decimals": 0, "interval": False, "limits": (0.0, inf)}
 SHOWN = {
     "regret": show("regret", "Regret (%)", limits=(0.0, inf), least_is_best=True),
     "tied_accuracy": show("tied_accuracy", "With ties (%)"),
@@ -54,7 +54,11 @@ SHOWN = {
     "nominal_calibration": show(
         "nominal_calibration",
         "ECE (share)",
-        **{"factor": 1, "decimals": 3, "interval": False, "limits": (0.0, 1.0), "least_is_best": True},
+        factor=1,
+        decimals=3,
+        interval=False,
+        limits=(0.0, 1.0),
+        least_is_best=True,
     ),
     "icp_calls": Column("ICP calls", **COUNTS),
     "samples": Column("n", **COUNTS),

@@ -216,7 +216,7 @@ def table1_extended(run: Run, intervals, metrics):
         cells: dict[str, Cell | None] = {}
         for metric in EXTENDED:
             if metric in ("accuracy", "permuted_accuracy", "causal_accuracy"):
-                cell = clustered_cell(intervals, **row.where, metric=metric, concept=ALL)
+                cell = clustered_cell(rows_where(intervals, **row.where), metric=metric, concept=ALL)
                 few = metric == "causal_accuracy" and cell is not None and cell.test_samples < LEAST_CAUSAL
                 cells[metric] = None if few else cell
                 continue

@@ -26,7 +26,7 @@ from gpca.causes.truth import BORDERLINE
 from gpca.encoders.registry import NamedEncoder, require_backbone, require_draws
 from gpca.errors import InputError, with_key
 from gpca.evaluation.intervals import ANYTHING, UNTRAINED, Clustered
-from gpca.evaluation.measures import ALL, POOLED, Rivals, compared, intervals, tidy
+from gpca.evaluation.measures import ALL, POOLED, Measure, Rivals, compared, intervals, tidy
 from gpca.experiments.experiment import ByName, Experiment, LeftOut, Names
 from gpca.experiments.plan import Run
 from gpca.experiments.result import numbers
@@ -251,9 +251,8 @@ def compared_samples(
     rows: list[tuple] = []
     for metric in metrics:
         of_metric = {explainer: each[metric] for explainer, each in values.items() if metric in each}
-        limits, least = ANYTHING, False
-        if metric in MEASURES:
-            limits, least = MEASURES[metric].limits, MEASURES[metric].least_is_best
+        measure = MEASURES.get(metric, Measure(limits=ANYTHING))
+        limits, least = measure.limits, measure.least_is_best
         subset = draws.subset(counted(samples, metric))
         rows += compared((TABLE, source), metric, part, of_metric, subset, limits, against, least)
     return rows

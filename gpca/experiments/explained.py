@@ -33,4 +33,6 @@ def titles(names: Collection[str]) -> dict[str, str]:
 
 def explainer_settings(config: Mapping[str, Any], explainers: Mapping[str, Mapping | None]) -> dict[str, dict]:
     """Settings of an experiment's explainers, added to those that they have elsewhere."""
-    return {name: (config["explainers"].get(name) or {}) | (settings or {}) for name, settings in explainers.items()}
+    return {
+        name: {**(config["explainers"].get(name) or {}), **(settings or {})} for name, settings in explainers.items()
+    }

@@ -24,6 +24,7 @@ from gpca.experiments.cause_tables import (
     COST_NOTE,
     COSTS,
     NOT_COMPARED,
+    POINTS,
     SECTION,
     SHOWN,
     counts_and_calls,
@@ -245,7 +246,8 @@ STARTS = {
 }
 MEASURED = {
     STATE: show(STATE, "State (%)"),
-    **{key: replace(SHOWN[key], where=SHOWN[key].where | {"metric": STATE}) for key in ("gain", "lead")},
+    "gain": show(STATE, SHOWN["gain"].title, where={"against": "untrained"}, **POINTS),
+    "lead": show(STATE, SHOWN["lead"].title, where={"against": "rival"}, **POINTS),
     **{key: SHOWN[key] for key in ("regret", "tied_accuracy", "dominant_accuracy")},
     **{key: SHOWN[key] for key in ("false_alarm_rate", "auroc_failed", "average_precision", "spearman_attribution")},
     **{key: SHOWN[key] for key in ("nominal_calibration", "icp_calls", "samples")},

@@ -184,8 +184,8 @@ CALIBRATED = {
     BY_FAMILY: "By family",
 }
 WORST = "worst_state"
-NUMBER = {"interval": False, "decimals": 0, "limits": (0.0, inf), "factor": 1}
-SIZES = {"decimals": 2, "limits": (0.0, float(len(STATES))), "factor": 1, "least_is_best": True}
+NUMBER: dict[str, Any] = {"interval": False, "decimals": 0, "limits": (0.0, inf), "factor": 1}
+SIZES: dict[str, Any] = {"decimals": 2, "limits": (0.0, float(len(STATES))), "factor": 1, "least_is_best": True}
 COLUMNS_OF_ALL = {
     COVERAGE: show(COVERAGE, "Coverage (%)"),
     WORST: show(WORST, "Of the worst state (%)"),

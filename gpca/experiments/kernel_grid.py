@@ -292,7 +292,8 @@ def table4_grid(run: Run, grid, intervals):
         for (source, *setting), values_R in grid.groupby(["source", *SETTING])["elbo"]
     }
     for i, row in enumerate(sheet.rows):
-        sheet.cells[i, "elbo"] = cell_of_repeats(by_setting[row.where["source"], row.where["method"]], 0)
+        if cell := cell_of_repeats(by_setting[row.where["source"], row.where["method"]], 0):
+            sheet.cells[i, "elbo"] = cell
     notes = (
         f"{over(sheet)}. Bold: best accuracy and NLL of a dataset.",
         "Confidence: mean of the largest score. ECE: its gap to the accuracy over 15 equally wide bins, mean of "

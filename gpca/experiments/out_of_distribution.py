@@ -146,7 +146,8 @@ def collect(
     """
     import pandas as pd
 
-    by_seed, records, of_learner = [], [], {}
+    by_seed, records = [], []
+    of_learner: dict[tuple[str, str], list] = {}
     for (source, learner, seed), rows in read_learner_predictions(prediction_files, set_files).items():
         of_learner.setdefault((source, learner), []).append(rows.assign(seed=seed))
         for name, subset in sets_of(rows).items():

@@ -157,7 +157,7 @@ def collect_intervals(run: Run, files: Iterable[str | Path]) -> pd.DataFrame:
 
     rows = _read_all(files)
     within = {
-        f"recovered_within_{k}": Measure(lambda cases, k=k: cases["step"] <= k)
+        f"recovered_within_{k}": Measure(lambda cases, k=k: cases["step"] <= k)  # type: ignore[misc]
         for k in range(1, run.config["recovery"]["loop"]["budget"] + 1)
     }
     left_alone = Measure(lambda cases: cases["first"] == NOTHING)

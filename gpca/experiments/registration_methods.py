@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -243,7 +243,7 @@ ERRORS = {
     "rotation_deg": show("rotation_deg", "Rotation (°)", factor=1, limits=(0, 180), least_is_best=True),
     "translation": show("translation", "Translation (% d)", limits=(0, inf), least_is_best=True),
 }
-NO_INTERVAL = {"interval": False, "limits": (0, inf)}
+NO_INTERVAL: dict[str, Any] = {"interval": False, "limits": (0, inf)}
 COSTS = {
     "points": show("points", "Points", factor=1, frame="metrics", decimals=0, **NO_INTERVAL),
     "milliseconds": show("seconds", "ms", factor=1e3, frame="seconds", least_is_best=True, **NO_INTERVAL),

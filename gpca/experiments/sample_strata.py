@@ -121,7 +121,9 @@ def table9_strata(run: Run, strata):
         )
         columns[f"{name}_regret"] = Show(
             f"{title}: regret (%)",
-            **{"interval": False, "limits": (0.0, inf), "where": {"method": name, "metric": "regret"}},
+            interval=False,
+            limits=(0.0, inf),
+            where={"method": name, "metric": "regret"},
         )
     rows = [
         Row([(kind, title), stratum], {"concept": f"{kind}_{stratum[0]}"})

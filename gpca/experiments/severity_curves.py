@@ -48,7 +48,8 @@ def collect(run: Run, files: Iterable[str | Path], samples: Iterable[str | Path]
     severities = dict(run.config["registrations"]["severities"])
     ranges = RegistrationSettings.from_dict({"severities": severities}).severities
     bins, success = run.config["controls"]["bins"], run.config["success"]["error"]
-    edges = {name: np.linspace(*getattr(ranges, name), bins + 1) for name in SEVERITIES}
+    limits = {name: getattr(ranges, name) for name in SEVERITIES}
+    edges = {name: np.linspace(low, high, bins + 1) for name, (low, high) in limits.items()}
     predictions = read_controls(files)
     predictions = predictions[predictions["control"] == PAPER]
     frames = []
@@ -72,8 +73,8 @@ def collect(run: Run, files: Iterable[str | Path], samples: Iterable[str | Path]
         subset = both[both["concept"] == concept]
         for (method, *numbers_of_bins), rows in subset.groupby(["explainer", *(f"bin_{n}" for n in names)], sort=False):
             bounds = [edges[name][i : i + 2] for name, i in zip(names, numbers_of_bins, strict=True)]
-            bounds = np.concatenate([*bounds, [np.nan] * 2])[:4]
-            records.append((concept, method, *bounds, len(rows), float(rows["right"].mean())))
+            four = np.concatenate([*bounds, [np.nan] * 2])[:4]
+            records.append((concept, method, *four, len(rows), float(rows["right"].mean())))
     frame = pd.DataFrame(records, columns=list(COLUMNS))
     return frame.sort_values(list(COLUMNS[:6]), kind="stable", ignore_index=True)
 

@@ -237,7 +237,7 @@ def _frames_of_scene(folder: Path) -> list[Frame]:
         if not isinstance(truth, list):
             raise InputError(folder / "scene_gt.json", f"image {image} has no list of objects", REMEDY)
         camera_3_3, depth_scale = read_camera(cameras[image], f"{folder / 'scene_camera.json'}: image {image}")
-        depth, color = _image_file(folder / "depth", f"{image:06d}"), _image_file(colors, f"{image:06d}", False)
+        depth, color = _image_file(folder / "depth", f"{image:06d}"), _find_image(colors, f"{image:06d}")
         annotations = []
         for n, entry in enumerate(truth):
             subject = f"{folder / 'scene_gt.json'}: image {image}, object {n}"
@@ -247,13 +247,15 @@ def _frames_of_scene(folder: Path) -> list[Frame]:
     return frames
 
 
-def _image_file(folder: Path, stem: str, required: bool = True) -> Path | None:
-    for suffix in (".png", ".jpg", ".jpeg", ".tif"):
-        if (path := folder / f"{stem}{suffix}").is_file():
-            return path
-    if required:
+def _find_image(folder: Path, stem: str) -> Path | None:
+    files = (folder / f"{stem}{suffix}" for suffix in (".png", ".jpg", ".jpeg", ".tif"))
+    return next((path for path in files if path.is_file()), None)
+
+
+def _image_file(folder: Path, stem: str) -> Path:
+    if (path := _find_image(folder, stem)) is None:
         raise InputError(folder / f"{stem}.png", "no such image", REMEDY)
-    return None
+    return path
 
 
 def from_entry(entry: dict, folder: Path) -> Iterator[Surface]:

@@ -52,10 +52,10 @@ FAULTS: dict[str, Undo] = {
 }
 for factor in (0.001, 0.01, 0.1, 0.25, 0.5, 2, 4, 10, 100, 1000):
     reason = f"is depth_scale wrong? the depth fits when it is {factor:g} times as large"
-    FAULTS[reason] = lambda T, points, factor=factor: (T, factor * points)
+    FAULTS[reason] = lambda T, points, factor=factor: (T, factor * points)  # type: ignore[misc]
 for factor in (0.5, 0.67, 0.8, 0.85, 0.9, 0.95, 1.05, 1.1, 1.15, 1.25, 1.5, 2):
     reason = f"is cam_K wrong? the depth fits when its focal lengths are about {factor:g} times as long"
-    FAULTS[reason] = lambda T, points, factor=factor: (T, points / (factor, factor, 1.0))
+    FAULTS[reason] = lambda T, points, factor=factor: (T, points / (factor, factor, 1.0))  # type: ignore[misc]
 
 
 @dataclass(frozen=True)

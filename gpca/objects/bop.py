@@ -48,8 +48,8 @@ def surfaces(folder: str | Path, unit: str = "mm", objects: Sequence[int] | None
         for path in models.glob("obj_[0-9]*.ply"):
             try:
                 ids.append(whole(path.stem.removeprefix("obj_")))
-            except ValueError as fault:
-                raise InputError(path, "is not named obj_{number}.ply", "name it like obj_000001.ply") from fault
+            except ValueError as error:
+                raise InputError(path, "is not named obj_{number}.ply", "name it like obj_000001.ply") from error
         ids.sort()
     require_models(models, ids)
     if unlisted := [number for number in ids if number not in listed_mm]:
@@ -195,7 +195,7 @@ def find_symmetries(points_N_3: np.ndarray, diameter: float) -> dict[str, list]:
                 T = np.eye(4)
                 T[:3, :3] = Rotation.from_rotvec(np.deg2rad(angle) * axis).as_matrix()
                 discrete.append(T.round(9).ravel().tolist())
-    found = {"symmetries_discrete": discrete, "symmetries_continuous": continuous}
+    found: dict[str, list] = {"symmetries_discrete": discrete, "symmetries_continuous": continuous}
     return {key: entries for key, entries in found.items() if entries}
 
 

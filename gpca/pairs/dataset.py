@@ -23,8 +23,10 @@ if TYPE_CHECKING:
 
 FARTHEST = 1e3  # diameters from the target's center; a registration may fail, but nothing lies so far away
 SAMPLE_COLUMNS = ("sample", "split", "instance", "dataset", "in_training")  # of the CSV beside registrations of frames
-FRAME_COLUMNS = (*SAMPLE_COLUMNS, "concept", "scene", "image", "object", "symmetric", "init_from")
-FRAME_COLUMNS += ("init_error", "icp_error", "lost_to")
+FRAME_COLUMNS = (
+    *(*SAMPLE_COLUMNS, "concept", "scene", "image", "object", "symmetric", "init_from"),
+    *("init_error", "icp_error", "lost_to"),
+)
 RIGID_TOLERANCE = 1e-2  # of a rotation's products with itself; datasets round their poses
 
 

@@ -107,7 +107,7 @@ class Sheet:
         """Numbers of test samples of some columns' cells in a row, such as ``15 to 200``."""
         return span(self.cells[row, key].test_samples for key in keys if (row, key) in self.cells)
 
-    def over(self, samples: int | str = "", clusters: tuple[str, str] = FAMILIES) -> str:
+    def over(self, samples: int | str = "", clusters: str = FAMILIES) -> str:
         """Start of the footnote on the cells' intervals, without a full stop; `clusters` in the plural and singular."""
         return over_clusters(self.seeds, samples, clusters)
 

@@ -68,7 +68,7 @@ def explain(job: Job) -> None:
     inputs += [*retrained.values(), *others.values(), *job.get("hard", [])]
     with record_provenance([job.predictions, job.samples, job.timings], inputs, job.settings, seed=job.seed):
         registrations = Registrations.load(job.registrations, axes)
-        [hard] = [Registrations.load(path, axes) for path in job.get("hard", [])] or [None]
+        hard = next((Registrations.load(path, axes) for path in job.get("hard", [])), None)
         model = load_model(job.encoder, encoder, axes=axes)
         embeddings = {PAPER: read_embedding(job.embeddings, registrations, logits=True)}
         for control, path in retrained.items():

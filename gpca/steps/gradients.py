@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
@@ -156,7 +156,7 @@ def deletions(
     arrays: dict[str, list] = {"sample": [], "points": [], "saliency": []}
     for row in chosen_rows(registrations, settings.samples):
         sample = int(registrations.sample[row])
-        cloud_1_N_3 = draw_points(registrations, np.array([row]), encoding.draw_points, source, seed, "saliency")
+        cloud_1_N_3: Any = draw_points(registrations, np.array([row]), encoding.draw_points, source, seed, "saliency")
         points_N_3 = cloud_1_N_3[0].numpy().astype(float)
         (before_C,) = _scores(encoder, gpc, cloud_1_N_3)
         named = int(before_C.argmax())

@@ -95,11 +95,11 @@ def measure(
         random = generator(*axes, "runtime", repeat)
         row = int(rows[repeat % len(rows)])
         pair = registrations.source(row), registrations.target(row).astype(float)
-        small = tuple(cloud[random.permutation(len(cloud))[:SMALL]] for cloud in pair)
+        source, target = (cloud[random.permutation(len(cloud))[:SMALL]] for cloud in pair)
         times = chain(
             time_stages(explainers, model, pair, random),
             time_labeling(projected, gpc, settings, random),
-            time_explanations(explainers, {"explanation": pair, "explanation_512": small}),
+            time_explanations(explainers, {"explanation": pair, "explanation_512": (source, target)}),
         )
         for key, elapsed in times:
             if repeat >= WARM_UP:
