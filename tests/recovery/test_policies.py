@@ -150,7 +150,7 @@ def test_a_sequence_takes_its_actions_in_turn_and_begins_anew():
 
 
 def test_who_is_told_that_the_pose_is_wrong():
-    alone = {name for name, entry in policies(ACTIONS).items() if not entry.told}
+    alone = {name for name, entry in policies(ACTIONS).items() if not entry.informed}
     gated = {"gpca_gated", "utility_gated", "error_only", "reenact_gated", "error_only_reenact"}
     assert alone == {"gpca", "utility", *gated}
 

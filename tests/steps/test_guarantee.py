@@ -10,7 +10,8 @@ from gpca.attribution.predictions import prediction_frame, write_predictions
 from gpca.attribution.scores import Attribution
 from gpca.causes.dataset import LABELS
 from gpca.causes.descriptors import WIDTHS, Descriptors
-from gpca.causes.settings import GROUPS
+from gpca.causes.drawing import draw_causes
+from gpca.causes.settings import GROUPS, CauseSettings
 from gpca.causes.truth import BORDERLINE
 from gpca.errors import InputError
 from gpca.guarantee.answers import Scored
@@ -20,6 +21,7 @@ from gpca.process.job import Job
 from gpca.reenactment.dataset import Reenactments
 from gpca.steps import guarantee as step
 from gpca.steps.guarantee import parts_of, read_pool
+from tests.conftest import FEW_CAUSES
 
 AXES = [(source, seed) for source in ("cups", "tools") for seed in (100, 101)]
 EXPLAINERS = {"pair_forest": {"trees": 5}, "reenact": None, "gpca": None}
@@ -45,6 +47,12 @@ def write_measurements(folder, causes, axes, random):
     attribution = Attribution.of_scores(LABELS, random.dirichlet(np.ones(4), size=n), seconds=0.0)
     write_predictions(paths["diagnoses"], registrations, attribution)
     return paths
+
+
+@pytest.fixture(scope="module")
+def causes(four):
+    """So many training samples that those of each family have two labels."""
+    return draw_causes(four, "four", 100, CauseSettings(**FEW_CAUSES | {"train": 16}))[0]
 
 
 @pytest.fixture(scope="module")

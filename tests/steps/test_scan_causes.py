@@ -111,11 +111,11 @@ SETTINGS = {
 
 @pytest.fixture(scope="module")
 def diagnosis(causes, tmp_path_factory):
-    """Its files: numbers of the test samples are made up, but for one that tells the nominal."""
+    """Its files: numbers of the test samples are made up, but for one that tells the nominal, which two scenes have."""
     folder, random = tmp_path_factory.mktemp("scans"), np.random.default_rng(0)
     objects = write_measurements(folder / "objects", causes, ("cups", 100), random)
     tested = causes.subset(causes.rows("test"))
-    names = np.resize(["hall", "kitchen", "attic"], len(tested))
+    names = np.resize(np.repeat(["hall", "kitchen", "attic"], 2), len(tested))
     tested = replace(tested, registrations=replace(tested.registrations, cluster=names))
     scans = [write_measurements(folder / "scans", tested, (name, 100), random) for name in ("rooms", "things")]
     files = {"scan_causes": "causes", "scan_descriptors": "descriptors", "scan_reenactments": "reenactments"}
