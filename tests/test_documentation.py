@@ -13,7 +13,7 @@ import pytest
 import yaml
 
 from gpca.__main__ import COMMANDS, load_command
-from gpca.experiments.registry import registered
+from gpca.experiments.registry import registered, steps
 from gpca.objects.entry import Source
 from gpca.steps.control_samples import CONTROLS
 
@@ -204,7 +204,8 @@ def test_the_resources_of_the_cluster_page_are_those_of_the_rules_and_the_profil
         "mem_mb": r"mem_mb=(\d+)",
         "runtime": r"runtime=(\d+)",
     }.items():
-        values = sorted({usual[declared], *map(int, re.findall(pattern, rules, re.MULTILINE))})
+        declared_by_steps = {step.resources[declared] for step in steps() if declared in step.resources}
+        values = sorted({usual[declared], *declared_by_steps, *map(int, re.findall(pattern, rules, re.MULTILINE))})
         [shown] = re.findall(rf"^\| `{declared}`.*\| (\d+(?: to \d+)?)\b[^|]*\|$", page, re.MULTILINE)
         assert shown == (f"{values[0]} to {values[-1]}" if len(values) > 1 else str(values[0]))
 

@@ -82,10 +82,10 @@ def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
         "whole_group": [name for name in readings["groups"] if name != FRAME_REPEATS],
         "frame_input": [name for name in groups if name == FRAME_INPUT],
         "estimated": f"{REAL_WORLD}_{estimated[0]}" if estimated else "",
-        "repeats": list(readings["groups"].get(FRAME_REPEATS, {}).get("repeats", [])),
+        "repeats": list((readings["groups"].get(FRAME_REPEATS) or {}).get("repeats", [])),
         "repeated_backbone": list(frames["backbones"]),
         "clouded_backbone": frames["backbones"][0],  # whose encoder sees other clouds
-        "cloud": [name for name in readings["groups"].get(FRAME_INPUT, {}).get("input", []) if name != ALIGNED],
+        "cloud": [name for name in (readings["groups"].get(FRAME_INPUT) or {}).get("input", []) if name != ALIGNED],
     }
 
 
