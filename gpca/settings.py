@@ -142,9 +142,14 @@ def read_settings(kind: type[T], settings: Mapping[str, Any], subject: str = "se
 
     adapter: TypeAdapter = _adapter(kind)  # type: ignore[arg-type]
     try:
-        return adapter.validate_json(json.dumps([settings], default=repr))[0]
+        return adapter.validate_json(json.dumps([settings], default=_as_json))[0]
     except ValidationError as fault:
         raise _input_error(fault.errors(), settings, adapter, subject) from None
+
+
+def _as_json(value: Any) -> Any:
+    """Other mappings than dictionaries as such; what no config can hold as its text."""
+    return dict(value) if isinstance(value, Mapping) else repr(value)
 
 
 def require_arguments(subject: str, function: Callable, leading: int, settings: Mapping[str, object]) -> None:
