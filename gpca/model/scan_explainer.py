@@ -36,7 +36,7 @@ from gpca.recovery.policy import NOTHING, TREATMENTS
 from gpca.reenactment.enactment import Enactment
 from gpca.reenactment.hypotheses import INDEPENDENT, weights_of
 from gpca.reenactment.scans import reenact_scan
-from gpca.reenactment.settings import ReenactmentSettings
+from gpca.reenactment.settings import STEEPNESS, ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface
 
 OUTSIDE = 0.01  # share of the target's points on either side that its extent ignores
@@ -44,7 +44,6 @@ FEWEST_VOXELS = 64
 ICP = "point_to_plane, coarse to fine"
 SHOWN_REACH = 5.0  # voxels, up to which distances are colored
 LIMIT = 0.05  # error above which a registration has failed, in extents of the target: 0.2 m of 4 m, as in rooms
-STEEPNESS = 8.0  # of the probability of a failure in the logarithm of the error, as in the re-enactment's verdict
 CLOSE = 0.8  # distance between partners with an even chance of failure, root mean square, voxels
 CLOSE_STEEPNESS = 16.0  # of the probability in the logarithm of this distance
 GOOD, BAD = 0.2, 0.5  # probability of a failure below which the state is nominal, and from which it is failed

@@ -21,10 +21,9 @@ from gpca.causes.truth import LARGEST_ERROR, SUBSETS, capped, shapley_values
 from gpca.frames.camera import MeshScene
 from gpca.frames.shots import NEAR, Shot, fuse
 from gpca.recovery.actions import Holding, Robot
-from gpca.reenactment.dataset import SMALLEST_ERROR, STEEPNESS
 from gpca.reenactment.enactment import NoiseScale, observe, rebuild, start_twists
 from gpca.reenactment.hypotheses import Hypothesis, find_hypotheses, weights_of
-from gpca.reenactment.settings import ReenactmentSettings
+from gpca.reenactment.settings import SMALLEST_ERROR, STEEPNESS, ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface
 from gpca.seeds import generator
 

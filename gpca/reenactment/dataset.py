@@ -23,10 +23,7 @@ from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.progress import progress
 from gpca.reenactment.enactment import Enactment, reenact
 from gpca.reenactment.hypotheses import weights_of
-from gpca.reenactment.settings import ReenactmentSettings
-
-STEEPNESS = 8.0  # of the probability of a failure in the logarithm of v̂
-SMALLEST_ERROR = 1e-4  # diameters
+from gpca.reenactment.settings import SMALLEST_ERROR, STEEPNESS, ReenactmentSettings
 
 
 def verdict(error_S_K_8: np.ndarray, weight_S_K: np.ndarray, limits: Limits) -> np.ndarray:
@@ -162,7 +159,6 @@ def _measured(enactment: Enactment, pair: ObservedPair) -> list[float]:
     ]
 
 
-SMALLEST_ERROR = 1e-4  # diameters
 SMALLEST_SUM = 0.01  # diameters, of the |φ̂| whose shares are taken
 FEATURES = (
     *(f"{whose}_error_{subset}" for whose in ("first", "mean", "second") for subset in range(len(SUBSETS))),

@@ -10,6 +10,8 @@ from gpca.causes.truth import ALL, BY_SIZE, SUBSETS
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.settings import Bounds, OpenShare, Positive, Share
 
+STEEPNESS = 8.0  # of the probability of a failure in the logarithm of the error
+SMALLEST_ERROR = 1e-4  # diameters, before its logarithm is taken
 Angle = Annotated[float, Bounds(exclusiveMinimum=0, maximum=180)]  # degrees
 
 

@@ -108,7 +108,7 @@ class Sheet:
         return span(self.cells[row, key].test_samples for key in keys if (row, key) in self.cells)
 
     def over(self, samples: int | str = "", clusters: str = FAMILIES) -> str:
-        """Start of the footnote on the cells' intervals, without a full stop; `clusters` in the plural and singular."""
+        """Start of the footnote on the cells' intervals, without a full stop; `clusters` in the plural."""
         return over_clusters(self.seeds, samples, clusters)
 
     def table(

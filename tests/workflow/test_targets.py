@@ -114,7 +114,7 @@ EDITS = {  # a module: what is made again where it has changed, and what is not
     ),
     "gpca/causes/descriptors.py": (
         "descriptors/ycb diagnoses/ycb/pair_forest estimates/ model.pt",
-        "predictions causes/ methods/",
+        "predictions causes/ recovery methods/",
     ),
     "gpca/uncertainty/estimators/analytic.py": ("estimates/ exchange/ estimators.csv", "uncertainty/ causes/ methods/"),
     "baselines/descriptors.py": ("diagnoses/ycb/pair_forest table9_causes", "predictions"),
