@@ -1,4 +1,4 @@
-"""Explainers that read the embedding of the aligned source alone, as GP-CA does in the paper.
+"""Rivals of GP-CA that read the embedding of the aligned source alone, as it does in the paper.
 
 The same explainers name causes, with "nominal" as a further class.
 """
@@ -8,11 +8,9 @@ from __future__ import annotations
 import numpy as np
 
 from gpca.causes.dataset import LABELS
-from gpca.classifier.settings import GPCArguments
 from gpca.errors import InputError
 from gpca.explainers.classifiers import known_concepts
-from gpca.explainers.gpca import GPCA
-from gpca.explainers.interface import DrawingExplainer, ExplainerEntry, ScoringExplainer, attached
+from gpca.explainers.interface import ExplainerEntry, ScoringExplainer, attached
 from gpca.pairs.dataset import Registrations
 from gpca.settings import Positive
 
@@ -75,30 +73,6 @@ class SoftmaxHead(ScoringExplainer):
         return softmax(attached(registrations, "head_logits"), axis=1)
 
 
-class GpytorchGPCA(DrawingExplainer):
-    """GP-CA in gpytorch's own classes, a check: it agrees with ``gpca_paper`` within rounding."""
-
-    def __init__(self, source: str, seed: int, **settings: GPCArguments) -> None:
-        from gpca.classifier.gpytorch_classes import GpytorchGPC
-        from gpca.classifier.settings import GPCSettings
-
-        self._gpc = GpytorchGPC(self.labels, GPCSettings(**settings), source, seed)
-
-    def fit(self, registrations: Registrations) -> None:
-        """Fit to the labeled embeddings; as many samples as concepts raise an InputError."""
-        self._gpc.fit(registrations.embedding, registrations.concept)
-
-    def summary(self, registrations: Registrations) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Summarize draws from the posterior at every embedding."""
-        return self._gpc.attribute(registrations.embedding)
-
-
-class CauseGPCA(GPCA):
-    """GP-CA over nominal, noise, pose and overlap."""
-
-    labels = LABELS
-
-
 class CauseVectors(ConceptVectors):
     """A concept activation vector for each label against the others."""
 
@@ -114,10 +88,8 @@ class CauseHead(SoftmaxHead):
 EXPLAINERS = {
     "concept_vectors": ExplainerEntry("Concept activation vectors", ConceptVectors, ("source",), reads="embeddings"),
     "softmax_head": ExplainerEntry("Softmax head", SoftmaxHead, ("source",), reads="embeddings"),
-    "gpca_gpytorch": ExplainerEntry("GP-CA (gpytorch's classes)", GpytorchGPCA, ("source",), reads="embeddings"),
 }
 CAUSE_EXPLAINERS = {
-    "gpca": ExplainerEntry("GP-CA (aligned source)", CauseGPCA, ("source",), reads="embeddings"),
     "softmax_head": ExplainerEntry("Softmax head (aligned source)", CauseHead, ("source",), reads="embeddings"),
     "concept_vectors": ExplainerEntry("Concept activation vectors", CauseVectors, ("source",), reads="embeddings"),
 }

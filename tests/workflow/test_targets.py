@@ -67,7 +67,7 @@ EDITS = {  # a module: what is made again where it has changed, and what is not
         "predictions/ycb/gpca/ predictions/real_rgbd/gpca_pair diagnoses/ycb/gpca active_learning/ycb kernels/ "
         "learners/ model.pt recovery/ controls/ exchange/ new_concepts/ saliency/ table2_per_concept fig4_pipeline",
         "registrations encoders/ embeddings/ uncertainty/ methods/ estimates/ descriptors/ shifted/ residuals_forest "
-        "predictions/ycb/shap_additive diagnoses/ycb/gate_rmse fig3_concepts",
+        "predictions/ycb/shap_additive predictions/ycb/softmax_head diagnoses/ycb/gate_rmse fig3_concepts",
     ),
     "gpca/steps/shift.py": (
         "shifted/ learners/ reliability",
@@ -91,7 +91,7 @@ EDITS = {  # a module: what is made again where it has changed, and what is not
     "gpca/experiments/registration_methods.py": ("table11_registration table11_severity", "methods/ figures/fig"),
     "baselines/aligned_source.py": (
         "predictions/ycb/softmax_head recovery/ controls/",
-        "predictions/ycb/gpca/ predictions/ycb/shap_additive learners embeddings model.pt gate_rmse",
+        "predictions/ycb/gpca predictions/ycb/shap_additive learners embeddings model.pt gate_rmse",
     ),
     "gpca/reporting/figures/contact_sheet.py": ("objects_coffee_cup objects_ycb", "objects/ tables/ fig4_pipeline"),
     "gpca/encoders/reduction.py": ("dgcnn/pca predictions/real_rgbd/dgcnn-pca", "encoders predictions/ycb model.pt"),
