@@ -1,9 +1,8 @@
 """Joint readings: a value of every choice that touches several of the paper's tables, and which numbers they fit.
 
-A printed number depends on some choices alone, those of its *part*, so that a grid of joint readings takes far fewer
-values than it has readings. The values of a part become an array with an axis for every choice, of length 1 where they
-do not depend on it; so the share of close numbers of every reading is a sum of such arrays, and so it is for every
-permutation of the printed numbers.
+A printed number depends only on the choices of its *part*, so a grid of joint readings needs far fewer values than it
+has readings. The values of a part form an array with an axis for every choice, of length 1 where they do not depend on
+it. The share of close numbers of every reading is a sum of these arrays, also for permuted printed numbers.
 """
 
 from __future__ import annotations

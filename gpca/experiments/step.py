@@ -11,7 +11,9 @@ import json
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import reduce
 from itertools import product
+from operator import getitem
 from pathlib import Path
 from typing import Any
 
@@ -251,14 +253,8 @@ def _as_json(step: Step, plan: Plan, wildcards: Wildcards) -> str:
     if callable(step.settings):
         settings = step.settings(plan, wildcards)
     else:
-        settings = {key.rpartition(".")[2]: _at(plan.config, key) for key in step.settings}
+        settings = {key.rpartition(".")[2]: reduce(getitem, key.split("."), plan.config) for key in step.settings}
     return json.dumps(settings, sort_keys=True)
-
-
-def _at(config: Any, key: str) -> Any:
-    for name in key.split("."):
-        config = config[name]
-    return config
 
 
 def _code(step: Step, plan: Plan) -> Any:

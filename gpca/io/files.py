@@ -39,7 +39,7 @@ _BOUNDED = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 
 
 def require_file(path: str | Path, fault: str, remedy: str, largest_bytes: float = LARGEST_FILE_BYTES) -> None:
-    """Raise an InputError unless a file of the user can be read to its end; every reader of such files calls this.
+    """Raise an InputError unless a user's file can be read to its end; all readers of users' files call this.
 
     Reading a device, a pipe, or an empty file of the kernel, as in /proc, may never end.
 

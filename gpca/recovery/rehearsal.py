@@ -148,7 +148,7 @@ class ClassifierLearner:
     """Treats what the classifier names; its doubt is BALD.
 
     Args:
-        explainer: a fitted one that can learn further labels; it stays as it is.
+        explainer: fitted, and able to learn further labels; it is not changed.
         queued, judged: registrations with what the explainer reads.
         treatments: concept -> action.
     """

@@ -43,7 +43,7 @@ class Track:
         seeds: key of the config that limits the number of seeds.
         run: of the samples: ``default``, or the name of a config that overrides the default one.
         predictions: pattern of a run's files of predictions, where one holds all methods.
-        labeled_by: the identifying columns of such a file.
+        labeled_by: the identifying columns of that file.
         read: patterns of further files that methods may read.
         training_folders: files of objects that methods learn from.
         learn_from: choices of the training data, the default first.

@@ -22,7 +22,7 @@ RUN = Run({"registrations": {"severities": SEVERITIES}, "controls": {"bins": 2},
 
 
 def rows_of(files, path):
-    """Values by control, source, concept, method, metric and rival, and the same of their differences."""
+    """Values by control, source, concept, method, metric and rival, and their differences."""
     write_metrics(collect_intervals(RUN, files), path)
     return read_clustered(path).set_index(["table", "source", "concept", "method", "metric", "against"]).sort_index()
 
