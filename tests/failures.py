@@ -2,9 +2,9 @@
 
 import pytest
 
-from gpca.frames.camera import Camera, DepthNoise
 from gpca.frames.initial_pose import InitialPoseSettings
 from gpca.frames.situations import Shelf, Situations, SituationSettings
+from gpca.objects.camera import Camera, DepthNoise
 from gpca.recovery.episodes import register_first
 from gpca.recovery.settings import LoopSettings
 

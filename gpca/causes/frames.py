@@ -25,10 +25,10 @@ from gpca.causes.candidate import Candidate, Unmeasurable
 from gpca.causes.dataset import Causes
 from gpca.causes.measuring import Case, Measuring, Subject, found_in, measure_cases, measure_clean_pairs
 from gpca.causes.settings import FEWEST_POINTS, CauseSettings, FrameCauseSettings
-from gpca.frames.camera import MeshScene
 from gpca.frames.instances import Instances
 from gpca.frames.shots import CleanView, clean_view, rendered_side
 from gpca.frames.starts import KINDS, Starts
+from gpca.objects.camera import MeshScene
 from gpca.objects.canonical import TRAINING, ObjectClouds
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.progress import progress

@@ -17,11 +17,11 @@ from gpca.experiments.plan import Run
 from gpca.experiments.recovery_measures import ERROR, SEQUENCE, pool_share
 from gpca.experiments.result import table
 from gpca.explainers.registry import explainer_entry, require_settings
-from gpca.frames.camera import Camera
 from gpca.frames.initial_pose import InitialPoseSettings
 from gpca.frames.situations import SituationSettings
 from gpca.io.csv_file import numbers as number_column
 from gpca.io.csv_file import read_csv
+from gpca.objects.camera import Camera
 from gpca.objects.entry import SurfacePoints
 from gpca.pairs.perturbation import CONCEPTS, Hidden
 from gpca.pairs.synthesis import TestSamples, TrainSamples

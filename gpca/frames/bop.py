@@ -17,10 +17,10 @@ import numpy as np
 
 from gpca.alignment.rigid import require_rotation, rigid_motion
 from gpca.errors import InputError
-from gpca.frames.camera import back_project
 from gpca.io.files import read_image
 from gpca.io.structured_text import finite_numbers, read_json
 from gpca.numerals import whole
+from gpca.objects.camera import back_project
 from gpca.objects.mesh_folder import meters_per
 from gpca.objects.surface import Surface, evenly
 

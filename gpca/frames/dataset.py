@@ -10,7 +10,6 @@ import numpy as np
 
 from gpca.errors import InputError
 from gpca.frames.bop import Frame, read_frames
-from gpca.frames.camera import MeshScene
 from gpca.frames.initial_pose import (
     PosesByObject,
     read_bop_results,
@@ -18,6 +17,7 @@ from gpca.frames.initial_pose import (
 from gpca.frames.source import frame_files, patterns, resolve_datasets
 from gpca.objects import bop
 from gpca.objects.bop import read_symmetries
+from gpca.objects.camera import MeshScene
 from gpca.objects.canonical import DRAWN, EVALUATION, TRAINING, ObjectClouds, Place, bounding_center, read_scene_splits
 from gpca.objects.source import folders
 from gpca.objects.surface import Surface

@@ -13,9 +13,9 @@ from scipy.spatial.transform import Rotation
 
 from gpca.alignment.rigid import inverse, rigid_motion, transform
 from gpca.errors import InputError
-from gpca.frames.camera import TABLE_M, Camera, DepthNoise, MeshScene, direction, look_at, shade, table
 from gpca.io.files import whole_folder
 from gpca.objects.bop import find_symmetries
+from gpca.objects.camera import TABLE_M, Camera, DepthNoise, MeshScene, direction, look_at, shade, table
 from gpca.objects.canonical import canonical_cloud, diameter
 from gpca.objects.surface import Surface
 from gpca.process.progress import progress

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from gpca.alignment.rigid import inverse, rotate, transform
-from gpca.frames.camera import Camera, MeshScene, back_project, direction, look_at, table
+from gpca.objects.camera import Camera, MeshScene, back_project, direction, look_at, table
 from gpca.process.environment import open3d_cloud
 
 

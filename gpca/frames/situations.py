@@ -11,11 +11,11 @@ from scipy.spatial import ConvexHull
 
 from gpca.alignment.rigid import inverse, scale_translation, transform
 from gpca.errors import InputError
-from gpca.frames.camera import TABLE_M, Camera, DepthNoise, MeshScene, direction, look_at, table
 from gpca.frames.initial_pose import GlobalRegistration, InitialPoseSettings
 from gpca.frames.rgbd_scene import Placed, SceneSettings, center, lay_table, rest, stable_poses
 from gpca.frames.shots import Shot, median_depth
 from gpca.objects.bop import find_symmetries
+from gpca.objects.camera import TABLE_M, Camera, DepthNoise, MeshScene, direction, look_at, table
 from gpca.objects.canonical import ObjectClouds, canonical_cloud
 from gpca.objects.surface import Surface
 from gpca.pairs.perturbation import Hidden, Severities, misplace

@@ -29,7 +29,7 @@ KINDS = {
     "mesh_folder": "gpca.objects.mesh_folder",
     "uw_rgbd": "gpca.objects.point_files",
     "bop_views": "gpca.frames.bop",
-    "mesh_views": "gpca.frames.camera",
+    "mesh_views": "gpca.objects.camera",
 }
 SYSTEM = ("/dev", "/proc", "/sys")
 TEXTS = (".md", ".txt")  # licenses beside data

@@ -18,8 +18,8 @@ from gpca.alignment.rigid import inverse, rotate, scale_translation, transform
 from gpca.causes.candidate import Counterfactuals, Registrar, Unmeasurable
 from gpca.causes.settings import CauseSettings
 from gpca.causes.truth import LARGEST_ERROR, SUBSETS, capped, shapley_values
-from gpca.frames.camera import MeshScene
 from gpca.frames.shots import NEAR, Shot, fuse
+from gpca.objects.camera import MeshScene
 from gpca.recovery.actions import Holding, Robot
 from gpca.reenactment.enactment import NoiseScale, observe, rebuild, start_twists
 from gpca.reenactment.hypotheses import Hypothesis, find_hypotheses, weights_of

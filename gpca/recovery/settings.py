@@ -10,9 +10,9 @@ from gpca.alignment.icp import ICPSettings
 from gpca.alignment.pose_error import SuccessSettings
 from gpca.causes.settings import OBSERVED, CauseSettings, Limits
 from gpca.encoders.registry import EncoderSettings
-from gpca.frames.camera import Camera
 from gpca.frames.rgbd_scene import SceneSettings
 from gpca.frames.situations import SituationSettings
+from gpca.objects.camera import Camera
 from gpca.pairs.synthesis import RegistrationSettings
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.settings import Bounds, Count

@@ -21,10 +21,10 @@ from gpca.causes.frames import candidate_of_view, outline, subjects_of
 from gpca.causes.measuring import Subject
 from gpca.causes.settings import FEWEST_POINTS, CauseSettings
 from gpca.errors import InputError
-from gpca.frames.camera import MeshScene
 from gpca.frames.instances import Instances
 from gpca.frames.shots import MOST_PIXELS, CleanView, Sighting, clean_view, rendered_side
 from gpca.frames.starts import Starts
+from gpca.objects.camera import MeshScene
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.distances import ObservedPair
 from gpca.reenactment.dataset import Reenactments, reenact_all

@@ -3,7 +3,7 @@
 They need no data. A scene is named by its number, from which all of it is drawn; those of development have numbers from
 100 on. A scan of a room is what a camera sees that turns on its way through the room; a scan of an object is what one
 sees on a circle around it. The camera has the noise of a structured-light sensor
-(:class:`gpca.frames.camera.DepthNoise`), in rooms half of it, as fragments of rooms are fused from many frames.
+(:class:`gpca.objects.camera.DepthNoise`), in rooms half of it, as fragments of rooms are fused from many frames.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from gpca.frames.camera import Camera, DepthNoise, MeshScene, look_at
+from gpca.objects.camera import Camera, DepthNoise, MeshScene, look_at
 from gpca.objects.procedural import box, cylinder, ellipsoid, mesh_of
 from gpca.scans.pair import Kind
 from gpca.scans.scene import Scan, Scene

@@ -13,7 +13,6 @@ import numpy as np
 
 from gpca.alignment.rigid import inverse
 from gpca.errors import InputError
-from gpca.frames.camera import MeshScene, shade
 from gpca.frames.dataset import simplified
 from gpca.frames.initial_pose import InitialPoseSettings
 from gpca.frames.rgbd_scene import TABLE_COLOR, model_color
@@ -22,6 +21,7 @@ from gpca.frames.situations import REDRAWS, Shelf, Situation, Situations
 from gpca.io.arrays import save_arrays
 from gpca.io.csv_file import write_csv
 from gpca.io.files import Axes, whole_file
+from gpca.objects.camera import MeshScene, shade
 from gpca.objects.source import data_files, resolve, surfaces
 from gpca.objects.surface import Surface
 from gpca.pairs.dataset import Registrations

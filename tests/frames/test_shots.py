@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 
 from gpca.alignment.rigid import transform
-from gpca.frames.camera import Camera, MeshScene, look_at
 from gpca.frames.shots import (
     VOXEL_M,
     Shot,
@@ -16,6 +15,7 @@ from gpca.frames.shots import (
     occupy,
     without_outliers,
 )
+from gpca.objects.camera import Camera, MeshScene, look_at
 
 from .tiny import CAMERA
 

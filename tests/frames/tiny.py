@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
-from gpca.frames.camera import Camera, DepthNoise
 from gpca.frames.dataset import Dataset, read_models
 from gpca.frames.initial_pose import InitialPoseSettings
 from gpca.frames.instances import read_instances
 from gpca.frames.rgbd_scene import SceneSettings
+from gpca.objects.camera import Camera, DepthNoise
 from gpca.objects.canonical import ObjectClouds, write_objects
 from gpca.objects.surface import Surface
 

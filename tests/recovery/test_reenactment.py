@@ -9,8 +9,8 @@ import pytest
 from gpca.alignment.rigid import inverse, rigid_motion, scale_translation
 from gpca.causes.settings import OBSERVED, CauseSettings
 from gpca.causes.truth import ALL, NONE
-from gpca.frames.camera import Camera, MeshScene
 from gpca.frames.shots import Shot
+from gpca.objects.camera import Camera, MeshScene
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.recovery.actions import ACTIONS
 from gpca.recovery.episodes import RobotIn, register_after
