@@ -1,12 +1,11 @@
 """A fixture for tests that bring code from outside: none of it is left behind."""
 
-import os
 import sys
 
 import pytest
 
-from gpca import plugins
-from gpca.code_files import _imports
+from gpca.process import plugins
+from gpca.process.code_files import ROOT, _imports
 
 
 def forget():
@@ -24,7 +23,7 @@ def apart(monkeypatch):
     yield
     for name in set(sys.modules) - modules:
         file = getattr(sys.modules[name], "__file__", None) or ""
-        if not file.startswith((os.path.dirname(os.path.dirname(plugins.__file__)), sys.prefix, sys.base_prefix)):
+        if not file.startswith((str(ROOT), sys.prefix, sys.base_prefix)):
             del sys.modules[name]
     plugins.ROOTS.clear()
     plugins.ROOTS.update(roots)

@@ -5,10 +5,10 @@ It is what the steps load before they look at their input, and what each of hund
 
 from importlib import import_module
 
-from gpca.code_files import ROOT
 from gpca.config.check import check
 from gpca.config.layers import with_defaults
 from gpca.explainers.registry import explainers
+from gpca.process.code_files import ROOT
 
 OURS = ("gpca.encoders.dgcnn", "gpca.objects.point_files", "gpca.objects.procedural", "manifold3d")
 LIBRARIES = (

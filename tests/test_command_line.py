@@ -8,7 +8,7 @@ import pytest
 
 import gpca
 from gpca.__main__ import COMMANDS, main
-from gpca.code_files import ROOT
+from gpca.process.code_files import ROOT
 
 
 def test_help_and_wrong_usage_need_no_heavy_library():

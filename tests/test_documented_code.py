@@ -6,7 +6,7 @@ import runpy
 import numpy as np
 import pytest
 
-from gpca.guarantee.conformal import OUTCOMES
+from gpca.evaluation.conformal import OUTCOMES
 from gpca.guarantee.guarantee import STATES
 
 from .documents import ROOT

@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from gpca.code_files import ROOT
+from gpca.process.code_files import ROOT
 
 from .process.test_processor import needs_the_level
 

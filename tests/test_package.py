@@ -137,7 +137,7 @@ def test_its_data_code_and_provenance_are_its_own(installed, tmp_path):
     code = """
 import json
 from pathlib import Path
-from gpca.code_files import code_files
+from gpca.process.code_files import code_files
 from gpca.comparison.published import PUBLISHED, read_published
 from gpca.comparison.published import REASONS
 from gpca.process.provenance import record_provenance

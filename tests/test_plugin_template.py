@@ -9,13 +9,13 @@ from snakemake.utils import update_config
 
 from gpca.active_learning.acquisition import strategy_module
 from gpca.alignment.methods.registry import method_module
-from gpca.code_files import code_files
 from gpca.config.check import check
 from gpca.config.layers import without_false
 from gpca.experiments.run import names_of
 from gpca.explainers.registry import CAUSES, explainer_entry, explainer_module
 from gpca.objects.source import source_modules
-from gpca.plugins import GROUPS
+from gpca.process.code_files import code_files
+from gpca.process.plugins import GROUPS
 from gpca.recovery.policies import policy_module
 
 from .config.configs import load

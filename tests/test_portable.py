@@ -4,8 +4,8 @@ import sys
 import pytest
 import torch
 
-from gpca.code_files import ROOT
 from gpca.portable import Adam, log_sum_exp, logarithm, square_root
+from gpca.process.code_files import ROOT
 
 
 @pytest.mark.parametrize("dtype", [torch.float32, torch.float64])

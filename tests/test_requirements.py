@@ -13,7 +13,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 from gpca.alignment.methods.registry import methods
-from gpca.code_files import code_files
+from gpca.process.code_files import code_files
 from gpca.process.environment import MODULES
 
 from .documents import ROOT

@@ -5,7 +5,7 @@ import re
 import pytest
 import torch
 
-from gpca.code_files import ROOT
+from gpca.process.code_files import ROOT
 
 from .vendor_guard import VendorGuard
 

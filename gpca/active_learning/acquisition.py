@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gpca.errors import require_known
-from gpca.plugins import joined_outside, module_outside
+from gpca.process.plugins import joined_outside, module_outside
 
 EXPANSION = 4  # K: BALD with k-means clusters the B·K most uncertain samples
 

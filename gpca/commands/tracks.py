@@ -73,7 +73,7 @@ def _method_names(method: str, track: Track) -> list[str]:
     from importlib.util import find_spec
 
     from gpca.explainers.registry import CAUSES, explainers
-    from gpca.plugins import load, named, use
+    from gpca.process.plugins import load, named, use
 
     if not method.endswith(".py"):
         if method in (explainer_names := explainers(track.kind)):

@@ -23,7 +23,7 @@ from gpca.attribution.predictions import read_predictions
 from gpca.comparison.published import UNITS, Counterpart, Number
 from gpca.evaluation.intervals import LEVEL, interval, mean_interval, pigeonhole_weights
 from gpca.evaluation.measures import ALL, read_metrics, source_method_seed
-from gpca.model.runtime_file import read_runtime
+from gpca.evaluation.runtime_file import read_runtime
 from gpca.seeds import generator
 
 if TYPE_CHECKING:

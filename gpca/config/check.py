@@ -17,7 +17,7 @@ from gpca.explainers.registry import explainer_entry, require_settings
 from gpca.frames.source import REAL_WORLD
 from gpca.io.structured_text import require_plain
 from gpca.objects.source import require_place, resolve
-from gpca.plugins import use
+from gpca.process.plugins import use
 from gpca.settings import read_settings
 
 RESERVED = ("reference", "leaderboard", "logs")  # folders of results/ that are no runs

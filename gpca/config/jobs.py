@@ -16,7 +16,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import IO
 
-from gpca.code_files import ROOT
+from gpca.process.code_files import ROOT
 from gpca.process.processor import pin_instructions
 from gpca.process.provenance import CONFIG_VARIABLE, sha256_of_settings
 

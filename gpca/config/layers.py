@@ -12,13 +12,13 @@ from functools import cache, partial, reduce
 from pathlib import Path
 from typing import Any
 
-from gpca.code_files import ROOT
 from gpca.config.schema import DESIGNS, Reductions
 from gpca.errors import InputError, require_names
 from gpca.experiments.experiment import EXPLAINERS, Names
 from gpca.experiments.registry import experiments
 from gpca.explainers.registry import explainers
 from gpca.io.structured_text import read_mapping, read_scalar
+from gpca.process.code_files import ROOT
 
 DEFAULTS = tuple(ROOT / "config" / name for name in ("sources.yaml", "readings.yaml", "config.yaml"))
 TEMPLATE = "__use_yte__"  # lets Snakemake run code in a config

@@ -8,8 +8,8 @@ from typing import Annotated, Any, Literal
 
 from gpca.errors import InputError, require_known, with_key
 from gpca.pairs.synthesis import Reading
-from gpca.plugins import joined_outside
-from gpca.registry import load
+from gpca.process.plugins import joined_outside
+from gpca.process.registry import load
 from gpca.settings import Bounds, Count, PositiveShare, Share, changes_of, read_settings
 
 ENCODERS = {

@@ -15,8 +15,8 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from gpca.code_files import ROOT
 from gpca.explainers.registry import explainers
+from gpca.process.code_files import ROOT
 from gpca.reporting.registry import expand
 
 ByName = Annotated[dict[str, dict | None], Field(min_length=1)]  # settings, by name of what checks its own

@@ -44,7 +44,7 @@ from gpca.io.container import require_same_samples
 from gpca.io.csv_file import ANY, read_csv
 from gpca.objects.canonical import BY_ICP
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.plugins import is_outside
+from gpca.process.plugins import is_outside
 from gpca.reporting.sheet import Row, Sheet, show, where
 from gpca.reporting.tables.builder import TableBuilder
 from gpca.reporting.tables.cells import plain_cell

@@ -41,7 +41,7 @@ from gpca.io.csv_file import numbers as number_column
 from gpca.io.csv_file import read_csv
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.plugins import is_outside
+from gpca.process.plugins import is_outside
 from gpca.reporting.sheet import Row, Sheet, show
 from gpca.reporting.tables.builder import missing_packages
 from gpca.steps.registration_trials import INITIAL, NO_START, SEVERITY_COLUMNS, PairSettings

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from gpca.comparison.published import HARDWARE, Number, printed_seconds, read_published
 from gpca.errors import InputError
+from gpca.evaluation.runtime_file import COMPONENTS, OF_ONE_EXPLANATION, read_runtime
 from gpca.experiments.experiment import Experiment, Tidy
 from gpca.experiments.frames import title_of_frames
 from gpca.experiments.plan import Run
 from gpca.experiments.result import figure, table
-from gpca.model.runtime_file import COMPONENTS, OF_ONE_EXPLANATION, read_runtime
 from gpca.reporting.figures.panels import legend_below, panels
 from gpca.reporting.figures.style import BLUE, GRAY, GREEN, ORANGE, SMALL_PT, write_title
 from gpca.reporting.tables.builder import TableBuilder

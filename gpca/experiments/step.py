@@ -17,8 +17,8 @@ from operator import getitem
 from pathlib import Path
 from typing import Any
 
-from gpca.code_files import code_files
 from gpca.experiments.plan import Run
+from gpca.process.code_files import code_files
 
 BRACED = re.compile(r"{(\*?)(\w+)}")
 OUTSIDE = "outside_"  # with a name behind it, the wildcard of entries from outside the suite

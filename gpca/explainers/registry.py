@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from gpca.explainers.interface import ExplainerEntry
-from gpca.registry import Registry
+from gpca.process.registry import Registry
 from gpca.settings import require_arguments
 
 CONCEPTS, CAUSES = "concepts", "causes"  # explainers name what was perturbed, or what is wrong

@@ -13,9 +13,9 @@ import numpy as np
 from gpca.causes.dataset import LABELS
 from gpca.causes.truth import NOMINAL
 from gpca.errors import InputError
+from gpca.evaluation.conformal import ALARM, GOOD, NOT_SURE
 from gpca.evaluation.measures import ALL
 from gpca.frames.source import REAL_WORLD
-from gpca.guarantee.conformal import ALARM, GOOD, NOT_SURE
 from gpca.guarantee.guarantee import STATES, calibrate, state_scores
 from gpca.io.csv_file import read_numbers, write_csv
 from gpca.settings import OpenShare
@@ -49,7 +49,7 @@ class GuaranteeSettings:
         missed, false_alarms: largest probabilities that a failed registration is called good, and a good one failed.
         family_risk: both for calibration by family; there are too few families for a smaller one.
         confidence: with which both hold for the thresholds themselves, in a row of its own.
-        nonconformity: score of how badly a state fits (:func:`gpca.guarantee.conformal.nonconformity`).
+        nonconformity: score of how badly a state fits (:func:`gpca.evaluation.conformal.nonconformity`).
     """
 
     level: OpenShare = 0.9
@@ -151,7 +151,7 @@ class Answers:
     Attributes:
         row: (A,) numbers of the rows.
         sets: variant -> (A, 5) which states are in the set.
-        calls: variant -> (A,) of :data:`gpca.guarantee.conformal.OUTCOMES`.
+        calls: variant -> (A,) of :data:`gpca.evaluation.conformal.OUTCOMES`.
         families: the smallest number of families that any was calibrated on.
     """
 

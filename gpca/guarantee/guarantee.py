@@ -12,7 +12,7 @@ import numpy as np
 from gpca.causes.dataset import LABELS, labels_of
 from gpca.causes.truth import BORDERLINE, NOMINAL, Truth
 from gpca.errors import InputError
-from gpca.guarantee.conformal import (
+from gpca.evaluation.conformal import (
     PROBABILITY,
     FailureAlarm,
     Nonconformity,
@@ -45,7 +45,7 @@ class Guarantee:
         return self.state_sets.of(scores_M_K)
 
     def alarm(self, failure_M: np.ndarray) -> np.ndarray:
-        """Return the call of each registration (M,), one of :data:`gpca.guarantee.conformal.OUTCOMES`."""
+        """Return the call of each registration (M,), one of :data:`gpca.evaluation.conformal.OUTCOMES`."""
         return self.failure_alarm.of(failure_M)
 
     def to_dict(self) -> dict[str, Any]:
@@ -97,8 +97,8 @@ def calibrate(
         state_N: true states; ``borderline`` samples are left out.
         family_N: family of each sample, or None.
         level: probability that a set contains the true state.
-        missed, false_alarms, confidence: see :func:`gpca.guarantee.conformal.calibrate_alarm`.
-        nonconformity, by_state: see :class:`gpca.guarantee.conformal.StateSets`.
+        missed, false_alarms, confidence: see :func:`gpca.evaluation.conformal.calibrate_alarm`.
+        nonconformity, by_state: see :class:`gpca.evaluation.conformal.StateSets`.
 
     Raises:
         InputError: arrays of different lengths, unknown states, scores that are not finite, shares out of range.

@@ -22,8 +22,8 @@ from gpca.causes.settings import GROUPS, OBSERVED, CauseSettings, DescriptorSett
 from gpca.causes.truth import ALL, BORDERLINE, LARGEST_ERROR, NOMINAL
 from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
+from gpca.evaluation.conformal import highest_level
 from gpca.explainers.pair_classifier import Judgment, PairClassifier
-from gpca.guarantee.conformal import highest_level
 from gpca.guarantee.guarantee import Guarantee, calibrate, states_of
 from gpca.model.diagnosis import Diagnosis, Guaranteed, Reenacted, state_probabilities
 from gpca.pairs.distances import ObservedPair

@@ -10,7 +10,7 @@ import numpy as np
 
 from gpca.alignment.rigid import inverse, log
 from gpca.causes.truth import ALL, FAILED, NOMINAL, shapley_values
-from gpca.guarantee.conformal import ALARM, GOOD
+from gpca.evaluation.conformal import ALARM, GOOD
 from gpca.guarantee.guarantee import SEVERAL, Guarantee
 from gpca.objects.bop import symmetric_turn
 from gpca.objects.canonical_frame import CanonicalFrame

@@ -24,9 +24,9 @@ from gpca.classifier.sparse_gp import make_covariance
 from gpca.encoders.registry import EncoderSettings, make_encoder
 from gpca.encoders.tensor_file import read_tensors, require_like, write_tensors
 from gpca.errors import InputError
+from gpca.evaluation.conformal import Nonconformity
 from gpca.explainers.classifiers import require_trees
 from gpca.explainers.pair_classifier import ABSENT, PRESENT
-from gpca.guarantee.conformal import Nonconformity
 from gpca.guarantee.guarantee import STATES, Guarantee
 from gpca.model.clouds import MEASURES, Familiarity
 from gpca.model.diagnoser import REENACTED, REMEDIED, Diagnoser

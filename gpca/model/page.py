@@ -9,7 +9,7 @@ from html import escape
 from math import sqrt
 
 from gpca.causes.truth import BY_SIZE
-from gpca.guarantee.conformal import ALARM, GOOD
+from gpca.evaluation.conformal import ALARM, GOOD
 from gpca.guarantee.guarantee import STATES
 from gpca.model.diagnosis import IN_WORDS, UNKNOWN, Reenacted
 from gpca.model.scene import ASSETS, WITHOUT, Scene, taken_out

@@ -15,12 +15,12 @@ from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 
-from gpca.code_files import ROOT
 from gpca.errors import InputError
 from gpca.io.files import sha256_of_file
 from gpca.objects import downloads
 from gpca.objects.surface import Surface
-from gpca.plugins import joined_outside
+from gpca.process.code_files import ROOT
+from gpca.process.plugins import joined_outside
 
 PROCEDURAL = "procedural"
 KINDS = {

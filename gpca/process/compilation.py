@@ -15,7 +15,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from gpca.code_files import ROOT, code_files
+from gpca.process.code_files import ROOT, code_files
 
 VARIABLE = "NUMBA_CACHE_DIR"
 NOTICE = "compiling loops, which takes up to half a minute; later calls load what is kept of them"

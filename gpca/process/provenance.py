@@ -17,8 +17,8 @@ from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from gpca.code_files import ROOT
 from gpca.io.files import require_outputs, sha256_of_file, whole_file
+from gpca.process.code_files import ROOT
 from gpca.process.processor import describe
 
 LIBRARIES = ("numpy", "scipy", "torch", "gpytorch", "open3d-cpu", "scikit-learn", "numba", "trimesh", "snakemake")

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from gpca.errors import InputError
-from gpca.guarantee.conformal import upper_bound
+from gpca.evaluation.conformal import upper_bound
 from gpca.recovery.policy import NOTHING, QUEUE, Decision
 
 INVERSE_REGULARIZATION = 0.3  # C of scikit-learn, chosen on development seeds; smaller is closer to the mean rate
@@ -72,7 +72,7 @@ def learn_gate(
 def alarm_threshold(failure_M: np.ndarray, false_alarms: float) -> float:
     """Return the threshold that a new good registration exceeds with at most this probability.
 
-    It is conformal over the M good registrations (:func:`gpca.guarantee.conformal.upper_bound`), or the largest
+    It is conformal over the M good registrations (:func:`gpca.evaluation.conformal.upper_bound`), or the largest
     of their scores if M is too small.
     """
     return min(upper_bound(failure_M, 1 - false_alarms), float(failure_M.max()))

@@ -15,7 +15,7 @@ import numpy as np
 
 from gpca.errors import require_known
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.plugins import joined_outside, module_outside
+from gpca.process.plugins import joined_outside, module_outside
 from gpca.recovery.chances import ExpectedUtility, FailureGate
 from gpca.recovery.policy import NOTHING, Decision, RecoveryPolicy, Thresholds, Treated
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 from gpca.io.structured_text import load_own_yaml
-from gpca.registry import load
+from gpca.process.registry import load
 
 SUFFIXES = {"tables": ("md", "csv", "tex", "json"), "figures": ("png", "pdf")}  # the files of each kind
 Names = Mapping[str, Any]  # what stands in braces -> its one value, or the list of its values

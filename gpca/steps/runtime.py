@@ -21,10 +21,10 @@ from gpca.alignment.rigid import transform
 from gpca.attribution.scores import summarize_draws
 from gpca.classifier.gpc import GPC
 from gpca.classifier.latents import Projection
+from gpca.evaluation.runtime_file import COMPONENTS, RUNTIME_COLUMNS
 from gpca.io.csv_file import write_csv
 from gpca.model.explainer import Explainer
 from gpca.model.file import Model
-from gpca.model.runtime_file import COMPONENTS, RUNTIME_COLUMNS
 from gpca.objects.canonical import FEWEST_CLOUD_POINTS
 from gpca.objects.canonical_frame import CanonicalFrame
 from gpca.pairs.dataset import Registrations, read_embedding

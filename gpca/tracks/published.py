@@ -14,11 +14,11 @@ import numpy as np
 
 from gpca.causes.judged import SampleTruth
 from gpca.causes.truth import SUBSETS, Truth
-from gpca.code_files import ROOT
 from gpca.errors import InputError
 from gpca.io.arrays import REAL, TEXT, WHOLE, load_arrays
 from gpca.io.files import whole_file
 from gpca.objects.source import DATA
+from gpca.process.code_files import ROOT
 from gpca.tracks.track import Track
 
 FOLDER = ROOT / "results/leaderboard/published"

@@ -20,10 +20,10 @@ from typing import Any
 
 import numpy as np
 
-from gpca.code_files import ROOT
 from gpca.errors import InputError
 from gpca.frames.source import REAL_WORLD
-from gpca.plugins import named
+from gpca.process.code_files import ROOT
+from gpca.process.plugins import named
 from gpca.steps.control_samples import HARD
 from gpca.tracks.published import Published, require_clone, sha256_of_arrays
 from gpca.tracks.track import DEFAULT, Track

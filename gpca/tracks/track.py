@@ -13,11 +13,11 @@ from typing import Any
 from gpca.causes.dataset import LABELS
 from gpca.causes.settings import OBJECTS, SCANS
 from gpca.causes.truth import NOMINAL
-from gpca.code_files import ROOT
 from gpca.errors import InputError, require_known
 from gpca.explainers.registry import CAUSES, CONCEPTS
 from gpca.frames.source import REAL_WORLD
 from gpca.pairs.perturbation import CONCEPTS as PERTURBATIONS
+from gpca.process.code_files import ROOT
 
 CAUSES_TRACK, HARD_TRACK, FRAMES_TRACK, SCANS_TRACK = ("causes", "hard", "frames", "scans")
 DEFAULT = "default"  # run

@@ -7,8 +7,8 @@ import shutil
 import pytest
 import yaml
 
-from gpca.code_files import ROOT
 from gpca.evaluation.measures import TIDY_COLUMNS as TIDY
+from gpca.process.code_files import ROOT
 from gpca.process.processor import describe
 
 SETTINGS = yaml.safe_load((ROOT / "config/config.yaml").read_text())["reference"]

@@ -3,11 +3,11 @@
 import pandas as pd
 import yaml
 
-from gpca.code_files import ROOT
 from gpca.comparison.published import Counterpart, Number
 from gpca.comparison.verdicts import Tolerance, compare
 from gpca.evaluation.measures import TIDY_COLUMNS as TIDY
-from gpca.model.runtime_file import RUNTIME_COLUMNS
+from gpca.evaluation.runtime_file import RUNTIME_COLUMNS
+from gpca.process.code_files import ROOT
 
 SETTINGS = yaml.safe_load((ROOT / "config/config.yaml").read_text())["comparison"]["tolerances"]
 TOLERANCES = {unit: Tolerance(**tolerance) for unit, tolerance in SETTINGS.items()}

@@ -4,7 +4,6 @@ import pytest
 import yaml
 
 from gpca.active_learning.acquisition import STRATEGIES
-from gpca.code_files import ROOT
 from gpca.comparison import published
 from gpca.comparison.published import (
     NONE_YET,
@@ -19,8 +18,9 @@ from gpca.comparison.published import (
     read_reasons,
     reason_of,
 )
+from gpca.evaluation.runtime_file import COMPONENTS
 from gpca.experiments.kernel_grid import PRINTED, setting_name
-from gpca.model.runtime_file import COMPONENTS
+from gpca.process.code_files import ROOT
 
 NUMBERS = read_published()
 CONFIG = yaml.safe_load((ROOT / "config/config.yaml").read_text())

@@ -4,7 +4,6 @@ import pandas as pd
 import pytest
 import yaml
 
-from gpca.code_files import ROOT
 from gpca.comparison.claims import read_verdicts
 from gpca.comparison.claims_table import counted
 from gpca.comparison.markdown import counts_table, summary
@@ -13,6 +12,7 @@ from gpca.comparison.readings import READINGS, judge_readings, with_readings
 from gpca.comparison.values import read_results
 from gpca.comparison.verdicts import JUDGED, NOT_COMPARABLE, Tolerance, compare
 from gpca.experiments.reading_words import ReadingWords
+from gpca.process.code_files import ROOT
 
 SETTINGS = yaml.safe_load((ROOT / "config/config.yaml").read_text())["comparison"]["tolerances"]
 TOLERANCES = {unit: Tolerance(**tolerance) for unit, tolerance in SETTINGS.items()}

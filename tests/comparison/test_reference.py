@@ -6,11 +6,11 @@ import shutil
 import pytest
 import yaml
 
-from gpca.code_files import ROOT
 from gpca.comparison import reference
 from gpca.comparison.reference import KINDS, Allowance, check_reference, kind_of, read_means
 from gpca.errors import InputError
 from gpca.evaluation.measures import TIDY_COLUMNS as TIDY
+from gpca.process.code_files import ROOT
 from gpca.process.processor import describe
 from tests.steps.by_words import main
 

@@ -9,7 +9,6 @@ import pytest
 import yaml
 from scipy.stats import chi2
 
-from gpca.code_files import ROOT
 from gpca.comparison.markdown import comparison_markdown, summary
 from gpca.comparison.published import NONE_YET, Reason, read_published, read_reasons, reason_of
 from gpca.comparison.readings import READINGS
@@ -32,6 +31,7 @@ from gpca.comparison.verdicts import (
 )
 from gpca.errors import InputError
 from gpca.experiments.registry import experiments
+from gpca.process.code_files import ROOT
 
 from .made_up import ACCURACY, OBJECTS, TIME, TOLERANCES, compared, number, runtime, tidy
 

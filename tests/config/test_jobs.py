@@ -13,9 +13,9 @@ from pathlib import Path
 import pytest
 import yaml
 
-from gpca.code_files import ROOT
 from gpca.config import jobs as restart
 from gpca.config.jobs import clear_leftovers, export_to_jobs
+from gpca.process.code_files import ROOT
 
 CONFIG = {"seeds": [0], "data_dir": "data", "comparison": {}, "registrations": {"train": 800, "test": 200}}
 VARIABLES = ("GPCA_CONFIG_SHA256", "PATH", "PYTHONPATH", "PYTHONSAFEPATH")

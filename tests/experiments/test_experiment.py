@@ -7,7 +7,7 @@ import pytest
 from gpca.config.layers import without_false
 from gpca.experiments.experiment import Experiment, Tidy
 from gpca.experiments.registry import experiments
-from gpca.registry import load as load_function
+from gpca.process.registry import load as load_function
 
 from ..config.configs import load
 

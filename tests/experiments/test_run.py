@@ -10,7 +10,7 @@ from gpca.config.layers import without_false
 from gpca.experiments.frame_tables import pretrained_on
 from gpca.experiments.registry import results_of
 from gpca.experiments.run import explainer_of, files_behind, names_of, settings_of
-from gpca.registry import load as load_function
+from gpca.process.registry import load as load_function
 from gpca.reporting.registry import input_name
 
 from ..config.configs import load

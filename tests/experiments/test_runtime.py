@@ -5,9 +5,9 @@ import pytest
 
 from gpca.comparison.published import printed_seconds, read_published
 from gpca.errors import InputError
+from gpca.evaluation.runtime_file import COMPONENTS, OF_ONE_EXPLANATION, RUNTIME_COLUMNS
 from gpca.experiments.plan import Run
 from gpca.experiments.runtime import ALL_STAGES, draw_runtime, stages_of, table7_runtime
-from gpca.model.runtime_file import COMPONENTS, OF_ONE_EXPLANATION, RUNTIME_COLUMNS
 
 
 def rows(device="CPU", hardware="A processor, 2 cores", components=tuple(COMPONENTS), start=0.001):

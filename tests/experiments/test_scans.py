@@ -4,7 +4,6 @@ import pandas as pd
 import pytest
 import yaml
 
-from gpca.code_files import ROOT
 from gpca.config.layers import with_defaults
 from gpca.errors import InputError
 from gpca.evaluation.measures import tidy
@@ -23,6 +22,7 @@ from gpca.experiments.scans import (
     titles_of_scans,
 )
 from gpca.io.csv_file import write_csv
+from gpca.process.code_files import ROOT
 from tests.experiments.runs import run_with
 from tests.scans.test_source import write_npz
 

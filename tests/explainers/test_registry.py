@@ -3,7 +3,7 @@
 import subprocess
 import sys
 
-from gpca.code_files import ROOT
+from gpca.process.code_files import ROOT
 
 
 def test_no_explainer_brings_a_slow_library_before_it_is_made():

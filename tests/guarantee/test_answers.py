@@ -7,6 +7,7 @@ import pytest
 
 from gpca.causes.truth import NOMINAL
 from gpca.errors import InputError
+from gpca.evaluation.conformal import ALARM, GOOD, NOT_SURE
 from gpca.guarantee.answers import (
     BY_FAMILY,
     BY_SAMPLE,
@@ -21,7 +22,6 @@ from gpca.guarantee.answers import (
     plain_sets,
     plain_threshold,
 )
-from gpca.guarantee.conformal import ALARM, GOOD, NOT_SURE
 from gpca.guarantee.guarantee import STATES
 from tests.guarantee.scored import scored_samples
 

@@ -8,7 +8,7 @@ import pytest
 from gpca.causes.dataset import labels_of
 from gpca.causes.truth import BORDERLINE, Truth
 from gpca.errors import InputError
-from gpca.guarantee.conformal import OUTCOMES
+from gpca.evaluation.conformal import OUTCOMES
 from gpca.guarantee.guarantee import SEVERAL, STATES, Guarantee, calibrate, state_scores, states_of
 
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from gpca.__main__ import COMMANDS
-from gpca.code_files import ROOT
 from gpca.errors import InputError
+from gpca.process.code_files import ROOT
 from gpca.process.job import Job, as_process
 
 JOB = Job(

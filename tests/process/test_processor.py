@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from gpca.code_files import ROOT
 from gpca.process import processor
+from gpca.process.code_files import ROOT
 from gpca.process.processor import (
     COMMON_LEVEL,
     INSTRUCTIONS_VARIABLE,

@@ -6,7 +6,7 @@ import pytest
 from gpca.experiments import registry
 from gpca.experiments.registry import registered, results_of
 from gpca.page.page import rendered_caption
-from gpca.registry import load
+from gpca.process.registry import load
 from gpca.reporting.registry import Input, Result, build, by_section, targets, unknown_target
 
 NAMES = {"source": ["ycb", "mine"], "seed": [0, 1], "first_seed": "0", "explainer": ["gpca", "forest"], "gpca": "gpca"}

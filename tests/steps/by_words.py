@@ -10,7 +10,7 @@ from pathlib import Path
 
 from gpca.__main__ import COMMANDS
 from gpca.__main__ import main as command
-from gpca.code_files import ROOT
+from gpca.process.code_files import ROOT
 from gpca.process.job import Job, as_process, call
 from gpca.process.processor import THREAD_VARIABLES
 

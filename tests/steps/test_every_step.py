@@ -5,8 +5,8 @@ import re
 import pytest
 
 from gpca.__main__ import COMMANDS
-from gpca.code_files import ROOT
 from gpca.experiments.registry import steps as declared
+from gpca.process.code_files import ROOT
 from tests.steps.by_words import main, module_of, run_apart
 
 from .command_lines import STEP_OPTIONS, arguments

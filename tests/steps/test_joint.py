@@ -6,7 +6,6 @@ import pandas as pd
 import pytest
 import yaml
 
-from gpca.code_files import ROOT
 from gpca.comparison.joint_reading import CHOICES, numbers_asked, read_choices, read_verdicts
 from gpca.comparison.published import read_published
 from gpca.comparison.readings import READING_COLUMNS
@@ -15,6 +14,7 @@ from gpca.experiments.joint_reading import judge_joint, table16_joint_reading
 from gpca.experiments.plan import Run
 from gpca.objects.canonical import write_objects
 from gpca.objects.procedural import surfaces
+from gpca.process.code_files import ROOT
 from tests.steps.by_words import main
 
 GPC = {"inducing": 4, "draws": 20}

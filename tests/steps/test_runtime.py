@@ -5,8 +5,8 @@ from gpca.active_learning.rounds import make_task
 from gpca.active_learning.settings import ActiveLearningSettings
 from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
+from gpca.evaluation.runtime_file import COMPONENTS, OF_ONE_EXPLANATION, RUNTIME_COLUMNS, read_runtime
 from gpca.io.csv_file import write_csv
-from gpca.model.runtime_file import COMPONENTS, OF_ONE_EXPLANATION, RUNTIME_COLUMNS, read_runtime
 from gpca.steps.runtime import measure
 
 

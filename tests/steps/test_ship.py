@@ -9,12 +9,12 @@ import pandas as pd
 import pytest
 import yaml
 
-from gpca.code_files import ROOT
 from gpca.commands import ship
 from gpca.commands.ship import licenses_of
 from gpca.evaluation.measures import AGAINST, KEYS, NUMBERS
 from gpca.model.explainer import Explainer
 from gpca.model.file import Model
+from gpca.process.code_files import ROOT
 from tests.steps.by_words import main
 
 from .spoiling import content, removed, written

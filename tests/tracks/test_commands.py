@@ -5,8 +5,8 @@ import re
 
 import pytest
 
-from gpca import plugins
 from gpca.__main__ import main
+from gpca.process import plugins
 from gpca.tracks import leaderboard
 from gpca.tracks.leaderboard import MARK
 

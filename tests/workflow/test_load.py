@@ -8,7 +8,7 @@ from gpca.config.check import check
 from gpca.config.layers import without_false
 from gpca.experiments.registry import results_of
 from gpca.experiments.run import names_of
-from gpca.registry import load
+from gpca.process.registry import load
 
 from ..config.configs import load as load_config
 from .conftest import ROOT

@@ -6,7 +6,7 @@ from gpca.experiments.active_learning import learning_settings
 from gpca.explainers.interface import BARE, REENACTED
 from gpca.explainers.registry import CAUSES, explainer_entry, explainer_module
 from gpca.alignment.methods.registry import method_module
-from gpca.code_files import code_files
+from gpca.process.code_files import code_files
 from gpca.encoders.registry import encoders
 from gpca.objects.source import find_file
 from gpca.experiments.frames import pretraining_of

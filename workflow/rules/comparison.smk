@@ -1,7 +1,7 @@
 # The numbers that the paper prints beside those of the run, and the page of the run.
 from os.path import relpath
 
-from gpca.code_files import ROOT
+from gpca.process.code_files import ROOT
 from gpca.comparison.claims import counterparts_of, read_claims
 from gpca.comparison.published import read_published
 from gpca.comparison.values import folders_behind

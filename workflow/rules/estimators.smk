@@ -1,6 +1,6 @@
 # Registrations with measured causes -> what every estimator says of their uncertainty -> estimators.csv.
 from gpca.experiments.estimators.experiment import estimates_of
-from gpca.plugins import is_outside
+from gpca.process.plugins import is_outside
 from gpca.uncertainty.estimators.registry import estimator_module
 
 # Those from outside have jobs of their own.

@@ -4,7 +4,7 @@ from gpca.evaluation.measures import write_metrics
 from gpca.experiments.plan import READ, Recorded, Run
 from gpca.experiments.run import names_of
 from gpca.process.job import files_by_name, workflow_script
-from gpca.registry import load
+from gpca.process.registry import load
 
 with workflow_script(snakemake) as added:
     arguments = dict(snakemake.params.items())

@@ -10,7 +10,7 @@ import numpy as np
 from gpca.alignment.methods.interface import FailedRegistration, MethodEntry, Outcome, Pair
 from gpca.errors import InputError
 from gpca.process.environment import require_open3d
-from gpca.registry import Registry
+from gpca.process.registry import Registry
 from gpca.settings import require_arguments
 
 # Includes methods whose package is missing.

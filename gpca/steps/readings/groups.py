@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal
 
 from gpca.classifier.settings import Kernel, LearningRate
 from gpca.pairs.synthesis import Reading as ReadAs
-from gpca.registry import load
+from gpca.process.registry import load
 from gpca.settings import Bounds, Count, Distinct, Keys, OpenShare, Positive
 
 FRAME_REPEATS = "frames"  # the group that fits classifiers to depth frames anew

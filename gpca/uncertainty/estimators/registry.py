@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from gpca.errors import InputError
-from gpca.registry import Registry
+from gpca.process.registry import Registry
 from gpca.settings import require_arguments
 from gpca.uncertainty.estimators.interface import Estimate, EstimatorEntry, Example, FailedEstimate, RegisteredPair
 

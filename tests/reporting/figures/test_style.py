@@ -7,7 +7,7 @@ import pytest
 from matplotlib.colors import to_rgb
 from PIL import Image
 
-from gpca.code_files import code_files
+from gpca.process.code_files import code_files
 from gpca.reporting.figures import style
 
 

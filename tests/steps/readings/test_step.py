@@ -5,12 +5,12 @@ import json
 import pytest
 import yaml
 
-from gpca.code_files import ROOT
 from gpca.config.check import check
 from gpca.config.layers import with_defaults
 from gpca.errors import InputError
 from gpca.evaluation.measures import read_metrics
 from gpca.experiments.reading_words import NUMBERS, WORDS, ReadingWords, reading_in_words
+from gpca.process.code_files import ROOT
 from gpca.steps.readings.groups import GROUPS, name_of, readings_of
 from tests.steps.by_words import main
 

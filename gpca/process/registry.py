@@ -8,7 +8,7 @@ from importlib import import_module
 from typing import Any, Generic, TypeVar
 
 from gpca.errors import require_known
-from gpca.plugins import entries_outside
+from gpca.process.plugins import entries_outside
 
 Entry = TypeVar("Entry")
 
@@ -56,7 +56,7 @@ class Registry(Generic[Entry]):
         """Return the entries of each module.
 
         Raises:
-            InputError: an unusable plugin (:mod:`gpca.plugins`).
+            InputError: an unusable plugin (:mod:`gpca.process.plugins`).
         """
         files = pkgutil.iter_modules(import_module(self._folder).__path__)
         names = sorted(f"{self._folder}.{file.name}" for file in files)

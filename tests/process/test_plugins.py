@@ -5,15 +5,15 @@ import sys
 import pytest
 
 from gpca.active_learning.acquisition import strategies
-from gpca.code_files import code_files
 from gpca.config.check import check
 from gpca.encoders.registry import encoders
 from gpca.errors import InputError
 from gpca.experiments.run import names_of
 from gpca.explainers.registry import CAUSES, explainer_entry, explainer_module, explainers
-from gpca.plugins import load, named, use
+from gpca.process.code_files import code_files
+from gpca.process.plugins import load, named, use
 
-from .config.configs import load as load_config
+from ..config.configs import load as load_config
 
 EXPLAINER = """
 from gpca.explainers.interface import ExplainerEntry, ScoringExplainer

@@ -2,8 +2,8 @@ import importlib.util
 
 import pytest
 
-from gpca import code_files as module_under_test
-from gpca.code_files import ROOT, code_files
+from gpca.process import code_files as module_under_test
+from gpca.process.code_files import ROOT, code_files
 
 FILES = {
     "gpca/__init__.py": "",

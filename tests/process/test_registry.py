@@ -4,7 +4,7 @@ from importlib import invalidate_caches
 import pytest
 
 from gpca.errors import InputError
-from gpca.registry import Registry, load
+from gpca.process.registry import Registry, load
 
 
 @pytest.fixture
@@ -41,4 +41,4 @@ def test_an_unknown_name_is_answered_with_the_known(fruits, ask):
 
 
 def test_what_is_written_as_module_and_name_is_loaded():
-    assert load("gpca.registry:load") is load
+    assert load("gpca.process.registry:load") is load

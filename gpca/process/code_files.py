@@ -6,9 +6,9 @@ import ast
 from functools import cache
 from pathlib import Path
 
-from gpca.plugins import ROOTS, lone_root
+from gpca.process.plugins import ROOTS, lone_root
 
-ROOT = Path(__file__).resolve().parent.parent  # of both packages: a checkout, or site-packages
+ROOT = Path(__file__).resolve().parents[2]  # of both packages: a checkout, or site-packages
 PACKAGES = ("gpca", "baselines")
 BESIDE = {  # files that a module reads from its folder
     "gpca.comparison.claims": "claims.yaml",
@@ -24,9 +24,9 @@ def code_files(*modules: str) -> list[str]:
     """Return the files of modules and of all project modules that they import, and their files in `BESIDE`; sorted.
 
     For ``module:function``, only the imports that the function needs count. Imports for type checking do not. A plugin
-    (:mod:`gpca.plugins`) counts with its imports from its package or, if it is a single file, from its folder. Paths
-    are relative where they are below the working directory, else absolute. Modules that are chosen by name at run time
-    (kinds of source, encoders, explainers) must be given.
+    counts with its imports from its package or, if it is a single file, from its folder. Paths are relative where they
+    are below the working directory, else absolute. Modules that are chosen by name at run time (kinds of source,
+    encoders, explainers) must be given.
     """
     reached: set[str] = set()
     open_modules = list(modules)

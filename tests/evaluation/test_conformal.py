@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import beta
 
 from gpca.errors import InputError
-from gpca.guarantee.conformal import (
+from gpca.evaluation.conformal import (
     ALARM,
     CUMULATIVE,
     GOOD,
