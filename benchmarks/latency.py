@@ -137,6 +137,7 @@ def make_explainer(options: argparse.Namespace):
     import torch
 
     from gpca.alignment.icp import ICPSettings
+    from gpca.causes.policy import RecoveryPolicy
     from gpca.classifier.gpc import GPC
     from gpca.classifier.settings import GPCSettings
     from gpca.encoders.registry import EncoderSettings
@@ -144,7 +145,6 @@ def make_explainer(options: argparse.Namespace):
     from gpca.model.explainer import Explainer
     from gpca.model.file import Model
     from gpca.pairs.perturbation import CONCEPTS
-    from gpca.recovery.policy import RecoveryPolicy
 
     torch.manual_seed(0)
     settings = EncoderSettings(draw_points=options.points)

@@ -94,6 +94,7 @@ def model(registrations, diagnoser):
     import torch
 
     from gpca.alignment.icp import ICPSettings
+    from gpca.causes.policy import RecoveryPolicy, Thresholds
     from gpca.classifier.gpc import GPC
     from gpca.classifier.settings import GPCSettings
     from gpca.encoders.registry import EncoderSettings
@@ -101,7 +102,6 @@ def model(registrations, diagnoser):
     from gpca.model.clouds import Familiarity
     from gpca.model.file import Model
     from gpca.pairs.perturbation import CONCEPTS
-    from gpca.recovery.policy import RecoveryPolicy, Thresholds
 
     settings = EncoderSettings(draw_points=64, draws=2, options={"k": 8, "point_features": 16})
     torch.manual_seed(0)

@@ -183,7 +183,7 @@ def _write(
 
 def _queue(path: Path | None, explainer: Explainer, explanation: Explanation, name: str) -> None:
     """Add a registration to the queue if that is the action; without a file, print how to."""
-    from gpca.recovery.policy import QUEUE
+    from gpca.causes.policy import QUEUE
 
     if explanation.action != QUEUE or explanation.scene is None:
         return

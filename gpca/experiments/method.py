@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gpca.causes.policy import NOTHING, QUEUE, Decision, RecoveryPolicy
 from gpca.errors import InputError
 from gpca.experiments.experiment import Experiment
 from gpca.experiments.frames import encoder_title
@@ -25,7 +26,6 @@ from gpca.experiments.result import figure
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS, SEVERITIES_OF
-from gpca.recovery.policy import NOTHING, QUEUE, Decision, RecoveryPolicy
 from gpca.reporting.figures.cloud_views import draw_clouds, legend_of_clouds, widest_views
 from gpca.reporting.figures.diagram import Canvas
 from gpca.reporting.figures.panels import panels, write_below

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field
 
+from gpca.causes.policy import Thresholds
 from gpca.encoders.registry import EncoderChanges
 from gpca.errors import InputError, require_names, with_key
 from gpca.experiments.experiment import Experiment, LeftOut, Names
@@ -27,7 +28,6 @@ from gpca.pairs.perturbation import CONCEPTS, Hidden
 from gpca.pairs.synthesis import TestSamples, TrainSamples
 from gpca.recovery.actions import ACTIONS, action_of
 from gpca.recovery.policies import named_policies, policies, policy_entry
-from gpca.recovery.policy import Thresholds
 from gpca.recovery.settings import LoopSettings
 from gpca.reporting.sheet import Row, Sheet, show
 from gpca.reporting.tables.builder import over_clusters

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gpca.causes.policy import DOUBTED, DRAWN
 from gpca.errors import InputError
 from gpca.evaluation.intervals import wilson_interval
 from gpca.experiments.plan import Run
@@ -15,7 +16,6 @@ from gpca.experiments.recovery import SECTION, tables_title, titles_of_policies
 from gpca.experiments.recovery_measures import at, pool_share, read_queues
 from gpca.experiments.result import figure
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.recovery.policy import DOUBTED, DRAWN
 from gpca.reporting.figures.panels import legend_below, panels
 from gpca.reporting.figures.style import (
     BLACK,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gpca.causes.policy import NOTHING, QUEUE, QUEUE_COLUMNS
 from gpca.evaluation.intervals import Clustered, wilson_interval
 from gpca.evaluation.measures import ALL, Measure, Parts, intervals, over_seeds, tidy
 from gpca.experiments.plan import Run
@@ -16,7 +17,6 @@ from gpca.io.csv_file import numbers as number_column
 from gpca.io.csv_file import read_csv, read_numbers
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.recovery.policies import ERROR_ONLY, is_fixed, policy_entry
-from gpca.recovery.policy import NOTHING, QUEUE, QUEUE_COLUMNS
 from gpca.seeds import seed_of_file
 
 if TYPE_CHECKING:

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpca.alignment.rigid import inverse, log
+from gpca.causes.policy import NOTHING, QUEUE
 from gpca.causes.truth import ALL, FAILED, NOMINAL, shapley_values
 from gpca.evaluation.conformal import ALARM, GOOD
 from gpca.guarantee.guarantee import SEVERAL, Guarantee
 from gpca.objects.bop import symmetric_turn
 from gpca.objects.canonical_frame import CanonicalFrame
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.recovery.policy import NOTHING, QUEUE
 from gpca.reenactment.enactment import Enactment
 from gpca.reenactment.hypotheses import SAME
 from gpca.reenactment.surface import ModelSurface

@@ -20,6 +20,7 @@ from gpca.alignment.methods.interface import Outcome, Pair
 from gpca.alignment.methods.registry import make_method
 from gpca.alignment.rigid import inverse, transform
 from gpca.attribution.scores import entropy
+from gpca.causes.policy import NOTHING, Decision, RecoveryPolicy
 from gpca.causes.settings import Limits
 from gpca.causes.truth import NOMINAL
 from gpca.encoders.training import best_device
@@ -33,7 +34,6 @@ from gpca.model.location import model_path
 from gpca.model.scene import Scene
 from gpca.objects.canonical_frame import CanonicalFrame, thin
 from gpca.objects.surface import as_points
-from gpca.recovery.policy import NOTHING, Decision, RecoveryPolicy
 from gpca.seeds import generator, seed_of
 from gpca.uncertainty.estimators.interface import Estimate, RegisteredPair
 from gpca.uncertainty.estimators.registry import make_estimator

@@ -88,7 +88,7 @@ class Explanation(Page):
             and variance over the posterior draws (Eqs. 4, 5).
         bald, entropy: uncertainty of these in nats: Eq. 7, and the entropy of the scores.
         concept: concept with the largest score (Eq. 6).
-        action: what to do next: a branch of the policy (:mod:`gpca.recovery.policy`), or `CHECK`.
+        action: what to do next: a branch of the policy (:mod:`gpca.causes.policy`), or `CHECK`.
         reason: reason for this action.
         spread: uncertainty of the pose by an estimator, if requested and available.
         unit: unit of all lengths.

@@ -16,6 +16,7 @@ from torch import nn
 
 from gpca.alignment.icp import ICPSettings
 from gpca.causes.descriptors import WIDTHS
+from gpca.causes.policy import NOTHING, QUEUE, RecoveryPolicy, Thresholds
 from gpca.causes.settings import DescriptorSettings, Moved
 from gpca.causes.truth import FAILED, NOMINAL
 from gpca.classifier.gpc import GPC
@@ -33,7 +34,6 @@ from gpca.model.diagnoser import REENACTED, REMEDIED, Diagnoser
 from gpca.model.location import REMEDY, require_model
 from gpca.objects.canonical import FEWEST_CLOUD_POINTS
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.recovery.policy import TREATMENTS, RecoveryPolicy, Thresholds
 from gpca.reenactment.dataset import DESCRIBED, FEATURES
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.settings import read_settings
@@ -228,14 +228,13 @@ def _require_counts(counts: Mapping[str, tuple[object, int, int]]) -> None:
 def _require_treatments(treatments: Mapping) -> None:
     if set(treatments) != set(CONCEPTS):
         raise ValueError(f"treatments: of {str([*treatments])[:80]}, not of {', '.join(CONCEPTS)}")
-    actions = list(TREATMENTS.values())
-    if not set(treatments.values()) <= set(actions):  # only other actions than the paper's need the robot's code
-        from gpca.recovery.actions import ACTIONS
-
-        actions = list(ACTIONS)
-    for action in treatments.values():
-        if action not in actions:
-            raise ValueError(f"treatments: {str(action)[:40]!r} is not one of {', '.join(actions)}")
+    for action in treatments.values():  # of any robot: other actions than the paper's are allowed
+        if (
+            not isinstance(action, str)
+            or not re.fullmatch(r"[a-z][a-z0-9_]{0,39}", action)
+            or action in (NOTHING, QUEUE)
+        ):
+            raise ValueError(f"treatments: {str(action)[:40]!r} is no name of an action")
     if len(set(treatments.values())) < len(treatments):
         raise ValueError("treatments: one action treats two concepts")
 

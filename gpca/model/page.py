@@ -8,12 +8,12 @@ from functools import cache
 from html import escape
 from math import sqrt
 
+from gpca.causes.policy import NOTHING
 from gpca.causes.truth import BY_SIZE
 from gpca.evaluation.conformal import ALARM, GOOD
 from gpca.guarantee.guarantee import STATES
 from gpca.model.diagnosis import IN_WORDS, UNKNOWN, Reenacted
 from gpca.model.scene import ASSETS, WITHOUT, Scene, taken_out
-from gpca.recovery.policy import NOTHING
 
 # This policy makes browsers refuse every network request of the page.
 ALONE = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:"

@@ -20,6 +20,7 @@ from scipy.special import expit
 
 from gpca.alignment.pose_error import displacements
 from gpca.alignment.rigid import inverse, require_rigid, transform
+from gpca.causes.policy import NOTHING, TREATMENTS
 from gpca.causes.settings import OBSERVED, CauseSettings
 from gpca.causes.truth import FAILED, NOMINAL
 from gpca.errors import InputError
@@ -32,7 +33,6 @@ from gpca.objects.canonical_frame import CanonicalFrame, require_cloud_points
 from gpca.objects.mesh_folder import meters_per
 from gpca.objects.surface import as_points
 from gpca.pairs.distances import ObservedPair
-from gpca.recovery.policy import NOTHING, TREATMENTS
 from gpca.reenactment.enactment import Enactment
 from gpca.reenactment.hypotheses import INDEPENDENT, weights_of
 from gpca.reenactment.scans import reenact_scan

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from gpca.causes.policy import NOTHING, QUEUE, Decision
 from gpca.errors import InputError
 from gpca.evaluation.conformal import upper_bound
-from gpca.recovery.policy import NOTHING, QUEUE, Decision
 
 INVERSE_REGULARIZATION = 0.3  # C of scikit-learn, chosen on development seeds; smaller is closer to the mean rate
 FOLDS = 8  # of the tables

@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gpca.causes.policy import NOTHING, Decision, RecoveryPolicy, Thresholds, Treated
 from gpca.errors import require_known
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.plugins import joined_outside, module_outside
 from gpca.recovery.chances import ExpectedUtility, FailureGate
-from gpca.recovery.policy import NOTHING, Decision, RecoveryPolicy, Thresholds, Treated
 
 if TYPE_CHECKING:
     from gpca.recovery.reenactment import Reenacted
@@ -77,7 +77,7 @@ class Means:
 
 
 def follow_scores(means: Means) -> Decide:
-    """Follow an explainer's scores and queue uncertain cases (:class:`gpca.recovery.policy.RecoveryPolicy`)."""
+    """Follow an explainer's scores and queue uncertain cases (:class:`gpca.causes.policy.RecoveryPolicy`)."""
     policy = means.policy
     concept_of = {action: concept for concept, action in policy.treatments.items()}
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from gpca.causes.policy import DOUBTED, DRAWN, NOTHING, QUEUE_COLUMNS, RecoveryPolicy
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.recovery.actions import Action
@@ -21,7 +22,6 @@ from gpca.recovery.answers import Answer, Answers, CaseKey, Explain, LoopExplain
 from gpca.recovery.chances import ExpectedUtility, FailureGate, Trial, learn_gate, learn_utility
 from gpca.recovery.episodes import Episode
 from gpca.recovery.policies import Means, Order, best_order, policy_entry
-from gpca.recovery.policy import DOUBTED, DRAWN, NOTHING, QUEUE_COLUMNS, RecoveryPolicy
 from gpca.recovery.settings import LoopSettings
 from gpca.seeds import generator
 

@@ -100,13 +100,13 @@ def train_on_causes(job: Job) -> None:
 
 def model(job: Job) -> None:
     """Fit all classifiers and write them with the encoder and the policy -> ``model.pt``, for ``gpca explain``."""
+    from gpca.causes.policy import RecoveryPolicy
     from gpca.classifier.gpc import GPC
     from gpca.classifier.settings import GPCSettings
     from gpca.encoders.training import load_model
     from gpca.model.clouds import Familiarity
     from gpca.model.diagnoser import TrainingSet, learn
     from gpca.model.file import Model
-    from gpca.recovery.policy import RecoveryPolicy
     from gpca.reenactment.dataset import Reenactments
 
     inputs = [job.registrations, job.encoder, job.embeddings, *job.causes, *job.reenactments]

@@ -7,6 +7,7 @@ import pytest
 import trimesh
 
 from gpca.alignment.rigid import scale_translation, transform
+from gpca.causes.policy import NOTHING, QUEUE, RecoveryPolicy, Thresholds
 from gpca.errors import InputError
 from gpca.experiments.method import choose_samples, choose_view, decide, fig2_overview, fig3_concepts
 from gpca.experiments.plan import Run
@@ -15,7 +16,6 @@ from gpca.io.arrays import save_arrays
 from gpca.objects.canonical import DRAWN
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS, PERTURBATIONS, SEVERITIES, SEVERITIES_OF, Severities
-from gpca.recovery.policy import NOTHING, QUEUE, RecoveryPolicy, Thresholds
 from tests.figures import assert_words_are_large_enough_and_inside, words_of
 
 from .runs import SOLIDS

@@ -3,6 +3,7 @@
 import pandas as pd
 import pytest
 
+from gpca.causes.policy import NOTHING, QUEUE, TREATMENTS
 from gpca.errors import InputError
 from gpca.evaluation.intervals import wilson_interval
 from gpca.evaluation.measures import read_clustered
@@ -19,7 +20,6 @@ from gpca.experiments.recovery_measures import (
 )
 from gpca.io.csv_file import write_csv
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.recovery.policy import NOTHING, QUEUE, TREATMENTS
 
 COSTS = {"denoise": 0.02, "reinitialize": 0.01, "new_view": 0.03}
 CURVE = (0.02, 0.05, 0.3)

@@ -9,11 +9,11 @@ import pytest
 from gpca import Explainer
 from gpca.alignment.rigid import exp, inverse, transform
 from gpca.causes.descriptors import WIDTHS
+from gpca.causes.policy import NOTHING, QUEUE, RecoveryPolicy, Thresholds
 from gpca.classifier.settings import GPCSettings
 from gpca.explainers.pair_classifier import PairClassifier
 from gpca.model.diagnoser import REMEDIED
 from gpca.model.diagnosis import ADVICE
-from gpca.recovery.policy import NOTHING, QUEUE, RecoveryPolicy, Thresholds
 from gpca.uncertainty.settings import UncertaintySettings
 
 

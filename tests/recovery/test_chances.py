@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from gpca.causes.policy import NOTHING, QUEUE
 from gpca.errors import InputError
 from gpca.recovery.chances import Chances, ExpectedUtility, Trial, alarm_threshold, learn_gate
-from gpca.recovery.policy import NOTHING, QUEUE
 
 COSTS = {"denoise": 0.02, "new_view": 0.03}
 

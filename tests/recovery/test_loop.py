@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from gpca.attribution.scores import Attribution
+from gpca.causes.policy import NOTHING, QUEUE, RecoveryPolicy, Thresholds
 from gpca.causes.settings import OBSERVED, CauseSettings
 from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS
@@ -14,7 +15,6 @@ from gpca.recovery.actions import ACTIONS, action_of
 from gpca.recovery.episodes import Episode
 from gpca.recovery.loop import Loop, Reenactor, calibrated_alarm
 from gpca.recovery.policies import POLICIES, Means
-from gpca.recovery.policy import NOTHING, QUEUE, RecoveryPolicy, Thresholds
 from gpca.reenactment.settings import ReenactmentSettings
 from tests.failures import LOOP
 

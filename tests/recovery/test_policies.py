@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from gpca.causes.policy import NOTHING, QUEUE, RecoveryPolicy, Thresholds
 from gpca.errors import InputError
 from gpca.recovery.chances import Chances, ExpectedUtility, Trial
 from gpca.recovery.policies import (
@@ -18,7 +19,6 @@ from gpca.recovery.policies import (
     sequences,
     title_of_sequence,
 )
-from gpca.recovery.policy import NOTHING, QUEUE, RecoveryPolicy, Thresholds
 from gpca.seeds import generator
 
 ACTIONS = ("reinitialize", "new_view", "denoise")

@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 
 from gpca.attribution.scores import Attribution
+from gpca.causes.policy import DOUBTED, DRAWN
 from gpca.errors import InputError
 from gpca.experiments.recovery_measures import read_queues
 from gpca.io.csv_file import write_csv
@@ -12,7 +13,6 @@ from gpca.pairs.perturbation import CONCEPTS
 from gpca.recovery.answers import LoopExplainers
 from gpca.recovery.chances import FailureGate, Trial
 from gpca.recovery.policies import Means
-from gpca.recovery.policy import DOUBTED, DRAWN
 from gpca.recovery.rehearsal import BATCH, DRAWS, ChancesLearner, Rehearsal, error_by_labels, robot_policy, summary
 
 SECTION = {

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from gpca.causes.policy import RecoveryPolicy, Thresholds
 from gpca.model.file import Model
-from gpca.recovery.policy import RecoveryPolicy, Thresholds
 from tests.steps.by_words import main
 
 

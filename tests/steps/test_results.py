@@ -7,9 +7,9 @@ import pytest
 from baselines import analytical
 from gpca.attribution.predictions import read_predictions, write_timings
 from gpca.causes.dataset import LABELS
+from gpca.causes.policy import RecoveryPolicy, Thresholds
 from gpca.io.arrays import save_arrays
 from gpca.model.file import Model
-from gpca.recovery.policy import RecoveryPolicy, Thresholds
 
 from .by_words import main
 from .command_lines import POLICY, STEP_OPTIONS, arguments

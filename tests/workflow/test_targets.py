@@ -97,7 +97,7 @@ EDITS = {  # a module: what is made again where it has changed, and what is not
     "gpca/encoders/reduction.py": ("dgcnn/pca predictions/real_rgbd/dgcnn-pca", "encoders predictions/ycb model.pt"),
     "gpca/frames/synthesis.py": ("poses/ embeddings/real_rgbd model.pt", "scenes instances predictions/ycb causes/"),
     "gpca/frames/bop.py": ("scenes/ instances/ frame_causes/ recovery/", "predictions/ycb encoders/ycb causes/ycb"),
-    "gpca/recovery/policy.py": ("model.pt runtime.csv recovery/ table8_recovery", "predictions encoders diagnoses/"),
+    "gpca/causes/policy.py": ("model.pt runtime.csv recovery/ table8_recovery", "predictions encoders diagnoses/"),
     "gpca/experiments/concept_attribution.py": (
         "table1_extended table2_per_concept",
         "predictions metrics.csv figures/cause",

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from gpca.causes.policy import Decision
 from gpca.recovery.policies import Case, Decide, Means, PolicyEntry
-from gpca.recovery.policy import Decision
 
 
 def take_the_last_first(means: Means) -> Decide:

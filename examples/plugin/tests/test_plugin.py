@@ -5,11 +5,11 @@ import numpy as np
 from gpca.active_learning.acquisition import Pool, select
 from gpca.alignment.methods.interface import Pair
 from gpca.alignment.methods.registry import make_method
+from gpca.causes.policy import RecoveryPolicy
 from gpca.encoders.registry import make_encoder
 from gpca.explainers.registry import CAUSES, CONCEPTS, explainers
 from gpca.objects.source import resolve, surfaces
 from gpca.recovery.policies import Case, Means, policy_entry
-from gpca.recovery.policy import RecoveryPolicy
 from gpca.uncertainty.estimators.interface import RegisteredPair
 from gpca.uncertainty.estimators.registry import make_estimator
 

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
+from gpca.causes.policy import QUEUE, RecoveryPolicy, Thresholds, Treated, choose_uncertain
 from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.recovery.policy import QUEUE, RecoveryPolicy, Thresholds, Treated, choose_uncertain
 
 POLICY = RecoveryPolicy(Thresholds(uncertain=0.3, dominant=0.4, improvement=0.1, attempts=3))
 
