@@ -290,7 +290,7 @@ def _counts(table: TableBuilder, columns: Mapping[str, Column], conditions: Mapp
     """Return how many samples of how many seeds the accuracies are over, by initial poses where these differ."""
     conditions_of: dict[str, list[str]] = {}
     for source, words in conditions.items():
-        cells = {key: cell for (row, key), cell in table.cells.items() if table.rows[row][0][0] == source}
+        cells = {key: cell for (row, key), cell in table.cells.items() if table.labels[row][0][0] == source}
         counts = [
             f"{columns[key].title.removesuffix(' (%)')} {cells[key].test_samples} ({plural(cells[key].seeds, 'seed')})"
             for key in columns

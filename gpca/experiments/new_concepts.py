@@ -305,7 +305,7 @@ def _fewer(builder: TableBuilder) -> str:
     """Words on the datasets with fewer seeds of Geometry than of the rest, if there are any."""
     most = builder.most_seeds()
     fewer = {
-        builder.rows[row][0][1]: plural(cell.seeds, "seed")
+        builder.labels[row][0][1]: plural(cell.seeds, "seed")
         for (row, key), cell in builder.cells.items()
         if key == GEOMETRY and cell.seeds < most
     }

@@ -7,16 +7,13 @@ from dataclasses import dataclass, field
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
-from gpca.errors import InputError
-from gpca.reporting.tables.builder import FAMILIES, NEAR_LIMITS, over_clusters
-from gpca.reporting.tables.cells import cell_over_sources, interval_cell, share_within_limits
+from gpca.reporting.tables.builder import FAMILIES, Label, TableBuilder, over_clusters
+from gpca.reporting.tables.cells import cell_of_repeats, interval_cell, where
 from gpca.reporting.tables.table import Cell, Column, Table
 from gpca.reporting.words import span
 
 if TYPE_CHECKING:
     import pandas as pd
-
-Label = tuple[str, str]  # key for the CSV, title for the reader
 
 
 @dataclass(frozen=True)
@@ -57,8 +54,8 @@ def crossed(*axes: tuple[str, Mapping[str, str]]) -> list[Row]:
     ]
 
 
-class Sheet:
-    """A table that is being made.
+class Sheet(TableBuilder):
+    """A table that is being made; an InputError says that it has no row.
 
     Args:
         name, heads: name of the table, titles of its labels by key.
@@ -82,26 +79,28 @@ class Sheet:
         blank: Callable[[Row, str], bool] = lambda row, key: False,
         more: Callable[[Row, pd.DataFrame], Mapping[str, Cell]] = lambda row, subset: {},
     ) -> None:
-        self.name, self.heads, self.columns = name, heads, columns
-        self._by_seed, self._sources = dict(by_seed or {}), sources
+        super().__init__(name, heads)
+        self.columns = columns
         self.rows: list[Row] = []
-        self.cells: dict[tuple[int, str], Cell] = {}
         for row in rows:
             subset = where(intervals, row.where)
-            shows = {key: column for key, column in columns.items() if isinstance(column, Show) and not blank(row, key)}
-            cells = {key: self._cell(subset, row, column) for key, column in shows.items()}
-            cells |= more(row, subset) if len(subset) else {}
-            if shown := {key: cell for key, cell in cells.items() if cell is not None}:
-                self.cells |= {(len(self.rows), key): cell for key, cell in shown.items()}
+            cells: dict[str, Cell | None] = {}
+            for key, column in columns.items():
+                if not isinstance(column, Show) or blank(row, key):
+                    continue
+                if column.frame:
+                    cells[key] = _over_sources(row, column, by_seed or {}, sources)
+                elif len(chosen := where(subset, {"against": ""} | dict(column.where))):
+                    cells[key] = interval_cell(chosen.iloc[0], factor=column.factor)
+            self.add_row(row.labels, cells | dict(more(row, subset) if len(subset) else {}), row.rival)
+            if len(self.labels) > len(self.rows):
                 self.rows.append(row)
-        if not self.rows:
-            fault = "has nothing to show: its files hold no numbers of what the config names"
-            raise InputError(f"table '{name}'", fault, "run that first")
+        self.require_rows()
 
     @property
     def seeds(self) -> int:
         """Number of seeds of the cell that has the most."""
-        return max(cell.seeds for cell in self.cells.values())
+        return self.most_seeds()
 
     def samples(self, *keys: str, row: int = 0) -> str:
         """Numbers of test samples of some columns' cells in a row, such as ``15 to 200``."""
@@ -125,45 +124,20 @@ class Sheet:
 
         Within each row, the columns of `bold_across` compete. With `keep_empty`, columns without any number stay.
         """
-        groups: dict[tuple, list[tuple[int, str]]] = {}
-        for key in bold_across:
-            for number in range(len(self.rows)):
-                groups.setdefault((number,), []).append((number, key))
-        for key in bold:
-            for number, row in enumerate(self.rows):
-                if row.rival:
-                    groups.setdefault((*row.labels[:same], key), []).append((number, key))
+        self.compare_across(bold_across)
+        self.compare_down(bold, same)
         filled = {key for _, key in self.cells}
         columns = {key: column for key, column in self.columns.items() if keep_empty or key in filled}
-        cells = {key: share_within_limits(cell, columns[key[1]]) for key, cell in self.cells.items()}
-        widened = any(cell is not self.cells[key] and columns[key[1]].interval for key, cell in cells.items())
-        return Table(
-            name=self.name,
-            caption=caption,
-            row_heads=self.heads,
-            rows=tuple(tuple(row.labels) for row in self.rows),
-            column_head=across,
-            columns=columns,
-            cells=cells,
-            footnotes=(*notes, *((NEAR_LIMITS,) if widened else ())),
-            compared=tuple(groups.values()),
-        )
-
-    def _cell(self, subset: pd.DataFrame, row: Row, column: Show) -> Cell | None:
-        if column.frame:
-            counts = next(iter(self._by_seed.values()))
-            values, selected = self._by_seed[column.frame], (row.where["method"], column.where["metric"])
-            sources = [row.where["source"]] if "source" in row.where else self._sources
-            return cell_over_sources(counts, values, sources, *selected, column.where["concept"], column.factor)
-        rows = where(subset, {"against": ""} | dict(column.where))
-        return interval_cell(rows.iloc[0], factor=column.factor) if len(rows) else None
+        return self.build(caption, across, columns, notes)
 
 
-def where(frame: pd.DataFrame, entries: Mapping[str, str]) -> pd.DataFrame:
-    """Rows of a frame with these entries; a column that it lacks is empty."""
-    for column, value in entries.items():
-        if column in frame:
-            frame = frame[frame[column] == value]
-        elif value:
-            return frame[:0]
-    return frame
+def _over_sources(row: Row, column: Show, by_seed: Mapping[str, pd.DataFrame], sources: Sequence[str]) -> Cell | None:
+    """Return the mean over the seeds of what all pairs of a seed have, whatever their source."""
+    of_method = {"method": row.where["method"], "concept": column.where["concept"]}
+    counts = where(next(iter(by_seed.values())), of_method | {"metric": "test_samples"})
+    values = where(by_seed[column.frame], of_method | {"metric": column.where["metric"]})
+    both = values.merge(counts, on=["source", "seed"], suffixes=("", "_n"))
+    both = both[both["source"].isin([row.where["source"]] if "source" in row.where else list(sources))]
+    sums = (both["value"] * both["value_n"]).groupby(both["seed"]).sum()
+    counts_R = both.groupby("seed")["value_n"].sum()
+    return cell_of_repeats((column.factor * sums / counts_R).to_numpy(), int(counts_R.sum()))

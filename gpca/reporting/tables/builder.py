@@ -22,56 +22,39 @@ Label = tuple[str, str]  # key for the CSV, title for the reader
 
 
 class TableBuilder:
-    """Collects labeled rows of cells and makes a :class:`Table` of them.
-
-    Attributes:
-        name: The name of the table, which the error for an empty one mentions.
-        row_heads: The title of each row label, by key.
-        rows: The labels of the rows so far.
-        cells: The cells so far, by row number and column key.
-    """
+    """Collects labeled rows of cells; whatever needs a row raises an InputError where there is none."""
 
     def __init__(self, name: str, row_heads: Mapping[str, str]) -> None:
         self.name = name
         self.row_heads = row_heads
-        self.rows: list[tuple[Label, ...]] = []
-        self.cells: dict[tuple[int, str], Cell] = {}
-        self._rivals: set[int] = set()
+        self.labels: list[tuple[Label, ...]] = []  # of each row
+        self.cells: dict[tuple[int, str], Cell] = {}  # by row number and column key
+        self._rivals: list[int] = []
         self._compared: list[list[tuple[int, str]]] = []
 
     def add_row(self, labels: Sequence[Label], cells: Mapping[str, Cell | None], rival: bool = True) -> None:
-        """Add a row, unless it has no cell at all.
-
-        Args:
-            labels: The key and the title of one label per row head.
-            cells: The cell of each column key, or None where there is no number.
-            rival: Whether the row competes with others for bold, as an oracle does not.
-        """
-        known = {key: cell for key, cell in cells.items() if cell is not None}
-        if not known:
-            return
-        row = len(self.rows)
-        self.rows.append(tuple(labels))
-        self.cells |= {(row, key): cell for key, cell in known.items()}
-        if rival:
-            self._rivals.add(row)
+        """Add a row unless it has no cell; only rivals compete for bold, which an oracle is not."""
+        known = {(len(self.labels), key): cell for key, cell in cells.items() if cell is not None}
+        if known:
+            self._rivals += [len(self.labels)] if rival else []
+            self.labels.append(tuple(labels))
+            self.cells |= known
 
     def compare_across(self, columns: Iterable[str]) -> None:
         """Let these columns compete for bold within each row."""
         columns = list(columns)
-        self._compared += [[(row, key) for key in columns] for row in range(len(self.rows))]
+        self._compared += [[(row, key) for key in columns] for row in range(len(self.labels))]
 
     def compare_down(self, columns: Iterable[str], same: int = 0) -> None:
         """Let the rivals whose first `same` labels agree compete for bold within each of these columns."""
         groups: dict[tuple, list[tuple[int, str]]] = {}
-        for key in columns:
-            for row in sorted(self._rivals):
-                groups.setdefault((self.rows[row][:same], key), []).append((row, key))
+        for key, row in product(columns, self._rivals):
+            groups.setdefault((self.labels[row][:same], key), []).append((row, key))
         self._compared += groups.values()
 
     def require_rows(self) -> None:
         """Raise an InputError if no row was added."""
-        if not self.rows:
+        if not self.labels:
             fault = "has nothing to show: its files hold no numbers of what the config names"
             raise InputError(f"table '{self.name}'", fault, "run that first")
 
@@ -80,14 +63,11 @@ class TableBuilder:
         self.require_rows()
         return self.cells[0, column]
 
-    def first_labels(self) -> list[str]:
-        """Return the different keys of the rows' first labels, in the order of the rows."""
-        self.require_rows()
-        return list(dict.fromkeys(labels[0][0] for labels in self.rows))
-
     def stand_in_clause(self, sources: Mapping[str, Mapping], partly: bool = True) -> str:
         """Return the caption's clause on stand-ins among the sources that name the rows."""
-        return stand_in_clause((sources[name] for name in self.first_labels()), partly)
+        self.require_rows()
+        names = dict.fromkeys(labels[0][0] for labels in self.labels)
+        return stand_in_clause((sources[name] for name in names), partly)
 
     def most_seeds(self) -> int:
         """Return over how many seeds the cell with the most of them is a mean."""
@@ -103,16 +83,16 @@ class TableBuilder:
         """Return the table with its columns, which may depend on the cells that there are."""
         self.require_rows()
         cells = {key: share_within_limits(cell, columns[key[1]]) for key, cell in self.cells.items()}
-        is_shown = any(cell is not self.cells[key] and columns[key[1]].interval for key, cell in cells.items())
+        widened = any(cell is not self.cells[key] and columns[key[1]].interval for key, cell in cells.items())
         return Table(
             name=self.name,
             caption=caption,
             row_heads=self.row_heads,
-            rows=tuple(self.rows),
+            rows=tuple(self.labels),
             column_head=column_head,
             columns=columns,
             cells=cells,
-            footnotes=(*footnotes, *((NEAR_LIMITS,) if is_shown else ())),
+            footnotes=(*footnotes, *((NEAR_LIMITS,) if widened else ())),
             compared=tuple(self._compared),
         )
 
@@ -128,26 +108,22 @@ def titles_of(sources: Mapping[str, Mapping]) -> dict[str, str]:
     return {name: title_of(entry) for name, entry in sources.items()}
 
 
+# Starts of footnotes, without a full stop. Numbers of samples are of each seed.
 def mean_over(seeds: int | str, samples: int | str) -> str:
-    """Return the start of the footnote that most tables begin with; it ends with what ± means, without a full stop."""
+    """Return how most tables begin theirs."""
     return f"Mean over {plural(seeds, 'seed')}, {samples} test samples each; {interval_over(seeds)}"
 
 
 def interval_over(seeds: int | str) -> str:
-    """Return what ± means in a table of means over these seeds, such as ``5`` or ``1 to 3``, without a full stop."""
-    fewest, most = (int(number) for number in (str(seeds).split()[0], str(seeds).split()[-1]))
+    """Return what ± means in a table of means over these seeds, such as ``5`` or ``1 to 3``."""
+    fewest, most = (int(str(seeds).split()[place]) for place in (0, -1))
     if most < LEAST_SEEDS:
         return f"with fewer than {LEAST_SEEDS} there is no interval and no bold"
     return INTERVAL if fewest >= LEAST_SEEDS else f"{INTERVAL} (none for fewer than {LEAST_SEEDS})"
 
 
 def over_clusters(seeds: int | str, samples: int | str = "", clusters: str = FAMILIES) -> str:
-    """Footnote on values with intervals over clusters and seeds, without a full stop.
-
-    Args:
-        seeds, samples: their numbers, the latter of each seed; empty where another note gives it.
-        clusters: the plural of what they are.
-    """
+    """Return that on values with intervals over seeds and clusters, which are named in the plural."""
     each = f", {samples} test samples each" if samples else ""
     return (
         f"Over {plural(seeds, 'seed')}{each}; in brackets: the 95 % interval of a bootstrap over {clusters} and seeds "
@@ -156,7 +132,7 @@ def over_clusters(seeds: int | str, samples: int | str = "", clusters: str = FAM
 
 
 def cautious_over(seeds: int | str, samples: int | str) -> str:
-    """Footnote on means over seeds whose single answers are not kept (:func:`cautious_cell`), without a full stop."""
+    """Return that on means over seeds whose single answers are not kept (:func:`cautious_cell`)."""
     over = f"Mean over {plural(seeds, 'seed')}, {samples} test samples each"
     of_accuracies = "In brackets, of accuracies, of which no single answers are kept:"
     wilson = "Wilson's interval, for which a family of objects counts once in each seed (docs/comparison.md)"
@@ -168,7 +144,5 @@ def cautious_over(seeds: int | str, samples: int | str) -> str:
 
 def missing_packages(left_out: Mapping[str, str]) -> list[str]:
     """Return the footnote on methods whose package is not installed, if there are any."""
-    if not left_out:
-        return []
     needs = ", ".join(f"{title} needs the package {package}" for title, package in left_out.items())
-    return [f"Left out, as the package is not installed: {needs}."]
+    return [f"Left out, as the package is not installed: {needs}."] if needs else []

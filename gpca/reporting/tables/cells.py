@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from math import isfinite, isnan, nan
 from typing import TYPE_CHECKING
@@ -14,27 +14,31 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+def where(frame: pd.DataFrame, entries: Mapping[str, object]) -> pd.DataFrame:
+    """Return the rows of a frame with these entries; a column that it lacks is empty."""
+    for column, value in entries.items():
+        if column in frame:
+            frame = frame[frame[column] == value]
+        elif value:
+            return frame[:0]
+    return frame
+
+
 def rows_where(frame: pd.DataFrame, **wanted: object) -> pd.DataFrame:
-    """Return the rows whose columns hold these values, e.g. ``rows_where(metrics, source="ycb", concept="all")``."""
-    chosen = None
-    for column, value in wanted.items():
-        holds = frame[column] == value
-        chosen = holds if chosen is None else chosen & holds
-    return frame if chosen is None else frame[chosen]
+    """Return the rows with these entries, e.g. ``rows_where(metrics, source="ycb", concept="all")``."""
+    return where(frame, wanted)
 
 
 def cell_of_repeats(
     values_R: Collection[float], test_samples: int, at_least: bool = False, clusters: int = 0
 ) -> Cell | None:
-    """Return the mean over R repeats with the half-width of its t-interval, or None without any repeat.
-
-    Fewer than `LEAST_SEEDS` repeats have no interval.
+    """Return the mean over R seeds with the half-width of its t-interval; None for no seed, no interval for few.
 
     Args:
-        values_R: One value per seed, in the column's unit.
-        test_samples: The number of test samples of all seeds together.
-        at_least: Whether some repeat was stopped before it was done, which makes the mean a lower bound.
-        clusters: In how many clusters the samples are, those of each seed counted; 0 where that is not known.
+        values_R: in the column's unit.
+        test_samples: of all seeds together.
+        at_least: some repeat was stopped before it was done, which makes the mean a lower bound.
+        clusters: number of clusters that the samples are in, those of each seed counted; 0 where unknown.
     """
     if len(values_R) == 0:
         return None
@@ -52,7 +56,7 @@ def share_within_limits(cell: Cell, column: Column) -> Cell:
     is_share = column.of_samples and column.limits == SHARE and not column.beside
     if not is_share or cell.bounds or cell.at_least or isnan(cell.half_width):
         return cell
-    (least, most), low, high = column.limits, cell.mean - cell.half_width, cell.mean + cell.half_width
+    (least, most), low, high = SHARE, cell.mean - cell.half_width, cell.mean + cell.half_width
     if cell.half_width >= 0.5 * 10.0**-column.decimals and least <= low and high <= most:
         return cell
     if not (trials := cell.clusters or cell.test_samples // cell.seeds) or not least <= cell.mean <= most:
@@ -65,10 +69,6 @@ def cautious_cell(values_R: Collection[float], test_samples: int, clusters: int)
 
     Its bounds are the farther ones of the t-interval over the seeds, where there are enough of them, and of Wilson's,
     in which a cluster counts once in each seed.
-
-    Args:
-        values_R, test_samples: as for :func:`cell_of_repeats`.
-        clusters: in how many clusters the samples are, those of each seed counted.
     """
     cell = cell_of_repeats(values_R, test_samples, clusters=clusters)
     if cell is None or not clusters:
@@ -84,28 +84,9 @@ def _farther_bounds(cell: Cell, trials: int) -> tuple[float, float]:
     return max(least, min(cell.mean - half_width, low)), min(most, max(cell.mean + half_width, high))
 
 
-def cell_over_sources(
-    metrics: pd.DataFrame,
-    values: pd.DataFrame,
-    sources: Iterable[str],
-    method: str,
-    metric: str,
-    concept: str,
-    factor: float,
-) -> Cell | None:
-    """Return the mean over the seeds of what all pairs of a seed have, whatever their source."""
-    counts = rows_where(metrics, method=method, metric="test_samples", concept=concept)
-    of_metric = rows_where(values, method=method, metric=metric, concept=concept)
-    both = of_metric.merge(counts, on=["source", "seed"], suffixes=("", "_n"))
-    both = both[both["source"].isin(list(sources))]
-    sums = (both["value"] * both["value_n"]).groupby(both["seed"]).sum()
-    counts_R = both.groupby("seed")["value_n"].sum()
-    return cell_of_repeats((factor * sums / counts_R).to_numpy(), int(counts_R.sum()))
-
-
 def clustered_cell(intervals: pd.DataFrame, factor: float = 100, **wanted: object) -> Cell | None:
     """Return the cell of the one row of intervals (:mod:`gpca.evaluation.measures`) with these entries, if any."""
-    rows = rows_where(intervals, **wanted)
+    rows = where(intervals, wanted)
     return interval_cell(rows.iloc[0], factor=factor) if len(rows) else None
 
 

@@ -6,29 +6,30 @@ import csv
 import json
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 from gpca.io.files import whole_file
 
-EMPTY = "–"  # A dash stands where there is no number.
+EMPTY = "–"  # where there is no number
 LEAST_SEEDS = 3  # A mean over fewer has no interval: that of two spans everything, however near they lie.
 SHARE = (0.0, 100.0)  # limits of a share in percent
-_COLUMN_CHARACTERS = 50  # This many fill one column of a two-column paper.
-_TEXT_CHARACTERS = 100  # This many fill both columns.
+_COLUMN_CHARACTERS, _TEXT_CHARACTERS = 50, 100  # fill one column of a two-column paper, and both
 _SCALED_DOWN = r"\resizebox{\ifdim\width>\textwidth\textwidth\else\width\fi}{!}{%"
 
 
 @dataclass(frozen=True)
 class Cell:
-    """Holds a mean over `seeds` repeats, the half-width of its 95 % t-interval, all test samples.
+    """A mean over `seeds` repeats with the half-width of its 95 % t-interval, and the test samples of all.
 
-    The half-width is NaN where there is no interval, as over fewer than `LEAST_SEEDS`. A mean that is `at_least` so
-    large has none either, since some repeats were stopped before they were done. Another interval than that over the
-    seeds (a bootstrap's, Wilson's) has `bounds`, and is printed by these. `clusters` are the combinations of a seed
-    and a cluster that the samples are of; 0 where their number is not known.
+    Attributes:
+        half_width: NaN where there is no interval, as over fewer than `LEAST_SEEDS`.
+        at_least: the mean is a lower bound without interval, as some repeats were stopped before they were done.
+        bounds: of another interval than that over the seeds (a bootstrap's, Wilson's), which is printed instead.
+        clusters: combinations of a seed and a cluster that the samples are of; 0 where their number is not known.
     """
 
     mean: float
@@ -42,13 +43,13 @@ class Cell:
 
 @dataclass(frozen=True)
 class Column:
-    """Says how one quantity is shown: its title, the digits after the point, with an interval or without.
+    """How one quantity is shown: its title, the digits after the point, with an interval or without.
 
-    `limits` are the least and the largest possible value; the bounds in the CSV are clipped to them. Of some
-    quantities, as the labels that were needed, the least is best. A column `beside` another has none of its own: its
-    cells stand with their sign in brackets behind the other's; the CSV holds both. Of a quantity with a `heavy_tail`,
-    an interval wider than the mean is not printed, as it would reach below zero. `of_samples` is False for percentages
-    that are no shares of samples, such as mean confidences.
+    Attributes:
+        limits: least and largest possible value; the bounds in the CSV are clipped to them.
+        beside: another column, behind whose cells these stand with their sign in brackets; the CSV holds both.
+        heavy_tail: an interval wider than the mean is not printed, as it would reach below zero.
+        of_samples: False for percentages that are no shares of samples, such as mean confidences.
     """
 
     title: str
@@ -75,18 +76,14 @@ class Column:
 
 @dataclass(frozen=True)
 class Table:
-    """Holds rows by columns of cells; every name has a key for the CSV and a title for the reader.
+    """Rows by columns of cells; every name has a key for the CSV and a title for the reader.
 
     Attributes:
-        name: The file name without suffix, e.g. ``table1_single_baselines``.
-        caption: The line that says what the numbers are, their unit, and on which objects.
-        row_heads: The title of each row label by key, e.g. ``{"source": "Dataset"}``.
-        rows: The labels of each row, a key and a title for each row head.
-        column_head: The key of what the columns are, e.g. ``explainer``.
-        columns: The :class:`Column` of each key, in order.
-        cells: The cells by row number and column key; a missing one is drawn as a dash.
-        footnotes: The sentences that a reader needs to judge the numbers.
-        compared: Groups of such keys; the best printed mean of each group is set in bold.
+        row_heads: title of each row label by key, e.g. ``{"source": "Dataset"}``.
+        rows: labels of each row, a key and a title for each row head.
+        column_head: key of what the columns are, e.g. ``explainer``.
+        cells: by row number and column key; a missing one is shown as a dash.
+        compared: groups of such keys; the best printed mean of each group is set in bold.
     """
 
     name: str
@@ -100,10 +97,9 @@ class Table:
     compared: tuple[Sequence[tuple[int, str]], ...] = ()
 
     def best(self) -> set[tuple[int, str]]:
-        """Return the keys of the cells with the best printed mean of their group.
+        """Return the keys of the cells with the best printed mean of their group, which takes seeds for an interval.
 
-        None are of a group of one, nor where all share the best, or more than half of a large group: that tells nothing
-        apart. A mean over fewer seeds than an interval takes is never the best.
+        None are of a group of one, nor where all share the best, or more than half of a large group.
         """
         best: set[tuple[int, str]] = set()
         for group in self.compared:
@@ -131,13 +127,21 @@ class Table:
 
     def printed(self) -> dict[str, Any]:
         """Return the words that a reader sees; each cell is its text, and whether it is bold."""
+        own = {name: column for name, column in self.columns.items() if not column.beside}
         best, rows = self.best(), []
         for row, labels in enumerate(self.rows):
-            numbers = [(self._text(row, name), (row, name) in best) for name in self._own_columns()]
-            rows.append([*((title, False) for _, title in labels), *numbers])
+            shown = [(title, False) for _, title in labels]
+            for name, column in own.items():
+                texts = []
+                if (row, name) in self.cells:
+                    beside = [(key, each) for key, each in self.columns.items() if each.beside == name]
+                    texts = [f"({each.text(self.cells[row, key])})" for key, each in beside if (row, key) in self.cells]
+                    texts.insert(0, column.text(self.cells[row, name]))
+                shown.append((" ".join(texts) or EMPTY, (row, name) in best))
+            rows.append(shown)
         return {
             "caption": self.caption,
-            "heads": [*self.row_heads.values(), *(column.title for column in self._own_columns().values())],
+            "heads": [*self.row_heads.values(), *(column.title for column in own.values())],
             "label_columns": len(self.row_heads),
             "rows": rows,
             "footnotes": list(self.footnotes),
@@ -147,27 +151,24 @@ class Table:
         """Return the CSV's rows, head first: one row per cell, in its column's unit, `n_test` over all seeds."""
         heads = (*self.row_heads, self.column_head, "mean", "ci_low", "ci_high", "n_seeds", "n_test", "at_least")
         records: list[tuple] = [heads]
-        for row, labels in enumerate(self.rows):
-            for name, column in self.columns.items():
-                cell = self.cells.get((row, name))
-                if cell is None:
-                    continue
-                least, most = column.limits
-                low, high = (
-                    "" if cell.at_least or math.isnan(cell.half_width) else round(min(max(bound, least), most), 6)
-                    for bound in cell.bounds or (cell.mean - cell.half_width, cell.mean + cell.half_width)
-                )
-                keys = (key for key, _ in labels)
-                counts = (cell.seeds, cell.test_samples, cell.at_least)
-                records.append((*keys, name, round(cell.mean, 6), low, high, *counts))
+        for (row, labels), (name, column) in product(enumerate(self.rows), self.columns.items()):
+            if (cell := self.cells.get((row, name))) is None:
+                continue
+            least, most = column.limits
+            low, high = (
+                "" if cell.at_least or math.isnan(cell.half_width) else round(min(max(bound, least), most), 6)
+                for bound in cell.bounds or (cell.mean - cell.half_width, cell.mean + cell.half_width)
+            )
+            counts = (cell.seeds, cell.test_samples, cell.at_least)
+            records.append((*(key for key, _ in labels), name, round(cell.mean, 6), low, high, *counts))
         return records
 
     def markdown(self) -> str:
         """Return a GitHub table, caption above, footnotes below."""
-        rule = [":--"] * len(self.row_heads) + ["--:"] * len(self._own_columns())
-        body = self._body(lambda text: text.replace("|", "\\|"), lambda text: f"**{text}**")
-        lines = [" | ".join(row) for row in (self.printed()["heads"], rule, *body)]
-        table = "\n".join(f"| {line} |" for line in lines)
+        printed = self.printed()
+        rule = [":--" if number < len(self.row_heads) else "--:" for number in range(len(printed["heads"]))]
+        body = _body(printed, lambda text: text.replace("|", "\\|"), "**{}**")
+        table = "\n".join(f"| {' | '.join(row)} |" for row in (printed["heads"], rule, *body))
         return "\n\n".join([f"**{self.caption}**", table, *self.footnotes]) + "\n"
 
     def latex(self) -> str:
@@ -175,19 +176,14 @@ class Table:
 
         A table that may be wider than the text is scaled down to it, which needs ``graphicx`` too.
         """
-        plain = [self.printed()["heads"], *self._body(str, str)]
-        characters = sum(2 + max(map(len, column)) for column in zip(*plain, strict=True))
+        printed = self.printed()
+        columns = zip(printed["heads"], *_body(printed, str, "{}"), strict=True)
+        characters = sum(2 + max(map(len, column)) for column in columns)
         float_name = "table" if characters <= _COLUMN_CHARACTERS else "table*"
-        alignments = "l" * len(self.row_heads) + "c" * len(self._own_columns())
-        begin = rf"\begin{{tabular}}{{{alignments}}}"
-        end = r"\end{tabular}"
-        packages = "booktabs"
+        alignments = "l" * len(self.row_heads) + "c" * (len(printed["heads"]) - len(self.row_heads))
+        begin, end, packages = rf"\begin{{tabular}}{{{alignments}}}", r"\end{tabular}", "booktabs"
         if characters > _TEXT_CHARACTERS:
-            begin = f"{_SCALED_DOWN}\n{begin}"
-            end += "}"
-            packages = "booktabs, graphicx"
-        heads = [r"\textbf{" + _tex(title) + "}" for title in plain[0]]
-        body = self._body(_tex, lambda text: r"\textbf{" + text + "}")
+            begin, end, packages = f"{_SCALED_DOWN}\n{begin}", end + "}", "booktabs, graphicx"
         return "\n".join(
             [
                 rf"% needs \usepackage{{{packages}}}",
@@ -198,9 +194,9 @@ class Table:
                 r"\small",
                 begin,
                 r"\toprule",
-                " & ".join(heads) + r" \\",
+                " & ".join(r"\textbf{" + _tex(title) + "}" for title in printed["heads"]) + r" \\",
                 r"\midrule",
-                *(" & ".join(row) + r" \\" for row in body),
+                *(" & ".join(row) + r" \\" for row in _body(printed, _tex, r"\textbf{{{}}}")),
                 r"\bottomrule",
                 end,
                 *(rf"\par\smallskip{{\footnotesize {_tex(footnote)}}}" for footnote in self.footnotes),
@@ -209,19 +205,10 @@ class Table:
             ]
         )
 
-    def _own_columns(self) -> dict[str, Column]:
-        return {name: column for name, column in self.columns.items() if not column.beside}
 
-    def _text(self, row: int, name: str) -> str:
-        cell = self.cells.get((row, name))
-        if cell is None:
-            return EMPTY
-        beside = [(key, column) for key, column in self.columns.items() if column.beside == name]
-        texts = [column.text(self.cells[row, key]) for key, column in beside if (row, key) in self.cells]
-        return " ".join([self.columns[name].text(cell), *(f"({text})" for text in texts)])
-
-    def _body(self, escape, bold) -> list[list[str]]:
-        return [[bold(escape(text)) if b else escape(text) for text, b in row] for row in self.printed()["rows"]]
+def _body(printed: Mapping[str, Any], escape: Callable[[str], str], bold: str) -> list[list[str]]:
+    """Return the rows of a table as printed, in a markup."""
+    return [[bold.format(escape(text)) if b else escape(text) for text, b in row] for row in printed["rows"]]
 
 
 _TEX = {
