@@ -6,9 +6,11 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
+from functools import reduce
 from itertools import product
+from operator import getitem
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Any
 
 from gpca.io.structured_text import load_own_yaml
 from gpca.process.registry import load
@@ -73,7 +75,7 @@ class Result:
 
     @property
     def readers(self) -> dict[str, dict]:
-        """How each argument is read, in plain words for the rules: the function, and its keywords' names of files."""
+        """How each argument is read, as data for the rules: the function, and its keywords' names of files."""
         return {
             source.argument: {
                 "function": source.read,
@@ -83,7 +85,7 @@ class Result:
         }
 
     def file(self, suffix: str) -> str:
-        """Return the path of its file below the folder of a run, e.g. ``tables/table2_per_concept.md``."""
+        """Return a path below the folder of a run, e.g. ``tables/table2_per_concept.md``."""
         return f"{self.kind}/{self.name}.{suffix}"
 
     @property
@@ -111,10 +113,10 @@ class Result:
         return all(shown[name] for name in (*self.needs, *_braced(patterns)))
 
     def arguments(self, settings: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the builder's arguments that come from the settings of a run, e.g. ``source_titles.ycb`` of them.
+        """Return the builder's arguments from the settings of a run, e.g. ``source_titles.ycb`` of them.
 
-        Where the result shows members of a list alone, so do the settings of all of them: ``explainers`` of its
-        explainers. What others have then changes nothing of it.
+        Where the result shows members of a list alone, it is given the settings of these alone: ``explainers`` of its
+        explainers, so that those of others change nothing of it.
         """
         if self.takes_run:
             return dict(self.settings)
@@ -122,7 +124,7 @@ class Result:
         for name, members in self.only.items():
             if isinstance(of_all := settings.get(f"{name}s"), Mapping):
                 shown[f"{name}s"] = {key: value for key, value in of_all.items() if key in members}
-        return {argument: _value_at(shown, place) for argument, place in self.settings.items()}
+        return {argument: reduce(getitem, place.split("."), shown) for argument, place in self.settings.items()}
 
     def of_source(self, source: str) -> Result:
         """Return the result of one source, where the name has ``{source}`` in it."""
@@ -141,17 +143,6 @@ class Result:
     def _shown(self, names: Names) -> dict[str, Any]:
         kept = {key: [name for name in names[key] if name in members] for key, members in self.only.items()}
         return {**names, **kept}
-
-
-class HasSection(Protocol):
-    """Anything that stands in a section of the paper."""
-
-    @property
-    def section(self) -> str:
-        """Its name."""
-
-
-InSection = TypeVar("InSection", bound=HasSection)
 
 
 def read_results(path: Path) -> list[tuple[str, list[Result]]]:
@@ -179,9 +170,9 @@ def unknown_target(target: str, known: Iterable[str]) -> str:
     return f"gpca: target '{target}': there is no such table, figure or stage; {remedy}"
 
 
-def by_section(results: Iterable[InSection]) -> dict[str, list[InSection]]:
+def by_section(results: Iterable[Any]) -> dict[str, list[Any]]:
     """Return section -> its results, both in the order given."""
-    sections: dict[str, list[InSection]] = {}
+    sections: dict[str, list[Any]] = {}
     for result in results:
         sections.setdefault(result.section, []).append(result)
     return sections
@@ -210,24 +201,16 @@ def build(
     arguments: Mapping[str, Any],
     run: Any = None,
 ) -> Any:
-    """Read the inputs and call the builder.
+    """Read the inputs (:attr:`Result.readers`, :meth:`Result.files`) and call the builder, with the run if it takes it.
 
-    Args:
-        builder: ``module:function``.
-        readers: as :attr:`Result.readers` has them.
-        files: of each input, as :meth:`Result.files` names them.
-        arguments: the builder's other arguments.
-        run: its first argument, if it takes the run.
+    Its arguments are the run, what is read of the inputs, and the other arguments.
     """
-    inputs = {argument: _read(files, **reader) for argument, reader in readers.items()}
+    inputs = {}
+    for argument, reader in readers.items():
+        given = {keyword: files[name] for keyword, name in reader["keywords"].items()}
+        read = load(reader["function"]) if reader["function"] else lambda path: path
+        inputs[argument] = read(given[""]) if "" in given else read(**given)
     return load(builder)(*([] if run is None else [run]), **inputs, **arguments)
-
-
-def _read(files: Mapping[str, Any], function: str, keywords: Mapping[str, str]) -> Any:
-    by_keyword = {keyword: files[name] for keyword, name in keywords.items()}
-    if not function:
-        return by_keyword[""]
-    return load(function)(by_keyword[""]) if "" in by_keyword else load(function)(**by_keyword)
 
 
 def _result(section: str, entry: Mapping) -> Result:
@@ -259,9 +242,3 @@ def _input(argument: str, source: str | Mapping) -> Input:
 
 def _braced(patterns: Iterable[str]) -> list[str]:
     return list(dict.fromkeys(name for pattern in patterns for name in re.findall(r"{(\w+)}", pattern)))
-
-
-def _value_at(settings: Mapping[str, Any], place: str) -> Any:
-    for key in place.split("."):
-        settings = settings[key]
-    return settings

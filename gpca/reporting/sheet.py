@@ -133,9 +133,9 @@ class Sheet(TableBuilder):
 
 def _over_sources(row: Row, column: Show, by_seed: Mapping[str, pd.DataFrame], sources: Sequence[str]) -> Cell | None:
     """Return the mean over the seeds of what all pairs of a seed have, whatever their source."""
-    of_method = {"method": row.where["method"], "concept": column.where["concept"]}
-    counts = where(next(iter(by_seed.values())), of_method | {"metric": "test_samples"})
-    values = where(by_seed[column.frame], of_method | {"metric": column.where["metric"]})
+    shared = {"method": row.where["method"], "concept": column.where["concept"]}
+    counts = where(next(iter(by_seed.values())), shared | {"metric": "test_samples"})
+    values = where(by_seed[column.frame], shared | {"metric": column.where["metric"]})
     both = values.merge(counts, on=["source", "seed"], suffixes=("", "_n"))
     both = both[both["source"].isin([row.where["source"]] if "source" in row.where else list(sources))]
     sums = (both["value"] * both["value_n"]).groupby(both["seed"]).sum()

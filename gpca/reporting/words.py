@@ -20,13 +20,7 @@ BOP_NAMES = {  # what datasets of the BOP benchmark call their objects, from num
     "icbin": ("coffee cup", "juice carton"),
     "visp": ("toy cube", "dragon"),
 }
-BOP_TITLES = {
-    "lm": "LINEMOD",
-    "lmo": "LINEMOD-Occlusion",
-    "ycbv": "YCB-Video",
-    "icbin": "IC-BIN",
-    "visp": "ViSP",
-}
+BOP_TITLES = {"lm": "LINEMOD", "lmo": "LINEMOD-Occlusion", "ycbv": "YCB-Video", "icbin": "IC-BIN", "visp": "ViSP"}
 
 
 def plural(count: int | str, noun: str) -> str:

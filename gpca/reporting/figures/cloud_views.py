@@ -9,20 +9,16 @@ import numpy as np
 from gpca.reporting.figures.panels import legend_below, panels
 from gpca.reporting.figures.style import SOURCE_COLOR, TARGET_COLOR, TEXT_WIDTH_IN, save_png, write_title
 
-_ELEVATION_RAD = np.radians(22.0)
-_POINTS_OF_QUERY = 1500  # At most this many points of each cloud are drawn, as more hide one another.
-_PALEST = 0.65  # The color of the farthest point holds this share of white.
+_POINTS_OF_QUERY = 1500  # of each cloud at most, as more hide one another
+_PALEST = 0.65  # share of white in the color of the farthest point
 
 
 def draw_clouds(axes, target_Q_3: np.ndarray, source_P_3: np.ndarray, size: float = 1.6, corners=None) -> None:
-    """Scatter both clouds together from back to front, without axes.
+    """Scatter both clouds together from back to front, in the frame of the view: right, up, towards the viewer.
 
     Args:
-        axes: The panel to draw on.
-        target_Q_3, source_P_3: The clouds in the frame of the view, whose axes are right, up and towards the viewer.
-        size: The area of a point in points².
-        corners: The lowest and the highest coordinates (2, 3), which panels of one scale share. They are those of the
-            two clouds by default.
+        size: area of a point in points².
+        corners: lowest and highest coordinates (2, 3), which panels of one scale share; by default of the two clouds.
     """
     from matplotlib.colors import to_rgb
 
@@ -54,7 +50,7 @@ def legend_of_clouds(figure, target: str, source: str, gap: float) -> None:
     figure.legend(handles=handles, loc="upper right", ncols=2, borderaxespad=gap, handletextpad=0.1, columnspacing=1)
 
 
-def view_from(azimuth_rad: float, elevation_rad: float = _ELEVATION_RAD) -> np.ndarray:
+def view_from(azimuth_rad: float, elevation_rad: float = np.radians(22.0)) -> np.ndarray:
     """Return the rotation (3, 3) to right, up and towards-the-viewer axes of a view from slightly above, z up."""
     sine, cosine = np.sin(azimuth_rad), np.cos(azimuth_rad)
     towards = np.array([cosine * np.cos(elevation_rad), sine * np.cos(elevation_rad), np.sin(elevation_rad)])
@@ -62,14 +58,10 @@ def view_from(azimuth_rad: float, elevation_rad: float = _ELEVATION_RAD) -> np.n
     return np.array([right, np.cross(towards, right), towards])
 
 
-def views_around(count: int = 24) -> list[np.ndarray]:
-    """Return the views from a number of directions around the object."""
-    return [view_from(azimuth) for azimuth in np.linspace(0, 2 * np.pi, count, endpoint=False)]
-
-
 def widest_views(cloud_P_3: np.ndarray, count: int = 8) -> list[np.ndarray]:
-    """Return those of the views around a cloud that show it widest: a mug with its handle at the side."""
-    return sorted(views_around(), key=lambda view: -np.std(cloud_P_3 @ view[0]))[:count]
+    """Return those of 24 views around a cloud that show it widest: a mug with its handle at the side."""
+    views = [view_from(azimuth) for azimuth in np.linspace(0, 2 * np.pi, 24, endpoint=False)]
+    return sorted(views, key=lambda view: -np.std(cloud_P_3 @ view[0]))[:count]
 
 
 def draw_query(cloud_P_3: np.ndarray, target_Q_3: np.ndarray, title: str, png_path: str | Path) -> None:

@@ -37,26 +37,21 @@ LEAST_TILT = 0.12  # Discs seen edge on are kept this wide.
 
 
 def render_cloud(points: np.ndarray, normals: np.ndarray, view: tuple[float, float], pixels: int) -> np.ndarray:
-    """Draw an oriented point cloud as an opaque, shaded solid in orthographic projection, filling the picture.
+    """Draw points (P, 3) with outward unit normals as an opaque, shaded solid in orthographic projection.
 
-    Every point is drawn as a disc (:func:`splat`), and the shading is done once per
-    pixel: Lambert with a soft terminator, darkened where the depth buffer dips behind its surroundings (Luft et al.,
-    "Image enhancement by unsharp masking the depth buffer", SIGGRAPH 2006).
+    Every point is a disc (:func:`splat`); normals that face away are turned towards the eye, as the back of a wall. The
+    shading is done once per pixel: Lambert with a soft terminator, darkened where the depth buffer dips behind its
+    surroundings (Luft et al., "Image enhancement by unsharp masking the depth buffer", SIGGRAPH 2006).
 
     Args:
-        points: The points (P, 3), in any unit of length.
-        normals: Their outward unit normals (P, 3). Those that face away are turned towards the eye, and count as the
-            back of a wall.
-        view: The azimuth and the elevation of the eye in radians, z up.
-        pixels: The width and the height of the picture.
+        view: azimuth and elevation of the eye in radians, z up.
 
     Returns:
-        The picture (pixels, pixels, 3) as float64 in [0, 1], row 0 on top, white where nothing is.
+        The picture (pixels, pixels, 3) in [0, 1], which the solid fills, row 0 on top, white where nothing is.
     """
     size = pixels * SUPERSAMPLING
     axes = view_from(*view)
-    positions = points @ axes.T
-    facing = normals @ axes.T
+    positions, facing = points @ axes.T, normals @ axes.T
     low, high = positions.min(axis=0), positions.max(axis=0)
     scale = FILL * size / (float((high - low)[:2].max()) or 1.0)
     positions = (positions - (low + high) / 2) * scale
@@ -87,7 +82,9 @@ def _shade(depth: np.ndarray, normal: np.ndarray, relief: float, radius: float) 
     solid = gaussian_filter(covered.astype(float), 0.5 * radius) > OUTLINE
     nearest = tuple(distance_transform_edt(~covered, return_distances=False, return_indices=True))
     depth = depth[nearest]  # Pinholes inside the outline take the pixel beside them.
-    lambert = _unit(normal[nearest]) @ (LIGHT / np.linalg.norm(LIGHT))
+    normal = normal[nearest]
+    normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-12)
+    lambert = normal @ (LIGHT / np.linalg.norm(LIGHT))
     soft = (0.5 + 0.5 * lambert) ** 1.6
     # Only solid pixels take part in the mean depth: the background is nowhere, not far away.
     heights = np.where(solid, depth, 0.0)
@@ -97,27 +94,19 @@ def _shade(depth: np.ndarray, normal: np.ndarray, relief: float, radius: float) 
     return np.where(solid[..., None], np.clip(BASE_COLOR * 1.15 * brightness[..., None], 0, 1), 1.0)
 
 
-def _unit(vectors: np.ndarray) -> np.ndarray:
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12)
-
-
 def draw_contact_sheet(objects_npz: str | Path, title: str, dataset: str = "") -> Figure:
-    """Draw all objects of one source in a grid, each filling its tile, with its name and diameter below.
-
-    Args:
-        objects_npz: The clouds as `gpca objects` writes them.
-        title: The line on top, which says so when the objects are stand-ins.
-
-    Raises:
-        InputError: the npz is missing, unreadable or not of that format.
-    """
+    """Draw all objects of one source (as `gpca objects` writes them) in tiles, with name and diameter below."""
     objects = ObjectClouds.load(objects_npz)
     count = len(objects)
-    columns = _columns(count)
+    # The fewest tiles are empty, of √n to 1.7 √n columns (4 at least), the most columns of equals.
+    widest = max(4, math.floor(1.7 * math.sqrt(count)))
+    choices = range(widest, max(4, math.ceil(math.sqrt(count))) - 1, -1)
+    columns = min(choices, key=lambda columns: -count % columns)
     rows = math.ceil(count / columns)
     tile_in = TEXT_WIDTH_IN / columns
     size_pt = min(7.0, max(4.5, 7.0 * tile_in))
-    captions = [_caption(object_in_words(name, dataset), tile_in * 72, size_pt) for name in objects.names]
+    letters = max(4, int(0.96 * tile_in * 72 / (0.5 * size_pt)))  # in a line; half as wide as high
+    captions = ["\n".join(textwrap.wrap(object_in_words(name, dataset), letters)) for name in objects.names]
     caption_in = size_pt * 1.2 / 72 * (max(caption.count("\n") for caption in captions) + 2) + 0.08
     figure = use_style().figure(figsize=(TEXT_WIDTH_IN, 0.36 + rows * (tile_in + caption_in)), layout="constrained")
     figure.get_layout_engine().set(w_pad=0, h_pad=0.02, wspace=0, hspace=0)
@@ -133,26 +122,10 @@ def draw_contact_sheet(objects_npz: str | Path, title: str, dataset: str = "") -
     return figure
 
 
-def _columns(count: int) -> int:
-    """Return the number of columns that leaves the fewest tiles empty, of √n to 1.7 √n (4 at least), wider first."""
-    widest = max(4, math.floor(1.7 * math.sqrt(count)))
-    return min(range(widest, max(4, math.ceil(math.sqrt(count))) - 1, -1), key=lambda columns: -count % columns)
-
-
-def _caption(name: str, width_pt: float, size_pt: float) -> str:
-    """Break a name into lines that fit the tile; letters are about half as wide as high."""
-    letters = max(4, int(0.96 * width_pt / (0.5 * size_pt)))
-    return "\n".join(textwrap.wrap(name, letters))
-
-
 def splat(positions: np.ndarray, facing: np.ndarray, radius: float, size: int) -> tuple[np.ndarray, np.ndarray]:
     """Draw every point as a disc: one pass finds the nearest depth of each pixel, another averages the discs there.
 
-    Args:
-        positions: The points (P, 3) in pixels: right, up, and towards the eye.
-        facing: Their unit normals (P, 3) along these axes.
-        radius: That of the discs, in pixels; every point lies at least so far inside the picture.
-        size: The width and the height of the picture.
+    Positions (P, 3), in pixels, and normals go right, up and towards the eye. Points lie at least a radius inside.
 
     Returns:
         The depth (size, size), NaN where bare, and the summed normals (size, size, 3) of what is seen.

@@ -8,18 +8,11 @@ from gpca.reporting.figures.style import GRAY, SMALL_PT, use_style
 
 
 class Canvas:
-    """Places everything on a figure in inches from the lower left corner.
-
-    Attributes:
-        figure: The figure of matplotlib, in the suite's style.
-        axes: Axes without frame that fill the figure; their data coordinates are inches.
-    """
+    """A figure in the suite's style, whose frameless axes have inches from the lower left corner as coordinates."""
 
     def __init__(self, width_in: float, height_in: float) -> None:
-        plt = use_style()
-        self.width_in = width_in
-        self.height_in = height_in
-        self.figure = plt.figure(figsize=(width_in, height_in))
+        self.width_in, self.height_in = width_in, height_in
+        self.figure = use_style().figure(figsize=(width_in, height_in))
         self.axes = self.figure.add_axes((0, 0, 1, 1))
         self.axes.set(xlim=(0, width_in), ylim=(0, height_in))
         self.axes.set_axis_off()
@@ -63,25 +56,13 @@ class Canvas:
         )
         self.text(left_in + width_in / 2, bottom_in + height_in / 2, words, va="center")
 
-    def arrow(self, *points_in: tuple[float, float], color: str = GRAY, words: str = "", over: bool = True) -> None:
-        """Draw a line through the points with a head at the last; words stand over (or under) the middle of its start.
-
-        Args:
-            points_in: Two or more points (x, y).
-            color: The color of line and head.
-            words: The words at the first stretch.
-            over: Whether the words stand above that stretch, else below.
-        """
+    def arrow(self, *points_in: tuple[float, float], color: str = GRAY, words: str = "") -> None:
+        """Draw a line through points (x, y) with a head at the last; words stand over the middle of its start."""
         if len(points_in) > 2:
-            self.axes.plot(
-                *zip(*points_in[:-1], strict=True),
-                color=color,
-                linewidth=0.9,
-                solid_capstyle="butt",
-                solid_joinstyle="miter",
-            )
+            corners = {"solid_capstyle": "butt", "solid_joinstyle": "miter"}
+            self.axes.plot(*zip(*points_in[:-1], strict=True), color=color, linewidth=0.9, **corners)
         look = {"arrowstyle": "-|>", "color": color, "lw": 0.9, "mutation_scale": 7, "shrinkA": 0, "shrinkB": 0}
         self.axes.annotate("", points_in[-1], points_in[-2], arrowprops=look)
         if words:
             (x, y), (x_end, _) = points_in[:2]
-            self.text((x + x_end) / 2, y + (0.035 if over else -0.035), words, va="bottom" if over else "top")
+            self.text((x + x_end) / 2, y + 0.035, words, va="bottom")

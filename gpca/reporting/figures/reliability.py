@@ -14,10 +14,8 @@ from gpca.reporting.figures.style import BLUE, GRAY, LIGHT_GRAY, SMALL_PT, TEXT_
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-FEWEST = 5  # A bin with fewer samples has no point.
-HEADROOM = 2.0  # The axis of the numbers is this many times as high as the highest bar.
-BESIDE_IN, ABOVE_IN = 0.42, 0.42  # what stands beside a square panel, and above and below it
-WIDEST_IN = 1.6  # of a panel
+FEWEST = 5  # samples of a bin that has a point
+HEADROOM = 2.0  # height of the axis of the numbers, in those of the highest bar
 
 
 def reliability_figure(
@@ -32,16 +30,14 @@ def reliability_figure(
     """Return a figure with a panel for each entry, and the calibration error of its samples in the panel's title.
 
     Args:
-        samples: What stands above a panel -> the probability of each of its samples, and whether it came true.
-        title: That of the figure.
-        bins: How many each panel has.
-        across, up: What the axes are called.
-        label: That of the curves, in the legend.
-        least: The smallest probability that there can be.
+        samples: words above a panel -> probability of each of its samples, and whether it came true.
+        across, up: names of the axes.
+        label: of the curves, in the legend.
+        least: the smallest probability that there can be.
     """
     lines = -(-len(samples) // MOST_PER_ROW)
-    square_in = TEXT_WIDTH_IN / -(-len(samples) // lines) - BESIDE_IN
-    figure, panels = panels_in_lines(len(samples), min(square_in, WIDEST_IN) + ABOVE_IN)
+    square_in = TEXT_WIDTH_IN / -(-len(samples) // lines) - 0.42
+    figure, panels = panels_in_lines(len(samples), min(square_in, 1.6) + 0.42)
     for panel, (words, (probability_S, true_S)) in zip(panels, samples.items(), strict=True):
         gap = draw_reliability_panel(panel, probability_S, true_S, bins, f"{label}, 95 % interval")
         panel.set_title(f"{words}\npooled ECE {gap:.3f}", fontsize=SMALL_PT)
@@ -59,15 +55,7 @@ def draw_reliability_panel(
 ) -> float:
     """Draw the share that came true and its Wilson interval (95 %) by bin; return the expected calibration error.
 
-    The panel is square, and its diagonal calibrated. The numbers of samples are bars with an axis of their own at the
-    right.
-
-    Args:
-        panel: axes of matplotlib.
-        probability_S: of S samples, between 0 and 1.
-        true_S: whether each came true.
-        bins: how many, of equal width.
-        label: of the curve, in the legend.
+    The panel is square, and its diagonal calibrated. The numbers of samples are bars with an axis at the right.
     """
     bin_S = np.minimum((probability_S * bins).astype(int), bins - 1)
     counts_B = np.bincount(bin_S, minlength=bins)

@@ -11,8 +11,7 @@ import numpy as np
 from gpca.io.files import whole_file
 
 MATPLOTLIBRC = str(Path(__file__).with_name("matplotlibrc"))
-COLUMN_WIDTH_IN = 3.5  # One column of an IEEE paper is this wide.
-TEXT_WIDTH_IN = 7.16  # Both columns are this wide.
+COLUMN_WIDTH_IN, TEXT_WIDTH_IN = 3.5, 7.16  # one column of an IEEE paper, and both
 
 # Okabe and Ito chose these colors ("Color Universal Design", 2008), which no common color blindness confuses.
 BLACK = "#000000"
@@ -47,10 +46,7 @@ OTHER_LOOK = (LIGHT_GRAY, "-", 0.9)
 
 
 def use_style() -> Any:
-    """Set matplotlib to the suite's style, the file `MATPLOTLIBRC`, drawn by Agg, and return its ``pyplot``.
-
-    It starts from matplotlib's own defaults, so that a user's matplotlibrc cannot change a figure.
-    """
+    """Set matplotlib to its defaults and `MATPLOTLIBRC`, whatever a user's file says, and return its ``pyplot``."""
     import matplotlib
 
     matplotlib.use("Agg")
@@ -77,10 +73,7 @@ def blues():
 
 
 def save_figure(figure, pdf_path: str | Path, png_path: str | Path) -> None:
-    """Write `figure` as vector PDF and as 300 dpi PNG, then close it.
-
-    Neither file holds a date or a program version, so that drawing the same data again changes no byte.
-    """
+    """Write `figure` as vector PDF and as 300 dpi PNG, both without date or version, then close it."""
     undated_pdf = {"CreationDate": None, "ModDate": None, "Producer": None, "Creator": None}
     with whole_file(pdf_path) as partial:
         figure.savefig(partial, format="pdf", metadata=undated_pdf)
@@ -90,19 +83,14 @@ def save_figure(figure, pdf_path: str | Path, png_path: str | Path) -> None:
 def save_png(figure, png_path: str | Path, dpi: int = 300) -> None:
     """Write `figure` as PNG alone, then close it: in 256 colors if they show it, for a quarter of the bytes."""
     import matplotlib.pyplot as plt
-    from PIL import Image
+    from PIL import Image, ImageChops
 
     drawn = io.BytesIO()
     figure.savefig(drawn, format="png", dpi=dpi)
     plt.close(figure)
-    with whole_file(png_path) as partial:
-        _fewer_colors(Image.open(drawn).convert("RGB")).save(partial, format="png", optimize=True, dpi=(dpi, dpi))
-
-
-def _fewer_colors(image):
-    """Return the image with a palette, or as it is, such as a photograph, where a channel would change by a twelfth."""
-    from PIL import Image, ImageChops
-
+    image = Image.open(drawn).convert("RGB")
     few = image.quantize(256, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+    # A photograph, of which a channel would change by a twelfth, keeps its colors.
     largest = np.asarray(ImageChops.difference(image, few.convert("RGB"))).max()
-    return few if largest <= 255 // 12 else image
+    with whole_file(png_path) as partial:
+        (few if largest <= 255 // 12 else image).save(partial, format="png", optimize=True, dpi=(dpi, dpi))

@@ -34,11 +34,11 @@ class TableBuilder:
 
     def add_row(self, labels: Sequence[Label], cells: Mapping[str, Cell | None], rival: bool = True) -> None:
         """Add a row unless it has no cell; only rivals compete for bold, which an oracle is not."""
-        known = {(len(self.labels), key): cell for key, cell in cells.items() if cell is not None}
-        if known:
+        given = {(len(self.labels), key): cell for key, cell in cells.items() if cell is not None}
+        if given:
             self._rivals += [len(self.labels)] if rival else []
             self.labels.append(tuple(labels))
-            self.cells |= known
+            self.cells |= given
 
     def compare_across(self, columns: Iterable[str]) -> None:
         """Let these columns compete for bold within each row."""

@@ -127,11 +127,11 @@ class Table:
 
     def printed(self) -> dict[str, Any]:
         """Return the words that a reader sees; each cell is its text, and whether it is bold."""
-        own = {name: column for name, column in self.columns.items() if not column.beside}
+        main = {name: column for name, column in self.columns.items() if not column.beside}
         best, rows = self.best(), []
         for row, labels in enumerate(self.rows):
             shown = [(title, False) for _, title in labels]
-            for name, column in own.items():
+            for name, column in main.items():
                 texts = []
                 if (row, name) in self.cells:
                     beside = [(key, each) for key, each in self.columns.items() if each.beside == name]
@@ -141,7 +141,7 @@ class Table:
             rows.append(shown)
         return {
             "caption": self.caption,
-            "heads": [*self.row_heads.values(), *(column.title for column in own.values())],
+            "heads": [*self.row_heads.values(), *(column.title for column in main.values())],
             "label_columns": len(self.row_heads),
             "rows": rows,
             "footnotes": list(self.footnotes),
