@@ -26,7 +26,7 @@ LARGEST_BYTES = 2**36  # a thousand times what five seeds of the paper's protoco
 
 
 def read(config: dict, command_line: Mapping, as_module: bool = False) -> tuple[dict, dict[str, dict]]:
-    """Read the config of a run as Snakemake merged it.
+    """Read the config of a run as Snakemake merged it; InputError as in :func:`check`.
 
     Args:
         command_line: the values given with ``--config``, whose numbers are still text.
@@ -35,9 +35,6 @@ def read(config: dict, command_line: Mapping, as_module: bool = False) -> tuple[
     Returns:
         the config in the order of the defaults, without what it leaves out, with the limit of success in all sections;
         the sources that :func:`check` returns.
-
-    Raises:
-        InputError: as :func:`check`.
     """
     whole = in_order(with_types(with_defaults(config) if as_module else config, command_line))
     sources = check(whole)
@@ -47,15 +44,8 @@ def read(config: dict, command_line: Mapping, as_module: bool = False) -> tuple[
 def check(config: dict) -> dict[str, dict]:
     """Check a configuration against its settings classes, plugins, names and data; it is not changed.
 
-    Entries that are left out with ``false`` are not checked.
-
-    Returns:
-        the resolved entry of every source, by name, with ``stand_in`` set.
-
-    Raises:
-        InputError: unknown key, wrong type, value out of range; an unusable plugin; unknown source, family, kind,
-            explainer or backbone, or one that is left out; data that is neither in its folder nor downloadable. The
-            line names the key.
+    Entries that are left out with ``false`` are not checked. Returns the resolved entry of every source, by name. The
+    line of an InputError names the key.
     """
     require_plain(config, "config key")
     with_key("plugins", use, config.get("plugins") or [])
@@ -108,8 +98,7 @@ def _check_registrations(config: dict) -> None:
 def _check_names(config: dict, left_out: LeftOut) -> None:
     """Check the names of encoders, explainers and sources, and the points that encoders and explainers read.
 
-    Draws of points from depth frames are not checked: their number of points is unknown here, and smaller clouds repeat
-    points.
+    Draws of points from depth frames are not checked: smaller clouds repeat points.
     """
     encoders, points = config["encoders"], config["registrations"]["cloud_points"]
     for name, encoder in encoders.items():
@@ -131,11 +120,7 @@ def _check_names(config: dict, left_out: LeftOut) -> None:
 
 
 def resolve_sources(config: dict) -> dict[str, dict]:
-    """Return the resolved entry of every source, by name, with ``stand_in`` set.
-
-    Raises:
-        InputError: an unknown kind or family; data that is neither in its folder nor downloadable.
-    """
+    """Return the resolved entry of every source, by name, with ``stand_in`` set."""
     return {
         name: {"stand_in": entry["kind"] == "procedural"}
         | with_key(f"sources.{name}", resolve, entry, config["data_dir"])
@@ -144,11 +129,7 @@ def resolve_sources(config: dict) -> dict[str, dict]:
 
 
 def with_success(config: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the config with ``success.error`` as the ``failed`` limit of the causes.
-
-    Raises:
-        InputError: such a limit in the config, which would be a second definition.
-    """
+    """Return the config with ``success.error`` as the ``failed`` limit of the causes, which must not have their own."""
 
     def limited(key: str, causes: Mapping[str, Any]) -> dict[str, Any]:
         if "failed" in causes["limits"]:

@@ -37,12 +37,7 @@ LISTED = {key: names for each in experiments() for key, names in each.lists.item
 
 
 def read_file(path: str | Path) -> dict[str, Any]:
-    """Return the config of one file.
-
-    Raises:
-        InputError: as :func:`gpca.io.structured_text.read_mapping`, which refuses what Snakemake would repair or ignore
-            silently, and for a template, which Snakemake would run.
-    """
+    """Return the config of one file; InputError for what Snakemake would repair or ignore, and for a template."""
     config = read_mapping(path)
     if TEMPLATE in config:
         remedy = "write out its values and remove that key"
@@ -94,11 +89,8 @@ def in_order(config: Mapping[str, Any], lower: Mapping[str, Any] | None = None) 
 def with_types(config: Mapping[str, Any], command_line: Mapping[str, Any]) -> dict[str, Any]:
     """Return the config with the command line's values read as in a config file: numbers, booleans, null.
 
-    Snakemake reads values inside lists and mappings as text.
-
-    Args:
-        command_line: its values alone, as Snakemake parsed them. Only those that the config still has are converted: a
-            workflow that uses this one as a module may have another config.
+    Snakemake reads values inside lists and mappings as text. Only those values of the command line that the config
+    still has are converted: a workflow that uses this one as a module may have another config.
     """
 
     def typed(value: Any, given: Any) -> Any:
@@ -125,9 +117,6 @@ def without_false(config: Mapping[str, Any]) -> dict[str, Any]:
 
     A row is an entry of a list, an explainer or a policy. Keys that name one thing that is left out, such as
     `figures.source`, and lists of nothing else stay: :func:`gpca.config.check.check` refuses them.
-
-    Raises:
-        InputError: a switch that is neither true nor false.
     """
     left_out = {key: names_left_out(config, key) for key in OPTIONAL}
     whole = dict(config)

@@ -103,22 +103,14 @@ class Annotation:
 
 @dataclass(frozen=True)
 class Frame:
-    """One image of a scene.
-
-    Attributes:
-        scene, image: numbers, as the folder and its files are named.
-        camera_3_3: K, in pixels.
-        depth_scale: millimeters per unit of the depth image.
-        depth, color: files; a frame may lack colors.
-        annotations: the objects in it.
-    """
+    """One image of a scene; the numbers of both are those of their folder and files."""
 
     scene: int
     image: int
     camera_3_3: np.ndarray
-    depth_scale: float
+    depth_scale: float  # millimeters per unit of the depth image
     depth: Path
-    color: Path | None
+    color: Path | None  # a frame may lack colors
     annotations: tuple[Annotation, ...]
 
     @property
@@ -127,11 +119,7 @@ class Frame:
         return self.scene, self.image
 
     def depth_m(self) -> np.ndarray:
-        """Return depth (H, W) in meters, 0 where nothing was measured.
-
-        InputError for a missing or unreadable image, colors, 8 bits, negative or infinite depth, or no measurement at
-        all.
-        """
+        """Return depth (H, W) in meters, 0 where nothing was measured; InputError unless the image has 16-bit depth."""
         depth_H_W = read_image(self.depth, REMEDY)
         if depth_H_W.ndim != 2:
             raise InputError(self.depth, "is a color image, not depth", REMEDY)
@@ -144,10 +132,7 @@ class Frame:
         return depth_H_W * np.float32(self.depth_scale / 1000)
 
     def mask(self, annotation: Annotation) -> np.ndarray:
-        """Return the visible part (H, W) of an object as booleans.
-
-        InputError for a missing or unreadable image, or one of many values: a picture, or numbers of objects.
-        """
+        """Return the visible part (H, W) of an object as booleans; InputError for a picture, or numbers of objects."""
         mask = read_image(annotation.mask, REMEDY)
         mask = mask if mask.ndim == 2 else mask[..., 0]
         inside = mask > 0
@@ -159,15 +144,9 @@ class Frame:
 
 
 def read_frames(folders: Iterable[Path], split: str = "test") -> list[Frame]:
-    """Return the frames of a dataset in order of scene and image.
+    """Return the frames of a dataset in order of scene and image; InputError for a faulty or incomplete file.
 
-    Args:
-        folders: the dataset's folder, or those that its archives were unpacked in.
-        split: the beginning of the subfolder's name.
-
-    Raises:
-        InputError: no scenes, missing or damaged JSON file, an image without camera or depth file, an impossible camera
-            or pose, an object without a mask, two folders of one scene.
+    `folders` are the dataset's, or those that its archives were unpacked in; `split` begins the subfolder's name.
     """
     folders = list(folders)
     scene_files = [path for folder in folders for path in folder.glob(f"**/{split}*/*/scene_gt.json")]
@@ -188,9 +167,7 @@ def read_frames(folders: Iterable[Path], split: str = "test") -> list[Frame]:
 def measured_points(frame: Frame, annotation: Annotation, depth_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the points (P, 3) that were measured within an object's mask, and their pixels (P, 2).
 
-    Raises:
-        InputError: mask and depth of different sizes.
-        TooFewPoints: fewer than `FEWEST_POINTS`.
+    InputError for mask and depth of different sizes, TooFewPoints for fewer than `FEWEST_POINTS`.
     """
     mask = frame.mask(annotation)
     if mask.shape != depth_m.shape:
@@ -259,10 +236,7 @@ def _image_file(folder: Path, stem: str) -> Path:
 
 
 def from_entry(entry: dict, folder: Path) -> Iterator[Surface]:
-    """Return surfaces of a configured source: keys `objects` (ids, default all) and `views_per_instance` (default 6).
-
-    InputError for a unit other than that of the format, and as in :func:`cut_out_views`.
-    """
+    """Return the surfaces of an entry: keys `objects` (ids, default all) and `views_per_instance` (default 6)."""
     if meters_per(entry.get("unit") or "mm") != meters_per("mm"):
         raise InputError(f"unit '{entry['unit']}'", "is not that of BOP frames", "leave unit out")
     return cut_out_views(folder, entry.get("objects"), entry.get("views_per_instance", VIEWS))
@@ -271,13 +245,7 @@ def from_entry(entry: dict, folder: Path) -> Iterator[Surface]:
 def cut_out_views(folder: Path, objects: Sequence[int] | None = None, views: int = VIEWS) -> Iterator[Surface]:
     """Yield the views of each object, spread evenly over its frames; those with too few points are named on stderr.
 
-    Args:
-        folder: of the dataset.
-        objects: ids; all in the frames when None.
-        views: the largest number of one object.
-
-    Raises:
-        InputError: faulty files, or an object that no frame shows.
+    `views` is the largest number of one object. InputError for faulty files, or an object that no frame shows.
     """
     shown: dict[int, list] = {}
     for frame in read_frames([folder]):

@@ -32,24 +32,20 @@ class Dataset:
     Attributes:
         name: seeds the draw of frames and prefixes the names of objects.
         folders: the dataset's, or those that its archives were unpacked in.
-        unit: of the models' vertices.
-        results: BOP results files with initial poses, one of each estimator.
-        errors: CSV of errors that estimators made elsewhere on its objects, or None.
+        errors: CSV of errors that estimators made elsewhere on its objects.
         models: the folder of its models where that is not its own.
-        most_frames: of more frames, this many are drawn; None reads all.
-        places: of its scenes, by number; none where no file says so.
         role: of the frames: other than for evaluation, only scenes of this role are read.
     """
 
     name: str
     folders: tuple[Path, ...]
-    unit: str = "mm"
+    unit: str = "mm"  # of the models' vertices
     split: str = "test"
-    results: tuple[Path, ...] = ()
+    results: tuple[Path, ...] = ()  # BOP results files with initial poses, one of each estimator
     errors: Path | None = None
     models: Path | None = None
-    most_frames: int | None = 200
-    places: Mapping[int, Place] = field(default_factory=dict)
+    most_frames: int | None = 200  # of more frames, this many are drawn; None reads all
+    places: Mapping[int, Place] = field(default_factory=dict)  # of its scenes, by number; none where no file says so
     role: str = EVALUATION
 
     def frames(self) -> list[Frame]:
@@ -174,11 +170,8 @@ def datasets_of(
 ) -> dict[str, Dataset]:
     """Return the datasets of the config by name, or in their place the rendered scenes, of which all frames are read.
 
-    Args:
-        splits, role: the file of scenes, and the role of the frames (:mod:`gpca.objects.canonical`).
-
-    Raises:
-        InputError: neither is given, or as in :func:`gpca.frames.source.resolve_datasets`.
+    `splits` is the file of scenes, `role` that of the frames (:mod:`gpca.objects.canonical`). InputError where neither
+    datasets nor scenes are given, or as in :func:`gpca.frames.source.resolve_datasets`.
     """
     if scenes:
         return {"scenes": Dataset("scenes", (scenes,), most_frames=None)}
@@ -229,14 +222,9 @@ def files_behind(datasets: Mapping[str, dict] | None, data_dir: str | None, scen
 def meshes_of(
     models: Mapping[str, dict[int, CenteredModel]], objects: ObjectClouds, shown: Iterable[int]
 ) -> dict[int, MeshScene]:
-    """Return each object's mesh alone, in the object's frame, by its number among the canonical clouds `objects`.
+    """Return the mesh of each object `shown`, in its frame, by its number in `objects`; InputError where one lacks.
 
-    Args:
-        models: of every dataset, as :func:`with_shared_models` returns them.
-        shown: numbers of the objects that are needed.
-
-    Raises:
-        InputError: an object without a mesh.
+    `models` are those of every dataset, as :func:`with_shared_models` returns them.
     """
     surfaces = {surface.name: surface for surface in distinct_surfaces(models)}
     meshes = {}
@@ -250,10 +238,7 @@ def meshes_of(
 
 
 def simplified(surface: Surface, most_faces: int = MOST_FACES) -> Surface:
-    """Return a mesh of at most this many faces, by quadric decimation (Garland and Heckbert 1997): scans have more.
-
-    InputError for a cloud of points.
-    """
+    """Return a mesh of at most this many faces, by quadric decimation (Garland and Heckbert 1997): scans have more."""
     if surface.faces is None:
         fault = "is a point cloud, but the virtual camera needs a mesh"
         raise InputError(f"object '{surface.name}'", fault, "name a source of meshes")

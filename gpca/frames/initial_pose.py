@@ -38,18 +38,10 @@ FARTHEST_MM = 1e4  # no estimator is off by more
 def read_bop_results(
     path: str | Path, distances_m: Mapping[tuple[int, int], Sequence[float]], known: Collection[int]
 ) -> PosesByObject:
-    """Read a results file of the BOP benchmark.
+    """Return the poses ``T_camera_model`` of a BOP results file by (scene, image, object id), the highest score first.
 
-    Args:
-        distances_m: (scene, image) of the dataset -> distances of its annotated objects from the camera.
-        known: ids of the dataset's objects.
-
-    Returns:
-        (scene, image, object id) -> poses ``T_camera_model`` in meters, the highest score first.
-
-    Raises:
-        InputError: missing file or column, R or t of another length or not finite, R that is no rotation, an unknown
-            image or object, a pose behind the camera, translations in another unit than millimeters.
+    `distances_m` are those of the annotated objects of each (scene, image) from the camera; `known` are the ids of the
+    dataset's objects. InputError for a damaged file, an unknown image or object, or translations in another unit.
     """
     rows = read_csv(path, RESULT_COLUMNS, others=ANY, remedy=REMEDY)
     scored_poses: dict[tuple[int, int, int], list[tuple[float, np.ndarray]]] = {}
@@ -109,10 +101,9 @@ def _require_unit(subject: object, ratio: float, most: float) -> None:
 def estimates_of(
     poses_by_estimator: Mapping[str, PosesByObject], place: tuple[int, int, int], alone: bool, seen: Mapping
 ) -> list[tuple[str, np.ndarray]]:
-    """Return the name of each estimator that found an object, and its pose ``T_camera_model``.
+    """Return the name of each estimator of a dataset that found an object, and its pose ``T_camera_model``.
 
     Args:
-        poses_by_estimator: of one dataset.
         place: scene, image, object id.
         alone: whether no other object of this id is in the image. If false, an estimate farther than a diameter from
             the measured points belongs to another one.
@@ -133,11 +124,9 @@ def estimates_of(
 
 @dataclass
 class EstimatorErrors:
-    """Errors of estimators by dataset and object id; objects without any draw from those of others.
+    """Errors ``T_true_estimated`` (m) by dataset and object id; objects without any draw from those of others.
 
-    Attributes:
-        symmetric: objects whose errors are not used for others, as they contain turns by a symmetry.
-        by_object: (dataset, object id) -> errors ``T_true_estimated`` (4, 4), meters.
+    `symmetric` objects lend theirs to no other, as they contain turns by a symmetry.
     """
 
     symmetric: Collection[tuple[str, int]]
@@ -163,13 +152,9 @@ def error_of(T_camera_true: np.ndarray, T_camera_estimated: np.ndarray) -> np.nd
 
 
 def read_pose_errors(path: Path, known: Iterable[int]) -> list[tuple[int, np.ndarray]]:
-    """Read a CSV of errors: `obj_id`, rotation vector `rx,ry,rz` in radians, translation `tx,ty,tz` in millimeters.
+    """Return id and error of each row of a CSV: `obj_id`, rotation vector `rx,ry,rz` (rad), shift `tx,ty,tz` (mm).
 
-    Args:
-        known: ids of the dataset's objects; rows of others are skipped.
-
-    Raises:
-        InputError: missing file or column, an entry that is not finite, an impossible id, rotation or translation.
+    Rows of objects that are not `known` are skipped. InputError for a damaged file, or an impossible motion.
     """
     rows = read_csv(path, ERROR_COLUMNS, others=ANY)
     columns = {name: numbers(path, rows, name).to_numpy() for name in ERROR_COLUMNS}
@@ -193,20 +178,13 @@ FORMS = get_args(Form)
 
 @dataclass(frozen=True)
 class InitialPoseSettings:
-    """Where initial poses come from.
-
-    Attributes:
-        form: ``results`` of an estimator, ``true_pose`` with an error, or ``global_registration``.
-        rotation_deg, translation: largest error of ``true_pose``, in degrees and diameters, drawn uniformly.
-        voxel: of the features of ``global_registration``, in diameters.
-        tries: random starts of RANSAC, of which the best is taken.
-    """
+    """Where poses come from: ``results`` of an estimator, ``true_pose`` with an error, or ``global_registration``."""
 
     form: Form = "global_registration"
-    rotation_deg: HalfTurn = 5.0
-    translation: Shift = 0.03
-    voxel: PositiveShare = 0.05
-    tries: Count = 20
+    rotation_deg: HalfTurn = 5.0  # largest error of `true_pose`, drawn uniformly
+    translation: Shift = 0.03  # the same, in diameters
+    voxel: PositiveShare = 0.05  # of the features of `global_registration`, in diameters
+    tries: Count = 20  # random starts of RANSAC, of which the best is taken
 
     def __post_init__(self) -> None:
         if self.form not in FORMS:
@@ -225,8 +203,7 @@ class GlobalRegistration:
 
     After point-to-plane ICP, a run is scored by the share of measured points on the model plus the share of the model's
     points facing the camera that were measured: many poses explain the points, but few also explain what should be
-    seen. It needs no truth; a stand-in for a pose estimator. The model is its canonical points (Q, 3) in meters and
-    their normals.
+    seen. It needs no truth; a stand-in for a pose estimator. The model is its canonical points (Q, 3) and normals.
     """
 
     def __init__(self, points_m: np.ndarray, normals: np.ndarray, diameter_m: float, settings: InitialPoseSettings):

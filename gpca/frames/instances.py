@@ -48,17 +48,14 @@ class Instances(Container):
     """I objects in frames. The object frame is that of the canonical cloud, centered on its bounding box.
 
     Attributes:
-        dataset, scene, image: (I,) where the instance was seen.
-        object_index: (I,) of the objects npz beside this file.
-        symmetric: (I,) a rotation exists that changes nothing about the object's shape.
-        T_camera_object_true, T_camera_object_init: (I, 4, 4), meters.
-        init_from: (I,) where the initial pose is from: an estimator, ``errors`` of estimators, or another form.
-        camera_3_3: (I, 3, 3) K in pixels.
-        colour: (I,) path of the color image; `NO_COLOR` where there is none.
-        fold: (I,) that the scene is tested with, `DRAWN` or `TRAINING` (:mod:`gpca.objects.canonical`).
-        points_m: (ΣP, 3) float32, measured points in the camera's frame; those of instance i are
-            ``points_m[offsets[i]:offsets[i + 1]]``.
-        pixels: (ΣP, 2) int32, where each was seen, (u, v).
+        object_index: of the objects npz beside this file.
+        symmetric: a rotation exists that changes nothing about the object's shape.
+        init_from: where the initial pose is from: an estimator, ``errors`` of estimators, or another form.
+        camera_3_3: K in pixels.
+        colour: path of the color image; `NO_COLOR` where there is none.
+        fold: that the scene is tested with, `DRAWN` or `TRAINING` (:mod:`gpca.objects.canonical`).
+        points_m: float32, measured points in the camera's frame, of one instance after another.
+        pixels: int32, where each was seen, (u, v).
     """
 
     dataset: np.ndarray = array("I", TEXT)
@@ -150,15 +147,12 @@ def read_instances(
 ) -> Instances:
     """Return every object of the frames with enough measured points, with its true and its initial pose.
 
-    Objects with too few points are left out and named on stderr.
+    Objects with too few points are left out and named on stderr. InputError for faulty files, an object that was
+    measured away from its pose, or nothing left.
 
     Args:
         datasets: name -> dataset, its frames, the models of their objects.
         objects: the canonical clouds of all these models, by their surfaces' names.
-        settings: of the initial poses.
-
-    Raises:
-        InputError: faulty files, an object that was measured away from its pose, or nothing left.
     """
     if settings.form == "results" and not any(of.results or of.errors for of, _, _ in datasets.values()):
         raise InputError(f"dataset {next(iter(datasets))}", "has no results file", "set results or choose another pose")

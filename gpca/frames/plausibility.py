@@ -60,18 +60,10 @@ for factor in (0.5, 0.67, 0.8, 0.85, 0.9, 0.95, 1.05, 1.1, 1.15, 1.25, 1.5, 2):
 
 @dataclass(frozen=True)
 class Observation:
-    """One annotated object and its measured points.
+    """One annotated object and its measured points (P, 3) in the camera's frame; `tree` is of the canonical cloud."""
 
-    Attributes:
-        subject: the annotation's place in its file.
-        T_camera_model: the annotated pose, meters, in the frame of the dataset's model.
-        T_model_object: the frame of the canonical cloud in that of the model.
-        tree: of the canonical cloud.
-        points_m: (P, 3) in the camera's frame.
-    """
-
-    subject: str
-    T_camera_model: np.ndarray
+    subject: str  # the annotation's place in its file
+    T_camera_model: np.ndarray  # the annotated pose, meters
     T_model_object: np.ndarray
     tree: cKDTree
     diameter_m: float

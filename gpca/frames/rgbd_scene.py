@@ -60,24 +60,15 @@ TABLE_COLOR = (0.72, 0.65, 0.55)
 
 @dataclass(frozen=True)
 class SceneSettings:
-    """Settings of scenes: the objects on the table, and the cameras.
+    """Settings of scenes: the objects on the table, and the cameras."""
 
-    Attributes:
-        families: of procedural objects; none for objects of another kind.
-        count, views: scenes, and frames of each.
-        objects: range of their number in a scene.
-        distance_m: range from the camera to the middle of the objects.
-        elevation_deg: range above the table; the azimuth goes all around.
-        gap_m: smallest distance between the outlines of two objects on the table.
-    """
-
-    families: Distinct[str] = ("ycb",)
-    count: Annotated[int, Bounds(minimum=2)] = 12
-    views: Count = 4
-    objects: tuple[Count, Count] = (4, 8)
-    distance_m: tuple[Distance, Distance] = (0.6, 0.9)
-    elevation_deg: tuple[Elevation, Elevation] = (15.0, 50.0)
-    gap_m: Annotated[float, Bounds(minimum=0, maximum=1)] = 0.01
+    families: Distinct[str] = ("ycb",)  # of procedural objects; none for objects of another kind
+    count: Annotated[int, Bounds(minimum=2)] = 12  # of scenes
+    views: Count = 4  # frames of each scene
+    objects: tuple[Count, Count] = (4, 8)  # range of their number in a scene
+    distance_m: tuple[Distance, Distance] = (0.6, 0.9)  # from the camera to the middle of the objects
+    elevation_deg: tuple[Elevation, Elevation] = (15.0, 50.0)  # above the table; the azimuth goes all around
+    gap_m: Annotated[float, Bounds(minimum=0, maximum=1)] = 0.01  # least between two outlines on the table
     camera: Camera = field(default_factory=Camera)
     noise: DepthNoise = field(default_factory=DepthNoise)
 
@@ -107,8 +98,8 @@ class Placed:
 def write_scenes(surfaces: Iterable[Surface], source: str, settings: SceneSettings, folder: str | Path) -> None:
     """Write models and frames in the layout of BOP: models/, test/{scene}/ with depth, rgb, mask, mask_visib, poses.
 
-    Random numbers are named by source, scene and view. The folder appears when it is complete. InputError where it
-    holds something other than scenes, or the table is too small.
+    Random numbers are named by source, scene and view. InputError where the folder holds something other than scenes,
+    or the table is too small.
     """
     folder = Path(folder)
     if folder.exists() and not folder.is_dir():

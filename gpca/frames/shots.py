@@ -22,7 +22,6 @@ class Sighting:
     Attributes:
         points_m: (N, 3) measured points in the camera's frame, all or some.
         pixels: (P, 2) all pixels at which the object was measured, (u, v).
-        camera_3_3: K in pixels.
     """
 
     points_m: np.ndarray
@@ -52,32 +51,20 @@ MOST_PIXELS = 20_000  # of a rendered side, about; of more, every second or thir
 
 @dataclass(frozen=True)
 class CleanView:
-    """Measurements of an object and a perfect sensor's view of it at some pose, in the object's frame, meters.
+    """Measurements of an object and a perfect sensor's view of it at some pose, in the object's frame, meters."""
 
-    Attributes:
-        measured: (N, 3) points that the sensor measured.
-        clean: (N, 3) where the rays of the same pixels meet the mesh; where one misses it, the nearest rendered point.
-        unmeasured: (V, 3) further points that the camera would see with nothing in front and no failed pixel.
-        share: of the whole visible side that was measured.
-    """
-
-    measured: np.ndarray
-    clean: np.ndarray
-    unmeasured: np.ndarray
-    share: float
+    measured: np.ndarray  # (N, 3) points that the sensor measured
+    clean: np.ndarray  # (N, 3) where their rays meet the mesh; where one misses it, the nearest rendered point
+    unmeasured: np.ndarray  # (V, 3) points that the camera would see with nothing in front and no failed pixel
+    share: float  # of the whole visible side that was measured
 
 
 @dataclass(frozen=True)
 class Side:
-    """The side that an object turns to a camera.
+    """The side that an object turns to a camera."""
 
-    Attributes:
-        points_m: (V, 3) in the object's frame, one for each pixel.
-        pixels: (V, 2) where the camera sees them, (u, v); also outside the image.
-    """
-
-    points_m: np.ndarray
-    pixels: np.ndarray
+    points_m: np.ndarray  # (V, 3) in the object's frame, one for each pixel
+    pixels: np.ndarray  # (V, 2) where the camera sees them, (u, v); also outside the image
 
     def __len__(self) -> int:
         return len(self.points_m)
@@ -88,9 +75,7 @@ def clean_view(
 ) -> CleanView | None:
     """Return a sighting beside a perfect sensor's view at a pose; None where no ray of its pixels meets the mesh.
 
-    Args:
-        mesh: of the object alone, in its frame.
-        surface_m: (Q, 3) points on it, which bound its place in the image.
+    `surface_m` (Q, 3) are points on the mesh, which bound its place in the image.
     """
     points_m = sighting.points_m
     met_m = met(mesh, points_m / points_m[:, 2:], T_camera_object)
@@ -112,9 +97,9 @@ def rendered_side(
     surface_m: np.ndarray,
     most_pixels: int = MOST_PIXELS,
 ) -> Side:
-    """Return the side of an object that a camera would see at a pose with nothing in front.
+    """Return the side of an object that a camera would see at a pose with nothing in front, by about `most_pixels`.
 
-    It is empty where a part of the object would lie behind the camera. About `most_pixels` are looked at.
+    It is empty where a part of the object would lie behind the camera.
     """
     shown = rotate(camera_3_3, transform(T_camera_object, surface_m))
     if shown[:, 2].min() <= 0:
@@ -143,18 +128,12 @@ NEAR = 0.05  # diameters; a measured point that is so near lies on the model
 
 @dataclass(frozen=True)
 class Shot:
-    """A robot's measurement of an object from one viewpoint.
-
-    Attributes:
-        T_world_camera: known to the robot.
-        depth_m: (H, W), 0 where nothing was measured; of several frames their median.
-        mask: (H, W) the visible part of the object, by segmentation.
-    """
+    """A robot's measurement of an object from one viewpoint."""
 
     camera: Camera
-    T_world_camera: np.ndarray
-    depth_m: np.ndarray
-    mask: np.ndarray
+    T_world_camera: np.ndarray  # known to the robot
+    depth_m: np.ndarray  # (H, W), 0 where nothing was measured; of several frames their median
+    mask: np.ndarray  # (H, W) the visible part of the object, by segmentation
 
     def object_points_m(self, diameter_m: float) -> np.ndarray:
         """Return the object's points (P, 3) in the world, none farther than a diameter from their median."""
@@ -169,10 +148,7 @@ class Shot:
         return transform(self.T_world_camera, points_m)
 
     def project(self, points_m: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the pixels, as v and u, and the depth in meters of points (P, 3) in the world.
-
-        Points outside the image get the pixel (-1, -1).
-        """
+        """Return the pixels, v and u, and the depth (m) of points (P, 3) in the world; outside the image, (-1, -1)."""
         seen = transform(inverse(self.T_world_camera), points_m)
         pixels = rotate(self.camera.matrix_3_3, seen)
         u, v = np.rint(pixels[:, :2] / np.maximum(pixels[:, 2:], 1e-6)).astype(int).T
@@ -213,14 +189,10 @@ def agreement(
 ) -> tuple[float, float, float]:
     """Return how well a pose explains the shots, and how much of the model is hidden, as shares in [0, 1].
 
-    First: the share of the measured points on the model; alone, it is high for many poses of a partial view. Second:
-    the share of the model's visible surface that was measured where it should be; visible is what faces the camera and
-    is not behind something else that was measured. Third: the share of the surface facing the camera that is behind
-    something else. Needs no truth.
-
-    Args:
-        points_m: measured points (P, 3) in the world.
-        model_m, normals: (Q, 3) in the object's frame.
+    First: the share of the measured points (P, 3) on the model (Q, 3); alone, it is high for many poses of a partial
+    view. Second: the share of the model's visible surface that was measured where it should be; visible is what faces
+    the camera and is not behind something else that was measured. Third: the share of the surface facing the camera
+    that is behind something else. Needs no truth.
     """
     placed_m = transform(T_world_object, model_m)
     facing_out = rotate(T_world_object, normals)
@@ -273,16 +245,10 @@ def expected_surface(
     poses_n: np.ndarray,
     camera: Camera,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return which of the model's points were measured (Q,), and which each viewpoint would show (n, Q).
+    """Return which of the model's points (Q, 3) were measured (Q,), and which each viewpoint would show (n, Q).
 
     The model is ray-cast at the estimated pose, over the table and among boxes where something else was measured.
-    Unseen space counts as free.
-
-    Args:
-        vertices_m, faces: the model, in its frame.
-        points_m: (Q, 3) on its surface.
-        T_world_object: the estimate.
-        camera: of the candidates; few pixels suffice.
+    Unseen space counts as free. The `camera` is that of the viewpoints; few pixels suffice.
     """
     placed_m = transform(T_world_object, points_m)
     reach_m = NEAR * diameter_m

@@ -31,19 +31,12 @@ OCCLUDER_TURN_DEG = 20.0  # largest angle of the occluder off the line to the ca
 
 @dataclass(frozen=True)
 class SituationSettings:
-    """Settings of situations: the scenes, and how strongly causes disturb a registration.
+    """Settings of situations: the scenes, and how strongly causes disturb a registration."""
 
-    Attributes:
-        scenes: tables, cameras and the usual sensor noise; its camera is the region of interest about the object.
-        noise_scale: range of the factor on that noise, for the cause noise.
-        hidden: range of the share of the visible part that an occluder hides, for the cause overlap.
-        severities: of the error of the estimated pose, for the cause pose.
-    """
-
-    scenes: SceneSettings = field(default_factory=SceneSettings)
-    noise_scale: tuple[NotNegative, NotNegative] = (3.0, 8.0)
-    hidden: tuple[Hidden, Hidden] = (0.5, 0.9)
-    severities: Severities = field(default_factory=Severities)
+    scenes: SceneSettings = field(default_factory=SceneSettings)  # their camera sees the region about the object
+    noise_scale: tuple[NotNegative, NotNegative] = (3.0, 8.0)  # factor on the scenes' noise, for the cause noise
+    hidden: tuple[Hidden, Hidden] = (0.5, 0.9)  # share of the visible part behind an occluder, for the cause overlap
+    severities: Severities = field(default_factory=Severities)  # of the error of the estimated pose, for the cause pose
 
     def __post_init__(self) -> None:
         for name in ("noise_scale", "hidden"):
@@ -53,12 +46,7 @@ class SituationSettings:
 
 
 class Shelf:
-    """The objects that tables are laid with: surfaces, stable poses, canonical clouds and symmetries.
-
-    Args:
-        points: sampled on each model.
-        estimator: how a pose is estimated from one shot.
-    """
+    """The objects that tables are laid with: surfaces, stable poses, canonical clouds of so many points, symmetries."""
 
     def __init__(
         self, surfaces: Sequence[Surface], source: str, points: int = 4096, estimator: InitialPoseSettings | None = None
@@ -91,27 +79,17 @@ class Shelf:
 
 @dataclass(frozen=True, eq=False)
 class Situation:
-    """The truth of one case; a robot gets only the model and what :meth:`shoot` and :meth:`estimate` return.
-
-    Attributes:
-        standing: the objects on the table, the one in question first.
-        T_world_camera: the first viewpoint.
-        T_object_estimated: error of every estimated pose, for the cause pose.
-        camera, noise: of every shot.
-        cause: of a failure; empty for none.
-        table: number of the table among those of its part.
-        axes: names of its random numbers.
-    """
+    """The truth of one case; a robot gets only the model and what :meth:`shoot` and :meth:`estimate` return."""
 
     shelf: Shelf
-    standing: tuple[Placed, ...]
-    T_world_camera: np.ndarray
-    T_object_estimated: np.ndarray
+    standing: tuple[Placed, ...]  # the objects on the table, the one in question first
+    T_world_camera: np.ndarray  # the first viewpoint
+    T_object_estimated: np.ndarray  # error of every estimated pose, for the cause pose
     camera: Camera
     noise: DepthNoise
-    cause: str
-    table: int
-    axes: tuple
+    cause: str  # of a failure; empty for none
+    table: int  # its number among the tables of its part
+    axes: tuple  # names of its random numbers
 
     @property
     def model(self) -> int:

@@ -33,14 +33,7 @@ GLOBAL = "global_registration"  # runs on the very image, as estimators do
 
 @dataclass(frozen=True)
 class Starts(Container):
-    """K starts.
-
-    Attributes:
-        instance: (K,) number of the instance.
-        kind: (K,) one of `KINDS`.
-        init_from: (K,) the estimator, ``errors`` of estimators, or the rung.
-        T_camera_object_init: (K, 4, 4) meters.
-    """
+    """K starts by kind, then by instance; `init_from` is the estimator, ``errors`` of estimators, or the rung."""
 
     instance: np.ndarray = array("K", WHOLE)
     kind: np.ndarray = array("K", TEXT)
@@ -55,17 +48,10 @@ def all_starts(
     models: Mapping[str, Mapping[int, CenteredModel]],
     rungs: Sequence[tuple[float, float]],
 ) -> Starts:
-    """Return every start of every instance, by kind.
+    """Return every start of every instance, by kind; InputError for a faulty file of results or errors.
 
-    Where no dataset has results, an initial pose that global registration found counts as an estimate.
-
-    Args:
-        objects: canonical clouds.
-        datasets, models: from which the instances were read, by name; the models by id.
-        rungs: of the ladder: turns in degrees and shifts in diameters.
-
-    Raises:
-        InputError: a faulty file of results or errors.
+    Where no dataset has results, an initial pose that global registration found counts as an estimate. `datasets` and
+    `models` are those that the instances were read from; `rungs` are turns in degrees and shifts in diameters.
     """
     found = _estimated(instances, objects, datasets, models)
     by_features = np.flatnonzero(instances.init_from == GLOBAL)

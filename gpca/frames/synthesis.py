@@ -33,16 +33,10 @@ TOLERANCE = 0.03
 
 @dataclass(frozen=True)
 class FrameSettings:
-    """How instances become registrations.
+    """How instances become registrations."""
 
-    Attributes:
-        test_share: of the instances, in scenes that training does not see.
-        occluders: share of the overlap samples that lose points to an occluder; the others lose them to a half-space.
-        registration: numbers of samples, points, severities, ICP.
-    """
-
-    test_share: OpenShare = 0.4
-    occluders: Share = 0.5
+    test_share: OpenShare = 0.4  # of the instances, in scenes that training does not see
+    occluders: Share = 0.5  # share of overlap samples that lose points to an occluder; others to a half-space
     registration: RegistrationSettings = field(default_factory=RegistrationSettings)
 
 
@@ -128,15 +122,11 @@ def _pose_row(instances: Instances, i: int, objects: ObjectClouds, record: dict,
 def occlude(
     instances: Instances, i: int, pixels_P_2: np.ndarray, share: float, random: np.random.Generator
 ) -> np.ndarray | None:
-    """Return which of the pixels stay visible (P,) when an occluder covers about the given share of them.
+    """Return which of the pixels (P, 2) stay visible (P,) when an occluder covers about the given share of them.
 
     Occluders are the visible silhouettes of the dataset's other objects at their own size, tried in random order. One
     comes in from a random direction until it covers the share. None where no silhouette covers that share to within
     `TOLERANCE`.
-
-    Args:
-        pixels_P_2: (u, v) of points of instance i.
-        share: of these pixels, to be covered.
     """
     from scipy.ndimage import binary_closing
 

@@ -34,10 +34,7 @@ _LONGEST_HEADER = 10_000  # bytes; NumPy parses none that is longer
 def save_arrays(path: str | Path, arrays: Mapping[str, np.ndarray], axes: Axes | None = None) -> None:
     """Write an npz whose bytes depend on the arrays and axes alone (NumPy stamps every member 1980-01-01).
 
-    Args:
-        path: the file.
-        arrays: by name.
-        axes: the source and seed that they are of, kept beside them as ``source`` and ``seed``.
+    The axes are kept beside the arrays as ``source`` and ``seed``.
     """
     source, seed = axes or (None, None)
     of = {name: np.array(value) for name, value in (("source", source), ("seed", seed)) if value is not None}
@@ -55,21 +52,16 @@ def load_arrays(
 ) -> dict[str, np.ndarray]:
     """Load the arrays of an npz that a stage needs, and no others.
 
-    What their headers say is checked before any data is read, so that a small file cannot fill the memory.
+    What their headers say is checked before any data is read, so that a small file cannot fill the memory. InputError
+    for a damaged file, another source or seed, and values that are wrong in any array (:func:`_fault_of`).
 
     Args:
-        path: the file.
         shapes: for each needed array its shape; a number must match, a name (``"S"``) must be the same size wherever
             it occurs, and ``"S+1"`` one more.
         kinds: for some of them what they may hold: `TEXT`, `WHOLE` or `REAL`. Any other may hold each of these.
         axes: the source and seed that the file has to be of; it may be of any where this is None.
         optional: arrays that may be missing, as ``source`` in a file that a user's own program wrote.
         remedy: what to do about a damaged file.
-
-    Raises:
-        InputError: missing or unreadable file, pickled objects, missing array, wrong shape or type, more than the
-            machine can hold, NaN, infinity, numbers beyond all that can be measured, unknown splits, empty names, a
-            file of another source or seed, or one that does not say.
     """
     path = Path(path)
     require_file(path, "no such file", "make it with Snakemake", math.inf)

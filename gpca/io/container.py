@@ -29,7 +29,6 @@ class ArrayField:
     Attributes:
         shape: sizes, and names of dimensions, which have one size in a file; ``S+1`` is one more than S.
         kind: `TEXT`, `WHOLE`, `REAL`, `FLOAT` or `FLAG`.
-        least, most: limits of its numbers.
         choices: its words.
         offsets: for an array of all rows' parts one after another, the field with their limits: those of row i are
             ``array[offsets[i]:offsets[i + 1]]``.
@@ -55,8 +54,7 @@ def array(shape: str, kind: str = REAL, **limits: Any) -> Any:
 class Container:
     """Arrays of samples, and the file that holds them. The first dimension of the first array counts the samples.
 
-    Attributes:
-        axes: the source and the seed of the samples; None where they are from several, or were not asked for.
+    `axes` are the source and the seed of the samples; None where they are from several, or were not asked for.
     """
 
     axes: Axes | None = field(default=None, kw_only=True)
@@ -110,16 +108,7 @@ class Container:
 
     @classmethod
     def load(cls, path: str | Path, expected: Axes | Container | None = None) -> Self:
-        """Read the npz.
-
-        Args:
-            path: the file.
-            expected: the source and the seed that it has to name, or the container whose samples it has to hold.
-
-        Raises:
-            InputError: missing or damaged file, another source or seed, other samples, a wrong shape or type, NaN,
-                pickled objects, impossible values.
-        """
+        """Read the npz; `expected` is the source and seed that it names, or the container whose samples it holds."""
         samples, axes = (expected, expected.axes) if isinstance(expected, Container) else (None, expected)
         arrays = cls.read(path, axes)
         loaded = cls(
@@ -166,15 +155,7 @@ def require_same_samples(
     what: str = "registrations",
     by: Sequence[str] = ("sample", "split"),
 ) -> None:
-    """Raise an InputError unless a file has the rows of `samples`, in their order.
-
-    Args:
-        path: the file.
-        rows: its arrays or columns, as numbers or as text.
-        samples: those expected.
-        what: name of `samples`, for the message.
-        by: columns that identify a sample.
-    """
+    """Raise an InputError unless the rows of a file are those of `samples`, by these columns and in their order."""
     for name in by:
         if list(map(str, rows[name])) != list(map(str, samples[name])):
             raise InputError(path, f"its samples differ from those of the {what}", REGENERATE_BOTH)

@@ -24,16 +24,9 @@ ANY = ("*",)
 def read_csv(
     path: str | Path, columns: Iterable[str], others: Iterable[str] = (), remedy: str = "regenerate it"
 ) -> pd.DataFrame:
-    """Read a CSV file with at least one row, all entries as text.
+    """Read a CSV file with at least one row, all entries as text; InputError for a damaged one.
 
-    Args:
-        columns: required ones.
-        others: patterns of optional ones; `ANY` for files of users, or if only a part is read.
-        remedy: for a damaged file.
-
-    Raises:
-        InputError: missing, empty or unreadable file; missing, unknown or repeated column; no rows, rows longer than
-            the head; an entry of several lines, an empty name, an unknown split.
+    `columns` are required, `others` are patterns of optional ones: `ANY` for files of users, or if only a part is read.
     """
     require_file(path, "no such file", "make it with snakemake")
     import pandas as pd
@@ -76,11 +69,7 @@ def _require_entries(path: str | Path, rows: pd.DataFrame, remedy: str) -> None:
 
 
 def numbers(path: str | Path, rows: pd.DataFrame, column: str, needed=True, least: float = -np.inf) -> pd.Series:
-    """Return a column as float64; NaN for other entries where they are not `needed`.
-
-    Raises:
-        InputError: no number where one is needed; a number below `least`.
-    """
+    """Return a column as float64; NaN for other entries if they are not `needed`. InputError for one below `least`."""
     import pandas as pd
 
     values = pd.to_numeric(rows[column], errors="coerce").astype(float)
@@ -99,11 +88,7 @@ def read_numbers(
     least: float = -np.inf,
     others: Iterable[str] = (),
 ) -> pd.DataFrame:
-    """Read a CSV file as :func:`read_csv` does, with numeric columns as numbers; empty optional entries become NaN.
-
-    Raises:
-        InputError: as :func:`read_csv` and :func:`numbers`.
-    """
+    """Read a CSV file as :func:`read_csv` does, with numeric columns as numbers; empty optional entries become NaN."""
     rows, may_be_empty = read_csv(path, columns, others), set(optional)
     for column in numeric:
         needed = rows[column] != "" if column in may_be_empty else True
@@ -112,11 +97,7 @@ def read_numbers(
 
 
 def finite_number(subject: object, name: str, text: str, remedy: str = "regenerate it") -> float:
-    """Return the number in a field; `subject` and `name` locate it in messages.
-
-    Raises:
-        InputError: no number, NaN or infinity.
-    """
+    """Return the number in a field; `subject` and `name` locate it in messages."""
     try:
         return decimal(text.strip())
     except ValueError as fault:

@@ -41,11 +41,8 @@ _BOUNDED = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 def require_file(path: str | Path, fault: str, remedy: str, largest_bytes: float = LARGEST_FILE_BYTES) -> None:
     """Raise an InputError unless a user's file can be read to its end; all readers of users' files call this.
 
-    Reading a device, a pipe, or an empty file of the kernel, as in /proc, may never end.
-
-    Args:
-        fault: the message for a missing file.
-        largest_bytes: that its reader can parse.
+    Reading a device, a pipe, or an empty file of the kernel, as in /proc, may never end. `fault` is the message for a
+    missing file, `largest_bytes` what its reader can parse.
     """
     try:
         status = os.stat(path)
@@ -124,15 +121,7 @@ def whole_file(path: str | Path) -> Iterator[Path]:
 
 
 def require_outputs(outputs: Iterable[str | Path], inputs: Iterable[str | Path] = (), folders: bool = False) -> None:
-    """Check before the work that its outputs can be written, and that none of them is an input; folders may be missing.
-
-    Args:
-        folders: whether the outputs are folders.
-
-    Raises:
-        InputError: two outputs, or an output and an input, are the same file; an output exists but is not a file, lies
-            below a file, or in a folder without permission.
-    """
+    """Check before the work that outputs can be written, and that none of them is an input; folders may be missing."""
     taken = {Path(os.path.realpath(path)) for path in inputs}
     for output in map(Path, outputs):
         if (real := Path(os.path.realpath(output))) in taken:
@@ -172,11 +161,7 @@ def sha256_of_file(path: str | Path) -> str:
 
 
 def read_image(path: str | Path, remedy: str) -> np.ndarray:
-    """Return the pixels of an image, (H, W) or (H, W, channels), in the file's depth.
-
-    Raises:
-        InputError: missing, truncated, unreadable or too large.
-    """
+    """Return the pixels of an image, (H, W) or (H, W, channels), in the file's depth; InputError for a damaged one."""
     require_file(path, "no such image", remedy)
     import numpy as np
     from PIL import Image

@@ -37,10 +37,8 @@ def load_own_yaml(path: Path) -> Any:
 def read_mapping(path: str | Path) -> dict[str, Any]:
     """Return the mapping that a YAML or JSON file holds.
 
-    Raises:
-        InputError: no such file, too large, not UTF-8, neither YAML nor JSON, no mapping, a repeated key, a scalar that
-            only YAML 1.1 has (`_ALIKE`), aliases that expand to more than `MOST_ENTRIES` or contain themselves, or what
-            :func:`require_plain` refuses.
+    InputError for a repeated key, a scalar that only YAML 1.1 has (`_ALIKE`), aliases that expand to more than
+    `MOST_ENTRIES` or contain themselves, and what :func:`require_plain` refuses.
     """
     path = Path(path)
     require_file(path, "no such file", "name a config, a YAML or JSON file", LARGEST_CONFIG_BYTES)
@@ -156,14 +154,7 @@ def _require_alike(node: yaml.ScalarNode, subject: str) -> None:
 
 
 def read_json(path: Path, what: str, remedy: str) -> dict[str, Any]:
-    """Return the object in a JSON file.
-
-    Args:
-        what: the kind of file, for the message: "is not `what`".
-
-    Raises:
-        InputError: missing, too large, not UTF-8, another type than an object, or what :func:`parse_json` refuses.
-    """
+    """Return the object in a JSON file; InputError, "is not `what`", for a damaged one."""
     require_file(path, "no such file", remedy, LARGEST_JSON_BYTES)
     try:
         content = parse_json(path.read_text(encoding="utf-8"))
@@ -175,11 +166,7 @@ def read_json(path: Path, what: str, remedy: str) -> dict[str, Any]:
 
 
 def parse_json(text: str) -> Any:
-    """Return the value of a JSON text.
-
-    Raises:
-        ValueError: no JSON (a JSONDecodeError), nested too deeply, a repeated key, NaN or infinity.
-    """
+    """Return the value of a JSON text; ValueError for none (a JSONDecodeError), a repeated key, NaN or infinity."""
     try:
         return json.loads(text, object_pairs_hook=_without_duplicates, parse_constant=_no_constant)
     except RecursionError as fault:
@@ -187,11 +174,7 @@ def parse_json(text: str) -> Any:
 
 
 def finite_numbers(value: Any, count: int, subject: object, name: str, remedy: str) -> np.ndarray:
-    """Return the numbers of a list, or of a list of rows; a single number needs no list.
-
-    Raises:
-        InputError: another count, something else than a number, or one that is not finite.
-    """
+    """Return the numbers of a list, or a list of rows; a single number needs no list. InputError for anything else."""
     rows = value if isinstance(value, list) and count > 1 else [value]
     numbers = [number for row in rows for number in (row if isinstance(row, list) and count > 1 else [row])]
     for number in numbers:

@@ -32,12 +32,8 @@ def from_entry(entry: dict, folder: Path) -> Iterator[Surface]:
 def surfaces(folder: str | Path, unit: str = "mm", objects: Sequence[int] | None = None) -> Iterator[Surface]:
     """Yield the models `objects` (ids; all when None), sorted and named ``obj_000001``.
 
-    Args:
-        folder: holds obj_*.ply itself, or models/ with them, as the datasets and their archives do.
-        unit: of the vertices; the format says mm.
-
-    Raises:
-        InputError: missing folder, model or models_info.json, or a model whose diameter is not the listed one.
+    The folder holds obj_*.ply itself, or models/ with them. InputError for a missing folder, model or models_info.json,
+    or a model whose diameter is not the listed one.
     """
     models = models_folder(Path(folder))
     scale = meters_per(unit)
@@ -92,12 +88,7 @@ def models_folder(folder: Path) -> Path:
 
 
 def read_models_info(path: Path) -> dict[int, dict]:
-    """Return the entries of models_info.json by object id.
-
-    Raises:
-        InputError: missing, damaged, an id that is no number or occurs twice, an impossible diameter, or a symmetry
-            that is no rigid transform.
-    """
+    """Return the entries of models_info.json by object id; InputError for a damaged file or impossible values."""
     from gpca.objects.bop import require_symmetries  # needs scipy, and the config's checks import this module
 
     remedy = "fetch the models again"
@@ -167,7 +158,6 @@ def find_symmetries(points_N_3: np.ndarray, diameter: float) -> dict[str, list]:
 
     Args:
         points_N_3: a dense cloud of the whole surface, centered on its bounding box.
-        diameter: of the object, in the unit of the points.
 
     Returns:
         ``symmetries_discrete``: 4×4 matrices row by row; ``symmetries_continuous``: axes with offsets. Only keys with

@@ -46,19 +46,12 @@ class Camera:
 
 @dataclass(frozen=True)
 class View:
-    """The view of a camera without noise.
+    """The view of a camera without noise."""
 
-    Attributes:
-        depth_m: (H, W), infinite where there is nothing.
-        mesh: (H, W) number of the mesh seen, `NOTHING` where there is none.
-        cosine: (H, W) of the angle between the surface's normal and the direction to the camera, in [0, 1].
-        normals: (H, W, 3) unit normals in the camera's frame, turned to the camera.
-    """
-
-    depth_m: np.ndarray
-    mesh: np.ndarray
-    cosine: np.ndarray
-    normals: np.ndarray
+    depth_m: np.ndarray  # (H, W), infinite where there is nothing
+    mesh: np.ndarray  # (H, W) number of the mesh seen, `NOTHING` where there is none
+    cosine: np.ndarray  # (H, W) of the angle between the surface's normal and the direction to the camera, in [0, 1]
+    normals: np.ndarray  # (H, W, 3) unit normals in the camera's frame, turned to the camera
 
 
 class MeshScene:
@@ -137,16 +130,11 @@ class DepthNoise:
         lateral deviation  σ_L = 0.8 + 0.035 θ / (π/2 - θ)  pixels.
 
     Lateral noise shifts the pixel that is looked at, so that edges fray.
-
-    Attributes:
-        scale: factor of both deviations; 0 is a perfect sensor.
-        grazing_deg: the steepest surface that is measured.
-        dropout: share of pixels that measure nothing.
     """
 
-    scale: Annotated[float, Bounds(minimum=0, maximum=10)] = 1.0
-    grazing_deg: Annotated[float, Bounds(exclusiveMinimum=0, maximum=90)] = 80.0
-    dropout: Annotated[float, Bounds(minimum=0, exclusiveMaximum=1)] = 0.01
+    scale: Annotated[float, Bounds(minimum=0, maximum=10)] = 1.0  # factor of both; 0 is a perfect sensor
+    grazing_deg: Annotated[float, Bounds(exclusiveMinimum=0, maximum=90)] = 80.0  # steepest that is measured
+    dropout: Annotated[float, Bounds(minimum=0, exclusiveMaximum=1)] = 0.01  # share of failed pixels
 
     def measure(self, view: View, random: np.random.Generator) -> np.ndarray:
         """Return measured depth (H, W) in meters, 0 where nothing was measured."""
@@ -227,8 +215,7 @@ def rendered_views(mesh: Surface, count: int) -> Iterator[Surface]:
     """Yield views of a mesh whose z axis points up, as clouds in the camera's frame, in meters.
 
     As in the UW RGB-D Object Dataset (Lai et al. 2011), the camera is 30, 45 and 60 degrees above a turntable in turn.
-    Views are named ``obj_000007_1_0`` by mesh, elevation and number. InputError for a cloud, or a mesh that the camera
-    does not see.
+    Views are named ``obj_000007_1_0`` by mesh, elevation and number.
     """
     if mesh.faces is None:
         raise InputError(f"object '{mesh.name}'", "is a cloud, of which there are no views", "use kind: mesh_folder")

@@ -68,8 +68,7 @@ def require_points(points: np.ndarray, subject: object) -> None:
 def diameter(points: np.ndarray, subject: object) -> float:
     """Return the largest distance between two of the (P, 3) points, in their unit (the diameter of the BOP benchmark).
 
-    The two farthest points are vertices of the convex hull, so only those are compared; of few points, all are.
-    InputError for no points, NaN, or points on one line.
+    Only vertices of the convex hull are compared, of few points all. InputError for NaN, or points on one line.
     """
     from scipy.spatial import ConvexHull
     from scipy.spatial.distance import cdist, pdist
@@ -91,20 +90,12 @@ def diameter(points: np.ndarray, subject: object) -> float:
 def canonical_cloud(
     surface: Surface, source: str, n_points: int = 16384, say: str = IN_CONFIG
 ) -> tuple[np.ndarray, np.ndarray, float]:
-    """Sample a surface uniformly and center it on its bounding box.
+    """Sample a surface uniformly, center it on its bounding box, and measure its diameter (m): points, unit normals, m.
 
     A mesh gives `n_points` area-uniform samples with the normals of their triangles. A point cloud keeps all its
-    points, in random order; missing normals are estimated and turned toward the camera at the origin.
-
-    Args:
-        surface: vertices in meters; its name and that of the `source` seed the sampling.
-        say: how the user sets the unit, for messages.
-
-    Returns:
-        points_m (P, 3) float32, unit normals (P, 3) float32, diameter in meters of the vertices.
-
-    Raises:
-        InputError: no points, NaN, no area, too few points, or a diameter that no declared unit would give.
+    points, in random order; missing normals are estimated and turned toward the camera at the origin. Arrays are
+    (P, 3) float32. The names of surface and source seed the sampling; `say` is how the user sets the unit. InputError
+    for NaN, no area, too few points, or a diameter that no declared unit would give.
     """
     subject = f"{source}: object '{surface.name}'"
     vertices_m = np.asarray(surface.vertices_m, dtype=np.float64)
@@ -209,19 +200,14 @@ def sample_objects(surfaces: Iterable[Surface], source: str, n_points: int = 163
 
 @dataclass(frozen=True)
 class ObjectClouds:
-    """The canonical clouds of one source, as :func:`write_objects` wrote them.
+    """The canonical clouds of one source, as :func:`write_objects` wrote them."""
 
-    Attributes:
-        names: those of the O objects.
-        diameters_m: (O,) float64.
-        clouds: for each object its points (P, 3) in meters and unit normals (P, 3), both float32.
-        families, folds: of each object, from a file of splits; without one, each instance is a family.
-    """
-
-    names: tuple[str, ...]
-    diameters_m: np.ndarray
-    clouds: tuple[tuple[np.ndarray, np.ndarray], ...]
-    families: tuple[str, ...] = ()
+    names: tuple[str, ...]  # of the O objects
+    diameters_m: np.ndarray  # (O,) float64
+    clouds: tuple[
+        tuple[np.ndarray, np.ndarray], ...
+    ]  # points (P, 3) in meters and unit normals (P, 3) of each, float32
+    families: tuple[str, ...] = ()  # of each object, from a file of splits; without one, each instance is a family
     folds: tuple[int, ...] = ()
 
     @classmethod
@@ -319,22 +305,14 @@ class Place(NamedTuple):
 
 
 def read_object_splits(path: str | Path, source: str) -> dict[str, Place]:
-    """Return the place of each object of a source by name; none where the file does not name the source.
-
-    Raises:
-        InputError: a damaged file, an object twice, an unknown role, a fold that is no whole number, a family in two
-            folds or roles.
-    """
+    """Return the place of each object of a source by name; none where the file does not name the source."""
     rows = read_csv(path, ("source", "object", "name", "family", "role", "fold"), remedy="restore it")
     rows = rows[rows["source"] == source]
     return _places(path, rows["object"], rows["family"], rows["role"], rows["fold"])
 
 
 def read_scene_splits(path: str | Path, dataset: str) -> dict[int, Place]:
-    """Return the place of each scene of a dataset by number; none where the file does not name the dataset.
-
-    InputError as in :func:`read_object_splits`, and for an unknown word for truth or estimates.
-    """
+    """Return the place of each scene of a dataset by number; none where the file does not name the dataset."""
     rows = read_csv(path, ("dataset", "scene", "role", "fold"), others=tuple(WORTH), remedy="restore it")
     rows = rows[rows["dataset"] == dataset]
     clusters = [f"{dataset} {scene}" for scene in rows["scene"]]

@@ -43,11 +43,8 @@ def fetch(url: str, sha256: str | None, folder: str | Path, location: str | None
     """Return the file of `url`, from the cache `folder` or downloaded to it, under the host and path of the URL.
 
     Without an expected `sha256`, the actual one is printed so that it can be pinned. `location` is that of the same
-    data below data_dir; the message names it when the network fails.
-
-    Raises:
-        InputError: no network, an error answer, an interrupted transfer, or another checksum. The download is removed
-            then; a file that was in the cache before stays.
+    data below data_dir; the message names it when the network fails. InputError for no network, an error answer, an
+    interrupted transfer, or another checksum: the download is removed then, but a file that was in the cache stays.
     """
     path = cached_path(url, folder)
     if path.is_file():
@@ -139,9 +136,8 @@ class Member:
 def open_archive(path: str | Path, largest_bytes: int = LARGEST_UNPACKED_BYTES) -> Iterator[list[Member]]:
     """Yield the regular files of an archive, readable within the context.
 
-    Raises:
-        InputError: missing, truncated or of another format; a member that is a link, a device or encrypted, or whose
-            path leaves the archive's folder; more than `largest_bytes` unpacked.
+    InputError for a damaged archive, or more than `largest_bytes` unpacked; for a member that is a link, a device or
+    encrypted, or whose path leaves the archive's folder.
     """
     path = Path(path)
     require_file(path, "no such file", "check url or files in the config", math.inf)
@@ -158,11 +154,8 @@ def open_archive(path: str | Path, largest_bytes: int = LARGEST_UNPACKED_BYTES) 
 def unpack(path: str | Path, folder: str | Path, largest_bytes: int = LARGEST_UNPACKED_BYTES) -> Path:
     """Unpack an archive into a folder, whole or not at all, with a list of SHA-256 beside it, and return the folder.
 
-    A folder that was unpacked before is checked against its list.
-
-    Raises:
-        InputError: see :func:`open_archive`; too little space on the disk; a file of the folder that was changed, is
-            missing or is not from the archive.
+    A folder that was unpacked before is checked against its list. InputError as in :func:`open_archive`, for too little
+    space on the disk, and for a file of the folder that was changed, is missing or is not from the archive.
     """
     folder = Path(folder)
     listed = folder.with_name(f"{folder.name}.sha256.json")

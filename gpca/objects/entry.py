@@ -25,31 +25,20 @@ SurfacePoints = Annotated[int, Bounds(minimum=256, maximum=1048576)]  # sampled 
 
 @dataclass(frozen=True)
 class Source:
-    """A source of objects: one row in every table.
-
-    Attributes:
-        kind: how the data is read.
-        family: of procedural objects.
-        location, files: the folder, relative to `data_dir`, and patterns below it.
-        objects: numbers of objects; all if empty.
-        unit: of lengths in the files.
-        url, urls, sha256: of the download, where the location does not exist.
-        views_per_instance: at most, of single views.
-        stand_in: every title says that the objects are stand-ins.
-    """
+    """A source of objects: one row in every table."""
 
     title: Text = ""
-    kind: str = ""
-    family: str = ""
-    location: Place | None = None
-    files: Annotated[list[Text], Field(min_length=1)] = field(default_factory=list)
-    objects: Distinct[Annotated[int, Bounds(minimum=0)]] = ()
-    unit: Unit | None = None
-    url: Url = ""
+    kind: str = ""  # how the data is read
+    family: str = ""  # of procedural objects
+    location: Place | None = None  # a folder, relative to `data_dir`
+    files: Annotated[list[Text], Field(min_length=1)] = field(default_factory=list)  # patterns below it
+    objects: Distinct[Annotated[int, Bounds(minimum=0)]] = ()  # their numbers; all if empty
+    unit: Unit | None = None  # of lengths in the files
+    url: Url = ""  # of the download, where the location does not exist; or several
     urls: Urls = field(default_factory=list)
     sha256: Checksums = None
-    views_per_instance: Count = 1
-    stand_in: bool = False
+    views_per_instance: Count = 1  # at most, of single views
+    stand_in: bool = False  # every title says that the objects are stand-ins
 
 
 @dataclass(frozen=True, kw_only=True)

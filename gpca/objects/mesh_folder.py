@@ -44,8 +44,7 @@ def meters_per(unit: str | None) -> float:
 def files_in(folder: str | Path, patterns: Sequence[str] | None, suffixes: Sequence[str]) -> list[Path]:
     """Return the files of a folder, sorted: the matches of the patterns, or all with one of the suffixes.
 
-    Raises:
-        InputError: no such folder, an empty one, a pattern without a match, a match of another format.
+    InputError for no such folder, an empty one, a pattern without a match, a match of another format.
     """
     folder = Path(folder)
     formats = ", ".join(suffixes)
@@ -71,9 +70,8 @@ def files_in(folder: str | Path, patterns: Sequence[str] | None, suffixes: Seque
 def read_surface(path: Path, scale: float) -> Surface:
     """Read one file, vertices times `scale`. Points without faces are a cloud, which only PLY may hold.
 
-    Raises:
-        InputError: unreadable, too large, truncated or longer than it declares, no points or faces, NaN, or a face that
-            refers to no vertex.
+    InputError for a file that is unreadable, truncated or longer than it declares, without points or faces, with NaN,
+    or with a face that refers to no vertex.
     """
     remedy = "fetch or export it again"
     require_file(path, "no such file", remedy)

@@ -276,8 +276,7 @@ CARTESIAN = ("cartesianX", "cartesianY", "cartesianZ")
 def read_scanner_file(path: Path) -> np.ndarray:
     """Return the points (P, 3) float64 of a file of `PACKAGES`, all scans of an E57 file joined in its frame.
 
-    Raises:
-        InputError: no such file, a missing package (the line says how to install it), or a file that it cannot read.
+    InputError for a missing package (the line says how to install it), or a file that it cannot read.
     """
     require_file(path, "no such file", "give a LAS, LAZ or E57 file")
     name = PACKAGES[path.suffix.lower()]
@@ -319,12 +318,8 @@ def from_entry(entry: dict, place: Path) -> Iterator[Surface]:
 def surfaces(paths: Iterable[Path], unit: str = "m", views_per_instance: int = 6) -> Iterator[Surface]:
     """Yield views of each instance of PCD files and tars of them, spread evenly in the order of sequence and frame.
 
-    Args:
-        unit: of the points.
-        views_per_instance: at most, of one tar or of the single files.
-
-    Raises:
-        InputError: damaged tar or PCD, a tar without PCD, NaN.
+    `views_per_instance` is the most of one tar or of the single files. InputError for a damaged file, or a tar without
+    PCD.
     """
     paths = [Path(path) for path in paths]
     scale = meters_per(unit)

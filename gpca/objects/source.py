@@ -44,15 +44,10 @@ def resolve(entry: dict, data_dir: str | None) -> dict:
     """Decide where a source's data comes from, without reading any, so that it is quick when a workflow loads.
 
     Data under `data_dir` comes first, then the repository's own, then the entry's `url` or `urls`. A `location` counts
-    if it exists; without one, each pattern of `files` must match.
+    if it exists; without one, each pattern of `files` must match. The returned entry has an `origin`, "procedural",
+    "local" or "download", and, when local, the absolute `location`; a download keeps the declared one, for messages.
 
-    Returns:
-        The entry with `origin` "procedural", "local" or "download" and, when local, with the absolute `location`. A
-        download keeps the declared one, for messages.
-
-    Raises:
-        InputError: unknown kind, missing data_dir, location not found and no url, checksums that do not match the urls,
-            and what the kind refuses of the entry.
+    InputError for an unknown kind, missing data, checksums that do not match the urls, and what the kind refuses.
     """
     subject = f"source '{entry.get('title', entry.get('kind'))}'"
     if data_dir is not None and not require_place(data_dir).is_dir():
@@ -162,9 +157,7 @@ def places_of(place: str, data_dir: str | None) -> list[Path]:
 def require_place(place: str | Path) -> Path:
     """Return a place of data as a path, with the user's home in place of ``~``: for each path that a user names.
 
-    Raises:
-        InputError: the home of an unknown user, a circle of symbolic links, or a folder of devices, whose files may
-            never end.
+    InputError for an unknown home, a circle of links, or a folder of devices, whose files may never end.
     """
     try:
         path = Path(place).expanduser()

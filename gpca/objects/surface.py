@@ -16,19 +16,12 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Surface:
-    """One object as its source gives it.
+    """One object as its source gives it."""
 
-    Attributes:
-        name: unique within the source.
-        vertices_m: (V, 3) float64, meters, in the source's own frame.
-        faces: (F, 3) int64 triangles, or None for a point cloud.
-        normals: (V, 3) unit normals of a point cloud; estimated from the points when None.
-    """
-
-    name: str
-    vertices_m: np.ndarray
-    faces: np.ndarray | None
-    normals: np.ndarray | None = None
+    name: str  # unique within the source
+    vertices_m: np.ndarray  # (V, 3) float64, meters, in the source's own frame
+    faces: np.ndarray | None  # (F, 3) int64 triangles, or None for a point cloud
+    normals: np.ndarray | None = None  # (V, 3) unit normals of a point cloud; estimated from the points when None
 
     @property
     def triangles(self) -> np.ndarray:

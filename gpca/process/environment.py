@@ -54,11 +54,7 @@ def system_library_hint(message: str) -> str | None:
 
 
 def require_open3d() -> ModuleType:
-    """Import and return Open3D.
-
-    Raises:
-        InputError: not installed, or not importable; the line names the extra, or the missing system library.
-    """
+    """Import and return Open3D; the line of an InputError names the extra, or the missing system library."""
     try:
         import open3d
     except (ImportError, OSError) as fault:

@@ -62,10 +62,8 @@ class Job:
 def run_step(snakemake: Any) -> None:
     """Run the step that the rule names in ``params.step``, then exit; see :func:`call`.
 
-    All stderr goes to the rule's log. A fault of the input ends as one line there and status 2.
-
-    Args:
-        snakemake: the object that Snakemake gives a script; the input ``code`` is no data.
+    `snakemake` is the object that Snakemake gives a script; its input ``code`` is no data. All stderr goes to the
+    rule's log. A fault of the input ends as one line there and status 2.
     """
     names = {"threads": snakemake.threads} | dict(snakemake.wildcards.items()) | dict(snakemake.params.items())
     prepare(names["threads"])  # before NumPy, torch and numba are loaded
@@ -93,13 +91,7 @@ def call(step: str, job: Job) -> None:
 def workflow_script(snakemake: Any) -> Iterator[dict]:
     """Run the block as a script of the workflow: stderr in the rule's log, provenance beside the outputs.
 
-    A fault of the input ends as one line in the log and status 2.
-
-    Args:
-        snakemake: the object that Snakemake gives a script; the input ``code`` is no data.
-
-    Yields:
-        a mapping, empty, of what the block adds to the provenance.
+    A fault of the input ends as one line in the log and status 2. The block can add to the provenance by the mapping.
     """
     from gpca.process.provenance import record_provenance
 
@@ -175,11 +167,7 @@ def keep_freed_memory() -> None:
 
 @contextmanager
 def standard_streams() -> Iterator[None]:
-    """Print letters that the encoding lacks as escapes such as ``\\xb0``, and check that all output was written.
-
-    Raises:
-        InputError: stdout is closed, its reader is gone, or its disk is full.
-    """
+    """Print letters that the encoding lacks as escapes such as ``\\xb0``, and check that all output was written."""
     if sys.stdout is None:
         raise InputError("stdout", "is closed", "redirect it, for example to /dev/null")
     if sys.stderr is None:  # its text would be printed to stdout

@@ -20,10 +20,7 @@ _interrupted = False
 def progress(items: Iterable[Item], title: str, **options) -> Iterator[Item]:
     """Iterate with a progress bar on a terminal, and with a line every ten seconds in a log file.
 
-    Work that ends before the first update prints nothing.
-
-    Raises:
-        KeyboardInterrupt: at the next item, where Ctrl-C was lost meanwhile.
+    Work that ends before the first update prints nothing. Where Ctrl-C was lost, the next item raises it again.
     """
     from tqdm import tqdm
 

@@ -35,18 +35,9 @@ def record_provenance(
 ) -> Iterator[dict]:
     """Time the block and, when it succeeds, write ``<output>.provenance.json`` beside each output.
 
-    The commit and the hash of environment.lock are null for a package outside a checkout.
-
-    Args:
-        outputs, inputs: files; the inputs are hashed (SHA-256).
-        settings: all that the result depends on besides its inputs.
-        folders: whether the outputs are folders.
-
-    Yields:
-        a mapping, empty, of what the block adds to the record.
-
-    Raises:
-        InputError: before the block, for an output that cannot be written: :func:`gpca.io.files.require_outputs`.
+    Inputs are files, which are hashed (SHA-256); `settings` are all that the result depends on besides them. The block
+    can add to the record by the mapping. An output that cannot be written is refused before the block, as an
+    InputError. The commit and the hash of environment.lock are null for a package outside a checkout.
     """
     require_outputs(outputs, inputs, folders)
     started, added = time.perf_counter(), {}  # type: ignore[var-annotated]

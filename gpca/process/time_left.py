@@ -59,13 +59,7 @@ class TimeLeft:
 
 
 class TimeLeftHandler(logging.Handler):
-    """Writes a line about the time left after Snakemake's counts of jobs, at most every `EVERY_S`.
-
-    Args:
-        has_ended: whether a job has ended.
-        say: writes a line.
-        clock: monotonic seconds.
-    """
+    """Writes a line about the time left after Snakemake's counts of jobs, at most every `EVERY_S`."""
 
     def __init__(
         self,
@@ -89,12 +83,7 @@ class TimeLeftHandler(logging.Handler):
 
 
 def tell_time_left(workflow: Any, run: str) -> None:
-    """Print the time left during a run, unless none of its jobs was ever measured.
-
-    Args:
-        workflow: Snakemake's object of that name, within ``onstart``.
-        run: name of the run.
-    """
+    """Print the time left during a run, unless none of its jobs was ever measured; `workflow` is Snakemake's object."""
     from snakemake.logging import logger
     from snakemake.settings.enums import Quietness
 

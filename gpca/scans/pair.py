@@ -135,15 +135,10 @@ def voxels(points_N_3: np.ndarray, edge: float) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Rung:
-    """A disturbance of a pose.
-
-    Attributes:
-        rotation_deg: about a random axis through the middle of the source.
-        translation_m: in a random direction; for objects, times :attr:`ScanPair.scale`.
-    """
+    """A disturbance of a pose: a turn about a random axis through the middle of the source, and a shift."""
 
     rotation_deg: Annotated[float, Bounds(minimum=0, maximum=180)]
-    translation_m: NotNegative
+    translation_m: NotNegative  # in a random direction; for objects, times `ScanPair.scale`
 
     @property
     def name(self) -> str:
@@ -177,14 +172,10 @@ class ScanSuccess:
     That is the criterion of 3DMatch (Zeng et al. 2017, after Choi et al. 2015): 0.2 m over the true correspondences.
     Here they are each point and its true place, as in the benchmark's code, which evaluates the same sum to second
     order from a 6×6 matrix of each pair.
-
-    Attributes:
-        room_m: in rooms, in meters.
-        object_share: of objects, relative to their size.
     """
 
-    room_m: Positive = 0.2
-    object_share: PositiveShare = 0.02
+    room_m: Positive = 0.2  # in rooms
+    object_share: PositiveShare = 0.02  # of objects, relative to their size
 
     def limit_m(self, pair: ScanPair) -> float:
         """Return the limit of a pair, in meters."""

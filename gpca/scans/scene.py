@@ -20,16 +20,11 @@ from gpca.seeds import generator
 
 @dataclass(frozen=True)
 class Scan:
-    """Points (N, 3) in the frame of their sensor, in meters.
-
-    Attributes:
-        T_scene_scan: the pose in the scene; None where only poses of pairs are known.
-        viewpoint_3: position of the sensor in the frame of the points; None where unknown.
-    """
+    """Points (N, 3) in the frame of their sensor, in meters."""
 
     points_N_3: np.ndarray
-    T_scene_scan: np.ndarray | None = None
-    viewpoint_3: np.ndarray | None = None
+    T_scene_scan: np.ndarray | None = None  # None where only poses of pairs are known
+    viewpoint_3: np.ndarray | None = None  # of the sensor in the frame of the points; None where unknown
 
 
 @dataclass(frozen=True)
@@ -44,19 +39,13 @@ class Known:
 
 @dataclass(frozen=True)
 class Scene:
-    """A scene that was scanned from several places.
-
-    Attributes:
-        name, family, kind: as of :class:`gpca.scans.pair.ScanPair`.
-        scans: by name, in order.
-        printed: the pairs that the data set lists; if empty, all pairs of scans.
-    """
+    """A scene that was scanned from several places."""
 
     name: str
     kind: Kind
-    scans: Mapping[str, Scan]
-    printed: tuple[Known, ...] = ()
-    family: str = ""
+    scans: Mapping[str, Scan]  # by name, in order
+    printed: tuple[Known, ...] = ()  # the pairs that the data set lists; if empty, all pairs of scans
+    family: str = ""  # as of `ScanPair`
 
     def __post_init__(self) -> None:
         if len(self.scans) < 2:
@@ -129,10 +118,8 @@ def stratum_of(overlap: float, edges: Sequence[float]) -> str | None:
 def choose_pairs(scenes: Iterable[Scene], edges: Sequence[float], most: int, *axes: object) -> list[ScanPair]:
     """Return up to `most` pairs of each scene and stratum, stratum by stratum, scene by scene.
 
-    Args:
-        scenes: read one after another; only the chosen clouds are kept.
-        edges: of the strata of overlap, ascending.
-        axes: name the random numbers; a scene's draw does not depend on the other scenes.
+    Scenes are read one after another, and only the chosen clouds are kept. `edges` are those of the strata of overlap,
+    ascending. The axes name the random numbers; a scene's draw does not depend on the other scenes.
     """
     chosen: dict[str, list[ScanPair]] = {stratum_name(*ends): [] for ends in pairwise(edges)}
     for scene in scenes:

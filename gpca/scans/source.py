@@ -177,11 +177,7 @@ def ply_scenes(entry: ScanEntry, place: Path) -> Iterator[Scene]:
 
 
 def read_poses(path: Path) -> dict[str, np.ndarray]:
-    """Return the pose (4×4) of each scan by name.
-
-    Raises:
-        InputError: no such file, other than 17 words in a line, no number, no rigid transform, a name twice.
-    """
+    """Return the pose (4×4) of each scan by name; InputError for a line other than a name and a rigid pose."""
     require_file(path, "no such file", POSES_REMEDY)
     poses: dict[str, np.ndarray] = {}
     for number, line in enumerate(path.read_text("utf-8", errors="replace").splitlines(), 1):
@@ -237,11 +233,7 @@ def benchmark_scenes(entry: ScanEntry, place: Path) -> Iterator[Scene]:
 
 
 def read_log(path: Path) -> dict[tuple[str, str], np.ndarray]:
-    """Return ``T_target_source`` (4×4) of each pair of a ``gt.log``, by the numbers of target and source.
-
-    Raises:
-        InputError: no such file, another count of numbers, no rigid transform, a pair twice.
-    """
+    """Return ``T_target_source`` (4×4) of each pair of a ``gt.log``, by the numbers of target and source."""
     require_file(path, "no such file", BENCHMARK_REMEDY)
     lines = [line.split() for line in path.read_text("utf-8", errors="replace").splitlines() if line.strip()]
     if not lines or len(lines) % LINES_OF_PAIR:
@@ -324,15 +316,9 @@ READERS: dict[str, Callable[[ScanEntry, Path], Iterator[Scene]]] = {
 
 
 def scenes_of(entry: ScanEntry, place: Path | None, role: str, most_points: int) -> Iterator[Scene]:
-    """Yield the scenes of a data set, one by one.
+    """Yield the scenes of a data set that the `role` of the run sees, one by one.
 
-    Args:
-        place: of its files; None of a virtual one.
-        role: of the run, ``development`` or ``evaluation``, which have different scenes.
-        most_points: larger scans are thinned to this many of their points, drawn at random.
-
-    Raises:
-        InputError: no scenes of the role, or faulty files.
+    Larger scans are thinned to `most_points`, drawn at random. InputError for no scenes of the role, or faulty files.
     """
     if entry.kind == "virtual":
         from gpca.scans import virtual  # loads trimesh, which nothing needs that plans a run
