@@ -1,11 +1,9 @@
 """95 % intervals: by the pigeonhole bootstrap over clusters and seeds, Wilson's, and Student's over seeds.
 
-Clusters (families of objects, scenes, rendered tables) and seeds are crossed. The pigeonhole bootstrap (Owen 2007)
-draws both with replacement and weights a sample by the product of the two counts.
-
-A share has the farther bounds of the bootstrap and of Wilson's interval for independent samples, because few clusters
-may agree by chance. Where all draws agree, the bootstrap has no width, and Wilson's interval counts a cluster once in
-each seed. docs/comparison.md states this rule for readers, benchmarks/intervals.py checks its coverage.
+The pigeonhole bootstrap (Owen 2007) draws clusters (families of objects, scenes, rendered tables) and seeds with
+replacement and weights a sample by the product of the two counts. A share has the farther bounds of it and of Wilson's
+interval for independent samples, because few clusters may agree by chance. Where all draws agree, Wilson's interval
+counts a cluster once in each seed. docs/comparison.md states this rule, benchmarks/intervals.py checks its coverage.
 """
 
 from __future__ import annotations
@@ -25,6 +23,7 @@ LEVEL = 0.95
 NO_WIDTH = 1e-9  # an interval this narrow differs from a point by rounding alone
 ANYTHING = (-np.inf, np.inf)  # limits of a value that has none
 UNTRAINED = ("chance", "most_frequent", "rule")  # explainers of baselines/untrained.py
+NO_OTHER = ("", np.nan, np.nan, np.nan)  # in the place of a difference
 
 
 class Estimate(NamedTuple):
@@ -36,12 +35,7 @@ class Estimate(NamedTuple):
 
 
 def pigeonhole_weights(random: np.random.Generator, *factors: np.ndarray) -> np.ndarray:
-    """Number of times that each of N samples is drawn, (`REPEATS`, N).
-
-    Args:
-        random: draws the levels of the factors, one factor after the other.
-        factors: (N,) each, the level of every sample, such as its seed or its object.
-    """
+    """Number of times that each of N samples is drawn, (`REPEATS`, N), by their levels of factors such as the seed."""
     weights_B_N = np.ones((REPEATS, len(factors[0])))
     for factor_N in factors:
         names, number_N = np.unique(factor_N, return_inverse=True)
@@ -64,7 +58,7 @@ def interval(
         drawn_B_N: (B, N) for a share: how often each draw contains each of its N samples. Without it, the interval is
             that of the bootstrap alone.
         difference: the statistic is a difference of two shares of the same samples.
-        samples: number of samples where a column of `drawn_B_N` stands for several.
+        samples: their number where a column of `drawn_B_N` stands for several.
     """
     value, (low, high) = float(value_B[0]), quantile_bounds(value_B[1:], level)
     if drawn_B_N is None or np.isnan(low):
@@ -98,19 +92,12 @@ def quantile_bounds(values_B: np.ndarray, level: float = LEVEL) -> tuple[float, 
 
 
 def independent(drawn_B_N: np.ndarray) -> int:
-    """Number of combinations of levels, such as a seed and a cluster, among the N samples.
-
-    Samples of one combination appear equally often in every draw.
-    """
+    """Number of combinations of a seed and a cluster among N samples: those of one are drawn equally often."""
     return len({column.tobytes() for column in np.ascontiguousarray(drawn_B_N.T)})
 
 
 def wilson_interval(successes: float, trials: int, level: float = LEVEL) -> tuple[float, float]:
-    """Score interval of a share (Wilson 1927), in [0, 1]; successes may be fractional, unlike SciPy's.
-
-    Raises:
-        ValueError: no trials.
-    """
+    """Score interval of a share (Wilson 1927), in [0, 1]; successes may be fractional, unlike SciPy's."""
     if trials < 1:
         raise ValueError("interval of no trials")
     z = NormalDist().inv_cdf((1 + level) / 2)
@@ -124,10 +111,7 @@ def wilson_interval(successes: float, trials: int, level: float = LEVEL) -> tupl
 def mean_interval(values_R: Iterable[float], level: float = LEVEL) -> Estimate:
     """Mean of R repeats and the bounds of its Student t-interval, mean ± t_{R-1} s / √R, not clipped.
 
-    One repeat has NaN bounds; a NaN repeat makes all three NaN.
-
-    Raises:
-        ValueError: no repeats.
+    One repeat has NaN bounds; a NaN repeat makes all three NaN; none raises ValueError.
     """
     from scipy.stats import t as student_t
 
@@ -150,16 +134,11 @@ def weighted_mean(value_N: np.ndarray, weights_B_N: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Clustered:
-    """N test samples of several seeds, and how often each draw of a bootstrap over clusters and seeds contains them.
-
-    Attributes:
-        seed: (N,). cluster: (N,) cluster id of each sample.
-        weights: (1 + B, N): ones for the samples themselves, then the counts of each draw.
-    """
+    """N test samples of several seeds, and how often each draw of a bootstrap over clusters and seeds contains them."""
 
     seed: np.ndarray
     cluster: np.ndarray
-    weights: np.ndarray
+    weights: np.ndarray  # (1 + B, N): ones for the samples themselves, then the counts of each draw
 
     @classmethod
     def drawn(cls, seed_N: Iterable, cluster_N: Iterable, *axes: object) -> Clustered:
@@ -199,14 +178,10 @@ class Clustered:
     ) -> Estimate:
         """Mean over the seeds, weighted by their samples, of a measure that is no mean over samples.
 
-        Repeated samples can inflate such a measure, for example a calibration error, so its draws are shifted until
-        their mean equals the value.
-
-        Args:
-            measure: values (1 + B,) of some samples, given their rows (n,) and weights (1 + B, n).
-            limits: of the measure, and so of the bounds.
+        It has values (1 + B,) of the samples in given rows (n,) with weights (1 + B, n). Repeated samples can inflate
+        it, for example a calibration error, so its draws are shifted until their mean equals the value.
         """
-        total_B, drawn_B = (np.zeros(len(self.weights)) for _ in range(2))
+        total_B, drawn_B = np.zeros(len(self.weights)), np.zeros(len(self.weights))
         for seed in np.unique(self.seed):
             rows = np.flatnonzero(self.seed == seed)
             weights_B_n = self.weights[:, rows]
@@ -231,21 +206,6 @@ class Clustered:
         return Estimate(value, float(low), float(high))
 
 
-@dataclass(frozen=True)
-class Difference:
-    """Value of a method minus that of another; NaN where there is no other."""
-
-    other: str = ""
-    value: float = np.nan
-    low: float = np.nan
-    high: float = np.nan
-
-    @property
-    def cells(self) -> tuple[str, float, float, float]:
-        """The four entries of a row."""
-        return self.other, self.value, self.low, self.high
-
-
 def best_of(values: Mapping[str, np.ndarray], names: Collection[str], least_is_best: bool = False) -> str:
     """Name with the best value on the samples themselves; empty where none has a value."""
     finite = [name for name in names if name in values and np.isfinite(values[name][0])]
@@ -255,27 +215,6 @@ def best_of(values: Mapping[str, np.ndarray], names: Collection[str], least_is_b
 
 def difference(
     values: Mapping[str, np.ndarray], name: str, other: str, drawn_B_N: np.ndarray | None = None
-) -> Difference:
-    """Paired difference of two methods; `values` and `drawn_B_N` as in :func:`interval`."""
-    if not other:
-        return Difference()
-    return Difference(other, *interval(values[name] - values[other], drawn_B_N, difference=True))
-
-
-def from_rival(
-    values: Mapping[str, np.ndarray],
-    name: str,
-    rivals: Collection[str],
-    least_is_best: bool = False,
-    drawn_B_N: np.ndarray | None = None,
-) -> Difference:
-    """Paired difference from the best of the other rivals; of equals, the first by name."""
-    others = sorted(other for other in rivals if other != name)
-    return difference(values, name, best_of(values, others, least_is_best), drawn_B_N)
-
-
-def from_untrained(
-    values: Mapping[str, np.ndarray], name: str, least_is_best: bool = False, drawn_B_N: np.ndarray | None = None
-) -> Difference:
-    """Paired difference from the best of the other untrained explainers."""
-    return from_rival(values, name, UNTRAINED, least_is_best, drawn_B_N)
+) -> tuple[str, float, float, float]:
+    """Other method, paired difference from it and its bounds; `NO_OTHER` where there is none. See :func:`interval`."""
+    return (other, *interval(values[name] - values[other], drawn_B_N, difference=True)) if other else NO_OTHER

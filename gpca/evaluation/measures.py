@@ -1,13 +1,13 @@
 """Measures of test samples by seed, and over all seeds with intervals and paired differences: one form of rows.
 
-Samples are a frame with one row each; ``seed`` is the repeat and ``cluster`` the family, scene or table. A file of
-numbers holds either one value per seed (`TIDY_COLUMNS`) or one row over all seeds with its interval (`COLUMNS`). A
-difference is a row of the latter kind: ``against`` says what kind of rival it is measured from, ``other`` which one.
+Samples are a frame with one row each; ``cluster`` is the family, scene or table. A file of numbers holds either one
+value per seed (`TIDY_COLUMNS`) or one row over all seeds with its interval (`COLUMNS`). A difference is a row of the
+latter kind: ``against`` says what kind of rival it is measured from, ``other`` which one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -58,26 +58,20 @@ class Measure:
     least_is_best: bool = False
     factor: float = 1.0
 
-    def values(self, samples: pd.DataFrame, weights_B_N: np.ndarray) -> np.ndarray:
-        """Values (B,) by weights of the samples."""
+    def values(self, samples: pd.DataFrame, weights_B_N: np.ndarray | None = None) -> np.ndarray:
+        """Values (B,) by weights of the samples; without weights, that of the samples themselves."""
         if self.statistic is not None:
-            return self.statistic(samples, weights_B_N)
-        return weighted_mean(self.per_sample(samples), weights_B_N) * self.factor
-
-    def per_sample(self, samples: pd.DataFrame) -> np.ndarray:
-        """Value of each sample (N,)."""
-        return np.asarray(samples[self.of] if isinstance(self.of, str) else self.of(samples), float)
+            return self.statistic(samples, np.ones((1, len(samples))) if weights_B_N is None else weights_B_N)
+        value_N = np.asarray(samples[self.of] if isinstance(self.of, str) else self.of(samples), float)
+        mean = [value_N.mean()] if weights_B_N is None else weighted_mean(value_N, weights_B_N)
+        return np.asarray(mean) * self.factor
 
 
 COUNT = Measure(statistic=lambda _samples, weights_B_N: weights_B_N.sum(axis=1), limits=ANYTHING)  # of samples
 
 
 def read_samples(files: Iterable[str | Path], read: Callable[[Path], pd.DataFrame]) -> pd.DataFrame:
-    """Rows of files named ``…/{source}/{method}/seed{seed}.csv``, with these three as columns.
-
-    Raises:
-        InputError: no files, a name of another form, or a file that the reader refuses.
-    """
+    """Rows of files named ``…/{source}/{method}/seed{seed}.csv``, with these three as columns."""
     import pandas as pd
 
     frames = []
@@ -96,18 +90,11 @@ def per_seed(
     records = []
     for (*keys, seed), rows in samples.groupby([*GROUPS, "seed"], sort=False):
         for part, mask_N in parts(rows).items():
-            if not mask_N.any():
-                continue
             subset = rows[mask_N]
-            once_1_n = np.ones((1, len(subset)))
-            for name, measure in _taken(part, measures):
-                mean = measure.statistic is None
-                value = (
-                    measure.per_sample(subset).mean() * measure.factor if mean else measure.values(subset, once_1_n)[0]
-                )
-                if np.isfinite(value):
+            for name, measure in _taken(part, measures) if len(subset) else ():
+                if np.isfinite(value := measure.values(subset)[0]):
                     records.append((*keys, name, part, seed, float(value)))
-            if TEST_SAMPLES not in measures:
+            if len(subset) and TEST_SAMPLES not in measures:
                 records.append((*keys, TEST_SAMPLES, part, seed, float(len(subset))))
     return tidy(records, "samples")
 
@@ -120,8 +107,7 @@ def over_seeds(
 ) -> pd.DataFrame:
     """`COLUMNS` of each measure by table, source, method and part, over all seeds.
 
-    Args:
-        draws: rows of the samples' index select their draws, so all methods of the same samples share them.
+    The index of the samples selects their draws, so all methods of the same samples share them.
     """
     import pandas as pd
 
@@ -155,8 +141,7 @@ def compared(
         values: method -> the measure (1 + B,) of the samples and of every draw; methods without a value are left out.
         draws: of the samples that the measure depends on.
         limits: as of :class:`Measure`.
-        against: kind of rival -> function of a method and all methods that returns its rivals; the difference is from
-            the best of them.
+        against: kind of rival -> function that returns the rivals; the difference is from the best of them.
     """
     values = {method: value_B for method, value_B in values.items() if np.isfinite(value_B[0])}
     drawn_B_N = draws.weights[1:] if limits is SHARE else None
@@ -176,25 +161,13 @@ def compared(
 
 
 def intervals(records: list[tuple], name: str) -> pd.DataFrame:
-    """Frame of `COLUMNS`, or of `KEYS`, `AGAINST` and `NUMBERS`.
-
-    Raises:
-        InputError: no records; `name` says of what.
-    """
-    import pandas as pd
-
-    if not records:
-        raise InputError(name, "no files were given", "run its step first")
-    with_rivals = len(records[0]) > len(COLUMNS)
-    return pd.DataFrame(records, columns=[*KEYS, *AGAINST, *NUMBERS] if with_rivals else list(COLUMNS))
+    """Frame of `COLUMNS`, or of `KEYS`, `AGAINST` and `NUMBERS`; `name` says what the records are of."""
+    with_rivals = bool(records) and len(records[0]) > len(COLUMNS)
+    return _frame(records, (*KEYS, *AGAINST, *NUMBERS) if with_rivals else COLUMNS, name, "run its step first")
 
 
 def read_clustered(path: str | Path) -> pd.DataFrame:
-    """Read a file of intervals; a value without an interval has NaN bounds, a row that is no difference no ``against``.
-
-    Raises:
-        InputError: missing, empty or unreadable file, missing column, a value that is no finite number.
-    """
+    """Read a file of intervals; a value without one has NaN bounds, a row that is no difference no ``against``."""
     rows = read_numbers(path, COLUMNS, NUMBERS, optional=("low", "high"), others=AGAINST)
     return rows.assign(**{name: "" for name in AGAINST if name not in rows})
 
@@ -207,11 +180,7 @@ def read_rows(path: str | Path) -> pd.DataFrame:
 
 
 def read_metrics(path: str | Path) -> pd.DataFrame:
-    """Read a file of values by seed.
-
-    Raises:
-        InputError: missing, empty or unreadable file, missing column, a seed or value that is not a finite number.
-    """
+    """Read a file of values by seed."""
     rows = read_csv(path, TIDY_COLUMNS)
     rows["seed"] = numbers(path, rows, "seed").astype(int)
     rows["value"] = numbers(path, rows, "value")
@@ -231,16 +200,16 @@ def write_metrics(metrics: pd.DataFrame, path: str | Path) -> None:
 
 
 def tidy(records: list[tuple], name: str) -> pd.DataFrame:
-    """Frame of `TIDY_COLUMNS`.
+    """Frame of `TIDY_COLUMNS`; `name` says what the records are of."""
+    return _frame(records, TIDY_COLUMNS, name, "name at least one explainer in the config")
 
-    Raises:
-        InputError: no records; `name` says of what.
-    """
+
+def _frame(records: list[tuple], columns: Sequence[str], name: str, remedy: str) -> pd.DataFrame:
     import pandas as pd
 
     if not records:
-        raise InputError(name, "no files were given", "name at least one explainer in the config")
-    return pd.DataFrame(records, columns=list(TIDY_COLUMNS))
+        raise InputError(name, "no files were given", remedy)
+    return pd.DataFrame(records, columns=list(columns))
 
 
 def source_method_seed(path: str | Path) -> tuple[str, str, int]:

@@ -34,7 +34,7 @@ from gpca.causes.settings import SCANS, ScanSamples
 from gpca.causes.truth import BORDERLINE, FAILED, GEOMETRY
 from gpca.encoders.registry import encoders
 from gpca.errors import InputError, with_key
-from gpca.evaluation.intervals import Difference, best_of, difference, interval, pigeonhole_weights
+from gpca.evaluation.intervals import NO_OTHER, best_of, difference, interval, pigeonhole_weights
 from gpca.evaluation.measures import POOLED
 from gpca.experiments.experiment import Experiment, LeftOut, Names
 from gpca.experiments.plan import Run
@@ -319,13 +319,13 @@ def _measures(
         counted_N = counted_of_scans(any_samples, metric)
         drawn_B_n = drawn_B_N[:, counted_N] if metric in (*SHARES, CAUSES) else None
         gates = [names[other] for other in judged if other[1].startswith(GATE) and other != key]
-        lead = Difference()
+        lead = NO_OTHER
         if key[1] != CEILING and metric != SAMPLES:
             gate = best_of(of_metric, gates, metric in SMALLER_IS_BETTER)
             lead = difference(of_metric, names[key], gate, drawn_B_n)
         value_B = of_metric[names[key]]
         counts = int(counted_N.sum()), len(set(cluster_N[counted_N])), len(set(any_samples.seed[counted_N].tolist()))
-        yield (*place, *key, metric, *counts, *interval(value_B, drawn_B_n), *lead.cells)
+        yield (*place, *key, metric, *counts, *interval(value_B, drawn_B_n), *lead)
 
 
 def scan_measures(samples: Judged, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
@@ -364,5 +364,5 @@ def _counts(place: tuple[str, str, str], samples: pd.DataFrame) -> list[tuple]:
     counts |= Counter({f"{name}s": samples[name].nunique() for name in ("pair", "cluster")})
     counts |= Counter(registrations=len(samples), missed=int((samples["missed"] == "True").sum()))
     own = (len(samples), samples["cluster"].nunique(), samples["seed"].nunique())
-    nothing = (np.nan, np.nan, *Difference().cells)
+    nothing = (np.nan, np.nan, *NO_OTHER)
     return [(*place, SCANS, TRUTH, f"count_{kind}", *own, float(counts[kind]), *nothing) for kind in COUNTED]

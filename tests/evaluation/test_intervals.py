@@ -1,12 +1,21 @@
+"""Intervals over draws, of shares, means and paired differences."""
+
 import numpy as np
 import pytest
 
+from baselines import untrained
 from gpca.evaluation.intervals import (
+    NO_OTHER,
+    REPEATS,
+    UNTRAINED,
+    best_of,
+    difference,
     independent,
     interval,
     mean_interval,
     pigeonhole_weights,
     quantile_bounds,
+    weighted_mean,
     wilson_interval,
 )
 from gpca.seeds import generator
@@ -104,3 +113,34 @@ def test_mean_interval_of_one_none_and_unfinished_repeats():
     assert np.isnan(mean_interval([0.7, np.nan])).all()
     with pytest.raises(ValueError, match="no repeats"):
         mean_interval([])
+
+
+N = 300
+RIGHT = {
+    name: np.random.default_rng(seed).random(N) < share
+    for seed, (name, share) in enumerate({"rule": 0.5, "chance": 0.3, "good": 0.8, "poor": 0.1}.items())
+}
+WEIGHTS = np.vstack([np.ones(N), pigeonhole_weights(np.random.default_rng(9), np.arange(N) // 3)])
+VALUES = {name: weighted_mean(right_N, WEIGHTS) for name, right_N in RIGHT.items()}
+
+
+def test_weighted_means_are_those_of_the_samples_and_then_of_every_draw():
+    assert VALUES["good"].shape == (1 + REPEATS,)
+    assert VALUES["good"][0] == RIGHT["good"].mean()
+    assert VALUES["good"][1:].std() > 0
+
+
+def test_the_best_untrained_one_is_beaten_by_a_paired_difference():
+    assert UNTRAINED == tuple(untrained.EXPLAINERS) == tuple(untrained.CAUSE_EXPLAINERS)
+    assert best_of(VALUES, UNTRAINED) == "rule" and best_of(VALUES, UNTRAINED, least_is_best=True) == "chance"
+    other, value, low, high = difference(VALUES, "good", "rule")
+    assert (other, value) == ("rule", pytest.approx(RIGHT["good"].mean() - RIGHT["rule"].mean()))
+    assert 0 < low < value < high
+    shifted = {"a": VALUES["good"], "b": VALUES["good"] - 0.1}  # an interval of the differences, not of the two
+    assert difference(shifted, "a", "b")[1:] == pytest.approx((0.1, 0.1, 0.1))
+
+
+def test_without_another_there_is_no_difference():
+    alone = {"good": VALUES["good"], "rule": np.full(1 + REPEATS, np.nan)}
+    assert best_of(alone, UNTRAINED) == ""
+    assert difference(VALUES, "good", "") is NO_OTHER

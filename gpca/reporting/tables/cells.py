@@ -51,7 +51,7 @@ def share_within_limits(cell: Cell, column: Column) -> Cell:
     """Return the cell of a share in % with bounds, where its t-interval has no width or reaches beyond 0 or 100 %.
 
     They are the farther ones of that interval, cut at the limits, and of Wilson's. For this a cluster counts once in
-    each seed, or where the clusters are not finite, a sample in one seed alone; without either there is no interval.
+    each seed, or where the clusters are not known, a sample in one seed alone; without either there is no interval.
     """
     is_share = column.of_samples and column.limits == SHARE and not column.beside
     if not is_share or cell.bounds or cell.at_least or isnan(cell.half_width):
