@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpca.attribution import weighted
+from gpca.attribution.diagnostics import LEAST_PROBABILITY
 from gpca.attribution.predictions import concepts_of, read_predictions
 from gpca.errors import InputError
 from gpca.evaluation.intervals import Clustered, Estimate
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
 SCORES = ("max_score", "entropy", "bald", "variance")  # not every learner has the last two
-LEAST_PROBABILITY = 1e-12  # of a true class, as in gpca.attribution.diagnostics
 
 
 def read_learner_predictions(prediction_files: Iterable[str | Path], set_files: Iterable[str | Path] = ()) -> dict:
@@ -29,15 +29,16 @@ def read_learner_predictions(prediction_files: Iterable[str | Path], set_files: 
     Args:
         prediction_files: named `…/{source}/{learner}/seed{seed}.csv`, as the step ``fit_learners`` writes them.
         set_files: named `…/{source}/seed{seed}.npz`; their `DISTANCES` become columns of the rows.
-
-    Raises:
-        InputError: an unusable prediction file, an unknown set, scores that are no probabilities, other samples in
-            the two kinds of files.
     """
+    import pandas as pd
+
     distances = {}
     for path in set_files:
         _, source, seed = source_method_seed(path)
-        distances[source, seed] = (path, _distances(ShiftedSets.load(path)))
+        sets = ShiftedSets.load(path)
+        test = sets.split == "test"
+        samples = pd.MultiIndex.from_arrays([sets.set[test], sets.sample[test].astype(str)])
+        distances[source, seed] = path, pd.DataFrame(sets.distance[test], index=samples, columns=list(DISTANCES))
     predictions = {}
     for path in prediction_files:
         source, learner, seed = source_method_seed(path)
@@ -45,13 +46,17 @@ def read_learner_predictions(prediction_files: Iterable[str | Path], set_files: 
         p_S_C = rows[[f"score_{concept}" for concept in concepts_of(rows)]].to_numpy()
         if not (p_S_C >= 0).all() or not np.allclose(p_S_C.sum(axis=1), 1, atol=1e-4):
             raise InputError(path, "scores are negative or do not sum to one", "a learner must give probabilities")
-        rows = rows.drop(columns="bald").assign(**_uncertainties(path, rows, p_S_C))
+        uncertainties = {"max_score": 1 - p_S_C.max(axis=1), "entropy": numbers(path, rows, "entropy")}
+        variances = [name for name in rows.columns if name.startswith("variance_")]
+        if variances and (rows["bald"] != "").all():
+            uncertainties |= {"bald": numbers(path, rows, "bald"), "variance": rows[variances].sum(axis=1)}
+        rows = rows.drop(columns="bald").assign(**uncertainties)
         if (source, seed) in distances:
-            other, measured = distances[source, seed]
-            keys = _keys(rows)
-            if not keys.isin(measured.index).all():
-                raise InputError(other, f"lacks samples of {path}", "regenerate both from the same config")
-            rows = rows.join(measured.loc[keys].set_axis(rows.index))
+            set_path, measured = distances[source, seed]
+            samples = pd.MultiIndex.from_frame(rows[["set", "sample"]])
+            if not samples.isin(measured.index).all():
+                raise InputError(set_path, f"lacks samples of {path}", "regenerate both from the same config")
+            rows = rows.join(measured.loc[samples].set_axis(rows.index))
         predictions[source, learner, seed] = rows
     return predictions
 
@@ -100,25 +105,3 @@ def estimates_of_scores(rows: pd.DataFrame, samples: Clustered) -> dict[str, Est
         "nll": samples.mean(-np.log(p_true_S), (0, np.inf)),
         "brier": samples.mean(squares_S, (0, 2)),
     }
-
-
-def _uncertainties(path, rows: pd.DataFrame, p_S_C: np.ndarray) -> dict[str, np.ndarray]:
-    uncertainties = {"max_score": 1 - p_S_C.max(axis=1), "entropy": numbers(path, rows, "entropy")}
-    variances = [name for name in rows.columns if name.startswith("variance_")]
-    if variances and (rows["bald"] != "").all():
-        uncertainties |= {"bald": numbers(path, rows, "bald"), "variance": rows[variances].sum(axis=1)}
-    return uncertainties
-
-
-def _distances(sets: ShiftedSets) -> pd.DataFrame:
-    import pandas as pd
-
-    test = sets.split == "test"
-    keys = pd.MultiIndex.from_arrays([sets.set[test], sets.sample[test].astype(str)])
-    return pd.DataFrame(sets.distance[test], index=keys, columns=list(DISTANCES))
-
-
-def _keys(rows: pd.DataFrame) -> pd.MultiIndex:
-    import pandas as pd
-
-    return pd.MultiIndex.from_frame(rows[["set", "sample"]])

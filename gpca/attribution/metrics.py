@@ -25,19 +25,14 @@ _CAUSAL_COLUMNS = ("sample", "split", "uncertainty_observed", "uncertainty_clean
 
 
 def accuracy(concept_true_S: np.ndarray, concept_predicted_S: np.ndarray, abstained_S: np.ndarray) -> float:
-    """Return the share in [0, 1] of the S samples whose concept was named and right; S = 0 raises ValueError."""
-    if len(concept_true_S) == 0:
-        raise ValueError("accuracy of no samples")
+    """Return the share in [0, 1] of the S samples whose concept was named and right."""
     return float(np.mean((concept_true_S == concept_predicted_S) & ~abstained_S))
 
 
 def concept_accuracy(
     concept_true_S: np.ndarray, concept_predicted_S: np.ndarray, abstained_S: np.ndarray, concepts: Iterable[str]
 ) -> dict[str, float]:
-    """Return for each concept the accuracy over the samples that truly are of it (its recall).
-
-    A concept without samples is left out: its accuracy is not defined.
-    """
+    """Return for each concept that has samples the accuracy over these (its recall)."""
     of_concept = {concept: concept_true_S == concept for concept in concepts}
     return {
         concept: accuracy(concept_true_S[mask], concept_predicted_S[mask], abstained_S[mask])
@@ -56,11 +51,10 @@ def confusion(
 
 
 def permuted_accuracy(confusion_C_C1: np.ndarray) -> float:
-    """Return the largest accuracy over all one-to-one relabelings of the predicted concepts.
+    """Return the largest accuracy over all one-to-one relabelings of the predicted concepts (Kuhn 1955).
 
-    Far above the plain accuracy it shows that an explainer tells the concepts apart but names them wrongly: an
-    artifact of sign or scale. It looks at the truth, so it is an upper bound and never a result: of many balanced
-    guesses it is slightly above 1/C. Solved as an assignment (Kuhn 1955).
+    Far above the plain accuracy it shows that an explainer tells the concepts apart but names them wrongly. It looks at
+    the truth, so it is an upper bound and never a result: of many balanced guesses it is slightly above 1/C.
     """
     from scipy.optimize import linear_sum_assignment
 
@@ -71,11 +65,7 @@ def permuted_accuracy(confusion_C_C1: np.ndarray) -> float:
 def read_uncertainties(path: str | Path) -> tuple[pd.Series, float]:
     """Return the uncertainty of each observed pair, and the 95th percentile of that of the clean ones.
 
-    The file holds those of one source and seed (KL divergences in nats, one row per test sample). The first are
-    indexed by (split, sample) as text.
-
-    Raises:
-        InputError: missing, empty or unreadable file, missing column, a sample twice, an uncertainty not finite.
+    The file holds those of one source and seed (KL divergences in nats). The first are indexed by (split, sample).
     """
     rows = read_csv(path, _CAUSAL_COLUMNS, others=("uncertainty_*",))
     require_samples(path, rows)
@@ -84,13 +74,7 @@ def read_uncertainties(path: str | Path) -> tuple[pd.Series, float]:
 
 
 def read_causal(path: str | Path) -> pd.Series:
-    """Return whether each sample is causal, indexed by (split, sample) as text: something made it uncertain.
-
-    A sample is causal if it is more uncertain than 95 % of the clean pairs.
-
-    Raises:
-        InputError: see :func:`read_uncertainties`.
-    """
+    """Return whether each sample, by (split, sample), is causal: more uncertain than 95 % of the clean pairs."""
     observed, limit = read_uncertainties(path)
     return observed > limit
 
@@ -99,12 +83,8 @@ def collect(prediction_files: Iterable[str | Path], causal_files: Iterable[str |
     """Return the tidy metrics (`TIDY_COLUMNS`) of prediction files named `…/{source}/{explainer}/seed{seed}.csv`.
 
     results/README.md lists them; the column `table` is "attribution". Values are shares in [0, 1], counts or means
-    per sample. Rows follow the order of the files. Causal metrics are those of the sources and seeds of
-    `causal_files`, named `…/{source}/{design}/seed{seed}.csv`; they may hold more samples than an explainer explains.
-
-    Raises:
-        InputError: no files, a name of another form, a file that :func:`read_predictions` or :func:`read_causal`
-            refuses or that has no test rows, a test sample that the causal file of its source and seed lacks.
+    per sample. Causal metrics are those of the sources and seeds of `causal_files`, named
+    `…/{source}/{design}/seed{seed}.csv`; they may hold more samples than an explainer explains.
     """
     causal = {}
     for path in causal_files:
@@ -113,13 +93,17 @@ def collect(prediction_files: Iterable[str | Path], causal_files: Iterable[str |
     records = []
     for path in prediction_files:
         source, method, seed = source_method_seed(path)
-        rows = read_predictions(path)
-        test = rows[rows["split"] == "test"]
-        if test.empty:
-            raise InputError(path, "has no test rows", "regenerate it")
-        metrics = attribution_metrics(test, concepts_of(rows))
+        test = _test_rows(path, read_predictions(path))
+        metrics = attribution_metrics(test, concepts_of(test))
         if (source, seed) in causal:
-            metrics |= _causal_metrics(path, test, *causal[source, seed])
+            causal_path, is_causal = causal[source, seed]
+            keys = _samples(test)
+            if not (listed := keys.isin(is_causal.index)).all():
+                fault = f"lacks {' sample '.join(keys[~listed][0])} of {path}"
+                raise InputError(causal_path, fault, "regenerate both from the same config")
+            shown = test[is_causal[keys].to_numpy()]
+            metrics["causal_samples"] = {ALL: len(shown)}
+            metrics |= {"causal_accuracy": {ALL: accuracy(*_judged(shown))}} if len(shown) else {}
         for metric, of_concept in metrics.items():
             records += [("attribution", source, method, metric, c, seed, float(v)) for c, v in of_concept.items()]
     return tidy(records, "predictions")
@@ -144,18 +128,11 @@ def attribution_metrics(test: pd.DataFrame, concepts: list[str]) -> dict[str, di
     return metrics
 
 
-def _causal_metrics(path, test: pd.DataFrame, causal_path, causal: pd.Series) -> dict[str, dict[str, float]]:
-    keys = _samples(test)
-    if not (known := keys.isin(causal.index)).all():
-        split, sample = keys[~known][0]
-        raise InputError(
-            causal_path, f"lacks {split} sample {sample} of {path}", "regenerate both from the same config"
-        )
-    shown = test[causal[keys].to_numpy()]
-    metrics: dict[str, dict[str, float]] = {"causal_samples": {ALL: len(shown)}}
-    if len(shown):
-        metrics["causal_accuracy"] = {ALL: accuracy(*_judged(shown))}
-    return metrics
+def _test_rows(path: str | Path, rows: pd.DataFrame) -> pd.DataFrame:
+    rows = rows[rows["split"] == "test"]
+    if rows.empty:
+        raise InputError(path, "has no test rows", "regenerate it")
+    return rows
 
 
 def _judged(rows: pd.DataFrame) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -169,18 +146,14 @@ def _samples(rows: pd.DataFrame) -> pd.MultiIndex:
 
 
 def collect_timings(timing_files: Iterable[str | Path]) -> pd.DataFrame:
-    """Return mean `seconds_per_sample` and `icp_seconds_per_sample`, tidy as :func:`collect`, with table "runtime".
+    """Return mean `seconds_per_sample` and `icp_seconds_per_sample` of test rows, tidy, with table "runtime".
 
-    Means are over the test rows, as in :func:`collect`. Apart from the metrics, because times differ from run to run
-    and metrics must not.
+    They are no part of the metrics, as times differ from run to run.
     """
     records = []
     for path in timing_files:
         source, method, seed = source_method_seed(path)
-        rows = read_csv(path, TIMING_COLUMNS)
-        test = rows[rows["split"] == "test"]
-        if test.empty:
-            raise InputError(path, "has no test rows", "regenerate it")
+        test = _test_rows(path, read_csv(path, TIMING_COLUMNS))
         for column in ("seconds", "icp_seconds"):
             mean = float(numbers(path, test, column).mean())
             records.append(("runtime", source, method, f"{column}_per_sample", ALL, seed, mean))

@@ -22,14 +22,7 @@ if TYPE_CHECKING:
     from gpca.pairs.dataset import Registrations
 
 PREDICTION_COLUMNS = (
-    "sample",
-    "split",
-    "object",
-    "cluster",
-    "concept_true",
-    "concept_predicted",
-    "abstained",
-    "icp_calls",
+    *("sample", "split", "object", "cluster", "concept_true", "concept_predicted", "abstained", "icp_calls"),
 )
 TIMING_COLUMNS = ("sample", "split", "seconds", "icp_seconds")
 _OF_CONCEPTS = ("score_?*", "variance_?*", "bald", "entropy")  # further columns; an explainer may lack some
@@ -65,13 +58,7 @@ def prediction_frame(registrations: Registrations, attribution: Attribution) -> 
 def read_predictions(path: str | Path, labels: Sequence[str] = ()) -> pd.DataFrame:
     """Read a prediction file as text, but for `score_…`, `variance_…` and `icp_calls` (numbers) and `abstained` (bool).
 
-    Args:
-        path: the file.
-        labels: columns before those of the samples; a number may occur once for each combination of theirs.
-
-    Raises:
-        InputError: missing, empty or unreadable file; missing column; an unknown concept; a sample twice in one split
-            (and under the same labels); a score that is not a finite number, unless the explainer abstained.
+    A sample may occur once for each combination of entries of the `labels`, columns before its own.
     """
     rows = read_csv(path, (*labels, *PREDICTION_COLUMNS), _OF_CONCEPTS)
     rows["abstained"] = rows["abstained"] == "True"
@@ -94,7 +81,7 @@ def concepts_of(predictions: pd.DataFrame) -> list[str]:
 def write_timings(
     path: str | Path, registrations: Registrations, seconds_S: np.ndarray, icp_seconds_S: np.ndarray
 ) -> None:
-    """Write seconds per sample; apart from the predictions, because they differ from run to run."""
+    """Write seconds per sample, in a file of their own, as they differ from run to run."""
     import pandas as pd
 
     columns = {"sample": registrations.sample, "split": registrations.split}
@@ -102,11 +89,7 @@ def write_timings(
 
 
 def read_timings(path: str | Path, registrations: Registrations) -> tuple[np.ndarray, np.ndarray]:
-    """Return seconds (S,) and icp_seconds (S,) of the registrations.
-
-    Raises:
-        InputError: missing, empty or unreadable file; missing column; other samples; seconds that are not numbers.
-    """
+    """Return seconds (S,) and icp_seconds (S,) of the registrations."""
     rows = read_numbers(path, TIMING_COLUMNS, ("seconds", "icp_seconds"))
     require_same_samples(path, rows, registrations.arrays)
     return rows["seconds"].to_numpy(), rows["icp_seconds"].to_numpy()

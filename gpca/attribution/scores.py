@@ -10,13 +10,12 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Attribution:
-    """The attribution of N registrations to C concepts, rows in the order of the registrations.
+    """The attribution of N registrations to C concepts.
 
     Attributes:
-        concepts: (C,) names, in the order of the columns.
         scores_N_C: score ŝ_c of each concept (Eq. 4).
-        variances_N_C: epistemic variance v_c (Eq. 5); NaN where an explainer has none.
-        bald_N: BALD in nats (Eq. 7); NaN where an explainer has none.
+        variances_N_C: epistemic variance v_c (Eq. 5); NaN where an explainer has none, as is BALD.
+        bald_N: BALD in nats (Eq. 7).
         abstained_N: whether the explainer declines to name a concept.
         icp_calls_N: ICP runs beyond the observed registration.
         seconds_N, icp_seconds_N: time of the explanation, and the part of it inside ICP.
@@ -44,10 +43,7 @@ class Attribution:
         variances_N_C: np.ndarray | None = None,
         bald_N: np.ndarray | None = None,
     ) -> Attribution:
-        """Make the attribution of an explainer; variances and BALD are NaN where it gives none.
-
-        Times and calls are one number for each row, or one for all.
-        """
+        """Make the attribution of an explainer; times and calls are one number for each row, or one for all."""
         n = len(scores_N_C)
         return cls(
             concepts=concepts,
@@ -63,8 +59,7 @@ class Attribution:
     @property
     def predicted_N(self) -> np.ndarray:
         """The concept with the largest score (Eq. 6), the first of equals; empty if it abstained."""
-        predicted = np.array(self.concepts)[self.scores_N_C.argmax(axis=1)]
-        return np.where(self.abstained_N, "", predicted)
+        return np.where(self.abstained_N, "", np.array(self.concepts)[self.scores_N_C.argmax(axis=1)])
 
     @property
     def entropy_N(self) -> np.ndarray:
@@ -83,13 +78,10 @@ def entropy(p: np.ndarray) -> np.ndarray:
 
 
 def summarize_draws(logits_M_N_C: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Turn M posterior draws of the latent logits into scores, variances and BALD.
+    """Return scores (N, C), variances (N, C) and BALD (N,) of M posterior draws of the latent logits.
 
     Eqs. 2, 4, 5 and 7 of the paper: p^(m) = softmax(f^(m)), ŝ = mean over m, v = mean squared deviation over m,
     BALD = H[ŝ] - mean over m of H[p^(m)].
-
-    Returns:
-        scores_N_C, variances_N_C, bald_N.
     """
     return _summarize(np.array(logits_M_N_C.T, order="C", dtype=float))
 
@@ -99,8 +91,7 @@ def summarize_marginals(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Summarize draws mean + deviation · normal of independent latents, as :func:`summarize_draws` does.
 
-    All N points share the M·C numbers, so a point's result does not depend on the others. Blocks of points small
-    enough for the processor's cache are summarized one after the other.
+    All N points share the M·C numbers. Blocks of points that fit the processor's cache follow one another.
     """
     parts = [_summarize(logits_C_N_M) for logits_C_N_M in _drawn(mean_N_C, deviation_N_C, normal_M_C, block)]
     scores_N_C, variances_N_C, bald_N = (np.concatenate(part) for part in zip(*parts, strict=True))
@@ -135,10 +126,10 @@ def _probabilities(logits_C_N_M: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _summarize(logits_C_N_M: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Do what :func:`summarize_draws` says, in the array that it is given.
+    """Do what :func:`summarize_draws` says, in the given array, as new ones would take most of the time.
 
-    New arrays would take most of the time. Classes come first, as sums over three neighbors are several times as slow
-    as sums of three arrays, and draws last, so that a point's sums do not depend on how many others there are.
+    Classes come first, as sums over three neighbors are several times as slow as sums of three arrays, and draws last,
+    so that a point's sums do not depend on how many others there are.
     """
     p_C_N_M, total_N_M = _probabilities(logits_C_N_M)
     scores_C_N = p_C_N_M.mean(axis=2)

@@ -1,8 +1,4 @@
-"""The diagnostics of :mod:`gpca.attribution.diagnostics` for B draws of the S samples at once.
-
-``weights_B_S`` says how often each draw has each sample, whole numbers. A value is that of the definition on samples
-that are repeated so often.
-"""
+"""The diagnostics of :mod:`gpca.attribution.diagnostics` for B draws, in which samples stand ``weights_B_S`` times."""
 
 from __future__ import annotations
 
@@ -26,15 +22,15 @@ def calibration_error(p_S_C: np.ndarray, target_S: np.ndarray, weights_B_S: np.n
 def aurc(confidence_S: np.ndarray, wrong_S: np.ndarray, weights_B_S: np.ndarray) -> np.ndarray:
     """Return the area under the risk-coverage curve (B,).
 
-    Of k samples in order of their confidence, E(k) are wrong. Within a group of w equal confidences, of which e are
-    wrong, E(k) rises evenly from E₀ at k = n: the sum of E(k) / k over the group is e + (E₀ - n e / w) (H(n + w) -
-    H(n)), with harmonic numbers H.
+    Of k samples in order of their confidence, E(k) are wrong. In a group of w equal confidences, e of them wrong, E(k)
+    rises evenly from E₀ at k = n: E(k) / k adds up to e + (E₀ - n e / w) (H(n + w) - H(n)), with harmonic numbers H.
     """
     count_B_G, wrong_B_G = _groups(confidence_S, wrong_S, weights_B_S)
     ends_B_G, errors_B_G = np.cumsum(count_B_G, axis=1), np.cumsum(wrong_B_G, axis=1)
     starts_B_G = ends_B_G - count_B_G
     before_B_G = errors_B_G - wrong_B_G - starts_B_G * wrong_B_G / np.maximum(count_B_G, 1)
-    harmonic_K = _harmonic(weights_B_S)
+    most = int(weights_B_S.sum(axis=1).max())  # samples of a draw
+    harmonic_K = np.append(0.0, np.cumsum(1 / np.arange(1, most + 1)))
     width_B_G = harmonic_K[ends_B_G.astype(int)] - harmonic_K[starts_B_G.astype(int)]
     return _ratio((wrong_B_G + before_B_G * width_B_G).sum(axis=1), weights_B_S.sum(axis=1))
 
@@ -54,11 +50,17 @@ def augrc(confidence_S: np.ndarray, wrong_S: np.ndarray, weights_B_S: np.ndarray
 
 def rank_correlation(one_S: np.ndarray, other_S: np.ndarray, weights_B_S: np.ndarray) -> np.ndarray:
     """Return Spearman's ρ (B,); 0 where one of the two is constant."""
-    drawn_B = np.maximum(weights_B_S.sum(axis=1), 1)[:, None]
-    rank_B_S, other_B_S = (_ranks(values_S, weights_B_S) for values_S in (one_S, other_S))
-    rank_B_S, other_B_S = (
-        ranks - (weights_B_S * ranks).sum(axis=1, keepdims=True) / drawn_B for ranks in (rank_B_S, other_B_S)
-    )
+    drawn_B_1 = np.maximum(weights_B_S.sum(axis=1), 1)[:, None]
+    centered = []
+    for values_S in (one_S, other_S):
+        order, starts = _order(np.asarray(values_S, float))
+        count_B_G = np.add.reduceat(weights_B_S[:, order], starts, axis=1)
+        middle_B_G = np.cumsum(count_B_G, axis=1) - (count_B_G - 1) / 2
+        group_S = np.empty(len(order), int)
+        group_S[order] = np.repeat(np.arange(len(starts)), np.diff(np.append(starts, len(order))))
+        rank_B_S = middle_B_G[:, group_S]
+        centered.append(rank_B_S - (weights_B_S * rank_B_S).sum(axis=1, keepdims=True) / drawn_B_1)
+    rank_B_S, other_B_S = centered
     products_B = (weights_B_S * rank_B_S * other_B_S).sum(axis=1)
     squares_B = (weights_B_S * rank_B_S**2).sum(axis=1) * (weights_B_S * other_B_S**2).sum(axis=1)
     varied_B = squares_B > TINY
@@ -73,26 +75,10 @@ def _groups(confidence_S: np.ndarray, wrong_S: np.ndarray, weights_B_S: np.ndarr
     return count_B_G, wrong_B_G
 
 
-def _ranks(values_S: np.ndarray, weights_B_S: np.ndarray) -> np.ndarray:
-    """Return the mean rank of each sample's value in each draw (B, S)."""
-    order, starts = _order(np.asarray(values_S, float))
-    count_B_G = np.add.reduceat(weights_B_S[:, order], starts, axis=1)
-    middle_B_G = np.cumsum(count_B_G, axis=1) - (count_B_G - 1) / 2
-    group_S = np.empty(len(order), int)
-    group_S[order] = np.repeat(np.arange(len(starts)), np.diff(np.append(starts, len(order))))
-    return middle_B_G[:, group_S]
-
-
 def _order(values_S: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the order of rising values, and where in it each different value begins."""
     order = np.argsort(values_S, kind="stable")
     return order, np.flatnonzero(np.append(True, np.diff(values_S[order]) != 0))
-
-
-def _harmonic(weights_B_S: np.ndarray) -> np.ndarray:
-    """Return the sums of 1 / k up to every number of samples that a draw may have."""
-    most = int(weights_B_S.sum(axis=1).max())
-    return np.append(0.0, np.cumsum(1 / np.arange(1, most + 1)))
 
 
 def _ratio(one_B: np.ndarray, other_B: np.ndarray) -> np.ndarray:

@@ -131,21 +131,3 @@ def test_some_printed_values_cannot_belong_to_the_printed_accuracies():
         p = np.where(~right & certain_of_mistakes, 1.0, (1 if certain_of_mistakes else 0.993) - lower)
         assert d.calibration_error(confident(p), np.where(right, 0, 1)) == pytest.approx(0.223)
         assert p.mean() == pytest.approx(mean_confidence, abs=5e-4)
-
-
-@pytest.mark.parametrize(
-    ("function", "arguments", "message"),
-    [
-        (d.aurc, ([], []), "confidences of"),
-        (d.aurc, ([1, 2], [True]), "confidences of"),
-        (d.augrc, ([np.nan], [True]), "not finite"),
-        (d.brier_score, (np.full((2, 3), 0.2), [0, 1]), "do not sum to one"),
-        (d.brier_score, (np.eye(3), [0, 1]), "for 2 samples"),
-        (d.calibration_error, (np.eye(3), [0, 1, 3]), "no class"),
-        (d.calibration_error, (np.full((1, 3), np.nan), [0]), "not finite"),
-        (d.rank_correlation, ([1, np.nan], [1, 2]), "not finite"),
-    ],
-)
-def test_what_has_no_answer_is_refused(function, arguments, message):
-    with pytest.raises(ValueError, match=message):
-        function(*arguments)
