@@ -7,12 +7,7 @@ from dataclasses import replace
 from math import inf
 from typing import TYPE_CHECKING, Any
 
-from gpca.causes.judged import (
-    BINS,
-    CEILING,
-    joined,
-    read_judged,
-)
+from gpca.causes.judged import BINS, CEILING, joined, read_judged
 from gpca.causes.truth import BORDERLINE, NOMINAL
 from gpca.errors import InputError
 from gpca.evaluation.intervals import REPEATS

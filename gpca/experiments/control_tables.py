@@ -25,16 +25,7 @@ from gpca.reporting.tables.builder import TableBuilder, crossed
 from gpca.reporting.tables.cells import cell_of_repeats, interval_cell, plain_cell, rows_where
 from gpca.reporting.tables.table import Cell, Column
 from gpca.reporting.words import plural, span
-from gpca.steps.control_samples import (
-    HARD,
-    PAPER,
-    SEEN,
-    TRAININGS,
-    TRANSFER,
-    UNSEEN,
-    WRONG_LABELS,
-    trained_otherwise,
-)
+from gpca.steps.control_samples import HARD, PAPER, SEEN, TRAININGS, TRANSFER, UNSEEN, WRONG_LABELS, trained_otherwise
 
 if TYPE_CHECKING:
     import pandas as pd

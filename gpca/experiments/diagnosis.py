@@ -12,15 +12,7 @@ import numpy as np
 
 from gpca.attribution.metrics import ABSTAINED, PREDICTED_AS, confusion
 from gpca.causes.dataset import LABELS
-from gpca.causes.judged import (
-    CEILING,
-    MEASURES,
-    Judged,
-    counted,
-    joined,
-    measure,
-    read_judged,
-)
+from gpca.causes.judged import CEILING, MEASURES, Judged, counted, joined, measure, read_judged
 from gpca.causes.settings import DescriptorSettings
 from gpca.causes.truth import BORDERLINE
 from gpca.encoders.registry import NamedEncoder, require_backbone, require_draws
@@ -132,10 +124,7 @@ DIAGNOSE = Step(
 DIAGNOSE_BY_FEATURES = Step(
     name="diagnose_by_features",
     run="gpca.steps.diagnosis:diagnose_by_features",
-    inputs={
-        "causes": "causes/{source}/seed{*seed}.npz",
-        "descriptors": "descriptors/{source}/seed{*seed}.npz",
-    },
+    inputs={"causes": "causes/{source}/seed{*seed}.npz", "descriptors": "descriptors/{source}/seed{*seed}.npz"},
     outputs={"predictions": "feature_diagnoses/{source}/{*feature_explainer}/seed{*seed}.csv"},
     settings=("diagnosis.by_features", "diagnosis.descriptors"),
     modules=lambda plan: [explainer_module(name, CAUSES) for name in plan.names["feature_explainer"]],

@@ -240,12 +240,7 @@ def encode(
     name = f"{source} under {control}"
     model, curve = train_encoder(registrations, name, seed, encoder, checkpoint)
     h_S_d, logits_S_C = embed(model, registrations, name, seed, encoder)
-    return {
-        "h": h_S_d,
-        "head_logits": logits_S_C,
-        "sample": registrations.sample,
-        "split": registrations.split,
-    }, curve
+    return {"h": h_S_d, "head_logits": logits_S_C, "sample": registrations.sample, "split": registrations.split}, curve
 
 
 def train(job: Job) -> None:
