@@ -21,7 +21,7 @@ from gpca.explainers.interface import WORDS
 from gpca.objects.entry import dataset_of
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.figures.reliability import reliability_figure
-from gpca.reporting.sheet import Row, Sheet, show, where
+from gpca.reporting.sheet import Row, Sheet, crossed, show, where, with_label
 from gpca.reporting.tables.cells import interval_cell, plain_cell, rows_where
 from gpca.reporting.tables.table import Cell, Column
 from gpca.reporting.words import plural
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 NEAR = 10  # points above chance up to which the untrained rule is near it
 SECTION = "Beyond the paper: what made a registration fail"
 POINTS: dict[str, Any] = {"limits": (-100.0, 100.0)}
+PLAIN: dict[str, Any] = {"factor": 1, "interval": False}
 COUNTS: dict[str, Any] = {"decimals": 0, "interval": False, "limits": (0.0, inf)}
 SHOWN = {
     "regret": show("regret", "Regret (%)", limits=(0.0, inf), least_is_best=True),
@@ -43,17 +44,9 @@ SHOWN = {
     "false_alarm_rate": show("false_alarm_rate", "False alarms (%)", least_is_best=True),
     "auroc_failed": show("auroc_failed", "AUROC", factor=1, decimals=3, limits=(0.0, 1.0)),
     "average_precision": show("average_precision", "mAP (%)", interval=False),
-    "spearman_attribution": show(
-        "spearman_attribution", "Spearman", factor=1, decimals=2, interval=False, limits=(-1.0, 1.0)
-    ),
+    "spearman_attribution": show("spearman_attribution", "Spearman", decimals=2, limits=(-1.0, 1.0), **PLAIN),
     "nominal_calibration": show(
-        "nominal_calibration",
-        "ECE (share)",
-        factor=1,
-        decimals=3,
-        interval=False,
-        limits=(0.0, 1.0),
-        least_is_best=True,
+        "nominal_calibration", "ECE (share)", decimals=3, limits=(0.0, 1.0), least_is_best=True, **PLAIN
     ),
     "icp_calls": Column("ICP calls", **COUNTS),
     "samples": Column("n", **COUNTS),
@@ -70,7 +63,7 @@ def reads(cost: Mapping) -> tuple[str, str]:
 
 
 def counts_and_calls(costs: Mapping[str, Mapping]) -> Callable[[Row, pd.DataFrame], dict[str, Cell]]:
-    """Return the function that gives a row of a sheet its most samples, and the runs of ICP of its explainer."""
+    """The function that gives a row of a sheet its most samples, and the runs of ICP of its explainer."""
 
     def cells(row: Row, subset: pd.DataFrame) -> dict[str, Cell]:
         judged, seeds = subset["samples"].max(), int(subset["seeds"].iloc[0])
@@ -98,7 +91,6 @@ def counts_and_calls(costs: Mapping[str, Mapping]) -> Callable[[Row, pd.DataFram
     predictions_csv="diagnoses/{shown_source}/{cause_explainer}/seed{first_seed}.csv",
 )
 def causes_example(run: Run, objects_npz, causes_npz, predictions_csv):
-    """The counterfactuals, the measured shares and the scores of every explainer."""
     source = run.config["figures"]["source"]
     truth = run.config["causes"] | {"icp": dict(run.config["registrations"]["icp"])}
     shown = run.source_titles[source], dataset_of(run.config["sources"][source])
@@ -118,21 +110,25 @@ def causes_example(run: Run, objects_npz, causes_npz, predictions_csv):
     intervals="cause_intervals.csv",
 )
 def table9_causes(run: Run, intervals):
-    """Every measure of every explainer, by source and pooled, the ceiling last."""
     explainers, titles = cause_titles(run.config), run.source_titles | {POOLED: "All together"}
     costs = cause_costs(run.config, explainers) | COSTS
-    rows = [
-        Row([source, explainer, reads(costs[explainer[0]])], {"source": source[0], "method": explainer[0]}, rival)
-        for source in titles.items()
-        for explainer in (explainers | AGAIN).items()
-        for rival in (explainer[0] != CEILING,)
-    ]
+    rows = with_label(
+        crossed(("source", titles), ("method", explainers | AGAIN)), lambda row: costs[row.where["method"]]["sees"]
+    )
+    rows = [replace(row, rival=row.where["method"] != CEILING) for row in rows]
+    states = {}
+    for source, title in run.source_titles.items():
+        samples = where(intervals, {"source": source}).groupby("metric")["samples"].max()
+        if (nominal := samples.get("false_alarm_rate")) is not None:
+            states[title] = f"{nominal:.0f} are nominal and {samples.max() - nominal:.0f} failed"
+    alike = len(states) > 1 and len(set(states.values())) == 1
+    counted = "; ".join(f"{words} on {title}" for title, words in states.items())
+    counted = f"{next(iter(states.values()))} on each dataset" if alike else counted
     heads = {"source": "Dataset", "explainer": "Explainer", "reads": "Reads"}
     sheet = Sheet("table9_causes", heads, rows, SHOWN, intervals, more=counts_and_calls(costs))
-    stand_ins = any(entry["stand_in"] for entry in run.sources.values())
     notes = (
         f"n: test samples that are judged, over {plural(sheet.seeds, 'seed')}; borderline ones are left "
-        f"out. Of them, {_states(intervals, titles)}. In brackets: the 95 % interval of a bootstrap over objects "
+        f"out. Of them, {counted}. In brackets: the 95 % interval of a bootstrap over objects "
         f"and seeds ({REPEATS} draws). Bold: best explainer on a dataset.",
         "Regret: of the failed, the share of the error that removing the best single cause would take away and "
         "removing the named one does not; who names nominal removes nothing. With ties: as Dominant, but any cause "
@@ -151,30 +147,14 @@ def table9_causes(run: Run, intervals):
         COST_NOTE,
     )
     caption = "What is wrong with a registration, if anything: objects that no explainer was trained on"
-    caption += ", procedural stand-ins among them" if stand_ins else ""
+    caption += ", procedural stand-ins among them" if run.stand_ins() else ""
     return sheet.table(caption, "metric", notes, bold=[key for key in SHOWN if key not in NOT_COMPARED], same=1)
-
-
-def _states(intervals: pd.DataFrame, titles: Mapping[str, str]) -> str:
-    """How many samples of each source are nominal and how many failed, in words."""
-    parts = {}
-    for source, title in titles.items():
-        samples = where(intervals, {"source": source}).groupby("metric")["samples"].max()
-        nominal, judged = samples.get("false_alarm_rate"), samples.max()
-        if source != POOLED and nominal is not None:
-            parts[title] = f"{nominal:.0f} are nominal and {judged - nominal:.0f} failed"
-    if len(parts) > 1 and len(set(parts.values())) == 1:
-        return f"{next(iter(parts.values()))} on each dataset"
-    return "; ".join(f"{words} on {title}" for title, words in parts.items())
 
 
 def rule_near_chance(intervals: pd.DataFrame, sources: Iterable[str], **wanted: object) -> str:
     """Sentence on the untrained rule's share, its distance from chance, and whether its interval ends near that.
 
-    Args:
-        intervals: rows with source, method, value, low and high.
-        sources: those after all together; the first that has the rule counts.
-        wanted: further entries of the row.
+    Of all sources together, or of the first that has the rule; `wanted` are further entries of the row.
     """
     rule, chance = rows_where(intervals, method="rule", **wanted), 100 / len(CONCEPTS)
     for source in (POOLED, *sources):
@@ -198,16 +178,11 @@ def rule_near_chance(intervals: pd.DataFrame, sources: Iterable[str], **wanted: 
     intervals="feature_intervals.csv",
 )
 def table9_features(run: Run, intervals):
-    """Measures of learners that see more and more, pooled and by source."""
     titles, explainers = {POOLED: "All together"} | run.source_titles, cause_titles(run.config, "by_features")
     keys = ("icp_calls", "regret", "tied_accuracy", "balanced_accuracy", "lead", "dominant_accuracy")
     columns = {key: SHOWN[key] for key in (*keys, "false_alarm_rate", "auroc_failed", "samples")}
     columns["lead"] = replace(columns["lead"], title="To the best other (points)")
-    rows = [
-        Row([source, explainer], {"source": source[0], "method": explainer[0]})
-        for source in titles.items()
-        for explainer in explainers.items()
-    ]
+    rows = crossed(("source", titles), ("method", explainers))
     more = counts_and_calls(cause_costs(run.config, explainers))
     heads = {"source": "Dataset", "explainer": "Learner and what it reads"}
     sheet = Sheet("table9_features", heads, rows, columns, intervals, more=more)
@@ -231,7 +206,6 @@ def table9_features(run: Run, intervals):
     metrics="causes.csv",
 )
 def cause_confusions(run: Run, metrics):
-    """Matrix of each explainer on each source."""
     return draw_confusions_figure(metrics, run.source_titles, cause_titles(run.config))
 
 
@@ -245,7 +219,6 @@ def cause_confusions(run: Run, metrics):
     judged=(read_judged, {"prediction_files": DIAGNOSES, "causes_files": CAUSES_FILES}),
 )
 def nominal_reliability(run: Run, judged):
-    """Share of nominal registrations over the score of "nominal", all sources and seeds together."""
     titles, samples, sources = run.source_titles, {}, set()
     for explainer, title in cause_titles(run.config).items():
         parts = {key: each for key, each in judged.items() if key[1] == explainer and key[0] in titles}

@@ -20,8 +20,8 @@ from gpca.explainers.gpca import GPCA_FORMS
 from gpca.explainers.registry import explainer_entry
 from gpca.io.csv_file import numbers, read_csv
 from gpca.reporting.figures.style import SMALL_PT
-from gpca.reporting.sheet import Row, Sheet, Show, show
-from gpca.reporting.tables.builder import TableBuilder, crossed
+from gpca.reporting.sheet import Sheet, Show, crossed, show, with_label
+from gpca.reporting.tables.builder import TableBuilder
 from gpca.reporting.tables.cells import cell_of_repeats, interval_cell, plain_cell, rows_where
 from gpca.reporting.tables.table import Cell, Column
 from gpca.reporting.words import plural, span
@@ -71,7 +71,6 @@ class Count(Show):
     **INTERVALS,
 )
 def table10_controls(run: Run, intervals):
-    """Accuracy under every control with its change against the paper's protocol: all and single sources × controls."""
     explainers = titles(run.config["controls"]["explainers"])
     names = [PAPER, *(name for name in TITLES if name in run.config["controls"]["controls"])]
 
@@ -86,36 +85,27 @@ def table10_controls(run: Run, intervals):
         for suffix, (against, words) in DIFFERENCES.items():
             title = f"{TITLES[name].removesuffix(' (%)')}: {words}"
             columns[name + suffix] = accuracy(name, title, against, limits=POINTS)
-    columns[CALLS] = show(
-        CALLS, "ICP calls", ALL, {"table": PAPER}, factor=1, decimals=0, interval=False, limits=(0, inf)
-    )
+    number: dict[str, Any] = {"factor": 1, "interval": False}
+    columns[CALLS] = show(CALLS, "ICP calls", ALL, {"table": PAPER}, decimals=0, limits=(0, inf), **number)
     for name, words in AUROCS.items() if UNSEEN in names else ():
-        key, options = f"{name}_auroc", {"factor": 1, "decimals": 2, "interval": False, "limits": (0, 1)}
-        columns[key] = show(AUROC, words, ALL, {"table": name}, **options)
+        key = f"{name}_auroc"
+        columns[key] = show(AUROC, words, ALL, {"table": name}, decimals=2, limits=(0, 1), **number)
         where = columns[name].where
         columns[key + WRONG] = Count(f"{words}: wrong", 0, False, (0, inf), beside=key, where=where, factor=1)
-    rows = [
-        Row([source, explainer, (sight, sight)], {"source": source[0], "method": explainer[0]})
-        for source in (ALL_TOGETHER | run.source_titles).items()
-        for explainer in explainers.items()
-        for sight in [explainer_entry(explainer[0]).sight]
-    ]
+    rows = with_label(
+        crossed(("source", ALL_TOGETHER | run.source_titles), ("method", explainers)),
+        lambda row: explainer_entry(row.where["method"]).sight,
+    )
     heads = {"source": "Dataset", "explainer": "Explainer", "reads": "Reads"}
     sheet = Sheet("table10_controls", heads, rows, columns, intervals)
     for (i, key), cell in list(sheet.cells.items()):
         if key == CALLS:
             sheet.cells[i, key] = plain_cell(cell.mean, cell.seeds, cell.test_samples)
         elif key.endswith(WRONG):
-            if (i, key.removesuffix(WRONG)) in sheet.cells:
-                wrong = round((1 - cell.mean) * cell.test_samples)
-                sheet.cells[i, key] = plain_cell(wrong, cell.seeds, cell.test_samples)
-            else:
-                del sheet.cells[i, key]
-    seeds = {
-        name: span(cell.seeds for (_, key), cell in sheet.cells.items() if key == name)
-        for name in names
-        if any(key == name for _, key in sheet.cells)
-    }
+            wrong = round((1 - cell.mean) * cell.test_samples)
+            sheet.cells[i, key] = plain_cell(wrong, cell.seeds, cell.test_samples)
+    by_control = {name: [cell.seeds for (_, key), cell in sheet.cells.items() if key == name] for name in names}
+    seeds = {name: span(numbers_of_seeds) for name, numbers_of_seeds in by_control.items() if numbers_of_seeds}
     usual = seeds.pop(PAPER, str(sheet.seeds))
     fewer = ", ".join(f"{TITLES[name]}: {plural(number, 'seed')}" for name, number in seeds.items() if number != usual)
     notes = (
@@ -162,12 +152,8 @@ def transfers(intervals: pd.DataFrame) -> pd.DataFrame:
     **INTERVALS,
 )
 def table10_transfer(run: Run, intervals):
-    """Accuracy of every explainer, by the source that it learned from × the source tested."""
-    rows = [
-        Row([explainer, trained_on], {"method": explainer[0], "concept": trained_on[0]})
-        for explainer in titles(run.config["controls"]["explainers"]).items()
-        for trained_on in (run.source_titles | {POOLED: "another (mean)"}).items()
-    ]
+    explainers = titles(run.config["controls"]["explainers"])
+    rows = crossed(("method", explainers), ("concept", run.source_titles | {POOLED: "another (mean)"}))
     columns = {name: Show(f"on {title}", where={"source": name}) for name, title in run.source_titles.items()}
     columns[POOLED] = Show("mean", where={"source": POOLED})
     heads = {"explainer": "Explainer", "trained_on": "Learned from"}
@@ -189,7 +175,6 @@ def table10_transfer(run: Run, intervals):
     **INTERVALS,
 )
 def transfer(run: Run, intervals) -> Figure:
-    """A matrix for each explainer: sources that it learned from × sources that it explains."""
     accuracy, sources = transfers(intervals), run.source_titles
     moved = set(accuracy["method"][accuracy["table"] == TRANSFER])
     shown = {name: title for name, title in titles(run.config["controls"]["explainers"]).items() if name in moved}
@@ -230,7 +215,6 @@ OBJECTS = {PAPER: TITLES[PAPER], SEEN: "Objects that it learned from (%)", UNSEE
     **INTERVALS,
 )
 def table10_encoders(run: Run, intervals):
-    """Accuracy of GP-CA with encoders that are trained in other ways: sources and trainings × objects."""
     builder = TableBuilder("table10_encoders", {"source": "Dataset", "training": "Encoder"})
     explainers = titles(run.config["controls"]["explainers"])
     forms = {name: words for name, words in explainers.items() if name in GPCA_FORMS}
@@ -240,7 +224,8 @@ def table10_encoders(run: Run, intervals):
         rows = rows_where(accuracy, source=source, method=method, against=against).set_index("table")
         return {objects: rows.loc[objects] for objects in OBJECTS if objects in rows.index}
 
-    for (source, explainer), (dataset, (_, words)) in crossed(ALL_TOGETHER | run.source_titles, forms):
+    for row in crossed(("source", ALL_TOGETHER | run.source_titles), ("method", forms)):
+        (source, explainer), (dataset, (_, words)) = row.where.values(), row.labels
         paper = by_objects(source, explainer)
         ways = {
             way: [by_objects(source, trained_otherwise(explainer, way), against) for against in ("", USUAL)]
@@ -290,14 +275,7 @@ SECONDS = {"learning_seconds": 1, "seconds": 1e3}  # column of the files -> fact
 
 
 def read_costs(files: Iterable[str | Path]) -> pd.DataFrame:
-    """Seconds to learn, and of one registration, by source, explainer and seed; they differ from run to run.
-
-    Args:
-        files: named ``…/{source}/controls/seed{seed}.csv``.
-
-    Raises:
-        InputError: a file that cannot be read, or holds seconds that are none.
-    """
+    """Seconds to learn, and of one registration, of files ``…/{source}/controls/seed{seed}.csv``."""
     records = []
     for path in files:
         source, _, seed = source_method_seed(path)
@@ -318,7 +296,6 @@ def read_costs(files: Iterable[str | Path]) -> pd.DataFrame:
     **INTERVALS,
 )
 def table10_costs(run: Run, intervals, costs):
-    """Cost of explainers that see the registrations themselves, and their accuracy."""
     builder = TableBuilder("table10_costs", {"explainer": "Explainer"})
     gains = {name: TITLES[name] for name in (PAPER, UNSEEN, TRANSFER)}
     pooled = POOLED if len(run.sources) > 1 else next(iter(run.sources))

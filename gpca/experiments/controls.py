@@ -11,12 +11,11 @@ import numpy as np
 
 from gpca.attribution.predictions import read_predictions
 from gpca.causes.settings import NOT_OF_CAUSES, CauseSettings
-from gpca.encoders.registry import encoders
 from gpca.errors import InputError, with_key
 from gpca.evaluation.intervals import UNTRAINED, Clustered, best_of, interval, weighted_mean
 from gpca.evaluation.measures import ALL, POOLED, TEST_SAMPLES, intervals, source_method_seed, tidy
 from gpca.experiments.experiment import EXPLAINERS, ByName, Experiment, LeftOut
-from gpca.experiments.explained import require_explained
+from gpca.experiments.explained import explainer_settings, require_explained
 from gpca.experiments.plan import Run
 from gpca.experiments.result import numbers
 from gpca.experiments.step import Plan, Step, Wildcards
@@ -25,18 +24,8 @@ from gpca.explainers.interface import BARE
 from gpca.explainers.registry import explainer_entry, explainer_module
 from gpca.io.csv_file import numbers as number_column
 from gpca.settings import changes_of
-from gpca.steps.control_samples import (
-    HARD,
-    LABELS,
-    OF_EVERY_SEED,
-    PAPER,
-    RETRAINED,
-    TRAININGS,
-    TRANSFER,
-    UNSEEN,
-    ControlSettings,
-    plain_of,
-)
+from gpca.steps import control_samples as samples
+from gpca.steps.control_samples import HARD, PAPER, RETRAINED, TRAININGS, TRANSFER, UNSEEN, plain_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -47,7 +36,7 @@ USUAL, RIVAL, NO_TRAINING = "usual", "rival", "untrained"  # kinds of difference
 
 
 @dataclass(frozen=True, kw_only=True)
-class Section(ControlSettings):
+class Section(samples.ControlSettings):
     """The controls, and the explainers under them, with settings beyond those that they have elsewhere.
 
     Attributes:
@@ -59,7 +48,6 @@ class Section(ControlSettings):
 
 
 def check(config: dict, _left_out: LeftOut) -> None:
-    """Check that every explainer finds what it reads under a control, and that hard samples can be drawn."""
     hard = config["causes"] | config["controls"]["hard"]
     with_key("controls.hard", CauseSettings.from_dict, hard, config["registrations"]["icp"])
     for key, name in require_explained(config, "controls.explainers"):
@@ -70,17 +58,14 @@ def check(config: dict, _left_out: LeftOut) -> None:
 
 
 def names(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str, Any]:
-    """Seeds, encoders that are compared, explainers that are timed, and sources between which there is transfer.
-
-    Encoders are compared on the samples that the unseen objects need; one source alone admits no transfer.
-    """
+    """Encoders are compared on the samples that the unseen objects need; one source alone admits no transfer."""
     controls = config["controls"]
-    explains_by_gpca = any(name in GPCA_FORMS for name in controls["explainers"])
+    by_gpca = any(name in GPCA_FORMS for name in controls["explainers"])
     return {
         "control_seed": list(config["seeds"])[: controls["seeds"]],
         "control": [*RETRAINED, *TRAININGS],
         "control_embedding": config["embedding"]["encoder"],
-        "control_encoder": list(controls["encoders"]) if explains_by_gpca and UNSEEN in controls["controls"] else [],
+        "control_encoder": list(controls["encoders"]) if by_gpca and UNSEEN in controls["controls"] else [],
         "timed_control": [name for name in controls["explainers"] if explainer_entry(name).reads == BARE],
         "transfer_source": list(sources) if TRANSFER in controls["controls"] and len(sources) > 1 else [],
     }
@@ -96,41 +81,25 @@ EXPERIMENT = Experiment(
 )
 
 
-def _has_further_encoders(plan: Plan, wildcards: Wildcards) -> bool:
-    seeds = plan.names["control_seed"][: plan.config["controls"]["encoder_seeds"]]
-    return int(wildcards.seed) in seeds
+def _controls_of(plan: Plan, wildcards: Wildcards) -> tuple[list[str], list[str]]:
+    """Controls of a seed, and those and the ways of training for which it has encoders of its own.
 
-
-def _controls_of(plan: Plan, wildcards: Wildcards) -> list[str]:
-    """Controls of a seed; those that need a further encoder are only in the first seeds."""
-    every = _has_further_encoders(plan, wildcards)
+    Only the first seeds train encoders beyond those of every seed.
+    """
     chosen = plan.config["controls"]["controls"]
-    return [name for name in chosen if every or name in OF_EVERY_SEED or name not in RETRAINED]
-
-
-def _retrained(plan: Plan, wildcards: Wildcards) -> list[str]:
-    """Controls and ways of training for which a seed has other encoders."""
-    controls = [name for name in _controls_of(plan, wildcards) if name in RETRAINED]
-    return controls + (plan.names["control_encoder"] if _has_further_encoders(plan, wildcards) else [])
+    if int(wildcards.seed) in plan.names["control_seed"][: plan.config["controls"]["encoder_seeds"]]:
+        return list(chosen), [name for name in chosen if name in RETRAINED] + plan.names["control_encoder"]
+    controls = [name for name in chosen if name in samples.OF_EVERY_SEED or name not in RETRAINED]
+    return controls, [name for name in controls if name in RETRAINED]
 
 
 def _other_sources(plan: Plan, wildcards: Wildcards) -> list[str]:
     return [name for name in plan.names["transfer_source"] if name != wildcards.source]
 
 
-def _explainers(plan: Plan) -> dict[str, dict]:
-    given = plan.config["controls"]["explainers"]
-    return {name: (plan.config["explainers"].get(name) or {}) | (added or {}) for name, added in given.items()}
-
-
 def _settings(plan: Plan, wildcards: Wildcards) -> dict[str, Any]:
     controls = {key: value for key, value in plan.config["controls"].items() if key not in ("explainers", "hard")}
-    controls["controls"] = _controls_of(plan, wildcards)
-    return {"controls": controls, "encoder": plan.config["encoders"][plan.names["control_embedding"]]}
-
-
-def _encoder_module(plan: Plan) -> str:
-    return encoders()[plan.config["encoders"][plan.names["control_embedding"]]["backbone"]].split(":")[0]
+    return {"controls": controls | {"controls": _controls_of(plan, wildcards)[0]}, "encoder": plan.encoder}
 
 
 HARD_FILE, SEED_FILE = "hard/{source}/seed{seed}.npz", "registrations/{source}/seed{seed}.npz"
@@ -158,7 +127,7 @@ TRAIN = Step(
         "curve": "control_embeddings/{control}/{source}/seed{seed}.csv",
     },
     settings=_settings,
-    modules=lambda plan: [_encoder_module(plan)],
+    modules=lambda plan: [plan.encoder_module],
     priority=10,
 )
 EXPLAIN = Step(
@@ -170,11 +139,11 @@ EXPLAIN = Step(
         "other_registrations": lambda plan, wildcards: [
             f"registrations/{name}/seed{{seed}}.npz" for name in _other_sources(plan, wildcards)
         ],
-        "hard": lambda plan, wildcards: [HARD_FILE] if HARD in _controls_of(plan, wildcards) else [],
+        "hard": lambda plan, wildcards: [HARD_FILE] if HARD in _controls_of(plan, wildcards)[0] else [],
         "encoder": "encoders/{source}/{control_embedding}/seed{seed}.pt",
         "embeddings": "embeddings/{source}/{control_embedding}/none/seed{seed}.npz",
         "retrained_embeddings": lambda plan, wildcards: [
-            f"control_embeddings/{name}/{{source}}/seed{{seed}}.npz" for name in _retrained(plan, wildcards)
+            f"control_embeddings/{name}/{{source}}/seed{{seed}}.npz" for name in _controls_of(plan, wildcards)[1]
         ],
     },
     outputs={
@@ -185,13 +154,13 @@ EXPLAIN = Step(
     settings=lambda plan, wildcards: (
         _settings(plan, wildcards)
         | {
-            "explainers": _explainers(plan),
+            "explainers": explainer_settings(plan.config, plan.config["controls"]["explainers"]),
             "uncertainty": plan.config["uncertainty"].get("removal", {}),
             "icp": plan.config["registrations"]["icp"],
         }
     ),
-    params={"retrained": _retrained, "others": _other_sources},
-    modules=lambda plan: [_encoder_module(plan), *map(explainer_module, _explainers(plan))],
+    params={"retrained": lambda plan, wildcards: _controls_of(plan, wildcards)[1], "others": _other_sources},
+    modules=lambda plan: [plan.encoder_module, *map(explainer_module, plan.config["controls"]["explainers"])],
     where={"seed": "control_seed"},
     target="controls",
     priority=5,
@@ -199,37 +168,29 @@ EXPLAIN = Step(
 
 
 def read_controls(files: Iterable[str | Path]) -> pd.DataFrame:
-    """Control, source (that is tested), trained_on, explainer, seed, sample, cluster, concept, right, scores and calls.
+    """Predictions of files named ``…/{source trained on}/seed{seed}.csv``; `source` is the one that is tested.
 
-    ``cluster`` names the family with its source. An abstained sample is wrong. ``bald`` is NaN where there is none.
-
-    Args:
-        files: named ``…/{source trained on}/seed{seed}.csv``.
-
-    Raises:
-        InputError: no files, or a file that cannot be read.
+    ``cluster`` names the family with its source. An abstained sample is not ``right``. ``bald`` is NaN where there is
+    none.
     """
     import pandas as pd
 
     frames = []
     for path in files:
         _, trained_on, seed = source_method_seed(path)
-        rows = read_predictions(path, LABELS)
-        columns = {
-            "control": rows["control"],
-            "source": rows["tested"],
-            "trained_on": trained_on,
-            "explainer": rows["explainer"],
-            "seed": seed,
-            "sample": rows["sample"],
-            "cluster": rows["tested"] + "/" + rows["cluster"],
-            "concept": rows["concept_true"],
-            "right": (rows["concept_true"] == rows["concept_predicted"]) & ~rows["abstained"],
-            "entropy": number_column(path, rows, "entropy"),
-            "bald": number_column(path, rows, "bald", needed=rows["bald"] != ""),
-            CALLS: rows[CALLS],
-        }
-        frames.append(pd.DataFrame(columns))
+        rows = read_predictions(path, samples.LABELS)
+        frames.append(
+            rows[["control", "explainer", "sample", CALLS]].assign(
+                source=rows["tested"],
+                trained_on=trained_on,
+                seed=seed,
+                cluster=rows["tested"] + "/" + rows["cluster"],
+                concept=rows["concept_true"],
+                right=(rows["concept_true"] == rows["concept_predicted"]) & ~rows["abstained"],
+                entropy=number_column(path, rows, "entropy"),
+                bald=number_column(path, rows, "bald", needed=rows["bald"] != ""),
+            )
+        )
     if not frames:
         raise InputError("controls", "no files were given", "name at least one explainer in controls.explainers")
     return pd.concat(frames, ignore_index=True)
@@ -248,7 +209,7 @@ def auroc_error(rows: pd.DataFrame, score: str, weights_B_N: np.ndarray) -> np.n
 def collect(run: Run, files: Iterable[str | Path]) -> pd.DataFrame:
     """Accuracy, and AUROC of errors by entropy and by BALD, by seed; ``table`` is the control.
 
-    The column ``concept`` is ``all``, and for transfer the source that was trained on.
+    ``concept`` is ``all``, and for transfer the source that was trained on.
     """
     records = []
     keys = ["control", "source", "trained_on", "explainer", "seed"]
@@ -285,38 +246,29 @@ def collect_intervals(run: Run, files: Iterable[str | Path]) -> pd.DataFrame:
         subset = predictions if source == POOLED else predictions[predictions["source"] == source]
         measured: dict[tuple[str, str], dict[str, tuple[Values, Clustered, str, Values]]] = {}
         for explainer, rows in subset.groupby("explainer", sort=False):
-            draws, usual, usual_draws = _drawn(source, rows), rows, None
-            if plain := plain_of(str(explainer)):
+            usual, plain = rows, plain_of(str(explainer))
+            draws = usual_draws = Clustered.drawn(rows["seed"], rows["cluster"], "control intervals", source)
+            if plain:
                 usual = subset[(subset["explainer"] == plain) & subset["seed"].isin(rows["seed"])]
-                usual_draws = _drawn(source, usual)
-            for (control, trained_on), mask_N in _groups(rows, source).items():
-                same = (usual["control"] == (control if plain else PAPER)) & usual["seed"].isin(rows["seed"][mask_N])
-                usual_values = _values(usual[same], (usual_draws or draws).subset(same.to_numpy()))
-                values = _values(rows[mask_N], draws.subset(mask_N))
-                group = measured.setdefault((control, trained_on), {})
-                group[str(explainer)] = values, draws.subset(mask_N), plain or PAPER, usual_values
-        for explainer in dict.fromkeys(subset["explainer"]):
+                usual_draws = Clustered.drawn(usual["seed"], usual["cluster"], "control intervals", source)
+            masks: dict[tuple[str, str], np.ndarray] = {}  # control, and `all` or the source trained on -> (N,)
+            for control in rows["control"].unique():
+                mask_N = (rows["control"] == control).to_numpy()
+                if control == TRANSFER and source != POOLED:
+                    for other in rows["trained_on"][mask_N].unique():
+                        masks[control, other] = mask_N & (rows["trained_on"] == other).to_numpy()
+                masks[control, POOLED if control == TRANSFER else ALL] = mask_N
+            for key, mask_N in masks.items():
+                same = (usual["control"] == (key[0] if plain else PAPER)) & usual["seed"].isin(rows["seed"][mask_N])
+                usual_values = _values(usual[same], usual_draws.subset(same.to_numpy()))
+                of_group = draws.subset(mask_N)
+                group = measured.setdefault(key, {})
+                group[str(explainer)] = _values(rows[mask_N], of_group), of_group, plain or PAPER, usual_values
+        for explainer in subset["explainer"].unique():
             for (control, trained_on), group in measured.items():
                 if explainer in group:
                     records += _records((control, source), trained_on, explainer, group)
     return intervals(records, "controls")
-
-
-def _drawn(source: str, rows: pd.DataFrame) -> Clustered:
-    return Clustered.drawn(rows["seed"], rows["cluster"], "control intervals", source)
-
-
-def _groups(rows: pd.DataFrame, source: str) -> dict[tuple[str, str], np.ndarray]:
-    """Control, and ``all`` or the source trained on -> mask of the rows."""
-    control_N, trained_on_N = rows["control"].to_numpy(str), rows["trained_on"].to_numpy(str)
-    groups = {}
-    for name in dict.fromkeys(control_N.tolist()):
-        mask_N = control_N == name
-        if name == TRANSFER and source != POOLED:
-            for other in dict.fromkeys(trained_on_N[mask_N].tolist()):
-                groups[name, other] = mask_N & (trained_on_N == other)
-        groups[name, POOLED if name == TRANSFER else ALL] = mask_N
-    return groups
 
 
 def _values(rows: pd.DataFrame, draws: Clustered) -> Values:
@@ -340,9 +292,7 @@ def _records(keys: tuple[str, str], trained_on: str, explainer: str, group: Mapp
         row = (*keys, explainer, metric, trained_on)
         drawn_B_N = None if metric == CALLS else draws.weights[1:]
         yield draws.record((*row, "", ""), interval(value_B, drawn_B_N))
-        others = {}
-        if keys[0] != PAPER or usual != PAPER:
-            others[USUAL] = usual, usual_values[metric]
+        others = {USUAL: (usual, usual_values[metric])} if keys[0] != PAPER or usual != PAPER else {}
         if metric == "accuracy":
             for kind, candidates in ((RIVAL, rivals), (NO_TRAINING, [name for name in UNTRAINED if name in rivals])):
                 if other := best_of(accuracies, candidates):

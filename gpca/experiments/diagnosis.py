@@ -22,7 +22,7 @@ from gpca.evaluation.measures import ALL, POOLED, Measure, Rivals, compared, int
 from gpca.experiments.experiment import ByName, Experiment, LeftOut, Names
 from gpca.experiments.plan import Run
 from gpca.experiments.result import numbers
-from gpca.experiments.step import Step
+from gpca.experiments.step import Step, Wildcards
 from gpca.explainers.interface import BARE, REENACTED, icp_calls
 from gpca.explainers.registry import CAUSES, explainer_entry, explainer_module, explainers, require_settings
 from gpca.reenactment.settings import ReenactmentSettings
@@ -47,7 +47,6 @@ class Section:
 
 
 def check(config: dict, _left_out: LeftOut) -> None:
-    """Check the explainers, and the encoder, for whose draws the clouds need points enough."""
     encoder = config[NAME]["encoder"]
     with_key("diagnosis.encoder.backbone", require_backbone, encoder["backbone"])
     require_draws("diagnosis.encoder", encoder, config["causes"]["points"][1], "causes.points")
@@ -92,10 +91,11 @@ EXPERIMENT = Experiment(
 )
 
 
-def read_by(explainer: str) -> str:
-    """Folder of what an explainer of causes reads."""
-    folders = {"embeddings": "cause_embeddings", REENACTED: "reenactments", BARE: "causes"}
-    return folders.get(explainer_entry(explainer, CAUSES).reads, "descriptors")
+FOLDERS = {"embeddings": "cause_embeddings", REENACTED: "reenactments", BARE: "causes"}  # by what is read
+
+
+def _folder_read(wildcards: Wildcards) -> str:
+    return FOLDERS.get(explainer_entry(wildcards.cause_explainer, CAUSES).reads, "descriptors")
 
 
 DIAGNOSE = Step(
@@ -103,10 +103,8 @@ DIAGNOSE = Step(
     run="gpca.steps.diagnosis:diagnose",
     inputs={
         "causes": "causes/{source}/seed{*seed}.npz",
-        "read": lambda plan, wildcards: f"{read_by(wildcards.cause_explainer)}/{{source}}/seed{{*seed}}.npz",
-        "read_timings": lambda plan, wildcards: (
-            f"timings/{{source}}/{read_by(wildcards.cause_explainer)}/seed{{*seed}}.csv"
-        ),
+        "read": lambda plan, wildcards: f"{_folder_read(wildcards)}/{{source}}/seed{{*seed}}.npz",
+        "read_timings": lambda plan, wildcards: f"timings/{{source}}/{_folder_read(wildcards)}/seed{{*seed}}.csv",
     },
     outputs={
         "predictions": "diagnoses/{source}/{cause_explainer}/seed{*seed}.csv",
@@ -139,17 +137,23 @@ DIAGNOSES = "diagnoses/{source}/{cause_explainer}/seed{seed}.csv"
 def collect(
     run: Run, prediction_files: Iterable[str | Path], causes_files: Iterable[str | Path]
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Confusions and measures of all test samples by seed, and the measures over all seeds with intervals."""
+    """Confusions and measures of all test samples by seed, and the measures over all seeds with intervals.
+
+    Borderline samples are in no confusion.
+    """
     judged, records = with_pooled(read_judged(prediction_files, causes_files)), []
     for (source, explainer, seed), samples in judged.items():
         values = {metric: value_1[0] for metric, value_1 in measure(samples, np.ones((1, len(samples)))).items()}
-        values["test_samples"] = len(samples)
-        records += [
-            (TABLE, source, explainer, metric, ALL, seed, float(value))
-            for metric, value in values.items()
-            if np.isfinite(value)
-        ]
-        records += [(TABLE, source, explainer, *row[:2], seed, row[2]) for row in _confusion(samples)]
+        rows = [(metric, ALL, value) for metric, value in values.items() if np.isfinite(value)]
+        rows.append(("test_samples", ALL, len(samples)))
+        if samples.names_causes:
+            labeled = samples.label != BORDERLINE
+            named = samples.named[labeled]
+            for true, counts in zip(LABELS, confusion(samples.label[labeled], named, named == "", LABELS), strict=True):
+                if counts.sum():
+                    predicted = zip((*LABELS, ABSTAINED), counts, strict=True)
+                    rows += [(PREDICTED_AS + label, true, count) for label, count in predicted]
+        records += [(TABLE, source, explainer, metric, part, seed, float(value)) for metric, part, value in rows]
     return tidy(records, "diagnoses"), compared_by_source(by_source(judged))
 
 
@@ -167,13 +171,12 @@ def collect_by_features(
 
 def with_pooled(judged: dict[tuple[str, str, int], Judged]) -> dict[tuple[str, str, int], Judged]:
     """Samples by source, explainer and seed, and those of all sources together where there are several."""
-    sources = list(dict.fromkeys(source for source, _, _ in judged))
+    sources = dict.fromkeys(source for source, _, _ in judged)
     if len(sources) < 2:
         return judged
-    rest = list(dict.fromkeys((explainer, seed) for _, explainer, seed in judged))
     return judged | {
         (POOLED, explainer, seed): joined(judged[source, explainer, seed] for source in sources)
-        for explainer, seed in rest
+        for explainer, seed in dict.fromkeys((explainer, seed) for _, explainer, seed in judged)
         if all((source, explainer, seed) in judged for source in sources)
     }
 
@@ -187,20 +190,6 @@ def by_source(judged: Mapping[tuple[str, str, int], Judged]) -> dict[str, dict[s
         source: {explainer: joined(seeds) for explainer, seeds in by_explainer.items()}
         for source, by_explainer in parts.items()
     }
-
-
-def _confusion(samples: Judged) -> list[tuple[str, str, float]]:
-    """Metric, true label and count of every label that is taken for another, without borderline samples."""
-    if not samples.names_causes:
-        return []
-    labeled = samples.label != BORDERLINE
-    counts = confusion(samples.label[labeled], samples.named[labeled], (samples.named == "")[labeled], LABELS)
-    return [
-        (PREDICTED_AS + predicted, true, float(count))
-        for true, row in zip(LABELS, counts, strict=True)
-        for predicted, count in zip((*LABELS, ABSTAINED), row, strict=True)
-        if row.sum()
-    ]
 
 
 # The ceiling is no rival, and none of it.
@@ -240,8 +229,8 @@ def compared_samples(
     rows: list[tuple] = []
     for metric in metrics:
         of_metric = {explainer: each[metric] for explainer, each in values.items() if metric in each}
-        measure = MEASURES.get(metric, Measure(limits=ANYTHING))
-        limits, least = measure.limits, measure.least_is_best
-        subset = draws.subset(counted(samples, metric))
-        rows += compared((TABLE, source), metric, part, of_metric, subset, limits, against, least)
+        how, subset = MEASURES.get(metric, Measure(limits=ANYTHING)), draws.subset(counted(samples, metric))
+        rows += compared(
+            (TABLE, source), metric, part, of_metric, subset, how.limits, against, least_is_best=how.least_is_best
+        )
     return rows

@@ -19,15 +19,15 @@ from gpca.attribution.learner_predictions import (
     sets_of,
     wrong,
 )
-from gpca.encoders.registry import EncoderChanges, encoders, require_draws
+from gpca.encoders.registry import EncoderChanges, require_draws
 from gpca.errors import InputError
 from gpca.evaluation.intervals import Clustered
 from gpca.evaluation.measures import ALL, intervals, tidy
 from gpca.experiments.experiment import ByName, Experiment, LeftOut, Names
-from gpca.experiments.explained import require_explained
+from gpca.experiments.explained import explainer_settings, require_explained
 from gpca.experiments.plan import Run
 from gpca.experiments.result import numbers, table
-from gpca.experiments.step import Plan, Step
+from gpca.experiments.step import Step
 from gpca.explainers.registry import explainer_entry, explainer_module, explainers
 from gpca.pairs.perturbation import Severities
 from gpca.pairs.shifted_sets import DISTANCES, TRAINED_ON, with_training_like
@@ -54,7 +54,6 @@ Shift = Annotated[dict, Keys(_SHIFT | {"encoder": EncoderChanges, "severities": 
 
 
 def check(config: dict, _left_out: LeftOut) -> None:
-    """Check that the samples can be drawn, and that every learner reads embeddings."""
     shift, registrations = config["shift"], config["registrations"]
     encoder = config["encoders"][config["embedding"]["encoder"]] | shift["encoder"]
     require_draws("shift.encoder", encoder, registrations["cloud_points"], "registrations.cloud_points")
@@ -69,15 +68,7 @@ def check(config: dict, _left_out: LeftOut) -> None:
 
 
 def learner_titles(config: Mapping[str, Any]) -> dict[str, str]:
-    """Name -> title of each learner."""
     return {name: explainer_entry(name).title.removesuffix(" on the embedding") for name in config["learners"]}
-
-
-def learner_settings(config: Mapping[str, Any]) -> dict[str, dict]:
-    """Settings of each learner: those of the explainer of its name, if the config has it, and its changes."""
-    return {
-        name: (config["explainers"].get(name) or {}) | (changes or {}) for name, changes in config["learners"].items()
-    }
 
 
 EXPERIMENT = Experiment(
@@ -91,10 +82,6 @@ EXPERIMENT = Experiment(
 )
 
 
-def _encoder(plan: Plan) -> str:
-    return plan.config["embedding"]["encoder"]
-
-
 SHIFT = Step(
     name="shift",
     run="gpca.steps.shift:shift",
@@ -102,7 +89,9 @@ SHIFT = Step(
         "objects": "objects/{source}.npz",
         "registrations": "registrations/{source}/seed{*seed}.npz",
         "embeddings": "embeddings/{source}/{embedding}/seed{*seed}.npz",
-        "encoders": lambda plan, wildcards: f"encoders/{wildcards.source}/{_encoder(plan)}/seed{{*seed}}.pt",
+        "encoders": lambda plan, wildcards: (
+            f"encoders/{wildcards.source}/{plan.config['embedding']['encoder']}/seed{{*seed}}.pt"
+        ),
         # Of a source that the encoder never saw, the first other one.
         "other_registrations": lambda plan, wildcards: [
             f"registrations/{name}/seed{{*seed}}.npz" for name in plan.names["source"] if name != wildcards.source
@@ -112,9 +101,9 @@ SHIFT = Step(
     settings=lambda plan, wildcards: {
         "shift": plan.config["shift"],
         "registrations": plan.config["registrations"],
-        "encoder": plan.config["encoders"][_encoder(plan)],
+        "encoder": plan.encoder,
     },
-    modules=lambda plan: [encoders()[plan.config["encoders"][_encoder(plan)]["backbone"]].split(":")[0]],
+    modules=lambda plan: [plan.encoder_module],
     target="shifted",
     priority=6,
 )
@@ -124,7 +113,7 @@ FIT = Step(
     run="gpca.steps.shift:fit_learners",
     inputs={"sets": "shifted/{source}/seed{*seed}.npz"},
     outputs={"out": "learners/{source}/{*learner}/seed{*seed}.csv"},
-    settings=lambda plan, wildcards: learner_settings(plan.config),
+    settings=lambda plan, wildcards: explainer_settings(plan.config, plan.config["learners"]),
     modules=lambda plan: map(explainer_module, plan.names["learner"]),
     target="learners",
     priority=4,
@@ -178,7 +167,6 @@ def _of_rows(function, first_S: np.ndarray, second_S: np.ndarray, rows: np.ndarr
 
 
 def correlations(rows: pd.DataFrame) -> dict[str, float]:
-    """Spearman's ρ of every score and every distance."""
     return {
         f"rho_{score}_{distance}": diagnostics.rank_correlation(rows[score], rows[distance])
         for score in scores_of(rows)
@@ -263,7 +251,6 @@ def _show(metric: str, title: str, name: str = "in_distribution", source: str = 
     **INTERVALS,
 )
 def table5_learners(run: Run, intervals: pd.DataFrame) -> Table:
-    """Accuracy and diagnostics on test samples like the training's: sources × learners."""
     columns = {
         "accuracy": _show("accuracy", "Accuracy (%)"),
         "rho": _show(RHO, "ρ", **RHO_LOOK),
@@ -292,12 +279,11 @@ def table5_learners(run: Run, intervals: pd.DataFrame) -> Table:
     **INTERVALS,
 )
 def table5_compact(run: Run, intervals: pd.DataFrame) -> Table:
-    """Accuracies by source, and diagnostics on one source: a row per learner."""
     one = PRINTED_SOURCE if PRINTED_SOURCE in run.sources else list(run.sources)[-1]
     columns = {source: _show("accuracy", f"{title} (%)", source=source) for source, title in run.source_titles.items()}
-    columns |= {"rho": _show(RHO, "ρ", source=one, **RHO_LOOK)}
-    columns |= {"aurc": _show("aurc_max_score", "AURC", source=one, **AREA_LOOK)}
-    columns |= {"ece": _show("ece", "ECE (share)", source=one, **ERROR_LOOK)}
+    columns["rho"] = _show(RHO, "ρ", source=one, **RHO_LOOK)
+    columns["aurc"] = _show("aurc_max_score", "AURC", source=one, **AREA_LOOK)
+    columns["ece"] = _show("ece", "ECE (share)", source=one, **ERROR_LOOK)
     rows = crossed(("method", learner_titles(run.config)))
     sheet = Sheet("table5_compact", {"learner": "Learner"}, rows, columns, intervals)
     shown = [source for source in run.sources if any(key == source for _, key in sheet.cells)]
@@ -316,7 +302,6 @@ def table5_compact(run: Run, intervals: pd.DataFrame) -> Table:
     **INTERVALS,
 )
 def table5_shift(run: Run, intervals: pd.DataFrame) -> Table:
-    """Accuracy, calibration and ρ on samples unlike those of the training: sources × learners by kinds of shift."""
     columns: dict[str, Show] = {}
     for name, title in SHIFTED.items():
         columns[f"accuracy_{name}"] = _show("accuracy", f"Acc., {title} (%)", name)
@@ -326,9 +311,8 @@ def table5_shift(run: Run, intervals: pd.DataFrame) -> Table:
         f"{OF_DISTANCE} It is taken over the shifted samples and those like the training's together.",
         f"Unseen objects: another encoder and other learners, which never saw some of the objects. {CALIBRATION}",
     )
-    return _by_source(
-        "table5_shift", run, intervals, columns, "Learners on samples unlike those of the training", notes
-    )
+    caption = "Learners on samples unlike those of the training"
+    return _by_source("table5_shift", run, intervals, columns, caption, notes)
 
 
 def _by_source(
@@ -349,6 +333,5 @@ def _by_source(
 
 
 def samples_of_seed(intervals: pd.DataFrame, source: str, name: str) -> int:
-    """Test samples of a seed in a set."""
     rows = rows_where(intervals, table=TABLE + name, source=source, metric="accuracy")
     return int((rows["samples"] // rows["seeds"]).max())

@@ -7,7 +7,7 @@ from typing import Any
 
 from gpca.encoders.registry import encoder_module
 from gpca.experiments.active_learning import learning_settings
-from gpca.experiments.out_of_distribution import learner_settings
+from gpca.experiments.explained import explainer_settings
 from gpca.experiments.step import Files, Plan, Step
 from gpca.explainers.registry import explainer_module
 from gpca.frames.source import REAL_WORLD, VIRTUAL
@@ -87,7 +87,7 @@ def _sections(plan: Plan) -> dict[str, Any]:
         "encoder": config["encoders"][config["embedding"]["encoder"]],
         "active_learning": learning_settings(plan),
         **{name: config["explainers"].get(name) or {} for name in ("gpca_paper", "gpca")},
-        "gpca_matern": learner_settings(config).get("gpca_matern", {}),
+        "gpca_matern": explainer_settings(config, config["learners"]).get("gpca_matern", {}),
     }
 
 

@@ -37,19 +37,14 @@ def collect(run: Run, files: Iterable[str | Path], samples: Iterable[str | Path]
     """Accuracy of every explainer and success of the registrations by severity, over all sources.
 
     Each range of severities has equally wide bins; pose errors have two ranges, rotation and translation.
-
-    Raises:
-        InputError: an unusable file, or a test sample without severities.
     """
     import pandas as pd
 
     from gpca.pairs.synthesis import RegistrationSettings
 
-    severities = dict(run.config["registrations"]["severities"])
+    bins, severities = run.config["controls"]["bins"], dict(run.config["registrations"]["severities"])
     ranges = RegistrationSettings.from_dict({"severities": severities}).severities
-    bins, success = run.config["controls"]["bins"], run.config["success"]["error"]
-    limits = {name: getattr(ranges, name) for name in SEVERITIES}
-    edges = {name: np.linspace(low, high, bins + 1) for name, (low, high) in limits.items()}
+    edges = {name: np.linspace(*getattr(ranges, name), bins + 1) for name in SEVERITIES}
     predictions = read_controls(files)
     predictions = predictions[predictions["control"] == PAPER]
     frames = []
@@ -62,11 +57,12 @@ def collect(run: Run, files: Iterable[str | Path], samples: Iterable[str | Path]
             rows[f"bin_{name}"] = np.clip(number_N, 0, bins - 1)
         frames.append(rows)
     table = pd.concat(frames, ignore_index=True)
-    keys = ["source", "seed", "sample"]
-    joined = predictions.merge(table, on=keys, suffixes=("", "_of_sample"), validate="many_to_one")
+    joined = predictions.merge(
+        table, on=["source", "seed", "sample"], suffixes=("", "_of_sample"), validate="many_to_one"
+    )
     if len(joined) != len(predictions):
         raise InputError("samples of the controls", "lack test samples of the predictions", "regenerate both")
-    outcomes = table.assign(explainer=REGISTRATION, right=table["error"] < success)
+    outcomes = table.assign(explainer=REGISTRATION, right=table["error"] < run.config["success"]["error"])
     both = pd.concat([outcomes, joined[outcomes.columns]])
     records = []
     for concept, names in BY_CONCEPT.items():
@@ -80,11 +76,7 @@ def collect(run: Run, files: Iterable[str | Path], samples: Iterable[str | Path]
 
 
 def read_severities(path: str | Path) -> pd.DataFrame:
-    """Read what :func:`collect` returned; only pose has bounds of a second severity, its translation.
-
-    Raises:
-        InputError: missing, empty or unreadable file, missing column, a value that is no finite number.
-    """
+    """Read what :func:`collect` returned; only pose has bounds of a second severity, its translation."""
     return read_numbers(path, COLUMNS, COLUMNS[2:], optional=("other_low", "other_high"))
 
 
@@ -109,7 +101,7 @@ LETTERS = 34  # in a line of an explainer's title
     severities=(read_severities, "control_severities.csv"),
 )
 def severity_curves(run: Run, severities) -> Figure:
-    """Matrices of methods × bins with numbers, since curves would lie on each other at 100 %."""
+    # Numbers, since curves would lie on each other at 100 %.
     explainers = titles(run.config["controls"]["explainers"])
     shown = [name for name in explainers if (severities["method"] == name).any()]
     if not shown:
@@ -120,7 +112,13 @@ def severity_curves(run: Run, severities) -> Figure:
     drawing, [drawn] = panels(1, len(parts), HEAD_IN + ROW_IN * (len(shown) + 2), sharey=True)
     for panel, (concept, low, label, factor) in zip(drawn, parts, strict=True):
         rows = severities[severities["concept"] == concept]
-        binned = [_binned(rows[rows["method"] == method], low) for method in (REGISTRATION, *shown)]
+        high, binned = low.replace("low", "high"), []
+        for method in (REGISTRATION, *shown):  # by the bin of one severity, over all bins of the other
+            of_method = rows[rows["method"] == method]
+            weighted = of_method.assign(value=100 * of_method["value"] * of_method["samples"])
+            weighted = weighted.assign(low=of_method[low], high=of_method[high])
+            sums = weighted.groupby("low").agg({"value": "sum", "samples": "sum", "high": "first"})
+            binned.append(sums.assign(value=sums["value"] / sums["samples"]))
         first = next(bins for bins in binned if len(bins))
         shares_R_B = np.array([bins["value"].reindex(first.index).to_numpy(float) for bins in binned])
         draw_percentages(panel, np.vstack([np.full(len(first), np.nan), shares_R_B]), "{:.0f}")
@@ -137,11 +135,3 @@ def severity_curves(run: Run, severities) -> Figure:
     sources = ", ".join(entry["title"] for entry in run.sources.values()) + run.stand_ins()
     write_title(drawing, f"{sources}: accuracy and success (%) by severity")
     return drawing
-
-
-def _binned(rows: pd.DataFrame, low: str) -> pd.DataFrame:
-    """The `value` in % and the number of `samples` by the bin of one severity, over all bins of the other."""
-    high = low.replace("low", "high")
-    weighted = rows.assign(value=100 * rows["value"] * rows["samples"], low=rows[low], high=rows[high])
-    sums = weighted.groupby("low").agg({"value": "sum", "samples": "sum", "high": "first"})
-    return sums.assign(value=sums["value"] / sums["samples"])

@@ -17,6 +17,7 @@ from operator import getitem
 from pathlib import Path
 from typing import Any
 
+from gpca.encoders.registry import encoders
 from gpca.experiments.plan import Run
 from gpca.process.code_files import code_files
 
@@ -39,6 +40,16 @@ class Plan:
     def config(self) -> Mapping[str, Any]:
         """The config of the run."""
         return self.run.config
+
+    @property
+    def encoder(self) -> Mapping[str, Any]:
+        """Settings of the encoder that GP-CA reads."""
+        return self.config["encoders"][self.config["embedding"]["encoder"]]
+
+    @property
+    def encoder_module(self) -> str:
+        """The module of its backbone."""
+        return encoders()[self.encoder["backbone"]].split(":")[0]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,7 +11,6 @@ import numpy as np
 
 from gpca.alignment.methods.registry import installed, method_entry, method_module
 from gpca.attribution.predictions import read_predictions
-from gpca.encoders.registry import encoders
 from gpca.errors import InputError, require_names, with_key
 from gpca.evaluation.intervals import Clustered
 from gpca.evaluation.measures import ALL, POOLED, Measure, Parts, over_seeds, per_seed, read_samples
@@ -45,7 +44,6 @@ class Section(ExchangeSettings):
 
 
 def check(config: dict, names_left_out: LeftOut) -> None:
-    """Check that all names exist, and that the explainers read what is exchanged."""
     for key, noun in {"sources": "source", "methods": "registration method", "estimators": "estimator"}.items():
         require_names(f"exchange.{key}", config["exchange"][key], config[key], noun, names_left_out(key))
     for key, name in require_explained(config, "exchange.explainers"):
@@ -53,7 +51,6 @@ def check(config: dict, names_left_out: LeftOut) -> None:
 
 
 def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
-    """The sources and seeds, the methods, and the explainers for which estimators or methods are exchanged."""
     exchange = config["exchange"]
     return {
         "exchange_source": list(exchange["sources"]),
@@ -84,18 +81,8 @@ def _settings(plan: Plan, _wildcards: Wildcards) -> dict[str, Any]:
         "methods": {name: config["methods"][name] for name in methods},
         "estimators": {name: config["estimators"][name] for name in exchange["estimators"]},
         "uncertainty": config["uncertainty"].get("additive", {}),
-        "encoder": config["encoders"][plan.names["exchange_encoder"]],
+        "encoder": plan.encoder,
     }
-
-
-def _modules(plan: Plan) -> list[str]:
-    exchange, backbone = plan.config["exchange"], plan.config["encoders"][plan.names["exchange_encoder"]]["backbone"]
-    return [
-        encoders()[backbone].split(":")[0],
-        *map(explainer_module, exchange["explainers"]),
-        *map(method_module, plan.names["exchange_method"]),
-        *map(estimator_module, exchange["estimators"]),
-    ]
 
 
 EXPLAIN = Step(
@@ -108,7 +95,12 @@ EXPLAIN = Step(
     },
     outputs={"out": "exchange/{source}/seed{*seed}.csv"},
     settings=_settings,
-    modules=_modules,
+    modules=lambda plan: [
+        plan.encoder_module,
+        *map(explainer_module, plan.config["exchange"]["explainers"]),
+        *map(method_module, plan.names["exchange_method"]),
+        *map(estimator_module, plan.config["exchange"]["estimators"]),
+    ],
     where={"source": "exchange_source", "seed": "exchange_seed"},
     target="exchanges",
     priority=2,
@@ -119,18 +111,8 @@ def answers(files: Iterable[str | Path]) -> pd.DataFrame:
     """Predictions of all files, and whether each is right, and the same as with Monte-Carlo.
 
     A sample without an estimate is wrong. The cluster is the object's family in its source.
-
-    Raises:
-        InputError: no files, one that cannot be read, or that exchanges something else.
     """
-
-    def read(path: Path) -> pd.DataFrame:
-        rows = read_predictions(path, (*LABELS, FAILURE))
-        if unknown := sorted(set(rows["exchanged"]) - {METHOD, ESTIMATOR}):
-            raise InputError(path, f"exchanges '{unknown[0]}'", f"expected {METHOD} or {ESTIMATOR}")
-        return rows
-
-    rows = read_samples(files, read)
+    rows = read_samples(files, lambda path: read_predictions(path, (*LABELS, FAILURE)))
     rows = rows.assign(source=rows["method"], table=rows["explainer"], method=rows["asked_of"])
     failed_N = rows[FAILURE] != ""
     usual = rows[rows["asked_of"] == MONTE_CARLO].set_index(["explainer", *SAMPLE])["concept_predicted"]
@@ -159,21 +141,19 @@ def measured(rows: pd.DataFrame) -> Iterator[tuple[pd.DataFrame, Any, dict[str, 
     for (exchanged, _), explained in rows.groupby(["exchanged", "explainer"], sort=False):
         for learnt_from, subset in explained.groupby("learnt_from", sort=False):
             if exchanged == ESTIMATOR:
-                yield subset, by_concept, by_estimator
+                yield subset, _by_concept, by_estimator
                 continue
             others = subset[subset["asked_of"] != learnt_from].assign(method=ANOTHER)
             several = subset["asked_of"].nunique() > 1
-            yield pd.concat([subset, others]) if several else subset, by_learned_method, by_method
+            yield pd.concat([subset, others]) if several else subset, _by_learned_method, by_method
 
 
-def by_concept(rows: pd.DataFrame) -> Parts:
-    """Masks of all rows and of each concept."""
+def _by_concept(rows: pd.DataFrame) -> Parts:
     masks = {concept: (rows["concept_true"] == concept).to_numpy() for concept in rows["concept_true"].unique()}
     return {ALL: np.ones(len(rows), bool)} | masks
 
 
-def by_learned_method(rows: pd.DataFrame) -> Parts:
-    """Masks of each method that registered the training pairs."""
+def _by_learned_method(rows: pd.DataFrame) -> Parts:
     return {name: (rows["learnt_from"] == name).to_numpy() for name in rows["learnt_from"].unique()}
 
 
@@ -219,7 +199,6 @@ ANSWERED = {
     intervals="exchange_intervals.csv",
 )
 def table14_estimator_explanations(run: Run, intervals):
-    """Accuracy in all and by concept, and agreement with Monte-Carlo: explainers × estimators."""
     exchange = run.config["exchange"]
     sheet = Sheet(
         "table14_estimator_explanations",
@@ -258,7 +237,6 @@ def table14_estimator_explanations(run: Run, intervals):
     intervals="exchange_intervals.csv",
 )
 def table14_method_matrix(run: Run, intervals):
-    """Accuracy of explainers × the method of the training pairs, by the method of the test pairs."""
     exchange = run.config["exchange"]
     methods = run.titles(method_entry, installed(exchange["methods"]))
     asked = {name: f"on {title}" for name, title in methods.items()} | {ANOTHER: "on another (mean)"}

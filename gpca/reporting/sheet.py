@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
@@ -52,6 +52,11 @@ def crossed(*axes: tuple[str, Mapping[str, str]]) -> list[Row]:
         Row(labels, dict(zip(columns, (key for key, _ in labels), strict=True)))
         for labels in product(*(titles.items() for _, titles in axes))
     ]
+
+
+def with_label(rows: Iterable[Row], label_of: Callable[[Row], str]) -> list[Row]:
+    """Rows with one more label, which is its own title."""
+    return [replace(row, labels=[*row.labels, (label_of(row),) * 2]) for row in rows]
 
 
 class Sheet(TableBuilder):
