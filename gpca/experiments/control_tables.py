@@ -104,6 +104,8 @@ def table10_controls(run: Run, intervals):
         elif key.endswith(WRONG):
             wrong = round((1 - cell.mean) * cell.test_samples)
             sheet.cells[i, key] = plain_cell(wrong, cell.seeds, cell.test_samples)
+            if (i, key.removesuffix(WRONG)) not in sheet.cells:
+                del sheet.cells[i, key]
     by_control = {name: [cell.seeds for (_, key), cell in sheet.cells.items() if key == name] for name in names}
     seeds = {name: span(numbers_of_seeds) for name, numbers_of_seeds in by_control.items() if numbers_of_seeds}
     usual = seeds.pop(PAPER, str(sheet.seeds))

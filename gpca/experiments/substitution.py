@@ -11,7 +11,7 @@ import numpy as np
 
 from gpca.alignment.methods.registry import installed, method_entry, method_module
 from gpca.attribution.predictions import read_predictions
-from gpca.errors import InputError, require_names, with_key
+from gpca.errors import require_names, with_key
 from gpca.evaluation.intervals import Clustered
 from gpca.evaluation.measures import ALL, POOLED, Measure, Parts, over_seeds, per_seed, read_samples
 from gpca.experiments.experiment import EXPLAINERS, ByName, Experiment, LeftOut
@@ -24,7 +24,7 @@ from gpca.explainers.registry import explainer_entry, explainer_module
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.sheet import Sheet, Show, crossed, show, where
 from gpca.settings import Distinct
-from gpca.steps.exchange import ESTIMATOR, FAILURE, LABELS, METHOD, ExchangeSettings, require_exchangeable
+from gpca.steps.exchange import ESTIMATOR, FAILURE, LABELS, ExchangeSettings, require_exchangeable
 from gpca.uncertainty.estimators.registry import estimator_entry, estimator_module
 from gpca.uncertainty.settings import MONTE_CARLO
 

@@ -108,14 +108,6 @@ def test_agreement_is_with_the_same_sample_of_the_same_source_and_seed(path, tmp
     assert intervals.set_index(["method", "metric"])["value"]["censi", "agreement"] == 0.5
 
 
-def test_another_exchange_is_refused(path):
-    path.write_text(path.read_text().replace("estimator,", "encoder,", 1))
-    with pytest.raises(InputError, match="exchanges 'encoder'; expected method or estimator"):
-        collect(RUN, [path])
-    with pytest.raises(InputError, match="no files were given"):
-        collect(RUN, [])
-
-
 @pytest.fixture
 def intervals():
     rows = []
