@@ -298,3 +298,36 @@ def test_causes_end_with_the_seconds_of_a_truth_and_the_shares_of_the_states(cap
     for shares in (("nominal", "borderline", "failed"), ("failed_by_noise", "failed_by_pose", "failed_by_overlap")):
         assert sum(result[name] for name in shares) == pytest.approx(1)
     assert 0 <= result["ceiling"] <= 1
+
+
+def test_an_encoder_has_converged_where_no_longer_training_is_better(tmp_path, capsys):
+    """Of two seeds; the row of a training that is there is not computed again."""
+    from benchmarks import convergence
+
+    by_epochs = {3: (0.70, 0.80), 6: (0.90, 0.93), 12: (0.91, 0.92), 24: (0.90, 0.93)}
+    rows = [
+        dict.fromkeys(convergence.COLUMNS, "0.5")
+        | {"backbone": "dgcnn", "epochs": str(epochs), "seed": str(seed), "head_accuracy": str(accuracy)}
+        for epochs, accuracies in by_epochs.items()
+        for seed, accuracy in enumerate(accuracies)
+    ]
+    convergence.write_rows(tmp_path / "rows.csv", rows)
+    convergence.main(["--out", str(tmp_path / "rows.csv")])
+    out = capsys.readouterr().out
+    assert last_line(out) == {"converged_dgcnn": 6}
+    assert "75.0" in out  # mean accuracy after 3 epochs
+    convergence.write_rows(tmp_path / "rows.csv", rows[:4])
+    convergence.main(["--out", str(tmp_path / "rows.csv")])
+    assert last_line(capsys.readouterr().out) == {"converged_dgcnn": None}
+
+
+def test_convergence_trains_and_judges_an_encoder(tmp_path, registrations):
+    from benchmarks import convergence
+
+    registrations.save(tmp_path / "ycb/seed100.npz", ("ycb", 100))
+    out = tmp_path / "rows.csv"
+    convergence.main([str(tmp_path / "ycb/seed100.npz"), "--backbones", "pointnet", "--epochs", "1", "--out", str(out)])
+    [row] = convergence.read_rows(out)
+    assert (row["backbone"], row["epochs"], row["seed"]) == ("pointnet", "1", "100")
+    assert 0 <= float(row["gpc_accuracy"]) <= 1
+    assert float(row["loss"]) > 0
