@@ -16,39 +16,28 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from gpca.alignment.icp import CONVERGED, ICP, ICPSettings, require_cloud
+from gpca.alignment.rigid import rigid_motion
 
 MOST_LISTS = 1 << 16  # beyond that, queries in new voxels search the cells
 SINGULAR = 1e-10  # eigenvalue, relative to the largest, below which a step leaves its direction alone
 
 
 class Target(NamedTuple):
-    """Points sorted into cubic cells, and the voxels' lists, which the queries fill.
+    """Points sorted into cubic cells, and lists of the points nearest to the centers of voxels, which queries fill."""
 
-    Attributes:
-        points: (P, 3) in the order of their cells; a neighbor is a row of it.
-        starts: first point of each cell, and the end of the last one.
-        low: (3,) corner of the cells; the voxels begin `distance` before it.
-        cell, cells: edge of a cell, and number along each axis; `voxel`, `voxels` likewise.
-        list_rows: row of a voxel's list, -1 before it has one.
-        listed, offsets: (lists, LISTED) points, (lists, 3, LISTED) their positions from the voxel's center.
-        reach: minimum distance of all unlisted points from the center.
-        used: (1,) number of lists.
-        distance: farther points are no neighbors; unit of the points.
-    """
-
-    points: np.ndarray
-    starts: np.ndarray
-    low: np.ndarray
-    cell: float
-    cells: np.ndarray
+    points: np.ndarray  # (P, 3) in the order of their cells; a neighbor is a row of it
+    starts: np.ndarray  # first point of each cell, and the end of the last one
+    low: np.ndarray  # (3,) corner of the cells; the voxels begin `distance` before it
+    cell: float  # edge
+    cells: np.ndarray  # number along each axis
     voxel: float
     voxels: np.ndarray
-    list_rows: np.ndarray
-    listed: np.ndarray
-    offsets: np.ndarray
-    reach: np.ndarray
-    used: np.ndarray
-    distance: float
+    list_rows: np.ndarray  # row of a voxel's list, -1 before it has one
+    listed: np.ndarray  # (lists, LISTED) points
+    offsets: np.ndarray  # (lists, 3, LISTED) their positions from the voxel's center
+    reach: np.ndarray  # minimum distance of all unlisted points from the center
+    used: np.ndarray  # (1,) number of lists
+    distance: float  # farther points are no neighbors; unit of the points
 
 
 def make_target(points: np.ndarray, distance: float) -> Target:
@@ -85,15 +74,9 @@ def make_target(points: np.ndarray, distance: float) -> Target:
 
 
 class BatchedICP:
-    """ICP to one target.
+    """ICP to one target (P, 3), in any unit, which the results and the correspondence distance share.
 
-    Args:
-        target: (P, 3) points, any unit; results come in the same unit.
-        settings: the correspondence distance is in the unit of the points.
-        target_normals: (P, 3), needed by point-to-plane and generalized ICP.
-
-    Raises:
-        InputError: fewer than three points, or NaN.
+    Point-to-plane and generalized ICP need normals (P, 3). Fewer than three points or NaN raise an InputError.
     """
 
     def __init__(self, target: np.ndarray, settings: ICPSettings, target_normals: np.ndarray | None = None) -> None:
@@ -110,9 +93,6 @@ class BatchedICP:
         """Align `source` (N, 3) from poses (n, 4, 4): T_target_source (n, 4, 4), fitness (n,), inlier RMSE (n,).
 
         `max_iterations` overrides the settings' limit of point-to-point runs.
-
-        Raises:
-            InputError: fewer than three points, or NaN.
         """
         require_cloud("source cloud", source)
         poses_n = np.array(T_target_source_init_n, np.float64)
@@ -129,31 +109,21 @@ class BatchedICP:
         return np.array([run.T_target_source for run in runs]), fitness_n, rmse_n
 
 
-class Pulls:
-    """The gradient of point-to-point ICP's mean squared distance at given poses.
+def pulls(
+    target: Target, source: np.ndarray, T_target_source_n: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the mean of [y × r, r] (n, 6) over correspondences of `source` (N, 3), fitness (n,) and RMSE (n,).
 
-    Args:
-        target: (P, 3).
-        distance: of the farthest correspondence, in the unit of the points.
+    r = y - q is the offset of the moved point y from its neighbor q; the mean is half the gradient of the mean of |r|²
+    by a twist on the left of each pose (n, 4, 4).
     """
+    from gpca.alignment.icp_kernels import pull_all
 
-    def __init__(self, target: np.ndarray, distance: float) -> None:
-        require_cloud("target cloud", target)
-        self._target = make_target(target, distance)
-
-    def __call__(self, source: np.ndarray, T_target_source_n: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the mean of [y × r, r] (n, 6) over correspondences of `source` (N, 3), fitness (n,) and RMSE (n,).
-
-        r = y - q is the offset of the moved point y from its neighbor q; the mean is half the gradient of the mean of
-        |r|² by a twist on the left of each pose (n, 4, 4).
-        """
-        from gpca.alignment.icp_kernels import pull_all
-
-        n = len(T_target_source_n)
-        pulls_n_6, fitness_n, rmse_n = np.empty((n, 6)), np.empty(n), np.empty(n)
-        source = np.ascontiguousarray(source, np.float64)
-        pull_all(source, self._target, np.ascontiguousarray(T_target_source_n), pulls_n_6, fitness_n, rmse_n)
-        return pulls_n_6, fitness_n, rmse_n
+    n = len(T_target_source_n)
+    pulls_n_6, fitness_n, rmse_n = np.empty((n, 6)), np.empty(n), np.empty(n)
+    source = np.ascontiguousarray(source, np.float64)
+    pull_all(source, target, np.ascontiguousarray(T_target_source_n), pulls_n_6, fitness_n, rmse_n)
+    return pulls_n_6, fitness_n, rmse_n
 
 
 class BatchedPlaneICP:
@@ -207,22 +177,17 @@ def _descend(
     for _ in range(iterations):
         if not len(active):
             break
-        poses_n[active] = _steps(hessian_n[active], gradient_n[active]) @ poses_n[active]
+        # Gauss-Newton steps of least norm, as :func:`gpca.alignment.rigid.plane_step`.
+        values_m_6, axes_m_6_6 = np.linalg.eigh(hessian_n[active])
+        held_m_6 = values_m_6 > SINGULAR * values_m_6[:, -1:]
+        along_m_6 = np.einsum("nji,nj->ni", axes_m_6_6, gradient_n[active])
+        along_m_6 = np.where(held_m_6, along_m_6 / np.where(held_m_6, values_m_6, 1.0), 0.0)
+        steps_m_6 = -np.einsum("nij,nj->ni", axes_m_6_6, along_m_6)
+        steps_m = rigid_motion(Rotation.from_euler("xyz", steps_m_6[:, :3]).as_matrix(), steps_m_6[:, 3:])
+        poses_n[active] = steps_m @ poses_n[active]
         hessian_m, gradient_m, fitness_m, rmse_m = sums(active)
         settled = (np.abs(fitness_m - fitness_n[active]) < CONVERGED) & (np.abs(rmse_m - rmse_n[active]) < CONVERGED)
         hessian_n[active], gradient_n[active] = hessian_m, gradient_m
         fitness_n[active], rmse_n[active] = fitness_m, rmse_m
         active = active[~settled & (fitness_m > 0)]
     return poses_n, fitness_n, rmse_n
-
-
-def _steps(hessian_n_6_6: np.ndarray, gradient_n_6: np.ndarray) -> np.ndarray:
-    """Return Gauss-Newton steps (n, 4, 4) of least norm, as :func:`gpca.alignment.rigid.plane_step`."""
-    values_n_6, axes_n_6_6 = np.linalg.eigh(hessian_n_6_6)
-    held_n_6 = values_n_6 > SINGULAR * values_n_6[:, -1:]
-    along_n_6 = np.einsum("nji,nj->ni", axes_n_6_6, gradient_n_6)
-    along_n_6 = np.where(held_n_6, along_n_6 / np.where(held_n_6, values_n_6, 1.0), 0.0)
-    steps_n_6 = -np.einsum("nij,nj->ni", axes_n_6_6, along_n_6)
-    T_n = np.tile(np.eye(4), (len(steps_n_6), 1, 1))
-    T_n[:, :3, :3], T_n[:, :3, 3] = Rotation.from_euler("xyz", steps_n_6[:, :3]).as_matrix(), steps_n_6[:, 3:]
-    return T_n

@@ -26,19 +26,15 @@ def estimate_normals(points_N_3: np.ndarray, neighbors: int = NEIGHBORS) -> np.n
     return np.where(inward_N[:, None], -normals_N_3, normals_N_3)
 
 
-def fpfh_of_pair(
-    pair: Any, radius: float = RADIUS, most_neighbors: int = MOST_NEIGHBORS
-) -> tuple[list[Any], list[Any]]:
-    """Return Open3D's clouds of a pair's source and target, and the features of each."""
-    clouds = [open3d_cloud(getattr(pair, name), pair.normals(name)) for name in ("source", "target")]
-    return clouds, [fpfh(cloud, radius, most_neighbors) for cloud in clouds]
+def fpfh_of_pair(pair: Any, radius: float, most_neighbors: int) -> tuple[list[Any], list[Any]]:
+    """Return Open3D's clouds of a pair's source and target, and the features of each, ``.data`` (33, N).
 
-
-def fpfh(cloud: Any, radius: float = RADIUS, most_neighbors: int = MOST_NEIGHBORS) -> Any:
-    """Return Open3D's features, ``.data`` (33, N), from at most the nearest `most_neighbors` points in the radius."""
+    A feature is made of at most the nearest `most_neighbors` points in the radius.
+    """
     o3d = require_open3d()
+    clouds = [open3d_cloud(getattr(pair, name), pair.normals(name)) for name in ("source", "target")]
     neighbors = o3d.geometry.KDTreeSearchParamHybrid(radius, most_neighbors)
-    return o3d.pipelines.registration.compute_fpfh_feature(cloud, neighbors)
+    return clouds, [o3d.pipelines.registration.compute_fpfh_feature(cloud, neighbors) for cloud in clouds]
 
 
 def mutual_matches(source_N_d: np.ndarray, target_P_d: np.ndarray, most: int) -> np.ndarray:

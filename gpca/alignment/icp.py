@@ -18,16 +18,10 @@ CONVERGED = 1e-6  # largest change of fitness and of inlier RMSE in the last ite
 
 @dataclass(frozen=True)
 class ICPSettings:
-    """Settings of ICP.
-
-    Attributes:
-        method: ``point_to_point``, ``point_to_plane`` or ``generalized``.
-        correspondence_distance: of the farthest correspondence, relative to the diameter.
-        max_iterations: upper limit; Open3D stops earlier when fitness and RMSE change by less than 1e-6.
-    """
+    """Settings of ICP; it stops before `max_iterations` when fitness and RMSE change by less than 1e-6."""
 
     method: Method = "point_to_point"
-    correspondence_distance: Annotated[float, Bounds(exclusiveMinimum=0, maximum=10)] = 0.10
+    correspondence_distance: Annotated[float, Bounds(exclusiveMinimum=0, maximum=10)] = 0.10  # diameters
     max_iterations: Count = 50
 
     def __post_init__(self) -> None:
@@ -47,18 +41,17 @@ class Registration:
 class ICP:
     """Open3D's ICP of many sources to one target (P, 3), in any unit, which the correspondence distance shares.
 
-    Point-to-plane and generalized ICP need normals (P, 3) and can take one of Open3D's robust kernels.
+    Point-to-plane and generalized ICP need normals (P, 3); point-to-plane can take one of Open3D's robust kernels.
     """
 
     def __init__(
         self, target: np.ndarray, target_normals: np.ndarray | None, settings: ICPSettings, kernel: Any = None
     ) -> None:
-        self._o3d = require_open3d()
         self._settings = settings
         if settings.method != "point_to_point" and target_normals is None:
             raise InputError(f"ICP method '{settings.method}'", "the target has no normals", "use point_to_point")
         self._target = open3d_cloud(target, target_normals)
-        registration = self._o3d.pipelines.registration
+        registration = self._registration = require_open3d().pipelines.registration
         self._estimation = {
             "point_to_point": registration.TransformationEstimationPointToPoint,
             "point_to_plane": registration.TransformationEstimationPointToPlane,
@@ -69,18 +62,10 @@ class ICP:
     def register(self, source: np.ndarray, T_target_source_init: np.ndarray) -> Registration:
         """Align `source` (P, 3) from the initial pose; fewer than three points or NaN raise an InputError."""
         require_cloud("source cloud", source)
-        registration = self._o3d.pipelines.registration
-        align = registration.registration_icp
-        if self._settings.method == "generalized":
-            align = registration.registration_generalized_icp
-        result = align(
-            open3d_cloud(source),
-            self._target,
-            self._settings.correspondence_distance,
-            T_target_source_init,
-            self._estimation,
-            self._criteria,
-        )
+        generalized = self._settings.method == "generalized"
+        align = self._registration.registration_generalized_icp if generalized else self._registration.registration_icp
+        distance, start = self._settings.correspondence_distance, T_target_source_init
+        result = align(open3d_cloud(source), self._target, distance, start, self._estimation, self._criteria)
         return Registration(np.array(result.transformation), result.fitness, result.inlier_rmse)
 
 

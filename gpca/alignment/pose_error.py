@@ -15,15 +15,10 @@ JUDGED_POINTS = 1000  # the first points of an object, over which errors are usu
 
 @dataclass(frozen=True)
 class SuccessSettings:
-    """The section ``success`` of the config.
+    """The section ``success`` of the config, in diameters."""
 
-    Attributes:
-        error: smallest error of a failure, ADD or ADD-S, in diameters.
-        curve: other limits, in ascending order, at which shares of successes are shown.
-    """
-
-    error: PositiveShare = 0.03
-    curve: Distinct[PositiveShare] = (0.02, 0.03, 0.05, 0.10)
+    error: PositiveShare = 0.03  # smallest of a failure, ADD or ADD-S
+    curve: Distinct[PositiveShare] = (0.02, 0.03, 0.05, 0.10)  # other limits at which shares of successes are shown
 
     def __post_init__(self) -> None:
         if list(self.curve) != sorted(self.curve):
@@ -35,11 +30,6 @@ def success_within(error: float) -> str:
     return f"success_{100 * error:g}"
 
 
-def add_error(points_N_3: np.ndarray, T_estimated: np.ndarray, T_true: np.ndarray) -> float:
-    """Return the mean distance of the object's points under the two poses (ADD), in their unit."""
-    return float(np.linalg.norm(transform(T_estimated, points_N_3) - transform(T_true, points_N_3), axis=1).mean())
-
-
 def adds_error(points_N_3: np.ndarray, T_estimated: np.ndarray, T_true: np.ndarray) -> float:
     """Return the mean distance from each point under the estimate to the nearest under the truth (ADD-S)."""
     from scipy.spatial import cKDTree
@@ -49,14 +39,16 @@ def adds_error(points_N_3: np.ndarray, T_estimated: np.ndarray, T_true: np.ndarr
 
 
 def pose_error(points_N_3: np.ndarray, T_estimated: np.ndarray, T_true: np.ndarray, symmetric: bool) -> float:
-    """Return ADD-S where the object is symmetric and ADD elsewhere."""
-    return (adds_error if symmetric else add_error)(points_N_3, T_estimated, T_true)
+    """Return ADD-S of a symmetric object, and else ADD, the mean distance of its points under the two poses."""
+    if symmetric:
+        return adds_error(points_N_3, T_estimated, T_true)
+    return float(np.linalg.norm(transform(T_estimated, points_N_3) - transform(T_true, points_N_3), axis=1).mean())
 
 
 def displacements(T_n: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Return the root mean square distance (n,) by which each transform (n, 4, 4) moves the points (N, 3)."""
-    x, y, z = points.T
     squared_n = np.zeros(len(T_n))
+    x, y, z = points.T
     for i, coordinate in enumerate((x, y, z)):
         a, b, c, t = (T_n[:, i, j, None] for j in range(4))
         squared_n += np.square(a * x + b * y + c * z + t - coordinate).mean(axis=1)

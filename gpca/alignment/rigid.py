@@ -34,10 +34,8 @@ def rigid_motion(R_b_a: np.ndarray, translation: ArrayLike = (0.0, 0.0, 0.0)) ->
 
 def inverse(T_b_a: np.ndarray) -> np.ndarray:
     """Return ``T_a_b``, by the transpose of the rotation."""
-    T_a_b = np.eye(4)
-    T_a_b[:3, :3] = T_b_a[:3, :3].T
-    T_a_b[:3, 3] = -T_b_a[:3, :3].T @ T_b_a[:3, 3]
-    return T_a_b
+    R_a_b = T_b_a[:3, :3].T
+    return rigid_motion(R_a_b, -R_a_b @ T_b_a[:3, 3])
 
 
 def inverses(T_b_a_n: np.ndarray) -> np.ndarray:
@@ -107,11 +105,8 @@ def log(T_n: np.ndarray) -> np.ndarray:
 
 def adjoint(T_b_a: np.ndarray) -> np.ndarray:
     """Return Ad (6, 6), which maps twists on the left from frame a to b: exp(Ad ξ) = T_b_a exp(ξ) T_b_a⁻¹."""
-    R, t = T_b_a[:3, :3], T_b_a[:3, 3]
-    Ad = np.zeros((6, 6))
-    Ad[:3, :3] = Ad[3:, 3:] = R
-    Ad[3:, :3] = _cross(t[None])[0] @ R
-    return Ad
+    R = T_b_a[:3, :3]
+    return np.block([[R, np.zeros((3, 3))], [_cross(T_b_a[None, :3, 3])[0] @ R, R]])
 
 
 def point_jacobians(points_N_3: np.ndarray) -> np.ndarray:
@@ -124,8 +119,7 @@ def point_jacobians(points_N_3: np.ndarray) -> np.ndarray:
 
 def _cross(vectors_n_3: np.ndarray) -> np.ndarray:
     """Return [v] (n, 3, 3), with [v] u = v × u."""
-    cross_n = np.zeros((len(vectors_n_3), 3, 3))
-    x, y, z = vectors_n_3.T
+    cross_n, (x, y, z) = np.zeros((len(vectors_n_3), 3, 3)), vectors_n_3.T
     cross_n[:, 0, 1], cross_n[:, 0, 2], cross_n[:, 1, 2] = -z, y, -x
     cross_n[:, 1, 0], cross_n[:, 2, 0], cross_n[:, 2, 1] = z, -y, x
     return cross_n

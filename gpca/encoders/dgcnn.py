@@ -49,8 +49,10 @@ class DGCNN(nn.Module):
 
     def forward(self, clouds: torch.Tensor | Sequence[torch.Tensor]) -> torch.Tensor:
         """Embed clouds (B, N, 3), or B clouds (N, 3) of any sizes, in the target's frame and in diameters: (B, d)."""
-        sizes = None if isinstance(clouds, torch.Tensor) else [len(cloud) for cloud in clouds]
-        x_B_N_F = clouds if isinstance(clouds, torch.Tensor) else torch.cat(list(clouds))[None]
+        if isinstance(clouds, torch.Tensor):
+            x_B_N_F, sizes = clouds, None
+        else:
+            x_B_N_F, sizes = torch.cat(list(clouds))[None], [len(cloud) for cloud in clouds]
         batch, n, _ = x_B_N_F.shape
         features = []
         for edge_conv in self.edge_convs:
@@ -108,7 +110,7 @@ class EdgeConv(nn.Module):
 
         With `sizes`, B is 1 and the N points are clouds of these sizes, one after the other.
         """
-        neighbors_B_N_k = knn_indices(x_B_N_F, self.k) if sizes is None else knn_indices_within(x_B_N_F, self.k, sizes)
+        neighbors_B_N_k = knn_indices(x_B_N_F, self.k, sizes)
         w1, w2 = self.weight.chunk(2, dim=1)
         ac_B_N_2F = linear(x_B_N_F, torch.cat([w1, w2 - w1]))
         wants_gradient = torch.is_grad_enabled() and x_B_N_F.requires_grad
@@ -124,12 +126,14 @@ class EdgeConv(nn.Module):
         return out_B_N_F
 
 
-def knn_indices(x_B_N_F: torch.Tensor, k: int) -> torch.Tensor:
+def knn_indices(x_B_N_F: torch.Tensor, k: int, sizes: Sequence[int] | None = None) -> torch.Tensor:
     """Return the indices (B, N, k), in any order, of each point's k nearest points in feature space, itself included.
 
-    Raises:
-        InputError: a cloud has fewer than k points.
+    With `sizes`, B is 1 and the points are concatenated clouds, each searched within its own points.
     """
+    if sizes is not None:
+        clouds = zip(x_B_N_F.split(list(sizes), 1), np.cumsum([0, *sizes[:-1]]), strict=True)
+        return torch.cat([knn_indices(x_1_n_F, k) + int(start) for x_1_n_F, start in clouds], dim=1)
     x_B_N_F = x_B_N_F.detach()
     n_points = x_B_N_F.shape[1]
     if n_points < k:
@@ -138,19 +142,11 @@ def knn_indices(x_B_N_F: torch.Tensor, k: int) -> torch.Tensor:
         )
     # |x_j|² - 2 x_i·x_j, as one product of [x_i ; 1] and [-2 x_j ; |x_j|²]: |x_i|² is the same for a whole row and does
     # not change which points are nearest.
-    ones_B_N_1 = x_B_N_F.new_ones((*x_B_N_F.shape[:2], 1))
-    rows_B_N_G = torch.cat([x_B_N_F, ones_B_N_1], dim=-1)
+    rows_B_N_G = torch.cat([x_B_N_F, x_B_N_F.new_ones((*x_B_N_F.shape[:2], 1))], dim=-1)
     columns_B_N_G = torch.cat([-2 * x_B_N_F, (x_B_N_F * x_B_N_F).sum(-1, keepdim=True)], dim=-1)
     if x_B_N_F.device.type == "cpu":
         return torch.from_numpy(edge_kernels.smallest_k(product(rows_B_N_G, columns_B_N_G.mT).numpy(), k))
     return (rows_B_N_G @ columns_B_N_G.mT).topk(k, dim=-1, largest=False, sorted=False).indices
-
-
-def knn_indices_within(x_1_P_F: torch.Tensor, k: int, sizes: Sequence[int]) -> torch.Tensor:
-    """Return :func:`knn_indices` (1, P, k) of concatenated clouds, each searched within its own points."""
-    starts = np.cumsum([0, *sizes[:-1]])
-    clouds = zip(x_1_P_F.split(list(sizes), 1), starts, strict=True)
-    return torch.cat([knn_indices(x_1_n_F, k) + int(start) for x_1_n_F, start in clouds], dim=1)
 
 
 class _EdgeMax(torch.autograd.Function):

@@ -29,7 +29,7 @@ def encoders() -> dict[str, str]:
 
 
 def encoder_module(settings: Mapping) -> str:
-    """Module of the encoder that has these settings."""
+    """Return the module of the encoder that has these settings."""
     return encoders()[settings["backbone"]].split(":")[0]
 
 
@@ -39,11 +39,7 @@ def require_backbone(backbone: str) -> None:
 
 
 def make_encoder(backbone: str, options: dict):
-    """Return a new encoder, a module from clouds (B, N, 3) to embeddings (B, ``embedding_size``).
-
-    Raises:
-        InputError: unknown backbone or option.
-    """
+    """Return a new encoder, a module from clouds (B, N, 3) to embeddings (B, ``embedding_size``)."""
     require_backbone(backbone)
     try:
         return load(encoders()[backbone])(**options)
@@ -52,13 +48,13 @@ def make_encoder(backbone: str, options: dict):
 
 
 def parameter_count(module) -> int:
-    """Number of trained values of a torch module."""
+    """Return the number of trained values of a torch module."""
     return sum(parameter.numel() for parameter in module.parameters() if parameter.requires_grad)
 
 
 @dataclass(frozen=True)
 class DGCNNOptions:
-    """Options of the backbone ``dgcnn``: neighbors per point, and width of its features before the pooling."""
+    """Neighbors per point, and width of its features before the pooling."""
 
     k: Annotated[int, Bounds(minimum=2)] = 20
     point_features: Count = 256
@@ -71,7 +67,7 @@ class DGCNNOptions:
 
 @dataclass(frozen=True)
 class PointNetOptions:
-    """Options of the backbones ``pointnet`` and ``pointnet_tnet``."""
+    """Options of PointNet with and without T-Nets."""
 
     width: Count = 64
 
@@ -83,7 +79,7 @@ class PointNetOptions:
 
 @dataclass(frozen=True)
 class PointNet2Options(PointNetOptions):
-    """Options of the backbone ``pointnet2``."""
+    """Options of PointNet++."""
 
     centroids: Annotated[int, Bounds(minimum=4)] = 256
     radius: PositiveShare = 0.1
@@ -93,7 +89,7 @@ class PointNet2Options(PointNetOptions):
 
 @dataclass(frozen=True)
 class PointNeXtOptions(PointNetOptions):
-    """Options of the backbone ``pointnext``."""
+    """Options of PointNeXt."""
 
     width: Count = 32
     radius: PositiveShare = 0.075
@@ -112,37 +108,23 @@ OPTIONS = {
 
 @dataclass(frozen=True)
 class EncoderSettings:
-    """Settings of an encoder and of its training.
-
-    Attributes:
-        backbone: one of :func:`encoders`.
-        draw_points: N, points of a cloud that the encoder sees at once.
-        fewest_points: if given, each draw has a random number of points from this one to `draw_points`, so that the
-            density carries no information. Only DGCNN takes such draws.
-        draws: an embedding is the mean over this many draws of N points.
-        reading: the cloud that the encoder sees (:mod:`gpca.pairs.synthesis`).
-        epochs, batch_size: length of the training, at most.
-        validation_share: share of the training groups held out to find the best epoch by its loss.
-        patience: epochs without a smaller validation loss after which training ends; None disables it.
-        learning_rate: peak of AdamW's one-cycle schedule (Smith & Topin 2019).
-        weight_decay: of AdamW.
-        options: further arguments of the backbone.
-        head: trained on the embedding together with the encoder, then dropped: a linear layer, or two with dropout.
-    """
+    """Settings of an encoder and of its training."""
 
     backbone: str = "dgcnn"
-    draw_points: Annotated[int, Bounds(minimum=32)] = 512
-    draws: Count = 4
-    epochs: Count = 10
+    draw_points: Annotated[int, Bounds(minimum=32)] = 512  # N, points of a cloud that the encoder sees at once
+    draws: Count = 4  # an embedding is the mean over this many draws of N points
+    epochs: Count = 10  # at most
     batch_size: Annotated[int, Bounds(minimum=2)] = 16
-    learning_rate: PositiveShare = 4e-3
-    weight_decay: Share = 1e-2
-    options: dict = field(default_factory=dict)
+    learning_rate: PositiveShare = 4e-3  # peak of AdamW's one-cycle schedule (Smith & Topin 2019)
+    weight_decay: Share = 1e-2  # of AdamW
+    options: dict = field(default_factory=dict)  # further arguments of the backbone
+    # If given, each draw has a random number of points from this one to `draw_points`, so that the density carries no
+    # information. Only DGCNN takes such draws.
     fewest_points: Annotated[int, Bounds(minimum=32)] | None = None
-    head: Literal["linear", "two_layer"] = "linear"
-    reading: Reading = "aligned"
-    validation_share: Annotated[float, Bounds(minimum=0, maximum=0.5)] = 0.0
-    patience: Count | None = None
+    head: Literal["linear", "two_layer"] = "linear"  # trained together with the encoder, then dropped
+    reading: Reading = "aligned"  # the cloud that the encoder sees (:mod:`gpca.pairs.synthesis`)
+    validation_share: Annotated[float, Bounds(minimum=0, maximum=0.5)] = 0.0  # of the groups, to find the best epoch
+    patience: Count | None = None  # epochs without a smaller validation loss after which training ends
 
     def __post_init__(self) -> None:
         if self.patience and not self.validation_share:
@@ -151,12 +133,10 @@ class EncoderSettings:
         if (points := self.fewest_points or self.draw_points) < neighbors:
             fault = f"{neighbors} neighbors are too many for draws of {points} points"
             raise InputError("encoder option 'k'", fault, "lower it, or draw more points")
-        if self.fewest_points is None:
-            return
-        if self.backbone not in OF_ANY_SIZE:
+        if self.fewest_points is not None and self.backbone not in OF_ANY_SIZE:
             fault = f"backbone '{self.backbone}' accepts clouds of one size only"
             raise InputError("encoder setting 'fewest_points'", fault, f"leave it out, or use {OF_ANY_SIZE[0]}")
-        if self.fewest_points > self.draw_points:
+        if self.fewest_points is not None and self.fewest_points > self.draw_points:
             fault = f"{self.fewest_points} exceeds draw_points, {self.draw_points}"
             raise InputError("encoder setting 'fewest_points'", fault, "lower it")
 

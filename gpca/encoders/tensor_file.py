@@ -18,10 +18,8 @@ from gpca.io.files import LARGEST_NUMBER, whole_file
 def read_tensors(path: str | Path) -> Any:
     """Return the content of a file of torch.save, on the CPU.
 
-    Raises:
-        ValueError: a member with a wrong checksum, compressed or shared; a tensor that is larger than its data in the
-            file, or holds NaN, infinity or implausibly large numbers.
-        Exception: of many kinds, for a file that torch does not read.
+    Raises ValueError for a member with a wrong checksum, compressed or shared, and for a tensor that is larger than its
+    data in the file, or holds NaN, infinity or implausibly large numbers; torch raises exceptions of many kinds.
     """
     with zipfile.ZipFile(path) as archive:
         members = archive.infolist()

@@ -67,7 +67,7 @@ def make_model(settings: EncoderSettings, classes: tuple[str, ...] = CONCEPTS) -
 
 
 def with_head(encoder: Any, settings: EncoderSettings, classes: tuple[str, ...] = CONCEPTS) -> Classifier:
-    """Return an encoder with a new head; one of two layers is DGCNN's usual kind without its first layer."""
+    """Return an encoder with a new head: a linear layer, or DGCNN's usual kind without its first layer."""
     d, n_classes = encoder.embedding_size, len(classes)
     if settings.head == "linear":
         return Classifier(encoder, nn.Linear(d, n_classes))
@@ -78,17 +78,11 @@ def with_head(encoder: Any, settings: EncoderSettings, classes: tuple[str, ...] 
 
 @dataclass(frozen=True)
 class TrainingTask:
-    """The task of an encoder: its view of a registration, and the classes of its head.
+    """The task of an encoder: its view of a registration, and the classes of its head."""
 
-    Attributes:
-        classes: the possible values of ``concept``.
-        make: makes an encoder that is not in the registry.
-        draw: the encoder's input for some rows, drawn anew in every epoch.
-    """
-
-    classes: tuple[str, ...] = CONCEPTS
-    make: Callable[[], nn.Module] | None = None
-    draw: Draw = draw_points
+    classes: tuple[str, ...] = CONCEPTS  # the possible values of ``concept``
+    make: Callable[[], nn.Module] | None = None  # makes an encoder that is not in the registry
+    draw: Draw = draw_points  # the encoder's input for some rows, drawn anew in every epoch
 
 
 def train_encoder(
@@ -139,7 +133,9 @@ def train_encoder(
             curve[-1] |= training.validate(held_out)
             if curve[-1]["validation_loss"] == min(record["validation_loss"] for record in curve):
                 best.load_state_dict(model.state_dict())
-        keep(checkpoint, identity, state, curve)
+        if checkpoint is not None:
+            content = {name: part.state_dict() for name, part in state.items()}
+            write_tensors(checkpoint, content | {"identity": identity, "curve": curve})
     return best.cpu().eval(), curve
 
 
@@ -152,7 +148,7 @@ class _Training:
         registrations: Registrations,
         rows: np.ndarray,
         task: TrainingTask,
-        axes: tuple[str, int],
+        axes: Axes,
         settings: EncoderSettings,
     ) -> None:
         self._model, self._registrations, self._rows = model, registrations, rows
@@ -183,7 +179,7 @@ class _Training:
             self._optimizer.step()
             self._schedule.step()
             loss_sum += loss.item() * len(batch_rows)
-            correct += _hits(outputs_B_C, targets_B)
+            correct += float((outputs_B_C.argmax(dim=1) == targets_B).sum())
         if not np.isfinite(loss_sum):
             raise InputError(self.title, f"the loss is not finite in epoch {epoch + 1}", "lower encoder.learning_rate")
         means = {"loss": loss_sum / len(self._rows), "accuracy": correct / len(self._rows)}
@@ -196,15 +192,15 @@ class _Training:
         batches = np.array_split(rows, -(-len(rows) // self._settings.batch_size))
         parts = [self._predict(batch_rows, "validation") for batch_rows in batches]
         outputs_R_C, targets_R = (torch.cat(part).cpu() for part in zip(*parts, strict=True))
+        correct = float((outputs_R_C.argmax(dim=1) == targets_R).sum())
         loss = nn.functional.cross_entropy(outputs_R_C, targets_R).item()
-        return {"validation_loss": loss, "validation_accuracy": _hits(outputs_R_C, targets_R) / len(rows)}
+        return {"validation_loss": loss, "validation_accuracy": correct / len(rows)}
 
     def _predict(self, rows: np.ndarray, *axes: object) -> tuple[torch.Tensor, torch.Tensor]:
         """Return the head's outputs (B, C) for a draw from each row, named by the axes, and the rows' targets."""
         points, fewest = self._settings.draw_points, self._settings.fewest_points
         clouds = self._draw(self._registrations, rows, points, *self._axes, *axes, fewest=fewest)
-        device = best_device()
-        return self._model(_on(device, clouds)), self._targets_S[rows].to(device)
+        return self._model(_on_device(clouds)), self._targets_S[rows].to(best_device())
 
 
 def _held_out(
@@ -221,11 +217,8 @@ def _held_out(
     return rows[~is_held_out], rows[is_held_out]
 
 
-def _hits(outputs_B_C: torch.Tensor, targets_B: torch.Tensor) -> float:
-    return float((outputs_B_C.argmax(dim=1) == targets_B).sum())
-
-
-def _on(device: torch.device, clouds: Any) -> Any:
+def _on_device(clouds: Any) -> Any:
+    device = best_device()
     return clouds.to(device) if isinstance(clouds, torch.Tensor) else [cloud.to(device) for cloud in clouds]
 
 
@@ -246,13 +239,6 @@ def _fingerprint_of_weights(weights: Mapping[str, torch.Tensor] | None) -> str:
     for name, tensor in (weights or {}).items():
         digest.update(name.encode() + tensor.numpy().tobytes())
     return digest.hexdigest()
-
-
-def keep(checkpoint: Path | None, identity: str, state: dict, curve: list[dict]) -> None:
-    """Write the state and the training curve so far, if a checkpoint is wanted."""
-    if checkpoint is not None:
-        content = {name: part.state_dict() for name, part in state.items()}
-        write_tensors(checkpoint, content | {"identity": identity, "curve": curve})
 
 
 def _resume(checkpoint: Path | None, identity: str, state: dict) -> list[dict]:
@@ -285,12 +271,11 @@ def load_model(
 ) -> Classifier:
     """Load encoder and head, trained with these settings and classes, for inference.
 
+    Missing, damaged, pickled or another encoder's weights raise an InputError.
+
     Args:
         axes: required source and seed of the training samples, if any.
         unlike: forbidden source and seed.
-
-    Raises:
-        InputError: missing, damaged, pickled or another encoder's weights, or those of another source or seed.
     """
     model = make_model(settings, classes)
     remedy = "regenerate them with Snakemake"
@@ -322,15 +307,15 @@ def embed(
     of 2048 points; averaging several halves the classifier's errors on unseen clouds. The logits of a linear head at h
     are their mean over the draws too.
     """
-    device, n_points = best_device(), settings.draw_points
-    model.to(device).eval()
+    model.to(best_device()).eval()
     batches = np.array_split(np.arange(len(registrations)), -(-len(registrations) // settings.batch_size))
+    points, fewest = settings.draw_points, settings.fewest_points
     parts = []
     for rows in progress(batches, f"embeddings of {source}, seed {seed}"):
         draws = [
-            draw(registrations, rows, n_points, source, seed, "embedding", number, fewest=settings.fewest_points)
+            draw(registrations, rows, points, source, seed, "embedding", number, fewest=fewest)
             for number in range(settings.draws)
         ]
-        parts.append(torch.stack([model.encoder(_on(device, clouds)) for clouds in draws]).mean(dim=0))
+        parts.append(torch.stack([model.encoder(_on_device(clouds)) for clouds in draws]).mean(dim=0))
     h_S_d = torch.cat(parts)
     return h_S_d.cpu().numpy(), model.head(h_S_d).cpu().numpy()

@@ -6,8 +6,8 @@ the uncertainty of the others is measured.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, fields
 from functools import cache, partial
 from typing import Any
 
@@ -39,7 +39,7 @@ Clouds = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 @dataclass(frozen=True)
 class Design:
-    """A list of conditions.
+    """A list of K conditions.
 
     Attributes:
         evaluate: pair, twists of the starts, settings and random numbers of a sample -> the outcomes of all conditions.
@@ -71,10 +71,7 @@ class RegisteredRow:
         return self.source[random.permutation(len(self.source))[:points]], self.target[:points], self.T_init, self.T_icp
 
     def clean(self, points: int, part: int = 1) -> Clouds:
-        """Clean pair: other points of the target as source, at the true pose.
-
-        `part` chooses which points, so that there are several sources: 1 or 2.
-        """
+        """Return the clean pair at the true pose; its source is `part` 1 or 2 of the target, its target part 0."""
         points = min(points, len(self.target) // 3)
         source = self.target[part * points : (part + 1) * points]
         return source, self.target[:points], np.eye(4), np.eye(4)
@@ -90,24 +87,16 @@ class RegisteredRow:
         return Knobs(float(self._severity["noise"]), float(spread), float(self._severity["crop"]))
 
 
-def _additive(
-    pair: RegisteredRow, xi_n_6: np.ndarray, settings: UncertaintySettings, random: np.random.Generator
+def _turned(
+    knobs: Callable[[], Iterable[Knobs]],
+    pair: RegisteredRow,
+    xi_n_6: np.ndarray,
+    settings: UncertaintySettings,
+    random: np.random.Generator,
 ) -> list[Spread]:
+    """Turn the knobs on top of the observed pair."""
     runs = KnobRuns(*pair.observed(settings.icp_points, random), xi_n_6, settings, random)
-    return [runs(knobs) for knobs in ADDITIVE_KNOBS]
-
-
-def _sweep(
-    kind: str, pair: RegisteredRow, xi_n_6: np.ndarray, settings: UncertaintySettings, random: np.random.Generator
-) -> list[Spread]:
-    runs = KnobRuns(*pair.observed(settings.icp_points, random), xi_n_6, settings, random)
-    return [runs(Knobs(*knobs)) for knobs in (UNTOUCHED, *sample_knobs(kind))]
-
-
-def _observed(
-    pair: RegisteredRow, xi_n_6: np.ndarray, settings: UncertaintySettings, random: np.random.Generator
-) -> list[Spread]:
-    return [KnobRuns(*pair.observed(settings.icp_points, random), xi_n_6, settings, random)(UNTOUCHED)]
+    return [runs(each) for each in knobs()]
 
 
 def _removal(
@@ -122,9 +111,8 @@ def _oracle(
 ) -> list[Spread]:
     runs = KnobRuns(*pair.clean(settings.icp_points), xi_n_6, settings, random)
     true = pair.true_knobs(settings)
-    corners = [Knobs(*np.where(switches, true, UNTOUCHED)) for switches in CORNERS]
     # Two of the three knobs are at rest, so the eight corners are two settings, and each is run once.
-    return [runs(knobs) for knobs in corners]
+    return [runs(Knobs(*np.where(switches, true, UNTOUCHED))) for switches in CORNERS]
 
 
 def _causal(
@@ -148,17 +136,21 @@ def sample_knobs(kind: str) -> np.ndarray:
     return sobol.sample(problem, SALTELLI, calc_second_order=False, seed=seed)
 
 
+def _swept(kind: str) -> Callable[[], Iterable[Knobs]]:
+    return lambda: (UNTOUCHED, *(Knobs(*knobs) for knobs in sample_knobs(kind)))
+
+
 DESIGNS = {
     # SHAP and local sensitivity as the paper describes them: fixed knobs on top of the observed pair.
-    "additive": Design(_additive, CONDITIONS["additive"]),
-    "latin": Design(partial(_sweep, "latin"), CONDITIONS["latin"]),
-    "saltelli": Design(partial(_sweep, "saltelli"), CONDITIONS["saltelli"]),
+    "additive": Design(partial(_turned, lambda: ADDITIVE_KNOBS), CONDITIONS["additive"]),
+    "latin": Design(partial(_turned, _swept("latin")), CONDITIONS["latin"]),
+    "saltelli": Design(partial(_turned, _swept("saltelli")), CONDITIONS["saltelli"]),
     # The true knobs on a clean pair.
     "oracle": Design(_oracle, CONDITIONS["oracle"], oracle=True),
     # Remedies applied to the observed pair; the clean run is the one with all of them.
     "removal": Design(_removal, CONDITIONS["removal"], reference=len(CORNERS) - 1, splits=SPLITS),
     # The observed pair alone, for explainers that need no more: the reference is itself, so the uncertainty is none.
-    "observed": Design(_observed, CONDITIONS["observed"], splits=SPLITS),
+    "observed": Design(partial(_turned, lambda: (UNTOUCHED,)), CONDITIONS["observed"], splits=SPLITS),
     # Whether the pair is uncertain at all, beside a second clean pair.
     "causal": Design(_causal, CONDITIONS["causal"]),
 }
@@ -169,19 +161,15 @@ def design_rows(registrations: Registrations, design: str, samples: int | None) 
 
     Samples come in threes of one object under the three concepts, and the threes go round the objects, so the first
     ones are a stratified choice.
-
-    Raises:
-        InputError: `samples` is not divisible by the number of concepts, or there are no rows.
     """
+    subject = f"uncertainty '{design}'"
     if samples is not None and samples % len(CONCEPTS):
-        raise InputError(
-            f"uncertainty '{design}'", f"{samples} samples do not balance the concepts", "give a multiple of 3"
-        )
+        raise InputError(subject, f"{samples} samples do not balance the concepts", "give a multiple of 3")
     chosen = np.isin(registrations.split, DESIGNS[design].splits)
     if samples is not None:
         chosen &= (registrations.split != "test") | (registrations.sample < samples)
     if not chosen.any():
-        raise InputError(f"uncertainty '{design}'", "has no registrations to evaluate", "increase their number")
+        raise InputError(subject, "has no registrations to evaluate", "increase their number")
     return np.flatnonzero(chosen)
 
 
@@ -206,13 +194,10 @@ def _random_numbers(
 def evaluate_design(
     design: str, registrations: Registrations, source: str, seed: int, settings: UncertaintySettings
 ) -> tuple[Outcomes, np.ndarray, np.ndarray]:
-    """Run every condition of the design for every registration.
+    """Run every condition of the design for every registration: the outcomes, seconds (S, K) and those in ICP (S, K).
 
     The random numbers of a sample are named by source, seed, split and number, not by the design: the observed pair has
     the same starts in all of them.
-
-    Returns:
-        the outcomes, and seconds (S, K) and seconds inside ICP (S, K).
     """
     entry = DESIGNS[design]
     observed = registrations if entry.oracle else registrations.without_labels()
@@ -221,8 +206,8 @@ def evaluate_design(
         xi_n_6, random = _random_numbers(observed, i, source, seed, settings)
         rows.append(entry.evaluate(RegisteredRow(observed, i), xi_n_6, settings, random))
     columns: dict[str, Any] = {
-        name: np.array([[getattr(outcome, name) for outcome in row] for row in rows])
-        for name in ("covariance", "residual", "degenerate", "icp_calls", "seconds", "icp_seconds")
+        field.name: np.array([[getattr(outcome, field.name) for outcome in row] for row in rows])
+        for field in fields(Spread)
     }
     seconds_S_K, icp_seconds_S_K = columns.pop("seconds"), columns.pop("icp_seconds")
     clean = columns["covariance"][:, entry.reference, None]
@@ -249,11 +234,7 @@ class LiveUncertainty:
         self._clean_6_6 = self._covariance(UNTOUCHED)
 
     def __call__(self, knobs: Knobs) -> float:
-        """Register from all starts with the knobs as given, and return the uncertainty.
-
-        Raises:
-            InputError: a knob outside its range.
-        """
+        """Register from all starts with the knobs as given; one outside its range raises an InputError."""
         return float(divergence(self._clean_6_6, self._covariance(knobs), self._floor))
 
     def _covariance(self, knobs: Knobs) -> np.ndarray:

@@ -25,17 +25,11 @@ from gpca.uncertainty.spread import Runs, Spread, run_from_starts, summarize_run
 
 
 class Knobs(NamedTuple):
-    """Setting of the three features, in the order of the concepts noise, pose, overlap.
+    """Setting of the three features, in the order of the concepts noise, pose, overlap."""
 
-    Attributes:
-        noise: standard deviation of the jitter added to the source, relative to the diameter.
-        spread: factor on the spread of the initial poses.
-        overlap: share of the source's points that is cut off.
-    """
-
-    noise: float = 0.0
-    spread: float = 1.0
-    overlap: float = 0.0
+    noise: float = 0.0  # standard deviation of the jitter added to the source, relative to the diameter
+    spread: float = 1.0  # factor on the spread of the initial poses
+    overlap: float = 0.0  # share of the source's points that is cut off
 
 
 UNTOUCHED = Knobs()
@@ -47,11 +41,9 @@ FEWEST_LEFT = 3  # that a cut leaves
 
 
 class KnobbedSource:
-    """A source cloud under any setting of noise and overlap.
+    """A source cloud (N, 3), in diameters, under any setting of noise and overlap.
 
-    Args:
-        source: (N, 3), in diameters.
-        random: draws the jitter and the direction of the cut.
+    `random` draws the jitter and the direction of the cut.
     """
 
     def __init__(self, source: np.ndarray, random: np.random.Generator) -> None:
@@ -60,11 +52,7 @@ class KnobbedSource:
         self._along = source @ random_direction(random)
 
     def at(self, knobs: Knobs) -> np.ndarray:
-        """Return the points (n, 3) that are left, with their jitter.
-
-        Raises:
-            InputError: a knob outside its range.
-        """
+        """Return the points (n, 3) that are left, with their jitter; a knob outside its range raises an InputError."""
         for name, value, most in zip(Knobs._fields, knobs, MOST, strict=True):
             if not 0 <= value <= most:
                 raise InputError(f"knob '{name}'", f"{value} is outside [0, {most}]", "give a value within it")
@@ -76,7 +64,7 @@ class KnobRuns:
     """The function f of one pair; a setting that was evaluated is not evaluated again.
 
     Args:
-        source: (N, 3), in its own frame. target: (Q, 3). Relative to the diameter.
+        source, target: (N, 3) and (Q, 3), in diameters, each in its own frame.
         T_target_source_init: initial pose. T_ref: pose from which the spread is measured.
         xi_n_6: twists of the starts.
     """
@@ -91,37 +79,23 @@ class KnobRuns:
         settings: UncertaintySettings,
         random: np.random.Generator,
     ) -> None:
-        self._xi_n_6 = xi_n_6
-        self._source = KnobbedSource(source, random)
-        self._target = target
-        self._T_init = T_target_source_init
-        self.T_ref = T_ref
-        self._settings = settings
+        self._source, self._target = KnobbedSource(source, random), target
+        self._T_init, self.T_ref, self._xi_n_6, self._settings = T_target_source_init, T_ref, xi_n_6, settings
         self._icp = BatchedICP(target, settings.icp)
         self._seen: dict[Knobs, Spread] = {}
 
     def __call__(self, knobs: Knobs) -> Spread:
-        """Evaluate one setting; the outcome of one seen before costs nothing.
-
-        Raises:
-            InputError: a knob outside its range.
-        """
+        """Evaluate one setting; the outcome of one seen before costs nothing."""
         if knobs in self._seen:
             return replace(self._seen[knobs], icp_calls=0, icp_seconds=0.0, seconds=0.0)
-        self._seen[knobs] = self._evaluate(knobs)
-        return self._seen[knobs]
-
-    def _evaluate(self, knobs: Knobs) -> Spread:
         started = perf_counter()
         runs, source = self.runs(knobs)
-        return summarize_runs(runs, cKDTree(source), self._target, self.T_ref, self._settings, started)
+        spread = summarize_runs(runs, cKDTree(source), self._target, self.T_ref, self._settings, started)
+        self._seen[knobs] = spread
+        return spread
 
     def runs(self, knobs: Knobs) -> tuple[Runs, np.ndarray]:
-        """Run ICP from all starts under one setting, seen before or not; return the runs and the source (N, 3).
-
-        Raises:
-            InputError: a knob outside its range.
-        """
+        """Run ICP from all starts under one setting, seen before or not; return the runs and the source (N, 3)."""
         source = self._source.at(knobs)
         return run_from_starts(self._icp, source, self._T_init, knobs.spread * self._xi_n_6), source
 
@@ -137,8 +111,8 @@ class RemedyRuns:
     """Runs of one observed pair under every combination of remedies.
 
     Args:
-        source: (N, 3), in its own frame. target: (Q, 3). Relative to the diameter; ICP sees fewer of their points
-            than denoising and the residual do.
+        source, target: (N, 3) and (Q, 3), in diameters, each in its own frame; ICP sees fewer of their points than
+            denoising and the residual do.
         T_target_source_init, T_target_source_icp: initial and found pose.
         xi_n_6: twists of the starts.
     """
@@ -153,18 +127,15 @@ class RemedyRuns:
         settings: UncertaintySettings,
         random: np.random.Generator,
     ) -> None:
-        self._xi_n_6 = xi_n_6
-        self._settings = settings
-        self._T_init = T_target_source_init
-        self._T_icp = T_target_source_icp
-        self._source = source[random.permutation(len(source))]
-        self._target = target
+        self._xi_n_6, self._settings = xi_n_6, settings
+        self._T_init, self._T_icp = T_target_source_init, T_target_source_icp
+        self._observed, self._target = source[random.permutation(len(source))], target
 
     def __call__(self, remedies: Remedies) -> Spread:
         """Evaluate one combination; work that several share is done, and charged, once."""
         started = perf_counter()
-        tree, points = self._denoised if remedies.denoise else self._observed
-        icp, target = self._trimmed if remedies.trim else self._whole
+        tree, points = self._denoised if remedies.denoise else self._whole
+        icp, target = self._trimmed if remedies.trim else self._untrimmed
         xi_n_6 = BROADER * self._xi_n_6 if remedies.restart else self._xi_n_6
         runs = run_from_starts(icp, points[: self._settings.icp_points], self._T_init, xi_n_6)
         if remedies.restart:
@@ -172,29 +143,31 @@ class RemedyRuns:
         return summarize_runs(runs, tree, target, self._T_icp, self._settings, started)
 
     @cached_property
-    def _observed(self) -> tuple[cKDTree, np.ndarray]:
-        return cKDTree(self._source), self._source
+    def _whole(self) -> tuple[cKDTree, np.ndarray]:
+        return cKDTree(self._observed), self._observed
 
     @cached_property
     def _denoised(self) -> tuple[cKDTree, np.ndarray]:
-        points = denoise(self._source)
+        points = denoise(self._observed)
         return cKDTree(points), points
 
     @cached_property
-    def _whole(self) -> tuple[BatchedICP, np.ndarray]:
-        return BatchedICP(self._target[: self._settings.icp_points], self._settings.icp), self._target
+    def _untrimmed(self) -> tuple[BatchedICP, np.ndarray]:
+        return self._seen(self._target)
 
     @cached_property
     def _trimmed(self) -> tuple[BatchedICP, np.ndarray]:
-        aligned = transform(self._T_icp, self._source)
-        points = trim(self._target, aligned, self._settings.icp.correspondence_distance)
-        return BatchedICP(points[: self._settings.icp_points], self._settings.icp), points
+        aligned = transform(self._T_icp, self._observed)
+        return self._seen(trim(self._target, aligned, self._settings.icp.correspondence_distance))
+
+    def _seen(self, target: np.ndarray) -> tuple[BatchedICP, np.ndarray]:
+        return BatchedICP(target[: self._settings.icp_points], self._settings.icp), target
 
 
 def denoise(points: np.ndarray) -> np.ndarray:
-    """Remove statistical outliers (Rusu et al. 2008) and move every other point onto the plane of its neighbors.
+    """Remove statistical outliers (Rusu et al. 2008) and move other points onto the least-squares planes of neighbors.
 
-    The plane is that of least squares, moving least squares of order one (Alexa et al. 2003).
+    That is moving least squares of order one (Alexa et al. 2003).
     """
     neighbors = min(NEIGHBORS, len(points))
     distances, rows = cKDTree(points).query(points, neighbors)

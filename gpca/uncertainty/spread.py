@@ -23,13 +23,7 @@ SMALLEST_RESIDUAL = 1e-6  # diameters; a cloud on itself counts as this far off,
 
 @dataclass(frozen=True)
 class Runs:
-    """The results of ICP from n starts.
-
-    Attributes:
-        T_target_source_n: (n, 4, 4).
-        fitness_n, inlier_rmse_n: (n,).
-        icp_calls, icp_seconds: runs of ICP, and the time inside them.
-    """
+    """The results of ICP from n starts: poses (n, 4, 4), fitness and inlier RMSE (n,), number and seconds of runs."""
 
     T_target_source_n: np.ndarray
     fitness_n: np.ndarray
@@ -43,12 +37,8 @@ class Runs:
 
     def chosen(self, rows_n: np.ndarray) -> Runs:
         """Return these runs' results at the given rows, which may repeat."""
-        return replace(
-            self,
-            T_target_source_n=self.T_target_source_n[rows_n],
-            fitness_n=self.fitness_n[rows_n],
-            inlier_rmse_n=self.inlier_rmse_n[rows_n],
-        )
+        names = ("T_target_source_n", "fitness_n", "inlier_rmse_n")
+        return replace(self, **{name: getattr(self, name)[rows_n] for name in names})
 
     def covariance(self, T_ref: np.ndarray) -> np.ndarray:
         """Return Σ (6, 6) of e = log(T T_ref⁻¹), radians and diameters."""
@@ -72,18 +62,11 @@ def run_from_starts(icp: BatchedICP, source: np.ndarray, T_target_source_init: n
 
 @dataclass(frozen=True)
 class Spread:
-    """The summary of one condition, e.g. one setting of the knobs.
+    """The summary of one condition, e.g. one setting of the knobs."""
 
-    Attributes:
-        covariance: Σ (6, 6).
-        residual: log of the root mean square distance from the target's points to the source at the best run's pose.
-        degenerate: whether the covariance says nothing (:meth:`Runs.degenerate`).
-        icp_calls, icp_seconds, seconds: what the condition cost.
-    """
-
-    covariance: np.ndarray
-    residual: float
-    degenerate: bool
+    covariance: np.ndarray  # Σ (6, 6)
+    residual: float  # log of the RMS distance from the target's points to the source at the best run's pose
+    degenerate: bool  # whether the covariance says nothing (:meth:`Runs.degenerate`)
     icp_calls: int
     icp_seconds: float
     seconds: float

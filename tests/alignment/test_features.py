@@ -1,21 +1,21 @@
 import numpy as np
 
-from gpca.alignment.features import estimate_normals, fpfh, mutual_matches
+from gpca.alignment.features import MOST_NEIGHBORS, RADIUS, estimate_normals, fpfh_of_pair, mutual_matches
+from gpca.alignment.methods.interface import Pair
 from gpca.alignment.rigid import exp, rotate, transform
-from gpca.process.environment import open3d_cloud
 
 from .methods.pairs import clouds
 
 
 def test_features_move_with_the_cloud_and_matches_are_each_others_nearest(objects):
     source, target, source_normals, target_normals = clouds(objects, 0)
-    features = fpfh(open3d_cloud(source, source_normals)).data
-    assert features.shape == (33, len(source))
     T = exp(np.array([[0.5, -1.0, 2.0, 3.0, 2.0, 1.0]]))[0]
-    moved = fpfh(open3d_cloud(transform(T, source), rotate(T, source_normals))).data
+    moved = Pair(transform(T, source), source, np.eye(4), rotate(T, source_normals), source_normals)
+    pair = Pair(source, target, np.eye(4), source_normals, target_normals)
+    moved, features = (each.data for each in fpfh_of_pair(moved, RADIUS, MOST_NEIGHBORS)[1])
+    _, others = (each.data for each in fpfh_of_pair(pair, RADIUS, MOST_NEIGHBORS)[1])
+    assert features.shape == (33, len(source))
     assert np.abs(moved - features).max() < 0.1 * np.abs(features).max()
-
-    others = fpfh(open3d_cloud(target, target_normals)).data
     distance = np.linalg.norm(features.T[:, None] - others.T, axis=2)
     rows = mutual_matches(features.T, others.T, 1000)
     assert 10 < len(rows) < len(source)

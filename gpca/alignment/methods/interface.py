@@ -5,22 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from gpca.alignment.features import NEIGHBORS, estimate_normals
-from gpca.alignment.icp import ICP, ICPSettings, Method, require_cloud
+from gpca.alignment.icp import require_cloud
 from gpca.alignment.rigid import require_rigid, transform
 from gpca.errors import InputError
 
 CORRESPONDENCE_DISTANCE = 0.10  # diameters, as in the protocol's ICP
 MAX_ITERATIONS = 50
 FEWEST = 3  # correspondences that determine a rigid motion
-# Open3D does not report which rule stopped it. When fitness and RMSE have converged, poses still oscillate by up to
-# 4e-3 diameters, as correspondences change; poses stopped by the number of iterations move more.
-AT_REST = 5e-3
 
 
 class FailedRegistration(Exception):
@@ -29,16 +25,13 @@ class FailedRegistration(Exception):
 
 @dataclass(frozen=True)
 class Pair:
-    """Two clouds to be aligned.
+    """Two clouds to be aligned; an InputError rejects normals of another shape, NaN, and poses that are not rigid.
 
     Attributes:
-        source, target: (N, 3) and (P, 3) points.
+        source, target: (N, 3) and (P, 3) points, at least three.
         T_target_source_init: start of local methods; global ones ignore it.
         source_normals, target_normals: unit vectors in the frame of their cloud, or None (:meth:`with_normals`).
         seed: of a method's random numbers.
-
-    Raises:
-        InputError: fewer than three points, NaN, normals of another shape, or an initial pose that is not rigid.
     """
 
     source: np.ndarray
@@ -65,11 +58,9 @@ class Pair:
 
     def with_normals(self, neighbors: int = NEIGHBORS) -> Pair:
         """Return the pair with normals of both clouds, estimated if missing."""
-        source_normals, target_normals = self.source_normals, self.target_normals
+        missing = [name for name in ("source", "target") if getattr(self, f"{name}_normals") is None]
         return replace(
-            self,
-            source_normals=estimate_normals(self.source, neighbors) if source_normals is None else source_normals,
-            target_normals=estimate_normals(self.target, neighbors) if target_normals is None else target_normals,
+            self, **{f"{name}_normals": estimate_normals(getattr(self, name), neighbors) for name in missing}
         )
 
     def normals(self, name: str) -> np.ndarray:
@@ -122,7 +113,6 @@ class MethodEntry:
     """A method in the registry.
 
     Attributes:
-        title: of its row in tables.
         align: ``align(pair, **settings)`` returns an :class:`Outcome` or raises :class:`FailedRegistration`.
         is_global: whether it needs no initial pose.
         package: a required module that the suite does not install, if any.
@@ -132,32 +122,3 @@ class MethodEntry:
     align: Callable[..., Outcome]
     is_global: bool = False
     package: str = ""
-
-
-def as_array(matrix: Any) -> np.ndarray:
-    """Copy a matrix of another library, as float64."""
-    return np.array(matrix, np.float64)
-
-
-def align_by_open3d(
-    pair: Pair, method: Method, correspondence_distance: float, max_iterations: int, kernel: Any = None
-) -> Outcome:
-    """Run one of Open3D's local methods, with a robust kernel if one is given."""
-    normals = None if method == "point_to_point" else pair.normals("target")
-
-    def icp(iterations: int) -> ICP:
-        return ICP(pair.target, normals, ICPSettings(method, correspondence_distance, iterations), kernel)
-
-    result = icp(max_iterations).register(pair.source, pair.T_target_source_init)
-    if result.fitness == 0:
-        raise FailedRegistration(f"no source point has a target point within {correspondence_distance:g} diameters")
-    step = icp(1).register(pair.source, result.T_target_source)
-    failure = failure_of_a_step(pair, result.T_target_source, step.T_target_source, max_iterations)
-    return Outcome(result.T_target_source, result.fitness, result.inlier_rmse, failure)
-
-
-def failure_of_a_step(pair: Pair, T_found: np.ndarray, T_further: np.ndarray, max_iterations: int) -> str:
-    """Return the failure of a method that stopped too early, given the pose after a further step, else empty."""
-    moved_N_3 = transform(T_further, pair.source) - transform(T_found, pair.source)
-    moving = np.linalg.norm(moved_N_3, axis=1).max() > AT_REST
-    return f"has not converged in {max_iterations} iterations" if moving else ""

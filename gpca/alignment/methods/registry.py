@@ -1,4 +1,4 @@
-"""Every registration method by name, one or a few per file of this folder."""
+"""Every registration method by name, one or several per file of this folder."""
 
 from __future__ import annotations
 
@@ -18,17 +18,15 @@ REGISTRY: Registry[MethodEntry] = Registry("registration method", __package__, "
 methods, method_entry, method_module = REGISTRY.entries, REGISTRY.entry, REGISTRY.module
 
 
-def installed(names: Iterable[str]) -> list[str]:
-    """Return the methods of these names that can run here."""
-    names = list(names)
-    missing = left_out(names)
-    return [name for name in names if name not in missing]
-
-
 def left_out(names: Iterable[str]) -> dict[str, str]:
     """Return the methods that cannot run here, each with its missing package."""
     packages = {name: method_entry(name).package for name in names}
     return {name: package for name, package in packages.items() if package and find_spec(package) is None}
+
+
+def installed(names: Iterable[str]) -> list[str]:
+    """Return the methods of these names that can run here."""
+    return [name for name in names if not left_out([name])]
 
 
 def require_settings(name: str, settings: Mapping[str, object]) -> None:
@@ -48,29 +46,26 @@ def require_local(name: str) -> None:
     if method_entry(name).is_global:
         remedy = "choose one that starts at an initial pose"
         raise InputError(f"registration method '{name}'", "is global, so its results have no spread", remedy)
-    if package := left_out([name]).get(name):
-        raise InputError(
-            f"registration method '{name}'", f"needs the package {package}", "install it or choose another"
-        )
+    _require_package(name, "install it or choose another")
+
+
+def _require_package(name: str, remedy: str) -> None:
+    for package in left_out([name]).values():
+        raise InputError(f"registration method '{name}'", f"needs the package {package}", remedy)
 
 
 def make_method(name: str, settings: Mapping[str, object] | None = None) -> Callable[[Pair], Outcome]:
     """Return a method as a function from pairs to outcomes; a failure becomes an outcome at the initial pose.
 
-    It runs in one thread, because Open3D sums and draws random numbers in the order in which its threads end.
-
-    Raises:
-        InputError: an unknown name, settings that the method does not take, or a missing package.
+    It runs in one thread, because Open3D sums and draws random numbers in the order in which its threads end. Raises
+    InputError for an unknown name, settings that the method does not take, and a missing package.
     """
     from threadpoolctl import ThreadpoolController
 
     settings = dict(settings or {})
     require_settings(name, settings)
-    entry = method_entry(name)
-    if name in left_out([name]):
-        raise InputError(
-            f"registration method '{name}'", f"needs the package {entry.package}", "install it or leave the method out"
-        )
+    _require_package(name, "install it or leave the method out")
+    align = method_entry(name).align
     utility = require_open3d().utility  # loads the thread pools that are limited below
     threads = ThreadpoolController()
 
@@ -78,7 +73,7 @@ def make_method(name: str, settings: Mapping[str, object] | None = None) -> Call
         try:
             # Open3D's warnings go to standard output, and repeat the outcome.
             with threads.limit(limits=1), utility.VerbosityContextManager(utility.VerbosityLevel.Error):
-                outcome = entry.align(pair, **settings)
+                outcome = align(pair, **settings)
             if not np.isfinite(outcome.T_target_source).all():
                 raise FailedRegistration("the pose is not finite")
         except FailedRegistration as failure:

@@ -10,8 +10,6 @@ Differences between two correspondences do not depend on the translation, and th
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from gpca.alignment.features import MOST_NEIGHBORS, RADIUS, fpfh_of_pair, mutual_matches
@@ -31,22 +29,16 @@ SETTLED = 1e-9  # relative change of the cost
 MOST_BRANCHES = 20_000  # limit of the clique search: counted, not timed, to be the same on every machine
 
 
-@dataclass(frozen=True)
-class Solution:
-    """The pose (4×4), the agreeing correspondences, and whether a larger set is excluded for certain."""
+def solve(source_n_3: np.ndarray, target_n_3: np.ndarray, noise: float) -> tuple[np.ndarray, np.ndarray] | None:
+    """Return the pose of corresponding points and the rows of those that agree with it, or None if no three agree.
 
-    T_target_source: np.ndarray
-    inliers: np.ndarray
-    certain: bool
-
-
-def solve(source_n_3: np.ndarray, target_n_3: np.ndarray, noise: float) -> Solution | None:
-    """Return the pose of corresponding points, or None if no three agree; `noise` bounds a right correspondence."""
+    `noise` bounds the error of a right correspondence.
+    """
     from scipy.spatial.distance import cdist
 
     agreeing_n_n = np.abs(cdist(source_n_3, source_n_3) - cdist(target_n_3, target_n_3)) <= 2 * noise
-    clique, certain = largest_clique(agreeing_n_n)
-    if len(clique) < 3:
+    clique, _ = largest_clique(agreeing_n_n)
+    if len(clique) < FEWEST:
         return None
     one, other = np.triu_indices(len(clique), 1)
     p_n_3, q_n_3 = source_n_3[clique], target_n_3[clique]
@@ -54,7 +46,7 @@ def solve(source_n_3: np.ndarray, target_n_3: np.ndarray, noise: float) -> Solut
     shifts_n_3 = q_n_3 - rotate(R, p_n_3)
     shift_3 = [vote(shifts_n, noise) for shifts_n in shifts_n_3.T]
     inlier_n = (np.abs(shifts_n_3 - shift_3) <= noise).all(axis=1)
-    return Solution(rigid_motion(R, shift_3), clique[inlier_n], certain)
+    return rigid_motion(R, shift_3), clique[inlier_n]
 
 
 def gnc_rotation(source_m_3: np.ndarray, target_m_3: np.ndarray, bound: float) -> tuple[np.ndarray, np.ndarray]:
@@ -84,10 +76,9 @@ def gnc_rotation(source_m_3: np.ndarray, target_m_3: np.ndarray, bound: float) -
 
 
 def vote(shifts_n: np.ndarray, bound: float) -> float:
-    """Return the t that minimizes Σ min((s - t)², bound²) over shifts (n,), exactly.
+    """Return the t that minimizes Σ min((s - t)², bound²) over shifts (n,): the mean of the best set of inliers.
 
-    The inliers of t change only where a shift enters or leaves the bound; the best t for a set of inliers is their
-    mean. So every set is tried.
+    The set of t changes only where a shift enters or leaves the bound, so every set is tried.
     """
     events = np.sort(np.concatenate([shifts_n - bound, shifts_n + bound]))
     inlier_e_n = np.abs(shifts_n - (events[1:] + events[:-1])[:, None] / 2) <= bound
@@ -161,7 +152,7 @@ def align(
     """Return the pose on which the largest set of matches agrees.
 
     Args:
-        feature_radius, feature_neighbors: radius in diameters and maximum number of a feature's neighbors.
+        feature_radius: of a feature, in diameters.
         noise: bound of a right match's error, in diameters: about the spacing of the points.
         most_matches: number of best matches used; TEASER's authors advise some hundreds.
     """
@@ -169,9 +160,9 @@ def align(
     source_N_33, target_P_33 = (each.data.T for each in features)
     rows_n_2 = mutual_matches(source_N_33, target_P_33, most_matches)
     solution = solve(pair.source[rows_n_2[:, 0]], pair.target[rows_n_2[:, 1]], noise)
-    if solution is None or len(solution.inliers) < FEWEST:
+    if solution is None or len(solution[1]) < FEWEST:
         raise FailedRegistration(f"fewer than {FEWEST} correspondences agree")
-    return Outcome.at(pair, solution.T_target_source, correspondence_distance)
+    return Outcome.at(pair, solution[0], correspondence_distance)
 
 
 METHODS = {"teaser": MethodEntry("TEASER's solver", align, is_global=True)}

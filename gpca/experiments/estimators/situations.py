@@ -22,7 +22,7 @@ from gpca.experiments.estimators.settings import KINDS, EstimatorPairSettings, K
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.judge import Judges
 from gpca.seeds import generator, seed_of
-from gpca.uncertainty.estimators.examples import Moved, describe, example, true_twist, twists_or_none
+from gpca.uncertainty.estimators.examples import Moved, describe, example, true_twist
 from gpca.uncertainty.estimators.interface import Example, FailedEstimate, RegisteredPair
 
 MOVED: Moved = "model"  # onto the observed cloud, as the causes' track has it
@@ -102,8 +102,8 @@ class Registering:
             judge = self.situations.judges.of(self.situations.causes.registrations, row)
             redraws, runs = self._redraws(row, T_true), self._settings.train_starts
             axes = (*self._axes, "examples")
-            twists_n_6 = twists_or_none(partial(draw_twists, "all", registered, redraws, runs, *axes), runs)
-            self._examples[row] = example(registered, T_true, judge, MOVED, twists_n_6)
+            draw = partial(draw_twists, "all", registered, redraws, runs, *axes)
+            self._examples[row] = example(registered, T_true, judge, MOVED, draw, runs)
         return self._examples[row]
 
     def _registered(self, row: int) -> tuple[RegisteredPair, np.ndarray]:

@@ -23,13 +23,8 @@ def bonnabel(registered: RegisteredPair, noise: float = 0.0) -> np.ndarray:
     """Return Σ = σ² (Σ JᵀJ)⁻¹ of point-to-plane ICP (Bonnabel, Barczyk & Goulette, ACC 2016).
 
     Between points and planes a match may slide along its plane and costs nothing, so matches that change do no harm.
-    Between points the same formula makes the pose look held where it is not.
-
-    Args:
-        noise: σ, standard deviation of the distances from planes, in diameters; with 0 it is estimated from them.
-
-    Raises:
-        FailedEstimate: another method than point-to-plane, no normals, or a singular Hessian.
+    Between points the same formula makes the pose look held where it is not. σ, `noise`, is the standard deviation of
+    the distances from planes, in diameters; with 0 it is estimated from them.
     """
     if registered.method.startswith(POINT_TO_POINT):
         raise FailedEstimate(
@@ -47,14 +42,8 @@ def censi(registered: RegisteredPair, noise: float = 0.0) -> np.ndarray:
     """Return Σ of point-to-point ICP (Censi, ICRA 2007).
 
     With A(z, ξ) the cost of the points z at the twist ξ, Σ = H⁻¹ (∂²A/∂z∂ξ) Σ_z (∂²A/∂z∂ξ)ᵀ H⁻¹ with H = ∂²A/∂ξ². It
-    leaves out that the matches change with the pose.
-
-    Args:
-        noise: standard deviation of every coordinate of both clouds' points, in diameters; with 0 it is estimated from
-            the residuals, in which that of both clouds adds up.
-
-    Raises:
-        FailedEstimate: another method than point-to-point, or a singular Hessian.
+    leaves out that the matches change with the pose. `noise` is the standard deviation of every coordinate of both
+    clouds' points, in diameters; with 0 it is estimated from the residuals, in which that of both clouds adds up.
     """
     if not registered.method.startswith(POINT_TO_POINT):
         raise FailedEstimate(f"the closed form is that of point-to-point, not of '{registered.method}'")

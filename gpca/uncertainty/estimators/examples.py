@@ -18,13 +18,7 @@ Moved = Literal["model", "observed"]  # which cloud the source is
 
 
 def describe(pair: Pair, outcome: Outcome, moved: Moved) -> np.ndarray:
-    """Descriptors (F,) that need no further registration: distances, local planes, entropy.
-
-    Args:
-        pair: the registered pair.
-        outcome: where its source ended.
-        moved: which cloud the source is.
-    """
+    """Return descriptors (F,) that need no further registration: distances, local planes, entropy."""
     if moved == "model":
         observed, model = transform(inverse(outcome.T_target_source), pair.target), pair.source
     else:
@@ -42,7 +36,7 @@ def describe(pair: Pair, outcome: Outcome, moved: Moved) -> np.ndarray:
 
 
 def true_twist(registered: RegisteredPair, T_true: np.ndarray, judge: Judge, moved: Moved) -> np.ndarray:
-    """Twist (6,) of the true pose about that of the registration, the symmetric one that is nearest.
+    """Return the twist (6,) of the true pose about that of the registration, the symmetric one that is nearest.
 
     Symmetries are turns of the model: before the pose where the model moves, after it where it is the target.
     """
@@ -54,21 +48,22 @@ def true_twist(registered: RegisteredPair, T_true: np.ndarray, judge: Judge, mov
     return log((turn @ T_true @ inverse(T_found))[None])[0]
 
 
-def twists_or_none(draw: Callable[[], np.ndarray], runs: int) -> np.ndarray:
-    """Twists (n, 6) of a few results; zeros where too few runs have any, as if all were at the pose."""
-    try:
-        return draw()
-    except FailedEstimate:
-        return np.zeros((runs, 6))
-
-
 def example(
-    registered: RegisteredPair, T_true: np.ndarray, judge: Judge, moved: Moved, twists_n_6: np.ndarray
+    registered: RegisteredPair,
+    T_true: np.ndarray,
+    judge: Judge,
+    moved: Moved,
+    draw: Callable[[], np.ndarray],
+    runs: int,
 ) -> Example:
-    """Training registration with the results (n, 6) of a few others, as twists about its pose."""
-    return Example(
-        describe(registered.pair, registered.outcome, moved),
-        twists_n_6,
-        true_twist(registered, T_true, judge, moved),
-        intrinsic_frame(registered.pair.target),
-    )
+    """Return a training registration with the results of a few others, as `draw` gives their twists (n, 6) about it.
+
+    Where too few of the `runs` have any result, the twists are zeros, as if all were at the pose.
+    """
+    try:
+        twists_n_6 = draw()
+    except FailedEstimate:
+        twists_n_6 = np.zeros((runs, 6))
+    described = describe(registered.pair, registered.outcome, moved)
+    truth_6 = true_twist(registered, T_true, judge, moved)
+    return Example(described, twists_n_6, truth_6, intrinsic_frame(registered.pair.target))

@@ -6,7 +6,7 @@ target's frame: T = exp(ξ) T̂.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -24,7 +24,6 @@ POINT_TO_POINT, POINT_TO_PLANE = "point_to_point", "point_to_plane"
 # What a covariance is that of: results from other starts, results of clouds measured again, both at once; poses that
 # are likely given these very clouds; or errors, whatever they come from.
 Modeled = Literal["starts", "data", "starts and data", "posterior", "error"]
-Starter = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
 class FailedEstimate(Exception):
@@ -33,12 +32,7 @@ class FailedEstimate(Exception):
 
 @dataclass(frozen=True)
 class Matches:
-    """Source points (n, 3) at the pose, their nearest target points, and how the points move under a twist.
-
-    Attributes:
-        jacobians: (n, 3, 6).
-        normals: (n, 3) of the target's points, or None.
-    """
+    """Source points (n, 3) at the pose, their nearest target points, and the normals of these (n, 3) or None."""
 
     source: np.ndarray
     target: np.ndarray
@@ -61,11 +55,7 @@ class Matches:
         return float(squares.sum() / max(squares.size - 6, 1))
 
     def plane_rows(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return distances from the target's planes (n,) and how they change under a twist (n, 6).
-
-        Raises:
-            FailedEstimate: the target has no normals.
-        """
+        """Return distances from the target's planes (n,) and how they change under a twist (n, 6)."""
         if self.normals is None:
             raise FailedEstimate("the target has no normals")
         distances_n = np.einsum("ni,ni->n", self.normals, self.residuals)
@@ -102,17 +92,14 @@ class RegisteredPair:
         near_N = distance_N < CORRESPONDENCE_DISTANCE
         if near_N.sum() < FEWEST:
             raise FailedEstimate(f"fewer than {FEWEST} correspondences at the pose")
-        normals = self.pair.target_normals
-        rows_n = rows_N[near_N]
+        rows_n, normals = rows_N[near_N], self.pair.target_normals
         return Matches(moved_N_3[near_N], self.pair.target[rows_n], None if normals is None else normals[rows_n])
 
     def twists_from(self, xi_n_6: np.ndarray) -> np.ndarray:
         """Register from the starts exp(ξ) T_init and return the results' twists about the pose (m, 6).
 
-        Runs that found no correspondence are no results.
-
-        Raises:
-            FailedEstimate: too few runs found any, or the method reads no initial pose.
+        Runs that found no correspondence are no results. Too few results, or a method that reads no initial pose, are a
+        failure.
         """
         if method_entry(self.method).is_global:
             raise FailedEstimate(f"'{self.method}' reads no initial pose, so that its results do not spread")
@@ -125,17 +112,33 @@ class RegisteredPair:
         return log(poses_n[found_n] @ inverse(self.T_target_source))
 
     @cached_property
-    def _register(self) -> Starter:
+    def _register(self) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]:
+        """From starts (n, 4, 4) to the results and whether any correspondence was found (n,)."""
+        pair, settings = self.pair, ICPSettings("point_to_point", CORRESPONDENCE_DISTANCE, MAX_ITERATIONS)
         if self.method in (POINT_TO_POINT, POINT_TO_PLANE):
-            return _batched(self.pair, self.method)
+            from gpca.alignment.batched_icp import BatchedICP, BatchedPlaneICP
+
+            icp: BatchedICP | BatchedPlaneICP
+            if self.method == POINT_TO_POINT:
+                icp = BatchedICP(pair.target, settings)
+            elif pair.target_normals is None:
+                raise FailedEstimate("the target has no normals")
+            else:
+                icp = BatchedPlaneICP(pair.target, pair.target_normals, settings)
+
+            def at_once(starts_n: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+                poses_n, fitness_n, _ = icp.register(pair.source, starts_n)
+                return poses_n, fitness_n > 0
+
+            return at_once
         register = make_method(self.method)
 
-        def from_starts(starts_n: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            outcomes = [register(self.pair.started_at(start)) for start in starts_n]
+        def one_by_one(starts_n: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            outcomes = [register(pair.started_at(start)) for start in starts_n]
             found_n = np.array([outcome.fitness > 0 for outcome in outcomes])
             return np.array([outcome.T_target_source for outcome in outcomes]), found_n
 
-        return from_starts
+        return one_by_one
 
 
 @dataclass(frozen=True)
@@ -148,19 +151,12 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Example:
-    """A registration to learn from.
+    """A registration to learn from."""
 
-    Attributes:
-        descriptors: (F,).
-        twists: (n, 6) results of several starts, as :meth:`RegisteredPair.twists_from` gives them.
-        true_twist: (6,) of the true pose about that of the registration.
-        T_target_intrinsic: :func:`intrinsic_frame` of the pair.
-    """
-
-    descriptors: np.ndarray
-    twists: np.ndarray
-    true_twist: np.ndarray
-    T_target_intrinsic: np.ndarray
+    descriptors: np.ndarray  # (F,)
+    twists: np.ndarray  # (n, 6) results of several starts, as :meth:`RegisteredPair.twists_from` gives them
+    true_twist: np.ndarray  # (6,) of the true pose about that of the registration
+    T_target_intrinsic: np.ndarray  # :func:`intrinsic_frame` of the pair
 
 
 Estimator = Callable[[RegisteredPair], np.ndarray]
@@ -171,7 +167,6 @@ class EstimatorEntry:
     """An estimator in the registry: it has the one or the other function.
 
     Attributes:
-        title: as tables name the row.
         models: what the covariance is that of, by which it is judged.
         estimate: ``estimate(registered, **settings)`` returns Σ (6, 6) or raises :class:`FailedEstimate`.
         learn: ``learn(examples, **settings)`` returns such a function of a registered pair.
@@ -182,24 +177,9 @@ class EstimatorEntry:
     estimate: Callable[..., np.ndarray] | None = None
     learn: Callable[..., Estimator] | None = None
 
-    @property
-    def function(self) -> Callable[..., object]:
-        """The function that takes the settings."""
-        return self.learn or self.estimate  # type: ignore[return-value]
-
-
-def require_examples(examples: Sequence[Example], fewest: int) -> None:
-    """Raise FailedEstimate where there are too few examples to learn from."""
-    if len(examples) < fewest:
-        raise FailedEstimate(f"{len(examples)} registrations to learn from, not {fewest}")
-
 
 def inverse_hessian(hessian_6_6: np.ndarray) -> np.ndarray:
-    """Return H⁻¹.
-
-    Raises:
-        FailedEstimate: the Hessian is singular, or no minimum.
-    """
+    """Return H⁻¹; a singular Hessian, or that of no minimum, is a failure."""
     values_6 = np.linalg.eigvalsh(hessian_6_6)
     if not np.isfinite(values_6).all() or values_6[-1] <= 0:
         raise FailedEstimate("the Hessian is singular: nothing holds the pose")
@@ -223,22 +203,3 @@ def intrinsic_frame(points_N_3: np.ndarray) -> np.ndarray:
     axes_3_3 = axes_3_3 * np.where((along_N_3**3).sum(axis=0) < 0, -1.0, 1.0)
     axes_3_3[:, 2] = np.cross(axes_3_3[:, 0], axes_3_3[:, 1])
     return rigid_motion(axes_3_3, center_3)
-
-
-def _batched(pair: Pair, method: str) -> Starter:
-    from gpca.alignment.batched_icp import BatchedICP, BatchedPlaneICP
-
-    settings = ICPSettings("point_to_point", CORRESPONDENCE_DISTANCE, MAX_ITERATIONS)
-    icp: BatchedICP | BatchedPlaneICP
-    if method == POINT_TO_POINT:
-        icp = BatchedICP(pair.target, settings)
-    elif pair.target_normals is None:
-        raise FailedEstimate("the target has no normals")
-    else:
-        icp = BatchedPlaneICP(pair.target, pair.target_normals, settings)
-
-    def from_starts(starts_n: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        poses_n, fitness_n, _ = icp.register(pair.source, starts_n)
-        return poses_n, fitness_n > 0
-
-    return from_starts

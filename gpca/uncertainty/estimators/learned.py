@@ -15,13 +15,13 @@ from gpca.uncertainty.estimators.interface import (
     FailedEstimate,
     RegisteredPair,
     intrinsic_frame,
-    require_examples,
 )
-from gpca.uncertainty.estimators.interface import EstimatorEntry as Entry
 
 FEWEST_EXAMPLES = 8
 FLOOR = 1e-8  # squared radians and diameters, of a training variance
 LEAST_SINGULAR = 1e-6  # of the largest: what is below is rounding
+COMPONENTS = 16  # of the descriptors, that networks read
+SMALLEST_LOG, LARGEST_LOG = -16.0, 2.0  # of a variance, in squared radians or diameters
 
 
 def learn_cello(
@@ -37,17 +37,14 @@ def learn_cello(
     Axes of a pair have no common sign, over which the covariance between two of them averages out: what is learned are
     the six variances along the principal axes of the target (:func:`intrinsic_frame`).
 
-    Args:
-        components: of a PCA of the descriptors.
-        steps, learning_rate: of Adam on the leave-one-out likelihood.
+    `components` are of a PCA of the descriptors, `steps` and `learning_rate` of Adam on the leave-one-out likelihood.
     """
     import torch
 
     from gpca.portable import Adam, logarithm
 
-    require_examples(examples, FEWEST_EXAMPLES)
-    reduce = Reduction([example.descriptors for example in examples], components)
-    features = torch.from_numpy(reduce(np.array([example.descriptors for example in examples])))
+    reduce, features_E_K = _reduced(examples, components)
+    features = torch.from_numpy(features_E_K)
     variances_E_6 = np.array([_variances(example) for example in examples])
     variances = torch.from_numpy(variances_E_6)
     log_scale = torch.zeros(features.shape[1], dtype=torch.float64, requires_grad=True)
@@ -64,7 +61,7 @@ def learn_cello(
         loss.backward()
         optimizer.step()
     scale_K = np.exp(log_scale.detach().numpy())
-    known_E_K = features.numpy() * scale_K
+    known_E_K = features_E_K * scale_K
 
     def estimate(registered: RegisteredPair) -> np.ndarray:
         squares_E = np.square(reduce(described(registered)[None]) * scale_K - known_E_K).sum(axis=1)
@@ -82,16 +79,15 @@ class Reduction:
     lie infinitely far away.
     """
 
-    def __init__(self, descriptors: Sequence[np.ndarray], components: int) -> None:
-        stacked_E_F = np.array(descriptors)
-        self._mean_F, deviation_F = stacked_E_F.mean(axis=0), stacked_E_F.std(axis=0)
+    def __init__(self, descriptors_E_F: np.ndarray, components: int) -> None:
+        self._mean_F, deviation_F = descriptors_E_F.mean(axis=0), descriptors_E_F.std(axis=0)
         self._deviation_F = np.where(deviation_F > 1e-9, deviation_F, np.inf)  # what never changes says nothing
-        _, singular_F, axes_F_F = np.linalg.svd(self._standard(stacked_E_F), full_matrices=False)
+        _, singular_F, axes_F_F = np.linalg.svd(self._standard(descriptors_E_F), full_matrices=False)
         axes_F_F = axes_F_F[singular_F > LEAST_SINGULAR * singular_F[0]]
         largest = np.abs(axes_F_F).argmax(axis=1)  # a component's sign is arbitrary
         signs = np.sign(axes_F_F[np.arange(len(axes_F_F)), largest])
         self._axes_K_F = (axes_F_F * signs[:, None])[:components]
-        self._size_K = np.einsum("ef,kf->ek", self._standard(stacked_E_F), self._axes_K_F).std(axis=0)
+        self._size_K = np.einsum("ef,kf->ek", self._standard(descriptors_E_F), self._axes_K_F).std(axis=0)
 
     def __call__(self, descriptors_n_F: np.ndarray) -> np.ndarray:
         """Return the components (n, K), of unit deviation over the training pairs."""
@@ -99,6 +95,15 @@ class Reduction:
 
     def _standard(self, descriptors_n_F: np.ndarray) -> np.ndarray:
         return np.clip((descriptors_n_F - self._mean_F) / self._deviation_F, -5, 5)
+
+
+def _reduced(examples: Sequence[Example], components: int) -> tuple[Reduction, np.ndarray]:
+    """Return the reduction that the examples give, and their components (E, K); too few examples are a failure."""
+    if len(examples) < FEWEST_EXAMPLES:
+        raise FailedEstimate(f"{len(examples)} registrations to learn from, not {FEWEST_EXAMPLES}")
+    descriptors_E_F = np.array([example.descriptors for example in examples])
+    reduce = Reduction(descriptors_E_F, components)
+    return reduce, reduce(descriptors_E_F)
 
 
 def described(registered: RegisteredPair) -> np.ndarray:
@@ -123,10 +128,6 @@ def _variances(example: Example) -> np.ndarray:
     return twists_along_axes(example.twists, example.T_target_intrinsic).var(axis=0) + FLOOR
 
 
-COMPONENTS = 16  # of the descriptors
-SMALLEST_LOG, LARGEST_LOG = -16.0, 2.0  # of a variance, in squared radians or diameters
-
-
 def learn_ensemble(
     examples: Sequence[Example],
     members: int = 5,
@@ -141,25 +142,12 @@ def learn_ensemble(
     aleatoric, their disagreement epistemic (Lakshminarayanan et al. 2017). The original is variational, on clouds. It
     models the error, whatever causes it.
 
-    Six means and six variances along the target's principal axes, by the Gaussian likelihood of all runs of a pair.
-
-    Args:
-        members: networks that differ by their initial weights.
-        weight_decay: of the squares of the weights.
+    Six means and six variances along the target's principal axes, by the Gaussian likelihood of all runs of a pair. The
+    `members` differ by their initial weights.
     """
-    require_examples(examples, FEWEST_EXAMPLES)
-    reduce = Reduction([example.descriptors for example in examples], COMPONENTS)
-    errors = [_errors(example) for example in examples]
-    features_E_K = reduce(np.array([example.descriptors for example in examples]))
+    reduce, features_E_K = _reduced(examples, COMPONENTS)
     networks = _Ensemble(features_E_K.shape[1], hidden, members)
-    networks.fit(
-        features_E_K,
-        np.array([error_n_6.mean(axis=0) for error_n_6 in errors]),
-        np.array([error_n_6.var(axis=0) for error_n_6 in errors]),
-        steps,
-        learning_rate,
-        weight_decay,
-    )
+    networks.fit(features_E_K, [_errors(example) for example in examples], steps, learning_rate, weight_decay)
 
     def estimate(registered: RegisteredPair) -> np.ndarray:
         aleatoric_6, epistemic_6 = networks.variances(reduce(described(registered)[None]))
@@ -175,46 +163,44 @@ class _Ensemble:
         import torch
 
         random = generator("learned covariance")
-
-        def weights(*shape: int):
-            scale = 1 / np.sqrt(shape[1])
-            return torch.tensor(random.normal(size=shape) * scale, dtype=torch.float64, requires_grad=True)
-
-        self._first = weights(members, inputs + 1, hidden)
-        self._second = weights(members, hidden + 1, 12)
+        shapes = (members, inputs + 1, hidden), (members, hidden + 1, 12)
+        drawn = [random.normal(size=shape) * (1 / np.sqrt(shape[1])) for shape in shapes]
+        self._layers = [torch.tensor(each, dtype=torch.float64, requires_grad=True) for each in drawn]
 
     def _predict(self, features_E_K):
         """Return the means and the logarithms of the variances (M, E, 6) of each network."""
         import torch
 
+        first, second = self._layers
         ones = torch.ones(*features_E_K.shape[:-1], 1, dtype=torch.float64)
-        inputs = torch.cat([features_E_K, ones], dim=-1).expand(len(self._first), -1, -1)
-        hidden = torch.tanh(inputs @ self._first)
-        outputs = torch.cat([hidden, torch.ones_like(hidden[:, :, :1])], dim=2) @ self._second
+        inputs = torch.cat([features_E_K, ones], dim=-1).expand(len(first), -1, -1)
+        hidden = torch.tanh(inputs @ first)
+        outputs = torch.cat([hidden, torch.ones_like(hidden[:, :, :1])], dim=2) @ second
         # In units near those of the errors, so that weights near one suit both.
         return 0.1 * outputs[:, :, :6], (2 * outputs[:, :, 6:] - 6).clamp(SMALLEST_LOG, LARGEST_LOG)
 
     def fit(
         self,
         features_E_K: np.ndarray,
-        mean_E_6: np.ndarray,
-        variance_E_6: np.ndarray,
+        errors: Sequence[np.ndarray],
         steps: int,
         learning_rate: float,
         weight_decay: float,
     ) -> None:
+        """Learn from the features of each pair and the errors (n, 6) of its runs."""
         import torch
 
         from gpca.portable import Adam
 
-        features, mean, variance = (torch.from_numpy(array) for array in (features_E_K, mean_E_6, variance_E_6))
-        parameters = [self._first, self._second]
-        optimizer = Adam(parameters, learning_rate)
+        features = torch.from_numpy(features_E_K)
+        mean = torch.from_numpy(np.array([error_n_6.mean(axis=0) for error_n_6 in errors]))
+        variance = torch.from_numpy(np.array([error_n_6.var(axis=0) for error_n_6 in errors]))
+        optimizer = Adam(self._layers, learning_rate)
         for _ in range(steps):
             optimizer.zero_grad()
             outputs, log_variance = self._predict(features)
             misfit = ((mean - outputs).square() + variance) * torch.exp(-log_variance)
-            decay = weight_decay * sum(parameter.square().sum() for parameter in parameters)
+            decay = weight_decay * sum(weights.square().sum() for weights in self._layers)
             loss = 0.5 * (log_variance + misfit).sum(dim=2).mean(dim=1).sum() + decay
             loss.backward()
             optimizer.step()
@@ -235,6 +221,6 @@ def _errors(example: Example) -> np.ndarray:
 
 
 ESTIMATORS = {
-    "cello": Entry("CELLO-3D", "starts and data", learn=learn_cello),
+    "cello": EstimatorEntry("CELLO-3D", "starts and data", learn=learn_cello),
     "learned": EstimatorEntry("Learned ensemble", "error", learn=learn_ensemble),
 }

@@ -23,23 +23,19 @@ class Posterior:
     """ln p(ξ) = -½ |ξ - ξ₀|² / σ₀² - Σ |r|² / 2σ² over the source's matched points at exp(ξ) T̂.
 
     The prior is the starts' distribution about the initial pose ξ₀; σ² is the variance of a residual's coordinate at
-    the pose that was found. Valid for small twists: distances on the group are those of the twists.
-
-    Attributes:
-        covariance: (6, 6) of the Gaussian that has its curvature at the pose, for steps of the right size.
-        source: (N, 3).
+    the pose that was found. Valid for small twists: distances on the group are those of the twists. `covariance` (6, 6)
+    is that of the Gaussian that has its curvature at the pose, for steps of the right size.
     """
 
     def __init__(self, registered: RegisteredPair) -> None:
-        from gpca.alignment.batched_icp import Pulls
+        from gpca.alignment.batched_icp import make_target
 
         matches = registered.matches()
-        self.source = registered.pair.source
-        self._T = registered.T_target_source
+        self._source, self._T = registered.pair.source, registered.T_target_source
         self._precision = 1 / max(matches.variance, SMALLEST_VARIANCE)
         self._prior_precision_6 = registered.deviation_6**-2.0
         self._prior_6 = log((registered.pair.T_target_source_init @ inverse(self._T))[None])[0]
-        self._pulls = Pulls(registered.pair.target, CORRESPONDENCE_DISTANCE)
+        self._target = make_target(registered.pair.target, CORRESPONDENCE_DISTANCE)
         curvature_6_6 = np.einsum("nik,nil->kl", matches.jacobians, matches.jacobians) * self._precision
         self.covariance = np.linalg.inv(curvature_6_6 + np.diag(self._prior_precision_6))
 
@@ -49,14 +45,16 @@ class Posterior:
 
     def slope_of_batch(self, xi_n_6: np.ndarray, batch: int, random: np.random.Generator) -> np.ndarray:
         """Return :meth:`slope` of so many of the source's points, drawn anew at each call."""
-        points = len(self.source)
+        points = len(self._source)
         return self.slope(xi_n_6, random.choice(points, min(batch, points), replace=False, shuffle=False))
 
     def slope(self, xi_n_6: np.ndarray, rows: np.ndarray | None = None) -> np.ndarray:
         """Return ∂ ln p/∂ξ (n, 6); of some of the source's points alone, they count for all."""
-        points = self.source if rows is None else self.source[rows]
-        pulls_n_6, fitness_n, _ = self._pulls(points, exp(xi_n_6) @ self._T)
-        matched_n = fitness_n * len(self.source)
+        from gpca.alignment.batched_icp import pulls
+
+        points = self._source if rows is None else self._source[rows]
+        pulls_n_6, fitness_n, _ = pulls(self._target, points, exp(xi_n_6) @ self._T)
+        matched_n = fitness_n * len(self._source)
         of_prior_n_6 = (self._prior_6 - xi_n_6) * self._prior_precision_6
         return of_prior_n_6 - self._precision * matched_n[:, None] * pulls_n_6
 
@@ -92,10 +90,8 @@ def langevin(
 ) -> np.ndarray:
     """Return the twists of n chains after the burn-in, all in one (m, 6): x ← x + ½ε M ∇ln p + √(εM) η.
 
-    Args:
-        slope: ∇ln p (n, 6) at (n, 6), exact or from a mini-batch.
-        preconditioner_6_6: M; with the posterior's covariance all directions mix alike.
-        step_size: ε; the variance comes out too large by about a quarter of it.
+    With the posterior's covariance as preconditioner M, all directions mix alike. The variance comes out too large by
+    about a quarter of ε, `step_size`.
     """
     root_6_6 = np.linalg.cholesky(preconditioner_6_6)
     x_n_6, visited = start_n_6.copy(), []
@@ -114,11 +110,10 @@ BETA_1, BETA_2, EPSILON = 0.9, 0.999, 1e-8  # Adam's defaults, as the authors ta
 def stein_icp(
     registered: RegisteredPair, particles: int = 100, steps: int = 150, batch: int = 150, learning_rate: float = 0.01
 ) -> np.ndarray:
-    """Return the covariance of the particles; batch and number are the authors'.
+    """Return the covariance of the particles of Stein ICP (Maken, Ramos & Ott, RA-L 2022), in the authors' number.
 
-    Stein ICP (Maken, Ramos & Ott, RA-L 2022): Stein variational gradient descent from the prior to the posterior. The
-    particles attract each other to where the posterior is high and repel each other by the kernel's slope (Liu & Wang
-    2016).
+    Stein variational gradient descent (Liu & Wang 2016) from the prior to the posterior: the particles attract each
+    other to where the posterior is high and repel each other by the kernel's slope.
     """
     posterior = Posterior(registered)
     random = generator("stein_icp", registered.pair.seed)

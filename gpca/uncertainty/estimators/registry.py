@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import cast
 
 import numpy as np
 
 from gpca.errors import InputError
 from gpca.process.registry import Registry
 from gpca.settings import require_arguments
-from gpca.uncertainty.estimators.interface import Estimate, EstimatorEntry, Example, FailedEstimate, RegisteredPair
+from gpca.uncertainty.estimators.interface import (
+    Estimate,
+    Estimator,
+    EstimatorEntry,
+    Example,
+    FailedEstimate,
+    RegisteredPair,
+)
 
 REGISTRY: Registry[EstimatorEntry] = Registry("estimator", __package__, "ESTIMATORS", outside=EstimatorEntry)
 estimators, estimator_entry, estimator_module = REGISTRY.entries, REGISTRY.entry, REGISTRY.module
@@ -17,7 +26,8 @@ estimators, estimator_entry, estimator_module = REGISTRY.entries, REGISTRY.entry
 
 def require_estimator_settings(name: str, settings: Mapping[str, object]) -> None:
     """Raise an InputError unless the estimator is known and takes these settings."""
-    require_arguments(f"estimator '{name}'", estimator_entry(name).function, 1, settings)
+    entry = estimator_entry(name)
+    require_arguments(f"estimator '{name}'", cast("Callable", entry.learn or entry.estimate), 1, settings)
 
 
 def make_estimator(
@@ -26,19 +36,17 @@ def make_estimator(
     """Return an estimator as a function from registered pairs to estimates.
 
     A failure inside it, at learning too, becomes an estimate that says why. So does a registration without any
-    correspondence, which no estimator is asked about.
+    correspondence, which no estimator is asked about. An unknown name, settings that it does not take, and one that
+    learns without examples raise an InputError.
 
     Args:
         examples: registrations of training objects by the same method, for one that learns.
-
-    Raises:
-        InputError: an unknown name, settings that it does not take, or one that learns without examples.
     """
     settings = dict(settings or {})
     require_estimator_settings(name, settings)
     entry = estimator_entry(name)
     learning_failure = ""
-    estimate: Callable[[RegisteredPair], np.ndarray] | None = None
+    estimate = cast("Estimator", partial(entry.estimate, **settings) if entry.estimate else None)
     if entry.learn is not None:
         if not examples:
             known = ", ".join(other for other, each in estimators().items() if each.learn is None)
@@ -48,12 +56,9 @@ def make_estimator(
             estimate = entry.learn(examples, **settings)
         except FailedEstimate as failure:
             learning_failure = str(failure)
-    elif entry.estimate is not None:
-        function = entry.estimate
-        estimate = lambda registered: function(registered, **settings)  # noqa: E731
 
     def estimate_or_failure(registered: RegisteredPair) -> Estimate:
-        if estimate is None:
+        if learning_failure:
             return Estimate(None, learning_failure)
         if registered.outcome.fitness == 0:
             return Estimate(None, registered.outcome.failure or "no source point is near the target")

@@ -19,9 +19,6 @@ def sample(registered: RegisteredPair, starts: int, *axes: object) -> np.ndarray
     return registered.twists_from(random.normal(size=(starts, 6)) * registered.deviation_6)
 
 
-SIGMA_POINTS = 12
-
-
 def brossard(registered: RegisteredPair, noise: float = 0.0, bias: float = 0.0) -> np.ndarray:
     """Return Σ = Σ_unscented + σ² A⁻¹ + b² g gᵀ with g = A⁻¹ Σ Jᵀ (Brossard, Bonnabel & Barrau, RA-L 2020).
 
@@ -32,9 +29,6 @@ def brossard(registered: RegisteredPair, noise: float = 0.0, bias: float = 0.0) 
     Args:
         noise: σ, standard deviation of the distances from planes, in diameters; with 0 it is estimated from them.
         bias: b, in diameters; with 0 it is as large as the noise, as the authors take it.
-
-    Raises:
-        FailedEstimate: no normals, a singular Hessian, or a method that does not start at an initial pose.
     """
     distances_n, rows_n_6 = registered.matches().plane_rows()
     variance = noise**2 if noise else np.square(distances_n).sum() / max(len(distances_n) - 6, 1)
@@ -49,7 +43,7 @@ def unscented(registered: RegisteredPair) -> np.ndarray:
 
     The middle sigma point has no weight, as in a transform of κ = 0; it is the registration itself.
     """
-    offsets_6_6 = np.sqrt(SIGMA_POINTS / 2) * np.diag(registered.deviation_6)
+    offsets_6_6 = np.sqrt(6) * np.diag(registered.deviation_6)
     twists_m_6 = registered.twists_from(np.concatenate([offsets_6_6, -offsets_6_6]))
     return np.cov(twists_m_6, rowvar=False, bias=True)
 

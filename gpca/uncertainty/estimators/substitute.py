@@ -20,7 +20,7 @@ from gpca.pairs.judge import Judges
 from gpca.process.progress import progress
 from gpca.seeds import generator, seed_of
 from gpca.uncertainty.designs import ADDITIVE_KNOBS, RegisteredRow
-from gpca.uncertainty.estimators.examples import Moved, describe, example, twists_or_none
+from gpca.uncertainty.estimators.examples import Moved, describe, example
 from gpca.uncertainty.estimators.interface import POINT_TO_POINT, Estimate, Example, RegisteredPair
 from gpca.uncertainty.estimators.starts import sample
 from gpca.uncertainty.interventions import UNTOUCHED, KnobbedSource, Knobs
@@ -33,27 +33,19 @@ OBSERVED = (UNTOUCHED,)  # the condition of explainers that read the observed pa
 
 @dataclass(frozen=True)
 class Estimates:
-    """One estimator's covariances of S registrations under K conditions.
+    """One estimator's covariances of S registrations under K conditions."""
 
-    Attributes:
-        covariance: (S, K, 6, 6), radians and diameters; NaN where there is none.
-        failure: (S, K) why there is none.
-    """
-
-    covariance: np.ndarray
-    failure: np.ndarray
+    covariance: np.ndarray  # (S, K, 6, 6), radians and diameters; NaN where there is none
+    failure: np.ndarray  # (S, K) why there is none
 
     def failures(self, conditions: int) -> np.ndarray:
-        """Why one of the first `conditions` has no estimate (S,), empty where all have one."""
+        """Return why one of the first `conditions` has no estimate (S,), empty where all have one."""
         return np.array([next(filter(None, row), "") for row in self.failure[:, :conditions]])
 
     def attach_to(self, registrations: Registrations, rows: np.ndarray, conditions: int, floor: float) -> Registrations:
-        """Rows with the outcomes of a design attached for explainers; its cost is not measured.
+        """Return rows of the S registrations with the outcomes of a design attached for explainers, at no cost.
 
-        Args:
-            registrations: the S registrations.
-            rows: those that have an estimate under each of the first `conditions`.
-            floor: ε of the divergence.
+        `rows` have an estimate under each of the first `conditions`; `floor` is ε of the divergence.
         """
         covariance = self.covariance[rows, :conditions]
         outcomes = {"covariance": covariance, "uncertainty": divergence(covariance[:, :1], covariance, floor)}
@@ -70,7 +62,7 @@ class KnobbedRegistrar:
         self._register = make_method(POINT_TO_POINT)
 
     def under(self, row: int, settings_of_knobs: Sequence[Knobs]) -> Iterator[RegisteredPair]:
-        """Registration of a row under each setting."""
+        """Yield the registration of a row under each setting."""
         registrations, settings = self._registrations, self._settings
         axes = (*self._axes, registrations.split[row], registrations.sample[row])
         random = generator(*axes, "clouds")
@@ -85,15 +77,14 @@ class KnobbedRegistrar:
             yield RegisteredPair(pair, outcome, POINT_TO_POINT, deviation_6, described)
 
     def examples(self, rows: np.ndarray, judges: Judges) -> list[Example]:
-        """Rows as estimators learn from them."""
+        """Return rows as estimators learn from them."""
         examples = []
         for row in rows:
             [registered] = self.under(row, OBSERVED)
             T_true = self._registrations.T_target_source("true", row)
-            judge = judges.of(self._registrations, row)
-            draw = partial(sample, registered, self._settings.starts, *self._axes, "examples")
-            twists_n_6 = twists_or_none(draw, self._settings.starts)
-            examples.append(example(registered, T_true, judge, MOVED, twists_n_6))
+            starts, judge = self._settings.starts, judges.of(self._registrations, row)
+            draw = partial(sample, registered, starts, *self._axes, "examples")
+            examples.append(example(registered, T_true, judge, MOVED, draw, starts))
         return examples
 
     def estimates(
@@ -102,7 +93,7 @@ class KnobbedRegistrar:
         estimators: Mapping[str, Callable[[RegisteredPair], Estimate]],
         settings_of_knobs: Sequence[Knobs] = ADDITIVE_KNOBS,
     ) -> dict[str, Estimates]:
-        """Covariances of the rows under each setting, by estimator."""
+        """Return the covariances of the rows under each setting, by estimator."""
         shape = len(rows), len(settings_of_knobs)
         estimates = {
             name: Estimates(np.full((*shape, 6, 6), np.nan), np.full(shape, "", object)) for name in estimators

@@ -12,7 +12,7 @@ def test_kiss_matcher_starts_no_thread_since_its_threads_would_race():
 import os
 import numpy as np
 from gpca.alignment.methods.interface import Pair
-from gpca.alignment.methods.kiss_matcher import align
+from gpca.alignment.methods.matching import align_by_kiss_matcher as align
 from gpca.process.processor import prepare
 
 prepare()

@@ -2,13 +2,14 @@ import hashlib
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from importlib import import_module
 
 import numpy as np
 import pytest
 
 from gpca.alignment.methods import registry
-from gpca.alignment.methods.interface import MethodEntry, Pair
+from gpca.alignment.methods.interface import MethodEntry, Outcome, Pair
 from gpca.alignment.methods.registry import (
     left_out,
     make_method,
@@ -17,7 +18,7 @@ from gpca.alignment.methods.registry import (
     methods,
     require_settings,
 )
-from gpca.alignment.pose_error import add_error
+from gpca.alignment.pose_error import pose_error
 from gpca.alignment.rigid import require_rigid
 from gpca.errors import InputError
 from tests.documents import ROOT
@@ -47,7 +48,8 @@ def test_a_local_method_aligns_what_lies_close(objects, name, seed):
     outcome = make_method(name)(pair)
     assert outcome.failure == ""
     require_rigid(outcome.T_target_source, name)
-    assert add_error(pair.source, outcome.T_target_source, T_true) < 0.04 < add_error(pair.source, np.eye(4), T_true)
+    before, after = (pose_error(pair.source, T, T_true, False) for T in (np.eye(4), outcome.T_target_source))
+    assert after < 0.04 < before
     assert outcome.fitness > 0.9
 
 
@@ -142,10 +144,6 @@ def test_poor_clouds_give_a_rigid_pose_and_no_exception(objects, name, poor):
 
 
 def test_a_pose_that_is_not_finite_is_a_failure(objects, monkeypatch):
-    from dataclasses import replace
-
-    from gpca.alignment.methods.interface import Outcome
-
     pair, T_true = small_motion(objects)
     broken = MethodEntry("Broken", lambda pair: replace(Outcome.at(pair, T_true, 0.1), T_target_source=T_true * np.nan))
     monkeypatch.setattr(registry.REGISTRY, "by_module", lambda: {"broken": {"broken": broken}})
@@ -163,7 +161,7 @@ def test_a_missing_package_is_named(monkeypatch):
 
 
 def test_an_unknown_name_lists_the_known():
-    with pytest.raises(InputError, match=r"'icp2': unknown; choose one of fgr, .*trimmed"):
+    with pytest.raises(InputError, match=r"'icp2': unknown; choose one of point_to_point, .*trimmed"):
         make_method("icp2")
 
 

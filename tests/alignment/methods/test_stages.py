@@ -1,12 +1,17 @@
+"""ICP in stages: with all switched off, one changed at a time, and trimmed."""
+
+from itertools import combinations, product
+
 import numpy as np
 import pytest
 
-from gpca.alignment.methods.interface import FailedRegistration
+from gpca.alignment.methods.interface import FailedRegistration, Pair
 from gpca.alignment.methods.registry import make_method
-from gpca.alignment.methods.stages import Stages, run_stages
+from gpca.alignment.methods.stages import Stages, nearest, reject, run_stages, sample, weigh
+from gpca.alignment.rigid import exp, inverse, transform
 from gpca.pairs.perturbation import CONCEPTS
 
-from .pairs import perturbed, small_motion
+from .pairs import clouds, perturbed, small_motion
 
 
 @pytest.mark.parametrize("metric", ["point_to_point", "point_to_plane"])
@@ -74,3 +79,126 @@ def test_a_share_counts_all_points_of_the_source(objects):
     np.testing.assert_allclose(np.sort(matches.distance), least[: round(len(rows) / 2)])
     distance = float(np.median(matches.distance))
     assert 0 < len(Stages(share=0.5, distance=distance).match(pair, T_true).distance) <= len(pair.source) / 2
+
+
+OFF = {
+    "random_sampling": {"sampled": 1.0},
+    "normal_space": {"sampled": 1.0},
+    "reject_distance": {"deviations": 1e6},
+    "reject_normals": {"angle_deg": 180.0},
+    "reject_worst": {"worst": 0.0},
+    "weight_distance": {"weighting": "none"},
+    "weight_normals": {"weighting": "none"},
+}
+
+
+@pytest.mark.parametrize("name", OFF)
+@pytest.mark.parametrize("metric", ["point_to_point", "point_to_plane"])
+def test_a_variant_that_is_switched_off_is_plain_icp(objects, name, metric):
+    pair, _ = perturbed(objects, 0, "noise")
+    plain = make_method(metric)(pair)
+    off = make_method(name, OFF[name] | {"metric": metric})(pair)
+    np.testing.assert_allclose(off.T_target_source, plain.T_target_source, rtol=0, atol=1e-6)
+    assert off.fitness == pytest.approx(plain.fitness)
+    on = make_method(name, {"metric": metric})(pair)
+    assert np.abs(on.T_target_source - plain.T_target_source).max() > 1e-4
+
+
+def test_every_variant_ends_at_a_pose_of_its_own(objects):
+    pair, _ = perturbed(objects, 0, "noise")
+    poses = [make_method(name)(pair).T_target_source for name in OFF]
+    assert len(np.unique(np.round(poses, 5), axis=0)) == len(OFF)
+
+
+def test_samples_in_normal_space_are_even_over_directions():
+    """A floor of 900 points and two walls of 50: half of the random points would be floor, here a third is."""
+    normals = np.repeat(np.eye(3), [900, 50, 50], axis=0)
+    pair = Pair(np.random.default_rng(0).normal(size=(1000, 3)), np.eye(3), source_normals=normals)
+    rows = sample(pair, "normal_space", 0.12)
+    assert np.array_equal(rows, np.unique(rows)) and len(rows) == 120
+    assert np.array_equal(normals[rows].sum(axis=0), [40, 40, 40])
+    assert normals[sample(pair, "normal_space", 0.3)].sum(axis=0).tolist() == [200, 50, 50]  # all there are
+    assert normals[sample(pair, "random", 0.12)].sum(axis=0)[0] > 90
+
+
+def test_samples_are_drawn_by_the_seed_of_the_pair(objects):
+    pair, _ = small_motion(objects)
+    other = Pair(pair.source, pair.target, source_normals=pair.source_normals, seed=1)
+    for sampling in ("random", "normal_space"):
+        assert np.array_equal(sample(pair, sampling, 0.3), sample(pair, sampling, 0.3))
+        assert not np.array_equal(sample(pair, sampling, 0.3), sample(other, sampling, 0.3))
+
+
+def test_rejections_keep_what_they_say(objects):
+    pair, _ = perturbed(objects, 0, "noise")
+    matches = Stages(distance=0.1).match(pair, np.eye(4))
+    limits = {"deviations": 1.5, "angle_deg": 30.0, "worst": 0.2}
+    d = matches.distance
+    kept = {criterion: reject(matches, criterion, **limits) for criterion in ("distance", "normals", "trimming")}
+    assert np.array_equal(kept["distance"].distance, d[d <= d.mean() + 1.5 * d.std()])
+    assert np.array_equal(kept["normals"].rows, matches.rows[matches.cosines() >= np.cos(np.pi / 6)])
+    assert np.array_equal(np.sort(kept["trimming"].distance), np.sort(d)[: round(0.8 * len(d))])
+    for part in kept.values():
+        assert 0 < len(part.distance) < len(d)
+        np.testing.assert_allclose(np.linalg.norm(pair.target[part.rows] - part.source, axis=1), part.distance)
+
+
+def test_weights_fall_with_distance_and_angle(objects):
+    pair, _ = perturbed(objects, 0, "noise")
+    matches = Stages(distance=0.1).match(pair, np.eye(4))
+    np.testing.assert_allclose(weigh(matches, "distance"), 1 - matches.distance / 0.1)
+    weights, cosines = weigh(matches, "normals"), matches.cosines()
+    assert np.array_equal(weights[cosines > 0], np.minimum(cosines[cosines > 0], 1)) and not weights[cosines < 0].any()
+
+
+def test_the_nearest_are_never_none():
+    assert nearest(np.array([3.0, 1.0, 2.0]), 2).tolist() == [1, 2]
+    assert nearest(np.array([3.0, 1.0, 2.0]), 0).tolist() == [1]
+
+
+def brute_force(source, target, kept):
+    """The pose and the sum of least squares over all choices of `kept` source points and all their target points."""
+    chosen = np.array(list(combinations(range(len(source)), kept)))
+    assigned = np.array(list(product(range(len(target)), repeat=kept)))
+    best = np.inf, None
+    for rows in chosen:
+        p = source[rows] - source[rows].mean(axis=0)
+        q_n = target[assigned] - target[assigned].mean(axis=1, keepdims=True)
+        u, _, vt = np.linalg.svd(np.einsum("nki,kj->nij", q_n, p))
+        u[:, :, 2] *= np.linalg.det(u @ vt)[:, None]
+        R_n = u @ vt
+        squares_n = np.square(q_n - np.einsum("nij,kj->nki", R_n, p)).sum(axis=(1, 2))
+        n = squares_n.argmin()
+        if squares_n[n] < best[0]:
+            T = np.eye(4)
+            T[:3, :3] = R_n[n]
+            T[:3, 3] = target[assigned[n]].mean(axis=0) - R_n[n] @ source[rows].mean(axis=0)
+            best = squares_n[n], T
+    return best
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_on_small_clouds_it_finds_the_least_of_all_choices(seed):
+    random = np.random.default_rng(seed)
+    target = random.uniform(-0.5, 0.5, size=(6, 3))
+    T_true = exp(random.normal(scale=0.03, size=(1, 6)))[0]
+    source = transform(inverse(T_true), target) + random.normal(scale=0.005, size=(6, 3))
+    source[4:] += random.choice([-0.25, 0.25], size=(2, 3))  # what the target does not have
+    least, T = brute_force(source, target, 4)
+    outcome = make_method("trimmed", {"overlap": 4 / 6})(Pair(source, target))
+    np.testing.assert_allclose(outcome.T_target_source, T, atol=1e-9)
+    moved = transform(outcome.T_target_source, source)
+    squares = np.sort(np.square(moved[:, None] - target).sum(axis=2).min(axis=1))[:4].sum()
+    assert squares == pytest.approx(least)
+
+
+def test_it_finds_how_much_of_the_source_overlaps(objects):
+    """Half of the target is missing: what has no counterpart draws plain least squares aside."""
+    source, target, _, _ = clouds(objects, 0, points=300)
+    target = target[target[:, 2] < 0.02]
+    pair = Pair(source, target, exp(np.array([[0.05, 0.05, 0.05, 0.03, 0.0, 0.03]]))[0])
+    errors = [
+        np.abs(make_method("trimmed", settings)(pair).T_target_source - np.eye(4)).max()
+        for settings in ({}, {"overlap": 0.55}, {"overlap": 1.0})
+    ]
+    assert 2 * max(errors[:2]) < errors[2]

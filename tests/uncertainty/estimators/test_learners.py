@@ -51,11 +51,11 @@ def test_networks_contradict_each_other_far_from_what_they_know():
         runs = 0.005 * random.normal(size=(13, 6))
         descriptors = np.concatenate([[x], 0.01 * random.normal(size=3)])
         examples.append(Example(descriptors, runs, adjoint(FRAME) @ truth, FRAME))
-    reduce = learned.Reduction([each.descriptors for each in examples], 4)
+    reduce = learned.Reduction(np.array([each.descriptors for each in examples]), 4)
     networks = learned._Ensemble(4, 16, 5)
     features = reduce(np.array([each.descriptors for each in examples]))
     errors = [learned._errors(each) for each in examples]
-    networks.fit(features, np.array([e.mean(0) for e in errors]), np.array([e.var(0) for e in errors]), 200, 0.01, 1e-3)
+    networks.fit(features, errors, 200, 0.01, 1e-3)
     known, unknown = (networks.variances(reduce(np.array([[x, 0, 0, 0]])))[1].sum() for x in (0.0, 5.0))
     assert unknown > 3 * known
 
@@ -85,7 +85,7 @@ def test_too_few_examples_and_a_pair_without_descriptors_are_failures(learn):
 
 
 def test_what_never_changes_says_nothing():
-    reduce = learned.Reduction([np.array([1.0, x, 5.0]) for x in range(4)], 8)
+    reduce = learned.Reduction(np.array([[1.0, x, 5.0] for x in range(4)]), 8)
     assert np.isfinite(reduce(np.array([[2.0, 1.0, 9.0]]))).all()
     assert reduce(np.array([[2.0, 1.0, 9.0]])) == pytest.approx(reduce(np.array([[1.0, 1.0, 5.0]])))
 

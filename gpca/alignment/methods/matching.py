@@ -1,0 +1,150 @@
+"""Global methods by packages: Open3D's RANSAC and fast global registration on FPFH features, and KISS-Matcher."""
+
+from __future__ import annotations
+
+import os
+from functools import cache
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from gpca.alignment.features import MOST_NEIGHBORS, RADIUS, fpfh_of_pair
+from gpca.alignment.methods.interface import (
+    CORRESPONDENCE_DISTANCE,
+    FEWEST,
+    FailedRegistration,
+    MethodEntry,
+    Outcome,
+    Pair,
+)
+from gpca.alignment.rigid import rigid_motion
+from gpca.process.environment import require_open3d
+from gpca.settings import Share
+
+VOXEL = 0.08  # diameters; on a development seed the best for some 500 points (0.05 for 2000)
+# Somewhat more than KISS-Matcher needs: three neighbors within three voxels at each remaining point.
+NEAR, NEIGHBORS, FEATURES = 2.0, 4, 10
+
+
+def align_by_ransac(
+    pair: Pair,
+    feature_radius: float = RADIUS,
+    inlier_distance: float = 0.05,
+    edge_similarity: Share = 0.9,
+    iterations: int = 20_000,
+    confidence: Share = 0.999,
+    correspondence_distance: float = CORRESPONDENCE_DISTANCE,
+    feature_neighbors: int = MOST_NEIGHBORS,
+) -> Outcome:
+    """Return the pose of three matches that agrees with most others (Fischler & Bolles 1981).
+
+    Args:
+        feature_radius, inlier_distance: of a feature and of an agreeing match, in diameters.
+        edge_similarity: minimum ratio of the edges of the two triangles.
+        iterations, confidence: stopping rules.
+    """
+    registration = require_open3d().pipelines.registration
+    clouds, features = fpfh_of_pair(pair, feature_radius, feature_neighbors)
+    require_open3d().utility.random.seed(pair.seed % 2**31)
+    result = registration.registration_ransac_based_on_feature_matching(
+        *clouds,
+        *features,
+        mutual_filter=True,
+        max_correspondence_distance=inlier_distance,
+        estimation_method=registration.TransformationEstimationPointToPoint(False),
+        ransac_n=FEWEST,
+        checkers=[
+            registration.CorrespondenceCheckerBasedOnEdgeLength(edge_similarity),
+            registration.CorrespondenceCheckerBasedOnDistance(inlier_distance),
+        ],
+        criteria=registration.RANSACConvergenceCriteria(iterations, confidence),
+    )
+    if len(result.correspondence_set) < FEWEST:
+        raise FailedRegistration(f"fewer than {FEWEST} correspondences agree")
+    return Outcome.at(pair, np.array(result.transformation, np.float64), correspondence_distance)
+
+
+def align_by_fgr(
+    pair: Pair,
+    feature_radius: float = RADIUS,
+    inlier_distance: float = 0.05,
+    tuple_similarity: Share = 0.95,
+    tuples: int = 1000,
+    iterations: int = 64,
+    correspondence_distance: float = CORRESPONDENCE_DISTANCE,
+    feature_neighbors: int = MOST_NEIGHBORS,
+) -> Outcome:
+    """Minimize a robust cost over all matches in agreeing triples (Zhou et al. 2016).
+
+    Args:
+        feature_radius, inlier_distance: radius of a feature and final scale of the robust cost, in diameters.
+        tuple_similarity: minimum ratio of the edges of the two triangles of a triple.
+        tuples: maximum number of triples.
+    """
+    registration = require_open3d().pipelines.registration
+    clouds, features = fpfh_of_pair(pair, feature_radius, feature_neighbors)
+    require_open3d().utility.random.seed(pair.seed % 2**31)
+    option = registration.FastGlobalRegistrationOption(
+        use_absolute_scale=True,
+        decrease_mu=True,
+        maximum_correspondence_distance=inlier_distance,
+        iteration_number=iterations,
+        tuple_scale=tuple_similarity,
+        maximum_tuple_count=tuples,
+    )
+    try:
+        result = registration.registration_fgr_based_on_feature_matching(*clouds, *features, option)
+    except RuntimeError as fault:  # it cannot draw triples from a single match
+        raise FailedRegistration("too few correspondences agree") from fault
+    T_target_source = np.array(result.transformation, np.float64)
+    if np.array_equal(T_target_source, np.eye(4)):  # its result for fewer than ten matches
+        raise FailedRegistration("too few correspondences agree")
+    return Outcome.at(pair, T_target_source, correspondence_distance)
+
+
+def align_by_kiss_matcher(
+    pair: Pair, voxel: float = VOXEL, correspondence_distance: float = CORRESPONDENCE_DISTANCE
+) -> Outcome:
+    """Match both clouds (Lim et al. 2025), thinned to voxels in diameters, which also determine all radii."""
+    package = _in_one_thread(import_module("kiss_matcher"))
+    for name in ("source", "target"):
+        # Enough points must have enough neighbors for a normal: without any, the package ends the process.
+        voxels_M_3 = np.unique(np.floor(getattr(pair, name) / max(voxel, 1e-6)), axis=0)
+        neighbors_M = cKDTree(voxels_M_3).query_ball_point(voxels_M_3, NEAR, return_length=True)
+        if (neighbors_M > NEIGHBORS).sum() < FEATURES:
+            raise FailedRegistration(f"of the {name}, voxels of {voxel:g} diameters leave too few points")
+    try:  # it rejects voxels below 0.005, and clouds with too few remaining points
+        matcher = package.KISSMatcher(package.KISSMatcherConfig(voxel))
+        result = matcher.estimate(pair.source.astype(np.float32), pair.target.astype(np.float32))
+    except RuntimeError as fault:
+        raise FailedRegistration(f"KISS-Matcher: {fault}") from fault
+    if not result.valid or matcher.get_num_final_inliers() < FEWEST:
+        raise FailedRegistration(f"fewer than {FEWEST} correspondences agree")
+    T_target_source = rigid_motion(result.rotation, np.ravel(result.translation))
+    return Outcome.at(pair, T_target_source, correspondence_distance)
+
+
+@cache
+def _in_one_thread(package: Any) -> Any:
+    """Return the package limited to one thread: several threads race, and change a pose now and then.
+
+    TBB has no variable for its threads; at its first call it starts one for each processor of the process.
+    """
+    process = os.getpid()
+    allowed = os.sched_getaffinity(process)
+    cube_N_3 = np.indices((6, 6, 6)).reshape(3, -1).T.astype(np.float32)
+    os.sched_setaffinity(process, {min(allowed)})
+    try:
+        package.KISSMatcher(package.KISSMatcherConfig(1.0)).estimate(cube_N_3, cube_N_3)
+    finally:
+        os.sched_setaffinity(process, allowed)
+    return package
+
+
+METHODS = {
+    "fpfh_ransac": MethodEntry("FPFH and RANSAC", align_by_ransac, is_global=True),
+    "fgr": MethodEntry("Fast global registration", align_by_fgr, is_global=True),
+    "kiss_matcher": MethodEntry("KISS-Matcher", align_by_kiss_matcher, is_global=True, package="kiss_matcher"),
+}
