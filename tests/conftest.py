@@ -69,14 +69,14 @@ def diagnoser():
 
     from gpca.causes.settings import CauseSettings
     from gpca.classifier.settings import GPCSettings
-    from gpca.model.diagnoser import REENACTED, TrainingSet, learn
-    from gpca.model.file import FEATURE_COUNTS
+    from gpca.model.diagnoser import TrainingSet, learn
+    from gpca.model.file import FEATURE_COUNT
     from gpca.reenactment.settings import ReenactmentSettings
 
     random, label_N = np.random.default_rng(0), np.array(["nominal", "noise", "pose"] * 4)
     failed_N = label_N != "nominal"
     training = TrainingSet(
-        features_N_F=random.normal(size=(12, FEATURE_COUNTS[REENACTED])) + 3 * failed_N[:, None],
+        features_N_F=random.normal(size=(12, FEATURE_COUNT)) + 3 * failed_N[:, None],
         label_N=label_N,
         state_N=np.where(failed_N, "several", "nominal"),
         causes_N_3=np.repeat(failed_N[:, None], 3, axis=1),

@@ -6,21 +6,19 @@ import hashlib
 import json
 import re
 from argparse import ArgumentParser, Namespace
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from textwrap import fill
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from gpca.causes.judged import CEILING, RECALL
 from gpca.errors import InputError
 from gpca.evaluation.measures import POOLED, read_clustered
 from gpca.io.files import require_outputs, whole_file
 from gpca.io.structured_text import load_own_yaml, read_json
-from gpca.model.diagnoser import REENACTED, Diagnoser
-from gpca.model.file import DIAGNOSED, VERSION, Model
+from gpca.model.file import VERSION, Model
 from gpca.objects.canonical import LARGEST_DIAMETER_M, SMALLEST_DIAMETER_M, ObjectClouds
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.sheet import where
@@ -56,8 +54,7 @@ REMEDY = "ship a model from the folder of the run that made it"
 _TRAINING_FILE = re.compile(r"/(model_causes|registrations)/([^/]+)/seed\d+\.npz$")  # among the inputs of a model
 
 
-@dataclass(frozen=True)
-class License:
+class License(NamedTuple):
     """The license of a dataset, and where it was read."""
 
     dataset: str
@@ -65,67 +62,38 @@ class License:
     known: str
 
 
-@dataclass(frozen=True)
-class Source:
-    """Training objects of a model.
-
-    Attributes:
-        name, title: in the run.
-        diagnosed: whether the diagnosis was trained on them, rather than GP-CA.
-        objects: number of objects.
-        licenses: licenses of their datasets.
-    """
+class Source(NamedTuple):
+    """Training objects of a model: their name and title in the run, and whether the diagnosis was trained on them."""
 
     name: str
     title: str
     diagnosed: bool
     objects: int
-    licenses: tuple[License, ...]
+    licenses: list[License]
 
-    @classmethod
-    def of(cls, run: Path, name: str, diagnosed: bool, title: str) -> Source:
-        """Read the objects of a run and their provenance; an InputError for generated objects."""
-        objects = run / "objects" / f"{name}.npz"
-        record = _provenance(objects)
-        settings = record["settings"]
+
+def _sources(model: Path, record: Mapping, title: str) -> Iterator[Source]:
+    """Yield the training objects of a model, read from ``objects/`` of its run, in the order of the record.
+
+    Args:
+        title: title of the depth frames, which the provenance of a dataset's objects does not name.
+    """
+    files = [match.groups() for path in record["inputs_sha256"] if (match := _TRAINING_FILE.search(f"/{path}"))]
+    if not files:
+        raise InputError(_record_path(model), "lists nothing that a model learns from", REMEDY)
+    for kind, name in files:
+        objects = model.parent / f"objects/{name}.npz"
+        made = _provenance(objects)
+        settings = made["settings"]
         entry = settings.get("entry", {"title": title, "stand_in": "datasets" not in settings})
         if entry.get("stand_in"):
             raise InputError(objects, "contains objects that the package drew", "ship a model of real objects")
-        downloads = settings["datasets"].values() if "datasets" in settings else [settings["entry"]]
-        origins = list(record["inputs_sha256"]) or [
-            url for each in downloads for url in (each.get("urls") or [each["url"]])
+        downloads = settings["datasets"].values() if "datasets" in settings else [entry]
+        origins = list(made["inputs_sha256"]) or [
+            url for each in downloads for url in each.get("urls") or [each["url"]]
         ]
-        licenses = {license: None for origin in origins for license in licenses_of(origin, objects)}
-        return cls(name, entry["title"], diagnosed, len(ObjectClouds.load(objects)), tuple(licenses))
-
-
-@dataclass(frozen=True)
-class Origin:
-    """The provenance of a model and its training objects, in the order of the record."""
-
-    record: Mapping
-    sources: tuple[Source, ...]
-
-    @classmethod
-    def of(cls, model: Path, title: str) -> Origin:
-        """Return the origin of a model in the folder of its run.
-
-        Args:
-            model: the file, beside its provenance and the run's ``objects/``.
-            title: title of the depth frames, which the provenance of a dataset's objects does not name.
-
-        Raises:
-            InputError: provenance that is missing or incomplete, generated objects, data without a license.
-        """
-        record = _provenance(model)
-        files = [match.groups() for path in record["inputs_sha256"] if (match := _TRAINING_FILE.search(f"/{path}"))]
-        if not files:
-            raise InputError(_record_path(model), "lists nothing that a model learns from", REMEDY)
-        try:
-            sources = [Source.of(model.parent, name, kind == "model_causes", title) for kind, name in files]
-        except (LookupError, TypeError, AttributeError) as fault:
-            raise InputError(model.parent / "objects", f"its provenance is incomplete ({fault})", REMEDY) from fault
-        return cls(record, tuple(sources))
+        licenses = list(dict.fromkeys(license for origin in origins for license in licenses_of(origin, objects)))
+        yield Source(name, entry["title"], kind == "model_causes", len(ObjectClouds.load(objects)), licenses)
 
 
 def licenses_of(origin: str, objects: Path) -> list[License]:
@@ -134,7 +102,11 @@ def licenses_of(origin: str, objects: Path) -> list[License]:
     Raises:
         InputError: none is listed; the message names `objects`, which were made from it.
     """
-    licenses = [license for words, license in _listed_licenses() if any(word in origin for word in words)]
+    licenses = [
+        License(dataset, entry["license"], entry["known"])
+        for dataset, entry in _listed_licenses().items()
+        if any(word in origin for word in entry["found"])
+    ]
     if not licenses:
         fault = f"was made from '{Path(origin).name}', which is from a dataset without a known license"
         raise InputError(objects, fault, f"add the dataset to {LICENSES}")
@@ -142,11 +114,8 @@ def licenses_of(origin: str, objects: Path) -> list[License]:
 
 
 @cache
-def _listed_licenses() -> tuple[tuple[tuple[str, ...], License], ...]:
-    return tuple(
-        (tuple(entry["found"]), License(dataset, entry["license"], entry["known"]))
-        for dataset, entry in load_own_yaml(LICENSES).items()
-    )
+def _listed_licenses() -> Mapping[str, Mapping]:
+    return load_own_yaml(LICENSES)
 
 
 def _record_path(path: Path) -> Path:
@@ -161,85 +130,72 @@ def _provenance(path: Path) -> dict:
     return record
 
 
-def card(name: str, content: bytes, model: Model, diagnoser: Diagnoser, origin: Origin, scores: pd.DataFrame) -> str:
+def card(
+    name: str, content: bytes, model: Model, record: Mapping, sources: Sequence[Source], scores: pd.DataFrame
+) -> str:
     """Return the card in Markdown; equal inputs give equal text.
 
     Args:
         name, content: of the shipped file.
-        model, diagnoser, origin: described by the card.
+        record: its provenance.
         scores: :func:`gpca.experiments.diagnosis.collect` of the run: values with intervals.
 
     Raises:
         InputError: no scores of a classifier like the model's, or incomplete settings of the run.
     """
+    diagnoser, code = model.diagnoser, record["code"]
     try:
-        limits = _limits(model, diagnoser, origin)
+        limits = _limits(model, record["settings"])
     except (LookupError, TypeError, ValueError, AttributeError) as fault:
         raise InputError("provenance of the model", f"is incomplete ({fault})", "regenerate the model") from fault
+    file = {
+        "file": f"`{name}`, {len(content)} bytes, format version {VERSION}",
+        "SHA-256": f"`{hashlib.sha256(content).hexdigest()}`",
+        "precision": "that of the training; no number was rounded",
+        "made by": f"version {code.get('version')} of the package, commit `{code.get('commit')}`"
+        + (", with changes" if code.get("dirty") else ""),
+        "settings": f"seed {record.get('seed')}, SHA-256 `{record.get('settings_sha256')}`",
+    }
+    training = [(source.title, source.objects, "diagnosis" if source.diagnosed else "GP-CA") for source in sources]
+    used: dict[License, list[str]] = {}
+    for source in sources:
+        for license in source.licenses:
+            used.setdefault(license, []).append(source.title)
+    held_out = [diagnoser.held_out[measure] for measure in HELD_OUT]
     paragraphs = [
         f"# Model card of {name}",
         "The model that `gpca explain` uses unless another is named or found. It says whether a registration of two "
         f"point clouds is right and, if it is not, which of the causes {', '.join(CONCEPTS)} made it fail. "
         "`python -m gpca ship` wrote this page; docs/explain.md says how to use the model.",
         "## File",
-        _file(name, content, origin),
-        *("## Training data", *_training(model, diagnoser, origin)),
-        *("## Data and licenses", *_licenses(origin)),
-        *("## Scores", *_held_out(diagnoser), *_scores(origin, scores)),
-        *("## Limits", "\n".join(_wrapped(f"- {line}", "  ") for line in limits)),
-    ]
-    return "\n\n".join(text if text[0] in "|-#" else _wrapped(text) for text in paragraphs) + "\n"
-
-
-def _file(name: str, content: bytes, origin: Origin) -> str:
-    record, code = origin.record, origin.record["code"]
-    changed = ", with changes" if code.get("dirty") else ""
-    rows = {
-        "file": f"`{name}`, {len(content)} bytes, format version {VERSION}",
-        "SHA-256": f"`{hashlib.sha256(content).hexdigest()}`",
-        "precision": "that of the training; no number was rounded",
-        "made by": f"version {code.get('version')} of the package, commit `{code.get('commit')}`{changed}",
-        "settings": f"seed {record.get('seed')}, SHA-256 `{record.get('settings_sha256')}`",
-    }
-    return _table(["", ""], rows.items())
-
-
-def _training(model: Model, diagnoser: Diagnoser, origin: Origin) -> list[str]:
-    rows = [(source.title, source.objects, DIAGNOSED if source.diagnosed else "GP-CA") for source in origin.sources]
-    return [
+        _table(["", ""], file.items()),
+        "## Training data",
         f"The diagnosis was trained on {diagnoser.classifier.samples} registrations whose causes were measured by "
         "counterfactuals (docs/causes.md). Their source clouds were sampled from the objects' surfaces and perturbed. "
         f"GP-CA as in the paper, which is printed beside it, was trained on {len(model.gpc.learned_N_d)} "
         "registrations, each perturbed in one way.",
-        _table(["objects", "number", "train"], rows),
-    ]
-
-
-def _licenses(origin: Origin) -> list[str]:
-    used: dict[License, list[str]] = {}
-    for source in origin.sources:
-        for license in source.licenses:
-            used.setdefault(license, []).append(source.title)
-    rows = [(key.dataset, key.license, key.known, "; ".join(dict.fromkeys(titles))) for key, titles in used.items()]
-    return [
+        _table(["objects", "number", "train"], training),
+        "## Data and licenses",
         "The file holds weights, descriptors and embeddings that were computed from these data, but none of their "
         "points or images. The data stay under their own licenses; this page takes no position on whether these extend "
         'to a trained model. "Seen" means read in the stated place, "from memory" means not confirmed.',
-        _table(["dataset", "license", "source of this information", "part of"], rows),
-    ]
-
-
-def _held_out(diagnoser: Diagnoser) -> list[str]:
-    held_out = [diagnoser.held_out[measure] for measure in HELD_OUT]
-    return [
+        _table(
+            ["dataset", "license", "source of this information", "part of"],
+            [(*license, "; ".join(dict.fromkeys(titles))) for license, titles in used.items()],
+        ),
+        "## Scores",
         "The training registrations were judged by classifiers like those in the file that had learned other families "
         "of shapes. The classifiers in the file learned them all, so nothing is left to test these on.",
         _table([*HELD_OUT.values()], [[f"{value:.0f}" if value >= 2 else f"{value:.3f}" for value in held_out]]),
+        *_scores(record, sources, scores),
+        "## Limits",
+        "\n".join(_wrapped(f"- {line}", "  ") for line in limits),
     ]
+    return "\n\n".join(text if text[0] in "|-#" else _wrapped(text) for text in paragraphs) + "\n"
 
 
-def _scores(origin: Origin, scores: pd.DataFrame) -> list[str]:
-    titles = {source.name: source.title for source in origin.sources if source.diagnosed} | {POOLED: "all together"}
+def _scores(record: Mapping, sources: Sequence[Source], scores: pd.DataFrame) -> list[str]:
+    titles = {source.name: source.title for source in sources if source.diagnosed} | {POOLED: "all together"}
     rows, committees = [], 0
     for source, title in titles.items():
         for explainer, words in EXPLAINERS.items():
@@ -253,7 +209,7 @@ def _scores(origin: Origin, scores: pd.DataFrame) -> list[str]:
                 rows.append((title, words, *(_interval(metrics, metric) for metric in MEASURES), counts))
     if not committees:
         raise InputError("cause_intervals.csv", f"has no scores of {COMMITTEE}", "switch it on in diagnosis.explainers")
-    changes = origin.record["settings"].get("model", {}).get("causes", {})
+    changes = record["settings"].get("model", {}).get("causes", {})
     return [
         "These are the scores of other explainers in the run that made this model, on objects held out of their "
         "training, with 95\u00a0% intervals over objects and seeds. The scored registrations were drawn as the section "
@@ -274,42 +230,30 @@ def _interval(metrics: pd.DataFrame, metric: str) -> str:
     return f"{value:.3f} ({low:.3f} to {high:.3f})"
 
 
-def _limits(model: Model, diagnoser: Diagnoser, origin: Origin) -> list[str]:
-    settings = origin.record["settings"]
-    causes = settings["causes"] | settings["model"].get("causes", {})
+def _limits(model: Model, settings: Mapping) -> list[str]:
+    causes, sets = settings["causes"] | settings["model"].get("causes", {}), model.diagnoser.guarantee.state_sets
+    guarantee, alarm = model.diagnoser.guarantee, model.diagnoser.guarantee.failure_alarm
     severities = ", ".join(f"{name} {low:g} to {high:g}" for name, (low, high) in causes["severities"].items())
-    ranges = model.familiar.ranges.items() if model.familiar else ()
-    familiar = ", ".join(f"{name} {low:.2f} to {high:.2f}" for name, (low, high) in ranges)
+    familiar = ", ".join(f"{name} {low:.2f} to {high:.2f}" for name, (low, high) in model.familiar.ranges.items())
+    fewest, most = causes["points"]
+    counted = f"{guarantee.families} families, family by family" if guarantee.families else "single registrations"
     return [
         f"Failed means an error above {causes['limits']['failed']:g} of the diameter. Your task may need "
         "another limit.",
         f"The diagnosis was trained on {severities} (lengths in diameters; crop and outliers in shares of the points), "
-        "on clouds of {} to {} points, and on results of ICP `{}`. Outside these ranges it extrapolates.".format(
-            *causes["points"], model.icp.method
-        ),
-        f"The threshold of {diagnoser.threshold:.3f} was chosen on families of shapes held out of a first classifier's "
-        f"training, so that at most {100 * settings['model']['false_alarms']:g}\u00a0% of their nominal registrations "
-        "are called failed.",
-        *_promises(diagnoser),
-        f"It knows only the causes {', '.join(CONCEPTS)}. It attributes whatever else is wrong, such as the wrong "
-        "object or a sensor's bias, to one of them.",
-        f"It warns of clouds outside the geometry that GP-CA was trained on: {familiar} (docs/explain.md)."
-        if familiar
-        else "It keeps no ranges of its training geometry, so it notices fewer unfamiliar clouds.",
-        f"It explains rigid objects of {SMALLEST_DIAMETER_M:g} to {LARGEST_DIAMETER_M:g} m. It is not a safety device.",
-    ]
-
-
-def _promises(diagnoser: Diagnoser) -> list[str]:
-    if (guarantee := diagnoser.guarantee) is None:
-        return []
-    sets, alarm = guarantee.state_sets, guarantee.failure_alarm
-    counted = f"{guarantee.families} families, family by family" if guarantee.families else "single registrations"
-    return [
+        f"on clouds of {fewest} to {most} points, and on results of ICP `{model.icp.method}`. Outside these ranges it "
+        "extrapolates.",
+        f"The threshold of {model.diagnoser.threshold:.3f} was chosen on families of shapes held out of a first "
+        f"classifier's training, so that at most {100 * settings['model']['false_alarms']:g}\u00a0% of their nominal "
+        "registrations are called failed.",
         f"A set of states holds the true one with a probability of {sets.level:g}, calibrated on {counted}; the alarm "
         f"calls at most {100 * alarm.missed:g}\u00a0% of failures good and {100 * alarm.false_alarms:g}\u00a0% of good "
         f"ones failed, calibrated on {guarantee.samples} single registrations. Both hold for objects that are to these "
-        "as these are to one another, and for pairs without a warning."
+        "as these are to one another, and for pairs without a warning.",
+        f"It knows only the causes {', '.join(CONCEPTS)}. It attributes whatever else is wrong, such as the wrong "
+        "object or a sensor's bias, to one of them.",
+        f"It warns of clouds outside the geometry that GP-CA was trained on: {familiar} (docs/explain.md).",
+        f"It explains rigid objects of {SMALLEST_DIAMETER_M:g} to {LARGEST_DIAMETER_M:g} m. It is not a safety device.",
     ]
 
 
@@ -337,9 +281,6 @@ def run_ship(options: Namespace) -> None:
     scores = options.model.with_name("cause_intervals.csv")
     require_outputs([options.out, options.card], [options.model, scores])
     model = Model.load(options.model)
-    if model.diagnoser is None or model.diagnoser.reads != REENACTED:
-        fault = "cannot say what is wrong with a registration" if model.diagnoser is None else "re-enacts nothing"
-        raise InputError(options.model, fault, "ship one that this version made")
     if model.stand_in:
         raise InputError(options.model, "was trained on objects that the package drew", "ship a model of real objects")
     with TemporaryDirectory() as folder:
@@ -349,8 +290,12 @@ def run_ship(options: Namespace) -> None:
     if len(content) > LARGEST_BYTES:
         fault = f"has {len(content) / 1e6:.1f} MB, more than the {LARGEST_BYTES / 1e6:g} MB allowed in the package"
         raise InputError(options.model, fault, "lower causes.train, causes.test or real_world.train")
-    origin = Origin.of(options.model, model.title)
-    text = card(options.out.name, content, model, model.diagnoser, origin, read_clustered(scores))
+    record = _provenance(options.model)
+    try:
+        sources = list(_sources(options.model, record, model.title))
+    except (LookupError, TypeError, AttributeError) as fault:
+        raise InputError(options.model.parent / "objects", f"its provenance is incomplete ({fault})", REMEDY) from fault
+    text = card(options.out.name, content, model, record, sources, read_clustered(scores))
     with whole_file(options.out) as partial:
         partial.write_bytes(content)
     with whole_file(options.card) as partial:

@@ -7,7 +7,7 @@ trained on the others. The final classifier is trained on all.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, replace
 from sys import intern
 
 import numpy as np
@@ -17,8 +17,7 @@ from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.icp import ICPSettings
 from gpca.alignment.rigid import exp, inverse, transform
 from gpca.causes.dataset import LABELS, Causes, labels_of
-from gpca.causes.descriptors import describe
-from gpca.causes.settings import GROUPS, OBSERVED, CauseSettings, DescriptorSettings, Moved
+from gpca.causes.settings import CauseSettings, Moved
 from gpca.causes.truth import ALL, BORDERLINE, LARGEST_ERROR, NOMINAL
 from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
@@ -36,7 +35,7 @@ from gpca.seeds import generator
 from gpca.uncertainty.settings import UncertaintySettings
 
 SMALLEST_ERROR = 1e-3  # diameters; the spacing of the points hides smaller errors
-REENACTED, REMEDIED = ("reenacted", "remedied")  # the features of a diagnoser
+READS = "reenacted"  # the name of the features in a model file
 QUICK_POINTS, QUICK_HYPOTHESES = 384, 2  # limits of a quick diagnosis; 256 points give twice as many false alarms
 MOST_REENACTED = 512  # points of a user's cloud; twice as many take twice the time without a gain
 RIDGE = 10.0  # penalty of the regression of the error, in samples
@@ -55,13 +54,10 @@ class Diagnoser:
         threshold: probability of failure from which a registration is called failed.
         points: maximum number of points per cloud.
         runs: spread of ICP over other starts.
-        reads: features: ``reenacted``, those of a re-enactment; or ``remedied``, all groups of descriptors, as in
-            models before version 4.
         moved: the cloud that ICP moves in a re-enactment.
         reenactment: search for the true pose.
-        descriptors: registrations with remedies.
-        guarantee: sets of states and alarm; None in older models and quick diagnoses.
-        held_out: measures of accuracy on unseen families of shapes; empty in older models.
+        guarantee: sets of states and alarm; None in quick diagnoses.
+        held_out: measures of accuracy on unseen families of shapes.
     """
 
     classifier: PairClassifier
@@ -69,12 +65,10 @@ class Diagnoser:
     threshold: float
     points: int
     runs: UncertaintySettings
-    reads: str = REENACTED
-    moved: Moved = OBSERVED
-    reenactment: ReenactmentSettings = field(default_factory=ReenactmentSettings)
-    descriptors: DescriptorSettings = field(default_factory=DescriptorSettings)
-    guarantee: Guarantee | None = None
-    held_out: Mapping[str, float] = field(default_factory=dict)
+    moved: Moved
+    reenactment: ReenactmentSettings
+    guarantee: Guarantee | None
+    held_out: Mapping[str, float]
 
     def quick(self) -> Diagnoser:
         """Return a diagnoser with fewer points and hypotheses and therefore without a guarantee."""
@@ -101,18 +95,14 @@ class Diagnoser:
             bald=float(judged.bald_N[0]),
             expected_error=float(np.clip(np.exp(log_error), SMALLEST_ERROR, LARGEST_ERROR)),
             unlikeness=float(self.classifier.unlikeness(inputs_1_F)[0]),
+            void=False,
             guarantee=Guaranteed.of(self.guarantee, state_probabilities(judged)) if self.guarantee else None,
             reenacted=reenacted,
         )
 
-    def measured(
-        self, observed: np.ndarray, model: np.ndarray, T_icp: np.ndarray
-    ) -> tuple[np.ndarray, Reenacted | None]:
-        """Return the features (F,) of the pair, and its re-enactment, if any."""
+    def measured(self, observed: np.ndarray, model: np.ndarray, T_icp: np.ndarray) -> tuple[np.ndarray, Reenacted]:
+        """Return the features (F,) of the pair, and its re-enactment."""
         pair = self.pair(observed, model, T_icp)
-        if self.reads == REMEDIED:
-            described, _ = describe(pair, self.descriptors, self.runs.icp)
-            return np.concatenate([described[group] for group in GROUPS]), None
         surface = ModelSurface(pair.model)
         enactments, truth = self._enacted(pair, surface)
         row = row_of(enactments, pair, self.reenactment, truth)
@@ -132,7 +122,10 @@ class Diagnoser:
 
     def pair(self, observed: np.ndarray, model: np.ndarray, T_icp: np.ndarray) -> ObservedPair:
         """Return the pair with the results of ICP from other starts, as in training."""
-        observed, model = _drawn(observed, self.points, "observed"), _drawn(model, self.points, "model")
+        observed, model = (
+            cloud[generator("diagnosis", role).permutation(len(cloud))[: self.points]]
+            for role, cloud in (("observed", observed), ("model", model))
+        )
         starts_n = exp(generator("diagnosis", "starts").normal(size=(self.runs.starts, 6)) * self.runs.deviation_6())
         starts_n[0] = T_icp
         T_n, fitness_n, rmse_n = BatchedICP(model, self.runs.icp).register(observed, starts_n)
@@ -149,9 +142,8 @@ class Diagnoser:
 
     def state(self) -> dict[str, object]:
         """Return tensors, numbers and names for :meth:`from_state`."""
-        feature_settings = {REENACTED: "reenactment", REMEDIED: "descriptors"}[self.reads]
         return {
-            "reads": self.reads,
+            "reads": READS,
             "classifier": self.classifier.state(),
             "error_weights": torch.from_numpy(self.error_weights),
             "threshold": self.threshold,
@@ -159,32 +151,26 @@ class Diagnoser:
             "runs": {name: value for name, value in asdict(self.runs).items() if name != "icp"},
             "icp": asdict(self.runs.icp),
             "moved": self.moved,
-            feature_settings: asdict(getattr(self, feature_settings)),
+            "reenactment": asdict(self.reenactment),
             "guarantee": self.guarantee and self.guarantee.to_dict(),
             "held_out": dict(self.held_out),
         }
 
     @classmethod
     def from_state(cls, state: Mapping) -> Diagnoser:
-        """Return the diagnoser of a :meth:`state`, also from before version 4, which read all descriptors."""
+        """Return the diagnoser of a :meth:`state`."""
         return cls(
             classifier=PairClassifier.from_state(state["classifier"]),
             error_weights=state["error_weights"].numpy(),
             threshold=state["threshold"],
             points=state["points"],
             runs=UncertaintySettings(**state["runs"], icp=ICPSettings(**state["icp"])),
-            reads=state.get("reads", REMEDIED),
-            moved=state.get("moved", OBSERVED),
-            reenactment=ReenactmentSettings(**state.get("reenactment", {})),
-            descriptors=DescriptorSettings(**state.get("descriptors", {})),
-            guarantee=Guarantee.from_dict(state["guarantee"]) if state.get("guarantee") else None,
+            moved=state["moved"],
+            reenactment=ReenactmentSettings(**state["reenactment"]),
+            guarantee=Guarantee.from_dict(state["guarantee"]),
             # Interned names are shared objects, which pickle writes once: equal models then give equal bytes.
-            held_out={intern(name): value for name, value in state.get("held_out", {}).items()},
+            held_out={intern(name): value for name, value in state["held_out"].items()},
         )
-
-
-def _drawn(cloud: np.ndarray, most: int, role: str) -> np.ndarray:
-    return cloud[generator("diagnosis", role).permutation(len(cloud))[:most]]
 
 
 @dataclass(frozen=True)
@@ -230,8 +216,8 @@ class TrainingSet:
 
     def classifier(self, gpc: GPCSettings, *axes: object) -> PairClassifier:
         """Train a classifier."""
-        classifier = PairClassifier(gpc, *axes, trees=True)
-        return classifier.fit(self.features_N_F, self.label_N != NOMINAL, self.causes_N_3)
+        made = PairClassifier(gpc, *axes, trees=True)
+        return made.fit(self.features_N_F, self.label_N != NOMINAL, self.causes_N_3)
 
 
 def learn(
@@ -251,6 +237,14 @@ def learn(
     nominal_N = clear.label_N == NOMINAL
     threshold = threshold_of(judged.failure_N[nominal_N], false_alarms)
     classifier = clear.classifier(gpc, *axes)
+    # Sets of states hold for new families if there are enough families. The alarm's level is too high for their number:
+    # it is calibrated on single samples, and holds as far as registrations of a new family are like the others.
+    scores_N_5 = state_probabilities(judged)
+    family_N = clear.family_N if highest_level(0, clear.family_N) >= LEVEL else None
+    by_family, single = (
+        calibrate(scores_N_5, clear.state_N, families, level=LEVEL, missed=MISSED, false_alarms=false_alarms)
+        for families in (family_N, None)
+    )
     diagnoser = Diagnoser(
         classifier=classifier,
         error_weights=fit_error(classifier.normalized(training.features_N_F), training.error_N),
@@ -259,7 +253,7 @@ def learn(
         runs=causes.runs(),
         moved=causes.moved,
         reenactment=reenactment,
-        guarantee=calibrated(clear, judged, false_alarms),
+        guarantee=Guarantee(by_family.state_sets, single.failure_alarm, by_family.samples, by_family.families),
         held_out=measured(clear, judged, threshold),
     )
     return diagnoser, judged.bald_N[~nominal_N]
@@ -283,23 +277,8 @@ def judged_unseen(training: TrainingSet, gpc: GPCSettings, *axes: object) -> Jud
     return Judgment(**parts)
 
 
-def calibrated(training: TrainingSet, judged: Judgment, false_alarms: float) -> Guarantee:
-    """Calibrate sets of states, for new families if there are enough families, and an alarm.
-
-    The level of the alarm is too high for the number of families, so it is calibrated on single samples and holds as
-    far as registrations of a new family are like the others.
-    """
-    scores_N_5 = state_probabilities(judged)
-    family_N = training.family_N if highest_level(0, training.family_N) >= LEVEL else None
-    by_family, single = (
-        calibrate(scores_N_5, training.state_N, families, level=LEVEL, missed=MISSED, false_alarms=false_alarms)
-        for families in (family_N, None)
-    )
-    return Guarantee(by_family.state_sets, single.failure_alarm, by_family.samples, by_family.families)
-
-
 def measured(training: TrainingSet, judged: Judgment, threshold: float) -> dict[str, float]:
-    """Return measures of accuracy (docs/causes.md) for the card of the model."""
+    """Measures of accuracy (docs/causes.md) for the card of the model."""
     from sklearn.metrics import roc_auc_score
 
     failed_N = training.label_N != NOMINAL

@@ -63,11 +63,10 @@ class Guaranteed:
     @classmethod
     def of(cls, guarantee: Guarantee, scores_1_K: np.ndarray) -> Guaranteed:
         """Apply a guarantee to the state scores of one registration."""
-        names, alarm = guarantee.state_sets.states, guarantee.failure_alarm
-        inside_K = guarantee.sets(scores_1_K)[0]
+        sets, alarm = guarantee.state_sets, guarantee.failure_alarm
         return cls(
-            states=tuple(name for name, inside in zip(names, inside_K, strict=True) if inside),
-            level=guarantee.state_sets.level,
+            states=tuple(np.array(sets.states)[guarantee.sets(scores_1_K)[0]].tolist()),
+            level=sets.level,
             call=str(guarantee.alarm(1 - scores_1_K[:, 0])[0]),
             missed=alarm.missed,
             false_alarms=alarm.false_alarms,
@@ -82,10 +81,7 @@ class Guaranteed:
             ALARM: f"at most {self.false_alarms:.0%} of the good ones are called so",
         }
         why = risk.get(self.call, "neither call keeps its promise here")
-        return [
-            f"set       {states} ({self.level:.0%} of such sets hold the truth)",
-            f"alarm     {self.call} ({why})",
-        ]
+        return [f"set       {states} ({self.level:.0%} of such sets hold the truth)", f"alarm     {self.call} ({why})"]
 
 
 def state_probabilities(judged: Judgment) -> np.ndarray:
@@ -126,7 +122,7 @@ class FittingPose:
     registered: bool
     apart: float
     turn_deg: float
-    axis: tuple[float, float, float]
+    axis: tuple[float, ...]
     shift: float
     error: float
 
@@ -140,7 +136,7 @@ class FittingPose:
         least[:3, :3] = symmetric_turn(from_result[:3, :3].T, surface.symmetries).T @ from_result[:3, :3]
         turn_3 = log(least[None])[0, :3]
         angle = float(np.sqrt(np.square(turn_3).sum()))
-        axis = turn_3 / angle if angle > 0 else np.array([0.0, 0.0, 1.0])
+        axis_3 = turn_3 / angle if angle > 0 else np.array([0.0, 0.0, 1.0])
         apart = float(surface.apart(from_result[None])[0])
         return cls(
             probability=probability,
@@ -148,7 +144,7 @@ class FittingPose:
             registered=apart <= SAME,
             apart=apart,
             turn_deg=float(np.rad2deg(angle)),
-            axis=(float(axis[0]), float(axis[1]), float(axis[2])),
+            axis=tuple(axis_3.tolist()),
             shift=float(np.sqrt(np.square(from_result[:3, 3]).sum())),
             error=float(enactment.error_8[ALL]),
         )
@@ -195,33 +191,24 @@ class Reenacted:
     def of(
         cls, enactments: Sequence[Enactment], weight_k: np.ndarray, T_result: np.ndarray, surface: ModelSurface
     ) -> Reenacted:
-        """Summarize the re-enactments of a pair.
-
-        Args:
-            weight_k: (k,) probabilities of their hypotheses.
-            T_result: (4, 4) the registration's result.
-            surface: the target's.
-        """
+        """Summarize the re-enactments of a pair: `weight_k` are the probabilities of their hypotheses."""
         error_k_8 = np.array([enactment.error_8 for enactment in enactments])
         mean_8 = (weight_k[:, None] * error_k_8).sum(axis=0)
         severity = enactments[0].candidate.severity
-        weighted = zip(enactments, weight_k, strict=True)
         return cls(
             error=float(mean_8[ALL]),
             effects=dict(zip(CONCEPTS, shapley_values(mean_8[None])[0].tolist(), strict=True)),
             noise=severity["noise"],
             outliers=severity["outliers"],
             missing=severity["crop"],
-            poses=tuple(FittingPose.of(enactment, float(weight), T_result, surface) for enactment, weight in weighted),
+            poses=tuple(
+                FittingPose.of(enactment, float(weight), T_result, surface)
+                for enactment, weight in zip(enactments, weight_k, strict=True)
+            ),
         )
 
     def outside(self, frame: CanonicalFrame, T_target_source_init: np.ndarray) -> Reenacted:
-        """Convert to the user's frame and unit of length.
-
-        Args:
-            frame: the target's.
-            T_target_source_init: (4, 4) initial pose, in that unit.
-        """
+        """Convert to the user's frame and unit of length, in which the initial pose is given."""
         poses = tuple(
             replace(
                 pose,
@@ -230,9 +217,13 @@ class Reenacted:
             )
             for pose in self.poses
         )
-        effects = {cause: effect * frame.diameter for cause, effect in self.effects.items()}
-        lengths = {"error": self.error * frame.diameter, "noise": self.noise * frame.diameter}
-        return replace(self, **lengths, effects=effects, poses=poses)
+        return replace(
+            self,
+            error=self.error * frame.diameter,
+            effects={cause: effect * frame.diameter for cause, effect in self.effects.items()},
+            noise=self.noise * frame.diameter,
+            poses=poses,
+        )
 
     def as_dict(self) -> dict[str, object]:
         """Values for JSON."""
@@ -254,17 +245,14 @@ class Reenacted:
 
     def pose_lines(self, subject: str, unit: str) -> list[str]:
         """One line of text per hypothesis."""
-        described = enumerate(zip(self.words(subject, unit), self.poses, strict=True), 1)
-        return [f"pose {k}    {words}: probability {pose.probability:.2f}" for k, (words, pose) in described]
+        poses = zip(self.words(subject, unit), self.poses, strict=True)
+        return [f"pose {k}    {words}: probability {pose.probability:.2f}" for k, (words, pose) in enumerate(poses, 1)]
 
     def lines(self, unit: str) -> list[str]:
         """Lines of text."""
         parts = f"{self.outliers:.0%} outliers, {self.missing:.0%} of the surface missing"
-        return [
-            self.effects_line(unit),
-            f"observed  noise of {self.noise:.2g} {unit}, {parts}",
-            *self.pose_lines("the object", unit),
-        ]
+        observed = f"observed  noise of {self.noise:.2g} {unit}, {parts}"
+        return [self.effects_line(unit), observed, *self.pose_lines("the object", unit)]
 
 
 @dataclass(frozen=True)
@@ -280,8 +268,8 @@ class Diagnosis:
         expected_error: expected error of the pose: ADD, or ADD-S of a symmetric object.
         unlikeness: distance to the training samples, scaled so that 1 % of them exceed 1.
         void: whether the pair is such that no number here means anything (:mod:`gpca.model.clouds`).
-        guarantee: set of states and alarm; None in older models and fast diagnoses.
-        reenacted: the counterfactuals; None if nothing was re-enacted.
+        guarantee: set of states and alarm; None in fast diagnoses.
+        reenacted: the counterfactuals.
     """
 
     failure: float
@@ -290,10 +278,10 @@ class Diagnosis:
     variances: dict[str, float]
     bald: float
     expected_error: float
-    unlikeness: float = 0.0
-    void: bool = False
-    guarantee: Guaranteed | None = None
-    reenacted: Reenacted | None = None
+    unlikeness: float
+    void: bool
+    guarantee: Guaranteed | None
+    reenacted: Reenacted
 
     @property
     def state(self) -> str:
@@ -312,15 +300,13 @@ class Diagnosis:
 
     def outside(self, frame: CanonicalFrame, T_target_source_init: np.ndarray) -> Diagnosis:
         """Convert from the target's canonical frame to the user's frame and unit of length."""
-        reenacted = self.reenacted and self.reenacted.outside(frame, T_target_source_init)
+        reenacted = self.reenacted.outside(frame, T_target_source_init)
         return replace(self, expected_error=self.expected_error * frame.diameter, reenacted=reenacted)
 
     def as_dict(self) -> dict[str, object]:
         """Values for JSON."""
-        parts = {
-            "guarantee": self.guarantee and asdict(self.guarantee),
-            "reenacted": self.reenacted and self.reenacted.as_dict(),
-        }
+        guarantee = self.guarantee and asdict(self.guarantee)
+        parts = {"guarantee": guarantee, "reenacted": self.reenacted.as_dict()}
         return vars(self) | parts | {"state": self.state, "named": list(self.named)}
 
     def lines(self, unit: str) -> list[str]:
@@ -332,5 +318,5 @@ class Diagnosis:
             *(self.guarantee.lines() if self.guarantee else ["set       none, since nothing is promised"]),
             f"causes    {', '.join(f'{cause} {share:.3f}' for cause, share in self.causes.items())}, if it failed",
             f"error     about {self.expected_error:.2g} {unit}",
-            *(self.reenacted.lines(unit) if self.reenacted else ["          (nothing was re-enacted)"]),
+            *self.reenacted.lines(unit),
         ]

@@ -40,7 +40,6 @@ from gpca.uncertainty.estimators.registry import make_estimator
 from gpca.uncertainty.settings import MONTE_CARLO, UncertaintySettings
 from gpca.uncertainty.spread import run_from_starts
 
-NOTHING_REENACTED = "the model is from an older version and re-enacts nothing; make another, or take the package's"
 FAST = f"fast: at most {QUICK_POINTS} points and {QUICK_HYPOTHESES} poses were re-enacted, and nothing is promised"
 GOOD_FITNESS = 0.9  # fitness from which an initial pose is not doubted
 INVERSE_COST = 0.5  # an inverse initial pose that ends with a smaller share of the cost was probably meant
@@ -95,7 +94,7 @@ class Explainer:
             unit: unit of points and pose: ``m``, ``cm`` or ``mm``.
             frame: canonical frame of the target; by default, computed from its points.
             uncertainty: spread of the starts for the uncertainty of the pose; None skips it.
-            diagnose: whether to diagnose the registration, if the model can. GP-CA alone takes a fifth of the time,
+            diagnose: whether to diagnose the registration. GP-CA alone takes a fifth of the time,
                 cannot state that nothing is wrong, and then determines the action.
             method: registration method (docs/registration.md) with its default settings; by default, the model's own
                 ICP, on whose results the classifier was trained.
@@ -120,16 +119,13 @@ class Explainer:
         T_found = outcome.T_target_source
         voids = voids_of(clouds.source, clouds.target, outcome.fitness, self.model.familiar)
         diagnosis, enact = None, None
-        if diagnose and (diagnoser := self.model.diagnoser) is not None:
-            diagnoser = diagnoser.quick() if fast else diagnoser
+        if diagnose:
+            diagnoser = self.model.diagnoser.quick() if fast else self.model.diagnoser
             with _timed(seconds, "diagnosis"):
                 diagnosis = diagnoser.diagnose(clouds.source, clouds.target, T_found)
             diagnosis = replace(diagnosis.outside(clouds.frame, clouds.T_target_source_init), void=bool(voids))
-            if diagnosis.reenacted is None:
-                notes.append(NOTHING_REENACTED)
-            else:
-                enact = partial(diagnoser.enacted_again, clouds.source, clouds.target, T_found)
-                notes += [FAST] if fast else []
+            enact = partial(diagnoser.enacted_again, clouds.source, clouds.target, T_found)
+            notes += [FAST] if fast else []
         with _timed(seconds, "embedding"):
             h_1_d = self.embed(transform(T_found, clouds.source))
         with _timed(seconds, "attribution"):
@@ -138,7 +134,12 @@ class Explainer:
         if not np.isfinite(h_1_d).all() or not np.isfinite(numbers).all():
             raise InputError("model", "gives non-finite numbers for these clouds", "use another one")
         with _timed(seconds, "familiarity"):
-            warnings = [*map(str, voids), *self._warnings(clouds, diagnosis)]
+            warnings = [*map(str, voids), *self.model.familiar.warnings(clouds.source, clouds.target)]
+            if diagnosis is not None and diagnosis.unlikeness > 1:
+                warnings.append(
+                    f"the pair is {diagnosis.unlikeness:.1f} times as far from the registrations that the diagnosis "
+                    "was trained on as 99 % of these are from one another"
+                )
             if T_target_source_init is not None and register is None and self._fits_inverted(clouds, outcome):
                 warnings.append("the inverse of the initial pose fits far better: is it T_source_target?")
         spread = None
@@ -152,11 +153,11 @@ class Explainer:
             inlier_rmse=outcome.inlier_rmse * clouds.frame.diameter,
             diagnosis=diagnosis,
             method=method or self.model.icp.method,
-            scores=dict(zip(self.model.concepts, scores_C.tolist(), strict=True)),
-            variances=dict(zip(self.model.concepts, variances_C.tolist(), strict=True)),
+            scores=dict(zip(self.model.gpc.classes, scores_C.tolist(), strict=True)),
+            variances=dict(zip(self.model.gpc.classes, variances_C.tolist(), strict=True)),
             bald=float(bald),
             entropy=float(entropy(scores_C)),
-            concept=self.model.concepts[scores_C.argmax()],
+            concept=self.model.gpc.classes[scores_C.argmax()],
             action=decision.action,
             reason=decision.reason,
             spread=spread,
@@ -259,24 +260,14 @@ class Explainer:
         return PoseSpread(estimated.covariance_6_6, diameter, estimator, starts)
 
     def _decision(self, scores_C: np.ndarray, bald: float, diagnosis: Diagnosis | None, voids: list[Void]) -> Decision:
-        """Choose the action, by the diagnosis if there is one, otherwise by GP-CA's scores."""
+        """Choose the action by the diagnosis if there is one, otherwise by GP-CA's scores."""
         if voids:
             return Decision(CHECK, "", ", ".join(void.check for void in voids))
         if diagnosis is None:
-            return self.policy.decide(scores_C, bald, concepts=self.model.concepts)
+            return self.policy.decide(scores_C, bald, concepts=self.model.gpc.classes)
         if diagnosis.state == NOMINAL:
             return Decision(NOTHING, "", "nothing is wrong")
         return self.policy.decide(np.array([*diagnosis.causes.values()]), diagnosis.bald, concepts=(*diagnosis.causes,))
-
-    def _warnings(self, clouds: Clouds, diagnosis: Diagnosis | None) -> list[str]:
-        """List how the pair differs from the training data."""
-        warnings = list(self.model.familiar.warnings(clouds.source, clouds.target)) if self.model.familiar else []
-        if diagnosis is not None and diagnosis.unlikeness > 1:
-            warnings.append(
-                f"the pair is {diagnosis.unlikeness:.1f} times as far from the registrations that the diagnosis was "
-                "trained on as 99 % of these are from one another"
-            )
-        return warnings
 
     def _fits_inverted(self, clouds: Clouds, outcome: Outcome) -> bool:
         if outcome.fitness >= GOOD_FITNESS:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from html import escape
@@ -58,12 +57,12 @@ class PoseSpread:
         return self.diameter * math.sqrt(np.trace(self.covariance_6_6[3:, 3:]))
 
 
-class Page(ABC):
+class Page:
     """An explanation that can be shown as a page."""
 
-    @abstractmethod
     def html(self, names: Mapping[str, str] | None = None) -> str:
-        """Return the page."""
+        """Return the page; defined by the subclasses."""
+        raise NotImplementedError
 
     def save_html(self, path: str | Path, names: Mapping[str, str] | None = None) -> None:
         """Write :meth:`html` to a file."""
@@ -138,13 +137,7 @@ class Explanation(Page):
             "estimator": self.spread.estimator,
             "starts": self.spread.starts,
         }
-        return {name: value for name, value in vars(self).items() if name != "scene"} | {
-            "T_target_source": self.T_target_source.tolist(),
-            "diagnosis": self.diagnosis and self.diagnosis.as_dict(),
-            "spread": spread,
-            "notes": list(self.notes),
-            "warnings": list(self.warnings),
-        }
+        return _plain(self) | {"diagnosis": self.diagnosis and self.diagnosis.as_dict(), "spread": spread}
 
     def html(self, names: Mapping[str, str] | None = None) -> str:
         """Return a page that needs no other file: both clouds in 3-D, causes, poses, counterfactuals.
@@ -152,16 +145,15 @@ class Explanation(Page):
         Args:
             names: names of the files and the model, for the page's details.
         """
-        scene, reenacted = self.scene, self.diagnosis.reenacted if self.diagnosis else None
+        scene, explained = self.scene, self.as_dict()
         if scene is not None and self.unknown:
             scene = replace(scene, enact=None)  # hypotheses mean nothing where scores mean nothing
-        explained = self.as_dict()
-        possible = scene is not None and bool(scene.possibilities)
+        possible = scene is not None and self.diagnosis is not None and not self.unknown
         body = [
             page.action(explained, self.advice),
             *([] if self.unknown else [page.promise(explained), page.causes(explained)]),
-            page.poses(reenacted, "the object", self.unit, observation=True) if possible and reenacted else "",
-            page.counterfactuals(scene.errors(), scene.frame.diameter * scene.limit, self.unit) if scene else "",
+            page.poses(self.diagnosis.reenacted, "the object", self.unit, observation=True) if possible else "",
+            page.counterfactuals(scene, self.unit) if scene else "",
             "" if self.unknown else page.as_in_the_paper(explained),
             page.details(explained, {"training": self.learned_from} | dict(names or {})),
         ]
@@ -242,11 +234,7 @@ class ScanExplanation(Page):
 
     def as_dict(self) -> dict[str, object]:
         """Values for JSON."""
-        values = {name: value for name, value in vars(self).items() if name != "scene"}
-        lists = {name: list(values[name]) for name in ("overlap", "notes", "warnings")}
-        return (
-            values | lists | {"T_target_source": self.T_target_source.tolist(), "reenacted": self.reenacted.as_dict()}
-        )
+        return _plain(self) | {"overlap": list(self.overlap), "reenacted": self.reenacted.as_dict()}
 
     def text(self) -> str:
         """Return a report for a reader."""
@@ -272,12 +260,11 @@ class ScanExplanation(Page):
         doubt = f"Probability of failure {self.failure:.2f}, not calibrated: {self.learned_from}."
         scene, explained = self.scene, self.as_dict()
         inputs = {"training": self.learned_from, "voxels": page.length(self.voxel, self.unit)} | dict(names or {})
-        possible = scene is not None and bool(scene.possibilities)
         body = [
             page.action(explained, self.advice),
             page.section("Overlap", f"<p>{escape(self._overlap())}.</p>"),
-            page.poses(self.reenacted, "the source", self.unit) if possible else "",
-            page.counterfactuals(scene.errors(), self.limit, self.unit, SCANS_WITHOUT) if scene else "",
+            page.poses(self.reenacted, "the source", self.unit),
+            page.counterfactuals(scene, self.unit, SCANS_WITHOUT),
             page.details(explained, inputs),
         ]
         head = f'<h1 class="{tone}">{title}</h1><p>{escape(doubt)}</p>{page.warnings(self.warnings)}'
@@ -286,6 +273,12 @@ class ScanExplanation(Page):
     def _overlap(self) -> str:
         source, target = self.overlap
         return f"{source:.0%} of the source lies on the target, {target:.0%} of the target on the source"
+
+
+def _plain(explanation: Explanation | ScanExplanation) -> dict[str, object]:
+    values = {name: value for name, value in vars(explanation).items() if name != "scene"}
+    lists = {name: list(values[name]) for name in ("notes", "warnings")}
+    return values | lists | {"T_target_source": explanation.T_target_source.tolist()}
 
 
 def _warning_lines(warnings: tuple[str, ...]) -> list[str]:

@@ -101,7 +101,7 @@ def _draw_causes(panel, explanation: Explanation) -> None:
     deviations = [float(np.sqrt(variances[name])) for name in shares]
     colors = [CONCEPT_COLORS.get(name, LIGHT_GRAY) for name in shares]
     panel.barh(places, [*shares.values()], xerr=deviations, color=colors, height=0.6, error_kw={"elinewidth": 0.8})
-    effects = diagnosis.reenacted.effects if diagnosis and diagnosis.reenacted else {}
+    effects = diagnosis.reenacted.effects if diagnosis else {}
     labels = [f"{name}\n{effects[name]:+.2g} {explanation.unit}" if name in effects else name for name in shares]
     panel.set_yticks(places, labels)
     panel.set(xlim=(0, 1), xlabel="probability", title="causes, if it failed, and what each adds")
@@ -112,8 +112,7 @@ def _draw_what_ifs(panel, scene: Scene, unit: str) -> None:
     if not scene.possibilities:
         panel.set_axis_off()
         return
-    what_ifs = scene.possibilities[0].what_ifs
-    errors = [scene.frame.diameter * what_ifs[subset].error for subset in BY_SIZE]
+    errors = [scene.frame.diameter * scene.possibilities[0].errors[subset] for subset in BY_SIZE]
     places = np.arange(len(errors))
     panel.barh(places, errors, color=BLUE, height=0.6)
     panel.axvline(scene.limit * scene.frame.diameter, color=VERMILION, linewidth=0.8)

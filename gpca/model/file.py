@@ -17,7 +17,7 @@ from torch import nn
 from gpca.alignment.icp import ICPSettings
 from gpca.causes.descriptors import WIDTHS
 from gpca.causes.policy import NOTHING, QUEUE, RecoveryPolicy, Thresholds
-from gpca.causes.settings import DescriptorSettings, Moved
+from gpca.causes.settings import Moved
 from gpca.causes.truth import FAILED, NOMINAL
 from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
@@ -30,7 +30,7 @@ from gpca.explainers.classifiers import require_trees
 from gpca.explainers.pair_classifier import ABSENT, PRESENT
 from gpca.guarantee.guarantee import STATES, Guarantee
 from gpca.model.clouds import MEASURES, Familiarity
-from gpca.model.diagnoser import REENACTED, REMEDIED, Diagnoser
+from gpca.model.diagnoser import READS, Diagnoser
 from gpca.model.location import REMEDY, require_model
 from gpca.objects.canonical import FEWEST_CLOUD_POINTS
 from gpca.pairs.perturbation import CONCEPTS
@@ -40,11 +40,8 @@ from gpca.settings import read_settings
 from gpca.uncertainty.settings import FEWEST_STARTS, UncertaintySettings
 
 FORMAT, VERSION = "GP-CA model", 4
-WITHOUT_REENACTMENT = 3  # the version whose diagnosis reads registrations with remedies
-LARGEST_CARD_BYTES = 10**6
-DIAGNOSED = "diagnosis"  # marks the objects of the diagnosis in the card beside a model (``gpca ship``)
-_CARD_ROW = re.compile(rf"^\| (.+?) \| \d+ \| {DIAGNOSED} \|$", re.MULTILINE)
-
+FEATURE_COUNT = len(FEATURES) + sum(WIDTHS[group] for group in DESCRIBED)  # of a diagnoser
+ASYMMETRY = 1e-9  # of a covariance, whose prior is the identity
 # Upper bounds on the work of one explanation. A score is a mean over the draws of the classifier, so that a million
 # draws leave an error of at most 0.0005.
 MOST_DRAWS = 10**6
@@ -53,11 +50,6 @@ MOST_CLOUD_POINTS = 10**6
 MOST_ITERATIONS = 10**5  # of ICP
 MOST_RUNS = 10**4  # of ICP, for the features of a pair
 MOST_NEIGHBORS = 10**4  # and other counts among a backbone's options
-FEATURE_COUNTS = {  # by what a diagnoser reads
-    REENACTED: len(FEATURES) + sum(WIDTHS[group] for group in DESCRIBED),
-    REMEDIED: sum(WIDTHS.values()),
-}
-ASYMMETRY = 1e-9  # of a covariance, whose prior is the identity
 
 
 @dataclass(frozen=True)
@@ -65,7 +57,7 @@ class Model:
     """A diagnoser of registrations and the paper's GP-CA.
 
     Attributes:
-        diagnoser: reads the pair after ICP, trained on measured causes of all sources; None if there is GP-CA alone.
+        diagnoser: reads the pair after ICP, trained on measured causes of all sources.
         encoder: maps clouds (B, N, 3) to embeddings (B, d); in evaluation mode.
         encoder_settings: number of points per draw and of draws per embedding, among others.
         gpc: the classifier; its classes are the concepts.
@@ -73,11 +65,11 @@ class Model:
         cloud_points: maximum number of points of source and target.
         policy: maps causes to actions.
         title, stand_in: training objects of GP-CA, and whether the package generated them.
-        familiar: ranges of simple measures over GP-CA's training clouds; None in older files.
+        familiar: ranges of simple measures over GP-CA's training clouds.
         learned_from: titles of the training objects of the diagnosis; empty if unknown.
     """
 
-    diagnoser: Diagnoser | None
+    diagnoser: Diagnoser
     encoder: nn.Module
     encoder_settings: EncoderSettings
     gpc: GPC
@@ -86,33 +78,25 @@ class Model:
     policy: RecoveryPolicy
     title: str
     stand_in: bool
-    familiar: Familiarity | None = None
+    familiar: Familiarity
     learned_from: tuple[str, ...] = ()
-
-    @property
-    def concepts(self) -> tuple[str, ...]:
-        """Names of the causes, in the order of the scores."""
-        return self.gpc.classes
 
     @property
     def learning(self) -> str:
         """The training data, in words."""
         paper = f"{self.title} (procedural stand-in)" if self.stand_in else self.title
-        if self.diagnoser is None:
-            return f"GP-CA as in the paper learned from {paper}; there is no diagnosis"
         objects = ", ".join(self.learned_from) or "objects that the model file does not name"
         return f"the diagnosis learned from {objects}; GP-CA as in the paper from {paper}"
 
     def save(self, path: str | Path) -> None:
         """Write the file; equal models give equal bytes."""
+        settings = {name: value for name, value in asdict(self.encoder_settings).items() if value is not None}
         content = {
             "format": FORMAT,
             "version": VERSION,
-            "diagnoser": self.diagnoser and self.diagnoser.state(),
+            "diagnoser": self.diagnoser.state(),
             "encoder": self.encoder.state_dict(),
-            "encoder_settings": _renamed(
-                {k: v for k, v in asdict(self.encoder_settings).items() if v is not None}, "draw_points", "points"
-            ),
+            "encoder_settings": {"points" if key == "draw_points" else key: value for key, value in settings.items()},
             "gpc": self.gpc.state(),
             "icp": asdict(self.icp),
             "points": self.cloud_points,
@@ -120,9 +104,8 @@ class Model:
             "treatments": dict(self.policy.treatments),
             "title": self.title,
             "stand_in": self.stand_in,
+            "familiar": {name: list(ends) for name, ends in self.familiar.ranges.items()},
         }
-        if self.familiar is not None:
-            content["familiar"] = {name: list(ends) for name, ends in self.familiar.ranges.items()}
         if self.learned_from:
             content["learned_from"] = list(self.learned_from)
         write_tensors(path, content)
@@ -137,63 +120,47 @@ class Model:
         require_model(path)
         try:
             content = read_tensors(path)
-        except ValueError as fault:
-            raise InputError(path, f"is damaged or not a model ({fault})", REMEDY) from fault
         except Exception as fault:  # torch raises errors of many kinds for a damaged or foreign file
-            raise InputError(path, "is damaged or not a model", REMEDY) from fault
+            why = f" ({fault})" if isinstance(fault, ValueError) else ""
+            raise InputError(path, f"is damaged or not a model{why}", REMEDY) from fault
         if not isinstance(content, Mapping) or content.get("format") != FORMAT:
             raise InputError(path, "is not a model", REMEDY)
-        if (version := content.get("version")) not in (WITHOUT_REENACTMENT, VERSION):
+        if (version := content.get("version")) != VERSION:
             raise InputError(path, f"is a model of version {version}, not {VERSION}", REMEDY)
         try:
-            settings = EncoderSettings(**_renamed(content["encoder_settings"], "points", "draw_points"))
-            require_possible(content, settings)
-            familiar = content.get("familiar")
+            encoder_settings = dict(content["encoder_settings"])
+            settings = EncoderSettings(draw_points=encoder_settings.pop("points"), **encoder_settings)
+            _require_possible(content, settings)
             encoder = make_encoder(settings.backbone, settings.options)
             encoder.load_state_dict(content["encoder"])
             return cls(
-                diagnoser=content["diagnoser"] and Diagnoser.from_state(content["diagnoser"]),
+                diagnoser=Diagnoser.from_state(content["diagnoser"]),
                 encoder=encoder.eval(),
                 encoder_settings=settings,
                 gpc=GPC.from_state(content["gpc"]),
                 icp=ICPSettings(**content["icp"]),
-                policy=RecoveryPolicy(Thresholds(**content["thresholds"]), dict(content["treatments"])),
                 cloud_points=content["points"],
-                familiar=familiar and Familiarity({name: (low, high) for name, (low, high) in familiar.items()}),
-                learned_from=tuple(content.get("learned_from", ())) or _titles_in_card(Path(path)),
-                **{name: content[name] for name in ("title", "stand_in")},
+                policy=RecoveryPolicy(Thresholds(**content["thresholds"]), dict(content["treatments"])),
+                title=content["title"],
+                stand_in=content["stand_in"],
+                familiar=Familiarity({name: (low, high) for name, (low, high) in content["familiar"].items()}),
+                learned_from=tuple(content.get("learned_from", ())),
             )
         except (LookupError, TypeError, ValueError, RuntimeError, AttributeError) as fault:
             raise InputError(path, f"is a model with missing or damaged parts ({fault})", REMEDY) from fault
 
 
-def _renamed(settings: Mapping, old: str, new: str) -> dict:
-    """Rename a setting without changing the order: files of this version call `draw_points` ``points``."""
-    return {new if name == old else name: value for name, value in settings.items()}
-
-
-def _titles_in_card(model: Path) -> tuple[str, ...]:
-    """Return the training objects of the diagnosis by the card beside a model; older model files do not list them."""
-    card = model.with_suffix(".md")
-    if not card.is_file() or card.stat().st_size > LARGEST_CARD_BYTES:
-        return ()
-    return tuple(_CARD_ROW.findall(card.read_text(encoding="utf-8", errors="replace")))
-
-
-def require_possible(content: Mapping, settings: EncoderSettings) -> None:
+def _require_possible(content: Mapping, settings: EncoderSettings) -> None:
     """Raise a ValueError that names any impossible content of a model file with these encoder settings."""
     read_settings(EncoderSettings, vars(settings))
     read_settings(GPCSettings, content["gpc"]["settings"])
     read_settings(ICPSettings, content["icp"])
-    if "familiar" in content:
-        ranges = content["familiar"]
-        if set(ranges) != set(MEASURES):
-            raise ValueError(f"ranges of {', '.join(map(repr, ranges))}, not {', '.join(MEASURES)}")
-        for name, (low, high) in ranges.items():
-            if not (type(low) is type(high) is float and 0 <= low <= high):
-                raise ValueError(f"range of {name}: {low!r} to {high!r} is not a range")
-    if content["diagnoser"] is not None:
-        _require_diagnoser(content["diagnoser"])
+    if set(ranges := content["familiar"]) != set(MEASURES):
+        raise ValueError(f"ranges of {', '.join(map(repr, ranges))}, not {', '.join(MEASURES)}")
+    for name, (low, high) in ranges.items():
+        if not (type(low) is type(high) is float and 0 <= low <= high):
+            raise ValueError(f"range of {name}: {low!r} to {high!r} is not a range")
+    _require_diagnoser(content["diagnoser"])
     counts = {
         "draws of the classifier": (content["gpc"]["settings"]["draws"], 2, MOST_DRAWS),
         "points": (content["points"], FEWEST_CLOUD_POINTS, MOST_CLOUD_POINTS),
@@ -210,7 +177,14 @@ def require_possible(content: Mapping, settings: EncoderSettings) -> None:
     titles = content.get("learned_from", [])
     if not isinstance(titles, list) or not all(isinstance(title, str) and title.isprintable() for title in titles):
         raise ValueError("learned_from is not a list of lines of text")
-    _require_treatments(content["treatments"])
+    if set(treatments := content["treatments"]) != set(CONCEPTS):
+        raise ValueError(f"treatments: of {str([*treatments])[:80]}, not of {', '.join(CONCEPTS)}")
+    for action in treatments.values():  # of any robot: other actions than the paper's are allowed
+        is_name = isinstance(action, str) and re.fullmatch(r"[a-z][a-z0-9_]{0,39}", action)
+        if not is_name or action in (NOTHING, QUEUE):
+            raise ValueError(f"treatments: {str(action)[:40]!r} is no name of an action")
+    if len(set(treatments.values())) < len(treatments):
+        raise ValueError("treatments: one action treats two concepts")
     if type(content["stand_in"]) is not bool:
         raise ValueError("stand_in is neither true nor false")
     with torch.device("meta"):  # the options may ask for more than the memory
@@ -225,66 +199,43 @@ def _require_counts(counts: Mapping[str, tuple[object, int, int]]) -> None:
             raise ValueError(f"{name}: {count!r} is not a number from {least} to {most}")
 
 
-def _require_treatments(treatments: Mapping) -> None:
-    if set(treatments) != set(CONCEPTS):
-        raise ValueError(f"treatments: of {str([*treatments])[:80]}, not of {', '.join(CONCEPTS)}")
-    for action in treatments.values():  # of any robot: other actions than the paper's are allowed
-        if (
-            not isinstance(action, str)
-            or not re.fullmatch(r"[a-z][a-z0-9_]{0,39}", action)
-            or action in (NOTHING, QUEUE)
-        ):
-            raise ValueError(f"treatments: {str(action)[:40]!r} is no name of an action")
-    if len(set(treatments.values())) < len(treatments):
-        raise ValueError("treatments: one action treats two concepts")
-
-
 def _require_diagnoser(state: Mapping) -> None:
     read_settings(UncertaintySettings, state["runs"])
     read_settings(ICPSettings, state["icp"])
-    classifier, reads = state["classifier"], state.get("reads", REMEDIED)
+    settings = read_settings(ReenactmentSettings, state["reenactment"])
+    for name, allowed in (("reads", (READS,)), ("moved", get_args(Moved))):
+        if state[name] not in allowed:
+            raise ValueError(f"{name}: {str(state[name])[:40]!r} is not one of {', '.join(allowed)}")
+    classifier, starts = state["classifier"], state["runs"]["starts"]
     counts = {
         "points of a description": (state["points"], FEWEST_CLOUD_POINTS, MOST_CLOUD_POINTS),
-        "starts": (state["runs"]["starts"], FEWEST_STARTS, MOST_RUNS),
+        "starts": (starts, FEWEST_STARTS, MOST_RUNS),
         "iterations of ICP": (state["icp"]["max_iterations"], 1, MOST_ITERATIONS),
         "classifiers of causes": (len(classifier["causes"]), len(CONCEPTS), len(CONCEPTS)),
+        "re-enactments": (settings.calls(starts), 1, MOST_RUNS),
     }
-    if reads == REENACTED:
-        settings = read_settings(ReenactmentSettings, state["reenactment"])
-        if state["moved"] not in get_args(Moved):
-            raise ValueError(f"moved: {str(state['moved'])[:40]!r} is not one of {', '.join(get_args(Moved))}")
-        counts["re-enactments"] = (settings.calls(state["runs"]["starts"]), 1, MOST_RUNS)
-    else:
-        remedies = read_settings(DescriptorSettings, state["descriptors"])
-        counts |= {
-            "starts with remedies": (remedies.starts, 1, MOST_RUNS),
-            "restarts": (remedies.restarts, 1, MOST_RUNS),
-        }
     _require_counts(counts)
-    features = FEATURE_COUNTS[reads]
     quantiles, weights, threshold = classifier["quantiles"], state["error_weights"], state["threshold"]
-    if quantiles.ndim != 2 or len(quantiles) < 2 or quantiles.shape[1] != features:
-        raise ValueError(f"'quantiles' has shape {tuple(quantiles.shape)}, not {features} descriptors")
+    if quantiles.ndim != 2 or len(quantiles) < 2 or quantiles.shape[1] != FEATURE_COUNT:
+        raise ValueError(f"'quantiles' has shape {tuple(quantiles.shape)}, not {FEATURE_COUNT} descriptors")
     if (quantiles.diff(dim=0) < 0).any():
         raise ValueError("'quantiles' decrease")
-    if tuple(weights.shape) != (features + 1,):
-        raise ValueError(f"'error_weights' has shape {tuple(weights.shape)}, not {(features + 1,)}")
+    if tuple(weights.shape) != (FEATURE_COUNT + 1,):
+        raise ValueError(f"'error_weights' has shape {tuple(weights.shape)}, not {(FEATURE_COUNT + 1,)}")
     if type(threshold) is not float or not 0 <= threshold <= 2:
         raise ValueError(f"threshold: {threshold!r} is not a probability")
     causes = [(cause, (ABSENT, PRESENT)) for cause in classifier["causes"]]
     for gpc, classes in [(classifier["failure"], (NOMINAL, FAILED)), *causes]:
         _require_counts({"draws of a classifier": (gpc["settings"]["draws"], 2, MOST_DRAWS)})
         read_settings(GPCSettings, gpc["settings"])
-        _require_classifier(gpc, classes, features)
-    if trees := classifier.get("trees"):
-        _require_counts({"questions of trees": (len(trees), 1 + len(CONCEPTS), 1 + len(CONCEPTS))})
-        for question in trees:
-            require_trees(question, features)
-    if state.get("guarantee") is not None:
-        sets = Guarantee.from_dict(state["guarantee"]).state_sets
-        if sets.states != STATES or not 0 < sets.level < 1 or sets.nonconformity not in get_args(Nonconformity):
-            raise ValueError("its guarantee is of different states, or of none")
-    for name, value in state.get("held_out", {}).items():
+        _require_classifier(gpc, classes, FEATURE_COUNT)
+    _require_counts({"questions of trees": (len(classifier["trees"]), 1 + len(CONCEPTS), 1 + len(CONCEPTS))})
+    for question in classifier["trees"]:
+        require_trees(question, FEATURE_COUNT)
+    sets = Guarantee.from_dict(state["guarantee"]).state_sets
+    if sets.states != STATES or not 0 < sets.level < 1 or sets.nonconformity not in get_args(Nonconformity):
+        raise ValueError("its guarantee is of different states, or of none")
+    for name, value in state["held_out"].items():
         if type(name) is not str or not name.isidentifier() or type(value) is not float or not 0 <= value < MOST_DRAWS:
             raise ValueError(f"held_out: {str(name)[:40]!r} is not the name of a measure with a value")
 
@@ -292,17 +243,9 @@ def _require_diagnoser(state: Mapping) -> None:
 def _require_classifier(state: Mapping, classes: tuple[str, ...], d: int) -> None:
     if tuple(state["classes"]) != classes:  # their order is that of the scores
         raise ValueError(f"its classes are {str(state['classes'])[:80]}, not {', '.join(classes)}")
-    n_classes = len(classes)
-    m, n = len(state["inducing"]), len(state["labelled"])
-    shapes = {
-        "scaler_mean": (d,),
-        "scaler_scale": (d,),
-        "inducing": (m, d),
-        "mean": (n_classes, m),
-        "covariance": (n_classes, m, m),
-        "labelled": (n, d),
-        "targets": (n,),
-    }
+    n_classes, m, n = len(classes), len(state["inducing"]), len(state["labelled"])
+    shapes = {"scaler_mean": (d,), "scaler_scale": (d,), "inducing": (m, d), "labelled": (n, d), "targets": (n,)}
+    shapes |= {"mean": (n_classes, m), "covariance": (n_classes, m, m)}
     for name, shape in shapes.items():
         if tuple(state[name].shape) != shape:
             raise ValueError(f"'{name}' has shape {tuple(state[name].shape)}, not {shape}")

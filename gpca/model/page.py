@@ -1,12 +1,15 @@
-"""The HTML page of an explanation: one file that needs no other and no network; text from users is escaped."""
+"""The HTML page of an explanation: one file that needs no other and no network; text from users is escaped.
+
+In all functions, `explained` is :meth:`gpca.model.explanation.Explanation.as_dict`.
+"""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from functools import cache
 from html import escape
 from math import sqrt
+from string import Template
 
 from gpca.causes.policy import NOTHING
 from gpca.causes.truth import BY_SIZE
@@ -15,8 +18,6 @@ from gpca.guarantee.guarantee import STATES
 from gpca.model.diagnosis import IN_WORDS, UNKNOWN, Reenacted
 from gpca.model.scene import ASSETS, WITHOUT, Scene, taken_out
 
-# This policy makes browsers refuse every network request of the page.
-ALONE = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:"
 FRAME_HEIGHT = 900  # of a notebook's frame, pixels
 SHOW = 'openView().load(JSON.parse(document.getElementById("scene").textContent));\n'
 CALLS = {GOOD: "good", ALARM: "bad"}  # CSS class of a call; others are "doubt"
@@ -24,42 +25,20 @@ TONES = {"nominal": "good", "failed": "bad", UNKNOWN: "doubt"}
 
 
 def assembled(title: str, head: str, body: Sequence[str], scene: Scene | None, unit: str) -> str:
-    """Return the page.
-
-    Args:
-        head: HTML at the top.
-        body: the sections.
-        scene: data of the 3-D view; None leaves it out.
-    """
-    view, script = "", ""
+    """Return the page of these sections, with a 3-D view if there is a scene."""
+    text = {path.name: path.read_text(encoding="utf-8") for path in ASSETS.iterdir()}
+    view = script = ""
     if scene is not None:
-        data = scene.packed(unit)
-        view = f"{_view(len(scene.possibilities))}\n"
-        text = json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")
-        script = f'<script type="application/json" id="scene">{text}</script>\n'
-        script += f"<script>\n{_asset('view.js')}{SHOW}</script>\n"
-    return f"""<!doctype html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<meta http-equiv="Content-Security-Policy" content="{ALONE}">
-<title>{escape(title)}</title>
-<link rel="icon" href="data:,">
-<style>
-{_asset("page.css")}</style>
-</head>
-<body>
-<header>
-{head}
-</header>
-<main>
-{view}<div class="facts">
-{"".join(body)}</div>
-</main>
-{script}</body>
-</html>
-"""
+        buttons = (
+            f'<button type="button" data-view="pose:{k}" aria-pressed="false">Pose {k + 1}</button>'
+            for k in range(len(scene.possibilities))
+        )
+        view = Template(text["view.html"]).substitute(poses="".join(buttons))
+        data = json.dumps(scene.packed(unit), separators=(",", ":")).replace("<", "\\u003c")
+        script = f'<script type="application/json" id="scene">{data}</script>\n'
+        script += f"<script>\n{text['view.js']}{SHOW}</script>\n"
+    parts = {"title": escape(title), "style": text["page.css"], "head": head, "body": "".join(body)}
+    return Template(text["page.html"]).substitute(parts, view=view, script=script)
 
 
 def framed(html: str) -> str:
@@ -68,49 +47,19 @@ def framed(html: str) -> str:
     return f'<iframe srcdoc="{escape(html)}" style="{style}" title="Registration explained"></iframe>'
 
 
-def _view(poses: int) -> str:
-    others = "".join(
-        f'<button type="button" data-view="pose:{k}" aria-pressed="false">Pose {k + 1}</button>' for k in range(poses)
-    )
-    return f"""<div class="view">
-<div class="buttons" role="group" aria-label="Pose of the source">
-<button type="button" data-view="start" aria-pressed="false">Before</button>
-<button type="button" data-view="found" aria-pressed="true">After</button>{others}
-</div>
-<canvas id="view" tabindex="0" role="img" aria-label="Both clouds in 3-D; arrow keys turn them"></canvas>
-<div class="buttons">
-<label><input type="checkbox" id="show-source" checked> <span class="key source"></span>source</label>
-<label><input type="checkbox" id="show-target" checked> <span class="key target"></span>target</label>
-<label><input type="checkbox" id="by-distance" checked> distances</label>
-<button type="button" id="reset">Reset view</button>
-</div>
-<div id="scale" class="scale"><span>0</span><i></i><span></span></div>
-<p id="said" class="note" aria-live="polite"></p>
-<noscript><p class="warnings">The view needs JavaScript.</p></noscript>
-</div>"""
-
-
-@cache
-def _asset(name: str) -> str:
-    return (ASSETS / name).read_text(encoding="utf-8")
-
-
 def headline(explained: Mapping) -> str:
-    """State the result in one line.
-
-    Args:
-        explained: :meth:`gpca.model.explanation.Explanation.as_dict`, here and below.
-    """
+    """State the result in one line."""
     diagnosis = explained["diagnosis"]
     if diagnosis is None:
         return f"<h1>The leading concept is {escape(explained['concept'])}</h1>"
+    state = diagnosis["state"]
     title = {
         "nominal": "This registration succeeded",
         "failed": f"This registration failed: {' and '.join(diagnosis['named'])}",
         UNKNOWN: "The state of this registration is unknown",
-    }[diagnosis["state"]]
-    line = f'<h1 class="{TONES[diagnosis["state"]]}">{escape(title)}</h1>'
-    if diagnosis["state"] == UNKNOWN:
+    }[state]
+    line = f'<h1 class="{TONES[state]}">{escape(title)}</h1>'
+    if state == UNKNOWN:
         return line
     chance = f"Probability of failure {diagnosis['failure']:.2f}; called a failure from {diagnosis['threshold']:.2f} on"
     return f"{line}<p>{chance}. Expected error {length(diagnosis['expected_error'], explained['unit'])}.</p>"
@@ -122,14 +71,12 @@ def warnings(lines: Sequence[str]) -> str:
 
 
 def action(explained: Mapping, advice: str) -> str:
-    do = "nothing" if explained["action"] == NOTHING else advice
-    why = f"<p>Reason: {escape(explained['reason'])}.</p>"
-    return section("What to do", f'<p class="action">{sentence(do)}</p>{why}')
+    do = sentence("nothing" if explained["action"] == NOTHING else advice)
+    return section("What to do", f'<p class="action">{do}</p><p>Reason: {escape(explained["reason"])}.</p>')
 
 
 def promise(explained: Mapping) -> str:
-    diagnosis = explained["diagnosis"]
-    if diagnosis is None or diagnosis["state"] == UNKNOWN:
+    if (diagnosis := explained["diagnosis"]) is None:
         return ""
     if (guarantee := diagnosis["guarantee"]) is None:
         return section("What is guaranteed", "<p>Nothing: a fast explanation, or a model without a guarantee.</p>")
@@ -158,17 +105,18 @@ def promise(explained: Mapping) -> str:
 
 
 def causes(explained: Mapping) -> str:
-    diagnosis, unit = explained["diagnosis"], explained["unit"]
-    if diagnosis is None:
+    if (diagnosis := explained["diagnosis"]) is None:
         return ""
-    effects = diagnosis["reenacted"]["effects"] if diagnosis["reenacted"] else {}
-    bars = [
-        bar(cause, share, sqrt(diagnosis["variances"][cause]), length(effects[cause], unit) if effects else "")
+    effects = diagnosis["reenacted"]["effects"]
+    bars = (
+        bar(cause, share, diagnosis["variances"][cause], length(effects[cause], explained["unit"]))
         for cause, share in diagnosis["causes"].items()
-    ]
-    note = "Probability that each is a cause, if the registration failed, ± the standard deviation of the posterior"
-    adds = "; on the right, what it adds to the re-enacted error." if effects else "."
-    return section("Causes", "".join(bars) + f'<p class="note">{note}{adds}</p>')
+    )
+    note = (
+        "Probability that each is a cause, if the registration failed, ± the standard deviation of the posterior; "
+        "on the right, what it adds to the re-enacted error."
+    )
+    return section("Causes", f'{"".join(bars)}<p class="note">{note}</p>')
 
 
 def poses(reenacted: Reenacted, subject: str, unit: str, *, observation: bool = False) -> str:
@@ -178,32 +126,29 @@ def poses(reenacted: Reenacted, subject: str, unit: str, *, observation: bool = 
         subject: what fits, such as ``the object``.
         observation: whether to state noise, outliers and missing surface under the most probable one.
     """
-    items = [
+    items = "".join(
         f'<li><button type="button" data-view="pose:{k}">Pose {k + 1}</button> <span>{sentence(words)}</span>'
         f'<span class="share"><span class="bar"><i style="width:{100 * pose.probability:.1f}%"></i></span>'
         f"<span>{pose.probability:.2f}</span></span></li>"
         for k, (words, pose) in enumerate(zip(reenacted.words(subject, unit), reenacted.poses, strict=True))
-    ]
+    )
     note = (
         f'<p class="note">Under pose 1, the noise is {escape(length(reenacted.noise, unit))} per axis, '
         f"{reenacted.outliers:.0%} of the points are outliers, and {reenacted.missing:.0%} of the surface was not "
         "seen.</p>"
     )
-    return section("Poses that fit", f'<ol class="poses">{"".join(items)}</ol>{note if observation else ""}')
+    return section("Poses that fit", f'<ol class="poses">{items}</ol>{note if observation else ""}')
 
 
-def counterfactuals(
-    errors: Sequence[Sequence[float]], limit: float, unit: str, without: Mapping[str, str] = WITHOUT
-) -> str:
+def counterfactuals(scene: Scene, unit: str, without: Mapping[str, str] = WITHOUT) -> str:
     """Draw the eight re-enacted registrations under each hypothesis, each as a button that shows its cloud.
 
-    Args:
-        errors: v̂ of each hypothesis and subset, in `unit`.
-        limit: error above which a registration counts as failed, in `unit`.
-        without: what removing each cause means.
+    `without` says what removing each cause means.
     """
-    if not errors:
+    if not scene.possibilities:
         return ""
+    errors = [[scene.frame.diameter * error for error in pose.errors] for pose in scene.possibilities]
+    limit = scene.frame.diameter * scene.limit
     most = max(max(map(max, errors)), 1.2 * limit)
     groups = []
     for k, error_8 in enumerate(errors):
@@ -225,36 +170,31 @@ def counterfactuals(
 
 
 def as_in_the_paper(explained: Mapping) -> str:
-    if not explained["scores"]:
-        return ""
-    bars = (bar(name, score, sqrt(explained["variances"][name]), "") for name, score in explained["scores"].items())
+    bars = (bar(name, score, explained["variances"][name], "") for name, score in explained["scores"].items())
     note = "It sees the aligned source alone and names a concept even where nothing is wrong."
     return section("GP-CA as in the paper", f'{"".join(bars)}<p class="note">{note}</p>')
 
 
 def details(explained: Mapping, names: Mapping[str, str]) -> str:
-    unit = explained["unit"]
-    rows = {
-        **{name.capitalize(): value for name, value in names.items() if value},
-        "Registration": f"{explained['method']}, fitness {explained['fitness']:.3f}, inlier RMSE "
-        f"{length(explained['inlier_rmse'], unit)}",
-        "Unit": unit,
+    rmse = length(explained["inlier_rmse"], explained["unit"])
+    rows = {name.capitalize(): value for name, value in names.items() if value} | {
+        "Registration": f"{explained['method']}, fitness {explained['fitness']:.3f}, inlier RMSE {rmse}",
+        "Unit": explained["unit"],
     }
     listed = "".join(f"<dt>{escape(name)}</dt><dd>{escape(str(value))}</dd>" for name, value in rows.items())
     matrix = "\n".join(" ".join(f"{number:12.6g}" for number in row) for row in explained["T_target_source"])
     notes = "".join(f"<li>{escape(note)}</li>" for note in explained["notes"])
-    return section(
-        "Details",
-        f"<dl>{listed}</dl><p>T_target_source</p><pre>{matrix}</pre>" + (f"<ul>{notes}</ul>" if notes else ""),
-    )
+    body = f"<dl>{listed}</dl><p>T_target_source</p><pre>{matrix}</pre>" + (f"<ul>{notes}</ul>" if notes else "")
+    return section("Details", body)
 
 
 def section(title: str, body: str) -> str:
     return f"<section><h2>{escape(title)}</h2>{body}</section>\n"
 
 
-def bar(name: str, share: float, spread: float, note: str) -> str:
+def bar(name: str, share: float, variance: float, note: str) -> str:
     """Draw a probability as a bar with a whisker of one standard deviation."""
+    spread = sqrt(variance)
     low, high = max(0.0, share - spread), min(1.0, share + spread)
     return (
         f'<div class="row"><span>{escape(name)}</span><span class="bar"><i style="width:{100 * share:.1f}%"></i>'

@@ -27,33 +27,20 @@ WITHOUT = {"noise": "clean points", "pose": "right start", "overlap": "whole sur
 
 
 @dataclass(frozen=True)
-class WhatIf:
-    """One of the eight re-enacted registrations under a hypothesis, in the target's frame and in its diameters.
-
-    Attributes:
-        causes: the causes that were left in.
-        error: v̂, the mean over the starts.
-        points: (P, 3) the source after one registration, run from the unperturbed start.
-    """
-
-    causes: tuple[str, ...]
-    error: float
-    points: np.ndarray
-
-
-@dataclass(frozen=True)
 class Possibility:
-    """A hypothesis of the true pose.
+    """A hypothesis of the true pose, with its re-enacted registrations in the target's frame and in its diameters.
 
     Attributes:
         probability: among all hypotheses.
         T: (4, 4) maps the source at its initial pose to the hypothesis.
-        what_ifs: one per subset of the causes, in the order of :data:`gpca.causes.truth.SUBSETS`.
+        errors: v̂, the mean over the starts, for each subset of the causes that is left in.
+        clouds: (P, 3) the source after one registration from the unperturbed start, for each subset.
     """
 
     probability: float
     T: np.ndarray
-    what_ifs: tuple[WhatIf, ...]
+    errors: tuple[float, ...]
+    clouds: tuple[np.ndarray, ...]
 
 
 @dataclass(frozen=True)
@@ -92,36 +79,31 @@ class Scene:
         enactments, truth = self.enact()
         weight_k = weights_of(enactment.hypothesis for enactment in enactments)
         return tuple(
-            Possibility(float(weight), enactment.hypothesis.T, _what_ifs(enactment, truth))
+            Possibility(float(weight), enactment.hypothesis.T, tuple(enactment.error_8), _clouds(enactment, truth))
             for enactment, weight in zip(enactments, weight_k, strict=True)
         )
-
-    def errors(self) -> list[list[float]]:
-        """Re-enacted error v̂ of each hypothesis and subset of the causes, in the user's unit."""
-        return [[self.frame.diameter * each.error for each in pose.what_ifs] for pose in self.possibilities]
 
     def packed(self, unit: str) -> dict[str, object]:
         """JSON values for the page's script, see :func:`packed_pair`."""
         pair = packed_pair(self.target, self.source, self.T_found, self.reach, self.frame.diameter, unit)
         poses = [
-            {"T": flat(pose.T), "what_ifs": [packed(pose.what_ifs[subset].points) for subset in BY_SIZE]}
+            {"T": flat(pose.T), "what_ifs": [packed(pose.clouds[subset]) for subset in BY_SIZE]}
             for pose in self.possibilities
         ]
         return pair | {"poses": poses}
 
 
-def _what_ifs(enactment: Enactment, truth: CauseSettings) -> tuple[WhatIf, ...]:
+def _clouds(enactment: Enactment, truth: CauseSettings) -> tuple[np.ndarray, ...]:
     candidate, registrar = enactment.candidate, Registrar(enactment.candidate, truth, misses=True)
-    what_ifs = []
-    for subset, causes in enumerate(SUBSETS):
+    clouds = []
+    for causes in SUBSETS:
         applied = tuple(cause for cause in causes if candidate.applied[cause])
         try:
             T = registrar.run(applied, np.zeros((1, 6))).T_target_source_n[0]
         except Unmeasurable:
             T = candidate.start(applied)
-        names = tuple(CONCEPTS[cause] for cause in causes)
-        what_ifs.append(WhatIf(names, float(enactment.error_8[subset]), transform(T, candidate.observed(applied))))
-    return tuple(what_ifs)
+        clouds.append(transform(T, candidate.observed(applied)))
+    return tuple(clouds)
 
 
 def packed_pair(
@@ -137,12 +119,12 @@ def packed_pair(
         reach: distance from which on all points get the same color.
     """
     radii = [np.linalg.norm(points, axis=1) for points in (target, source, transform(T_found, source))]
+    radius = max(float(np.quantile(radius, 0.98)) for radius in radii)  # a few far points are ignored
     return {
         "unit": unit,
         "diameter": diameter,
         "reach": reach,
-        # A few far points are ignored.
-        "radius": float(np.clip(max(float(np.quantile(radius, 0.98)) for radius in radii), 0.5, FARTHEST)),
+        "radius": float(np.clip(radius, 0.5, FARTHEST)),
         "target": packed(target),
         "source": packed(source),
         "found": flat(T_found),

@@ -7,16 +7,13 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from gpca.alignment.rigid import exp, transform
-from gpca.causes.descriptors import WIDTHS
+from gpca.alignment.rigid import exp
 from gpca.causes.settings import CauseSettings
 from gpca.causes.truth import ALL
 from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
 from gpca.explainers.pair_classifier import Judgment, PairClassifier
 from gpca.model.diagnoser import (
-    REENACTED,
-    REMEDIED,
     Diagnoser,
     TrainingSet,
     fit_error,
@@ -24,8 +21,8 @@ from gpca.model.diagnoser import (
     learn,
     threshold_of,
 )
-from gpca.model.diagnosis import Diagnosis, state_probabilities
-from gpca.model.file import FEATURE_COUNTS
+from gpca.model.diagnosis import Diagnosis, Reenacted, state_probabilities
+from gpca.model.file import FEATURE_COUNT
 from gpca.reenactment.dataset import FEATURES, Reenactments, reenactment_features
 from gpca.reenactment.settings import ReenactmentSettings
 
@@ -38,20 +35,9 @@ def cloud():
     return points * np.array([0.5, 0.3, 0.2]) / np.sqrt(np.square(points).sum(axis=1, keepdims=True))
 
 
-def test_descriptors_do_not_depend_on_where_icp_was_started_but_for_the_motion(diagnoser, cloud):
-    older = replace(diagnoser, points=1024, reads=REMEDIED)
-    here, _ = older.measured(cloud, cloud[::2], np.eye(4))
-    assert here.shape == (sum(WIDTHS.values()),)
-    moved, _ = older.measured(transform(np.linalg.inv(SMALL_MOTION), cloud), cloud[::2], SMALL_MOTION)
-    distances = WIDTHS["distances"]
-    np.testing.assert_allclose(moved[:distances], here[:distances], atol=5e-3)
-    rotation = distances + WIDTHS["planes"]
-    assert moved[rotation] - here[rotation] == pytest.approx(np.sqrt(0.05**2 + 0.02**2 + 0.03**2), abs=0.01)
-
-
 def test_what_is_read_is_what_the_reenactment_says(diagnoser, cloud):
     features, said = diagnoser.measured(cloud, cloud[::2], np.eye(4))
-    assert features.shape == (FEATURE_COUNTS[REENACTED],)
+    assert features.shape == (FEATURE_COUNT,)
     assert said.error == pytest.approx(np.exp(features[FEATURES.index("mean_error_7")]))
     assert said.noise == features[FEATURES.index("first_noise")]
     assert said.poses[0].probability == features[FEATURES.index("first_weight")]
@@ -77,19 +63,9 @@ def test_a_quick_diagnosis_reenacts_less_and_promises_nothing(diagnoser, cloud):
     assert 1 <= len(said.reenacted.poses) <= 2
 
 
-def test_one_of_a_model_from_before_version_4_reads_what_it_learned(diagnoser, cloud):
-    state = {**diagnoser.state(), "descriptors": {"starts": 1, "restarts": 2, "icp_points": 64}}
-    for name in ("reads", "moved", "reenactment", "guarantee", "held_out"):
-        del state[name]
-    older = Diagnoser.from_state(state)
-    features, said = older.measured(cloud, cloud[::2], np.eye(4))
-    assert features.shape == (sum(WIDTHS.values()),)
-    assert said is None
-    assert older.guarantee is None
-
-
+NOTHING = Reenacted(0.1, {}, 0.0, 0.0, 0.0, poses=())
 CAUSES = {"noise": 0.2, "pose": 0.9, "overlap": 0.6}
-FAILED = Diagnosis(0.7, 0.5, CAUSES, dict.fromkeys(CAUSES, 0.0), bald=0.0, expected_error=0.1)
+FAILED = Diagnosis(0.7, 0.5, CAUSES, CAUSES, 0.0, 0.1, unlikeness=0.0, void=False, guarantee=None, reenacted=NOTHING)
 
 
 def test_below_the_threshold_nothing_is_named_and_above_it_what_is_likely_and_at_least_one():
@@ -103,7 +79,7 @@ def test_below_the_threshold_nothing_is_named_and_above_it_what_is_likely_and_at
 
 
 SETTINGS = GPCSettings(learning_rate=0.1, iterations=40, inducing=8, draws=200)
-WIDTH = FEATURE_COUNTS[REENACTED]
+WIDTH = FEATURE_COUNT
 
 
 def training_set(n, seed, shift=3.0):
@@ -172,7 +148,7 @@ def test_failures_are_told_from_what_is_fine_and_the_uncertainty_is_of_unseen_fa
     assert alarm_N[new.label_N != "nominal"].all()
     assert alarm_N[new.label_N == "nominal"].mean() <= 0.2
     assert diagnoser.runs.starts == CauseSettings().starts
-    assert (diagnoser.moved, diagnoser.points, diagnoser.reads) == ("observed", 512, REENACTED)
+    assert (diagnoser.moved, diagnoser.points) == ("observed", 512)
 
 
 def test_what_is_promised_and_measured_is_of_families_that_were_not_learned(learned):

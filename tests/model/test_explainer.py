@@ -44,7 +44,7 @@ def test_scores_are_those_of_the_workflow_on_the_same_embedding(explainer, model
     np.testing.assert_allclose(scores(explanation), expected[0], atol=1e-3)
     np.testing.assert_allclose(list(explanation.variances.values()), variances[0], atol=1e-3)
     assert explanation.bald == pytest.approx(bald[0], abs=1e-3)
-    assert explanation.concept == model.concepts[expected[0].argmax()]
+    assert explanation.concept == model.gpc.classes[expected[0].argmax()]
     assert sum(explanation.scores.values()) == pytest.approx(1)
 
 

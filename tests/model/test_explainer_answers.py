@@ -8,11 +8,8 @@ import pytest
 
 from gpca import Explainer
 from gpca.alignment.rigid import exp, inverse, transform
-from gpca.causes.descriptors import WIDTHS
 from gpca.causes.policy import NOTHING, QUEUE, RecoveryPolicy, Thresholds
-from gpca.classifier.settings import GPCSettings
 from gpca.explainers.pair_classifier import PairClassifier
-from gpca.model.diagnoser import REMEDIED
 from gpca.model.diagnosis import ADVICE
 from gpca.uncertainty.settings import UncertaintySettings
 
@@ -47,8 +44,6 @@ def test_what_is_unlike_the_training_is_said_in_text_and_in_json(model, pair):
     [line] = [line for line in said.warnings if "are both in the same unit and scale?" in line]
     assert f"warning   {line}" in said.text()
     assert said.as_dict()["warnings"] == list(said.warnings)
-    older = Explainer(replace(model, familiar=None), device="cpu").explain(3 * source, target)
-    assert line not in older.warnings
 
 
 def test_a_pair_far_from_all_that_the_diagnosis_learnt_is_said_to_be(explainer, pair, monkeypatch):
@@ -121,20 +116,6 @@ def test_a_fast_explanation_promises_nothing_and_says_so(explainer, pair):
     assert "set       none, since nothing is promised" in said.text()
     [again] = explainer.explain_many([pair], fast=True)
     assert json.dumps(again.as_dict()["diagnosis"]) == json.dumps(said.as_dict()["diagnosis"])
-
-
-def test_a_model_without_reenactment_says_so(model, pair):
-    random, n = np.random.default_rng(0), sum(WIDTHS.values())
-    failed_N = np.arange(40) % 2 == 0
-    features_N_F = random.normal(size=(40, n)) + failed_N[:, None]
-    classifier = PairClassifier(GPCSettings(iterations=5, inducing=4, draws=50), "tiny", 0)
-    classifier.fit(features_N_F, failed_N, np.repeat(failed_N[:, None], 3, axis=1))
-    diagnoser = replace(model.diagnoser, classifier=classifier, error_weights=np.zeros(n + 1), reads=REMEDIED)
-    older = replace(model, diagnoser=replace(diagnoser, guarantee=None))
-    said = Explainer(older, device="cpu").explain(*pair)
-    assert "(nothing was re-enacted)" in said.text()
-    assert any("re-enacts nothing; make another" in note for note in said.notes)
-    assert said.as_dict()["diagnosis"]["guarantee"] is None
 
 
 def ell(n, seed):

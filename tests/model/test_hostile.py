@@ -126,6 +126,7 @@ CONTENTS = {
     "a list that contains itself": holds_itself,
     "a title of two lines": put("title", "Mugs\nTraceback"),
     "a doubtful stand-in": put("stand_in", "no"),
+    "no ranges": drop("familiar"),
     "ranges of nothing": put("familiar", {}),
     "ranges of a list": put("familiar", [1, 2]),
     "a range of text": put("familiar/size", ["small", "large"]),
@@ -270,7 +271,7 @@ def test_a_flipped_bit_anywhere_is_found_or_harmless(saved, tmp_path):
             found += 1
             continue
         assert all(map(torch.equal, tensors_of(loaded), tensors_of(expected)))
-        for name in ("encoder_settings", "icp", "cloud_points", "policy", "title", "stand_in", "concepts"):
+        for name in ("encoder_settings", "icp", "cloud_points", "policy", "title", "stand_in"):
             assert getattr(loaded, name) == getattr(expected, name)
     assert found > 200
 

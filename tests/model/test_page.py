@@ -59,18 +59,17 @@ def test_a_page_holds_both_clouds_and_every_registration_that_was_reenacted(html
     found = explained.diagnosis.reenacted
     assert len(drawn["poses"]) == len(scene.possibilities) == len(found.poses)
     for pose, possibility, of_page in zip(found.poses, scene.possibilities, drawn["poses"], strict=True):
-        assert pose.error == scene.frame.diameter * possibility.what_ifs[ALL].error
+        assert pose.error == scene.frame.diameter * possibility.errors[ALL]
         assert pose.probability == possibility.probability
         for place, subset in enumerate(BY_SIZE):
-            points = possibility.what_ifs[subset].points
-            np.testing.assert_allclose(unpacked(of_page["what_ifs"][place]), points, atol=1e-3)
+            np.testing.assert_allclose(unpacked(of_page["what_ifs"][place]), possibility.clouds[subset], atol=1e-3)
 
 
 def test_with_a_right_start_on_clean_and_whole_surface_the_cloud_ends_on_the_target(explained):
     """The best case of the most probable pose, up to twice the spacing of the points."""
     from scipy.spatial import cKDTree
 
-    points = explained.scene.possibilities[0].what_ifs[0].points
+    points = explained.scene.possibilities[0].clouds[0]
     assert np.median(cKDTree(explained.scene.target).query(points)[0]) < 0.06
 
 
