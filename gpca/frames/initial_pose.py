@@ -6,7 +6,7 @@ takes the true pose to the estimated one."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, get_args
@@ -46,46 +46,43 @@ def read_bop_results(
     rows = read_csv(path, RESULT_COLUMNS, others=ANY, remedy=REMEDY)
     scored_poses: dict[tuple[int, int, int], list[tuple[float, np.ndarray]]] = {}
     ratios = []
-    for number, row in enumerate(rows.to_dict("records"), start=2):
-        subject = f"{path}: line {number}"
-        key = (_id(subject, row, "scene_id"), _id(subject, row, "im_id"), _id(subject, row, "obj_id"))
-        if key[:2] not in distances_m:
-            raise InputError(subject, f"the dataset has no image {key[1]} of scene {key[0]}", "check results or split")
-        if key[2] not in known:
-            raise InputError(subject, f"the dataset has no object {key[2]}", "check results, or fetch the models again")
-        (score,) = _entries(subject, row, "score", 1)
-        pose = rigid_motion(_entries(subject, row, "R", 9).reshape(3, 3), _entries(subject, row, "t", 3) / 1000)
+    for line, row in enumerate(rows.to_dict("records"), start=2):
+        subject = f"{path}: line {line}"
+        key = []
+        for column in ("scene_id", "im_id", "obj_id"):
+            try:
+                key.append(whole(row[column].strip()))
+            except ValueError as fault:
+                raise InputError(subject, f"{column} is {row[column][:40]!r}, not a whole number", REMEDY) from fault
+        scene, image, number = key
+        if (scene, image) not in distances_m:
+            raise InputError(subject, f"the dataset has no image {image} of scene {scene}", "check results or split")
+        if number not in known:
+            raise InputError(subject, f"the dataset has no object {number}", "check results, or fetch the models again")
+        entries = {}
+        for column, count in (("score", 1), ("R", 9), ("t", 3)):
+            try:
+                entries[column] = np.array([decimal(text) for text in row[column].replace(",", " ").split()])
+            except ValueError as fault:
+                message = f"{column} contains values that are not finite numbers: {fault}"
+                raise InputError(subject, message, REMEDY) from fault
+            if len(entries[column]) != count:
+                fault = f"{column} has {len(entries[column])} entries, not {count}"
+                raise InputError(subject, fault, "separate them by spaces")
+            if not (abs(entries[column]) < 1e100).all():  # no norm of these overflows
+                raise InputError(subject, f"{column} contains a number that is out of bounds", REMEDY)
+        pose = rigid_motion(entries["R"].reshape(3, 3), entries["t"] / 1000)
         require_rotation(pose, subject)
         if pose[2, 3] <= 0:
             fault = f"t has z = {1e3 * pose[2, 3]:.6g} mm, not in front of the camera"
             raise InputError(subject, fault, "leave out failed estimates")
-        if annotated := distances_m[key[:2]]:
+        if annotated := distances_m[scene, image]:
             ratios.append(float(np.linalg.norm(pose[:3, 3]) / np.median(annotated)))
             _require_unit(subject, ratios[-1], ONE_OFF)
-        scored_poses.setdefault(key, []).append((score, pose))
+        scored_poses.setdefault((scene, image, number), []).append((float(entries["score"][0]), pose))
     if ratios:
         _require_unit(path, float(np.median(ratios)), HALF_OFF)
     return {key: [T for _, T in sorted(poses, key=lambda pose: -pose[0])] for key, poses in scored_poses.items()}
-
-
-def _id(subject: str, row: dict, column: str) -> int:
-    text = str(row[column]).strip()
-    try:
-        return whole(text)
-    except ValueError as fault:
-        raise InputError(subject, f"{column} is {text[:40]!r}, not a whole number", REMEDY) from fault
-
-
-def _entries(subject: str, row: dict, column: str, count: int) -> np.ndarray:
-    try:
-        numbers = np.array([decimal(text) for text in str(row[column]).replace(",", " ").split()])
-    except ValueError as fault:
-        raise InputError(subject, f"{column} contains values that are not finite numbers: {fault}", REMEDY) from fault
-    if len(numbers) != count:
-        raise InputError(subject, f"{column} has {len(numbers)} entries, not {count}", "separate them by spaces")
-    if not (abs(numbers) < 1e100).all():  # no norm of these overflows
-        raise InputError(subject, f"{column} contains a number that is out of bounds", REMEDY)
-    return numbers
 
 
 def _require_unit(subject: object, ratio: float, most: float) -> None:
@@ -132,6 +129,17 @@ class EstimatorErrors:
     symmetric: Collection[tuple[str, int]]
     by_object: dict[tuple[str, int], list[np.ndarray]] = field(default_factory=dict)
 
+    @classmethod
+    def read(
+        cls, files: Mapping[str, tuple[Path | None, Collection[int]]], symmetric: Collection[tuple[str, int]]
+    ) -> EstimatorErrors:
+        """Return the errors in the file of each dataset that has one, of the objects with these ids."""
+        errors = cls(symmetric)
+        for name, (path, known) in files.items():
+            for number, T_error in read_pose_errors(path, known) if path else ():
+                errors.add((name, number), T_error)
+        return errors
+
     def add(self, object_: tuple[str, int], T_true_estimated: np.ndarray) -> None:
         """Add an error that an estimator made on an object."""
         self.by_object.setdefault(object_, []).append(T_true_estimated)
@@ -146,30 +154,23 @@ class EstimatorErrors:
         return errors[int(random.integers(len(errors)))]
 
 
-def error_of(T_camera_true: np.ndarray, T_camera_estimated: np.ndarray) -> np.ndarray:
-    """Return ``T_true_estimated`` of two poses of one model."""
-    return inverse(T_camera_true) @ T_camera_estimated
-
-
-def read_pose_errors(path: Path, known: Iterable[int]) -> list[tuple[int, np.ndarray]]:
+def read_pose_errors(path: Path, known: Collection[int]) -> list[tuple[int, np.ndarray]]:
     """Return id and error of each row of a CSV: `obj_id`, rotation vector `rx,ry,rz` (rad), shift `tx,ty,tz` (mm).
 
     Rows of objects that are not `known` are skipped. InputError for a damaged file, or an impossible motion.
     """
     rows = read_csv(path, ERROR_COLUMNS, others=ANY)
-    columns = {name: numbers(path, rows, name).to_numpy() for name in ERROR_COLUMNS}
-    ids = columns["obj_id"]
+    ids, turns_N_3, shifts_N_3 = np.split(
+        np.stack([numbers(path, rows, name) for name in ERROR_COLUMNS], axis=1), (1, 4), axis=1
+    )
     if (ids != np.round(ids)).any() or (ids < 0).any():
         raise InputError(path, "column 'obj_id' contains values that are not whole numbers", "regenerate it")
-    turns_N_3 = np.stack([columns[name] for name in ("rx", "ry", "rz")], axis=1)
-    shifts_N_3 = np.stack([columns[name] for name in ("tx", "ty", "tz")], axis=1)
     if np.linalg.norm(turns_N_3, axis=1).max() > np.pi + 1e-3:
         raise InputError(path, "contains a rotation of more than half a turn", "give rotation vectors in radians")
     if np.linalg.norm(shifts_N_3, axis=1).max() > FARTHEST_MM:
         raise InputError(path, "contains an error of more than 10 m", "give translations in millimeters")
     motions = rigid_motion(Rotation.from_rotvec(turns_N_3).as_matrix(), shifts_N_3 / 1000)
-    known = set(known)
-    return [(int(number), T) for number, T in zip(ids, motions, strict=True) if int(number) in known]
+    return [(int(number), T) for number, T in zip(ids[:, 0], motions, strict=True) if int(number) in known]
 
 
 Form = Literal["results", "true_pose", "global_registration"]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -19,9 +19,7 @@ from gpca.frames.initial_pose import (
     GlobalRegistration,
     InitialPoseSettings,
     displace,
-    error_of,
     estimates_of,
-    read_pose_errors,
 )
 from gpca.frames.plausibility import (
     FARTHEST,
@@ -157,127 +155,120 @@ def read_instances(
     if settings.form == "results" and not any(of.results or of.errors for of, _, _ in datasets.values()):
         raise InputError(f"dataset {next(iter(datasets))}", "has no results file", "set results or choose another pose")
     left_out: list[str] = []
-    seen: list[tuple[_Objects, Frame, int, dict]] = []
+    seen: list[_Seen] = []
     for dataset, frames, models in datasets.values():
-        catalog = _Objects(dataset, objects, models, settings)
-        first = len(seen)
+        index = {number: objects.names.index(model.surface.name) for number, model in models.items()}
+        trees = {number: cKDTree(objects.points(i)) for number, i in index.items()}
+        symmetric = {}
+        for number, i in index.items():
+            listed = models[number].listed_symmetries
+            found = find_symmetries(objects.points(i), objects.diameters_m[i]) if listed is None else listed
+            symmetric[number] = bool(found)
+        observations = []
         for frame in progress(frames, f"frames of {dataset.name}"):
-            shown = {"dataset": dataset.name, "scene": frame.scene, "image": frame.image}
-            shown |= {"camera_3_3": frame.camera_3_3, "colour": str(frame.color or NO_COLOR)}
-            shown["fold"] = dataset.fold(frame.scene)
-            seen += [(catalog, frame, n, shown | row) for n, row in catalog.in_frame(frame, left_out)]
-        observations = [catalog.observation(frame.annotations[n], row["points_m"]) for _, frame, n, row in seen[first:]]
+            depth_m = frame.depth_m()
+            for n, annotation in enumerate(frame.annotations):
+                number, T_camera_model = annotation.object_id, annotation.T_camera_model
+                T_model_object, diameter_m = models[number].T_model_object, float(objects.diameters_m[index[number]])
+                try:
+                    points_m, pixels = measured_points(frame, annotation, depth_m)
+                    place = annotation.subject, T_camera_model, T_model_object, trees[number], diameter_m
+                    observed = Observation(*place, points_m)
+                    require_plausible(observed)
+                    points_m, pixels = without_background(points_m, pixels, annotation, diameter_m)
+                except TooFewPoints as fault:
+                    left_out.append(str(fault))
+                    continue
+                row = {
+                    "dataset": dataset.name,
+                    "scene": frame.scene,
+                    "image": frame.image,
+                    "camera_3_3": frame.camera_3_3,
+                    "colour": str(frame.color or NO_COLOR),
+                    "fold": dataset.fold(frame.scene),
+                    "object_index": index[number],
+                    "symmetric": symmetric[number],
+                    "T_camera_object_true": T_camera_model @ T_model_object,
+                    "points_m": points_m.astype(np.float32),
+                    "pixels": pixels.astype(np.int32),
+                }
+                seen.append(_Seen(frame, n, T_model_object, diameter_m, row))
+                observations.append(replace(observed, points_m=row["points_m"]))
         require_shared_form(dataset.name, observations)
     if not seen:
         reasons = f"; the first skipped: {left_out[0]}" if left_out else ""
         raise InputError(", ".join(datasets), f"no object is left in any frame{reasons}", "check masks and depth")
-    if settings.form == "results":  # last, since errors are measured against poses that fit the measurements
-        poses = _poses_from_results(datasets, seen)
-    else:
-        poses = [
-            (settings.form, catalog.initial_pose(frame, n, row))
-            for catalog, frame, n, row in progress(seen, "initial poses")
-        ]
+    # Last, since errors are measured against poses that fit the measurements.
+    poses = _poses_from_results(datasets, seen) if settings.form == "results" else _poses(seen, objects, settings)
     for fault in left_out:
         print(f"skipped: {fault}", file=sys.stderr)
-    rows = [
-        row | {"T_camera_object_init": T_init, "init_from": init_from}
-        for (*_, row), (init_from, T_init) in zip(seen, poses, strict=True)
-    ]
-    parts = ("points_m", "pixels")
-    columns: dict[str, Any] = {name: np.array([row[name] for row in rows]) for name in rows[0] if name not in parts}
-    columns |= {name: np.concatenate([row[name] for row in rows]) for name in parts}
-    offsets = np.cumsum([0, *(len(row["points_m"]) for row in rows)], dtype=np.int64)
-    return Instances(**columns, offsets=offsets)
+    columns = {name: np.array([of.row[name] for of in seen]) for name in seen[0].row if name not in PARTS}
+    columns |= {name: np.concatenate([of.row[name] for of in seen]) for name in PARTS}
+    columns["offsets"] = np.cumsum([0, *(len(of.row["points_m"]) for of in seen)], dtype=np.int64)
+    init_from, T_camera_object_init = zip(*poses, strict=True)
+    return Instances(**columns, init_from=np.array(init_from), T_camera_object_init=np.array(T_camera_object_init))
 
 
-def _poses_from_results(
-    datasets: Mapping[str, tuple[Dataset, list[Frame], dict]], seen: list[tuple[_Objects, Frame, int, dict]]
-) -> list[tuple[str, np.ndarray]]:
-    """Return a random estimator that found each object, and its pose; else ``errors``, and the truth with an error."""
-    estimators = {name: dataset.estimators() for name, (dataset, _, _) in datasets.items()}
-    errors = EstimatorErrors(
-        {(catalog.name, number) for catalog, *_ in seen for number, symmetric in catalog.symmetric.items() if symmetric}
-    )
-    for name, (dataset, _, models) in datasets.items():
-        for number, T_error in read_pose_errors(dataset.errors, models) if dataset.errors else ():
-            errors.add((name, number), T_error)
-    estimates: list[tuple[str, np.ndarray] | None] = []
-    for catalog, frame, n, row in seen:
-        annotation = frame.annotations[n]
-        number = annotation.object_id
-        alone = [each.object_id for each in frame.annotations].count(number) == 1
-        random = generator(catalog.name, *frame.place, n, "estimator")
-        shown = row | {"diameter_m": catalog.diameter_m(number)}
-        candidates = estimates_of(estimators[catalog.name], (*frame.place, number), alone, shown)
-        chosen = candidates[int(random.integers(len(candidates)))] if candidates else None
-        estimates.append(chosen)
-        if chosen:
-            errors.add((catalog.name, number), error_of(annotation.T_camera_model, chosen[1]))
-    poses = []
-    for (catalog, frame, n, _), chosen in zip(seen, estimates, strict=True):
-        annotation = frame.annotations[n]
-        T_model_object = catalog.models[annotation.object_id].T_model_object
-        if chosen is None:
-            random = generator(catalog.name, *frame.place, n, "error")
-            T_error = errors.draw((catalog.name, annotation.object_id), random)
-            chosen = ("errors", annotation.T_camera_model @ T_error)
-        poses.append((chosen[0], chosen[1] @ T_model_object))
+PARTS = ("points_m", "pixels")
+
+
+class _Seen(NamedTuple):
+    """An object in a frame: its number among the annotations, and what is known but for its initial pose."""
+
+    frame: Frame
+    n: int
+    T_model_object: np.ndarray
+    diameter_m: float
+    row: dict[str, Any]
+
+    @property
+    def annotation(self) -> Annotation:
+        return self.frame.annotations[self.n]
+
+    def random_axes(self, use: str) -> tuple:
+        return self.row["dataset"], *self.frame.place, self.n, use
+
+
+def _poses(seen: list[_Seen], objects: ObjectClouds, settings: InitialPoseSettings) -> list[tuple[str, np.ndarray]]:
+    """Return the form of the initial poses, and each of them, without asking an estimator."""
+    poses, registration = [], dict[tuple[str, int], GlobalRegistration]()
+    for of in progress(seen, "initial poses"):
+        axes, row = of.random_axes("initial pose"), of.row
+        if settings.form == "true_pose":
+            T_init = displace(row["T_camera_object_true"], of.diameter_m, settings, generator(*axes))
+        else:
+            key = row["dataset"], of.annotation.object_id
+            if key not in registration:
+                cloud = objects.clouds[row["object_index"]]
+                registration[key] = GlobalRegistration(*cloud, of.diameter_m, settings)
+            T_init = registration[key].register(row["points_m"], seed_of(*axes))
+        poses.append((settings.form, T_init))
     return poses
 
 
-class _Objects:
-    """The objects of one dataset, ready to be found in frames."""
-
-    def __init__(
-        self, dataset: Dataset, objects: ObjectClouds, models: dict[int, CenteredModel], settings: InitialPoseSettings
-    ):
-        self.name, self.models = dataset.name, models
-        self._objects, self._settings = objects, settings
-        self._index = {number: objects.names.index(model.surface.name) for number, model in models.items()}
-        self._trees = {number: cKDTree(objects.points(index)) for number, index in self._index.items()}
-        self._registration: dict[int, GlobalRegistration] = {}
-        self.symmetric = {}
-        for number, i in self._index.items():
-            symmetries = models[number].listed_symmetries
-            if symmetries is None:
-                symmetries = find_symmetries(objects.points(i), objects.diameters_m[i])
-            self.symmetric[number] = bool(symmetries)
-
-    def in_frame(self, frame: Frame, left_out: list[str]) -> list[tuple[int, dict]]:
-        """Return the objects that were measured, by their number among the annotations."""
-        depth_m = frame.depth_m()
-        rows = []
-        for n, annotation in enumerate(frame.annotations):
-            number = annotation.object_id
-            try:
-                points_m, pixels = measured_points(frame, annotation, depth_m)
-                require_plausible(self.observation(annotation, points_m))
-                points_m, pixels = without_background(points_m, pixels, annotation, self.diameter_m(number))
-            except TooFewPoints as fault:
-                left_out.append(str(fault))
-                continue
-            T_true = annotation.T_camera_model @ self.models[number].T_model_object
-            seen: dict[str, Any] = {"object_index": self._index[number], "symmetric": self.symmetric[number]}
-            seen |= {"T_camera_object_true": T_true, "points_m": points_m.astype(np.float32)}
-            rows.append((n, {**seen, "pixels": pixels.astype(np.int32)}))
-        return rows
-
-    def observation(self, annotation: Annotation, points_m: np.ndarray) -> Observation:
-        number, T_camera_model = annotation.object_id, annotation.T_camera_model
-        T_model_object, tree = self.models[number].T_model_object, self._trees[number]
-        return Observation(annotation.subject, T_camera_model, T_model_object, tree, self.diameter_m(number), points_m)
-
-    def initial_pose(self, frame: Frame, n: int, row: dict) -> np.ndarray:
-        """Return ``T_camera_object`` that ICP starts from where no estimator is asked."""
-        number = frame.annotations[n].object_id
-        axes = (self.name, frame.scene, frame.image, n, "initial pose")
-        if self._settings.form == "true_pose":
-            return displace(row["T_camera_object_true"], self.diameter_m(number), self._settings, generator(*axes))
-        if number not in self._registration:
-            cloud = self._objects.clouds[self._index[number]]
-            self._registration[number] = GlobalRegistration(*cloud, self.diameter_m(number), self._settings)
-        return self._registration[number].register(row["points_m"], seed_of(*axes))
-
-    def diameter_m(self, number: int) -> float:
-        return float(self._objects.diameters_m[self._index[number]])
+def _poses_from_results(
+    datasets: Mapping[str, tuple[Dataset, list[Frame], dict]], seen: list[_Seen]
+) -> list[tuple[str, np.ndarray]]:
+    """Return a random estimator that found each object, and its pose; else ``errors``, and the truth with an error."""
+    objects = [(of.row["dataset"], of.annotation.object_id) for of in seen]
+    errors = EstimatorErrors.read(
+        {name: (dataset.errors, models) for name, (dataset, _, models) in datasets.items()},
+        {key for key, of in zip(objects, seen, strict=True) if of.row["symmetric"]},
+    )
+    estimators = {name: dataset.estimators() for name, (dataset, _, _) in datasets.items()}
+    estimates: list[tuple[str, np.ndarray] | None] = []
+    for (name, number), of in zip(objects, seen, strict=True):
+        alone = [each.object_id for each in of.frame.annotations].count(number) == 1
+        random = generator(*of.random_axes("estimator"))
+        shown = of.row | {"diameter_m": of.diameter_m}
+        found = estimates_of(estimators[name], (*of.frame.place, number), alone, shown)
+        estimates.append(found[int(random.integers(len(found)))] if found else None)
+        if found:
+            errors.add((name, number), inverse(of.annotation.T_camera_model) @ estimates[-1][1])  # type: ignore[index]
+    poses = []
+    for key, of, estimate in zip(objects, seen, estimates, strict=True):
+        if estimate is None:
+            T_error = errors.draw(key, generator(*of.random_axes("error")))
+            estimate = "errors", of.annotation.T_camera_model @ T_error
+        poses.append((estimate[0], estimate[1] @ of.T_model_object))
+    return poses

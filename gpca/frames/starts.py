@@ -18,7 +18,7 @@ import numpy as np
 
 from gpca.alignment.rigid import inverse, scale_translation
 from gpca.frames.dataset import CenteredModel, Dataset
-from gpca.frames.initial_pose import EstimatorErrors, error_of, estimates_of, read_pose_errors
+from gpca.frames.initial_pose import EstimatorErrors, estimates_of
 from gpca.frames.instances import Instances
 from gpca.io.arrays import TEXT, WHOLE
 from gpca.io.container import Container, array
@@ -53,52 +53,17 @@ def all_starts(
     Where no dataset has results, an initial pose that global registration found counts as an estimate. `datasets` and
     `models` are those that the instances were read from; `rungs` are turns in degrees and shifts in diameters.
     """
-    found = _estimated(instances, objects, datasets, models)
-    by_features = np.flatnonzero(instances.init_from == GLOBAL)
-    found += [(i, NATIVE, GLOBAL, instances.T_camera_object_init[i]) for i in by_features]
-    for number, (turn_deg, shift) in enumerate(rungs):
-        name = f"{turn_deg:g} deg, {shift:g} d"
-        for i in range(len(instances)):
-            random = generator(*_axes(instances, i), "rung", number)
-            T_error = misplacement(np.deg2rad(turn_deg), shift, random)
-            diameter_m = float(objects.diameters_m[instances.object_index[i]])
-            T_init = instances.T_camera_object_true[i] @ scale_translation(T_error, diameter_m)
-            found.append((i, LADDER, name, T_init))
-    found.sort(key=lambda start: (KINDS.index(start[1]), start[0]))
-    instance_K, kind_K, from_K, T_K = zip(*found, strict=True) if found else ((), (), (), ())
-    return Starts(
-        np.array(instance_K, int), np.array(kind_K, str), np.array(from_K, str), np.array(T_K, float).reshape(-1, 4, 4)
-    )
-
-
-def _axes(instances: Instances, i: int) -> tuple:
-    """Return the names of an instance's random numbers, independent of how many others there are."""
-    u, v = instances.pixels_of(i)[0].tolist()  # several of one object may be in an image
-    return str(instances.dataset[i]), int(instances.scene[i]), int(instances.image[i]), u, v
-
-
-def _estimated(
-    instances: Instances,
-    objects: ObjectClouds,
-    datasets: Mapping[str, Dataset],
-    models: Mapping[str, Mapping[int, CenteredModel]],
-) -> list[tuple]:
-    """Return the estimators' poses, and for instances without any the truth with an error made elsewhere."""
     numbers = {
         (name, objects.names.index(model.surface.name)): number
         for name, by_id in models.items()
         for number, model in by_id.items()
     }
-    place_I = [
-        (str(instances.dataset[i]), numbers[str(instances.dataset[i]), int(instances.object_index[i])])
-        for i in range(len(instances))
-    ]
-    errors = EstimatorErrors(
-        {place for place, symmetric in zip(place_I, instances.symmetric, strict=True) if symmetric}
+    shown = zip(instances.dataset.tolist(), instances.object_index.tolist(), strict=True)
+    object_I = [(name, numbers[name, index]) for name, index in shown]
+    errors = EstimatorErrors.read(
+        {name: (dataset.errors, models[name]) for name, dataset in datasets.items()},
+        {key for key, symmetric in zip(object_I, instances.symmetric, strict=True) if symmetric},
     )
-    for name, dataset in datasets.items():
-        for number, T_error in read_pose_errors(dataset.errors, models[name]) if dataset.errors else ():
-            errors.add((name, number), T_error)
     estimators = {name: dataset.estimators() for name, dataset in datasets.items()}
     annotated = Counter(
         (name, *frame.place, annotation.object_id)
@@ -107,8 +72,8 @@ def _estimated(
         for frame in dataset.frames()
         for annotation in frame.annotations
     )
-    found: list[tuple] = []
-    for i, (name, number) in enumerate(place_I):
+    found: list[tuple[int, str, str, np.ndarray]] = []
+    for i, (name, number) in enumerate(object_I):
         place = (int(instances.scene[i]), int(instances.image[i]), number)
         seen = {
             "points_m": instances.cloud_m(i),
@@ -121,12 +86,29 @@ def _estimated(
         for estimator, T_camera_model in estimates_of(estimators[name], place, annotated[name, *place] == 1, seen):
             found.append((i, kind, estimator, T_camera_model @ T_model_object))
             T_camera_model_true = instances.T_camera_object_true[i] @ inverse(T_model_object)
-            errors.add((name, number), error_of(T_camera_model_true, T_camera_model))
+            errors.add((name, number), inverse(T_camera_model_true) @ T_camera_model)
     without = sorted(set(range(len(instances))) - {start[0] for start in found}) if errors.by_object else []
     for i in without:
-        name, number = place_I[i]
-        T_model_object = models[name][number].T_model_object
-        T_error = errors.draw((name, number), generator(*_axes(instances, i), "error"))
+        T_model_object = models[object_I[i][0]][object_I[i][1]].T_model_object
+        T_error = errors.draw(object_I[i], generator(*_axes(instances, i), "error"))
         T_init = instances.T_camera_object_true[i] @ inverse(T_model_object) @ T_error @ T_model_object
         found.append((i, TRANSPLANTED, "errors", T_init))
-    return found
+    by_features = np.flatnonzero(instances.init_from == GLOBAL)
+    found += [(i, NATIVE, GLOBAL, instances.T_camera_object_init[i]) for i in by_features]
+    for rung, (turn_deg, shift) in enumerate(rungs):
+        for i in range(len(instances)):
+            T_error = misplacement(np.deg2rad(turn_deg), shift, generator(*_axes(instances, i), "rung", rung))
+            diameter_m = float(objects.diameters_m[instances.object_index[i]])
+            T_init = instances.T_camera_object_true[i] @ scale_translation(T_error, diameter_m)
+            found.append((i, LADDER, f"{turn_deg:g} deg, {shift:g} d", T_init))
+    found.sort(key=lambda start: (KINDS.index(start[1]), start[0]))
+    instance_K, kind_K, from_K, T_K = zip(*found, strict=True) if found else ((), (), (), ())
+    return Starts(
+        np.array(instance_K, int), np.array(kind_K, str), np.array(from_K, str), np.array(T_K, float).reshape(-1, 4, 4)
+    )
+
+
+def _axes(instances: Instances, i: int) -> tuple:
+    """Return the names of an instance's random numbers, independent of how many others there are."""
+    u, v = instances.pixels_of(i)[0].tolist()  # several of one object may be in an image
+    return str(instances.dataset[i]), int(instances.scene[i]), int(instances.image[i]), u, v

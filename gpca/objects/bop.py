@@ -39,14 +39,14 @@ def surfaces(folder: str | Path, unit: str = "mm", objects: Sequence[int] | None
     scale = meters_per(unit)
     info = read_models_info(models / "models_info.json")
     listed_mm = {number: model["diameter"] for number, model in info.items()}
-    ids = sorted(objects or ())
+    ids = list(objects or ())
     if objects is None:
         for path in models.glob("obj_[0-9]*.ply"):
             try:
                 ids.append(whole(path.stem.removeprefix("obj_")))
             except ValueError as error:
                 raise InputError(path, "is not named obj_{number}.ply", "name it like obj_000001.ply") from error
-        ids.sort()
+    ids.sort()
     require_models(models, ids)
     if unlisted := [number for number in ids if number not in listed_mm]:
         raise InputError(models / "models_info.json", f"lists no object {unlisted[0]}", "fetch the models again")
@@ -89,8 +89,6 @@ def models_folder(folder: Path) -> Path:
 
 def read_models_info(path: Path) -> dict[int, dict]:
     """Return the entries of models_info.json by object id; InputError for a damaged file or impossible values."""
-    from gpca.objects.bop import require_symmetries  # needs scipy, and the config's checks import this module
-
     remedy = "fetch the models again"
     require_file(path, "no such file", f"{remedy}, or use kind: mesh_folder for plain meshes")
     listed: dict[int, dict] = {}

@@ -16,7 +16,7 @@ from another one of the sequence."""
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
@@ -170,10 +170,14 @@ def write_objects(
     in one of them; nothing is written then.
     """
     places = read_object_splits(splits, source) if splits else {}
-    used = surfaces
-    if places:
-        used = (surface for surface in surfaces if _place_of(surface.name, places).role != UNUSED)
-    objects = sample_objects(used, source, n_points)
+
+    def is_used(surface: Surface) -> bool:
+        if surface.name not in places:
+            remedy = "add it to the file of objects, or set splits.objects: null"
+            raise InputError(f"object '{surface.name}'", "is in no split", remedy)
+        return places[surface.name].role != UNUSED
+
+    objects = sample_objects(filter(is_used, surfaces) if places else surfaces, source, n_points)
     if places:
         families, folds = zip(*((places[name].cluster, places[name].fold) for name in objects.names), strict=True)
         objects = replace(objects, families=families, folds=folds)
@@ -182,20 +186,20 @@ def write_objects(
 
 def sample_objects(surfaces: Iterable[Surface], source: str, n_points: int = 16384) -> ObjectClouds:
     """Return the canonical clouds of a source; InputError as in :func:`write_objects`."""
-    names, clouds, diameters_m = [], [], []
+    sampled: dict[str, tuple[np.ndarray, np.ndarray, float]] = {}
     for surface in surfaces:
         if not is_name(surface.name):
             fault = "its name is empty or does not fit on one line"
             raise InputError(f"{source}: object {surface.name!r}", fault, "rename it")
-        if surface.name in names:
+        if surface.name in sampled:
             raise InputError(f"{source}: object '{surface.name}'", "occurs twice", "give each file its own name")
-        points_m, normals, diameter_m = canonical_cloud(surface, source, n_points)
-        names.append(surface.name)
-        clouds.append((points_m, normals))
-        diameters_m.append(diameter_m)
-    if not names:
+        sampled[surface.name] = canonical_cloud(surface, source, n_points)
+    if not sampled:
         raise InputError(source, "the source has no object", "check its location and files")
-    return ObjectClouds(tuple(names), np.array(diameters_m, dtype=np.float64), tuple(clouds))
+    diameters_m = np.array([diameter_m for *_, diameter_m in sampled.values()])
+    return ObjectClouds(
+        tuple(sampled), diameters_m, tuple((points, normals) for points, normals, _ in sampled.values())
+    )
 
 
 @dataclass(frozen=True)
@@ -230,22 +234,18 @@ class ObjectClouds:
         parts = (np.split(arrays[key], offsets[1:-1]) for key in ("points_m", "normals"))
         optional = {name: tuple(arrays[name].tolist()) for name in ("families", "folds") if name in arrays}
         objects = cls(tuple(names), arrays["diameters_m"], tuple(zip(*parts, strict=True)), **optional)
-        for i, name in enumerate(names):
-            objects._require_possible(i, f"{path}, object '{name}'")
+        for i, (name, diameter_m) in enumerate(zip(names, objects.diameters_m, strict=True)):
+            subject = f"{path}, object '{name}'"
+            if not SMALLEST_DIAMETER_M <= diameter_m <= LARGEST_DIAMETER_M:
+                raise InputError(subject, f"its diameter is {diameter_m:.4g} m", REGENERATE)
+            # From the center of its box, no point of an object is farther away than its diameter.
+            extent_m = float(np.linalg.norm(np.ptp(objects.points(i), axis=0)))
+            if np.abs(objects.points(i)).max() > diameter_m or extent_m < SMALLEST_EXTENT * diameter_m:
+                fault = f"its points span {extent_m:.4g} m, its diameter is {diameter_m:.4g} m"
+                raise InputError(subject, f"{fault}, or they are not centered", REGENERATE)
+            if np.abs(np.linalg.norm(objects.normals(i), axis=1) - 1).max() > UNIT_TOLERANCE:
+                raise InputError(subject, "a normal is not of unit length", REGENERATE)
         return objects
-
-    def _require_possible(self, i: int, subject: str) -> None:
-        points_m, diameter_m = self.points(i), self.diameters_m[i]
-        if not SMALLEST_DIAMETER_M <= diameter_m <= LARGEST_DIAMETER_M:
-            raise InputError(subject, f"its diameter is {diameter_m:.4g} m", REGENERATE)
-        # From the center of its box, no point of an object is farther away than its diameter.
-        extent_m = float(np.linalg.norm(np.ptp(points_m, axis=0)))
-        if np.abs(points_m).max() > diameter_m or extent_m < SMALLEST_EXTENT * diameter_m:
-            fault = f"its points span {extent_m:.4g} m, its diameter is {diameter_m:.4g} m"
-            raise InputError(subject, f"{fault}, or they are not centered", REGENERATE)
-        lengths = np.linalg.norm(self.normals(i), axis=1)
-        if np.abs(lengths - 1).max() > UNIT_TOLERANCE:
-            raise InputError(subject, "a normal is not of unit length", REGENERATE)
 
     def __len__(self) -> int:
         return len(self.names)
@@ -269,19 +269,16 @@ class ObjectClouds:
     def save(self, path: str | Path, source: str) -> None:
         """Write the objects npz, and list the objects on stderr."""
         points_m, normals = zip(*self.clouds, strict=True)
-        optional = {"families": np.array(self.families), "folds": np.array(self.folds)} if self.families else {}
-        save_arrays(
-            path,
-            {
-                "names": np.array(self.names),
-                "points_m": np.concatenate(points_m),
-                "normals": np.concatenate(normals),
-                "offsets": np.cumsum([0, *map(len, points_m)], dtype=np.int64),
-                "diameters_m": self.diameters_m,
-                **optional,
-            },
-            (source, None),
-        )
+        arrays = {
+            "names": np.array(self.names),
+            "points_m": np.concatenate(points_m),
+            "normals": np.concatenate(normals),
+            "offsets": np.cumsum([0, *map(len, points_m)], dtype=np.int64),
+            "diameters_m": self.diameters_m,
+        }
+        if self.families:
+            arrays |= {"families": np.array(self.families), "folds": np.array(self.folds)}
+        save_arrays(path, arrays, (source, None))
         for name, cloud_m, diameter_m in zip(self.names, points_m, self.diameters_m, strict=True):
             print(f"{source}: {name}: {len(cloud_m)} points, {1e3 * diameter_m:.1f} mm", file=sys.stderr)
 
@@ -291,7 +288,6 @@ TRAINING = -2  # the fold of scenes for development, which are never tested but 
 DEVELOPMENT, EVALUATION, UNUSED = ROLES = ("development", "evaluation", "unused")
 ANNOTATED, BY_ICP = TRUTHS = ("annotated", "icp")
 ON_IMAGE, CARRIED = ESTIMATES = ("image", "carried")
-WORTH = {"truth": TRUTHS, "estimates": ESTIMATES}  # columns of scenes that may be missing
 
 
 class Place(NamedTuple):
@@ -313,11 +309,11 @@ def read_object_splits(path: str | Path, source: str) -> dict[str, Place]:
 
 def read_scene_splits(path: str | Path, dataset: str) -> dict[int, Place]:
     """Return the place of each scene of a dataset by number; none where the file does not name the dataset."""
-    rows = read_csv(path, ("dataset", "scene", "role", "fold"), others=tuple(WORTH), remedy="restore it")
+    rows = read_csv(path, ("dataset", "scene", "role", "fold"), others=("truth", "estimates"), remedy="restore it")
     rows = rows[rows["dataset"] == dataset]
     clusters = [f"{dataset} {scene}" for scene in rows["scene"]]
     places = _places(path, rows["scene"], clusters, rows["role"], rows["fold"])
-    for column, words in WORTH.items():
+    for column, words in {"truth": TRUTHS, "estimates": ESTIMATES}.items():
         for scene, word in zip(rows["scene"], rows.get(column, ()), strict=False):
             if word not in words:
                 fault = f"scene {scene} of {dataset} has '{word}' as {column}"
@@ -341,13 +337,6 @@ def _places(path, names, clusters, roles, folds) -> dict[str, Place]:
             raise InputError(path, f"'{cluster}' has two roles or is in two folds", "give all of it one of each")
         places[name] = place
     return places
-
-
-def _place_of(name: str, places: Mapping[str, Place]) -> Place:
-    if name not in places:
-        remedy = "add it to the file of objects, or set splits.objects: null"
-        raise InputError(f"object '{name}'", "is in no split", remedy)
-    return places[name]
 
 
 def unseen(fold_N: np.ndarray, seed: int) -> np.ndarray | None:

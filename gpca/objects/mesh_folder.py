@@ -6,7 +6,7 @@ early as another mesh, without a word; so files of text are first checked to hol
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import IO
 
@@ -30,8 +30,7 @@ def from_entry(entry: dict, folder: Path) -> Iterator[Surface]:
 def surfaces(paths: Iterable[Path], unit: str | None) -> Iterator[Surface]:
     """Yield one surface per file, named by the file's stem."""
     scale = meters_per(unit)
-    for path in paths:
-        yield read_surface(path, scale)
+    return (read_surface(path, scale) for path in paths)
 
 
 def meters_per(unit: str | None) -> float:
@@ -73,10 +72,12 @@ def read_surface(path: Path, scale: float) -> Surface:
     InputError for a file that is unreadable, truncated or longer than it declares, without points or faces, with NaN,
     or with a face that refers to no vertex.
     """
-    remedy = "fetch or export it again"
+    remedy, suffix = "fetch or export it again", path.suffix.lower()
     require_file(path, "no such file", remedy)
     try:
-        require_whole(path)
+        if check := CHECKS.get(suffix):
+            with path.open("rb") as file:
+                check(file)
         import trimesh
 
         # Unprocessed: processing would drop NaN vertices and merge others in silence.
@@ -84,7 +85,15 @@ def read_surface(path: Path, scale: float) -> Surface:
             loaded = trimesh.load(path, process=False, skip_materials=True, fix_texture=False)
         if isinstance(loaded, trimesh.Scene) and loaded.geometry:  # an OBJ with several materials
             loaded = loaded.to_mesh()
-        _require_equal_lists(loaded)
+        raw = getattr(loaded, "metadata", {}).get("_ply_raw", {})
+        for name, data in ((name, element.get("data")) for name, element in raw.items()):
+            for field in (isinstance(data, np.ndarray) and data.dtype.names) or ():
+                if data.dtype[field].names:
+                    lengths = data[field]["f0"]  # of lists, all of which trimesh reads like the first
+                    if (lengths != lengths[:1]).any():
+                        raise ValueError(f"lists of element {name} differ in length")
+                    if field.encode() in CORNERS and (lengths < 3).any():
+                        raise ValueError(f"element {name} has rows of {lengths[0]} corners")
     except InputError:
         raise
     except Exception as fault:  # a malformed file makes the parsers raise nearly anything
@@ -92,41 +101,20 @@ def read_surface(path: Path, scale: float) -> Surface:
     vertices = np.asarray(getattr(loaded, "vertices", np.zeros((0, 3))), dtype=np.float64)
     faces = np.asarray(getattr(loaded, "faces", np.zeros((0, 3))), dtype=np.int64)
     require_points(vertices, path)
-    if len(faces) == 0:
-        if path.suffix.lower() != ".ply":
-            raise InputError(path, "has no faces", f"{remedy}, or give the points as PLY")
-        return Surface(path.stem, vertices * scale, None, _cloud_normals(loaded, path))
-    if faces.min() < 0 or faces.max() >= len(vertices):
-        raise InputError(path, "a face refers to a missing vertex", remedy)
-    return Surface(path.stem, vertices * scale, faces)
-
-
-def _cloud_normals(cloud, path: Path) -> np.ndarray | None:
-    """Return the unit normals in the PLY of a point cloud, None where it has none."""
-    vertex = cloud.metadata["_ply_raw"]["vertex"]  # the only place where trimesh keeps a cloud's normals
-    axes = ("nx", "ny", "nz")
-    if not set(axes) <= set(vertex["properties"]):
-        return None
-    normals = np.column_stack([np.ravel(vertex["data"][axis]) for axis in axes]).astype(np.float64)
-    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-    if not (lengths > 0).all():
-        raise InputError(path, "a normal is zero or NaN", "export it again with its normals or without any")
-    return normals / lengths
-
-
-def _require_equal_lists(loaded) -> None:
-    """Raise a ValueError where lists of a binary PLY differ in length: trimesh reads them all like the first."""
-    raw = getattr(loaded, "metadata", {}).get("_ply_raw", {})
-    for name, element in raw.items():
-        data = element.get("data")
-        for field in (isinstance(data, np.ndarray) and data.dtype.names) or ():
-            if not data.dtype[field].names:
-                continue
-            lengths = data[field]["f0"]
-            if (lengths != lengths[:1]).any():
-                raise ValueError(f"lists of element {name} differ in length")
-            if field.encode() in CORNERS and (lengths < 3).any():
-                raise ValueError(f"element {name} has rows of {lengths[0]} corners")
+    if len(faces):
+        if faces.min() < 0 or faces.max() >= len(vertices):
+            raise InputError(path, "a face refers to a missing vertex", remedy)
+        return Surface(path.stem, vertices * scale, faces)
+    if suffix != ".ply":
+        raise InputError(path, "has no faces", f"{remedy}, or give the points as PLY")
+    axes, normals = ("nx", "ny", "nz"), None
+    if set(axes) <= set(raw["vertex"]["properties"]):  # the only place where trimesh keeps a cloud's normals
+        normals = np.column_stack([np.ravel(raw["vertex"]["data"][axis]) for axis in axes]).astype(np.float64)
+        lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+        if not (lengths > 0).all():
+            raise InputError(path, "a normal is zero or NaN", "export it again with its normals or without any")
+        normals /= lengths
+    return Surface(path.stem, vertices * scale, None, normals)
 
 
 OFF_VERTEX_COLUMNS = (3, 6, 7)  # coordinates, alone or with a color
@@ -140,37 +128,35 @@ LARGEST_TEXT_BYTES = 250 * 10**6
 LONGEST_LINE = 2**20  # bytes; a file with longer ones is not text
 CORNERS = (b"vertex_index", b"vertex_indices")  # names of the corners of a face in PLY
 PLY_FORMATS = (b"ascii", b"binary_little_endian", b"binary_big_endian")
-STL_FACET = (b"facet normal", b"outer loop", b"vertex", b"vertex", b"vertex", b"endloop", b"endfacet")
-STL_NUMBERS = {b"facet normal": 3, b"vertex": 3}
+# The keywords of the lines of a facet, and how many numbers follow.
+STL_FACET = ((b"facet normal", 3), (b"outer loop", 0), *[(b"vertex", 3)] * 3, (b"endloop", 0), (b"endfacet", 0))
 STL_HEAD_BYTES, STL_FACET_BYTES = 84, 50  # of binary STL; the head ends with the number of facets
 
 
-def require_whole(path: Path) -> None:
-    """Check that a text file holds what it declares; of a binary one, only the header of PLY is checked.
-
-    Raises:
-        ValueError: it does not.
-        InputError: too much text to parse, or no faces in a format for meshes alone.
-    """
-    check = {".ply": _check_ply, ".off": _check_off, ".obj": _check_obj, ".stl": _check_stl}.get(path.suffix.lower())
-    if check:
-        check(path)
-
-
-def _check_ply(path: Path) -> None:
-    with path.open("rb") as file:
-        is_text, elements = _ply_header(file)
-        if not is_text:
-            return
-        rows = (row.split() for row in _lines(file) if row.strip())
-        for name, count, properties in elements:
-            lists = [prop[1] == b"list" for prop in properties]
-            corners = [prop[-1] in CORNERS for prop in properties]
-            for i in range(count):
-                if fault := _fault_of_row(next(rows, None), lists, corners):
-                    raise ValueError(f"row {i + 1} of {count} of element {name} {fault}")
-        if next(rows, None) is not None:
-            raise ValueError("more rows than the header states")
+def _check_ply(file: IO[bytes]) -> None:
+    is_text, elements = _ply_header(file)
+    if not is_text:
+        return
+    rows = (row.split() for row in _lines(file) if row.strip())
+    for name, count, properties in elements:
+        for i in range(count):
+            row, place, subject = next(rows, None), 0, f"row {i + 1} of {count} of element {name}"
+            if row is None:
+                raise ValueError(f"{subject} is missing")
+            for words in properties:
+                if words[1] == b"list" and place < len(row):
+                    length = _count(row[place])
+                    if words[-1] in CORNERS:
+                        if length < 3:
+                            raise ValueError(f"{subject} has {length} corners")
+                        if not all(word.isdigit() for word in row[place + 1 : place + 1 + length]):
+                            raise ValueError(f"{subject} has a corner that is not a number of a vertex")
+                    place += length
+                place += 1
+            if place != len(row):
+                raise ValueError(f"{subject} does not match its header")
+    if next(rows, None) is not None:
+        raise ValueError("more rows than the header states")
 
 
 def _ply_header(file: IO[bytes]) -> tuple[bool, list[tuple[str, int, list[list[bytes]]]]]:
@@ -203,68 +189,52 @@ def _ply_header(file: IO[bytes]) -> tuple[bool, list[tuple[str, int, list[list[b
     raise ValueError("its header has no end")
 
 
-def _fault_of_row(row: list[bytes] | None, lists: list[bool], corners: list[bool]) -> str:
-    """Return how a row differs from its properties and list lengths; empty where it does not."""
-    if row is None:
-        return "is missing"
-    position = 0
-    for is_list, is_corners in zip(lists, corners, strict=True):
-        length = 0
-        if is_list and position < len(row):
-            length = _count(row[position])
-            words = row[position + 1 : position + 1 + length]
-            if is_corners and length < 3:
-                return f"has {length} corners"
-            if is_corners and not all(word.isdigit() for word in words):
-                return "has a corner that is not a number of a vertex"
-        position += 1 + length
-    return "" if position == len(row) else "does not match its header"
+def _check_off(file: IO[bytes]) -> None:
+    rows = (words for words in (line.split(b"#")[0].split() for line in _lines(file)) if words)
+    head = next(rows, [b""])
+    # The counts may stand in the line of the word OFF or COFF, even without a space.
+    counts = [word for word in (head[0].lstrip(b"COF"), *head[1:]) if word] or next(rows, [])
+    vertices, faces = (_count(word) for word in counts[:2])
+    for i in range(vertices):
+        if len(row := next(rows, [])) not in OFF_VERTEX_COLUMNS:
+            raise ValueError(f"vertex {i + 1} of {vertices} is missing or does not have 3 coordinates")
+        for word in row:  # of the formats of text, trimesh reads this one by Python's float()
+            decimal(word.decode("utf-8", "replace"))
+    for i in range(faces):
+        row = next(rows, [b"0"])
+        corners = _count(row[0])
+        whole = len(row) - 1 - corners in OFF_COLOR_COLUMNS and all(word.isdigit() for word in row[1 : 1 + corners])
+        if 0 < corners < 3:
+            raise ValueError(f"face {i + 1} of {faces} has {corners} corners")
+        if not corners or not whole:
+            raise ValueError(f"face {i + 1} of {faces} is missing or does not have its stated length")
+    if next(rows, None) is not None:
+        raise ValueError("more rows than it declares")
 
 
-def _check_off(path: Path) -> None:
-    with path.open("rb") as file:
-        rows = (words for words in (line.split(b"#")[0].split() for line in _lines(file)) if words)
-        head = next(rows, [b""])
-        # The counts may stand in the line of the word OFF or COFF, even without a space.
-        counts = [word for word in (head[0].lstrip(b"COF"), *head[1:]) if word] or next(rows, [])
-        vertices, faces = (_count(word) for word in counts[:2])
-        for i in range(vertices):
-            if len(row := next(rows, [])) not in OFF_VERTEX_COLUMNS:
-                raise ValueError(f"vertex {i + 1} of {vertices} is missing or does not have 3 coordinates")
-            for word in row:  # of the formats of text, trimesh reads this one by Python's float()
-                decimal(word.decode("utf-8", "replace"))
-        for i in range(faces):
-            row = next(rows, [b"0"])
-            corners = _count(row[0])
-            whole = len(row) - 1 - corners in OFF_COLOR_COLUMNS and all(word.isdigit() for word in row[1 : 1 + corners])
-            if corners < 3 or not whole:
-                short = 0 < corners < 3
-                defect = f"has {corners} corners" if short else "is missing or does not have its stated length"
-                raise ValueError(f"face {i + 1} of {faces} {defect}")
-        if next(rows, None) is not None:
-            raise ValueError("more rows than it declares")
-
-
-def _check_obj(path: Path) -> None:
-    vertices, relative_at = 0, -1
+def _check_obj(file: IO[bytes]) -> None:
+    vertices, relative_at, others, before = 0, -1, False, b""
     used: set[int] = set()
-    others = False
-    for number, words in _obj_rows(path):
-        if words[0] == b"v":
+    for number, line in enumerate(_lines(file), start=1):
+        line = before + line.split(b"#")[0].rstrip()
+        before = line[:-1] + b" " if line.endswith(b"\\") else b""  # it continues in the next line
+        if before or not line.strip():
+            continue
+        keyword, *words = line.split()
+        if keyword == b"v":
             vertices += 1
-            columns = len(words) - 1
-            if columns not in OBJ_VERTEX_COLUMNS or (columns == 4 and float(words[4]) != 1):
-                raise ValueError(f"line {number}: a vertex has {columns} numbers or a weight other than 1")
-        elif words[0] == b"f":
-            corners = [int(word.split(b"/")[0]) for word in words[1:]]
+            if len(words) not in OBJ_VERTEX_COLUMNS or (len(words) == 4 and float(words[3]) != 1):
+                raise ValueError(f"line {number}: a vertex has {len(words)} numbers or a weight other than 1")
+        elif keyword == b"f":
+            corners = [int(word.split(b"/")[0]) for word in words]
             if len(corners) < 3 or 0 in corners:
                 raise ValueError(f"line {number}: a face has {len(corners)} corners or refers to vertex 0")
             if min(corners) < 0:
                 relative_at = vertices
             used.update(corner if corner > 0 else vertices + 1 + corner for corner in corners)
-        others |= words[0] in (b"l", b"p")  # lines and points use vertices, too
+        others |= keyword in (b"l", b"p")  # lines and points use vertices, too
     if not used:
-        raise InputError(path, "has no faces", "export it again, or give the points as PLY")
+        raise InputError(file.name, "has no faces", "export it again, or give the points as PLY")
     if min(used) < 1 or max(used) > vertices:
         raise ValueError("a face refers to a missing vertex")
     if relative_at not in (-1, vertices):
@@ -273,42 +243,39 @@ def _check_obj(path: Path) -> None:
         raise ValueError(f"{vertices - len(used)} of {vertices} vertices belong to no face, as in a truncated file")
 
 
-def _obj_rows(path: Path) -> Iterator[tuple[int, list[bytes]]]:
-    """Yield number and words of each line; a backslash at the end continues the line."""
-    before = b""
-    with path.open("rb") as file:
-        for number, line in enumerate(_lines(file), start=1):
-            line = before + line.split(b"#")[0].rstrip()
-            before = line[:-1] + b" " if line.endswith(b"\\") else b""
-            if not before and line.strip():
-                yield number, line.split()
-
-
-def _check_stl(path: Path) -> None:
-    with path.open("rb") as file:
-        head, size = file.read(STL_HEAD_BYTES), file.seek(0, os.SEEK_END)
-        if size == STL_HEAD_BYTES + STL_FACET_BYTES * int.from_bytes(head[80:], "little"):
-            return
-        if not head.lstrip().lower().startswith(b"solid"):
-            raise ValueError("it neither begins with 'solid' nor has the length that its number of facets needs")
-        file.seek(0)
-        place, keyword = 0, b"solid"  # within the facet, and of the line before
-        for number, line in enumerate(_lines(file), start=1):
-            words = line.lower().split()
-            if not words:
-                continue
-            if place == 0 and words[0] in (b"solid", b"endsolid"):
-                keyword = words[0]
-                continue
-            keyword = STL_FACET[place]
-            length = len(keyword.split())
-            if (written := b" ".join(words[:length])) != keyword:
-                raise ValueError(f"line {number}: {_shown(written)} stands where {_shown(keyword)} should")
-            if (numbers := len(words) - length) != STL_NUMBERS.get(keyword, 0):
-                raise ValueError(f"line {number}: {_shown(keyword)} has {numbers} numbers")
-            place = (place + 1) % len(STL_FACET)
+def _check_stl(file: IO[bytes]) -> None:
+    head, size = file.read(STL_HEAD_BYTES), file.seek(0, os.SEEK_END)
+    if size == STL_HEAD_BYTES + STL_FACET_BYTES * int.from_bytes(head[80:], "little"):
+        return
+    if not head.lstrip().lower().startswith(b"solid"):
+        raise ValueError("it neither begins with 'solid' nor has the length that its number of facets needs")
+    file.seek(0)
+    place, keyword = 0, b"solid"  # within the facet, and of the line before
+    for number, line in enumerate(_lines(file), start=1):
+        words = line.lower().split()
+        if not words:
+            continue
+        if place == 0 and words[0] in (b"solid", b"endsolid"):
+            keyword = words[0]
+            continue
+        keyword, wanted = STL_FACET[place]
+        length = len(keyword.split())
+        if (written := b" ".join(words[:length])) != keyword:
+            raise ValueError(f"line {number}: {_shown(written)} stands where {_shown(keyword)} should")
+        if (numbers := len(words) - length) != wanted:
+            raise ValueError(f"line {number}: {_shown(keyword)} has {numbers} numbers")
+        place = (place + 1) % len(STL_FACET)
     if keyword != b"endsolid":
         raise ValueError("it ends before 'endsolid'")
+
+
+# They check that a text file holds what it declares; of a binary PLY, only the header. ValueError where it does not.
+CHECKS: dict[str, Callable[[IO[bytes]], None]] = {
+    ".ply": _check_ply,
+    ".off": _check_off,
+    ".obj": _check_obj,
+    ".stl": _check_stl,
+}
 
 
 def _lines(file: IO[bytes]) -> Iterator[bytes]:

@@ -14,11 +14,11 @@ import io
 import struct
 import warnings
 import zipfile
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
 from importlib import import_module
 from itertools import groupby
 from pathlib import Path, PurePosixPath
-from types import ModuleType
 
 import numpy as np
 
@@ -30,9 +30,8 @@ from gpca.objects.downloads import open_archive
 from gpca.objects.mesh_folder import LARGEST_TEXT_BYTES, files_in, meters_per
 from gpca.objects.surface import Surface, evenly, instance_of, view_order
 
-SCALARS = {
-    f"{kind}{size}" for kind, sizes in (("f", (4, 8)), ("i", (1, 2, 4, 8)), ("u", (1, 2, 4, 8))) for size in sizes
-}
+SCALARS = {"f4", "f8", *(f"{sign}{size}" for sign in "iu" for size in (1, 2, 4, 8))}
+AXES = ("x", "y", "z")
 
 
 def parse_pcd(content: bytes, subject: object) -> np.ndarray:
@@ -42,17 +41,14 @@ def parse_pcd(content: bytes, subject: object) -> np.ndarray:
     InputError for a wrong header, another amount of data than it says, or no points.
     """
     try:
-        points, organized = _parse_pcd(content)
+        points = _parse_pcd(content)
     except (ValueError, KeyError, IndexError, TypeError, struct.error) as fault:
         raise InputError(subject, f"is not a readable PCD file ({fault})", "fetch or export it again") from fault
-    if organized:
-        points = points[~np.isnan(points).any(axis=1)]
     require_points(points, subject)
     return points
 
 
-def _parse_pcd(content: bytes) -> tuple[np.ndarray, bool]:
-    """Return the points, and whether they are organized as an image."""
+def _parse_pcd(content: bytes) -> np.ndarray:
     values: dict[str, list[str]] = {}
     position = 0
     while "DATA" not in values:
@@ -66,14 +62,14 @@ def _parse_pcd(content: bytes) -> tuple[np.ndarray, bool]:
     for key in ("FIELDS", "SIZE", "TYPE", "WIDTH", "HEIGHT", "POINTS"):
         if not values.get(key):
             raise ValueError(f"wrong header: no {key} line")
-    fields, sizes, types = values["FIELDS"], values["SIZE"], values["TYPE"]
+    fields = values["FIELDS"]
     counts = values.get("COUNT", ["1"] * len(fields))
-    if not len(fields) == len(sizes) == len(types) == len(counts):
+    if not len(fields) == len(values["SIZE"]) == len(values["TYPE"]) == len(counts):
         raise ValueError("wrong header: FIELDS, SIZE, TYPE and COUNT differ in length")
-    scalars = [kind.lower() + size for kind, size in zip(types, sizes, strict=True)]
+    scalars = [kind.lower() + size for kind, size in zip(values["TYPE"], values["SIZE"], strict=True)]
     if not set(scalars) <= SCALARS:
         raise ValueError("wrong header: unknown SIZE or TYPE")
-    if not {"x", "y", "z"} <= set(fields) or any(counts[fields.index(axis)] != "1" for axis in "xyz"):
+    if not set(AXES) <= set(fields) or any(counts[fields.index(axis)] != "1" for axis in AXES):
         raise ValueError("wrong header: FIELDS lacks x, y or z")
     width, height, count = (whole(values[key][0], most=10**18) for key in ("WIDTH", "HEIGHT", "POINTS"))
     if width * height != count:
@@ -82,7 +78,7 @@ def _parse_pcd(content: bytes) -> tuple[np.ndarray, bool]:
     lengths = [whole(length) for length in counts]
     columns = [np.dtype((f"<{scalar}", (length,))) for scalar, length in zip(scalars, lengths, strict=True)]
     dtype = np.dtype([(str(i), column) for i, column in enumerate(columns)])
-    body, xyz, size = content[position:], [fields.index(axis) for axis in "xyz"], count * dtype.itemsize
+    body, xyz, size = content[position:], [fields.index(axis) for axis in AXES], count * dtype.itemsize
     match " ".join(values["DATA"]):
         case "ascii":
             starts = np.cumsum([0, *lengths])
@@ -106,11 +102,11 @@ def _parse_pcd(content: bytes) -> tuple[np.ndarray, bool]:
             if not len(data) == unpacked == size:
                 raise ValueError("its compressed data does not have the size that the header states")
             starts = count * np.cumsum([0, *(column.itemsize for column in columns)])
-            arrays = [np.frombuffer(data, columns[i].base, count, int(starts[i])) for i in xyz]
-            points = np.column_stack(arrays)
+            points = np.column_stack([np.frombuffer(data, columns[i].base, count, int(starts[i])) for i in xyz])
         case encoding:
             raise ValueError(f"wrong header: unknown DATA {encoding}")
-    return points.astype(np.float64), height > 1
+    points = points.astype(np.float64)
+    return points[~np.isnan(points).any(axis=1)] if height > 1 else points
 
 
 def _lzf_decompress(data: bytes, size: int) -> bytearray:
@@ -118,8 +114,7 @@ def _lzf_decompress(data: bytes, size: int) -> bytearray:
 
     Stops after more than `size` bytes.
     """
-    out = bytearray()
-    i = 0
+    out, i = bytearray(), 0
     while i < len(data) and len(out) <= size:
         control = data[i]
         i += 1
@@ -135,28 +130,17 @@ def _lzf_decompress(data: bytes, size: int) -> bytearray:
         i += 1
         if start < 0:
             raise ValueError("its compressed data is damaged")
-        length += 2
-        earlier = out[start : start + length]
-        out += (earlier * (length // len(earlier) + 1))[:length]
+        earlier = out[start : start + length + 2]
+        out += (earlier * ((length + 2) // len(earlier) + 1))[: length + 2]
     return out
 
 
-AXES = ("x", "y", "z")
 # What the array of points is called in an npz that holds others too, most usual first.
 NAMES = ("points", "xyz", "positions", "pos", "coords", "vertices", "pcd", "cloud", "data")
 KITTI_COLUMNS = 4  # x, y, z and the intensity, float32
 SEPARATORS = (",", ";", "\t")
 FARTHEST_KITTI = 1e4  # meters; no such scanner sees so far, so the file holds something else
 COLUMNS_REMEDY = "export it as three columns x, y, z"
-
-
-def read_table(path: Path) -> np.ndarray:
-    """Return the points (P, 3) float64 of a file of `TABLE_READERS`, in its unit; InputError for anything else.
-
-    They are the first three columns, or those named x, y and z in a csv with a header.
-    """
-    require_file(path, "no such file", COLUMNS_REMEDY)
-    return TABLE_READERS[path.suffix.lower()](path)
 
 
 def _numpy_file(path: Path) -> np.ndarray:
@@ -166,28 +150,21 @@ def _numpy_file(path: Path) -> np.ndarray:
             with zipfile.ZipFile(path) as members:
                 size = sum(info.file_size for info in members.infolist())
             require_memory(size, path.stat().st_size, path, "save it again")
-        loaded = np.load(path, allow_pickle=False)
+        array = np.load(path, allow_pickle=False)
+        if not isinstance(array, np.ndarray):
+            with array as archive:
+                names = [name for name in NAMES if name in archive.files] or archive.files
+                if not names:
+                    raise InputError(path, "holds no array", COLUMNS_REMEDY)
+                if len(names) > 1 and names == archive.files:
+                    several = ", ".join(archive.files[:8])
+                    fault = f"holds several arrays ({several}), none of them named 'points'"
+                    raise InputError(path, fault, "rename one")
+                array = archive[names[0]]
     except InputError:
         raise
     except Exception as fault:  # numpy and zipfile raise errors of many kinds for a damaged file
         raise InputError(path, f"is not a readable {path.suffix} file ({fault})", "save it again") from fault
-    if isinstance(loaded, np.ndarray):
-        return _points_of(loaded, path)
-    with loaded as archive:
-        names = [name for name in NAMES if name in archive.files] or archive.files
-        if not names:
-            raise InputError(path, "holds no array", COLUMNS_REMEDY)
-        if len(names) > 1 and names == archive.files:
-            several = ", ".join(archive.files[:8])
-            raise InputError(path, f"holds several arrays ({several}), none of them named 'points'", "rename one")
-        try:
-            array = archive[names[0]]
-        except Exception as fault:
-            raise InputError(path, f"array '{names[0]}' cannot be read ({fault})", "save it again") from fault
-    return _points_of(array, path)
-
-
-def _points_of(array: np.ndarray, path: Path) -> np.ndarray:
     if array.dtype.names:
         if not set(AXES) <= set(array.dtype.names):
             raise InputError(path, f"has the fields {', '.join(array.dtype.names[:8])}, not x, y, z", COLUMNS_REMEDY)
@@ -204,38 +181,35 @@ def _points_of(array: np.ndarray, path: Path) -> np.ndarray:
 
 
 def _text(path: Path) -> np.ndarray:
-    """Read columns separated by spaces, commas, semicolons or tabs; lines that begin with # or // are comments."""
+    """Read columns separated by spaces, commas, semicolons or tabs; lines that begin with # or // are comments.
+
+    They are the first three columns, or those that a header names x, y and z; a number alone in the first line counts.
+    """
     require_file(path, "no such file", COLUMNS_REMEDY, LARGEST_TEXT_BYTES)
     lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
-    kept = [line for line in lines if line.strip() and not line.lstrip().startswith(("#", "//"))]
-    if not kept:
+    lines = [line for line in lines if line.strip() and not line.lstrip().startswith(("#", "//"))]
+    if not lines:
         raise InputError(path, "has no points", COLUMNS_REMEDY)
-    separator = next((sign for sign in SEPARATORS if sign in kept[0]), None)
-    columns, body = _columns(kept, separator, path)
+    separator = next((sign for sign in SEPARATORS if sign in lines[0]), None)
+    words = [word.strip().strip('"').lower() for word in lines[0].split(separator)]
+    are_numbers, columns = [_is_number(word) for word in words], (0, 1, 2)
+    if not any(are_numbers):
+        if not set(AXES) <= set(words):
+            raise InputError(path, f"has the columns {', '.join(words[:8])}, not x, y, z", COLUMNS_REMEDY)
+        columns = tuple(words.index(axis) for axis in AXES)
+    is_head = not any(are_numbers) or (len(words) == 1 and len(lines) > 1)
+    if not is_head and len(words) < 3:
+        raise InputError(path, f"has {len(words)} columns", COLUMNS_REMEDY)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # of a table without rows
-            text = io.StringIO("\n".join(body))
+            text = io.StringIO("\n".join(lines[is_head:]))
             table = np.loadtxt(text, np.float64, delimiter=separator, ndmin=2, usecols=columns, comments=None)
     except (ValueError, IndexError) as fault:
         raise InputError(path, f"is no table of numbers ({fault})", COLUMNS_REMEDY) from fault
     if table.shape[1] != 3 or not len(table):
         raise InputError(path, "has no points", COLUMNS_REMEDY)
     return table
-
-
-def _columns(lines: list[str], separator: str | None, path: Path) -> tuple[tuple[int, ...], list[str]]:
-    """Return which columns are x, y, z, and the lines below a header, if there is one."""
-    words = [word.strip().strip('"').lower() for word in lines[0].split(separator)]
-    if not any(map(_is_number, words)):
-        if not set(AXES) <= set(words):
-            raise InputError(path, f"has the columns {', '.join(words[:8])}, not x, y, z", COLUMNS_REMEDY)
-        return tuple(words.index(axis) for axis in AXES), lines[1:]
-    if len(words) == 1 and len(lines) > 1 and _is_number(words[0]):  # how many points follow
-        return (0, 1, 2), lines[1:]
-    if len(words) < 3:
-        raise InputError(path, f"has {len(words)} columns", COLUMNS_REMEDY)
-    return (0, 1, 2), lines
 
 
 def _is_number(word: str) -> bool:
@@ -247,30 +221,33 @@ def _is_number(word: str) -> bool:
 
 
 def _kitti(path: Path) -> np.ndarray:
-    values = np.fromfile(path, "<f4")
+    remedy = "give a scan of KITTI, or save it as npy"
     if path.stat().st_size % (4 * KITTI_COLUMNS):
         fault = f"has {path.stat().st_size} bytes, which are no rows of 4 float32 (x, y, z, intensity)"
-        raise InputError(path, fault, "give a scan of KITTI, or save it as npy")
-    points = values.reshape(-1, KITTI_COLUMNS)[:, :3].astype(np.float64)
+        raise InputError(path, fault, remedy)
+    points = np.fromfile(path, "<f4").reshape(-1, KITTI_COLUMNS)[:, :3].astype(np.float64)
     with np.errstate(invalid="ignore"):
         if not (np.abs(points) <= FARTHEST_KITTI).all():
             fault = "holds no rows of 4 float32 (x, y, z, intensity) in meters, as scans of KITTI do"
-            raise InputError(path, fault, "save it as npy")
+            raise InputError(path, fault, remedy)
     return points
 
 
 TABLE_READERS: dict[str, Callable[[Path], np.ndarray]] = {
-    ".npy": _numpy_file,
-    ".npz": _numpy_file,
-    ".xyz": _text,
-    ".csv": _text,
+    **dict.fromkeys((".npy", ".npz"), _numpy_file),
+    **dict.fromkeys((".xyz", ".csv"), _text),
     ".bin": _kitti,
 }
 
 
+def read_table(path: Path) -> np.ndarray:
+    """Return the points (P, 3) float64 of a file of `TABLE_READERS`, in its unit; InputError for anything else."""
+    require_file(path, "no such file", COLUMNS_REMEDY)
+    return TABLE_READERS[path.suffix.lower()](path)
+
+
 PACKAGES = {".las": "laspy", ".laz": "laspy", ".e57": "pye57"}
 INSTALL = {"laspy": "pip install 'laspy[lazrs]'", "pye57": "pip install pye57"}
-CARTESIAN = ("cartesianX", "cartesianY", "cartesianZ")
 
 
 def read_scanner_file(path: Path) -> np.ndarray:
@@ -285,7 +262,14 @@ def read_scanner_file(path: Path) -> np.ndarray:
     except ImportError as fault:
         raise InputError(path, f"needs the package {name}, which is not installed", INSTALL[name]) from fault
     try:
-        return np.asarray(module.read(path).xyz if name == "laspy" else _e57(module, path), np.float64)
+        if name == "laspy":
+            return np.asarray(module.read(path).xyz, np.float64)
+        with closing(module.E57(str(path))) as file:
+            if not file.scan_count:
+                raise InputError(path, "holds no scan", "export it again")
+            scans = [file.read_scan(number, ignore_missing_fields=True) for number in range(file.scan_count)]
+        axes = [[scan[f"cartesian{axis}"] for axis in "XYZ"] for scan in scans]
+        return np.concatenate([np.stack(xyz, axis=1) for xyz in axes]).astype(np.float64)
     except InputError:
         raise
     except Exception as fault:  # of many kinds, some from C++
@@ -293,20 +277,8 @@ def read_scanner_file(path: Path) -> np.ndarray:
         raise InputError(path, f"cannot be read ({fault})", remedy) from fault
 
 
-def _e57(pye57: ModuleType, path: Path) -> np.ndarray:
-    file = pye57.E57(str(path))
-    try:
-        if not file.scan_count:
-            raise InputError(path, "holds no scan", "export it again")
-        scans = [file.read_scan(number, ignore_missing_fields=True) for number in range(file.scan_count)]
-    finally:
-        file.close()
-    return np.concatenate([np.stack([scan[axis] for axis in CARTESIAN], axis=1) for scan in scans])
-
-
 SUFFIXES = (".pcd", ".tar", ".tar.gz", ".tgz")
 READS_ARCHIVES = True  # only a few of the 600 views in a tar are read, so nothing is unpacked
-_View = tuple[str, Callable[[], bytes], str]  # name, reader of its bytes, subject for messages
 
 
 def from_entry(entry: dict, place: Path) -> Iterator[Surface]:
@@ -315,13 +287,12 @@ def from_entry(entry: dict, place: Path) -> Iterator[Surface]:
     return surfaces(paths, entry.get("unit", "m"), entry.get("views_per_instance", 6))
 
 
-def surfaces(paths: Iterable[Path], unit: str = "m", views_per_instance: int = 6) -> Iterator[Surface]:
+def surfaces(paths: Sequence[Path], unit: str = "m", views_per_instance: int = 6) -> Iterator[Surface]:
     """Yield views of each instance of PCD files and tars of them, spread evenly in the order of sequence and frame.
 
     `views_per_instance` is the most of one tar or of the single files. InputError for a damaged file, or a tar without
     PCD.
     """
-    paths = [Path(path) for path in paths]
     scale = meters_per(unit)
     single = [path for path in paths if path.suffix.lower() == ".pcd"]
     for path in single:
@@ -339,7 +310,10 @@ def surfaces(paths: Iterable[Path], unit: str = "m", views_per_instance: int = 6
             yield from _chosen(views, scale, views_per_instance)
 
 
-def _chosen(views: list[_View], scale: float, views_per_instance: int) -> Iterator[Surface]:
+def _chosen(
+    views: list[tuple[str, Callable[[], bytes], str]], scale: float, views_per_instance: int
+) -> Iterator[Surface]:
+    """Yield the chosen of views, each a name, what reads its bytes, and a subject for messages."""
     views = sorted(views, key=lambda view: view_order(view[0]))
     for _, group in groupby(views, key=lambda view: instance_of(view[0])):
         for name, read, subject in evenly(list(group), views_per_instance):

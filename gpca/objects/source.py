@@ -58,14 +58,28 @@ def resolve(entry: dict, data_dir: str | None) -> dict:
             raise InputError(subject, "names no family", "set family in the config")
         module.require_family(entry["family"])
         return {name: value for name, value in entry.items() if name not in FILE_KEYS} | {"origin": PROCEDURAL}
-    if folder := _local_data(entry, data_dir):
-        require_whole_if_ours(folder)
-        if require_entry := getattr(module, "require_entry", None):
-            require_entry(entry, folder)
-        return {**entry, "origin": "local", "location": os.path.abspath(folder)}
+    location, patterns = require_place(entry.get("location") or ""), entry.get("files") or ()
+    for pattern in patterns:
+        remedy = "give one relative to location"
+        if ".." in Path(pattern).parts:
+            raise InputError(f"pattern '{pattern}'", "leads out of location", remedy)
+        try:
+            next(Path(os.devnull).glob(pattern), None)  # nothing is below that, but the pattern is looked at
+        except (ValueError, IndexError, NotImplementedError) as fault:
+            raise InputError(f"pattern '{pattern}'", f"finds no files ({fault})", remedy) from fault
+    for base in folders_of_data(data_dir) if entry.get("location") or patterns else ():
+        if not (folder := require_place(base / location)).exists():
+            continue
+        if not (folder.is_dir() or folder.is_file()):
+            raise InputError(folder, "is neither a folder nor a file", "correct location in the config")
+        if entry.get("location") or all(any(folder.glob(pattern)) for pattern in patterns):
+            require_whole_if_ours(folder)
+            if require_entry := getattr(module, "require_entry", None):
+                require_entry(entry, folder)
+            return {**entry, "origin": "local", "location": os.path.abspath(folder)}
     urls, checksums = _as_list(entry.get("urls") or entry.get("url")), _as_list(entry.get("sha256"))
     if not urls:
-        wanted = entry.get("location") or ", ".join(entry.get("files") or ["location"])
+        wanted = entry.get("location") or ", ".join(patterns or ["location"])
         raise InputError(subject, f"{wanted} does not exist", "correct location, or set data_dir to its parent folder")
     if checksums and len(checksums) != len(urls):
         fault = f"has {len(urls)} url(s) but {len(checksums)} sha256 value(s)"
@@ -123,22 +137,6 @@ def source_modules(entry: dict) -> list[str]:
     return [_kinds()[entry["kind"]]]
 
 
-def _local_data(entry: dict, data_dir: str | None) -> Path | None:
-    location, patterns = require_place(entry.get("location") or ""), entry.get("files")
-    for pattern in patterns or ():
-        _require_pattern(pattern)
-    if not (entry.get("location") or patterns):
-        return None
-    for base in folders_of_data(data_dir):
-        if not (folder := require_place(base / location)).exists():
-            continue
-        if not (folder.is_dir() or folder.is_file()):
-            raise InputError(folder, "is neither a folder nor a file", "correct location in the config")
-        if entry.get("location") or all(any(folder.glob(pattern)) for pattern in patterns or ()):
-            return folder
-    return None
-
-
 def find_file(place: str, data_dir: str | None) -> Path:
     """Return a file that a config names, in `data_dir` or the repository's data; InputError where neither has it."""
     paths = places_of(place, data_dir)
@@ -172,16 +170,6 @@ def require_place(place: str | Path) -> Path:
     if any(real.is_relative_to(system) for system in SYSTEM) and not real.is_relative_to("/dev/shm"):
         raise InputError(place, "is a folder of devices, not of data", "name a folder of files")
     return path
-
-
-def _require_pattern(pattern: str) -> None:
-    remedy = "give one relative to location"
-    if ".." in Path(pattern).parts:
-        raise InputError(f"pattern '{pattern}'", "leads out of location", remedy)
-    try:
-        next(Path(os.devnull).glob(pattern), None)  # nothing is below that, but the pattern is looked at
-    except (ValueError, IndexError, NotImplementedError) as fault:
-        raise InputError(f"pattern '{pattern}'", f"finds no files ({fault})", remedy) from fault
 
 
 def _module_of(kind: object) -> ModuleType:

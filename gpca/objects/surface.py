@@ -64,10 +64,15 @@ def as_points(cloud: Any, role: str) -> np.ndarray:
         if hasattr(cloud, "points"):  # of open3d.geometry.PointCloud, and of trimesh's scans
             values = cloud.points
         elif hasattr(cloud, "point"):  # a map of tensors, of open3d.t.geometry.PointCloud
-            values = _positions(cloud, role)
+            try:
+                values = cloud.point["positions"]
+            except (KeyError, TypeError, RuntimeError) as fault:
+                raise InputError(role, f"is a {type(cloud).__name__} without positions", REMEDY) from fault
         elif hasattr(cloud, "vertices"):
             raise InputError(role, f"is a mesh ({type(cloud).__name__})", "sample points on it first")
-        values = _on_the_cpu(values)
+        for name in ("detach", "cpu", "numpy"):  # of a tensor of torch or Open3D
+            if (method := getattr(values, name, None)) is not None:
+                values = method()
     try:
         points = np.asarray(values, np.float64)
     except (TypeError, ValueError) as fault:
@@ -76,18 +81,3 @@ def as_points(cloud: Any, role: str) -> np.ndarray:
         advice = "transpose it" if points.ndim == 2 and points.shape[0] == 3 else REMEDY
         raise InputError(role, f"has the shape {points.shape}, not (N, 3)", advice)
     return points
-
-
-def _positions(cloud: Any, role: str) -> Any:
-    try:
-        return cloud.point["positions"]
-    except (KeyError, TypeError, RuntimeError) as fault:
-        raise InputError(role, f"is a {type(cloud).__name__} without positions", REMEDY) from fault
-
-
-def _on_the_cpu(tensor: Any) -> Any:
-    """Return a tensor of torch or Open3D as an array; anything else unchanged."""
-    for name in ("detach", "cpu", "numpy"):
-        if (method := getattr(tensor, name, None)) is not None:
-            tensor = method()
-    return tensor

@@ -14,7 +14,6 @@ from gpca.frames.initial_pose import (
     GlobalRegistration,
     InitialPoseSettings,
     displace,
-    error_of,
     estimates_of,
     read_bop_results,
     read_pose_errors,
@@ -103,11 +102,6 @@ def test_errors_are_those_of_the_object_or_of_others_without_symmetry():
     assert drawn(("b", 7)) == {0.1, 0.3}
     with pytest.raises(InputError, match="no estimator has a result for an object without symmetry"):
         EstimatorErrors(symmetric=()).draw(("a", 1), random)
-
-
-def test_an_error_takes_the_true_pose_to_the_estimated_one():
-    true, estimated = pose(0.1, 0.8), pose(0.3, 0.9)
-    assert np.allclose(true @ error_of(true, estimated), estimated)
 
 
 def test_a_file_of_errors_is_read_in_metres_and_of_known_objects(tmp_path):

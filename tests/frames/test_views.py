@@ -11,7 +11,8 @@ from gpca.alignment.rigid import inverse, transform
 from gpca.config.check import check
 from gpca.config.layers import without_false
 from gpca.errors import InputError
-from gpca.frames import bop, camera
+from gpca.frames import bop
+from gpca.objects import camera
 from gpca.objects.canonical import ObjectClouds, write_objects
 from gpca.objects.source import data_files, resolve, source_modules
 from gpca.objects.source import surfaces as surfaces_of

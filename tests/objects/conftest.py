@@ -6,16 +6,11 @@ import pytest
 
 
 class Handler(http.server.SimpleHTTPRequestHandler):
-    """Serves a folder; short.* ends before the length that was announced; drip*.* comes byte by byte and never ends."""
+    """Serves a folder; short.* ends before the length that was announced."""
 
     def do_GET(self):
         self.server.requests.append(self.path)
-        if "drip" in self.path:
-            self.close_connection = True
-            self.wfile.write(b"HTTP/1.0 200 OK\r\n" if "head" in self.path else b"HTTP/1.0 200 OK\r\n\r\n")
-            while not self.server.stopped.wait(0.05):
-                self.wfile.write(b"x")
-        elif "short" in self.path:
+        if "short" in self.path:
             self.send_response(200)
             self.send_header("Content-Length", "1000")
             self.end_headers()
@@ -33,11 +28,9 @@ def server(tmp_path_factory, monkeypatch):
     monkeypatch.setenv("NO_PROXY", "127.0.0.1")
     folder = tmp_path_factory.mktemp("served")
     with http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Handler, directory=folder)) as server:
-        server.stopped = threading.Event()
         server.requests, server.folder, server.url = [], folder, f"http://127.0.0.1:{server.server_port}"
         thread = threading.Thread(target=server.serve_forever, args=[0.02])
         thread.start()
         yield server
-        server.stopped.set()
         server.shutdown()
         thread.join()

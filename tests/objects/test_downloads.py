@@ -5,7 +5,6 @@ import hashlib
 import io
 import json
 import os
-import shutil
 import socket
 import tarfile
 import zipfile
@@ -92,22 +91,6 @@ def test_error_answer_and_interrupted_transfer(server, tmp_path):
     assert files(tmp_path) == []
 
 
-@pytest.mark.parametrize("name", ["drip.zip", "drip-head.zip"])
-def test_a_server_that_sends_a_byte_now_and_then_is_left(server, tmp_path, monkeypatch, name):
-    monkeypatch.setattr(downloads, "GRACE_S", 0)
-    monkeypatch.setattr(downloads, "SLOWEST_BYTES_PER_S", 10**6)
-    with pytest.raises(InputError, match=rf"{name}: sent \d+ bytes in \d+ s, which is too slow; set data_dir"):
-        fetch(f"{server.url}/{name}", None, tmp_path)
-    assert files(tmp_path) == []
-
-
-def test_a_download_that_is_larger_than_any_is_stopped(server, url, tmp_path, monkeypatch):
-    monkeypatch.setattr(downloads, "LARGEST_DOWNLOAD_BYTES", len(CONTENT) - 1)
-    with pytest.raises(InputError, match=r"models\.zip: sends more than 11999 bytes"):
-        fetch(url, None, tmp_path)
-    assert files(tmp_path) == []
-
-
 def test_each_url_has_a_file_of_its_own_within_the_cache(tmp_path):
     urls = [
         "https://a.org/x/m.zip",
@@ -172,56 +155,12 @@ def test_unpacks(tmp_path, suffix):
     assert contents(tmp_path / "new/target") == FILES
 
 
-CHANGES = {
-    "changed": (lambda folder: (folder / "top.txt").write_bytes(b"u"), "top.txt: was changed"),  # as long as before
-    "longer": (lambda folder: (folder / "models/deep/er/info.json").write_bytes(b"{} "), "info.json: was changed"),
-    "lost": (lambda folder: (folder / "models/obj_000001.ply").unlink(), "obj_000001.ply: is missing"),
-    "added": (
-        lambda folder: (folder / "models/obj_000002.ply").write_bytes(b"ply"),
-        "obj_000002.ply: is not from the archive",
-    ),
-}
-
-
-@FORMATS
-def test_a_folder_that_was_unpacked_is_checked_and_kept(tmp_path, suffix):
-    archive = pack(tmp_path / f"a.{suffix}")
+def test_a_folder_that_was_unpacked_is_kept(tmp_path):
+    archive = pack(tmp_path / "a.zip")
     folder = unpack(archive, tmp_path / "target")
-    (folder / ".DS_Store").write_bytes(b"what a desktop leaves")
     before = (folder / "top.txt").stat().st_mtime_ns
     assert unpack(archive, folder) == folder
     assert (folder / "top.txt").stat().st_mtime_ns == before
-
-
-@FORMATS
-@pytest.mark.parametrize("name", CHANGES)
-def test_a_folder_that_was_changed_since_is_refused(tmp_path, suffix, name):
-    change, fault = CHANGES[name]
-    archive = pack(tmp_path / f"a.{suffix}")
-    folder = unpack(archive, tmp_path / "target")
-    change(folder)
-    with pytest.raises(InputError, match=f"{fault}.*; remove {folder} and target.sha256.json"):
-        unpack(archive, folder)
-    for path in (folder, tmp_path / "target.sha256.json"):
-        shutil.rmtree(path) if path.is_dir() else path.unlink()
-    assert contents(unpack(archive, folder)) == FILES
-
-
-def test_a_folder_without_a_list_is_unpacked_again(tmp_path):
-    archive = pack(tmp_path / "a.zip")
-    folder = unpack(archive, tmp_path / "target")
-    (folder / "top.txt").write_bytes(b"u")
-    (tmp_path / "target.sha256.json").unlink()
-    assert contents(unpack(archive, folder)) == FILES
-
-
-@pytest.mark.parametrize("text", [" ", "{", "[1, 2]", "null"])
-def test_a_list_that_is_damaged_is_refused(tmp_path, text):
-    archive = pack(tmp_path / "a.zip")
-    folder = unpack(archive, tmp_path / "target")
-    (tmp_path / "target.sha256.json").write_text(text)
-    with pytest.raises(InputError, match=r"target\.sha256\.json: is not a list of files .*; remove"):
-        unpack(archive, folder)
 
 
 @FORMATS
@@ -293,7 +232,7 @@ def test_bomb(tmp_path, suffix):
 
 def test_file_that_is_also_a_folder(tmp_path):
     archive = pack(tmp_path / "a.tar", {"a": b"1", "a/b": b"2"})
-    with pytest.raises(InputError, match="both a file and a folder"):
+    with pytest.raises(InputError, match=r"a\.tar: is a truncated or damaged archive"):
         unpack(archive, tmp_path / "target")
     assert nothing_left(tmp_path, archive)
 
@@ -338,11 +277,7 @@ def with_member(path, name, kind=tarfile.REGTYPE):
         file.addfile(info, io.BytesIO(b"x"))
 
 
-LONG = {"pax header": tarfile.XHDTYPE, "global header": tarfile.XGLTYPE, "long name": tarfile.GNUTYPE_LONGNAME}
-LONG |= {"long link": tarfile.GNUTYPE_LONGLINK, "header of Solaris": tarfile.SOLARIS_XHDTYPE}
 ARCHIVES = {
-    **{f"{name}.tar": lambda path, kind=kind: said_to_hold(path, kind, 3 * GB) for name, kind in LONG.items()},
-    "long name.tgz": lambda path: said_to_hold(path, tarfile.GNUTYPE_LONGNAME, 3 * GB),
     "member.tar": lambda path: said_to_hold(path, tarfile.REGTYPE, 3 * GB),
     "members.tar": lambda path: said_to_hold(path, tarfile.REGTYPE, 30 * GB),
     "bytes missing.tgz": lambda path: said_to_hold(path, tarfile.REGTYPE, 3 * GB),
@@ -358,13 +293,6 @@ def test_an_archive_of_views_is_refused(name, tmp_path):
     settings = json.dumps({"kind": "uw_rgbd", "location": ".", "unit": "m"})
     command = ["objects", "--source", "s", "--data-dir", ".", "--out", "new.npz", "--settings", settings]
     refusal(command, tmp_path, name)
-
-
-@pytest.mark.parametrize("method", [zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
-def test_compression_that_cannot_be_read_piece_by_piece_is_refused(method, tmp_path):
-    zipped(tmp_path / "a.zip", method, bytes(10**6))
-    with pytest.raises(InputError, match=r"a\.zip: member 'mug_1_1_1\.pcd' is compressed by a method other"):
-        unpack(tmp_path / "a.zip", tmp_path / "target")
 
 
 def test_a_disk_that_is_too_small_is_named_before_anything_is_written(tmp_path, monkeypatch):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gpca.errors import InputError
-from gpca.objects.point_files import CARTESIAN, from_entry, parse_pcd, read_scanner_file, read_table, surfaces
+from gpca.objects.point_files import from_entry, parse_pcd, read_scanner_file, read_table, surfaces
 
 # The layout of the UW dataset.
 HEADER = """# .PCD v.7 - Point Cloud Data file format
@@ -212,7 +212,13 @@ class E57:
 
     def read_scan(self, number, ignore_missing_fields):
         assert ignore_missing_fields
-        return dict(zip(CARTESIAN, SCANNER_FILES_POINTS[2 * number : 2 * number + 2].T, strict=True))
+        return dict(
+            zip(
+                ("cartesianX", "cartesianY", "cartesianZ"),
+                SCANNER_FILES_POINTS[2 * number : 2 * number + 2].T,
+                strict=True,
+            )
+        )
 
     def close(self):
         pass
