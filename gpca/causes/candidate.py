@@ -3,10 +3,9 @@
 A cause that is not there is small, not zero: a start is never perfect, a sensor never without noise, a surface never
 whole. Without this, any trace of a cause would give away that it was applied.
 
-All lengths are relative to the object's diameter. The observed cloud is kept in the model's frame, in which the true
-pose is the identity; a pose error is where the registration starts. ICP aligns the model to the observed cloud, so that
-missing surface hurts: every point of the model looks for a partner. It may be asked to run the other way
-(:attr:`gpca.causes.settings.CauseSettings.moved`).
+Lengths are in diameters. The observed cloud is kept in the model's frame, in which the true pose is the identity; a
+pose error is where the registration starts. ICP aligns the model to the observed cloud, so that missing surface hurts:
+every point of the model looks for a partner; or the other way (:attr:`gpca.causes.settings.CauseSettings.moved`).
 """
 
 from __future__ import annotations
@@ -20,8 +19,8 @@ import numpy as np
 from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.rigid import exp, inverses, random_direction, transform
 from gpca.causes.dataset import Causes
-from gpca.causes.settings import FEWEST_POINTS, OBSERVED, CauseSettings, CauseSeverities
-from gpca.causes.truth import ALL, NONE, SUBSETS, capped
+from gpca.causes.settings import FEWEST_POINTS, OBSERVED, CauseSettings
+from gpca.causes.truth import NONE, SUBSETS, capped
 from gpca.errors import InputError
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.perturbation import CONCEPTS, NOISE, OVERLAP, POSE, displacement, within_half_space
@@ -29,6 +28,7 @@ from gpca.seeds import generator
 from gpca.uncertainty.settings import UncertaintySettings
 from gpca.uncertainty.spread import Runs, divergence
 
+REPRODUCED = 1e-3  # diameters; points that are drawn again lie no farther from those of a file, which are rounded
 CAUSE_OF = {"noise": NOISE, "outliers": NOISE, "rotation_rad": POSE, "translation": POSE, "crop": OVERLAP}
 
 
@@ -41,38 +41,33 @@ def draw_applied(settings: CauseSettings, random: np.random.Generator) -> np.nda
 class Candidate:
     """A pair and all causes that may be applied to it.
 
-    Attributes:
-        applied: (3,) which of noise, pose and overlap are.
-        model: (P, 3) points of the model.
-        clean, noisy: (Q, 3) other points of the surface with a sensor's least noise, and with jitter and outliers.
-        seen, kept: rows of them that a small gap leaves, and those that an occlusion leaves.
-        T_near, T_init: 4×4, where a good start is, and where a pose error starts: they take what was observed to a
-            wrong place in the model's frame.
-        severity: by name; small where not applied.
-        model_at_truth: (P, 3) the model where no pose error is, if it is rendered where the registration starts; None
-            where it is the same everywhere.
-        toward_hidden: (3,) unit vector along which the surface was cut off; None where no half-space has cut it.
+    Poses, 4×4, take what was observed to a wrong place in the model's frame.
     """
 
-    applied: np.ndarray
-    model: np.ndarray
-    clean: np.ndarray
-    noisy: np.ndarray
-    seen: np.ndarray
-    kept: np.ndarray
-    T_near: np.ndarray
-    T_init: np.ndarray
-    severity: dict[str, float]
-    model_at_truth: np.ndarray | None = None
-    toward_hidden: np.ndarray | None = None
+    applied: np.ndarray  # (3,) which of noise, pose and overlap are
+    model: np.ndarray  # (P, 3)
+    clean: np.ndarray  # (Q, 3) other points of the surface with a sensor's least noise,
+    noisy: np.ndarray  # and with jitter and outliers
+    seen: np.ndarray  # rows of them that a small gap leaves,
+    kept: np.ndarray  # and those that an occlusion leaves
+    T_near: np.ndarray  # where a good start is,
+    T_init: np.ndarray  # and where a pose error starts
+    severity: dict[str, float]  # small where not applied
+    model_at_truth: np.ndarray | None = None  # (P, 3) where there is no pose error, if that changes the model's points
+    toward_hidden: np.ndarray | None = None  # (3,) unit vector along which a half-space has cut the surface off
+
+    @property
+    def present(self) -> tuple[int, ...]:
+        """The numbers of the causes that are applied."""
+        return tuple(np.flatnonzero(self.applied).tolist())
 
     def observed(self, causes: tuple[int, ...]) -> np.ndarray:
-        """Return the observed cloud with these of the applied causes."""
+        """Return the cloud with these of the applied causes."""
         points = self.noisy if NOISE in causes else self.clean
         return points[self.kept if OVERLAP in causes else self.seen]
 
     def reference(self, causes: tuple[int, ...]) -> np.ndarray:
-        """Return the model's points that a registration with these of the applied causes is given."""
+        """Return the model's points with these of the applied causes."""
         return self.model if POSE in causes or self.model_at_truth is None else self.model_at_truth
 
     def changing_reference(self, causes: tuple[int, ...]) -> tuple[int, ...]:
@@ -80,26 +75,27 @@ class Candidate:
         return () if self.model_at_truth is None else tuple(cause for cause in causes if cause == POSE)
 
     def start(self, causes: tuple[int, ...]) -> np.ndarray:
-        """Return the pose, 4×4, that a registration with these of the applied causes starts from."""
+        """Return where a registration with these of the applied causes starts."""
         return self.T_init if POSE in causes else self.T_near
 
 
 def draw_candidate(
     surface: np.ndarray, applied: np.ndarray, settings: CauseSettings, random: np.random.Generator
 ) -> Candidate:
-    """Draw the points and the severities of a candidate.
+    """Draw the points, of the object's (N, 3), and the severities of a candidate.
 
     What is small where a cause is not applied is the same perturbation with a smaller severity: along the same axes,
     away from the same side. The number of points is that of what remains, so that it tells nothing about the surface
     that is missing.
-
-    Args:
-        surface: (N, 3) points of the object, of which model and observation take different ones.
-        applied: (3,) of :func:`draw_applied`.
     """
     fewest, most = settings.points
     counts = np.exp(random.uniform(np.log(fewest), np.log(most), size=2)).round().astype(int)
-    strong, small = (_severities(ranges, random) for ranges in (settings.severities, settings.small.ranges()))
+    strong, small = (
+        {part.name: random.uniform(*getattr(ranges, part.name)) for part in fields(ranges)}
+        for ranges in (settings.severities, settings.small.ranges())
+    )
+    for level in (strong, small):
+        level["rotation_rad"] = float(np.deg2rad(level.pop("rotation_deg")))
     severity = {name: (strong if applied[cause] else small)[name] for name, cause in CAUSE_OF.items()}
     n_model, n_seen = np.minimum(counts, len(surface) // 2)
     n_observed = min(round(n_seen / (1 - severity["crop"])), len(surface) - n_model)
@@ -138,11 +134,6 @@ def redrawn(candidate: Candidate, surface: np.ndarray, random: np.random.Generat
     return replace(candidate, model=model, clean=clean, seen=seen)
 
 
-def _severities(ranges: CauseSeverities, random: np.random.Generator) -> dict[str, float]:
-    drawn = {part.name: random.uniform(*getattr(ranges, part.name)) for part in fields(ranges)}
-    return drawn | {"rotation_rad": float(np.deg2rad(drawn.pop("rotation_deg")))}
-
-
 class Unmeasurable(Exception):
     """A candidate has no truth; the text says why."""
 
@@ -150,8 +141,7 @@ class Unmeasurable(Exception):
 class Registrar:
     """Registers one candidate from any starts; what several calls share is computed once.
 
-    Args:
-        misses: whether runs may all find no correspondence, and so stay where they started; else that is refused.
+    With `misses`, runs may all find no correspondence, and so stay where they started; else that is refused.
     """
 
     def __init__(self, candidate: Candidate, settings: CauseSettings, misses: bool = False) -> None:
@@ -163,12 +153,8 @@ class Registrar:
     def run(self, causes: tuple[int, ...], xi_n_6: np.ndarray) -> Runs:
         """Register with these causes from the starts exp(ξ) T_init.
 
-        Returns:
-            the runs, whose poses take what was observed to the model: the identity is right. The inlier RMSE of a run
-            without any correspondence is the correspondence distance: 0 would be the best there is.
-
-        Raises:
-            Unmeasurable: no run found a correspondence, unless that is allowed, or a pose is not finite.
+        Poses take what was observed to the model: the identity is right. The inlier RMSE of a run without any
+        correspondence is the correspondence distance: 0 would be the best there is. Raises Unmeasurable.
         """
         starts_n = exp(xi_n_6) @ self.candidate.start(causes)
         observed, model = self.candidate.observed(causes), self.candidate.reference(causes)
@@ -197,10 +183,8 @@ class Registrar:
 class Counterfactuals:
     """The errors and uncertainties of one candidate, each measured when it is first asked for.
 
-    Args:
-        registrar: of the candidate.
-        errors: of poses (n, 4, 4) of its object's points, in diameters.
-        xi_n_6: twists of the starts, the same for every subset.
+    All may raise Unmeasurable. `errors` are those of poses (n, 4, 4) of the object's points, in diameters; the starts
+    exp(ξ) are the same for every subset.
     """
 
     def __init__(
@@ -217,19 +201,15 @@ class Counterfactuals:
         self._measured: dict[tuple[int, ...], tuple[float, np.ndarray]] = {}
 
     def error(self, subset: int) -> float:
-        """Return v, the mean error over the starts, in diameters.
-
-        Raises:
-            Unmeasurable: see :meth:`Registrar.run`; also an error that is not finite.
-        """
+        """Return v, the mean error over the starts, in diameters."""
         return self._measure(subset)[0]
 
     def uncertainty(self, subset: int) -> float:
-        """Return u against the clean pair, nats. Raises Unmeasurable as :meth:`error` does."""
+        """Return u against the clean pair, nats."""
         return float(divergence(self.covariance(NONE), self.covariance(subset), self._floor))
 
     def covariance(self, subset: int) -> np.ndarray:
-        """Return Σ (6, 6) of the poses. Raises Unmeasurable as :meth:`error` does."""
+        """Return Σ (6, 6) of the poses."""
         return self._measure(subset)[1]
 
     def _measure(self, subset: int) -> tuple[float, np.ndarray]:
@@ -245,51 +225,38 @@ class Counterfactuals:
         return self._measured[causes]
 
 
-@dataclass(frozen=True)
-class Replay:
-    """One sample under every subset of its causes.
+def drawn_again(
+    objects: ObjectClouds, causes: Causes, row: int, source: str, seed: int, settings: CauseSettings
+) -> tuple[Candidate, np.ndarray]:
+    """Return the candidate that a sample is, drawn again, and the points (N, 3) of its object in diameters.
 
-    Attributes:
-        model: (P, 3) in diameters.
-        observed: for each of the eight subsets the observed cloud (Q, 3) where ICP put it in the model's frame.
-    """
-
-    model: np.ndarray
-    observed: list[np.ndarray]
-
-
-def surface_of(objects: ObjectClouds, causes: Causes, row: int) -> np.ndarray:
-    """Return the points (N, 3) of a sample's object, in diameters."""
-    index = int(causes.registrations.object_index[row])
-    return objects.points(index).astype(np.float64) / float(objects.diameters_m[index])
-
-
-def candidate_of(
-    causes: Causes, row: int, surface: np.ndarray, source: str, seed: int, settings: CauseSettings
-) -> Candidate:
-    """Return the candidate that a sample is, drawn again from the points of its object and the same settings."""
-    random = generator(source, seed, "causes", str(causes.registrations.split[row]), int(causes.candidate[row]))
-    return draw_candidate(surface, draw_applied(settings, random), settings, random)
-
-
-def replay(objects: ObjectClouds, causes: Causes, row: int, source: str, seed: int, settings: CauseSettings) -> Replay:
-    """Return the results of ICP under each subset from the initial pose itself.
-
-    Raises:
-        InputError: the objects or the settings are not those that the sample was drawn with.
+    Raises InputError where the sample was drawn from other objects or with other settings.
     """
     registrations = causes.registrations
-    candidate = candidate_of(causes, row, surface_of(objects, causes, row), source, seed, settings)
+    index = int(registrations.object_index[row])
+    surface = objects.points(index).astype(np.float64) / float(objects.diameters_m[index])
+    random = generator(source, seed, "causes", str(registrations.split[row]), int(causes.candidate[row]))
+    candidate = draw_candidate(surface, draw_applied(settings, random), settings, random)
+    present = candidate.present
+    drawn, shown = transform(candidate.start(present), candidate.observed(present)), registrations.source(row)
+    if drawn.shape != shown.shape or np.abs(drawn - shown).max() > REPRODUCED:
+        subject = f"sample {registrations.sample[row]} of {source}, seed {seed}"
+        raise InputError(subject, "is not reproduced by these settings", "regenerate the causes from a single config")
+    return candidate, surface
+
+
+def replay(
+    objects: ObjectClouds, causes: Causes, row: int, source: str, seed: int, settings: CauseSettings
+) -> tuple[np.ndarray, list[np.ndarray]]:
+    """Return a sample's model, in diameters, and under each subset of its causes the cloud where ICP put it.
+
+    ICP starts from the initial pose itself. See :func:`drawn_again` for faults.
+    """
+    candidate, _ = drawn_again(objects, causes, row, source, seed, settings)
     registrar = Registrar(candidate, settings)
     observed = []
-    for present in SUBSETS:
-        applied = tuple(cause for cause in present if candidate.applied[cause])
+    for subset in SUBSETS:
+        applied = tuple(cause for cause in subset if candidate.applied[cause])
         runs = registrar.run(applied, np.zeros((1, 6)))
         observed.append(transform(runs.T_target_source_n[0], candidate.observed(applied)))
-    shown = registrations.cloud(row)
-    if shown.shape != observed[ALL].shape or np.abs(observed[ALL] - shown).max() > 1e-3:
-        fault = "is not reproduced by these settings"
-        raise InputError(
-            f"sample {registrations.sample[row]} of {source}", fault, "regenerate the causes from a single config"
-        )
-    return Replay(candidate.model, observed)
+    return candidate.model, observed

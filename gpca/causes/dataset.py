@@ -25,26 +25,20 @@ class Causes(Container):
         registrations: as everywhere, the observed cloud is the source and the model the target: the source lies where
             ICP put it, in the model's frame. ICP itself ran the other way. ``concept`` is the one that adds most to the
             error, in any state; only for the failed does it mean much.
-        applied: (S, 3) which causes were applied.
-        symmetric: (S,) the error is ADD-S.
-        severity_outliers: (S,) share of the points, 0 where noise was not applied.
-        candidate: (S,) number of the candidate within its split.
-        T_target_source_runs: (S, n, 4, 4) what ICP found from n starts around the initial pose, in meters; the first is
-            the initial pose itself. They are for explainers, and not the runs that the truth was measured by.
-        fitness_runs, inlier_rmse_runs: (S, n) of these.
-        error_shown: (S,) min(ADD(-S), d/2) / d of the registration that is shown, the first of these runs. The truth is
-            a mean over others, so this one may be right where the truth says failed, and the reverse.
-        truth: of all S.
         truth_again: of the T test samples, measured from other starts: how well anything could do.
+        T_target_source_runs: what ICP found from n starts around the initial pose, in meters; the first is the initial
+            pose itself. They are for explainers, and not the runs that the truth was measured by.
+        error_shown: min(ADD(-S), d/2) / d of the registration that is shown, the first of these runs. The truth is a
+            mean over others, so this one may be right where the truth says failed, and the reverse.
     """
 
     registrations: Registrations
     truth: Truth
     truth_again: Truth
     applied: np.ndarray = array("S 3", FLAG)
-    symmetric: np.ndarray = array("S", FLAG)
-    severity_outliers: np.ndarray = array("S")
-    candidate: np.ndarray = array("S", WHOLE)
+    symmetric: np.ndarray = array("S", FLAG)  # the error is ADD-S
+    severity_outliers: np.ndarray = array("S")  # share of the points, 0 where noise was not applied
+    candidate: np.ndarray = array("S", WHOLE)  # its number within its split
     T_target_source_runs: np.ndarray = array("S n 4 4")
     fitness_runs: np.ndarray = array("S n")
     inlier_rmse_runs: np.ndarray = array("S n")
@@ -55,7 +49,7 @@ class Causes(Container):
         return self.registrations.rows(split)
 
     def subset(self, rows: np.ndarray) -> Causes:
-        """Return the given rows, in the given order."""
+        """Return the given rows."""
         test_row = np.cumsum(self.registrations.split == "test") - 1
         tested = rows[self.registrations.split[rows] == "test"]
         return replace(
@@ -75,7 +69,7 @@ class Causes(Container):
 
     @classmethod
     def load(cls, path: str | Path, expected: Axes | Container | None = None) -> Causes:
-        """Read the npz; see :meth:`gpca.io.container.Container.load`."""
+        """Read the npz."""
         registrations = Registrations.load(path, expected)
         tested = int((registrations.split == "test").sum())
         shapes: Shapes = dict.fromkeys(MEASURED, (len(registrations), len(SUBSETS))) | dict.fromkeys(LIMITS, ())
@@ -109,13 +103,13 @@ def observed_only(registrations: Registrations) -> Registrations:
 
 
 def labeled(causes: Causes) -> Registrations:
-    """Return the registrations with their labels in the place of the concepts, and the sets of causes attached.
+    """Return the registrations as an explainer learns them, with their labels in the place of the concepts.
 
-    An explainer that learns gets these; ``causes`` (S, 3) is 1 where a concept is one of the causes.
+    The attached ``causes`` (S, 3) are 1 where a concept is one of the causes.
     """
-    truth = {"causes": causes.truth.causes.astype(float)}
     own = causes.registrations
-    return replace(own, concept=labels_of(causes.truth), attached={**own.attached, **truth})
+    attached = {**own.attached, "causes": causes.truth.causes.astype(float)}
+    return replace(own, concept=labels_of(causes.truth), attached=attached)
 
 
 def with_label(causes: Causes) -> Registrations:

@@ -22,7 +22,7 @@ from gpca.alignment.pose_error import displacements
 from gpca.alignment.rigid import exp, inverse, inverses, log, scale_translation
 from gpca.causes.dataset import Causes
 from gpca.causes.settings import DENSITIES, GROUPS, MOTION, QUANTILES, REMEDIED, DescriptorSettings
-from gpca.causes.truth import LARGEST_ERROR, SUBSETS, shapley_values
+from gpca.causes.truth import SUBSETS, capped, shapley_values
 from gpca.io.arrays import TEXT, WHOLE
 from gpca.io.container import Container, array
 from gpca.pairs.distances import ENTROPY, ObservedPair, describe_distances, describe_entropy
@@ -40,80 +40,33 @@ def describe_remedied(pair: ObservedPair, settings: DescriptorSettings, icp: ICP
     Last, the share of the points that denoising takes for outliers, and how far it smooths.
     """
     observed = pair.observed[generator(*pair.axes, "remedies").permutation(len(pair.observed))]
-    cleaned = denoise(observed)
-    starts = _starts(pair, settings)
-    model = pair.model[: settings.icp_points]
-    results = []
-    for present in SUBSETS:
-        cloud = (observed if NOISE in present else cleaned)[: settings.icp_points]
-        onto_observed = OVERLAP in present
-        results.append(_register(cloud, model, starts[POSE in present], onto_observed, icp))
-    truth = results[0].best
-    error_8 = np.array(
-        [
-            results[0].best_error(truth, observed),
-            *(
-                result.mean_error(truth, observed) if POSE in present else result.best_error(truth, observed)
-                for present, result in zip(SUBSETS[1:], results[1:], strict=True)
-            ),
-        ]
-    )
-    return np.concatenate(
-        [
-            error_8,
-            shapley_values(error_8[None])[0],
-            displacements(np.array([result.best for result in results]), observed),
-            [result.cost_n.min() for result in results],
-            [result.fitness_n[result.cost_n.argmin()] for result in results],
-            [1 - len(cleaned) / len(observed)],
-            [np.sqrt(np.square(cKDTree(cleaned).query(observed)[0]).mean())],
-        ]
-    )
-
-
-@dataclass(frozen=True)
-class _Results:
-    """Poses (n, 4, 4) of the observed cloud relative to where ICP put it, with cost and fitness (n,)."""
-
-    T_n: np.ndarray
-    cost_n: np.ndarray
-    fitness_n: np.ndarray
-
-    @property
-    def best(self) -> np.ndarray:
-        return self.T_n[self.cost_n.argmin()]
-
-    def mean_error(self, truth: np.ndarray, points: np.ndarray) -> float:
-        return float(_errors(self.T_n, truth, points).mean())
-
-    def best_error(self, truth: np.ndarray, points: np.ndarray) -> float:
-        return float(_errors(self.best[None], truth, points)[0])
-
-
-def _errors(T_n: np.ndarray, truth: np.ndarray, points: np.ndarray) -> np.ndarray:
-    return np.minimum(displacements(T_n @ inverse(truth), points), LARGEST_ERROR)
-
-
-def _starts(pair: ObservedPair, settings: DescriptorSettings) -> dict[bool, np.ndarray]:
-    """Return the starts (k, 4, 4) where the pose error is left alone, and the restart's: farther off, and more."""
+    cleaned, model = denoise(observed), pair.model[: settings.icp_points]
     random = generator(*pair.axes, "restarts")
-    near_k_6, far_k_6 = settings.twists(
-        random.normal(size=(settings.starts, 6)), random.normal(size=(settings.restarts, 6))
-    )
-    near_k_6[0] = far_k_6[0] = 0
-    return {True: exp(near_k_6) @ pair.T_init, False: exp(far_k_6) @ pair.T_init}
-
-
-def _register(
-    observed: np.ndarray, model: np.ndarray, starts_n: np.ndarray, onto_observed: bool, icp: ICPSettings
-) -> _Results:
-    """Align the model to the observed cloud, as the registration did, or the observed cloud to the model."""
-    if onto_observed:
-        T_n, fitness_n, rmse_n = BatchedICP(observed, icp).register(model, inverses(starts_n))
-        T_n = inverses(T_n)
-    else:
-        T_n, fitness_n, rmse_n = BatchedICP(model, icp).register(observed, starts_n)
-    return _Results(T_n, clipped_cost(fitness_n, rmse_n, icp.correspondence_distance), fitness_n)
+    normal_k_6 = random.normal(size=(settings.starts, 6)), random.normal(size=(settings.restarts, 6))
+    twists = settings.twists(*normal_k_6)
+    for xi_k_6 in twists:
+        xi_k_6[0] = 0
+    near_k, far_k = (exp(xi_k_6) @ pair.T_init for xi_k_6 in twists)
+    counted, best_8, cost_8, fitness_8 = [], [], [], []
+    for alone in SUBSETS:
+        cloud = (observed if NOISE in alone else cleaned)[: settings.icp_points]
+        starts_k = near_k if POSE in alone else far_k
+        if OVERLAP in alone:  # the model is aligned to the observed cloud, as the registration did
+            T_k, fitness_k, rmse_k = BatchedICP(cloud, icp).register(model, inverses(starts_k))
+            T_k = inverses(T_k)
+        else:
+            T_k, fitness_k, rmse_k = BatchedICP(model, icp).register(cloud, starts_k)
+        cost_k = clipped_cost(fitness_k, rmse_k, icp.correspondence_distance)
+        best = cost_k.argmin()
+        counted.append(T_k if POSE in alone else T_k[[best]])
+        best_8.append(T_k[best])
+        cost_8.append(cost_k[best])
+        fitness_8.append(fitness_k[best])
+    back = inverse(best_8[0])  # with all remedies
+    error_8 = np.array([capped(displacements(T_k @ back, observed)).mean() for T_k in counted])
+    smoothed = np.sqrt(np.square(cKDTree(cleaned).query(observed)[0]).mean())
+    phi_3, moved_8 = shapley_values(error_8[None])[0], displacements(np.array(best_8), observed)
+    return np.concatenate([error_8, phi_3, moved_8, cost_8, fitness_8, [1 - len(cleaned) / len(observed), smoothed]])
 
 
 SPREAD_FLOOR = 1e-4  # of the spread's variances, as in the truth (docs/causes.md)
@@ -134,34 +87,24 @@ EVERYTHING: Columns = dict.fromkeys(GROUPS, EVERY)
 # Every other quantile of the three distances, and all of the motion.
 RESIDUALS: Columns = {"distances": slice(0, 3 * QUANTILES, 2), "motion": EVERY}
 
-_MOVED, _FIT, _SPREAD = MOTION[:3], MOTION[3:5], MOTION[5:]
-_QUICK = [
-    name
-    for name in REMEDIED
-    if name in ("outliers", "smoothed")
+_QUICK = {"outliers", "smoothed"} | {
     # The errors of the others are relative to the result with all remedies, a restart among them.
-    or name in [f"{what}_{i}" for what in ("moved", "cost", "fitness") for i, of in enumerate(SUBSETS) if POSE in of]
-]
+    *(f"{what}_{i}" for what in ("moved", "cost", "fitness") for i, alone in enumerate(SUBSETS) if POSE in alone),
+}
 COLUMNS: Mapping[str, Columns] = {
     # The observed cloud's thickness, spacing, extent and number of points.
     "source": {"distances": slice(3 * QUANTILES, None), "planes": DENSITIES[::2]},
-    "pair": {"distances": EVERY, "planes": EVERY, "entropy": EVERY, "motion": [MOTION.index(name) for name in _FIT]},
-    "motion": {"motion": [MOTION.index(name) for name in _MOVED]},
-    "runs": {"motion": [MOTION.index(name) for name in _SPREAD], "starts": EVERY},
-    "quick_remedies": {"remedied": [REMEDIED.index(name) for name in _QUICK]},
+    "pair": {"distances": EVERY, "planes": EVERY, "entropy": EVERY, "motion": slice(3, 5)},  # how well it fits
+    "motion": {"motion": slice(0, 3)},
+    "runs": {"motion": slice(5, None), "starts": EVERY},  # the spread
+    "quick_remedies": {"remedied": [column for column, name in enumerate(REMEDIED) if name in _QUICK]},
     "remedies": {"remedied": EVERY},
 }
 
 
 @dataclass(frozen=True)
 class Descriptors(Container):
-    """The descriptors of S registrations.
-
-    Attributes:
-        sample, split: (S,) as in the registrations.
-        distances, planes, motion, starts, remedied, entropy: (S, F) groups; see the functions that
-            describe them.
-    """
+    """The descriptors of S registrations in groups; see the functions that describe them."""
 
     sample: np.ndarray = array("S", WHOLE)
     split: np.ndarray = array("S", TEXT)
@@ -198,22 +141,16 @@ def observed_pair(causes: Causes, row: int, *axes: object) -> ObservedPair:
 
 
 def describe_motion(pair: ObservedPair) -> np.ndarray:
-    """Return the numbers of :data:`gpca.causes.settings.MOTION`, in radians and diameters.
-
-    Angle, length and displacement from the initial pose; the fit; and the spread of the runs from other starts.
-    """
+    """Return the numbers of :data:`gpca.causes.settings.MOTION`, in radians and diameters."""
     moved = log(inverse(pair.T_init)[None])[0]
     covariance = np.cov(log(pair.T_runs), rowvar=False)
     variance_6 = np.diag(covariance)
     return np.array(
         [
-            np.sqrt(np.square(moved[:3]).sum()),
-            np.sqrt(np.square(moved[3:]).sum()),
+            *(np.sqrt(np.square(moved[:3]).sum()), np.sqrt(np.square(moved[3:]).sum())),
             displacements(pair.T_init[None], pair.observed)[0],
-            pair.fitness_n[0],
-            pair.inlier_rmse_n[0],
-            np.sqrt(variance_6[:3].sum()),
-            np.sqrt(variance_6[3:].sum()),
+            *(pair.fitness_n[0], pair.inlier_rmse_n[0]),
+            *(np.sqrt(variance_6[:3].sum()), np.sqrt(variance_6[3:].sum())),
             np.linalg.slogdet(covariance + SPREAD_FLOOR * np.eye(6))[1],
         ]
     )
@@ -226,12 +163,9 @@ def describe_starts(pair: ObservedPair, icp: ICPSettings) -> np.ndarray:
     moved_n = displacements(pair.T_runs, pair.observed)
     return np.array(
         [
-            cost_n[0],
-            cost_n[best],
-            cost_n[0] - cost_n[best],
+            *(cost_n[0], cost_n[best], cost_n[0] - cost_n[best]),
             np.log(max(cost_n[0], SMALLEST_COST) / max(cost_n[best], SMALLEST_COST)),
-            moved_n[best],
-            moved_n.mean(),
+            *(moved_n[best], moved_n.mean()),
             *np.quantile(moved_n, QUARTERS),
             cost_n.std(),
             *np.quantile(pair.fitness_n, ENDS),
@@ -243,12 +177,8 @@ def describe_starts(pair: ObservedPair, icp: ICPSettings) -> np.ndarray:
 def describe_plainly(pair: ObservedPair, icp: ICPSettings) -> dict[str, np.ndarray]:
     """Return the groups of a pair that are quick to measure: distances, planes, motion and starts."""
     distances, planes = describe_distances(pair)
-    return {
-        "distances": distances,
-        "planes": planes,
-        "motion": describe_motion(pair),
-        "starts": describe_starts(pair, icp),
-    }
+    quick = {"distances": distances, "planes": planes, "motion": describe_motion(pair)}
+    return quick | {"starts": describe_starts(pair, icp)}
 
 
 def describe(pair: ObservedPair, settings: DescriptorSettings, icp: ICPSettings) -> tuple[dict[str, np.ndarray], float]:
@@ -270,19 +200,13 @@ def describe_all(
         rows.append(described)
         seconds.append(perf_counter() - started)
         icp_seconds.append(remedies)
-    registrations = causes.registrations
-    groups = {name: np.array([described[name] for described in rows]) for name in GROUPS}
-    all_described = Descriptors(registrations.sample, registrations.split, **groups, axes=registrations.axes)
-    return all_described, np.array(seconds), np.array(icp_seconds)
+    own, groups = causes.registrations, {name: np.array([described[name] for described in rows]) for name in GROUPS}
+    return Descriptors(own.sample, own.split, **groups, axes=own.axes), np.array(seconds), np.array(icp_seconds)
 
 
 def seen(arrays: Mapping[str, np.ndarray], sees: Collection[str], wanted: Columns = EVERYTHING) -> np.ndarray:
-    """Return the wanted descriptors that these parts show, side by side (N, F) in the order of `GROUPS`.
-
-    Args:
-        arrays: group -> (N, F).
-        sees: keys of `COLUMNS`.
-        wanted: the columns of each group in question.
+    """Return the wanted columns of these arrays (N, F) that these parts (keys of `COLUMNS`) show, in the order of
+    `GROUPS`.
     """
     chosen = []
     for group in (name for name in GROUPS if name in wanted):

@@ -46,11 +46,7 @@ def apportion(total: int, shares: dict[str, float]) -> dict[str, int]:
 
 
 class Quotas:
-    """The samples that are still wanted for one split.
-
-    Args:
-        total: samples of the split.
-    """
+    """The samples, `total` in all, that are still wanted for one split."""
 
     def __init__(self, total: int, settings: CauseSettings) -> None:
         low, high = settings.several
@@ -59,7 +55,7 @@ class Quotas:
         for name, count in self._wanted.items():
             fewest, most = (round(low * count), round(high * count)) if name in CONCEPTS else (0, 0)
             self._most |= {(name, False): count - fewest, (name, True): most}
-        self._taken: Counter[Group] = Counter()
+        self.taken: Counter[Group] = Counter()
 
     def all_filled(self) -> bool:
         """Whether nothing is wanted any more."""
@@ -76,34 +72,21 @@ class Quotas:
         """
         if state != FAILED:
             return self.wants((state, False))
-        several_possible = applied.sum() > 1
-        return any(
-            self.wants((concept, several))
-            for concept in np.array(CONCEPTS)[applied].tolist()
-            for several in ((False, True) if several_possible else (False,))
-        )
+        kinds = (False, True) if applied.sum() > 1 else (False,)
+        named = np.array(CONCEPTS)[applied].tolist()
+        return any(self.wants((concept, several)) for concept in named for several in kinds)
 
     def wants(self, group: Group) -> bool:
         """Whether a candidate of this group is wanted."""
-        return self._taken[group] < self._most[group] and self._count(group[0]) < self._wanted[group[0]]
-
-    def take(self, group: Group) -> None:
-        """Count a candidate that is kept."""
-        self._taken[group] += 1
+        return self.taken[group] < self._most[group] and self._count(group[0]) < self._wanted[group[0]]
 
     def refuse_to_go_on(self, source: str, seed: int, split: str, candidates: int) -> InputError:
         """Return the error to raise, which names the rarest group and what to widen."""
         unfilled = [name for name, wanted in self._wanted.items() if self._count(name) < wanted]
         # The least filled one; of several that are empty, the largest.
         name = min(unfilled, key=lambda name: (self._count(name) / self._wanted[name], -self._wanted[name]))
-        samples = {
-            NOMINAL: "nominal samples",
-            BORDERLINE: "borderline samples",
-            GEOMETRY: "samples misaligned when clean",
-        }
-        state = samples.get(name)
-        change = ""
-        if state is None:
+        change, state = "", "samples misaligned when clean" if name == GEOMETRY else f"{name} samples"
+        if name in CONCEPTS:
             state = f"samples that failed from {name}"
             lacking = [several for several in (False, True) if self.wants((name, several))]
             if len(lacking) == 1:
@@ -114,7 +97,7 @@ class Quotas:
         return InputError(f"causes of {source}, seed {seed}, {split}", fault, remedy)
 
     def _count(self, name: str) -> int:
-        return self._taken[name, False] + self._taken[name, True]
+        return self.taken[name, False] + self.taken[name, True]
 
 
 def state_of(truth: Truth) -> str:
@@ -132,8 +115,8 @@ def group_of(truth: Truth) -> Group:
 class Tally:
     """How many candidates were kept and refused, by split, object and group.
 
-    A candidate that cannot be wanted is refused as soon as that is known: before any registration (group ``any``), or
-    when its state is (group ``failed``). The others are those of `Quotas`, and the reasons that one has no truth.
+    A candidate that cannot be wanted is refused before any registration (group ``any``) or when its state is known
+    (``failed``). The other groups are those of `Quotas`, and the reasons that one has no truth.
     """
 
     def __init__(self) -> None:
@@ -186,13 +169,7 @@ def draw_geometry(
 ) -> Causes | None:
     """Draw failures without a cause: candidates refused by :func:`draw_causes`, of the same objects per split.
 
-    Args:
-        settings: those of the other causes.
-        wanted: samples of each split, at most.
-        most: candidates of each split.
-
-    Returns:
-        the registrations; None where a split has none.
+    Of each split, `most` candidates give so many samples at most; None where a split has none.
     """
     subjects, uncertainty_limit = measure_clean_pairs(read_subjects(objects), source, seed, settings)
     alone = replace(
@@ -216,17 +193,12 @@ def draw_further(
 ) -> Causes:
     """Draw training samples of the same objects as those of :func:`draw_causes`, and of the same states but borderline.
 
-    Args:
-        settings: those of the other causes.
-        chunk: names the draws: two chunks have no candidate in common, and neither depends on the other.
-        wanted: how many.
-
-    Raises:
-        InputError: see :func:`draw_causes`.
+    The settings are those of the other causes. The chunk names the draws: two have no candidate in common, and neither
+    depends on the other. Raises InputError as :func:`draw_causes` does.
     """
-    shares = asdict(settings.shares) | {"borderline": 0.0, "geometry": 0.0}
-    labeled = {name: share / sum(shares.values()) for name, share in shares.items()}
-    own = replace(settings, train=wanted, shares=Shares(**labeled))
+    shares = asdict(settings.shares) | {BORDERLINE: 0.0, GEOMETRY: 0.0}
+    labeled = Shares(**{name: share / sum(shares.values()) for name, share in shares.items()})
+    own = replace(settings, train=wanted, shares=labeled)
     subjects, uncertainty_limit = measure_clean_pairs(read_subjects(objects), source, seed, settings)
     drawing = _Drawing(source, seed, own, Measuring(own, uncertainty_limit), part=("further", chunk))
     train = split_by_object(subjects, source, seed, settings)["train"]
@@ -245,8 +217,7 @@ class _Drawing:
     def of_split(self, split: str, subjects: list[Subject]) -> list[dict[str, Any]]:
         """Return the rows of one split; its candidates show its objects in turn."""
         wanted = getattr(self.settings, split)
-        quotas = Quotas(wanted, self.settings)
-        most = self.settings.candidates * wanted
+        quotas, most = Quotas(wanted, self.settings), self.settings.candidates * wanted
         records = self.up_to(most, split, subjects, quotas)
         if not quotas.all_filled():
             raise quotas.refuse_to_go_on(self.source, self.seed, split, most)
@@ -260,7 +231,7 @@ class _Drawing:
             record, group = self._try(split, number, subject, quotas)
             self.tally.count(split, subject.name, group, kept=record is not None)
             if record is not None:
-                quotas.take(group)
+                quotas.taken[group] += 1
                 records.append(record | {"sample": len(records), "split": split, "candidate": number})
             if quotas.all_filled():
                 break

@@ -14,8 +14,7 @@ never shows an object's back: the side that it hides by itself counts as no caus
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from functools import partial
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -71,7 +70,7 @@ def measure_frames(
     """Measure the causes of registrations from these starts.
 
     One that finds no correspondence is measured where it started. Those that cannot be measured, since the object's own
-    clean pairs are off or its mesh is not in sight, are left out and named on stderr.
+    clean pairs are off or its mesh is not in sight, are left out and named on stderr; none left raises InputError.
 
     Args:
         meshes: of the objects that the instances show, see :func:`gpca.frames.dataset.meshes_of`.
@@ -80,28 +79,33 @@ def measure_frames(
     Returns:
         the registrations, all of them test samples with the number of their start; a row for each of where it was
         seen, what it started from and what was found.
-
-    Raises:
-        InputError: no registration can be measured.
     """
+    import pandas as pd
+
     subjects, limit = measure_clean_pairs(subjects_of(instances, starts.instance, objects), source, seed, settings)
     of_object = {subject.index: subject for subject in subjects}
 
-    def cases() -> Iterator[Case]:
-        for k in progress(range(len(starts)), f"causes of {source}, seed {seed}"):
-            i, began = int(starts.instance[k]), f"{starts.kind[k]}, {starts.init_from[k]}"
-            axes = (source, seed, "frame causes", i, began)
-            yield Case(k, i, f"instance {i} ({began})", axes, partial(candidate, k, i, axes))
+    def case(k: int) -> Case:
+        i, began = int(starts.instance[k]), f"{starts.kind[k]}, {starts.init_from[k]}"
+        axes = (source, seed, "frame causes", i, began)
 
-    def candidate(k: int, i: int, axes: tuple) -> tuple[Candidate, Subject]:
-        if (subject := of_object.get(int(instances.object_index[i]))) is None:
-            raise Unmeasurable("its clean pairs are misaligned")
-        T_init, random = starts.T_camera_object_init[k], generator(*axes)
-        return frame_candidate(instances, i, T_init, subject, meshes[subject.index], points, random), subject
+        def candidate() -> tuple[Candidate, Subject]:
+            if (subject := of_object.get(int(instances.object_index[i]))) is None:
+                raise Unmeasurable("its clean pairs are misaligned")
+            T_init, random = starts.T_camera_object_init[k], generator(*axes)
+            return frame_candidate(instances, i, T_init, subject, meshes[subject.index], points, random), subject
+
+        return Case(k, i, f"instance {i} ({began})", axes, candidate)
 
     nothing = ("no instance in the frames can be measured", "check the meshes and poses")
-    causes = measure_cases(cases(), Measuring(settings, limit), (source, seed), nothing)
-    return causes, _table(instances, starts, causes)
+    cases = map(case, progress(range(len(starts)), f"causes of {source}, seed {seed}"))
+    causes = measure_cases(cases, Measuring(settings, limit), (source, seed), nothing)
+    registrations, (severities, found) = causes.registrations, found_in(causes)
+    started = starts.subset(registrations.sample)
+    seen = {"instance": started.instance, "start": started.kind, "init_from": started.init_from}
+    seen |= {name: getattr(instances, name)[started.instance] for name in ("dataset", "scene", "image")}
+    own = {"sample": registrations.sample, **seen, "object": registrations.object_name}
+    return causes, pd.DataFrame({**own, **severities, **found})
 
 
 def frame_candidate(
@@ -115,11 +119,8 @@ def frame_candidate(
 ) -> Candidate:
     """Return an instance with everything that may be taken away from it, in diameters.
 
-    Args:
-        T_init: where the registration starts, ``T_camera_object`` in meters.
-
-    Raises:
-        Unmeasurable: no ray of its pixels meets the mesh, or the model cannot be seen at the initial pose.
+    The registration starts from `T_init`, ``T_camera_object`` in meters. Raises Unmeasurable where no ray of its pixels
+    meets the mesh, or the model cannot be seen at the initial pose.
     """
     diameter_m, sighting = subject.diameter_m, instances.sighting(i)
     T_true = instances.T_camera_object_true[i]
@@ -155,20 +156,20 @@ def candidate_of_view(
     """Return what was seen of an object at a pose that is taken for the true one, with all that may be taken away.
 
     Args:
-        view: at that pose.
         kept: rows of what was measured that are registered.
         model, model_at_truth: (P, 3) diameters, what the camera would see where the registration starts, and at that
             pose.
         T_model_observed: 4×4, takes what was observed to where it lies in the model at the start, diameters.
     """
-    hidden = _drawn(view.unmeasured, round(len(kept) * (1 - view.share) / max(view.share, 1e-9)), random)
+    most = round(len(kept) * (1 - view.share) / max(view.share, 1e-9))
+    hidden = view.unmeasured[random.permutation(len(view.unmeasured))[:most]]
     residuals = view.measured[kept] - view.clean[kept]
+    noisy = np.concatenate([view.measured[kept], hidden + residuals[random.integers(len(kept), size=len(hidden))]])
     return Candidate(
         applied=np.ones(len(CONCEPTS), bool),
         model=model,
         clean=np.concatenate([view.clean[kept], hidden]) / diameter_m,
-        noisy=np.concatenate([view.measured[kept], hidden + residuals[random.integers(len(kept), size=len(hidden))]])
-        / diameter_m,
+        noisy=noisy / diameter_m,
         seen=np.arange(len(kept) + len(hidden)),
         kept=np.arange(len(kept)),
         T_near=np.eye(4),
@@ -184,25 +185,9 @@ def candidate_of_view(
     )
 
 
-def _drawn(points_N_3: np.ndarray, most: int, random: np.random.Generator) -> np.ndarray:
-    return points_N_3[random.permutation(len(points_N_3))[:most]]
-
-
 def subjects_of(instances: Instances, rows: np.ndarray, objects: ObjectClouds) -> list[Subject]:
     """Return the objects that the instances show; symmetric is what the dataset says is."""
     return [
         Subject.of(objects, index, bool(instances.symmetric[instances.object_index == index].any()))
         for index in np.unique(instances.object_index[rows]).tolist()
     ]
-
-
-def _table(instances: Instances, starts: Starts, causes: Causes) -> pd.DataFrame:
-    import pandas as pd
-
-    registrations, (severities, found) = causes.registrations, found_in(causes)
-    started = starts.subset(registrations.sample)
-    seen = {"instance": started.instance, "start": started.kind, "init_from": started.init_from}
-    seen |= {name: getattr(instances, name)[started.instance] for name in ("dataset", "scene", "image")}
-    return pd.DataFrame(
-        {"sample": registrations.sample, **seen, "object": registrations.object_name, **severities, **found}
-    )

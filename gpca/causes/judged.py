@@ -15,9 +15,9 @@ import numpy as np
 
 from gpca.attribution.predictions import read_predictions
 from gpca.causes.dataset import LABELS, Causes, labels_of
-from gpca.causes.truth import ALL, BORDERLINE, NOMINAL, Truth, state_of_errors
+from gpca.causes.truth import ALL, BORDERLINE, FAILED, NOMINAL, Truth
 from gpca.errors import InputError
-from gpca.evaluation.intervals import ANYTHING
+from gpca.evaluation.intervals import ANYTHING, weighted_mean
 from gpca.evaluation.measures import SHARE, Measure, source_method_seed
 from gpca.io.container import require_same_samples
 from gpca.pairs.perturbation import CONCEPTS
@@ -33,11 +33,8 @@ BINS = 10  # of the calibration error
 
 @dataclass(frozen=True)
 class SampleTruth:
-    """N test samples with their truth, without their clouds.
-
-    Attributes:
-        truth, truth_again: as of :class:`gpca.causes.dataset.Causes`.
-        cluster, symmetric, error_shown: (N,) the same.
+    """N test samples with their truth, without their clouds; the attributes are those of
+    :class:`gpca.causes.dataset.Causes`.
     """
 
     truth: Truth
@@ -46,42 +43,25 @@ class SampleTruth:
     symmetric: np.ndarray
     error_shown: np.ndarray
 
-    @classmethod
-    def of(cls, causes: Causes) -> SampleTruth:
-        """Return what is kept of registrations that are all for testing."""
-        return cls(causes.truth, causes.truth_again, causes.registrations.cluster, causes.symmetric, causes.error_shown)
-
 
 @dataclass(frozen=True)
 class Judged:
-    """N test samples with an explainer's predictions.
+    """N test samples with an explainer's predictions."""
 
-    Attributes:
-        label: one of :data:`gpca.causes.dataset.LABELS`, or ``borderline``.
-        instance: the object, views of one instance together. seed: the repeat.
-        error: (N, 8) v of every subset of the causes. phi: (N, 3). causes: (N, 3) whether each is one of them.
-        tied: (N, 3) whether each adds as much as the dominant one, up to the limit of a cause. margin: between the two
-            largest φ.
-        shown: state of the registration that the explainer sees, by its own error. symmetric: the error is ADD-S.
-        alarm: how wrong the explainer takes the registration to be, larger is worse. scores: (N, 3) of the causes.
-        named: the label that it names; empty where it names none.
-        nominal: its score of "nominal".
-    """
-
-    label: np.ndarray
-    instance: np.ndarray
-    seed: np.ndarray
-    error: np.ndarray
-    phi: np.ndarray
-    causes: np.ndarray
-    tied: np.ndarray
-    margin: np.ndarray
-    shown: np.ndarray
-    symmetric: np.ndarray
-    alarm: np.ndarray
-    scores: np.ndarray
-    named: np.ndarray
-    nominal: np.ndarray
+    label: np.ndarray  # of :data:`gpca.causes.dataset.LABELS`, or ``borderline``
+    instance: np.ndarray  # the object, views of one instance together
+    seed: np.ndarray  # of the repeat
+    error: np.ndarray  # (N, 8) v of every subset of the causes
+    phi: np.ndarray  # (N, 3)
+    causes: np.ndarray  # (N, 3) whether each is one of them
+    tied: np.ndarray  # (N, 3) whether each adds as much as the dominant one, up to the limit of a cause
+    margin: np.ndarray  # between the two largest φ
+    shown: np.ndarray  # state of the registration that the explainer sees, by its own error
+    symmetric: np.ndarray  # the error is ADD-S
+    alarm: np.ndarray  # how wrong the explainer takes the registration to be, larger is worse
+    scores: np.ndarray  # (N, 3) of the causes
+    named: np.ndarray  # the label that it names; empty where it names none
+    nominal: np.ndarray  # its score of "nominal"
 
     def __len__(self) -> int:
         return len(self.label)
@@ -101,19 +81,15 @@ def read_judged(
 ) -> dict[tuple[str, str, int], Judged]:
     """Return the test samples of every source, explainer and seed, those of the ceiling first.
 
-    Args:
-        prediction_files: named ``…/{source}/{explainer}/seed{seed}.csv``.
-        causes_files: named ``…/{source}/seed{seed}.npz``.
-
-    Raises:
-        InputError: no files, a file that cannot be read, predictions of other samples.
+    Predictions are named ``…/{source}/{explainer}/seed{seed}.csv``, causes ``…/{source}/seed{seed}.npz``. Raises
+    InputError for no files, a file that cannot be read, and predictions of other samples.
     """
     truths, judged = {}, {}
     for path in causes_files:
         source, seed = Path(path).parent.name, seed_of_file(path)
         causes = Causes.load(path, (source, seed))
-        truths[source, seed] = causes.subset(causes.rows("test"))
-        judged[source, CEILING, seed] = ceiling_of(truths[source, seed], seed)
+        truth = truths[source, seed] = causes.subset(causes.rows("test"))
+        judged[source, CEILING, seed] = ceiling_of(truth, seed)
     for path in prediction_files:
         source, explainer, seed = source_method_seed(path)
         if (source, seed) not in truths:
@@ -137,18 +113,11 @@ def joined(parts: Iterable[Judged]) -> Judged:
 def judged_by(rows: pd.DataFrame, truth: Causes, seed: int) -> Judged:
     """Return test samples with the predictions of a file whose rows are in the same order."""
     scores_N_4 = rows[[f"score_{label}" for label in LABELS]].to_numpy(float)
-    named_N = np.where(rows["abstained"], "", rows["concept_predicted"].to_numpy(str))
-    return judged_of(SampleTruth.of(truth), seed, scores_N_4, named_N)
+    return judged_of(truth, seed, scores_N_4, np.where(rows["abstained"], "", rows["concept_predicted"].to_numpy(str)))
 
 
-def judged_of(tested: SampleTruth, seed: int, scores_N_4: np.ndarray, named_N: np.ndarray) -> Judged:
-    """Return test samples with scores of :data:`gpca.causes.dataset.LABELS` and the labels named, empty for none."""
-    return _judged(tested, seed, 1 - scores_N_4[:, 0], scores_N_4, named_N)
-
-
-def ceiling_of(causes: Causes | SampleTruth, seed: int) -> Judged:
+def ceiling_of(tested: Causes | SampleTruth, seed: int) -> Judged:
     """Return test samples with the truth measured from other starts as their predictions."""
-    tested = SampleTruth.of(causes) if isinstance(causes, Causes) else causes
     again = tested.truth_again
     error_N = again.error[:, -1]
     shares_N_3 = np.maximum(again.phi, 0) + 1e-12
@@ -157,23 +126,34 @@ def ceiling_of(causes: Causes | SampleTruth, seed: int) -> Judged:
     is_nominal_N = error_N < (again.nominal_limit + again.failed_limit) / 2
     scores_N_4 = np.column_stack([is_nominal_N.astype(float), ~is_nominal_N[:, None] * shares_N_3])
     named_N = np.where(is_nominal_N, NOMINAL, np.array(CONCEPTS)[again.phi.argmax(axis=1)])
-    return _judged(tested, seed, error_N, scores_N_4, named_N)
+    return judged_of(tested, seed, scores_N_4, named_N, error_N)
 
 
-def _judged(tested: SampleTruth, seed: int, alarm_N, scores_N_4: np.ndarray, named_N: np.ndarray) -> Judged:
-    truth = tested.truth
+def judged_of(
+    tested: Causes | SampleTruth,
+    seed: int,
+    scores_N_4: np.ndarray,
+    named_N: np.ndarray,
+    alarm_N: np.ndarray | None = None,
+) -> Judged:
+    """Return test samples with scores of :data:`gpca.causes.dataset.LABELS` and the labels named, empty for none.
+
+    The alarm is by default how far the score of "nominal" is from 1.
+    """
+    truth, shown_N = tested.truth, tested.error_shown
     return Judged(
         label=labels_of(truth),
-        instance=tested.cluster,
+        instance=tested.registrations.cluster if isinstance(tested, Causes) else tested.cluster,
         seed=np.full(len(truth), seed),
         error=truth.error,
         phi=truth.phi,
         causes=truth.causes,
         tied=truth.tied,
         margin=truth.margin,
-        shown=state_of_errors(tested.error_shown, truth),
+        # A single registration has an error and no uncertainty.
+        shown=np.select([shown_N < truth.nominal_limit, shown_N > truth.failed_limit], [NOMINAL, FAILED], BORDERLINE),
         symmetric=tested.symmetric,
-        alarm=np.asarray(alarm_N, float),
+        alarm=np.asarray(1 - scores_N_4[:, 0] if alarm_N is None else alarm_N, float),
         scores=scores_N_4[:, 1:],
         named=named_N,
         nominal=scores_N_4[:, 0],
@@ -184,12 +164,8 @@ def _labeled(samples: Judged) -> np.ndarray:
     return samples.label != BORDERLINE
 
 
-def _nominal(samples: Judged) -> np.ndarray:
-    return samples.label == NOMINAL
-
-
 def _failed(samples: Judged) -> np.ndarray:
-    return _labeled(samples) & ~_nominal(samples)
+    return _labeled(samples) & (samples.label != NOMINAL)
 
 
 def _shown(samples: Judged) -> np.ndarray:
@@ -205,7 +181,7 @@ MEASURES: Mapping[str, Measure] = {
     "dominant_accuracy": Measure(counted=_failed),
     "auroc_failed": Measure(counted=_labeled),
     "auprc_failed": Measure(counted=_labeled),
-    "false_alarm_rate": Measure(counted=_nominal, least_is_best=True),
+    "false_alarm_rate": Measure(counted=lambda samples: samples.label == NOMINAL, least_is_best=True),
     "nominal_calibration": Measure(counted=_labeled, limits=ANYTHING, least_is_best=True),
     "state_accuracy": Measure(counted=_labeled),
     "state_accuracy_shown": Measure(counted=_shown),
@@ -239,23 +215,44 @@ def measure(samples: Judged, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
     - spearman_attribution, cosine_attribution: between scores and φ of a failed sample, mean.
     - deletion_gain: share of the error of a failed sample that goes when the cause named first is removed, mean.
     """
-    labeled_N = samples.label != BORDERLINE
-    failed_N = labeled_N & (samples.label != NOMINAL)
-    shown_N = samples.shown != BORDERLINE
+    from scipy.stats import rankdata
+
+    labeled_N, shown_N, failed_N = _labeled(samples), _shown(samples), _failed(samples)
+    of_labeled, of_failed = weights_B_N[:, labeled_N], weights_B_N[:, failed_N]
     called_failed_N = samples.nominal < samples.scores.max(axis=1)
+    ranked = ranking(samples.alarm[labeled_N], failed_N[labeled_N], of_labeled)
     alarms_shown = ranking(samples.alarm[shown_N], samples.shown[shown_N] != NOMINAL, weights_B_N[:, shown_N])
+    is_nominal_n = samples.label[labeled_N] == NOMINAL
     measures = {
         "state_accuracy": _state_accuracy(samples.label, called_failed_N, weights_B_N),
         "state_accuracy_shown": _state_accuracy(samples.shown, called_failed_N, weights_B_N),
         "auroc_failed_shown": alarms_shown["area"],
-        **_of_alarm(samples.alarm[labeled_N], failed_N[labeled_N], weights_B_N[:, labeled_N]),
-        "nominal_calibration": _calibration_error(
-            samples.nominal[labeled_N], samples.label[labeled_N] == NOMINAL, weights_B_N[:, labeled_N]
-        ),
+        "auroc_failed": ranked["area"],
+        "auprc_failed": ranked["precision"],
+        "false_alarm_rate": ranked["false_alarms"],
+        "nominal_calibration": _calibration_error(samples.nominal[labeled_N], is_nominal_n, of_labeled),
     }
-    if samples.names_causes:
-        measures |= _of_causes(samples, labeled_N, failed_N, weights_B_N)
-    return measures
+    if not samples.names_causes:
+        return measures
+    right_N, rows_N, first_N = samples.named == samples.label, np.arange(len(samples)), samples.scores.argmax(axis=1)
+    recalls = [weighted_mean(right_N[of], weights_B_N[:, of]) for of in (samples.label == label for label in LABELS)]
+    precisions = [
+        ranking(samples.scores[labeled_N, i], samples.causes[labeled_N, i], of_labeled)["precision"]
+        for i in range(len(CONCEPTS))
+    ]
+    scores_F_3, phi_F_3 = samples.scores[failed_N], samples.phi[failed_N]
+    ranks = [rankdata(of, axis=1) if len(of) else of for of in (scores_F_3, phi_F_3)]
+    spearman_F = _cosines(*(ranks_F_3 - ranks_F_3.mean(axis=1, keepdims=True) for ranks_F_3 in ranks))
+    return measures | {
+        **of_decisions(samples, weights_B_N),
+        "tied_accuracy": weighted_mean(samples.tied[rows_N, first_N][failed_N], of_failed),
+        "balanced_accuracy": np.mean(recalls, axis=0),
+        "dominant_accuracy": weighted_mean((np.array(CONCEPTS)[first_N] == samples.label)[failed_N], of_failed),
+        "average_precision": np.mean(precisions, axis=0),
+        "spearman_attribution": weighted_mean(spearman_F, of_failed),
+        "cosine_attribution": weighted_mean(_cosines(scores_F_3, np.maximum(phi_F_3, 0)), of_failed),
+        "deletion_gain": weighted_mean(gains(samples)[rows_N, first_N][failed_N], of_failed),
+    }
 
 
 def counted(samples: Judged, metric: str) -> np.ndarray:
@@ -263,40 +260,15 @@ def counted(samples: Judged, metric: str) -> np.ndarray:
     return MEASURES[metric].counted(samples) if metric in MEASURES else _labeled(samples)  # type: ignore[misc]
 
 
-def _of_causes(samples: Judged, labeled_N, failed_N, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
-    right_N = samples.named == samples.label
-    recalls = [_mean(right_N[of], weights_B_N[:, of]) for of in (samples.label == label for label in LABELS)]
-    first_N = samples.scores.argmax(axis=1)
-    of_failed = weights_B_N[:, failed_N]
-    scores_F_3, phi_F_3 = samples.scores[failed_N], samples.phi[failed_N]
-    precisions = [
-        ranking(samples.scores[labeled_N, i], samples.causes[labeled_N, i], weights_B_N[:, labeled_N])["precision"]
-        for i in range(len(CONCEPTS))
-    ]
-    rows_N = np.arange(len(samples))
-    gain_N, tied_N = gains(samples)[rows_N, first_N], samples.tied[rows_N, first_N]
-    return {
-        **of_decisions(samples, weights_B_N),
-        "tied_accuracy": _mean(tied_N[failed_N], of_failed),
-        "balanced_accuracy": np.mean(recalls, axis=0),
-        "dominant_accuracy": _mean((np.array(CONCEPTS)[first_N] == samples.label)[failed_N], of_failed),
-        "average_precision": np.mean(precisions, axis=0),
-        "spearman_attribution": _mean(_correlations(_ranks(scores_F_3), _ranks(phi_F_3)), of_failed),
-        "cosine_attribution": _mean(_cosines(scores_F_3, np.maximum(phi_F_3, 0)), of_failed),
-        "deletion_gain": _mean(gain_N[failed_N], of_failed),
-    }
-
-
 def of_decisions(samples: Judged, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
     """Return regret and named_right, which judge what is named alone, whatever the other scores are."""
-    labeled_N = samples.label != BORDERLINE
-    failed_N = labeled_N & (samples.label != NOMINAL)
+    labeled_N, failed_N = _labeled(samples), _failed(samples)
     gain_N_3, named_N_3 = gains(samples), samples.named[:, None] == np.array(CONCEPTS)
     regret_N = np.maximum(gain_N_3.max(axis=1), 0) - np.where(named_N_3, gain_N_3, 0).sum(axis=1)
     right_N = np.where(failed_N, (named_N_3 & samples.tied).any(axis=1), samples.named == samples.label)
     return {
-        "regret": _mean(regret_N[failed_N], weights_B_N[:, failed_N]),
-        "named_right": _mean(right_N[labeled_N], weights_B_N[:, labeled_N]),
+        "regret": weighted_mean(regret_N[failed_N], weights_B_N[:, failed_N]),
+        "named_right": weighted_mean(right_N[labeled_N], weights_B_N[:, labeled_N]),
     }
 
 
@@ -310,16 +282,7 @@ def _state_accuracy(state_N: np.ndarray, called_failed_N: np.ndarray, weights_B_
     nominal_N = state_N == NOMINAL
     failed_N = ~nominal_N & (state_N != BORDERLINE)
     groups = ((nominal_N, ~called_failed_N), (failed_N, called_failed_N))
-    return np.mean([_mean(right_N[of_N], weights_B_N[:, of_N]) for of_N, right_N in groups], axis=0)
-
-
-def _of_alarm(alarm_N: np.ndarray, failed_N: np.ndarray, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
-    ranked = ranking(alarm_N, failed_N, weights_B_N)
-    return {
-        "auroc_failed": ranked["area"],
-        "auprc_failed": ranked["precision"],
-        "false_alarm_rate": ranked["false_alarms"],
-    }
+    return np.mean([weighted_mean(right_N[of_N], weights_B_N[:, of_N]) for of_N, right_N in groups], axis=0)
 
 
 def ranking(score_N: np.ndarray, true_N: np.ndarray, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
@@ -352,22 +315,6 @@ def _calibration_error(score_N: np.ndarray, true_N: np.ndarray, weights_B_N: np.
         error_B += np.abs((weights_B_N[:, inside] * (score_N - true_N)[inside]).sum(axis=1))
     with np.errstate(divide="ignore", invalid="ignore"):
         return error_B / weights_B_N.sum(axis=1)
-
-
-def _mean(value_N: np.ndarray, weights_B_N: np.ndarray) -> np.ndarray:
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return (weights_B_N * value_N).sum(axis=1) / weights_B_N.sum(axis=1)
-
-
-def _ranks(values_N_3: np.ndarray) -> np.ndarray:
-    from scipy.stats import rankdata
-
-    return rankdata(values_N_3, axis=1) if len(values_N_3) else values_N_3
-
-
-def _correlations(a_N_3: np.ndarray, b_N_3: np.ndarray) -> np.ndarray:
-    a_N_3, b_N_3 = (x - x.mean(axis=1, keepdims=True) for x in (a_N_3, b_N_3))
-    return _cosines(a_N_3, b_N_3)
 
 
 def _cosines(a_N_3: np.ndarray, b_N_3: np.ndarray) -> np.ndarray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from gpca.alignment.rigid import inverse, scale_translation, transform
 from gpca.causes.candidate import Candidate, Counterfactuals, Registrar, Unmeasurable, draw_candidate, redrawn
 from gpca.causes.dataset import Causes
 from gpca.causes.settings import CauseSettings
-from gpca.causes.truth import ALL, NONE, SUBSETS, Truth, capped, joined
+from gpca.causes.truth import ALL, NONE, SUBSETS, Truth, capped
 from gpca.errors import InputError
 from gpca.io.files import SPLITS, Axes
 from gpca.objects.bop import find_symmetries
@@ -35,21 +35,14 @@ FEWEST_FAMILIES = 2  # one for training, one for testing; intervals over objects
 
 @dataclass(frozen=True)
 class Subject:
-    """One object.
+    """One object, or a pair of scans in its place."""
 
-    Attributes:
-        index: its number in the file of the objects.
-        family, fold: as :class:`gpca.objects.canonical.ObjectClouds` has them.
-        surface: (N, 3) its points, in diameters.
-        errors: of poses (n, 4, 4) of it, in diameters (n,); the identity is right.
-    """
-
-    index: int
+    index: int  # its number in the file of the objects
     name: str
     diameter_m: float
-    surface: np.ndarray
+    surface: np.ndarray  # (N, 3) its points, in diameters
     symmetric: bool
-    errors: Callable[[np.ndarray], np.ndarray]
+    errors: Callable[[np.ndarray], np.ndarray]  # of poses (n, 4, 4) of it, in diameters (n,); the identity is right
     family: str
     fold: int
 
@@ -59,16 +52,8 @@ class Subject:
         diameter_m = float(objects.diameters_m[index])
         surface = objects.points(index).astype(np.float64) / diameter_m
         errors = PoseErrors(surface, JUDGED_POINTS, symmetric)
-        return cls(
-            index,
-            str(objects.names[index]),
-            diameter_m,
-            surface,
-            symmetric,
-            errors,
-            objects.family(index),
-            objects.fold(index),
-        )
+        name, family, fold = str(objects.names[index]), objects.family(index), objects.fold(index)
+        return cls(index, name, diameter_m, surface, symmetric, errors, family, fold)
 
 
 def read_subjects(objects: ObjectClouds) -> list[Subject]:
@@ -80,10 +65,8 @@ def read_subjects(objects: ObjectClouds) -> list[Subject]:
 def split_by_object(
     subjects: list[Subject], source: str, seed: int, settings: CauseSettings
 ) -> dict[str, list[Subject]]:
-    """Return the subjects of each split; those of one family are in the same.
-
-    Raises:
-        InputError: fewer than two families.
+    """Return the subjects of each split; those of one family are in the same. Raises InputError for fewer than two
+    families.
     """
     family_N = np.array([subject.family for subject in subjects])
     if len(set(family_N.tolist())) < FEWEST_FAMILIES:
@@ -92,11 +75,8 @@ def split_by_object(
     is_test_N = unseen(np.array([subject.fold for subject in subjects]), seed)
     if is_test_N is None:
         is_test_N = drawn(family_N, settings.test_objects, source, seed, "causes", "objects")
-    train, tested = SPLITS
-    return {
-        train: [subject for subject, is_test in zip(subjects, is_test_N, strict=True) if not is_test],
-        tested: [subject for subject, is_test in zip(subjects, is_test_N, strict=True) if is_test],
-    }
+    rows = (np.flatnonzero(~is_test_N), np.flatnonzero(is_test_N))
+    return {split: [subjects[row] for row in own] for split, own in zip(SPLITS, rows, strict=True)}
 
 
 def measure_clean_pairs(
@@ -104,42 +84,35 @@ def measure_clean_pairs(
 ) -> tuple[list[Subject], float]:
     """Measure clean pairs, of which no cause is more than small.
 
-    An object of which nearly all clean pairs are off is left out, unless the settings ask for samples of that kind.
+    An object of which nearly all clean pairs are off is left out, unless the settings ask for samples of that kind;
+    none left raises InputError.
 
     Returns:
         the subjects that are left; the limit of the uncertainty: the quantile `settings.limits.clean` of the divergence
         between two clean pairs of the same object, with equal numbers of points, from the same starts.
-
-    Raises:
-        InputError: no object is left.
     """
+    off = f"an error of at least {100 * settings.limits.nominal:g} % of the diameter or cannot be registered"
+    nominal, count = settings.limits.nominal, -(-settings.clean_pairs // len(subjects))
+
+    def most_are_off(pairs: list[tuple[float, float] | None]) -> bool:
+        right = sum(pair is not None and pair[0] < nominal for pair in pairs)
+        return len(pairs) - right > MOST_FAILING * len(pairs)
+
     left, uncertainties = [], []
-    count = -(-settings.clean_pairs // len(subjects))
     for subject in progress(subjects, f"clean pairs of {source}, seed {seed}"):
         measured = [_clean_pair(subject, source, seed, number, settings) for number in range(count)]
-        if _most_are_off(measured, settings) and not settings.shares.geometry:
-            further = [_clean_pair(subject, source, seed, count + number, settings) for number in range(MORE * count)]
-            if _most_are_off(looked_at := measured + further, settings):
-                print(
-                    f"causes of {source}: object '{subject.name}' is skipped: nearly all of {len(looked_at)} clean "
-                    f"pairs have an error of at least {100 * settings.limits.nominal:g} % of the diameter or cannot be "
-                    "registered",
-                    file=sys.stderr,
-                )
+        if most_are_off(measured) and not settings.shares.geometry:
+            more = [_clean_pair(subject, source, seed, count + number, settings) for number in range(MORE * count)]
+            if most_are_off(looked_at := measured + more):
+                fault = f"nearly all of {len(looked_at)} clean pairs have {off}"
+                print(f"causes of {source}: object '{subject.name}' is skipped: {fault}", file=sys.stderr)
                 continue
         left.append(subject)
         uncertainties += [pair[1] for pair in measured if pair is not None]
     if not uncertainties:
-        limit = f"{100 * settings.limits.nominal:g} % of the diameter"
-        fault = f"nearly all clean pairs of every object have an error of at least {limit} or cannot be registered"
+        fault = f"nearly all clean pairs of every object have {off}"
         raise InputError(f"causes of {source}", fault, "raise causes.limits.nominal or causes.points")
     return left, float(np.quantile(uncertainties, settings.limits.clean))
-
-
-def _most_are_off(pairs: list[tuple[float, float] | None], settings: CauseSettings) -> bool:
-    """Return whether the share of the pairs that are off, or have no error, is above `MOST_FAILING`."""
-    right = sum(pair is not None and pair[0] < settings.limits.nominal for pair in pairs)
-    return len(pairs) - right > MOST_FAILING * len(pairs)
 
 
 def _clean_pair(
@@ -160,11 +133,7 @@ def _clean_pair(
 
 @dataclass(frozen=True)
 class Measuring:
-    """How candidates are measured.
-
-    Attributes:
-        uncertainty_limit: of a nominal registration, nats.
-    """
+    """How candidates are measured; the limit is that of the uncertainty of a nominal registration, nats."""
 
     settings: CauseSettings
     uncertainty_limit: float
@@ -175,22 +144,17 @@ class Measuring:
 
     def truth(self, measured: Counterfactuals, subsets: Sequence[int] = range(len(SUBSETS))) -> Truth:
         """Return the truth of one candidate, with these in the places of all eight subsets."""
+        error_1_8 = np.array([[measured.error(subset) for subset in subsets]])
+        uncertainty_1_8 = np.array([[measured.uncertainty(subset) for subset in subsets]])
         limits = self.settings.limits
-        return Truth(
-            np.array([[measured.error(subset) for subset in subsets]]),
-            np.array([[measured.uncertainty(subset) for subset in subsets]]),
-            nominal_limit=limits.nominal,
-            failed_limit=limits.failed,
-            cause_limit=limits.cause,
-            uncertainty_limit=self.uncertainty_limit,
-        )
+        return Truth(error_1_8, uncertainty_1_8, limits.nominal, limits.failed, limits.cause, self.uncertainty_limit)
 
     def observed(self, registrar: Registrar, subject: Subject, axes: tuple) -> dict[str, Any]:
         """Return the explainer's view of a candidate, and the perturbations applied to it."""
         candidate = registrar.candidate
         xi_n_6 = self._twists(axes, "observed starts")
         xi_n_6[0] = 0
-        causes = tuple(np.flatnonzero(candidate.applied).tolist())
+        causes = candidate.present
         runs = registrar.run(causes, xi_n_6)
         # The source is what was observed, in the frame of the initial pose.
         T_true = inverse(candidate.start(causes))
@@ -225,20 +189,13 @@ class Measuring:
 
 @dataclass(frozen=True)
 class Case:
-    """A registration to be measured that was not drawn: one in a depth frame, or one of two scans.
+    """A registration to be measured that was not drawn: one in a depth frame, or one of two scans."""
 
-    Attributes:
-        sample, candidate: numbers of its row and of what it shows.
-        name: for messages.
-        axes: name its random numbers.
-        make: returns the candidate and what stands for its object; may raise `Unmeasurable`.
-    """
-
-    sample: int
-    candidate: int
-    name: str
-    axes: tuple
-    make: Callable[[], tuple[Candidate, Subject]]
+    sample: int  # number of its row
+    candidate: int  # and of what it shows
+    name: str  # for messages
+    axes: tuple  # name its random numbers
+    make: Callable[[], tuple[Candidate, Subject]]  # what stands for its object; may raise `Unmeasurable`
 
 
 def measure_cases(cases: Iterable[Case], measuring: Measuring, axes: Axes, nothing: tuple[str, str]) -> Causes:
@@ -247,14 +204,9 @@ def measure_cases(cases: Iterable[Case], measuring: Measuring, axes: Axes, nothi
     This is the one way to measure what happened in a world that gives cases: depth frames (:mod:`gpca.causes.frames`)
     or scans (:mod:`gpca.causes.scans`). A world provides the cases, each with two clouds, everything that may be taken
     away from them and the errors of poses; and a table of what else is known of the measured rows (:func:`found_in`).
-    Drawn objects are measured by the same :class:`Measuring`, but one by one, since most are refused
-    (:mod:`gpca.causes.drawing`).
 
     A registration that finds no correspondence is measured where it started; one that cannot be measured is left out
-    and named on stderr.
-
-    Args:
-        nothing: the fault if no case can be measured, and its remedy.
+    and named on stderr. `nothing` is the fault if no case can be measured, and its remedy.
     """
     records: list[dict[str, Any]] = []
     for case in cases:
@@ -287,17 +239,20 @@ def found_in(causes: Causes) -> tuple[dict[str, Any], dict[str, Any]]:
 def as_causes(records: list[dict[str, Any]], axes: Axes) -> tuple[Causes, np.ndarray]:
     """Return rows as registrations with their truth, and the seconds (S,) that ICP took for each.
 
-    Args:
-        records: what :meth:`Measuring.observed` returned, with ``sample``, ``split``, ``candidate``, ``truth`` and, of
-            test samples, the truth ``again``.
-        axes: the source and the seed that they are of.
+    A record is what :meth:`Measuring.observed` returned, with ``sample``, ``split``, ``candidate``, ``truth`` and, of
+    test samples, the truth ``again``.
     """
+
+    def joined(truths: list[Truth]) -> Truth:
+        error_S_8 = np.concatenate([np.empty((0, len(SUBSETS))), *(each.error for each in truths)])
+        uncertainty_S_8 = np.concatenate([np.empty((0, len(SUBSETS))), *(each.uncertainty for each in truths)])
+        return replace(records[0]["truth"], error=error_S_8, uncertainty=uncertainty_S_8)
+
     truth = joined([record["truth"] for record in records])
     concept_S = np.array(CONCEPTS)[truth.phi.argmax(axis=1)]
     registrations, icp_seconds_S = as_registrations(
         [record | {"concept": concept} for record, concept in zip(records, concept_S, strict=True)], axes
     )
     columns: dict[str, Any] = {name: np.array([record[name] for record in records]) for name in Causes.array_fields()}
-    tested = [record["again"] for record in records if "again" in record]
-    again = joined(tested) if tested else truth.subset(np.array([], int))
+    again = joined([record["again"] for record in records if "again" in record])
     return Causes(registrations=registrations, **columns, truth=truth, truth_again=again), icp_seconds_S

@@ -25,19 +25,12 @@ TREATMENTS = {"noise": "denoise", "pose": "reinitialize", "overlap": "new_view"}
 
 @dataclass(frozen=True)
 class Thresholds:
-    """Conditions of the branches.
+    """Conditions of the branches."""
 
-    Attributes:
-        uncertain: BALD in nats above which a case is queued.
-        dominant: score from which a concept is treated; otherwise none dominates and the case is queued.
-        improvement: least decrease of the treated concept's score that counts as an improvement.
-        attempts: number of actions without improvement after which the case is queued.
-    """
-
-    uncertain: NotNegative = np.inf
-    dominant: Share = 0.0
-    improvement: Share = 0.1
-    attempts: int = 3
+    uncertain: NotNegative = np.inf  # BALD in nats above which a case is queued
+    dominant: Share = 0.0  # score from which a concept is treated; otherwise none dominates and the case is queued
+    improvement: Share = 0.1  # least decrease of the treated concept's score that counts as an improvement
+    attempts: int = 3  # actions without improvement after which the case is queued
 
     def __post_init__(self) -> None:
         if not 0 <= self.improvement <= 1 or not 0 <= self.dominant <= 1:
@@ -82,7 +75,6 @@ class RecoveryPolicy:
         """Build a policy from the config; `uncertain` is chosen on calibration samples if null.
 
         Args:
-            attempts: see :class:`Thresholds`.
             bald_N: uncertainties of the calibration samples, see :func:`choose_uncertain`.
         """
         declared = {name: value for name, value in thresholds.items() if value is not None}
@@ -92,11 +84,7 @@ class RecoveryPolicy:
         return cls(Thresholds(**declared, attempts=attempts), dict(treatments))
 
     def decide(
-        self,
-        scores_C: np.ndarray,
-        bald: float = 0.0,
-        before: Sequence[Treated] = (),
-        concepts: Sequence[str] = CONCEPTS,
+        self, scores_C: np.ndarray, bald: float = 0, before: Sequence[Treated] = (), concepts: Sequence[str] = CONCEPTS
     ) -> Decision:
         """Choose the branch of a case.
 
@@ -106,7 +94,6 @@ class RecoveryPolicy:
         Args:
             scores_C: scores ŝ_c that sum to one.
             bald: uncertainty in nats; 0 for explainers without one.
-            before: earlier actions of this case, in order.
         """
         limits = self.thresholds
         stale = [treated.concept for treated in before if treated.fall < limits.improvement]
@@ -125,13 +112,9 @@ class RecoveryPolicy:
 
 
 def choose_uncertain(bald_N: np.ndarray, queued_share: float) -> float:
-    """Return the BALD in nats that at most the share `queued_share` of calibration samples exceeds.
+    """Return the BALD in nats that at most this share of calibration samples, not used for training, exceeds.
 
     So the share of cases for a person is declared, and the most uncertain ones are queued.
-
-    Args:
-        bald_N: uncertainties of samples that were not used for training.
-        queued_share: in [0, 1).
     """
     if not 0 <= queued_share < 1:
         raise InputError("recovery.thresholds.queued_share", f"{queued_share} is not in [0, 1)", "give a share")

@@ -11,9 +11,9 @@ A *natural* registration has no added noise: it is what an estimate by a local m
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -45,18 +45,13 @@ NORMAL_DEVIATION = 1.4826  # of a normal distribution, in median distances from 
 
 @dataclass(frozen=True, kw_only=True)
 class ScanCandidate(Candidate):
-    """Two scans: the source is what was observed, the target is the model.
+    """Two scans: the source is what was observed, the target is the model."""
 
-    Attributes:
-        noisy_model: (P, 3) the target's points with the noise that is added.
-        model_common: rows of them that lie on surface that the source has as well; ``seen`` has those of the source.
-    """
-
-    noisy_model: np.ndarray
-    model_common: np.ndarray
+    noisy_model: np.ndarray  # (P, 3) the target's points with the noise that is added
+    model_common: np.ndarray  # rows of them on surface that the source has as well; ``seen`` has those of the source
 
     def reference(self, causes: tuple[int, ...]) -> np.ndarray:
-        """Return the target's points that a registration with these of the applied causes is given."""
+        """Return the target's points with these of the applied causes."""
         points = self.noisy_model if NOISE in causes else self.model
         return points if OVERLAP in causes else points[self.model_common]
 
@@ -67,12 +62,7 @@ class ScanCandidate(Candidate):
 
 @dataclass(frozen=True)
 class OverlapErrors:
-    """Root mean square distances of the common points from their true places.
-
-    Attributes:
-        common: (N, 3) the points, where they truly lie.
-        factor: turns these distances into errors, see :attr:`DrawnScans.error_factor`.
-    """
+    """Root mean square distances of the common points (N, 3) from where they truly lie, times a factor."""
 
     common: np.ndarray
     factor: float
@@ -86,35 +76,27 @@ class OverlapErrors:
 class DrawnScans:
     """Some points of both scans of a pair, where they truly lie, in the target's frame about its middle.
 
-    Lengths are relative to :attr:`unit_m`.
-
-    Attributes:
-        pair: the scans.
-        source, target: (N, 3) and (P, 3).
-        source_common, target_common: rows of either that lie on surface that the other scan has as well.
-        error_factor: an error is the distance (RMSE over the common points) times this, so that the limit of success
-            is the same number for all pairs, and for whole objects.
+    Lengths are relative to :attr:`unit_m`. An error is the distance (RMSE over the common points) times the factor, so
+    that the limit of success is the same number for all pairs, and for whole objects.
     """
 
     pair: ScanPair
-    source: np.ndarray
-    target: np.ndarray
-    source_common: np.ndarray
+    source: np.ndarray  # (N, 3)
+    target: np.ndarray  # (P, 3)
+    source_common: np.ndarray  # rows of either that lie on surface that the other scan has as well
     target_common: np.ndarray
     error_factor: float
 
     @classmethod
     def of(cls, pair: ScanPair, points: int, limit_m: float, failed: float, random: np.random.Generator) -> DrawnScans:
-        """Draw the points.
+        """Draw points of each scan, at most so many.
 
         Args:
-            points: of each scan, at most.
             limit_m: RMSE from which a registration of this pair has failed.
             failed: the error that this is to be.
         """
-        rows_N, rows_M = (
-            np.sort(random.permutation(len(cloud))[:points]) for cloud in (pair.source_N_3, pair.target_M_3)
-        )
+        clouds = (pair.source_N_3, pair.target_M_3)
+        rows_N, rows_M = (np.sort(random.permutation(len(cloud))[:points]) for cloud in clouds)
         center_3, unit_m = middle(pair), unit_of(pair)
         return cls(
             pair=pair,
@@ -125,7 +107,7 @@ class DrawnScans:
             error_factor=failed * unit_m / limit_m,
         )
 
-    @property
+    @cached_property
     def unit_m(self) -> float:
         """The usual size of what is scanned, in meters."""
         return unit_of(self.pair)
@@ -141,14 +123,11 @@ class DrawnScans:
         return sensor_noise_m(self.pair) / self.unit_m
 
     def candidate(self, T_target_source_init: np.ndarray, times: float, random: np.random.Generator) -> ScanCandidate:
-        """Return the pair started somewhere, with so many times the sensor's noise added to both scans.
-
-        Args:
-            T_target_source_init: 4×4, in meters, in the frames of the scans.
-        """
+        """Return the pair started at a pose in meters, with so many times the sensor's noise added to both scans."""
         noise = times * self.sensor_noise if times else 0.0
         jitter_N, jitter_M = (noise * random.normal(size=cloud.shape) for cloud in (self.source, self.target))
-        T_init, middle_3 = self.displaced(T_target_source_init), self.source.mean(axis=0)
+        T_init = motion_between(self.pair, self.pair.T_target_source, T_target_source_init)
+        middle_3 = self.source.mean(axis=0)
         applied = np.ones(len(CONCEPTS), bool)
         applied[NOISE] = times > 0
         return ScanCandidate(
@@ -171,17 +150,11 @@ class DrawnScans:
             },
         )
 
-    def displaced(self, T_target_source: np.ndarray) -> np.ndarray:
-        """Return where (4×4) a pose puts points of the source that lie at their true places."""
-        return motion_between(self.pair, self.pair.T_target_source, T_target_source)
-
 
 def motion_between(pair: ScanPair, T_target_source_from: np.ndarray, T_target_source_to: np.ndarray) -> np.ndarray:
-    """Return the motion (4×4) of points of the source from one pose to another, as a pair is registered.
+    """Return the motion (4×4) of points of the source from one pose to another, in meters, as a pair is registered.
 
-    Args:
-        pair: its clouds are read, and not its true pose.
-        T_target_source_from, T_target_source_to: 4×4, meters.
+    Of the pair its clouds are read, and not its true pose.
     """
     T_m, center_3 = T_target_source_to @ inverse(T_target_source_from), middle(pair)
     # Poses of data sets are rounded, so that the last row of a product may not be exact.
@@ -220,23 +193,14 @@ LADDER, GLOBAL = KINDS = ("ladder", "global")
 
 @dataclass(frozen=True)
 class ScanStart:
-    """Where a registration of a pair begins, and with how much more noise.
+    """Where a registration of a pair begins, and with how much more noise."""
 
-    Attributes:
-        pair: its number.
-        kind: ``ladder``: the true pose, disturbed by a rung; ``global``: the pose that a global method found.
-        init_from: the rung or the method.
-        T_target_source: 4×4, meters.
-        times: how much noise is added, in units of the sensor's; 0 where the registration is natural.
-        found: what global methods found of the pair, 4×4 each, in meters: an observer may know it.
-    """
-
-    pair: int
-    kind: str
-    init_from: str
-    T_target_source: np.ndarray
-    times: float = 0.0
-    found: tuple[np.ndarray, ...] = ()
+    pair: int  # its number
+    kind: str  # ``ladder``: the true pose, disturbed by a rung; ``global``: the pose that a global method found
+    init_from: str  # the rung or the method
+    T_target_source: np.ndarray  # 4×4, meters
+    times: float = 0.0  # how much noise is added, in units of the sensor's; 0 where the registration is natural
+    found: tuple[np.ndarray, ...] = ()  # what global methods found of the pair, 4×4, meters: an observer may know it
 
 
 def measure_scans(
@@ -250,102 +214,69 @@ def measure_scans(
 ) -> tuple[Causes, pd.DataFrame]:
     """Measure the causes of registrations from these starts, those of a pair one after another.
 
-    One that finds no correspondence is measured where it started. Pairs of which too few points lie on surface that
-    both scans see are left out and named on stderr.
-
-    Args:
-        settings: of the truth; what it says of candidates is not read.
-        points: of each scan, at most.
+    One that finds no correspondence is measured where it started. Pairs of which too few points, of so many of each
+    scan at most, lie on surface that both see are left out and named on stderr; none left raises InputError.
 
     Returns:
         the registrations, all of them test samples with the number of their start; a row for each of what it is and
         what was found.
-
-    Raises:
-        InputError: no registration can be measured.
     """
+    import pandas as pd
+
     drawn: dict[int, DrawnScans] = {}
     limits: list[float] = []
     for k in progress(sorted({start.pair for start in starts}), f"clean pairs of {source}, seed {seed}"):
-        scans = _drawn(pairs[k], (source, seed), settings, success, points)
+        pair = pairs[k]
+        randoms = (generator(source, seed, "scan causes", pair.name, part) for part in ("points", "other points"))
+        limit_m, failed = success.limit_m(pair), settings.limits.failed
+        scans, others = (DrawnScans.of(pair, points, limit_m, failed, random) for random in randoms)
         try:
-            limits.append(_clean_uncertainty(scans, (source, seed), settings, success, points))
+            limits.append(_clean_uncertainty(scans, others, (source, seed), settings))
             drawn[k] = scans
         except Unmeasurable as fault:
-            print(f"causes of {source}: pair {scans.pair.name} is skipped: {fault}", file=sys.stderr)
+            print(f"causes of {source}: pair {pair.name} is skipped: {fault}", file=sys.stderr)
     measuring = Measuring(settings, float(np.quantile(limits, settings.limits.clean)) if limits else 0.0)
 
-    def cases() -> Iterator[Case]:
-        for number, start in enumerate(progress(starts, f"causes of {source}, seed {seed}")):
-            if start.pair in drawn:
-                name = drawn[start.pair].pair.name
-                axes = (source, seed, "scan causes", name, start.init_from)  # the same starts, whatever noise is added
-                title = f"pair {name} ({start.kind}, {start.init_from})"
-                yield Case(number, number, title, axes, partial(candidate, start, axes))
-
-    def candidate(start: ScanStart, axes: tuple) -> tuple[Candidate, Subject]:
+    def case(number: int) -> Case:
+        start = starts[number]
         scans = drawn[start.pair]
-        noisy = scans.candidate(start.T_target_source, start.times, generator(*axes, "noise", start.times))
-        return noisy, _subject(scans, start.pair)
+        pair = scans.pair
+        axes = (source, seed, "scan causes", pair.name, start.init_from)  # the same starts, whatever noise is added
 
+        def candidate() -> tuple[Candidate, Subject]:
+            random = generator(*axes, "noise", start.times)
+            unit_m, errors = scans.unit_m, scans.errors
+            # The pair stands in the place of an object, and its scene in that of a family.
+            subject = Subject(start.pair, pair.name, unit_m, scans.target, False, errors, pair.cluster, DRAWN)
+            return scans.candidate(start.T_target_source, start.times, random), subject
+
+        return Case(number, number, f"pair {pair.name} ({start.kind}, {start.init_from})", axes, candidate)
+
+    numbers = progress(range(len(starts)), f"causes of {source}, seed {seed}")
+    cases = (case(number) for number in numbers if starts[number].pair in drawn)
     nothing = ("no registration of the scans can be measured", "check their poses")
-    causes = measure_cases(cases(), measuring, (source, seed), nothing)
-    measured = [starts[number] for number in causes.registrations.sample]
-    return causes, _table([(start, drawn[start.pair]) for start in measured], causes)
+    causes = measure_cases(cases, measuring, (source, seed), nothing)
+    registrations, (severities, found) = causes.registrations, found_in(causes)
+    measured = [starts[number] for number in registrations.sample]
+    scans_S = [drawn[start.pair] for start in measured]
+    columns = {"pair": [each.pair.name for each in scans_S], "cluster": registrations.cluster}
+    columns |= {name: [getattr(each.pair, name) for each in scans_S] for name in ("kind", "overlap")}
+    columns |= {"start": [start.kind for start in measured], "init_from": [start.init_from for start in measured]}
+    columns |= {"times": [start.times for start in measured], "sensor_noise": [each.sensor_noise for each in scans_S]}
+    factors = {"error_factor": [each.error_factor for each in scans_S]}
+    return causes, pd.DataFrame({"sample": registrations.sample, **columns, **severities, **found, **factors})
 
 
-def _drawn(
-    pair: ScanPair, axes: tuple, settings: CauseSettings, success: ScanSuccess, points: int, part: str = "points"
-) -> DrawnScans:
-    random = generator(*axes, "scan causes", pair.name, part)
-    return DrawnScans.of(pair, points, success.limit_m(pair), settings.limits.failed, random)
-
-
-def _clean_uncertainty(
-    scans: DrawnScans, axes: tuple, settings: CauseSettings, success: ScanSuccess, points: int
-) -> float:
+def _clean_uncertainty(scans: DrawnScans, others: DrawnScans, axes: tuple, settings: CauseSettings) -> float:
     """Return the divergence between two registrations of a pair that nothing is wrong with: of other points of both."""
     pair = scans.pair
-    others = _drawn(pair, axes, settings, success, points, "other points")
     xi_n_6 = generator(*axes, "scan causes", pair.name, "clean").normal(size=(settings.starts, 6))
     covariances = []
     for each in (scans, others):
-        _require_common(each)
+        if min(len(each.source_common), len(each.target_common)) < FEWEST_POINTS:
+            raise Unmeasurable("too few of its points lie on surface that both scans see")
         candidate = each.candidate(pair.T_target_source, 0.0, generator(*axes, "nothing is drawn"))
         registrar = Registrar(candidate, settings, misses=True)
         measured = Counterfactuals(registrar, each.errors, xi_n_6 * settings.deviation_6(), settings)
         covariances.append(measured.covariance(NONE))
-    first, second = covariances
-    return float(divergence(first, second, settings.floor))
-
-
-def _require_common(scans: DrawnScans) -> None:
-    if min(len(scans.source_common), len(scans.target_common)) < FEWEST_POINTS:
-        raise Unmeasurable("too few of its points lie on surface that both scans see")
-
-
-def _subject(scans: DrawnScans, number: int) -> Subject:
-    """Return the pair in the place of an object, and its scene in that of a family."""
-    return Subject(
-        index=number,
-        name=scans.pair.name,
-        diameter_m=scans.unit_m,
-        surface=scans.target,
-        symmetric=False,
-        errors=scans.errors,
-        family=scans.pair.cluster,
-        fold=DRAWN,
-    )
-
-
-def _table(seen: Sequence[tuple[ScanStart, DrawnScans]], causes: Causes) -> pd.DataFrame:
-    import pandas as pd
-
-    registrations, (severities, found) = causes.registrations, found_in(causes)
-    starts, scans = zip(*seen, strict=True)
-    columns = {"pair": [each.pair.name for each in scans], "cluster": registrations.cluster}
-    columns |= {"kind": [each.pair.kind for each in scans], "overlap": [each.pair.overlap for each in scans]}
-    columns |= {"start": [start.kind for start in starts], "init_from": [start.init_from for start in starts]}
-    columns |= {"times": [start.times for start in starts], "sensor_noise": [each.sensor_noise for each in scans]}
-    factors = {"error_factor": [each.error_factor for each in scans]}
-    return pd.DataFrame({"sample": registrations.sample, **columns, **severities, **found, **factors})
+    return float(divergence(*covariances, settings.floor))

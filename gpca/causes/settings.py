@@ -1,4 +1,7 @@
-"""Settings of the registrations with measured causes and of their descriptors (docs/causes.md)."""
+"""Settings of the registrations with measured causes and of their descriptors (docs/causes.md).
+
+Lengths are in diameters, on scans in the usual size of a scan.
+"""
 
 from __future__ import annotations
 
@@ -22,62 +25,47 @@ MOTION = (
 REMEDIED = (
     *(f"error_{subset}" for subset in range(len(SUBSETS))),
     *(f"phi_{concept}" for concept in CONCEPTS),
-    *(f"moved_{subset}" for subset in range(len(SUBSETS))),
-    *(f"cost_{subset}" for subset in range(len(SUBSETS))),
-    *(f"fitness_{subset}" for subset in range(len(SUBSETS))),
+    *(f"{what}_{subset}" for what in ("moved", "cost", "fitness") for subset in range(len(SUBSETS))),
     *("outliers", "smoothed"),
 )
 DENSITIES = list(range(3 * QUANTILES, 3 * QUANTILES + 6))  # of the planes: spacings, extents, numbers of points
 DescribedPoints = Annotated[int, Bounds(minimum=16, maximum=65536)]  # of each cloud
-
-
-@dataclass(frozen=True)
-class FrameCauseSettings:
-    """Which starts of instances are measured, and with how many points.
-
-    Attributes:
-        seeds: the first so many of the run's, each with other points, starts around these and explainers.
-        starts: drawn of each kind, at most; None for all.
-        rungs: of the ladder of errors that the true pose is given: turns in degrees, and shifts in diameters.
-        points: of what was measured, at most, and of the model.
-    """
-
-    seeds: Count = 1
-    starts: Count | None = None
-    rungs: tuple[tuple[HalfTurn, Shift], ...] = ((5.0, 0.03), (15.0, 0.08), (30.0, 0.15), (60.0, 0.3))
-    points: CloudPoints = 512
-
-
+CloudPoints = Annotated[int, Bounds(minimum=64, maximum=65536)]
+Calls = Annotated[int, Bounds(minimum=1, maximum=1000)]
+Angle = Annotated[float, Bounds(exclusiveMinimum=0, maximum=180)]  # degrees
 FEWEST_POINTS = 16  # that a crop leaves of a cloud, at least; as few as Monte-Carlo ICP takes anywhere
 Moved = Literal["model", "observed"]  # the cloud that ICP moves onto the other
 MODEL: Moved = "model"
 OBSERVED: Moved = "observed"
 NOT_OF_CAUSES = ("icp", "icp_points")  # which sections of the config lack: registrations has them
-CloudPoints = Annotated[int, Bounds(minimum=64, maximum=65536)]
+OBJECTS, SCANS = "objects", "scans"  # where an explainer of scans has learned
+
+
+@dataclass(frozen=True)
+class FrameCauseSettings:
+    """Which starts of instances are measured, and with how many points."""
+
+    seeds: Count = 1  # the first of the run's, each with other points, starts around these and explainers
+    starts: Count | None = None  # drawn of each kind, at most; None for all
+    # Of the ladder of errors that the true pose is given: turns in degrees, and shifts.
+    rungs: tuple[tuple[HalfTurn, Shift], ...] = ((5.0, 0.03), (15.0, 0.08), (30.0, 0.15), (60.0, 0.3))
+    points: CloudPoints = 512  # of what was measured, at most, and of the model
 
 
 @dataclass(frozen=True)
 class CauseSeverities(Severities):
-    """Ranges (low, high) of the severities, wider than those of one perturbation at a time.
-
-    Attributes:
-        outliers: share of the points that noise throws anywhere in the object's cube.
-    """
+    """Ranges (low, high) of the severities, wider than those of one perturbation at a time."""
 
     noise: tuple[Share, Share] = (0.01, 0.08)
     rotation_deg: tuple[HalfTurn, HalfTurn] = (10.0, 90.0)
     translation: tuple[Shift, Shift] = (0.02, 0.40)
     crop: tuple[Hidden, Hidden] = (0.20, 0.75)
-    outliers: tuple[Share, Share] = (0.0, 0.05)
+    outliers: tuple[Share, Share] = (0.0, 0.05)  # of the points, that noise throws anywhere in the object's cube
 
 
 @dataclass(frozen=True)
 class Small:
-    """Largest severities where a cause is not applied: they are drawn from 0 on, and nothing is an outlier.
-
-    Attributes:
-        noise, rotation_deg, translation, crop: as in :class:`gpca.pairs.perturbation.Severities`.
-    """
+    """Largest severities where a cause is not applied: they are drawn from 0 on, and nothing is an outlier."""
 
     noise: Share = 0.003
     rotation_deg: HalfTurn = 5.0
@@ -91,19 +79,12 @@ class Small:
 
 @dataclass(frozen=True)
 class Limits:
-    """The limits that tell the states apart. Errors are relative to the diameter.
+    """The limits that tell the states apart, of errors relative to the diameter."""
 
-    Attributes:
-        nominal: mean error below which nothing is wrong.
-        failed: mean error above which a registration has failed: the config's ``success.error``.
-        cause: part of the error above which a concept is one of the causes.
-        clean: share of the clean pairs whose uncertainty is no larger than a nominal registration's may be.
-    """
-
-    nominal: Positive = 0.02
-    failed: Positive = 0.03
-    cause: Positive = 0.01
-    clean: OpenShare = 0.95
+    nominal: Positive = 0.02  # mean error below which nothing is wrong
+    failed: Positive = 0.03  # mean error above which a registration has failed: the config's success.error
+    cause: Positive = 0.01  # part of the error above which a concept is one of the causes
+    clean: OpenShare = 0.95  # of the clean pairs whose uncertainty is no larger than a nominal registration's may be
 
     def __post_init__(self) -> None:
         if self.nominal > self.failed:
@@ -113,20 +94,14 @@ class Limits:
 
 @dataclass(frozen=True)
 class Shares:
-    """Of the samples of a split, by their state and, of the failed, by their dominant cause.
-
-    Attributes:
-        nominal, borderline: share of these states.
-        noise, pose, overlap: share of the failed with that dominant cause.
-        geometry: share of those whose clean pair is off already; where it is 0 these are refused.
-    """
+    """Of the samples of a split, by their state and, of the failed, by their dominant cause."""
 
     nominal: Share = 0.3
     borderline: Share = 0.16
     noise: Share = 0.18
     pose: Share = 0.18
     overlap: Share = 0.18
-    geometry: Share = 0.0
+    geometry: Share = 0.0  # of those whose clean pair is off already; where it is 0 these are refused
 
     def __post_init__(self) -> None:
         if abs((total := sum(asdict(self).values())) - 1) > 1e-6:
@@ -135,36 +110,29 @@ class Shares:
 
 @dataclass(frozen=True)
 class CauseSettings(UncertaintySettings):
-    """How many samples are drawn and how (docs/causes.md).
+    """How many samples are drawn and how.
 
     Attributes:
-        train, test: samples of each split.
-        test_objects: share of the objects that only test samples show, at least one.
         points: range of the number of points of a cloud, drawn for the model and for what is left of the observed one.
-        present: probability of each cause.
-        small: what there is of a cause that is not applied.
         moved: the cloud that ICP moves onto the other: the ``model``, which has no partners where surface is missing,
             or what was ``observed``, which has them everywhere.
-        several: range of the share that has several causes, of the failed of each dominant cause.
-        clean_pairs: on which the limit of the uncertainty is measured.
-        candidates: drawn for each sample that is wanted, at most.
     """
 
     starts: Annotated[int, Bounds(minimum=FEWEST_STARTS)] = FEWEST_STARTS
     floor: Annotated[float, Bounds(exclusiveMinimum=0, maximum=1)] = 1e-4
     train: Annotated[int, Bounds(minimum=12)] = 600
     test: Annotated[int, Bounds(minimum=6)] = 300
-    test_objects: OpenShare = 0.3
+    test_objects: OpenShare = 0.3  # that only test samples show, at least one
     points: tuple[CloudPoints, CloudPoints] = (128, 1024)
-    present: OpenShare = 0.5
+    present: OpenShare = 0.5  # probability of each cause
     moved: Moved = MODEL
     severities: CauseSeverities = field(default_factory=CauseSeverities)
-    small: Small = field(default_factory=Small)
+    small: Small = field(default_factory=Small)  # what there is of a cause that is not applied
     limits: Limits = field(default_factory=Limits)
     shares: Shares = field(default_factory=Shares)
-    several: tuple[Share, Share] = (0.3, 0.7)
-    clean_pairs: Annotated[int, Bounds(minimum=20)] = 200
-    candidates: Annotated[int, Bounds(minimum=1, maximum=1000)] = 20
+    several: tuple[Share, Share] = (0.3, 0.7)  # have several causes, of the failed of each dominant cause
+    clean_pairs: Annotated[int, Bounds(minimum=20)] = 200  # on which the limit of the uncertainty is measured
+    candidates: Calls = 20  # drawn for each sample that is wanted, at most
 
     def __post_init__(self) -> None:
         for name in ("points", "several"):
@@ -178,33 +146,21 @@ class CauseSettings(UncertaintySettings):
 
     @classmethod
     def from_dict(cls, settings: dict, icp: dict | None = None) -> CauseSettings:
-        """Build from the config's sections ``causes`` and ``registrations.icp``.
-
-        Raises:
-            InputError: values that contradict each other.
-        """
+        """Build from the config's sections ``causes`` and ``registrations.icp``."""
         return read_settings(cls, settings | {"icp": icp or {}})
 
 
 @dataclass(frozen=True)
 class DescriptorSettings:
-    """The registrations that a description runs again with remedies.
+    """The registrations that a description runs again with remedies."""
 
-    Attributes:
-        starts: near the initial pose, and as many as that again farther off where the remedy is a restart.
-        start_rotation_deg, start_translation: root mean square angle and length (diameters) of the offsets near by.
-        restarts: starts farther off.
-        restart_rotation_deg, restart_translation: theirs.
-        icp_points: of each cloud in these runs, at most.
-    """
-
-    starts: Annotated[int, Bounds(minimum=1, maximum=1000)] = 3
-    start_rotation_deg: Annotated[float, Bounds(exclusiveMinimum=0, maximum=180)] = 10.0
-    start_translation: Positive = 0.05
-    restarts: Annotated[int, Bounds(minimum=1, maximum=1000)] = 8
-    restart_rotation_deg: Annotated[float, Bounds(exclusiveMinimum=0, maximum=180)] = 50.0
+    starts: Calls = 3  # near the initial pose, and as many again farther off where the remedy is a restart
+    start_rotation_deg: Angle = 10.0  # root mean square angle
+    start_translation: Positive = 0.05  # and length of the offsets near by
+    restarts: Calls = 8  # starts farther off, with these offsets
+    restart_rotation_deg: Angle = 50.0
     restart_translation: Positive = 0.25
-    icp_points: Annotated[int, Bounds(minimum=16, maximum=65536)] = 512
+    icp_points: DescribedPoints = 512  # of each cloud in these runs, at most
 
     @property
     def quick_remedy_calls(self) -> int:
@@ -217,24 +173,16 @@ class DescriptorSettings:
         return self.quick_remedy_calls + 4 * self.restarts
 
     def twists(self, near_k_6: np.ndarray, far_k_6: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the twists of the starts near by and farther off, of standard normal numbers (k, 6)."""
+        """Return the twists of the starts near by and farther off, of standard normal numbers."""
         return (
             near_k_6 * start_deviation(self.start_rotation_deg, self.start_translation),
             far_k_6 * start_deviation(self.restart_rotation_deg, self.restart_translation),
         )
 
 
-OBJECTS, SCANS = "objects", "scans"  # where an explainer of scans has learned
-
-
 @dataclass(frozen=True)
 class ScanICP:
-    """How ICP runs on scans; lengths are relative to the usual size of a scan.
-
-    Attributes:
-        correspondence_distance: largest distance of a correspondence.
-        max_iterations: at most.
-    """
+    """How ICP runs on scans."""
 
     correspondence_distance: Annotated[float, Bounds(exclusiveMinimum=0, maximum=10)] = 0.10
     max_iterations: Count = 50
@@ -242,24 +190,14 @@ class ScanICP:
 
 @dataclass(frozen=True)
 class ScanSamples:
-    """Which registrations are measured.
+    """Which registrations of scans are measured."""
 
-    Attributes:
-        points: of each scan, at most.
-        pairs: of each scene and stratum of overlap, at most.
-        most_pairs: of a data set, at most.
-        ladder_starts: rungs of ``scans.ladder`` that are drawn for each pair; none that starts at the truth.
-        global_start: whether the pose that ``scans.global_start`` finds is a start as well.
-        times: multiples of the sensor's noise, of which each pair in turn has one added to one registration.
-        icp: how ICP runs.
-        folds: largest number of parts into which scenes are divided; each is left out of training once.
-    """
-
-    points: CloudPoints = 512
-    pairs: Count = 8
-    most_pairs: Count = 100
-    ladder_starts: Count = 2
-    global_start: bool = True
+    points: CloudPoints = 512  # of each scan, at most
+    pairs: Count = 8  # of each scene and stratum of overlap, at most
+    most_pairs: Count = 100  # of a data set
+    ladder_starts: Count = 2  # rungs of scans.ladder drawn for each pair; none that starts at the truth
+    global_start: bool = True  # whether the pose that scans.global_start finds is a start as well
+    # Multiples of the sensor's noise, of which each pair in turn has one added to one registration.
     times: tuple[Positive, ...] = (1.0, 2.0, 3.0)
     icp: ScanICP = field(default_factory=ScanICP)
-    folds: Annotated[int, Bounds(minimum=2)] = 10
+    folds: Annotated[int, Bounds(minimum=2)] = 10  # into which scenes are divided at most; each is left out once

@@ -17,6 +17,9 @@ NONE, ALL = 0, len(SUBSETS) - 1
 BY_SIZE = tuple(sorted(range(len(SUBSETS)), key=lambda subset: (len(SUBSETS[subset]), subset)))  # as figures show them
 # Of a value, by how many of the other concepts are present: |S|! (2 − |S|)! / 3!
 WEIGHTS = (1 / 3, 1 / 6, 1 / 3)
+NOMINAL, BORDERLINE, FAILED = ("nominal", "borderline", "failed")
+LARGEST_ERROR = 0.5  # diameters: a pose that is farther off is as wrong as one can be
+GEOMETRY = "geometry"  # the clean pair is off already: too little shape to hold the pose
 
 
 def shapley_values(worth_S_8: np.ndarray) -> np.ndarray:
@@ -33,16 +36,9 @@ def shapley_values(worth_S_8: np.ndarray) -> np.ndarray:
     return phi_S_3
 
 
-NOMINAL, BORDERLINE, FAILED = ("nominal", "borderline", "failed")
-LARGEST_ERROR = 0.5  # diameters: a pose that is farther off is as wrong as one can be
-GEOMETRY = "geometry"  # the clean pair is off already: too little shape to hold the pose
-
-
 @dataclass(frozen=True)
 class Truth:
     """The measurements of S registrations, and the limits that tell their states apart.
-
-    Subset b of the eight has cause i of noise, pose and overlap where bit i of b is set.
 
     Attributes:
         error: (S, 8) v, mean over the starts of min(ADD(-S), d/2) / d, with only those causes applied.
@@ -108,17 +104,3 @@ class Truth:
 def capped(error_N: np.ndarray) -> np.ndarray:
     """Return errors in diameters, none larger than `LARGEST_ERROR`."""
     return np.minimum(error_N, LARGEST_ERROR)
-
-
-def state_of_errors(error_N: np.ndarray, truth: Truth) -> np.ndarray:
-    """Return the states (N,) of single registrations, which have an error and no uncertainty, by the truth's limits."""
-    return np.select([error_N < truth.nominal_limit, error_N > truth.failed_limit], [NOMINAL, FAILED], BORDERLINE)
-
-
-def joined(truths: list[Truth]) -> Truth:
-    """Return the samples of several truths, which have the limits of the first."""
-    return replace(
-        truths[0],
-        error=np.concatenate([truth.error for truth in truths]),
-        uncertainty=np.concatenate([truth.uncertainty for truth in truths]),
-    )

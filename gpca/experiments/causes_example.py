@@ -62,17 +62,17 @@ def draw_causes_example(
     source, seed = Path(causes_npz).parent.name, seed_of_file(causes_npz)
     sections = dict(settings)
     own = CauseSettings.from_dict({k: v for k, v in sections.items() if k != "icp"}, sections.get("icp"))
-    shown = replay(ObjectClouds.load(objects_npz), causes, row, source, seed, own)
+    model, observed_8 = replay(ObjectClouds.load(objects_npz), causes, row, source, seed, own)
     names, scores_R_4, verdicts = _scores(causes, row, predictions_csv, explainers)
     rows_in = 0.35 + ROW_IN * (len(names) + GAP)
     height_in = HEAD_IN + max(4 * (0.75 * PANEL_IN + CAPTION_IN), rows_in)
     figure = use_style().figure(figsize=(TEXT_WIDTH_IN, height_in), layout="constrained")
     left, right = figure.subfigures(1, 2, width_ratios=(PANELS_IN, TEXT_WIDTH_IN - PANELS_IN))
-    view = widest_views(shown.model)[0]
-    everything = np.concatenate([shown.model @ view.T, *(cloud @ view.T for cloud in shown.observed)])
+    view = widest_views(model)[0]
+    everything = np.concatenate([model @ view.T, *(cloud @ view.T for cloud in observed_8)])
     corners = np.quantile(everything, (0.001, 0.999), axis=0)
     for panel, subset in zip(left.subplots(4, 2).flat, BY_SIZE, strict=True):
-        draw_clouds(panel, shown.model @ view.T, shown.observed[subset] @ view.T, size=0.9, corners=corners)
+        draw_clouds(panel, model @ view.T, observed_8[subset] @ view.T, size=0.9, corners=corners)
         words = " + ".join(CONCEPTS[i] for i in SUBSETS[subset]) or "none"
         words = "all three" if subset == ALL else words
         write_below(panel, f"{words}: {100 * causes.truth.error[row, subset]:.1f} %", fontsize=SMALL_PT)

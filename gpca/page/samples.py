@@ -133,7 +133,7 @@ def cause_samples(files: Mapping[str, str | Path], source: Mapping, settings: Ca
     registrations, truth = causes.registrations, causes.truth
     samples = []
     for row in rows:
-        observed_8 = replay(objects, causes, row, name, seed, settings).observed
+        _, observed_8 = replay(objects, causes, row, name, seed, settings)
         phi, errors = truth.phi[row], truth.error[row]
         samples.append(
             {

@@ -29,13 +29,9 @@ from gpca.reenactment.settings import SMALLEST_ERROR, STEEPNESS, ReenactmentSett
 def verdict(error_S_K_8: np.ndarray, weight_S_K: np.ndarray, limits: Limits) -> np.ndarray:
     """Return the probabilities (S, 4) of nominal and of each cause to be the dominant one, of S pairs.
 
-    Under each of K hypotheses a failure is as probable as not where v̂(all) is midway between the limits, and φ̂ is known
-    up to the limit of a cause: P(cause) is its softmax at that temperature. Hypotheses are weighted by how probable
-    they are.
-
-    Args:
-        error_S_K_8: v̂.
-        weight_S_K: probabilities of the hypotheses, 0 where there is none.
+    Under each of K hypotheses a failure is as probable as not where v̂(all) is midway between the limits, and φ̂ is
+    known up to the limit of a cause: P(cause) is its softmax at that temperature. Hypotheses are weighted by how
+    probable they are, 0 where there is none.
     """
     middle = np.sqrt(limits.nominal * limits.failed)
     failed_S_K = expit(STEEPNESS * np.log(np.maximum(error_S_K_8[..., ALL], SMALLEST_ERROR) / middle))
@@ -50,9 +46,9 @@ MEASURED = ("log_likelihood", "width", "covered", "noise", "outliers", "missing"
 DESCRIBED = ("distances", "planes", "motion", "starts")  # groups of descriptors, without further registrations
 
 
-# What re-enacts a row in the world that its registration comes from: it takes the observed pair and the number of the
-# row, finds hypotheses of the true pose and returns the counterfactuals under each, the most probable first. Whole
-# objects: :func:`gpca.reenactment.enactment.reenact`; depth frames and scans: the modules of this folder so named.
+# What re-enacts a row where its registration comes from: it finds hypotheses of the true pose of the observed pair and
+# returns the counterfactuals under each, the most probable first. Whole objects: :mod:`gpca.reenactment.enactment`;
+# depth frames and scans: the modules of this folder so named.
 World = Callable[[ObservedPair, int], list[Enactment]]
 
 
@@ -63,21 +59,18 @@ class Reenactments(Container):
     Where a pair has fewer hypotheses, its first stands in the place of the others, with weight 0.
 
     Attributes:
-        sample, split: (S,) as in the registrations.
-        weight: (S, K) probabilities of the hypotheses.
-        T_model_observed: (S, K, 4, 4) takes what was observed from where the registration began to where a hypothesis
-            has it in the model, in diameters.
-        error, uncertainty: (S, K, 8) v̂ and û of every subset of the causes.
-        measured: (S, K, 8) the numbers of `MEASURED`: those of :class:`gpca.reenactment.hypotheses.Hypothesis`; the
-            severities of noise, outliers and crop under it; and how far (root mean square, diameters) the observed
-            points then lie from where the registration began, and from where it ended.
-        described: (S, F) the groups `DESCRIBED` of descriptors (:mod:`gpca.causes.descriptors`), side by side.
-        verdict: (S, 4) of :func:`gpca.reenactment.dataset.verdict`.
+        T_model_observed: takes what was observed from where the registration began to where a hypothesis has it in the
+            model, in diameters.
+        error, uncertainty: v̂ and û of every subset of the causes.
+        measured: the numbers of `MEASURED`: those of :class:`gpca.reenactment.hypotheses.Hypothesis`; the severities of
+            noise, outliers and crop under it; and how far (root mean square, diameters) the observed points then lie
+            from where the registration began, and from where it ended.
+        described: the groups `DESCRIBED` of descriptors (:mod:`gpca.causes.descriptors`), side by side.
     """
 
     sample: np.ndarray = array("S", WHOLE)
     split: np.ndarray = array("S", TEXT)
-    weight: np.ndarray = array("S K")
+    weight: np.ndarray = array("S K")  # probabilities of the hypotheses
     T_model_observed: np.ndarray = array("S K 4 4")
     error: np.ndarray = array(f"S K {len(SUBSETS)}")
     uncertainty: np.ndarray = array(f"S K {len(SUBSETS)}")
@@ -91,13 +84,11 @@ class Reenactments(Container):
     ) -> Reenactments:
         """Return those of the rows of pairs (:func:`row_of`), which may be of no registrations of a file."""
         arrays = {name: np.array([row[name] for row in rows]) for name in rows[0]}
-        return cls(
-            sample=np.arange(len(rows)) if registrations is None else registrations.sample,
-            split=np.full(len(rows), "") if registrations is None else registrations.split,
-            **arrays,
-            verdict=verdict(arrays["error"], arrays["weight"], truth.limits),
-            axes=None if registrations is None else registrations.axes,
-        )
+        said = verdict(arrays["error"], arrays["weight"], truth.limits)
+        if registrations is None:
+            return cls(sample=np.arange(len(rows)), split=np.full(len(rows), ""), **arrays, verdict=said)
+        own = registrations
+        return cls(sample=own.sample, split=own.split, **arrays, verdict=said, axes=own.axes)
 
 
 def reenact_all(
@@ -110,11 +101,8 @@ def reenact_all(
 ) -> tuple[Reenactments, np.ndarray, np.ndarray]:
     """Return the re-enactments of every row, the seconds (S,) that each took, and those of its registrations.
 
-    Of the causes it reads both clouds, the initial pose and what registrations found.
-
-    Args:
-        truth: how counterfactuals are registered, and the limits of the states.
-        world: where the rows come from; whole objects by default.
+    Of the causes it reads both clouds, the initial pose and what registrations found. `truth` says how counterfactuals
+    are registered, and the limits of the states; rows come from whole objects where no other world is given.
     """
     rows, seconds, icp_seconds = [], [], []
     for row in progress(range(len(causes)), f"re-enactments of {source}, seed {seed}"):
@@ -137,26 +125,21 @@ def row_of(
 
 def as_arrays(enactments: list[Enactment], pair: ObservedPair, most: int) -> dict[str, np.ndarray]:
     """Return the arrays of one pair (K, …), see :class:`Reenactments`, for K = `most` hypotheses."""
+    before, measured = transform(pair.T_init, pair.observed), []
+    for enactment in enactments:
+        found, severity = enactment.hypothesis, enactment.candidate.severity
+        to_start = displacements(found.T[None], before)[0]
+        to_result = displacements((found.T @ pair.T_init)[None], pair.observed)[0]
+        numbers = (found.log_likelihood, found.width, found.covered)
+        measured.append((*numbers, *(severity[name] for name in ("noise", "outliers", "crop")), to_start, to_result))
     rows_K = np.where(np.arange(most) < len(enactments), np.arange(most), 0)
-    measured_k = [_measured(enactment, pair) for enactment in enactments]
     return {
         "weight": np.pad(weights_of(enactment.hypothesis for enactment in enactments), (0, most - len(enactments))),
         "T_model_observed": np.array([enactment.hypothesis.T for enactment in enactments])[rows_K],
         "error": np.array([enactment.error_8 for enactment in enactments])[rows_K],
         "uncertainty": np.array([enactment.uncertainty_8 for enactment in enactments])[rows_K],
-        "measured": np.array(measured_k)[rows_K],
+        "measured": np.array(measured)[rows_K],
     }
-
-
-def _measured(enactment: Enactment, pair: ObservedPair) -> list[float]:
-    hypothesis, severity = enactment.hypothesis, enactment.candidate.severity
-    before = transform(pair.T_init, pair.observed)
-    return [
-        *(hypothesis.log_likelihood, hypothesis.width, hypothesis.covered),
-        *(severity["noise"], severity["outliers"], severity["crop"]),
-        displacements(hypothesis.T[None], before)[0],
-        displacements((hypothesis.T @ pair.T_init)[None], pair.observed)[0],
-    ]
 
 
 SMALLEST_SUM = 0.01  # diameters, of the |φ̂| whose shares are taken

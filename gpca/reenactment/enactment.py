@@ -7,6 +7,7 @@ From this the pair is rebuilt without each of its causes, and registered again.
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from time import perf_counter
@@ -18,7 +19,6 @@ from gpca.causes.candidate import Candidate, Counterfactuals, Registrar, Unmeasu
 from gpca.causes.settings import CauseSettings
 from gpca.causes.truth import LARGEST_ERROR, SUBSETS, shapley_values
 from gpca.pairs.distances import ObservedPair
-from gpca.pairs.perturbation import CONCEPTS, NOISE, OVERLAP, POSE
 from gpca.reenactment.hypotheses import Hypothesis, find_hypotheses
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface, covered_points, trimmed_square
@@ -51,22 +51,14 @@ class NoiseScale:
 
 @dataclass(frozen=True)
 class Observation:
-    """The observed points (N, 3) where a hypothesis puts them in the model.
-
-    Attributes:
-        points: (N, 3).
-        is_outlier: (N,).
-        noise: standard deviation per axis, diameters.
-        residuals, rows: (N,) signed distances from the plane of the nearest model point, and that point.
-        covered: (M,) which points of the model were observed.
-    """
+    """The observed points (N, 3) where a hypothesis puts them in the model."""
 
     points: np.ndarray
-    is_outlier: np.ndarray
-    noise: float
-    residuals: np.ndarray
-    rows: np.ndarray
-    covered: np.ndarray
+    is_outlier: np.ndarray  # (N,)
+    noise: float  # standard deviation per axis, diameters
+    residuals: np.ndarray  # (N,) signed distance from the plane of the nearest model point,
+    rows: np.ndarray  # (N,) and that point
+    covered: np.ndarray  # (M,) which points of the model were observed
 
     @property
     def outliers(self) -> float:
@@ -80,11 +72,7 @@ class Observation:
 
 
 def observe(
-    observed: np.ndarray,
-    hypothesis: Hypothesis,
-    surface: ModelSurface,
-    scale: NoiseScale,
-    random: np.random.Generator,
+    observed: np.ndarray, hypothesis: Hypothesis, surface: ModelSurface, scale: NoiseScale, random: np.random.Generator
 ) -> Observation:
     """Return what a hypothesis says of the observed points (N, 3)."""
     points = transform(hypothesis.T, observed)
@@ -108,10 +96,8 @@ def rebuild(T: np.ndarray, observation: Observation, surface: ModelSurface, rand
     """Return the pair as a candidate of the truth: what was observed is its noisy cloud, of which a part is kept.
 
     Noise is taken away by moving each point to its plane, as far as the noise exceeds the roughness of the planes;
-    outliers become fresh points. Missing surface is filled with fresh points, as dense as the rest and as noisy.
-
-    Args:
-        T: 4×4, the hypothesis: takes what was observed to the model.
+    outliers become fresh points. Missing surface is filled with fresh points, as dense as the rest and as noisy. `T` is
+    the hypothesis: it takes what was observed to the model.
     """
     noise, missing = observation.noise, observation.missing
     quiet = noise <= QUIET and observation.outliers < FEW_OUTLIERS
@@ -128,10 +114,8 @@ def rebuild(T: np.ndarray, observation: Observation, surface: ModelSurface, rand
     jitter, anywhere = random.normal(size=added.shape), random.uniform(-0.5, 0.5, size=added.shape)
     scattered = random.random(count) < observation.outliers
     noisy = np.where(scattered[:, None] & (not quiet), anywhere, added + (noise > QUIET) * noise * jitter)
-    applied = np.zeros(len(CONCEPTS), bool)
-    applied[NOISE], applied[POSE], applied[OVERLAP] = not quiet, True, count > 0
     return Candidate(
-        applied=applied,
+        applied=np.array([not quiet, True, count > 0]),  # noise, pose, overlap
         model=surface.points,
         clean=np.concatenate([clean, added]),
         noisy=np.concatenate([observation.points, noisy]),
@@ -152,19 +136,13 @@ def fresh_points(surface: ModelSurface, rows: np.ndarray, count: int, random: np
 
 @dataclass(frozen=True)
 class Enactment:
-    """One hypothesis and what the registration would have done, were it true.
-
-    Attributes:
-        candidate: what is registered; its severities are what the hypothesis says of noise, outliers and crop.
-        error_8, uncertainty_8: v̂ and û of every subset of the causes, as in :class:`gpca.causes.truth.Truth`.
-        icp_seconds: that the registrations took.
-    """
+    """One hypothesis and what the registration would have done, were it true."""
 
     hypothesis: Hypothesis
-    candidate: Candidate
-    error_8: np.ndarray
-    uncertainty_8: np.ndarray
-    icp_seconds: float
+    candidate: Candidate  # its severities are what the hypothesis says of noise, outliers and crop
+    error_8: np.ndarray  # v̂ and
+    uncertainty_8: np.ndarray  # û of every subset of the causes, as in :class:`gpca.causes.truth.Truth`
+    icp_seconds: float  # that the registrations took
 
     @cached_property
     def phi_3(self) -> np.ndarray:
@@ -177,9 +155,7 @@ def reenact(
 ) -> list[Enactment]:
     """Find hypotheses of the true pose and enact each, the most probable first.
 
-    Args:
-        truth: how the truth's counterfactuals are registered; what it says of candidates is not read.
-        surface: that of the model, where it is known already.
+    `truth` says how counterfactuals are registered; what it says of candidates is not read.
     """
     surface = surface or ModelSurface(pair.model)
     before = transform(pair.T_init, pair.observed)
@@ -221,21 +197,13 @@ def register(
     """
     started = perf_counter()
     measured = Counterfactuals(Registrar(candidate, truth, misses), errors, xi_n_6, truth)
-    error_8, uncertainty_8 = np.array([_measured(measured, subset) for subset in range(len(SUBSETS))]).T
+    error_8, uncertainty_8 = np.full(len(SUBSETS), LARGEST_ERROR), np.zeros(len(SUBSETS))
+    for subset in range(len(SUBSETS)):
+        with suppress(Unmeasurable):
+            error_8[subset], uncertainty_8[subset] = measured.error(subset), measured.uncertainty(subset)
     return Enactment(hypothesis, candidate, error_8, uncertainty_8, perf_counter() - started)
 
 
 def start_twists(axes: tuple, truth: CauseSettings) -> np.ndarray:
-    """Return the twists (n, 6) of the starts around the initial pose, the same for every subset and hypothesis.
-
-    Args:
-        axes: name the random numbers of the registration.
-    """
+    """Return the twists (n, 6) of the starts around the initial pose, the same for every subset and hypothesis."""
     return generator(*axes, "starts").normal(size=(truth.starts, 6)) * truth.deviation_6()
-
-
-def _measured(measured: Counterfactuals, subset: int) -> tuple[float, float]:
-    try:
-        return measured.error(subset), measured.uncertainty(subset)
-    except Unmeasurable:
-        return LARGEST_ERROR, 0.0

@@ -8,7 +8,7 @@ front. At a wrong pose another side would be seen, or much of it where nothing w
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -27,20 +27,10 @@ from gpca.frames.starts import Starts
 from gpca.objects.camera import MeshScene
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.distances import ObservedPair
+from gpca.reenactment import hypotheses as search
 from gpca.reenactment.dataset import Reenactments, reenact_all
 from gpca.reenactment.enactment import Enactment, register, start_twists
-from gpca.reenactment.hypotheses import (
-    FITTED,
-    INDEPENDENT,
-    LEAST_COVERED,
-    SAME,
-    Hypothesis,
-    anchor_of,
-    log_prior,
-    most_probable,
-    not_negligible,
-    search_ends,
-)
+from gpca.reenactment.hypotheses import Hypothesis
 from gpca.reenactment.mixture import LARGEST_WIDTH, Anchor, Mixture
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface
@@ -53,8 +43,7 @@ class KnownObject:
     """What an observer knows of an object: its mesh, alone and in its own frame, points on it, and its symmetry."""
 
     def __init__(self, subject: Subject, mesh: MeshScene) -> None:
-        self.subject, self.mesh = subject, mesh
-        self.outline_m = outline(subject)
+        self.subject, self.mesh, self.outline_m = subject, mesh, outline(subject)
 
     @cached_property
     def surface(self) -> ModelSurface:
@@ -68,47 +57,37 @@ class FrameView:
 
     Poses `T` are hypotheses: they take what was observed, where the registration began, to the model, in diameters; the
     identity is the initial pose.
-
-    Attributes:
-        pair: both clouds; the model is the side that the camera would see at the initial pose.
-        known: the object.
-        camera_3_3, pixels: as in :class:`gpca.frames.shots.Sighting`.
-        T_camera_start: 4×4, where the registration began, ``T_camera_object`` in meters.
     """
 
-    pair: ObservedPair
+    pair: ObservedPair  # the model is the side that the camera would see at the initial pose
     known: KnownObject
     camera_3_3: np.ndarray
-    pixels: np.ndarray
-    T_camera_start: np.ndarray
+    pixels: np.ndarray  # as in :class:`gpca.frames.shots.Sighting`
+    T_camera_start: np.ndarray  # 4×4, where the registration began, ``T_camera_object`` in meters
 
     @cached_property
     def before(self) -> np.ndarray:
         """(N, 3) what was observed, in the model's frame before the registration, diameters."""
         return transform(self.pair.T_init, self.pair.observed)
 
-    @property
-    def T_found_n(self) -> np.ndarray:
-        """(n, 4, 4) the poses that the registrations ended at."""
-        return self.pair.T_runs @ inverse(self.pair.T_init)
-
     @cached_property
     def sighting(self) -> Sighting:
         """The points that were registered, in the camera's frame, and all pixels of the object."""
-        points_m = transform(self.T_camera_start, self.before * self._diameter_m)
+        points_m = transform(self.T_camera_start, self.before * self.known.subject.diameter_m)
         return Sighting(points_m, self.pixels, self.camera_3_3)
 
     def T_camera_object(self, T: np.ndarray) -> np.ndarray:
         """Return the pose of the object in the camera's frame, meters, under a hypothesis."""
-        return self.T_camera_start @ scale_translation(inverse(T), self._diameter_m)
+        return self.T_camera_start @ scale_translation(inverse(T), self.known.subject.diameter_m)
 
     def side(self, T: np.ndarray, most_pixels: int) -> tuple[np.ndarray, float]:
-        """Return the points (V, 3), in diameters, that the camera would see under a hypothesis, and which share of them
-        lies at pixels that were measured."""
+        """Return the points (V, 3), in diameters, that the camera would see under a hypothesis, and the share that was
+        measured.
+        """
         T_camera_object, known = self.T_camera_object(T), self.known
         side = rendered_side(known.mesh, self.camera_3_3, T_camera_object, known.outline_m, most_pixels)
         seen = self.sighting.measured(side.pixels).mean() if len(side) else 0.0
-        return side.points_m / self._diameter_m, float(seen)
+        return side.points_m / self.known.subject.diameter_m, float(seen)
 
     def candidate(self, T: np.ndarray, random: np.random.Generator) -> Candidate:
         """Return the pair as a candidate of the truth's, as if a hypothesis were true.
@@ -117,18 +96,14 @@ class FrameView:
         """
         view = clean_view(self.sighting, self.T_camera_object(T), self.known.mesh, self.known.outline_m)
         if view is None:
-            measured_m = transform(T, self.before) * self._diameter_m
+            measured_m = transform(T, self.before) * self.known.subject.diameter_m
             view = CleanView(measured_m, measured_m, np.empty((0, 3)), 1.0)
         model, side = self.pair.model, self.side(T, MOST_PIXELS)[0]
         at_truth = side[random.permutation(len(side))[: len(model)]]
         if len(at_truth) < FEWEST_POINTS:
             at_truth = model
         rows = np.arange(len(self.before))
-        return candidate_of_view(view, rows, model, at_truth, inverse(T), self._diameter_m, random)
-
-    @property
-    def _diameter_m(self) -> float:
-        return self.known.subject.diameter_m
+        return candidate_of_view(view, rows, model, at_truth, inverse(T), self.known.subject.diameter_m, random)
 
 
 COARSE, FINE = 1200, 3000  # pixels at which a side is looked at, about
@@ -143,19 +118,18 @@ def find_frame_hypotheses(
 ) -> list[Hypothesis]:
     """Return the probable hypotheses, the best first."""
     before, surface = view.before, view.known.surface
-    few = before[np.sort(random.permutation(len(before))[:FITTED])]
-    ends_n = search_ends(before, surface, view.T_found_n, random)
+    few = before[np.sort(random.permutation(len(before))[: search.FITTED])]
+    ends_n = search.search_ends(before, surface, view.pair.T_runs @ inverse(view.pair.T_init), random)
 
-    def fits(T_n: np.ndarray, observed: np.ndarray, pixels: int, rounds: int) -> list[Hypothesis]:
-        anchor = anchor_of(len(observed), settings)
-        free = [_fit(view, T, observed, pixels, rounds, settings) for T in T_n]
-        return [*free, _fit(view, np.eye(4), observed, pixels, rounds, settings, anchor)]
+    def fits(T_n: np.ndarray, observed: np.ndarray, pixels: int, rounds: int, apart: float) -> list[Hypothesis]:
+        found = [_fit(view, T, observed, pixels, rounds, settings) for T in T_n]
+        anchor = search.anchor_of(len(observed), settings)
+        found.append(_fit(view, np.eye(4), observed, pixels, rounds, settings, anchor))
+        return search.most_probable(found, surface, settings.hypotheses, apart)
 
-    first = most_probable(fits(ends_n, few, COARSE, 1), surface, settings.hypotheses, SAME)
-    first = not_negligible(first, OUT_OF_REACH)
+    first = search.not_negligible(fits(ends_n, few, COARSE, 1, search.SAME), OUT_OF_REACH)
     T_n = np.stack([hypothesis.T for hypothesis in first])
-    found = fits(T_n, before, FINE, ROUNDS)
-    return not_negligible(most_probable(found, surface, settings.hypotheses, SAME / 2))
+    return search.not_negligible(fits(T_n, before, FINE, ROUNDS, search.SAME / 2))
 
 
 def _fit(
@@ -172,19 +146,15 @@ def _fit(
         side, share = view.side(T, pixels)
         if len(side) < FEWEST_POINTS:
             return Hypothesis(T, np.zeros(len(observed)), 0.0, LARGEST_WIDTH, 0.0, IMPOSSIBLE)
-        fits = Mixture(side, _spacing(side) / 2).fit(observed, T[None], ITERATIONS, anchor=anchor)
+        spacing = float(np.median(cKDTree(side).query(side, 2)[0][:, 1]))
+        fits = Mixture(side, spacing / 2).fit(observed, T[None], ITERATIONS, anchor=anchor)
         T = fits.T_n[0]
     likelihood, outliers = float(fits.log_likelihood_n[0]), float(fits.outliers_n[0])
     # What was measured of the side is the denser, the less of it was.
-    density = (1 - outliers) * np.log(max(share, LEAST_COVERED))
-    log_posterior = min(len(observed), INDEPENDENT) * (likelihood - density) + log_prior(T, settings)
+    density = (1 - outliers) * np.log(max(share, search.LEAST_COVERED))
+    log_posterior = min(len(observed), search.INDEPENDENT) * (likelihood - density) + search.log_prior(T, settings)
     log_posterior -= MISSING * (1 - share)
     return Hypothesis(T, fits.inlier_n_N[0], likelihood, float(fits.width_n[0]), share, float(log_posterior))
-
-
-def _spacing(points: np.ndarray) -> float:
-    """Return the median distance of points (V, 3) from the nearest other."""
-    return float(np.median(cKDTree(points).query(points, 2)[0][:, 1]))
 
 
 def reenact_frames(
@@ -196,52 +166,33 @@ def reenact_frames(
     settings: ReenactmentSettings,
     truth: CauseSettings,
 ) -> Reenactments:
-    """Return the re-enactments of every row.
+    """Return the re-enactments of every row, which starts and meshes are of as in
+    :func:`gpca.causes.frames.measure_frames`.
 
     Of the instances it reads pixels, camera and what the dataset says of symmetries; of the causes, both clouds, the
-    initial pose and what registrations found.
-
-    Args:
-        causes: as :func:`gpca.causes.frames.measure_frames` returns them.
-        starts: of these rows, in the same order.
-        meshes: as for that function.
-        truth: how counterfactuals are registered, and the limits of the states.
-
-    Raises:
-        InputError: the starts are of other rows.
+    initial pose and what registrations found. Raises InputError where the starts are of other rows.
     """
     registrations = causes.registrations
     of_object = instances.object_index[starts.instance] if len(starts) == len(causes) else np.array([])
     if not np.array_equal(of_object, registrations.object_index):
         fault = "are of other registrations than the causes"
         raise InputError("starts of frames", fault, "regenerate both from the same config")
-    known = {
-        subject.index: KnownObject(subject, meshes[subject.index])
-        for subject in subjects_of(instances, starts.instance, objects)
-    }
+    subjects = subjects_of(instances, starts.instance, objects)
+    known = {subject.index: KnownObject(subject, meshes[subject.index]) for subject in subjects}
 
     def world(pair: ObservedPair, row: int) -> list[Enactment]:
         i = int(starts.instance[row])
         own, T_start = known[int(instances.object_index[i])], starts.T_camera_object_init[row]
         view = FrameView(pair, own, instances.camera_3_3[i], instances.pixels_of(i), T_start)
-        return reenact_frame(view, settings, truth)
+        random = generator(*pair.axes, "hypotheses")
+        hypotheses = find_frame_hypotheses(view, settings, random)
+        xi_n_6, errors = start_twists(pair.axes, truth), own.subject.errors
+        enactments = []
+        for hypothesis in hypotheses:
+            candidate = view.candidate(hypothesis.T, random)
+            candidate.severity["outliers"] = float((hypothesis.inlier_N <= 0.5).mean())
+            # As in the truth of frames, a run without any correspondence stays where it started.
+            enactments.append(register(hypothesis, candidate, errors, xi_n_6, truth, misses=True))
+        return enactments
 
     return reenact_all(causes, *(registrations.axes or ("", None)), settings, truth, world)[0]
-
-
-def reenact_frame(view: FrameView, settings: ReenactmentSettings, truth: CauseSettings) -> list[Enactment]:
-    """Find hypotheses of the true pose in a depth frame and enact each, the most probable first.
-
-    As in the truth of frames, a run without any correspondence stays where it started.
-    """
-    random = generator(*view.pair.axes, "hypotheses")
-    hypotheses = find_frame_hypotheses(view, settings, random)
-    xi_n_6 = start_twists(view.pair.axes, truth)
-    enactments = []
-    for hypothesis in hypotheses:
-        candidate = view.candidate(hypothesis.T, random)
-        outliers = float((hypothesis.inlier_N <= 0.5).mean())
-        candidate = replace(candidate, severity=candidate.severity | {"outliers": outliers})
-        errors = view.known.subject.errors
-        enactments.append(register(hypothesis, candidate, errors, xi_n_6, truth, misses=True))
-    return enactments

@@ -48,9 +48,8 @@ def rotations(count: int, largest_deg: float) -> np.ndarray:
     i = np.arange(n) + 0.5
     inner, outer = np.sqrt(i / n), np.sqrt(1 - i / n)
     first, second = 2 * np.pi * i / 2**0.5, 2 * np.pi * i / 1.533751168755204288118041
-    spread = Rotation.from_quat(
-        np.column_stack([inner * np.sin(first), inner * np.cos(first), outer * np.sin(second), outer * np.cos(second)])
-    )
+    quaternions = inner * np.sin(first), inner * np.cos(first), outer * np.sin(second), outer * np.cos(second)
+    spread = Rotation.from_quat(np.column_stack(quaternions))
     return spread.as_matrix()[spread.magnitude() <= largest]
 
 
@@ -72,23 +71,14 @@ Evidence = Callable[[np.ndarray, float], float]  # pose (4×4), width of the nor
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """A pose that may be the true one.
+    """A pose that may be the true one."""
 
-    Attributes:
-        T: 4×4, takes what was observed, before the registration, to the model.
-        inlier_N: probability of each observed point to be no outlier.
-        log_likelihood: mean over the points, nats.
-        width: of the mixture's normals, diameters per axis.
-        covered: share of the model that was observed, at most.
-        log_posterior: tempered, up to a constant.
-    """
-
-    T: np.ndarray
-    inlier_N: np.ndarray
-    log_likelihood: float
-    width: float
-    covered: float
-    log_posterior: float
+    T: np.ndarray  # 4×4, takes what was observed, before the registration, to the model
+    inlier_N: np.ndarray  # probability of each observed point to be no outlier
+    log_likelihood: float  # mean over the points, nats
+    width: float  # of the mixture's normals, diameters per axis
+    covered: float  # share of the model that was observed, at most
+    log_posterior: float  # tempered, up to a constant
 
 
 def find_hypotheses(
@@ -106,11 +96,23 @@ def find_hypotheses(
         T_found_n: (n, 4, 4) poses that registrations ended at.
         evidence: what else speaks for a pose, such as what a camera saw around the points.
     """
-    search = _Search(observed, surface, settings, random, evidence)
-    free = search.fit(search_ends(observed, surface, T_found_n, random))
-    held = search.hold()
-    first = most_probable([*free, held], surface, settings.hypotheses, SAME)
-    found = [*search.refine(first), search.hold(held.width)]
+    few, few_model = observed[np.sort(random.permutation(len(observed))[:FITTED])], surface.points[:FITTED_MODEL]
+    few_spacing = surface.spacing * np.sqrt(len(surface.points) / len(few_model))
+    some = few, Mixture(few_model, few_spacing / 2), ITERATIONS
+    every = observed, Mixture(surface.points, surface.spacing / 2), LAST_ITERATIONS
+
+    def fit(fitted: tuple[np.ndarray, Mixture, int], T_n: np.ndarray, **options: Any) -> list[Hypothesis]:
+        points, mixture, iterations = fitted
+        fits = mixture.fit(points, T_n, iterations, **options)
+        return [_hypothesis(fits, i, points, surface, settings, random, evidence) for i in range(len(T_n))]
+
+    free = fit(some, search_ends(observed, surface, T_found_n, random))
+    held = fit(some, np.eye(4)[None], anchor=anchor_of(len(few), settings))
+    first = most_probable([*free, *held], surface, settings.hypotheses, SAME)
+    # On all points, the normals start as wide as they were, which leaves fewer partners.
+    T_n, width_n = (np.array([getattr(hypothesis, name) for hypothesis in first]) for name in ("T", "width"))
+    found = fit(every, T_n, width_n=width_n)
+    found += fit(every, np.eye(4)[None], anchor=anchor_of(len(observed), settings), width_n=np.array([held[0].width]))
     return not_negligible(most_probable(found, surface, settings.hypotheses, SAME / 2))
 
 
@@ -136,11 +138,8 @@ def weights_of(hypotheses: Iterable[Hypothesis]) -> np.ndarray:
 
 def anchor_of(points: int, settings: ReenactmentSettings) -> Anchor:
     """Return what holds a pose to the initial one, as firmly as is believed of good starts, against so many points."""
-    return Anchor(
-        np.deg2rad(settings.good_rotation_deg) / np.sqrt(3),
-        settings.good_translation / np.sqrt(3),
-        max(points / INDEPENDENT, 1.0),
-    )
+    rotation_rad = np.deg2rad(settings.good_rotation_deg) / np.sqrt(3)
+    return Anchor(rotation_rad, settings.good_translation / np.sqrt(3), max(points / INDEPENDENT, 1.0))
 
 
 def hypothesis_at(
@@ -150,57 +149,10 @@ def hypothesis_at(
     settings: ReenactmentSettings,
     random: np.random.Generator,
 ) -> Hypothesis:
-    """Return a pose, 4×4, as a hypothesis: with the width and the outliers that are most likely there.
-
-    Args:
-        T: takes what was observed, before the registration, to the model.
-        observed: (N, 3) as in :func:`find_hypotheses`.
-    """
+    """Return a pose, as in :func:`find_hypotheses`, with the width and the outliers that are most likely there."""
     mixture = Mixture(surface.points, surface.spacing / 2)
     fits = mixture.fit(observed, T[None], LAST_ITERATIONS, moving=False)
     return _hypothesis(fits, 0, observed, surface, settings, random, None)
-
-
-class _Search:
-    """Fits poses to some of the points, and then the best to all."""
-
-    def __init__(
-        self,
-        observed: np.ndarray,
-        surface: ModelSurface,
-        settings: ReenactmentSettings,
-        random: np.random.Generator,
-        evidence: Evidence | None,
-    ) -> None:
-        self._surface, self._settings, self._random, self._evidence = surface, settings, random, evidence
-        few = observed[np.sort(random.permutation(len(observed))[:FITTED])]
-        few_model = surface.points[:FITTED_MODEL]
-        spacing = surface.spacing * np.sqrt(len(surface.points) / len(few_model))
-        self._few = few, Mixture(few_model, spacing / 2), ITERATIONS
-        self._all = observed, Mixture(surface.points, surface.spacing / 2), LAST_ITERATIONS
-
-    def fit(self, T_n: np.ndarray) -> list[Hypothesis]:
-        """Fit poses (n, 4, 4) to some of the points."""
-        return self._fit(self._few, T_n)
-
-    def refine(self, hypotheses: list[Hypothesis]) -> list[Hypothesis]:
-        """Fit hypotheses to all points; the normals start as wide as they were, which leaves fewer partners."""
-        width_n = np.array([hypothesis.width for hypothesis in hypotheses])
-        return self._fit(self._all, np.stack([hypothesis.T for hypothesis in hypotheses]), width_n=width_n)
-
-    def hold(self, width: float | None = None) -> Hypothesis:
-        """Fit the initial pose, held by what is believed of good starts: to all points if normals were so wide."""
-        fitted, width_n = (self._few, None) if width is None else (self._all, np.array([width]))
-        anchor = anchor_of(len(fitted[0]), self._settings)
-        return self._fit(fitted, np.eye(4)[None], anchor=anchor, width_n=width_n)[0]
-
-    def _fit(self, fitted: tuple[np.ndarray, Mixture, int], T_n: np.ndarray, **options: Any) -> list[Hypothesis]:
-        observed, mixture, iterations = fitted
-        fits = mixture.fit(observed, T_n, iterations, **options)
-        return [
-            _hypothesis(fits, i, observed, self._surface, self._settings, self._random, self._evidence)
-            for i in range(len(fits.T_n))
-        ]
 
 
 def search_ends(
@@ -272,12 +224,9 @@ def distinct_rows(surface: ModelSurface, T_n: np.ndarray, most: int, limit: floa
     chosen: list[int] = []
     back_n = inverses(T_n)
     for i, T in enumerate(T_n):
-        if chosen:
-            if (np.abs(T - T_n[chosen]).max(axis=(1, 2)) <= CLOSE).any():
-                continue
-            if (surface.apart(T @ back_n[chosen]) <= limit).any():
-                continue
-        chosen.append(i)
         if len(chosen) == most:
             break
+        alike = chosen and (np.abs(T - T_n[chosen]).max(axis=(1, 2)) <= CLOSE).any()
+        if not (alike or (chosen and (surface.apart(T @ back_n[chosen]) <= limit).any())):
+            chosen.append(i)
     return chosen

@@ -26,23 +26,9 @@ AT_MIDDLE = float(np.exp(-MIDDLE))
 
 @njit(cache=True, error_model="numpy")
 def fit_all(
-    observed,
-    poses,
-    iterations,
-    moving,
-    precision,
-    arm,
-    least,
-    points,
-    starts,
-    low,
-    cell,
-    cells,
-    likelihood,
-    variance,
-    outliers,
-    inlier,
-):
+    observed, poses, iterations, moving, precision, arm, least, points, starts, low, cell, cells,
+    likelihood, variance, outliers, inlier,
+):  # fmt: skip
     """Maximize the likelihood of the observed points (N, 3) from every pose (n, 4, 4), in place.
 
     Args:
@@ -218,8 +204,8 @@ CELL = 0.15  # diameters; edge of the cubes that the model's points are sorted i
 class Anchor:
     """A prior of a pose: normal around the identity, of the angle (radians) and the length per axis.
 
-    It acts as six points that stay where they are, so many that they hold the pose as firmly (:meth:`arm`). `strength`
-    is a factor of its precision.
+    It acts as six points that stay where they are, so many that they hold the pose as firmly (:meth:`arm`), times a
+    factor.
     """
 
     rotation_rad: float
@@ -234,21 +220,13 @@ class Anchor:
 
 @dataclass(frozen=True)
 class Fits:
-    """What the mixture says of n poses of the observed points (N, 3).
+    """What the mixture says of n poses of the observed points (N, 3)."""
 
-    Attributes:
-        T_n: (n, 4, 4), takes what was observed to the model.
-        log_likelihood_n: (n,) mean over the points, nats.
-        width_n: (n,) of the normals, standard deviation per axis.
-        outliers_n: (n,) share.
-        inlier_n_N: (n, N) probability of each point to be no outlier.
-    """
-
-    T_n: np.ndarray
-    log_likelihood_n: np.ndarray
-    width_n: np.ndarray
-    outliers_n: np.ndarray
-    inlier_n_N: np.ndarray
+    T_n: np.ndarray  # (n, 4, 4), takes what was observed to the model
+    log_likelihood_n: np.ndarray  # mean over the points, nats
+    width_n: np.ndarray  # of the normals, standard deviation per axis
+    outliers_n: np.ndarray  # share
+    inlier_n_N: np.ndarray  # probability of each point to be no outlier
 
 
 class Mixture:
@@ -275,11 +253,8 @@ class Mixture:
     ) -> Fits:
         """Maximize the likelihood of the observed points (N, 3) from each pose (n, 4, 4), times that of an anchor.
 
-        A fit that has converged takes fewer iterations.
-
-        Args:
-            moving: if not, the width and the share of outliers are estimated at the poses as they are.
-            width_n: of the normals at first (n,); by default `FIRST_WIDTH`.
+        A fit that has converged takes fewer iterations. Where poses are not moving, the width and the share of outliers
+        are estimated there. The normals are `width_n` wide at first, by default `FIRST_WIDTH`.
         """
         poses_n, n = np.array(T_n, np.float64), len(T_n)
         likelihood_n, outliers_n = np.empty(n), np.empty(n)

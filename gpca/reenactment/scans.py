@@ -16,7 +16,6 @@ from gpca.causes.dataset import Causes
 from gpca.causes.scans import OverlapErrors, ScanCandidate
 from gpca.causes.settings import FEWEST_POINTS, CauseSettings
 from gpca.pairs.distances import ObservedPair
-from gpca.pairs.perturbation import CONCEPTS, NOISE, OVERLAP, POSE
 from gpca.reenactment.dataset import Reenactments, reenact_all
 from gpca.reenactment.enactment import QUIET, Enactment, NoiseScale, register, start_twists
 from gpca.reenactment.hypotheses import Hypothesis, find_hypotheses
@@ -38,9 +37,7 @@ def reenact_scans(
     """Return the re-enactments of every row; of the causes it reads what may be observed.
 
     Args:
-        causes: as :func:`gpca.causes.scans.measure_scans` returns them.
-        error_factor_S: (S,) of :class:`gpca.causes.scans.DrawnScans`: what counts as a failure.
-        truth: how counterfactuals are registered, and the limits of the states.
+        causes, error_factor_S: as :func:`gpca.causes.scans.measure_scans` returns them; the second says what fails.
         T_found_S: (k, 4, 4) for each row, where else the source may belong: what global methods found takes it there
             from where the registration began.
     """
@@ -79,10 +76,8 @@ def reenact_scan(
 def cropped(hypothesis: Hypothesis, before: np.ndarray, surface: ModelSurface, scale: NoiseScale) -> ScanCandidate:
     """Return the pair as a candidate of the truth's, as if a hypothesis were true.
 
-    Where hardly any point is common then, nothing can be cropped.
-
-    Args:
-        before: (N, 3) the source, before the registration, in the target's frame.
+    Where hardly any point is common then, nothing can be cropped. The source (N, 3) lies in the target's frame, as
+    before the registration.
     """
     points, reach = transform(hypothesis.T, before), REACH * surface.spacing
     common_N, common_M = near(points, surface.points, reach), near(surface.points, points, reach)
@@ -91,11 +86,9 @@ def cropped(hypothesis: Hypothesis, before: np.ndarray, surface: ModelSurface, s
         common_N, common_M = np.ones(len(points), bool), np.ones(len(surface.points), bool)
     residuals, rows = surface.residuals(points)
     noise = scale.noise(residuals[common_N])
-    applied = np.zeros(len(CONCEPTS), bool)
-    applied[NOISE], applied[POSE], applied[OVERLAP] = noise > QUIET, True, not (common_N.all() and common_M.all())
     moved_N = np.where(common_N, residuals, 0.0) * (noise**2 / (noise**2 + surface.roughness) if noise > QUIET else 0.0)
     return ScanCandidate(
-        applied=applied,
+        applied=np.array([noise > QUIET, True, not (common_N.all() and common_M.all())]),  # noise, pose, overlap
         model=surface.points,
         noisy_model=surface.points,
         clean=points - moved_N[:, None] * surface.normals[rows],

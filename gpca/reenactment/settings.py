@@ -6,34 +6,26 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated
 
+from gpca.causes.settings import Angle
 from gpca.causes.truth import ALL, BY_SIZE, SUBSETS
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.settings import Bounds, OpenShare, Positive, Share
 
 STEEPNESS = 8.0  # of the probability of a failure in the logarithm of the error
 SMALLEST_ERROR = 1e-4  # diameters, before its logarithm is taken
-Angle = Annotated[float, Bounds(exclusiveMinimum=0, maximum=180)]  # degrees
 
 
 @dataclass(frozen=True)
 class ReenactmentSettings:
-    """What is believed of a pose error beforehand, and how many hypotheses of the true pose are enacted.
+    """What is believed of a pose error beforehand, and how many hypotheses of the true pose are enacted."""
 
-    Attributes:
-        hypotheses: enacted of each pair, at most.
-        good_starts: how probable it is that the initial pose is good.
-        good_rotation_deg, good_translation: root mean square angle and length (diameters) of a good start's error.
-        bad_rotation_deg, bad_translation: those of any other hypothesis.
-        lost_starts: how probable it is that the initial pose says nothing, and any other is as likely.
-    """
-
-    hypotheses: Annotated[int, Bounds(minimum=2, maximum=20)] = 4
-    good_starts: OpenShare = 0.5
-    good_rotation_deg: Angle = 3.0
-    good_translation: Positive = 0.017
-    bad_rotation_deg: Angle = 70.0
+    hypotheses: Annotated[int, Bounds(minimum=2, maximum=20)] = 4  # enacted of each pair, at most
+    good_starts: OpenShare = 0.5  # how probable it is that the initial pose is good
+    good_rotation_deg: Angle = 3.0  # root mean square angle
+    good_translation: Positive = 0.017  # and length (diameters) of a good start's error
+    bad_rotation_deg: Angle = 70.0  # and those of any other hypothesis
     bad_translation: Positive = 0.35
-    lost_starts: Share = 0.0
+    lost_starts: Share = 0.0  # how probable it is that the initial pose says nothing, and any other is as likely
 
     def calls(self, starts: int) -> int:
         """Return how many runs of ICP take whole clouds, at most: of all subsets of the causes from so many starts."""

@@ -34,9 +34,7 @@ def nearest_rows(searched, target, rows):
 def surface_distances(searched, target, normals, reach, distances):
     """Fill the distance of each point (N, 3) from the surface, the target's own where no point of it is within that.
 
-    Args:
-        normals: (P, 3) of the target's points.
-        reach: (P,) how far the surface reaches from each point, along its plane.
+    The target's points have normals (P, 3) and reach (P,): how far the surface reaches from them, along their planes.
     """
     room = np.empty(LISTED)
     points, starts, low, cell, cells, voxel, voxels, list_of_voxel, listed, offsets, within, used, distance = target
@@ -65,19 +63,16 @@ class ModelSurface:
     """A model (M, 3) with its local planes.
 
     Attributes:
-        points: (M, 3).
         spacing: median distance to the nearest other point; spacing_M: mean distance (M,) to the three nearest.
-        centers: (M, 3) of the planes, the means of each point and its neighbors.
-        normals, tangents: (M, 3) and (M, 2, 3) unit vectors.
+        centers, normals, tangents: (M, 3), (M, 3) and (M, 2, 3) of the planes through each point and its neighbors.
         roughness: variance of the distance between a plane and points of the surface that had no part in it, beyond
             that of the points that had.
-        tree: of the points.
     """
 
     def __init__(self, points: np.ndarray) -> None:
         self.points = np.ascontiguousarray(points, np.float64)
         self.tree = cKDTree(self.points)
-        neighbors = min(_neighbors(len(points)), len(points) - 1)
+        neighbors = min(8 if len(points) < 256 else 10 if len(points) < 512 else 12, len(points) - 1)
         distances, rows = self.tree.query(self.points, neighbors + 1)
         self.spacing = max(float(np.median(distances[:, 1])), LEAST_SPACING)
         self.spacing_M = distances[:, 1:4].mean(axis=1)
@@ -90,14 +85,9 @@ class ModelSurface:
         self.roughness = max(trimmed_square(left_out) - trimmed_square(own), 0.0)
 
     @cached_property
-    def symmetries(self) -> dict[str, list]:
-        """The turns that leave the shape as it is (:func:`gpca.objects.bop.find_symmetries`)."""
-        return find_symmetries(self.points, 1.0)
-
-    @property
     def symmetric(self) -> bool:
         """Whether some turn leaves the shape as it is; errors then are those of the nearest points."""
-        return bool(self.symmetries)
+        return bool(find_symmetries(self.points, 1.0))
 
     def residuals(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the signed distances (N,) of points (N, 3) from the plane of the nearest model point, and its row."""
@@ -112,7 +102,8 @@ class ModelSurface:
 
     def distances(self, points: np.ndarray) -> np.ndarray:
         """Return the distances (N,) of points (N, 3) from the surface: from the plane of the nearest model point, and
-        along it as far as the points' spacing does not reach."""
+        along it as far as the points' spacing does not reach.
+        """
         target, _, normals, reach = self._target
         distance_N = np.empty(len(points))
         surface_distances(np.ascontiguousarray(points), target, normals, reach, distance_N)
@@ -144,10 +135,6 @@ def trimmed_square(values: np.ndarray) -> float:
     """Return the mean square of the smallest values (N,), `TRIMMED` of them."""
     squares = np.sort(np.square(values))
     return float(squares[: max(1, int(TRIMMED * len(squares)))].mean())
-
-
-def _neighbors(points: int) -> int:
-    return 8 if points < 256 else 10 if points < 512 else 12
 
 
 def _planes(around_M_k_3: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -186,11 +173,7 @@ def share_within(model: np.ndarray, observed: np.ndarray, noise: float, random: 
 def covered_points(model: np.ndarray, observed: np.ndarray, noise: float, random: np.random.Generator) -> np.ndarray:
     """Return which points of a model (M, 3) lie on the side of the plane that was observed, (M,) bool.
 
-    The model is blurred as much as what was observed; what of it reaches as far is covered.
-
-    Args:
-        observed: (N, 3) in the model's frame, without outliers.
-        noise: standard deviation per axis.
+    The model is blurred as much as what was observed, (N, 3) without outliers; what of it reaches as far is covered.
     """
     blur_M = noise * random.normal(size=len(model))
     direction, share, limit = _cut(model, observed, blur_M)
@@ -198,7 +181,10 @@ def covered_points(model: np.ndarray, observed: np.ndarray, noise: float, random
         return np.ones(len(model), bool)
     along_M = (model * direction).sum(axis=1)
     order_M = np.argsort(along_M, kind="stable")
-    kept = _reaching((along_M + blur_M)[order_M], limit, _beyond(len(observed)) / len(observed))
+    # As many points, in their order, as let the allowed share of them lie beyond the limit.
+    over_M = np.cumsum((along_M + blur_M)[order_M] > limit) / np.arange(1, len(model) + 1)
+    reaching = np.flatnonzero(over_M > _beyond(len(observed)) / len(observed))
+    kept = max(int(LEAST_KEPT * len(model)), int(reaching[0]) if len(reaching) else len(model))
     covered_M = np.zeros(len(model), bool)
     covered_M[order_M[:kept]] = True
     return covered_M
@@ -225,13 +211,6 @@ def directions() -> np.ndarray:
     z, turn = 1 - 2 * i / DIRECTIONS, np.pi * (1 + 5**0.5) * i
     across = np.sqrt(1 - z * z)
     return np.column_stack([np.cos(turn) * across, np.sin(turn) * across, z])
-
-
-def _reaching(blurred_M: np.ndarray, limit: float, beyond: float) -> int:
-    """Return how many points, in their order, reach so far that this share of them lies beyond the limit."""
-    over_M = np.cumsum(blurred_M > limit) / np.arange(1, len(blurred_M) + 1)
-    reaching = np.flatnonzero(over_M > beyond)
-    return max(int(LEAST_KEPT * len(blurred_M)), int(reaching[0]) if len(reaching) else len(blurred_M))
 
 
 @njit(cache=True, error_model="numpy")

@@ -221,13 +221,12 @@ def test_the_same_pair_has_the_same_numbers_and_another_sample_other_starts(pair
 
 
 def test_the_remedies_run_as_often_as_their_settings_say(monkeypatch, pair):
-    counted, settings = [], DescriptorSettings(starts=2, restarts=5, icp_points=64)
+    counted, settings, real = [], DescriptorSettings(starts=2, restarts=5, icp_points=64), module.BatchedICP.register
 
-    def register(observed, model, starts_n, onto_observed, icp):
+    def register(icp, moving, starts_n):
         counted.append(len(starts_n))
-        return real(observed, model, starts_n, onto_observed, icp)
+        return real(icp, moving, starts_n)
 
-    real = module._register
-    monkeypatch.setattr(module, "_register", register)
+    monkeypatch.setattr(module.BatchedICP, "register", register)
     describe_remedied(pair, settings, ICP)
     assert sum(counted) == settings.remedy_calls

@@ -6,8 +6,8 @@ from scipy.stats import spearmanr
 from sklearn.metrics import average_precision_score, balanced_accuracy_score, roc_auc_score
 
 from gpca.causes.dataset import LABELS
-from gpca.causes.judged import MEASURES, RECALL, counted, measure, of_decisions
-from gpca.causes.truth import BORDERLINE, FAILED, NOMINAL
+from gpca.causes.judged import MEASURES, RECALL, SampleTruth, ceiling_of, counted, measure, of_decisions
+from gpca.causes.truth import BORDERLINE, FAILED, NOMINAL, Truth
 from tests.judged import random_judged
 
 OF_FAILED = ("regret", "tied_accuracy", "dominant_accuracy", "deletion_gain")
@@ -106,6 +106,12 @@ def test_the_registration_that_is_shown_is_judged_by_its_own_state(judged):
     assert one(by_own)["auroc_failed_shown"] == 1 > one(by_own)["auroc_failed"]
     always = replace(judged, nominal=np.full(len(judged), 2.0))
     assert one(always)["state_accuracy"] == one(always)["state_accuracy_shown"] == 0.5
+
+
+def test_a_single_registration_has_a_state_of_its_own():
+    truth = Truth(np.zeros((4, 8)), np.zeros((4, 8)), 0.02, 0.03, 0.01, 5.0)
+    samples = SampleTruth(truth, truth, np.zeros(4), np.zeros(4), np.array([0.0199, 0.02, 0.03, 0.31]))
+    assert ceiling_of(samples, 0).shown.tolist() == [NOMINAL, BORDERLINE, BORDERLINE, FAILED]
 
 
 def test_false_alarms_are_counted_where_nine_of_ten_failures_are_found(judged):

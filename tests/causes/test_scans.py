@@ -15,6 +15,7 @@ from gpca.causes.scans import (
     OverlapErrors,
     ScanStart,
     measure_scans,
+    motion_between,
     sensor_noise_m,
     unit_of,
 )
@@ -71,7 +72,7 @@ def test_an_error_is_the_rmse_over_the_true_overlap_in_units_of_the_limit():
     pair = corner_pair(0.5)
     scans = DrawnScans.of(pair, POINTS, SUCCESS.room_m, SETTINGS.limits.failed, np.random.default_rng(100))
     T_start = start_off(pair, 5, 0.1)
-    T_observed_model = np.linalg.inv(scans.displaced(T_start))[None]
+    T_observed_model = np.linalg.inv(motion_between(scans.pair, scans.pair.T_target_source, T_start))[None]
     expected = SETTINGS.limits.failed * overlap_rmse(pair, T_start) / SUCCESS.room_m
     assert scans.errors(T_observed_model)[0] == pytest.approx(expected, rel=0.1)  # of some of the points
     shifted = np.eye(4)[None].copy()

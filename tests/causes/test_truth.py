@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from baselines.shap_kl import shapley_values as by_library
-from gpca.causes.truth import ALL, NONE, SUBSETS, Truth, joined, shapley_values, state_of_errors
+from gpca.causes.truth import ALL, NONE, SUBSETS, Truth, shapley_values
 
 LIMITS = {"nominal_limit": 0.02, "failed_limit": 0.03, "cause_limit": 0.01, "uncertainty_limit": 5.0}
 
@@ -49,22 +49,15 @@ def test_a_cause_that_helps_has_a_negative_part():
     assert found.causes.tolist() == [[False, True, False]]
 
 
-def test_truths_are_joined_and_chosen_from():
-    both = joined([truth((0.0, 0.1)), truth((0.0, 0.2), (0.0, 0.3))])
-    assert both.error[:, -1].tolist() == [0.1, 0.2, 0.3]
-    assert both.subset(np.array([2, 0])).error[:, -1].tolist() == [0.3, 0.1]
-    assert len(both) == 3
+def test_truths_are_chosen_from():
+    both = truth((0.0, 0.1), (0.0, 0.2), (0.0, 0.3)).subset(np.array([2, 0]))
+    assert both.error[:, -1].tolist() == [0.3, 0.1] and len(both) == 2
 
 
 def test_causes_that_add_nearly_as_much_as_the_dominant_one_are_tied():
     found = truth(additive(0.01, 0.1, 0.0901, 0.08), additive(0.01, 0.2, 0, 0))
     assert found.tied.tolist() == [[True, True, False], [True, False, False]]
     assert found.margin == pytest.approx([0.0099, 0.2])
-
-
-def test_a_single_registration_has_a_state_of_its_own():
-    states = state_of_errors(np.array([0.0199, 0.02, 0.03, 0.31]), truth((0.0, 0.1)))
-    assert states.tolist() == ["nominal", "borderline", "borderline", "failed"]
 
 
 RANDOM = np.random.default_rng(100)

@@ -16,9 +16,9 @@ SETTINGS = FEW_CAUSES | {"points": list(FEW_CAUSES["points"]), "icp": {}}
 
 def test_a_sample_is_drawn_again_where_it_lay(four, causes):
     row = choose_sample(causes, "causes.npz")
-    again = replay(four, causes, row, "four", 100, CauseSettings(**FEW_CAUSES))
-    assert again.observed[ALL] == pytest.approx(causes.registrations.cloud(row), abs=1e-5)
-    assert np.array_equal(again.model.astype(np.float32), causes.registrations.target(row))
+    model, observed_8 = replay(four, causes, row, "four", 100, CauseSettings(**FEW_CAUSES))
+    assert observed_8[ALL] == pytest.approx(causes.registrations.cloud(row), abs=1e-5)
+    assert np.array_equal(model.astype(np.float32), causes.registrations.target(row))
     with pytest.raises(InputError, match="is not reproduced by these settings"):
         replay(four, causes, row, "four", 101, CauseSettings(**FEW_CAUSES))
 

@@ -11,12 +11,11 @@ import numpy as np
 
 from gpca.alignment.methods.interface import Pair
 from gpca.alignment.methods.registry import make_method
-from gpca.alignment.rigid import inverse, transform
-from gpca.causes.candidate import candidate_of, surface_of
+from gpca.alignment.rigid import inverse
+from gpca.causes.candidate import drawn_again
 from gpca.causes.dataset import Causes
 from gpca.causes.descriptors import observed_pair
 from gpca.causes.settings import CauseSettings
-from gpca.errors import InputError
 from gpca.experiments.estimators.references import Redraws, Reference, draw_twists
 from gpca.experiments.estimators.settings import KINDS, EstimatorPairSettings, Kind
 from gpca.objects.canonical import ObjectClouds
@@ -26,7 +25,6 @@ from gpca.uncertainty.estimators.examples import Moved, describe, example, true_
 from gpca.uncertainty.estimators.interface import Example, FailedEstimate, RegisteredPair
 
 MOVED: Moved = "model"  # onto the observed cloud, as the causes' track has it
-REPRODUCED = 1e-3  # diameters, by which a point may be off: those of the file have single precision
 
 
 @dataclass(frozen=True)
@@ -132,14 +130,7 @@ class Registering:
             InputError: the settings, or the objects, are not those that the row was drawn with.
         """
         of = self.situations
-        surface = surface_of(of.objects, of.causes, row)
-        candidate = candidate_of(of.causes, row, surface, of.source, of.seed, of.drawn_by)
-        expected = transform(T_true, candidate.observed(tuple(np.flatnonzero(candidate.applied).tolist())))
-        cloud = of.causes.registrations.cloud(row)
-        if expected.shape != cloud.shape or np.abs(expected - cloud).max() > REPRODUCED:
-            subject = f"sample {of.causes.registrations.sample[row]} of {of.source}, seed {of.seed}"
-            remedy = "regenerate the causes from a single config"
-            raise InputError(subject, "is not reproduced by these settings", remedy)
+        candidate, surface = drawn_again(of.objects, of.causes, row, of.source, of.seed, of.drawn_by)
         return Redraws(candidate, surface, T_true, self._settings.points)
 
     def _reference(self, kind: Kind, registered: RegisteredPair, redraws: Redraws) -> Reference:
