@@ -35,19 +35,22 @@ class Pool:
     truth_N: np.ndarray
 
 
+Choose = Callable[[Pool, int, np.random.Generator], np.ndarray]
+
+
 @dataclass(frozen=True)
 class Strategy:
     """A registered strategy.
 
     Attributes:
-        title: title in tables and figures.
+        title: in tables and figures.
         choose: called with pool, batch size and generator; may return fewer rows, or repeated ones.
         oracle: whether it reads the true classes.
         needs_scores: whether it reads the classifier's scores.
     """
 
     title: str
-    choose: Callable[[Pool, int, np.random.Generator], np.ndarray]
+    choose: Choose
     oracle: bool = False
     needs_scores: bool = True
 
@@ -85,10 +88,6 @@ def top(values_N: np.ndarray, n: int) -> np.ndarray:
     return np.argsort(-values_N, kind="stable")[:n]
 
 
-def random_rows(pool: Pool, batch: int, random: np.random.Generator) -> np.ndarray:
-    return random.permutation(len(pool.h_N_d))[:batch]
-
-
 def random_stratified(pool: Pool, batch: int, random: np.random.Generator) -> np.ndarray:
     """Draw equally many of each true class, as far as possible."""
     order = random.permutation(len(pool.h_N_d))
@@ -100,22 +99,15 @@ def random_stratified(pool: Pool, batch: int, random: np.random.Generator) -> np
     return np.lexsort([tie_N, rank_N])[:batch]
 
 
-def entropy(pool: Pool, batch: int, _random: np.random.Generator) -> np.ndarray:
-    """Take the largest predictive entropies H[ŝ]."""
-    from skactiveml.pool import uncertainty_scores
+def by_scores(method: str) -> Choose:
+    """Take the largest predictive entropies H[ŝ], or the smallest differences of the two largest scores."""
 
-    return top(uncertainty_scores(pool.scores_N_C, method="entropy"), batch)
+    def choose(pool: Pool, batch: int, _random: np.random.Generator) -> np.ndarray:
+        from skactiveml.pool import uncertainty_scores
 
+        return top(uncertainty_scores(pool.scores_N_C, method=method), batch)
 
-def margin(pool: Pool, batch: int, _random: np.random.Generator) -> np.ndarray:
-    """Take the smallest differences of the two largest scores."""
-    from skactiveml.pool import uncertainty_scores
-
-    return top(uncertainty_scores(pool.scores_N_C, method="margin_sampling"), batch)
-
-
-def bald(pool: Pool, batch: int, _random: np.random.Generator) -> np.ndarray:
-    return top(pool.bald_N, batch)
+    return choose
 
 
 def bald_kmeans(pool: Pool, batch: int, random: np.random.Generator) -> np.ndarray:
@@ -134,11 +126,7 @@ def bald_kmeans(pool: Pool, batch: int, random: np.random.Generator) -> np.ndarr
 def balanced_kmeans(
     h_n_d: np.ndarray, clusters: int, random: np.random.Generator, most: int = 100
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Balanced k-means: assign equally many samples to each centroid at the least cost (Malinen and Fränti 2014).
-
-    Returns:
-        Cluster (n,) of each sample, and centroids (B, d).
-    """
+    """Clusters (n,) of equally many samples each at the least cost (Malinen and Fränti 2014), and centroids (B, d)."""
     from scipy.optimize import linear_sum_assignment  # here: planning reads names only
     from scipy.spatial.distance import cdist
     from sklearn.cluster import kmeans_plusplus
@@ -154,14 +142,6 @@ def balanced_kmeans(
             break
         centers_B_d = np.stack([h_n_d[cluster_n == cluster].mean(axis=0) for cluster in range(clusters)])
     return cluster_n, centers_B_d
-
-
-def bald_stochastic(pool: Pool, batch: int, random: np.random.Generator) -> np.ndarray:
-    """Draw without replacement in proportion to BALD: PowerBALD (Kirsch et al. 2023), β = 1, by Gumbel top-k.
-
-    It equals BatchBALD in their comparison, without joint entropies.
-    """
-    return top(np.log(np.maximum(pool.bald_N, 1e-12)) + random.gumbel(size=len(pool.bald_N)), batch)
 
 
 def badge(pool: Pool, batch: int, random: np.random.Generator) -> np.ndarray:
@@ -207,15 +187,24 @@ def _with_labeled(strategy, pool: Pool, batch: int) -> np.ndarray:
 
 
 STRATEGIES = {
-    "random": Strategy("Random", random_rows, needs_scores=False),
+    "random": Strategy(
+        "Random", lambda pool, batch, random: random.permutation(len(pool.h_N_d))[:batch], needs_scores=False
+    ),
     "random_stratified": Strategy(
         "Stratified random (knows the truth)", random_stratified, oracle=True, needs_scores=False
     ),
-    "entropy": Strategy("Entropy", entropy),
-    "margin": Strategy("Margin", margin),
-    "bald": Strategy("BALD", bald),
+    "entropy": Strategy("Entropy", by_scores("entropy")),
+    "margin": Strategy("Margin", by_scores("margin_sampling")),
+    "bald": Strategy("BALD", lambda pool, batch, random: top(pool.bald_N, batch)),
     "bald_kmeans": Strategy("BALD + k-means (paper)", bald_kmeans),
-    "bald_stochastic": Strategy("PowerBALD", bald_stochastic),
+    # Draws without replacement in proportion to BALD (Kirsch et al. 2023, β = 1) by Gumbel top-k, equal to BatchBALD
+    # in their comparison, without joint entropies.
+    "bald_stochastic": Strategy(
+        "PowerBALD",
+        lambda pool, batch, random: top(
+            np.log(np.maximum(pool.bald_N, 1e-12)) + random.gumbel(size=len(pool.bald_N)), batch
+        ),
+    ),
     "badge": Strategy("BADGE", badge),
     "coreset": Strategy("CoreSet", coreset, needs_scores=False),
     "typiclust": Strategy("TypiClust", typiclust, needs_scores=False),

@@ -43,11 +43,7 @@ def write_curves(
 
 
 def read_curves(path: str | Path) -> dict[tuple[str, str], pd.DataFrame]:
-    """Read the curves of :func:`write_curves`.
-
-    Raises:
-        InputError: missing, empty or unreadable file, missing column, or a number that is not finite.
-    """
+    """Read the curves of :func:`write_curves`."""
     rows = read_csv(path, _SHARED, others=(*POOL_COLUMNS, *STREAM_COLUMNS))
     for column in rows.columns[2:]:
         # Empty are the running accuracy before the first arrival, and accuracies without test samples.
@@ -56,11 +52,7 @@ def read_curves(path: str | Path) -> dict[tuple[str, str], pd.DataFrame]:
 
 
 def collect_curves(files: Iterable[str | Path], target: float) -> pd.DataFrame:
-    """Return the tidy metrics of files named `…/{source}/{strategy}/seed{seed}.csv`; results/README.md lists them.
-
-    Raises:
-        InputError: no files, a name of another form, a file that :func:`read_curves` refuses.
-    """
+    """Return the tidy metrics of files named `…/{source}/{strategy}/seed{seed}.csv`; results/README.md lists them."""
     curves = {source_method_seed(path): read_curves(path) for path in files}
     records = []
     for (source, strategy, seed), by_setting in curves.items():

@@ -78,9 +78,6 @@ def add_to_queue(path: str | Path, aligned: np.ndarray, target: np.ndarray, h_1_
         aligned, target: (N, 3) and (M, 3), in the target's canonical frame and diameters.
         h_1_d: (1, d) embedding of the aligned source (:meth:`gpca.model.explainer.Explainer.embed`).
         name: description in one line.
-
-    Raises:
-        InputError: the file is not a queue, or the queue of another model.
     """
     path = Path(path)
     one = Queue(
@@ -106,9 +103,6 @@ class LabelFile:
     Args:
         path: the file; it need not exist.
         samples: the samples that may be labeled.
-
-    Raises:
-        InputError: missing column, unknown sample, contradicting labels, invalid concept name.
     """
 
     def __init__(self, path: str | Path, samples: Mapping[Key, object]) -> None:
@@ -175,9 +169,6 @@ class Session:
         settings: training of the classifier.
         strategy: strategy of :mod:`gpca.active_learning.acquisition` that picks the questions.
         gpc: a trained classifier to continue with; then `start` may be empty.
-
-    Raises:
-        InputError: fewer than two concepts are labeled.
     """
 
     def __init__(

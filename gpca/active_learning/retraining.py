@@ -26,8 +26,6 @@ class Retraining:
 
     Args:
         task: initial, pool and test samples, not projected.
-        settings: training of the classifier.
-        axes: names of the draws.
         warm: whether a fit continues from the last one.
         sees_pool: whether scaling, inducing inputs and lengthscale are initialized on the pool too.
     """
@@ -40,18 +38,12 @@ class Retraining:
         warm: bool = False,
         sees_pool: bool = False,
     ) -> None:
-        self.task = task
-        self.settings = settings
+        self.task, self.settings = task, settings
         self._axes = (*axes, "retraining", task.held_out)
-        self._warm = warm
-        self._sees_pool = sees_pool
+        self._warm, self._sees_pool = warm, sees_pool
 
     def fit(self, queried: Sequence[int], before: GPC | None) -> GPC:
-        """Return the classifier of the initial labels and of these rows of the pool.
-
-        Args:
-            before: the last classifier; it is not changed.
-        """
+        """Return the classifier of the initial labels and of these rows of the pool; the last one is not changed."""
         [(_, gpc)] = self.fit_up_to([self.settings.iterations], queried, before)
         return gpc
 
@@ -59,14 +51,12 @@ class Retraining:
         self, iterations: Iterable[int], queried: Sequence[int], before: GPC | None
     ) -> Iterator[tuple[int, GPC]]:
         """Yield each number of passes over the labels, in rising order, and the classifier after it."""
-        initial, pool = self.task.initial, self.task.pool
-        rows = list(queried)
+        initial, pool, rows = self.task.initial, self.task.pool, list(queried)
         h_L_d = np.concatenate([initial.h, pool.h[rows]])
         concept_L = np.concatenate([initial.concept_N, pool.concept_N[rows]])
         around = np.concatenate([initial.h, pool.h]) if self._sees_pool else None
         gpc = GPC(CONCEPTS, self.settings, *self._axes)
-        continued = before if self._warm else None
-        for done in gpc.fit_up_to(iterations, h_L_d, concept_L, around, continued):
+        for done in gpc.fit_up_to(iterations, h_L_d, concept_L, around, before if self._warm else None):
             yield done, gpc
 
     def passes(self, target: float, queried: Sequence[int], before: GPC | None) -> int:
@@ -77,7 +67,7 @@ class Retraining:
         return next((done for done, gpc in fits if self.look(gpc, queried)["accuracy"] >= target), most)
 
     def look(self, gpc: GPC, queried: Sequence[int]) -> Step:
-        """Return the step after these labels, see :func:`gpca.active_learning.rounds.run_rounds`."""
+        """Return the step after these labels, see :func:`gpca.active_learning.rounds.rounds`."""
         return step_of(self.task, gpc, list(queried), self.settings.iterations if queried else 0)
 
 
@@ -105,7 +95,6 @@ def learn(
     Args:
         targets: accuracies on the test samples; the curve has a step at each. With a single one, ``epochs`` of that
             step are the passes up to the target instead of those of the whole retraining.
-        axes: names of the strategy's draws.
     """
     task = retraining.task
     random = generator(*axes, "retraining", task.held_out, strategy)
@@ -124,7 +113,16 @@ def learn(
         before, gpc = gpc, retraining.fit(queried + chosen, gpc)
         last = retraining.look(gpc, queried + chosen)
         reached = [target for target in open_targets if last["accuracy"] >= target]
-        added = [*_first_at(retraining, reached, queried, chosen, before), last]
+        added, missing = [], sorted(reached)
+        for given in range(1, len(chosen)):
+            if not missing:
+                break
+            rows = queried + chosen[:given]
+            step = retraining.look(retraining.fit(rows, before), rows)
+            if step["accuracy"] >= missing[0]:
+                missing = [target for target in missing if step["accuracy"] < target]
+                added.append(step)
+        added.append(last)
         if len(targets) == 1 and reached:
             rows = queried + chosen[: int(added[0]["labels"]) - len(queried)]
             added[0]["epochs"] = retraining.passes(targets[0], rows, before)
@@ -132,18 +130,3 @@ def learn(
         queried += chosen
         open_targets = [target for target in open_targets if target not in reached]
     return Learned(steps, queried)
-
-
-def _first_at(
-    retraining: Retraining, targets: Sequence[float], queried: list[int], chosen: list[int], before: GPC
-) -> Iterator[Step]:
-    """Yield the steps within a round at which one of these targets, which it reaches, is first reached."""
-    missing = sorted(targets)
-    for given in range(1, len(chosen)):
-        if not missing:
-            return
-        rows = queried + chosen[:given]
-        step = retraining.look(retraining.fit(rows, before), rows)
-        if step["accuracy"] >= missing[0]:
-            missing = [target for target in missing if step["accuracy"] < target]
-            yield step

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from copy import copy
 from dataclasses import dataclass
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
@@ -37,11 +37,8 @@ class Embedded:
 
     def followed_by(self, other: Embedded) -> Embedded:
         """Append other samples."""
-        return Embedded(
-            np.concatenate([self.embedding, other.embedding]),
-            np.concatenate([self.concept, other.concept]),
-            np.concatenate([self.split, other.split]),
-        )
+        names = ("embedding", "concept", "split")
+        return Embedded(*(np.concatenate([getattr(self, name), getattr(other, name)]) for name in names))
 
 
 Inputs = TypeVar("Inputs", np.ndarray, Projection)
@@ -85,12 +82,8 @@ def make_task(
 
     Args:
         held_out: concept without initial labels.
-        axes: names of the draw (source, seed).
         classes: all concepts; the others have equally many initial samples.
         new_share: share (below 1) of the held-out concept in the pool, if there are enough samples; None keeps all.
-
-    Raises:
-        InputError: too few training samples.
     """
     train = generator(*axes, "initial", held_out).permutation(samples.rows("train"))
     concept_S = samples.concept
@@ -128,27 +121,9 @@ def initial_gpc(
     return gpc
 
 
-def run_rounds(
-    task: LabelingTask[Projection],
-    gpc: GPC,
-    strategy: str,
-    settings: ActiveLearningSettings,
-    *axes: object,
-    answers_N: np.ndarray | None = None,
-) -> list[dict[str, float]]:
-    """Spend the budget of labels with one strategy.
-
-    Args:
-        task: projected by `gpc`.
-        gpc: result of :func:`initial_gpc`; it is not changed.
-        axes: names of the draws (source, seed, …).
-        answers_N: the oracle's answers for the pool; by default, the truth.
-
-    Returns:
-        One step per round, the first before any label: ``labels``, ``new_labels`` of the held-out concept, ``accuracy``
-        on all test samples, ``accuracy_new`` on those of the held-out concept, and ``epochs`` of the retraining.
-    """
-    return [step for step, _ in rounds(task, gpc, strategy, settings, *axes, answers_N=answers_N)]
+def run_rounds(*given: Any, **options: Any) -> list[dict[str, float]]:
+    """Spend the budget of labels with one strategy: the steps of :func:`rounds`."""
+    return [step for step, _ in rounds(*given, **options)]
 
 
 def rounds(
@@ -159,15 +134,24 @@ def rounds(
     *axes: object,
     answers_N: np.ndarray | None = None,
 ) -> Iterator[tuple[dict[str, float], list[int]]]:
-    """Yield each step of :func:`run_rounds`, and the rows of the pool labeled so far."""
+    """Yield a step per round, the first before any label, and the rows of the pool labeled so far.
+
+    A step has ``labels``, ``new_labels`` of the held-out concept, ``accuracy`` on all test samples, ``accuracy_new`` on
+    those of the held-out concept, and ``epochs`` of the retraining.
+
+    Args:
+        task: projected by `gpc`.
+        gpc: result of :func:`initial_gpc`; it is not changed.
+        answers_N: the oracle's answers for the pool; by default, the truth.
+    """
     random = generator(*axes, "active_learning", task.held_out, strategy)
-    gpc = copy(gpc)
+    gpc, needs_scores = copy(gpc), require_strategy(strategy).needs_scores
     answers_N = task.pool.concept_N if answers_N is None else answers_N
     left = np.arange(len(task.pool))
     queried: list[int] = []
     yield step_of(task, gpc, queried, epochs=0), []
     while len(queried) < settings.labels and len(left):
-        pool = pool_of(task, gpc, left, queried, require_strategy(strategy).needs_scores)
+        pool = pool_of(task, gpc, left, queried, needs_scores)
         chosen = left[select(strategy, pool, min(settings.batch, settings.labels - len(queried)), random)]
         epochs = gpc.update(task.pool.h[chosen], answers_N[chosen], settings.iterations, settings.tolerance)
         queried += chosen.tolist()
@@ -180,17 +164,15 @@ def pool_of(
 ) -> Pool:
     """Return the rows `left` of the pool with the GPC's scores and BALD, as a strategy reads them."""
     h = task.pool.h[left]
+    scores_N_C, bald_N = np.empty((len(left), 0)), np.empty(len(left))
     if needs_scores:
         scores_N_C, _, bald_N = gpc.attribute(h)
-    else:
-        scores_N_C = np.empty((len(left), 0))
-        bald_N = np.empty(len(left))
     labeled = np.concatenate([task.initial.h.inputs_N_d, task.pool.h.inputs_N_d[queried]])
     return Pool(h.inputs_N_d, scores_N_C, bald_N, labeled, task.pool.concept_N[left])
 
 
 def step_of(task: LabelingTask, gpc: GPC, queried: list[int], epochs: int) -> dict[str, float]:
-    """Return a step of :func:`run_rounds` after the labels of these rows of the pool."""
+    """Return a step of :func:`rounds` after the labels of these rows of the pool."""
     accuracy, accuracy_new = accuracies(task, gpc)
     return {
         "labels": len(queried),
@@ -202,11 +184,7 @@ def step_of(task: LabelingTask, gpc: GPC, queried: list[int], epochs: int) -> di
 
 
 def accuracies(task: LabelingTask, classifier) -> tuple[float, float]:
-    """Return the accuracy on all test samples and on those of the held-out concept; NaN if there are none.
-
-    Args:
-        classifier: a GPC, or another object with ``classes`` and ``scores``.
-    """
+    """Return the accuracy on all test samples and on those of the held-out concept; NaN if there are none."""
     scores_N_C = classifier.scores(task.test.h)
     right_N = np.array(classifier.classes)[scores_N_C.argmax(axis=1)] == task.test.concept_N
     new_N = task.test.concept_N == task.held_out
@@ -214,15 +192,9 @@ def accuracies(task: LabelingTask, classifier) -> tuple[float, float]:
 
 
 def answers(concept_N: np.ndarray, classes: tuple[str, ...], share: float, *axes: object) -> np.ndarray:
-    """Return an oracle's answers for N samples, some of them wrong.
+    """Return an oracle's answers for N samples, of which this share is wrong.
 
     Errors are drawn once for all shares, so that an oracle with more errors repeats those of a better one.
-
-    Args:
-        concept_N: the truth.
-        classes: possible answers.
-        share: share of wrong answers.
-        axes: names of the draw.
     """
     random = generator(*axes, "oracle")
     order = random.permutation(len(concept_N))
@@ -238,10 +210,7 @@ class NewConceptTrial:
     """A new concept in one embedding.
 
     Attributes:
-        embedding: name of the embedding.
-        samples: the embedded samples.
-        held_out: the new concept.
-        classes: all concepts.
+        embedding: its name; ``samples`` are embedded by it.
         errors: shares of wrong answers of further oracles, besides one without errors.
     """
 
@@ -252,15 +221,10 @@ class NewConceptTrial:
     errors: tuple[float, ...] = ()
 
 
-def setting_of(embedding: str, errors: float) -> str:
-    """Return the name of an embedding and of an oracle with a share of errors, for a file of curves."""
-    return f"{embedding}_errors_{round(100 * errors)}" if errors else embedding
-
-
 def run_trial(
     trial: NewConceptTrial, strategies: Iterable[str], settings: ActiveLearningSettings, *axes: object
 ) -> Iterator[tuple[str, str, list[dict[str, float]]]]:
-    """Yield setting, strategy and learning curve of each run (:func:`run_rounds`).
+    """Yield setting (embedding, and the errors if there are any), strategy and learning curve of each run.
 
     Start, pool and the strategies' draws are equal for all oracles. `ALL_LABELS` uses the oracle without errors.
     """
@@ -283,4 +247,5 @@ def run_trial(
                 curve = [step_of(projected, gpc, [], epochs=0), last]
             else:
                 continue
-            yield setting_of(trial.embedding, errors), strategy, curve
+            setting = f"{trial.embedding}_errors_{round(100 * errors)}" if errors else trial.embedding
+            yield setting, strategy, curve

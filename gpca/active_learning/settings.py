@@ -75,7 +75,7 @@ JUDGED_SHARE = 0.05  # the paper's numbers are compared with the run of this sha
 
 
 def rare_setting(share: float) -> str:
-    """Return the setting's name in a file of curves, such as ``rare_5`` for a share of 0.05."""
+    """The name in files of curves, such as ``rare_5``."""
     return f"rare_{100 * share:g}"
 
 
@@ -101,10 +101,8 @@ class StreamSettings:
 ALL_LABELS = "all_labels"  # the whole pool at once, an upper bound
 PAIR = "pair"  # embedding of a depth frame that consists of measurements of the pair
 NEW_CONCEPT_STRATEGIES = ("bald_kmeans", "random", ALL_LABELS)
-FROM_OTHERS = {  # embeddings by encoders of other jobs, and what they require
-    "other_samples": "two seeds or more",
-    "other_source": "two sources or more",
-}
+# Embeddings by encoders of other jobs, and what they require.
+FROM_OTHERS = {"other_samples": "two seeds or more", "other_source": "two sources or more"}
 SeenBy = Literal["other_samples", "other_source", "pair"]
 NewCause = Literal["nominal", "geometry"]
 

@@ -55,10 +55,6 @@ def collect_intervals(prediction_files: Iterable[str | Path], causal_files: Iter
     Args:
         prediction_files: named `…/{source}/{explainer}/seed{seed}.csv`.
         causal_files: named `…/{source}/{design}/seed{seed}.csv`.
-
-    Raises:
-        InputError: no files, a name of another form, a file that cannot be read or has no test rows, a sample that the
-            causal file of its source and seed lacks.
     """
     import pandas as pd
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.encoders.registry import DIFFERENTIABLE, DGCNNOptions, EncoderSettings, encoders
+from gpca.encoders.registry import DIFFERENTIABLE, DGCNNOptions, EncoderSettings
 from gpca.errors import InputError
 from gpca.evaluation.measures import ALL, source_method_seed, tidy
 from gpca.experiments.experiment import Experiment, LeftOut
@@ -16,8 +16,7 @@ from gpca.experiments.plan import Run
 from gpca.experiments.result import figure, numbers, table
 from gpca.experiments.step import Step
 from gpca.io.arrays import REAL, WHOLE, load_arrays
-from gpca.io.csv_file import numbers as number_column
-from gpca.io.csv_file import read_csv
+from gpca.io.csv_file import read_numbers
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.figures.style import LIGHT_GRAY, SMALL_PT, blues, write_title
@@ -32,14 +31,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def encoder_settings(config: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Section of the encoder that GP-CA reads."""
-    return config["encoders"][config["embedding"]["encoder"]]
-
-
 def check(config: dict, _left_out: LeftOut) -> None:
     """Check that enough points are left for the encoder where most are deleted."""
-    encoder = EncoderSettings(**encoder_settings(config))
+    encoder = EncoderSettings(**config["encoders"][config["embedding"]["encoder"]])
     if encoder.backbone != "dgcnn":
         return
     share, neighbors = max(config["gradients"]["deleted"]), encoder.options.get("k", DGCNNOptions.k)
@@ -53,7 +47,9 @@ EXPERIMENT = Experiment(
     sections={"gradients": GradientSettings},
     needs=("gradient_source",),
     names=lambda config, sources: {
-        "gradient_source": list(sources) if encoder_settings(config)["backbone"] in DIFFERENTIABLE else [],
+        "gradient_source": [
+            name for name in sources if config["encoders"][config["embedding"]["encoder"]]["backbone"] in DIFFERENTIABLE
+        ],
         "gradient_encoder": config["embedding"]["encoder"],
     },
     check=check,
@@ -74,10 +70,10 @@ FOLLOW = Step(
     },
     settings=lambda plan, wildcards: {
         "gradients": plan.config["gradients"],
-        "encoder": encoder_settings(plan.config),
+        "encoder": plan.encoder,
         "gpc": plan.config["explainers"].get("gpca") or {},
     },
-    modules=lambda plan: [encoders()[encoder_settings(plan.config)["backbone"]].split(":")[0]],
+    modules=lambda plan: [plan.encoder_module],
     where={"source": "gradient_source"},
     target="gradients",
 )
@@ -93,21 +89,15 @@ TCAV_VALUES = ("score", "chance", "p", "significant", "probe")
     tests="tcav/{gradient_source}/seed{seed}.csv",
 )
 def collect(run: Run, deletions: Iterable[str | Path], tests: Iterable[str | Path]) -> pd.DataFrame:
-    """Fall of the score by order and share of deleted points, and TCAV's tests, by source and seed.
-
-    Raises:
-        InputError: no files, one that is missing or damaged.
-    """
+    """Fall of the score by order and share of deleted points, and TCAV's tests, by source and seed."""
     records: list[tuple] = []
     for path in deletions:
         _, source, seed = source_method_seed(path)
-        rows = read_csv(path, DELETION_COLUMNS)
-        for column in ("deleted", "before", "after", "changed"):
-            rows[column] = number_column(path, rows, column)
+        rows = read_numbers(path, DELETION_COLUMNS, ("deleted", "before", "after", "changed"))
         rows["drop"] = rows["before"] - rows["after"]
         means = rows.groupby(["order", "deleted"], sort=False)[["drop", "changed"]].mean()
         for (order, deleted), row in means.iterrows():
-            values = {"drop": row["drop"], "changed": row["changed"]}
+            values = dict(row)
             if order != RANDOM and (RANDOM, deleted) in means.index:
                 values["excess"] = row["drop"] - means.loc[(RANDOM, deleted), "drop"]
             records += [
@@ -120,9 +110,7 @@ def collect(run: Run, deletions: Iterable[str | Path], tests: Iterable[str | Pat
         ]
     for path in tests:
         _, source, seed = source_method_seed(path)
-        rows = read_csv(path, ("tested", "concept", *TCAV_VALUES))
-        for value in TCAV_VALUES:
-            rows[value] = number_column(path, rows, value)
+        rows = read_numbers(path, ("tested", "concept", *TCAV_VALUES), TCAV_VALUES)
         records += [
             (TCAV, source, row["tested"], value, row["concept"], seed, float(row[value]))
             for _, row in rows.iterrows()
@@ -148,12 +136,10 @@ NEEDS = ("gradient_source",)
     deletions="saliency/{shown_source}/seed{first_seed}.csv",
 )
 def saliency(run: Run, registrations: Path, maps: Path, deletions: Path) -> Figure:
-    """One sample of each concept: of those named correctly, if any, the one with the median score."""
     loaded = Registrations.load(registrations)
     shapes: dict[str, tuple[int | str, ...]] = {"sample": ("S",), "points": ("S", "N", 3), "saliency": ("S", "N")}
     arrays = load_arrays(maps, shapes, {"sample": WHOLE, "points": REAL, "saliency": REAL})
-    rows = read_csv(deletions, DELETION_COLUMNS).drop_duplicates("sample")
-    rows["before"] = number_column(deletions, rows, "before")
+    rows = read_numbers(deletions, DELETION_COLUMNS, ("before",)).drop_duplicates("sample")
     shown = {}
     for concept in CONCEPTS:
         candidates = rows[rows["concept"] == concept]
@@ -211,7 +197,6 @@ TICKS = (0, 0.5, 1)
     metrics="gradients.csv",
 )
 def saliency_deletion(run: Run, metrics):
-    """Fall of the named concept's score by share of deleted points: sources × orders."""
     rows_of_table = rows_where(metrics, table=SALIENCY)
     sheet = TableBuilder("saliency_deletion", {"source": "Dataset", "order": "Deleted"})
     columns: dict[str, Column] = {}
@@ -256,7 +241,6 @@ ORDERS = {
     metrics="gradients.csv",
 )
 def tcav(run: Run, metrics):
-    """Score of every concept for every class, and in how many seeds it differs from chance."""
     rows_of_table = rows_where(metrics, table=TCAV)
     classes = list(dict.fromkeys(rows_of_table["concept"]))
     sheet = TableBuilder("tcav", {"source": "Dataset", "tested": "Concept"})

@@ -18,31 +18,12 @@ from gpca.experiments.experiment import Experiment, LeftOut
 from gpca.experiments.frame_causes import FEWEST_FAILURES
 from gpca.experiments.plan import Run
 from gpca.experiments.result import figure, numbers, table
-from gpca.experiments.step import Plan, Step
+from gpca.experiments.step import Step
 from gpca.explainers.interface import EMBEDDINGS, REENACTED
 from gpca.explainers.registry import CAUSES, explainer_entry, explainer_module
 from gpca.frames.source import REAL_WORLD
-from gpca.guarantee.answers import (
-    BY_FAMILY,
-    BY_SAMPLE,
-    BY_STATE,
-    CONFIDENT,
-    COVERAGE,
-    FALSE_ALARMS,
-    FAMILIES,
-    MISSED,
-    PLAIN,
-    SHARES,
-    SINGLE,
-    SIZE,
-    UNSURE,
-    Answers,
-    GuaranteeSettings,
-    Scored,
-    answers_of,
-    conditions,
-    measures,
-)
+from gpca.guarantee import answers as asked_for
+from gpca.guarantee.answers import COVERAGE, FALSE_ALARMS, FAMILIES, MISSED, SHARES, SINGLE, SIZE, UNSURE
 from gpca.guarantee.guarantee import STATES
 from gpca.io.csv_file import read_numbers
 from gpca.reporting.sheet import Row, Sheet, Show, crossed, show, where
@@ -63,14 +44,13 @@ NUMBERS = COLUMNS[7:]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Section(GuaranteeSettings):
+class Section(asked_for.GuaranteeSettings):
     """The guarantees, and the explainers of causes that they are made for."""
 
     explainers: Distinct[str]
 
 
 def check(config: dict, left_out: LeftOut) -> None:
-    """Check that the explainers are among those of the diagnosis, and that files hold their inputs."""
     chosen, diagnosed = config[NAME]["explainers"], config["diagnosis"]["explainers"]
     require_names("guarantee.explainers", chosen, diagnosed, "explainer", left_out("diagnosis.explainers"))
     for name in chosen:
@@ -88,10 +68,6 @@ EXPERIMENT = Experiment(
 )
 
 
-def _explainers(plan: Plan, _wildcards: Any) -> dict[str, Any]:
-    return {"explainers": {name: plan.config["diagnosis"]["explainers"][name] for name in plan.names["guaranteed"]}}
-
-
 SCORE = Step(
     name="guarantee_scores",
     run="gpca.steps.guarantee",
@@ -105,7 +81,9 @@ SCORE = Step(
         "frame_predictions": "frame_diagnoses/seed{*frame_cause_seed}.csv",
     },
     outputs={"scores": "guarantee/{*guaranteed}.csv"},
-    settings=_explainers,
+    settings=lambda plan, wildcards: {
+        "explainers": {name: plan.config["diagnosis"]["explainers"][name] for name in plan.names["guaranteed"]}
+    },
     modules=lambda plan: (explainer_module(name, CAUSES) for name in plan.names["guaranteed"]),
     priority=3,
 )
@@ -117,31 +95,32 @@ def collect(run: Run, score_files: Iterable[str | Path]) -> pd.DataFrame:
     import pandas as pd
 
     section = {name: value for name, value in run.config[NAME].items() if name != "explainers"}
-    settings = read_settings(GuaranteeSettings, section)
+    settings = read_settings(asked_for.GuaranteeSettings, section)
     rows: list[tuple] = []
     for path in score_files:
-        scored = Scored.load(path)
-        for condition in conditions(scored):
-            answers = answers_of(scored, condition, settings)
+        scored = asked_for.Scored.load(path)
+        for condition in asked_for.conditions(scored):
+            answers = asked_for.answers_of(scored, condition, settings)
             if answers is not None:
-                asked = scored.subset(answers.row)
-                rows += _rows_of_condition(condition.name, Path(path).stem, asked, answers, settings)
+                rows += _rows_of_condition(
+                    condition.name, Path(path).stem, scored.subset(answers.row), answers, settings
+                )
     if not rows:
         raise InputError(NAME, "no files with scores were given", "name an explainer in guarantee.explainers")
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 
 def read_guarantee(path: str | Path) -> pd.DataFrame:
-    """Read the rows of :func:`collect`; a value that has no nominal limit has no `promised`.
-
-    Raises:
-        InputError: missing, empty or unreadable file, missing column, a value that is not a finite number.
-    """
+    """Read the rows of :func:`collect`; a value that has no nominal limit has no `promised`."""
     return read_numbers(path, COLUMNS, NUMBERS, optional=("promised", "low", "high"))
 
 
 def _rows_of_condition(
-    name: str, explainer: str, asked: Scored, answers: Answers, settings: GuaranteeSettings
+    name: str,
+    explainer: str,
+    asked: asked_for.Scored,
+    answers: asked_for.Answers,
+    settings: asked_for.GuaranteeSettings,
 ) -> Iterator[tuple]:
     # All samples of a family and a seed are drawn together, so sums over them are enough.
     keys_A = np.char.add(np.char.add(asked.seed.astype(str), " "), asked.family)
@@ -152,7 +131,7 @@ def _rows_of_condition(
     masks = {source: asked.source == source for source in sources}
     if len(sources) > 1:
         masks = {POOLED: np.ones(len(asked), bool)} | masks
-    measured = list(measures(asked, answers, settings))
+    measured = list(asked_for.measures(asked, answers, settings))
     for source, inside_A in masks.items():
         by_state = name == FAMILIES and source == next(iter(masks))
         for variant, metric, concept, promised, value_A, counted_A in measured:
@@ -177,13 +156,14 @@ def _rows_of_condition(
 SECTION = "Beyond the paper: what made a registration fail"
 INPUT = {"measured": (read_guarantee, "guarantee.csv")}
 CALIBRATED = {
-    PLAIN: "None: scores as they are",
-    BY_SAMPLE: "By sample",
-    BY_STATE: "By sample, each state",
-    CONFIDENT: "By sample, with confidence",
-    BY_FAMILY: "By family",
+    asked_for.PLAIN: "None: scores as they are",
+    asked_for.BY_SAMPLE: "By sample",
+    asked_for.BY_STATE: "By sample, each state",
+    asked_for.CONFIDENT: "By sample, with confidence",
+    asked_for.BY_FAMILY: "By family",
 }
 WORST = "worst_state"
+STAND_INS = ", procedural stand-ins among them"
 NUMBER: dict[str, Any] = {"interval": False, "decimals": 0, "limits": (0.0, inf), "factor": 1}
 SIZES: dict[str, Any] = {"decimals": 2, "limits": (0.0, float(len(STATES))), "factor": 1, "least_is_best": True}
 COLUMNS_OF_ALL = {
@@ -205,11 +185,11 @@ def _by(variant: str, metric: str, title: str = "") -> Show:
 
 
 COLUMNS_OF_SHIFT = {
-    COVERAGE: _by(BY_SAMPLE, COVERAGE),
-    SIZE: _by(BY_SAMPLE, SIZE),
-    "each_state_coverage": _by(BY_STATE, COVERAGE, "Each state: coverage (%)"),
-    "each_state_set_size": _by(BY_STATE, SIZE, "Each state: states in a set"),
-    **{name: _by(BY_SAMPLE, name) for name in (MISSED, FALSE_ALARMS, UNSURE, "samples")},
+    COVERAGE: _by(asked_for.BY_SAMPLE, COVERAGE),
+    SIZE: _by(asked_for.BY_SAMPLE, SIZE),
+    "each_state_coverage": _by(asked_for.BY_STATE, COVERAGE, "Each state: coverage (%)"),
+    "each_state_set_size": _by(asked_for.BY_STATE, SIZE, "Each state: states in a set"),
+    **{name: _by(asked_for.BY_SAMPLE, name) for name in (MISSED, FALSE_ALARMS, UNSURE, "samples")},
 }
 
 
@@ -226,16 +206,15 @@ COLUMNS_OF_SHIFT = {
     **INPUT,
 )
 def table19_guarantee(run: Run, measured):
-    """Coverage and size of the sets and the risks of the alarm: explainers × ways of calibration."""
-    pooled = where(measured, {"condition": FAMILIES})
-    pooled = where(pooled, {"source": _all_sources(pooled)})
+    pooled = _of_all_sources(where(measured, {"condition": FAMILIES}))
     heads = {"explainer": "Explainer", "calibrated": "Calibrated"}
     rows = crossed(("method", _titles(run)), ("variant", CALIBRATED))
     sheet = Sheet("table19_guarantee", heads, rows, COLUMNS_OF_ALL, _with_counts(pooled))
-    level, missed, false_alarms, family_risk, confidence = _limits(run)
+    names = ("level", "missed", "false_alarms", "family_risk", "confidence")
+    level, missed, false_alarms, family_risk, confidence = (f"{100 * run.config[NAME][name]:g}" for name in names)
     return sheet.table(
         "Sets of states that hold the true one, and an alarm with bounded errors, on families of shapes that nothing "
-        "was trained or calibrated on" + _stand_ins(run),
+        "was trained or calibrated on" + (STAND_INS if run.stand_ins() else ""),
         "metric",
         [
             f"Guaranteed: sets that hold the state in {level} % of the cases (Coverage); at most {missed} % of the "
@@ -260,7 +239,6 @@ def table19_guarantee(run: Run, measured):
     **INPUT,
 )
 def table19_shift(run: Run, measured):
-    """Sets and alarm on single sources, and calibrated on other samples: conditions × sources × explainers."""
     titles = run.source_titles
     others = {f"from_{name}": f"{title} alone" for name, title in titles.items()}
     shifts = {"milder": "The milder half", "harder": "The harder half", "frames": "Simulated pairs"}
@@ -274,9 +252,11 @@ def table19_shift(run: Run, measured):
         rows += [Row([condition, source, explainer], {**entries, "source": source[0]}) for source in sources.items()]
     heads = {"calibrated_on": "Calibrated on", "source": "Tested on", "explainer": "Explainer"}
     sheet = Sheet("table19_shift", heads, rows, COLUMNS_OF_SHIFT, _with_counts(measured))
-    level, missed, false_alarms, *_ = _limits(run)
+    limits = (f"{100 * run.config[NAME][name]:g}" for name in ("level", "missed", "false_alarms"))
+    level, missed, false_alarms = limits
     return sheet.table(
-        "Guarantees for causes on single datasets, and where calibrated and tested samples differ" + _stand_ins(run),
+        "Guarantees for causes on single datasets, and where calibrated and tested samples differ"
+        + (STAND_INS if run.stand_ins() else ""),
         "metric",
         [
             f"The limits are those of Table XIX, by sample: {level} % coverage, at most {missed} % missed failures and "
@@ -298,18 +278,17 @@ def table19_shift(run: Run, measured):
     **INPUT,
 )
 def guarantee(run: Run, measured):
-    """Coverage, set size and the two risks in a panel each, with a row for each explainer."""
     from matplotlib.lines import Line2D
 
     from gpca.reporting.figures.panels import in_lines, legend_below, panels
     from gpca.reporting.figures.style import BLUE, COLUMN_WIDTH_IN, GRAY, GREEN, ORANGE, PURPLE, SMALL_PT, VERMILION
 
     looks = {  # variant -> label, color, marker
-        PLAIN: ("not calibrated", VERMILION, "x"),
-        BY_SAMPLE: ("by sample", BLUE, "o"),
-        BY_STATE: ("by sample, each state", PURPLE, "s"),
-        CONFIDENT: ("by sample, with confidence", ORANGE, "D"),
-        BY_FAMILY: ("by family", GREEN, "^"),
+        asked_for.PLAIN: ("not calibrated", VERMILION, "x"),
+        asked_for.BY_SAMPLE: ("by sample", BLUE, "o"),
+        asked_for.BY_STATE: ("by sample, each state", PURPLE, "s"),
+        asked_for.CONFIDENT: ("by sample, with confidence", ORANGE, "D"),
+        asked_for.BY_FAMILY: ("by family", GREEN, "^"),
     }
     limits = {name: 100 * run.config[NAME][name] for name in ("level", "missed", "false_alarms", "family_risk")}
     shown = {  # metric -> label, and lines
@@ -318,8 +297,7 @@ def guarantee(run: Run, measured):
         MISSED: ("failed called\ngood (%)", [(limits["missed"], "-"), (limits["family_risk"], "--")]),
         FALSE_ALARMS: ("good called\nfailed (%)", [(limits["false_alarms"], "-"), (limits["family_risk"], "--")]),
     }
-    rows = where(measured, {"condition": FAMILIES, "concept": ALL})
-    rows = where(rows, {"source": _all_sources(rows)})
+    rows = _of_all_sources(where(measured, {"condition": FAMILIES, "concept": ALL}))
     titles = {name: title for name, title in _titles(run).items() if (rows["method"] == name).any()}
     if not titles:
         raise InputError(NAME, "has no results for these explainers", "run them first")
@@ -361,26 +339,16 @@ def _with_counts(measured: pd.DataFrame) -> pd.DataFrame:
 
     states = measured[(measured["metric"] == COVERAGE) & (measured["concept"] != ALL)]
     worst = states.loc[states.groupby(list(ROWS))["value"].idxmin()].assign(metric=WORST, concept=ALL)
-    most = (
-        measured[measured["concept"] == ALL].groupby(list(ROWS), as_index=False)[["families", "samples", "seeds"]].max()
-    )
+    whole = measured[measured["concept"] == ALL]
+    most = whole.groupby(list(ROWS), as_index=False)[["families", "samples", "seeds"]].max()
     counts = [most.assign(metric=name, concept=ALL, value=most[name]) for name in ("families", "samples")]
     return pd.concat([measured, worst, *counts])
 
 
-def _all_sources(rows: pd.DataFrame) -> str:
-    """All sources together, or the only one."""
-    return POOLED if (rows["source"] == POOLED).any() else rows["source"].iloc[:1].sum()
-
-
-def _limits(run: Run) -> list[str]:
-    names = ("level", "missed", "false_alarms", "family_risk", "confidence")
-    return [f"{100 * run.config[NAME][name]:g}" for name in names]
+def _of_all_sources(rows: pd.DataFrame) -> pd.DataFrame:
+    """Rows of all sources together, or of the only one."""
+    return where(rows, {"source": POOLED if (rows["source"] == POOLED).any() else rows["source"].iloc[:1].sum()})
 
 
 def _titles(run: Run) -> dict[str, str]:
     return run.titles(lambda name: explainer_entry(name, CAUSES), run.config[NAME]["explainers"])
-
-
-def _stand_ins(run: Run) -> str:
-    return ", procedural stand-ins among them" if run.stand_ins() else ""

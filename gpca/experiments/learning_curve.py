@@ -89,11 +89,7 @@ LEARN = Step(
 
 
 def read_curves(files: Iterable[str | Path]) -> pd.DataFrame:
-    """Read files named ``…/{source}/seed{seed}.csv`` into one frame with the further columns `source` and `seed`.
-
-    Raises:
-        InputError: no files, a missing column, a value that is not a finite number.
-    """
+    """Read files named ``…/{source}/seed{seed}.csv`` into one frame with the further columns `source` and `seed`."""
     import pandas as pd
 
     curves = []

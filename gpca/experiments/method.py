@@ -199,9 +199,6 @@ def choose_samples(registrations: Registrations, path: str | Path) -> dict[str, 
 
     Severities are compared by their ranks within the test samples of the concept, so that no unit or range matters.
     The object is the one whose farthest sample is nearest.
-
-    Raises:
-        InputError: no object has a test sample of each concept; it names `path`.
     """
     from scipy.stats import rankdata
 

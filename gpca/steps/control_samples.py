@@ -81,7 +81,6 @@ class ControlSettings:
 
 
 def trained_otherwise(explainer: str, way: str) -> str:
-    """Name of an explainer whose encoder is trained in another way."""
     return f"{explainer}_{way}"
 
 
@@ -108,7 +107,7 @@ def left_out(control: str, registrations: Registrations, settings: ControlSettin
 def variant(
     control: str, registrations: Registrations, source: str, seed: int, settings: ControlSettings, icp: ICPSettings
 ) -> Registrations:
-    """Training and test samples under a control; those of labels and transfer leave the registrations as they are."""
+    """Samples under a control; controls of labels and transfer leave the registrations as they are."""
     if control == "density":
         return thinned(registrations, settings.draw_points, source, seed)
     if control in (UNSEEN, *TRAININGS):
@@ -126,13 +125,13 @@ def thinned(registrations: Registrations, points: tuple[int, int], *axes: object
     A fixed number of points makes a cropped cloud denser than the others, and all points make it the smallest; a random
     number hides both.
     """
-    clouds = []
+    clouds, targets = [], []
     for row in range(len(registrations)):
         cloud = registrations.cloud(row)
         random = generator(*axes, "thinned", registrations.split[row], registrations.sample[row])
         count = min(int(random.integers(points[0], points[1] + 1)), len(cloud))
         clouds.append(cloud[np.sort(random.permutation(len(cloud))[:count])])
-    targets = [registrations.target(row) for row in range(len(registrations))]
+        targets.append(registrations.target(row))
     thin: dict[str, Any] = ragged(clouds, targets)
     return replace(registrations, **thin)
 
@@ -183,11 +182,7 @@ def relabeled(control: str, train: Registrations, *axes: object) -> Registration
 
 
 def sample_table(tested: Mapping[str, Registrations], objects: ObjectClouds) -> pd.DataFrame:
-    """`SAMPLE_COLUMNS` of the test samples; the error is the final ADD, or ADD-S where symmetric, in diameters.
-
-    Args:
-        tested: registrations of each control that has other samples, and of the paper's protocol.
-    """
+    """`SAMPLE_COLUMNS` of the test samples of each control; the error is the final ADD, or ADD-S, in diameters."""
     import pandas as pd
 
     from gpca.causes.measuring import read_subjects
@@ -200,18 +195,15 @@ def sample_table(tested: Mapping[str, Registrations], objects: ObjectClouds) -> 
         for row in rows:
             left = registrations.T_target_source("icp", row) @ inverse(registrations.T_target_source("true", row))
             errors.append(subjects[str(registrations.object_name[row])].errors(left[None])[0])
-        columns = {
-            "control": control,
-            "sample": registrations.sample[rows],
-            "object": registrations.object_name[rows],
-            "concept": registrations.concept[rows],
-            "noise": registrations.severity_noise[rows],
-            "rotation_deg": np.rad2deg(registrations.severity_rotation_rad[rows]),
-            "translation": registrations.severity_translation[rows],
-            "crop": registrations.severity_crop[rows],
-            "error": errors,
-        }
-        frames.append(pd.DataFrame(columns))
+        severities = (
+            registrations.severity_noise,
+            np.rad2deg(registrations.severity_rotation_rad),
+            registrations.severity_translation,
+            registrations.severity_crop,
+        )
+        named = (registrations.sample, registrations.object_name, registrations.concept)
+        columns = (control, *(column[rows] for column in (*named, *severities)), errors)
+        frames.append(pd.DataFrame(dict(zip(SAMPLE_COLUMNS, columns, strict=True))))
     return pd.concat(frames, ignore_index=True)
 
 
@@ -259,8 +251,7 @@ def train(job: Job) -> None:
             arrays: dict[str, np.ndarray] = {**empty, "sample": np.zeros(0, int), "split": np.zeros(0, "U5")}
             curve: list[dict] = []
         else:
-            axes = (job.source, job.seed, settings, encoder, checkpoint)
-            arrays, curve = encode(job.control, registrations, *axes)
+            arrays, curve = encode(job.control, registrations, job.source, job.seed, settings, encoder, checkpoint)
         save_arrays(job.embeddings, arrays, registrations.axes)
         write_csv(job.curve, pd.DataFrame(curve, columns=list(CURVE)), form="%.6g")
         checkpoint.unlink(missing_ok=True)

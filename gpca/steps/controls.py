@@ -28,23 +28,8 @@ from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
 from gpca.settings import read_settings
-from gpca.steps.control_samples import (
-    HARD,
-    LABELS,
-    PAPER,
-    RELABELED,
-    RETRAINED,
-    SEEN,
-    TRANSFER,
-    UNSEEN,
-    ControlSettings,
-    left_out,
-    relabeled,
-    sample_table,
-    shows_known_object,
-    trained_otherwise,
-    variant,
-)
+from gpca.steps import control_samples as samples
+from gpca.steps.control_samples import HARD, LABELS, PAPER, RELABELED, RETRAINED, SEEN, TRANSFER, UNSEEN
 from gpca.uncertainty.designs import evaluate_design
 from gpca.uncertainty.settings import UncertaintySettings
 
@@ -57,7 +42,7 @@ Attach = Callable[[Registrations], Registrations]
 def explain(job: Job) -> None:
     """Let every explainer learn and explain under the paper's protocol and under each control."""
     rivals = make_rivals(job.section("explainers"), job.source, job.seed)
-    settings = read_settings(ControlSettings, job.section("controls"))
+    settings = read_settings(samples.ControlSettings, job.section("controls"))
     encoder = EncoderSettings(**job.section("encoder"))
     icp = ICPSettings(**job.section("icp"))
     runs = {name: value for name, value in job.section("uncertainty").items() if name != "samples"}
@@ -74,63 +59,53 @@ def explain(job: Job) -> None:
         for control, path in retrained.items():
             if control == HARD and hard:
                 embeddings[control] = read_embedding(path, hard, logits=True)
-            elif not left_out(control, registrations, settings, encoder.backbone):
-                changed = variant(control, registrations, job.source, job.seed, settings, icp)
+            elif not samples.left_out(control, registrations, settings, encoder.backbone):
+                changed = samples.variant(control, registrations, *axes, settings, icp)
                 embeddings[control] = read_embedding(path, changed, logits=True)
         experiment = ControlRun(
-            source=job.source,
-            seed=job.seed,
-            settings=settings,
-            backbone=encoder.backbone,
-            uncertainty=UncertaintySettings(**runs, icp=icp),
-            rivals=rivals,
-            embed=lambda others, source: embed(model, others, source, job.seed, encoder),
-            embeddings=embeddings,
-            hard=hard,
+            *axes,
+            settings,
+            encoder.backbone,
+            UncertaintySettings(**runs, icp=icp),
+            rivals,
+            lambda asked, source: embed(model, asked, source, job.seed, encoder),
+            embeddings,
+            hard,
         )
         rows = experiment.run(
             registrations, {name: Registrations.load(path, (name, job.seed)) for name, path in others.items()}
         )
         tested = {PAPER: registrations} | ({HARD: hard} if hard else {})
-        samples = sample_table(tested, ObjectClouds.load(job.objects, job.source))
         write_csv(job.predictions, rows)
-        write_csv(job.samples, samples)
+        write_csv(job.samples, samples.sample_table(tested, ObjectClouds.load(job.objects, job.source)))
         write_csv(job.timings, experiment.costs.rows())
 
 
 @dataclass
 class Costs:
-    """Seconds of the explainers under the paper's protocol."""
+    """Seconds of the explainers under the paper's protocol.
 
-    _learning: dict[str, float] = field(default_factory=lambda: defaultdict(float))
-    _asking: dict[str, float] = field(default_factory=dict)
-    _explaining: dict[str, float] = field(default_factory=dict)
+    Attributes:
+        learning: of each, with its encoder if it has its own.
+        asking: to measure and embed one registration.
+        explaining: of one registration, with all measurements made.
+    """
+
+    learning: dict[str, float] = field(default_factory=lambda: defaultdict(float))
+    asking: dict[str, float] = field(default_factory=dict)
+    explaining: dict[str, float] = field(default_factory=dict)
 
     @contextmanager
-    def learning(self, control: str, explainer: str) -> Iterator[None]:
-        """Count the seconds of the body as learning, of the explainer or of its encoder."""
+    def count_learning(self, control: str, explainer: str) -> Iterator[None]:
+        """Count the seconds of the body, under the paper's protocol."""
         started = perf_counter()
         yield
         if control == PAPER:
-            self._learning[explainer] += perf_counter() - started
-
-    @contextmanager
-    def asking(self, explainer: str, count: int) -> Iterator[None]:
-        """Count the seconds of the body as measuring and embedding `count` registrations."""
-        started = perf_counter()
-        yield
-        self._asking[explainer] = (perf_counter() - started) / count
-
-    def explained(self, control: str, explainer: str, seconds_N: np.ndarray) -> None:
-        """Count the mean seconds of explaining, with all measurements made."""
-        if control == PAPER:
-            self._explaining[explainer] = float(seconds_N.mean())
+            self.learning[explainer] += perf_counter() - started
 
     def rows(self) -> pd.DataFrame:
         """`COSTS` of each explainer that reads bare registrations."""
-        records = [
-            (name, self._learning[name], asking + self._explaining[name]) for name, asking in self._asking.items()
-        ]
+        records = [(name, self.learning[name], asking + self.explaining[name]) for name, asking in self.asking.items()]
         return pd.DataFrame(records, columns=list(COSTS))
 
 
@@ -139,21 +114,17 @@ class ControlRun:
     """The parts that all controls of one source and seed share.
 
     Attributes:
-        source, seed: they name the random numbers.
-        settings: those of the controls.
         backbone: that of the encoder.
         uncertainty: settings of Monte-Carlo ICP, for covariances; its ICP is that of the registrations.
-        rivals: the explainers by name.
         embed: registrations and the name of their source -> embeddings and head's logits by the paper's encoder.
         embeddings: ``embedding`` and ``head_logits`` by the paper's encoder, and by that of each control that has one,
             and by those trained in other ways, of the samples of unseen objects.
         hard: the samples of that control, if it is among them.
-        costs: the seconds of the explainers under the paper's protocol.
     """
 
     source: str
     seed: int
-    settings: ControlSettings
+    settings: samples.ControlSettings
     backbone: str
     uncertainty: UncertaintySettings
     rivals: Mapping[str, Rival]
@@ -176,18 +147,28 @@ class ControlRun:
         plain = _attached(embeds, plain)
         tests = self._tests(PAPER, plain)
         admitted = [control for control in self.settings.controls if self._admits(control, registrations, others)]
-        if TRANSFER in admitted:
-            tests |= {
-                (TRANSFER, name): _attached(embeds, self._asked(name, of_other)) for name, of_other in others.items()
-            }
+        if TRANSFER in admitted:  # test samples of other sources with embeddings by the encoders of this one
+            for name, other in others.items():
+                test = self._embedded(other.subset(other.rows("test")), name)
+                tests[TRANSFER, name] = _attached(embeds, self._described(test, name))
         frames = list(self._explained(PAPER, plain, tests, self.rivals))
-        self._time_asking(plain, embeds)
+        test = plain.subset(plain.rows("test")[:ASKED])
+        for name, rival in self.rivals.items():  # times what explainers of bare registrations measure before they can
+            if rival.reads == BARE:
+                bare, explainer, started = replace(test, attached={}), rival.make(), perf_counter()
+                described = explainer.describe(bare) if isinstance(explainer, Describing) else bare
+                _attached({name: embeds[name]} if name in embeds else {}, described)
+                self.costs.asking[name] = (perf_counter() - started) / len(test)
         for control in admitted:
             if control != TRANSFER:
                 changed = self._changed(control, plain, embeds)
                 frames += self._explained(control, changed, self._tests(control, changed), self.rivals)
-                if control == UNSEEN:
-                    frames += self._trained_otherwise(changed)
+                for way in self.settings.encoders if control == UNSEEN else ():  # encoders that are trained otherwise
+                    if way in self.embeddings:
+                        own = replace(changed, attached={**changed.attached, **self.embeddings[way]})
+                        rivals = {name: rival for name, rival in self.rivals.items() if name in GPCA_FORMS}
+                        forms = {samples.trained_otherwise(name, way): rival for name, rival in rivals.items()}
+                        frames += self._explained(UNSEEN, own, self._tests(UNSEEN, own), forms)
         return pd.concat(frames, ignore_index=True)
 
     def explain_hard(self, name: str) -> tuple[Attribution, float]:
@@ -200,7 +181,7 @@ class ControlRun:
         return attribution, float(attribution.seconds_N.mean())
 
     def _admits(self, control: str, registrations: Registrations, others: Mapping) -> bool:
-        why = left_out(control, registrations, self.settings, self.backbone)
+        why = samples.left_out(control, registrations, self.settings, self.backbone)
         if control == TRANSFER and not others:
             why = "it needs at least two sources"
         if control == HARD and self.hard is None:
@@ -209,17 +190,12 @@ class ControlRun:
             print(f"controls of {self.source}: '{control}' is skipped: {why}", file=sys.stderr)
         return not why
 
-    def _asked(self, source: str, registrations: Registrations) -> Registrations:
-        """Test samples of another source with embeddings by the paper's encoder of this one."""
-        test = registrations.subset(registrations.rows("test"))
-        return self._described(self._embedded(test, source), source)
-
     def _changed(self, control: str, plain: Registrations, embeds: Mapping[str, Attach]) -> Registrations:
         """Registrations under a control, with all that explainers read attached."""
         if control == HARD and self.hard is not None:
             changed = self.hard
         else:
-            changed = variant(control, plain, self.source, self.seed, self.settings, self.uncertainty.icp)
+            changed = samples.variant(control, plain, self.source, self.seed, self.settings, self.uncertainty.icp)
         if control == UNSEEN:  # the measurements of each stay
             changed = replace(changed, attached={**changed.attached, **self.embeddings[control]})
         elif control in RETRAINED:
@@ -235,36 +211,18 @@ class ControlRun:
         for name, rival in self.rivals.items():
             explainer = rival.make()
             if isinstance(explainer, Encoding):
-                with self.costs.learning(control, name):
+                with self.costs.count_learning(control, name):
                     embeds[name] = explainer.learn_encoder(train)
         return embeds
-
-    def _time_asking(self, plain: Registrations, embeds: Mapping[str, Attach]) -> None:
-        """Time the measurements that explainers of bare registrations need before they can explain."""
-        test = plain.subset(plain.rows("test")[:ASKED])
-        for name, rival in self.rivals.items():
-            if rival.reads == BARE:
-                bare, explainer = replace(test, attached={}), rival.make()
-                with self.costs.asking(name, len(test)):
-                    described = explainer.describe(bare) if isinstance(explainer, Describing) else bare
-                    _attached({name: embeds[name]} if name in embeds else {}, described)
 
     def _tests(self, control: str, changed: Registrations) -> dict[tuple[str, str], Registrations]:
         """Test samples by control and source; those of training objects are apart."""
         test = changed.subset(changed.rows("test"))
         if control != UNSEEN:
             return {(control, self.source): test}
-        known = shows_known_object(changed)[changed.split == "test"]
+        known = samples.shows_known_object(changed)[changed.split == "test"]
         by_name = {UNSEEN: np.flatnonzero(~known), SEEN: np.flatnonzero(known)}
         return {(name, self.source): test.subset(rows) for name, rows in by_name.items() if len(rows)}
-
-    def _trained_otherwise(self, changed: Registrations) -> Iterator[pd.DataFrame]:
-        """Yield GP-CA's predictions of training and unseen objects with encoders that are trained in other ways."""
-        for way in self.settings.encoders:
-            if way in self.embeddings:
-                own = replace(changed, attached={**changed.attached, **self.embeddings[way]})
-                forms = {trained_otherwise(n, way): rival for n, rival in self.rivals.items() if n in GPCA_FORMS}
-                yield from self._explained(UNSEEN, own, self._tests(UNSEEN, own), forms)
 
     def _embedded(self, registrations: Registrations, source: str) -> Registrations:
         h_S_d, logits_S_C = self.embed(registrations, source)
@@ -285,39 +243,31 @@ class ControlRun:
         tests: Mapping[tuple[str, str], Registrations],
         rivals: Mapping[str, Rival],
     ) -> Iterator[pd.DataFrame]:
-        """Yield each explainer's predictions for the test samples after it has learned from the training samples."""
-        for train, parts in self._trainings(control, learned.subset(learned.rows("train")), tests):
+        """Yield each explainer's predictions for the test samples after it has learned from the training samples.
+
+        Labels without information make an explainer name a whole cluster by chance. So shuffled ones are learned in
+        parts: an explainer learns from one part and explains one part of the test samples.
+        """
+        whole, axes = learned.subset(learned.rows("train")), (self.source, self.seed)
+        parts = max(1, min(PARTS, len(whole) // FEWEST_OF_PART)) if control == "shuffled" else 1
+        for part in range(parts):
+            train, asked = _dealt(whole, part, parts), {key: _dealt(test, part, parts) for key, test in tests.items()}
+            if control in RELABELED:
+                train = samples.relabeled(control, train, *axes, *([part] if control == "shuffled" else []))
             for name, rival in rivals.items():
                 explainer = rival.make()
                 if control in RELABELED and getattr(explainer, "trained_with_encoder", False):
                     continue
-                with self.costs.learning(control, name):
+                with self.costs.count_learning(control, name):
                     explainer.fit(train)
-                for (name_of_test, source), test in parts.items():
+                for (name_of_test, source), test in asked.items():
                     attribution = explainer.explain(test.without_labels())
-                    self.costs.explained(name_of_test, name, attribution.seconds_N)
+                    if name_of_test == PAPER:
+                        self.costs.explaining[name] = float(attribution.seconds_N.mean())
                     frame = prediction_frame(test, attribution)
                     for i, entry in enumerate(zip(LABELS, (name_of_test, source, name), strict=True)):
                         frame.insert(i, *entry)
                     yield frame
-
-    def _trainings(
-        self, control: str, train: Registrations, tests: Mapping[tuple[str, str], Registrations]
-    ) -> Iterator[tuple[Registrations, Mapping[tuple[str, str], Registrations]]]:
-        """Yield training samples, each with the test samples that are explained after learning from them.
-
-        Labels without information make an explainer name a whole cluster by chance. So they are shuffled in parts: an
-        explainer learns from one part and explains one part of the test samples.
-        """
-        if control not in RELABELED:
-            yield train, tests
-        elif control != "shuffled":
-            yield relabeled(control, train, self.source, self.seed), tests
-        else:
-            parts = max(1, min(PARTS, len(train) // FEWEST_OF_PART))
-            for part in range(parts):
-                learned = relabeled(control, _dealt(train, part, parts), self.source, self.seed, part)
-                yield learned, {name: _dealt(test, part, parts) for name, test in tests.items()}
 
 
 def _attached(embeds: Mapping[str, Attach], registrations: Registrations) -> Registrations:

@@ -29,7 +29,7 @@ from gpca.settings import Bounds, Count, Distinct, read_settings
 from gpca.steps.registration_trials import pair_to_register
 from gpca.uncertainty.designs import ADDITIVE_KNOBS
 from gpca.uncertainty.estimators.registry import make_estimator
-from gpca.uncertainty.estimators.substitute import OBSERVED, Estimates, KnobbedRegistrar
+from gpca.uncertainty.estimators.substitute import OBSERVED, KnobbedRegistrar
 from gpca.uncertainty.settings import UncertaintySettings
 
 if TYPE_CHECKING:
@@ -109,8 +109,6 @@ class Exchange:
     """The methods and estimators that are exchanged for the explainers of one source and seed.
 
     Attributes:
-        source, seed: they name the random numbers.
-        settings: those of the exchange.
         methods, estimators: name -> settings.
         uncertainty: floor, points and spread of the starts, of the estimators.
         rivals: by name. Those that read an uncertainty get each estimator's, the others each method's registrations.
@@ -127,15 +125,10 @@ class Exchange:
     embed: Embed
 
     def run(self, registrations: Registrations, judges: Judges) -> pd.DataFrame:
-        """Predictions of each explainer on the test samples by each method or estimator.
+        """Predictions of each explainer on the test samples by each method or estimator: `LABELS`, ..., `FAILURE`.
 
-        Args:
-            registrations: those of the source, by the paper's protocol.
-            judges: of their objects.
-
-        Returns:
-            the columns of a prediction file after `LABELS`, and `FAILURE`. For methods, ``learnt_from`` registered the
-            training pairs and ``asked_of`` the test pairs; for estimators they are equal.
+        For methods, ``learnt_from`` registered the training pairs and ``asked_of`` the test pairs; for estimators they
+        are equal.
         """
         import pandas as pd
 
@@ -182,40 +175,28 @@ class Exchange:
         estimates_of_test = registrar.estimates(rows["test"], estimators)
         train, test = (described.subset(each) for each in rows.values())
         for estimator in estimators:
-            estimates = train, estimates_of_train[estimator], test, estimates_of_test[estimator]
+            of_train, of_test = estimates_of_train[estimator], estimates_of_test[estimator]
             for name, rival in rivals.items():
-                attribution, failure_S = self._attributed(rival, *estimates)
+                floor, conditions = self.uncertainty.floor, len(OBSERVED if rival.observed_only else ADDITIVE_KNOBS)
+                explainer, failure_S = rival.make(), of_test.failures(conditions)
+                if rival.observed_only:
+                    usable = np.flatnonzero(of_train.failures(len(OBSERVED)) == "")
+                    if set(train.concept[usable]) < set(CONCEPTS):
+                        failure_S = np.where(failure_S == "", TOO_FEW, failure_S)
+                    else:
+                        explainer.fit(of_train.attach_to(train, usable, len(OBSERVED), floor))
+                # Abstained where there is no estimate.
+                scores_S_C, abstained_S = np.zeros((len(test), len(CONCEPTS))), np.ones(len(test), bool)
+                estimated = np.flatnonzero(failure_S == "")
+                if len(estimated):
+                    found = explainer.explain(of_test.attach_to(test.without_labels(), estimated, conditions, floor))
+                    scores_S_C[estimated], abstained_S[estimated] = found.scores_N_C, found.abstained_N
+                attribution = Attribution.of_scores(CONCEPTS, scores_S_C, seconds=0.0, abstained_N=abstained_S)
                 yield labeled(prediction_frame(test, attribution), (ESTIMATOR, estimator, estimator, name), failure_S)
-
-    def _attributed(
-        self,
-        rival: Rival,
-        train: Registrations,
-        estimates_of_train: Estimates,
-        test: Registrations,
-        estimates_of_test: Estimates,
-    ) -> tuple[Attribution, np.ndarray]:
-        """Attribution of all test samples, abstained where there is no estimate, and why there is none (S,)."""
-        floor, conditions = self.uncertainty.floor, len(OBSERVED if rival.observed_only else ADDITIVE_KNOBS)
-        explainer = rival.make()
-        failure_S = estimates_of_test.failures(conditions)
-        if rival.observed_only:
-            usable = np.flatnonzero(estimates_of_train.failures(len(OBSERVED)) == "")
-            if set(train.concept[usable]) < set(CONCEPTS):
-                failure_S = np.where(failure_S == "", TOO_FEW, failure_S)
-            else:
-                explainer.fit(estimates_of_train.attach_to(train, usable, len(OBSERVED), floor))
-        estimated = np.flatnonzero(failure_S == "")
-        scores_S_C, abstained_S = np.zeros((len(test), len(CONCEPTS))), np.ones(len(test), bool)
-        if len(estimated):
-            attached = estimates_of_test.attach_to(test.without_labels(), estimated, conditions, floor)
-            attribution = explainer.explain(attached)
-            scores_S_C[estimated], abstained_S[estimated] = attribution.scores_N_C, attribution.abstained_N
-        return Attribution.of_scores(CONCEPTS, scores_S_C, seconds=0.0, abstained_N=abstained_S), failure_S
 
 
 def first(registrations: Registrations, split: str, samples: int) -> np.ndarray:
-    """Rows of the first `samples` of a split: threes of one object, which alternate between the objects."""
+    """Rows of a split's first samples: threes of one object, which alternate between the objects."""
     return np.flatnonzero((registrations.split == split) & (registrations.sample < samples))
 
 
@@ -234,9 +215,6 @@ def registered_by(
 
     All methods get the same thinned clouds and the initial pose, which global ones do not read. The whole observed
     cloud moves to the resulting pose; a registration that failed stays where the method left it, and counts.
-
-    Raises:
-        InputError: an unknown method or setting, or a missing package.
     """
     made = {name: make_method(name, entry) for name, entry in methods.items()}
     outcomes: dict[str, list] = {name: [] for name in made}

@@ -81,10 +81,9 @@ def run(job: Job) -> None:
             gpc.fit(train.embedding, train.concept)
             encoder = load_model(inputs[1], encoding, axes=axes).encoder
             rows, maps = deletions(encoder, gpc, registrations, *axes, encoding, settings)
-            tested = tcav(gpc, train, test, settings, *axes)
             write_csv(outputs[0], rows)
             save_arrays(outputs[1], maps, axes)
-            write_csv(outputs[2], tested)
+            write_csv(outputs[2], tcav(gpc, train, test, settings, *axes))
 
 
 def chosen_rows(registrations: Registrations, count: int) -> np.ndarray:
@@ -142,10 +141,9 @@ def deletions(
 ) -> tuple[pd.DataFrame, dict[str, np.ndarray]]:
     """Delete points of test samples in every order, and explain what is left with GP-CA.
 
-    Returns:
-        `DELETION_COLUMNS` by sample, order and share: the score of the concept that is named on the whole draw, before
-        and after, and the share of orders after which another one is named; and the arrays ``sample`` (S), ``points``
-        (S, N, 3) and ``saliency`` (S, N).
+    `DELETION_COLUMNS` by sample, order and share: the score of the concept that is named on the whole draw, before and
+    after, and the share of orders after which another one is named; and the arrays ``sample`` (S), ``points``
+    (S, N, 3) and ``saliency`` (S, N).
     """
     import pandas as pd
     import torch
@@ -196,23 +194,23 @@ def concept_examples(train: Registrations, concepts: tuple[str, ...]) -> dict[st
 def tcav(
     gpc: GPC, train: Registrations, test: Registrations, settings: GradientSettings, *axes: object
 ) -> pd.DataFrame:
-    """Test every concept for every class.
+    """Test every concept for every class by a GPC that was fitted to the training samples.
 
-    Args:
-        gpc: fitted to the training samples.
-        train, test: with their embeddings.
-        axes: name the random numbers.
-
-    Returns:
-        rows of ``tested, concept`` (the class), ``score``, ``chance`` (means over the vectors), ``p`` of the test,
-        ``significant`` (0 or 1), ``probe`` (balanced accuracy of the concept's probes on held-out samples).
+    Rows of ``tested``, ``concept`` (the class), ``score``, ``chance`` (means over the vectors), ``p`` of the test,
+    ``significant`` (0 or 1), ``probe`` (balanced accuracy of the concept's probes on held-out samples).
     """
     import pandas as pd
+    import torch
 
     h_N_d = train.embedding.astype(float)
     mean_d, deviation_d = h_N_d.mean(axis=0), np.maximum(h_N_d.std(axis=0), 1e-9)
     scaled_N_d = (h_N_d - mean_d) / deviation_d
-    gradients = {c: _gradients(gpc, test, c) * deviation_d for c in gpc.classes if (test.concept == c).any()}
+    gradients = {}  # (n, d) of a class's log odds in the embeddings of its test samples
+    for number, concept in enumerate(gpc.classes):
+        if (of_class_N := test.concept == concept).any():
+            h_n_d = torch.from_numpy(test.embedding[of_class_N].astype(float)).requires_grad_()
+            odds_n = log_odds(gpc.mean_logits(h_n_d), number)
+            gradients[concept] = torch.autograd.grad(odds_n.sum(), h_n_d)[0].numpy() * deviation_d
     examples = concept_examples(train, gpc.classes)
     rows = []
     for tested, shown_N in examples.items():
@@ -221,21 +219,13 @@ def tcav(
         drawn = [_vector(scaled_N_d, None, size, *axes, tested, v) for v in range(settings.vectors)]
         for concept, gradient_N_d in gradients.items():
             score_V, chance_V = (
-                [_score(gradient_N_d, vector_d) for vector_d, _ in vectors] for vectors in (probes, drawn)
+                [float(np.mean(gradient_N_d @ vector_d > 0)) for vector_d, _ in vectors] for vectors in (probes, drawn)
             )
             p = two_sided_p(score_V, chance_V)
-            rows.append(
-                {
-                    "tested": tested,
-                    "concept": concept,
-                    "score": np.mean(score_V),
-                    "chance": np.mean(chance_V),
-                    "p": p,
-                    "significant": int(p < settings.level / (len(examples) * len(gradients))),
-                    "probe": np.mean([accuracy for _, accuracy in probes]),
-                }
-            )
-    return pd.DataFrame(rows)
+            significant = int(p < settings.level / (len(examples) * len(gradients)))
+            probe = np.mean([accuracy for _, accuracy in probes])
+            rows.append((tested, concept, np.mean(score_V), np.mean(chance_V), p, significant, probe))
+    return pd.DataFrame(rows, columns=["tested", "concept", "score", "chance", "p", "significant", "probe"])
 
 
 def two_sided_p(score_V: list[float], chance_V: list[float]) -> float:
@@ -248,19 +238,6 @@ def two_sided_p(score_V: list[float], chance_V: list[float]) -> float:
         return float(difference == 0)
     freedom = errors_2.sum() ** 2 / np.sum(errors_2**2 / (np.array([len(score_V), len(chance_V)]) - 1))
     return float(2 * student_t.sf(difference / np.sqrt(errors_2.sum()), freedom))
-
-
-def _gradients(gpc: GPC, test: Registrations, concept: str) -> np.ndarray:
-    """Gradient (N, d) of a class's log odds in the embeddings of its test samples."""
-    import torch
-
-    h_N_d = torch.from_numpy(test.embedding[test.concept == concept].astype(float)).requires_grad_()
-    odds_N = log_odds(gpc.mean_logits(h_N_d), gpc.classes.index(concept))
-    return torch.autograd.grad(odds_N.sum(), h_N_d)[0].numpy()
-
-
-def _score(gradient_N_d: np.ndarray, vector_d: np.ndarray) -> float:
-    return float(np.mean(gradient_N_d @ vector_d > 0))
 
 
 def _vector(scaled_N_d: np.ndarray, shown_N: np.ndarray | None, size: int, *axes: object) -> tuple[np.ndarray, float]:

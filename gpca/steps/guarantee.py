@@ -95,11 +95,7 @@ class Pool:
 
 
 def read_pool(causes_files: Sequence[Path], descriptors: Sequence[Path], reenactments: Sequence[Path]) -> Pool:
-    """Read the registrations of every source and seed, in the order of the files, which is the same in all three lists.
-
-    Raises:
-        InputError: a file that is missing, damaged, or of other samples.
-    """
+    """Read the registrations of every source and seed; the files of all three lists have one order."""
     parts, columns = [], []
     for path, described, enacted in zip(causes_files, descriptors, reenactments, strict=True):
         causes = Causes.load(path)

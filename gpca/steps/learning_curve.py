@@ -147,9 +147,6 @@ def learning_curve(
     Args:
         pool: all training samples.
         tested, truth: the test samples, in the same order.
-
-    Raises:
-        InputError: fewer training samples than the largest size.
     """
     import pandas as pd
 

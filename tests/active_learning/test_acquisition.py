@@ -9,7 +9,6 @@ from gpca.active_learning.acquisition import (
     Pool,
     balanced_kmeans,
     bald_kmeans,
-    bald_stochastic,
     require_strategy,
     select,
     top,
@@ -170,7 +169,7 @@ def test_bald_kmeans_names_the_most_uncertain_of_its_choice_first():
 
 def test_bald_stochastic_draws_in_proportion_to_bald():
     pool, random = make_pool(5, bald_N=np.array([0.0, 0.1, 0.2, 0.3, 0.4])), np.random.default_rng(0)
-    draws = [bald_stochastic(pool, 5, random).tolist() for _ in range(2000)]
+    draws = [STRATEGIES["bald_stochastic"].choose(pool, 5, random).tolist() for _ in range(2000)]
     assert {rows[-1] for rows in draws} == {0}
     first = Counter(rows[0] for rows in draws)
     assert [first[row] / 2000 for row in range(1, 5)] == pytest.approx([0.1, 0.2, 0.3, 0.4], abs=0.05)
