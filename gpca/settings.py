@@ -134,9 +134,6 @@ def read_settings(kind: type[T], settings: Mapping[str, Any], subject: str = "se
         kind: the class, or another type that pydantic knows.
         settings: text, numbers, booleans, None, lists and mappings.
         subject: precedes the name of a key in messages.
-
-    Raises:
-        InputError: an unknown or missing key, a value of another type or out of range, or inconsistent values.
     """
     from pydantic import ValidationError
 
@@ -156,9 +153,6 @@ def require_arguments(subject: str, function: Callable, leading: int, settings: 
     """Check settings that a function takes as named arguments, after `leading` others.
 
     A number without a range must not be negative unless its default is.
-
-    Raises:
-        InputError: as :func:`read_settings`.
     """
     read_settings(_settings_of_arguments(function, leading), settings, f"{subject}: setting")
 

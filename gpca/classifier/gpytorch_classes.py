@@ -51,9 +51,6 @@ def ascend(model: LatentGPs, inputs_N_d: Tensor, targets_N: Tensor, learning_rat
     """Yield, without end, the loss before each step of Adam on the ELBO of all samples, in nats per sample.
 
     Random numbers come from torch's global generator, which gpytorch requires.
-
-    Raises:
-        InputError: as many samples as classes, which ``SoftmaxLikelihood`` takes for an old, transposed layout.
     """
     n_classes = model.variational_strategy.num_tasks
     if len(targets_N) == n_classes:

@@ -97,11 +97,7 @@ def _sources(model: Path, record: Mapping, title: str) -> Iterator[Source]:
 
 
 def licenses_of(origin: str, objects: Path) -> list[License]:
-    """Return the licenses of the datasets of a file or an address.
-
-    Raises:
-        InputError: none is listed; the message names `objects`, which were made from it.
-    """
+    """Return the licenses of the datasets of a file or an address."""
     licenses = [
         License(dataset, entry["license"], entry["known"])
         for dataset, entry in _listed_licenses().items()
@@ -139,9 +135,6 @@ def card(
         name, content: of the shipped file.
         record: its provenance.
         scores: :func:`gpca.experiments.diagnosis.collect` of the run: values with intervals.
-
-    Raises:
-        InputError: no scores of a classifier like the model's, or incomplete settings of the run.
     """
     diagnoser, code = model.diagnoser, record["code"]
     try:

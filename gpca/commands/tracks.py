@@ -65,11 +65,7 @@ def run_bench(options: Namespace) -> None:
 
 
 def _method_names(method: str, track: Track) -> list[str]:
-    """Return the names of the methods for a track that a file or a module lists, and register it as a plugin.
-
-    Raises:
-        InputError: it cannot be imported or lists no method; or there is no explainer with that name.
-    """
+    """Return the names of the methods for a track that a file or a module lists, and register it as a plugin."""
     from importlib.util import find_spec
 
     from gpca.explainers.registry import CAUSES, explainers

@@ -127,9 +127,6 @@ def calibrate_sets(
         scores_N_K: scores of samples that were not used for training.
         state_N: their true states.
         family_N: see :func:`upper_bound`.
-
-    Raises:
-        InputError: scores of another shape or not finite, unknown state, `level` outside (0, 1).
     """
     require_share("level of the sets", level)
     require_scores(scores_N_K, states)
@@ -188,9 +185,6 @@ def calibrate_alarm(
         failed_N: whether each failed.
         family_N: see :func:`upper_bound`.
         confidence: use :func:`confident_upper_bound` instead.
-
-    Raises:
-        InputError: scores that are not finite, risks or confidence outside (0, 1), or both confidence and families.
     """
     require_share("risk of missed failures", missed)
     require_share("risk of false alarms", false_alarms)

@@ -31,11 +31,7 @@ class Rival:
 
 
 def make_rivals(explainers: Mapping[str, Mapping], source: str, seed: int) -> dict[str, Rival]:
-    """Explainers of a section of the config, name -> settings.
-
-    Raises:
-        InputError: no explainer, an unknown one, or settings that it does not take.
-    """
+    """Explainers of a section of the config, name -> settings."""
     if not explainers:
         raise InputError("setting explainers", "is empty", "name at least one")
     rivals = {}

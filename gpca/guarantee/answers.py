@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, fields
+from functools import partial
 from math import floor
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
@@ -27,9 +28,8 @@ SCORES = tuple(f"score_{label}" for label in LABELS)
 TEXTS = ("model", "source", "sample", "family", "state")
 NUMBERS = ("seed", "taught", "severity", "weight")  # columns
 FAMILIES = "families"  # the condition under which the guarantee holds
-PLAIN, BY_SAMPLE, BY_STATE, CONFIDENT, BY_FAMILY = VARIANTS = (
-    *("plain", "by_sample", "by_state", "confident", "by_family"),
-)
+VARIANTS = ("plain", "by_sample", "by_state", "confident", "by_family")
+PLAIN, BY_SAMPLE, BY_STATE, CONFIDENT, BY_FAMILY = VARIANTS
 WITH_SETS = (PLAIN, BY_SAMPLE, BY_STATE, BY_FAMILY)
 WITH_ALARM = (PLAIN, BY_SAMPLE, CONFIDENT, BY_FAMILY)
 SHIFTED = (BY_SAMPLE, BY_STATE)  # variants under shift
@@ -110,11 +110,7 @@ class Scored:
 
     @classmethod
     def load(cls, path: str | Path) -> Scored:
-        """Read the CSV.
-
-        Raises:
-            InputError: the file is missing or damaged, or has an unknown state.
-        """
+        """Read the CSV."""
         rows: pd.DataFrame = read_numbers(path, (*TEXTS, *NUMBERS, *SCORES), (*NUMBERS, *SCORES))
         if unknown := set(rows["state"]) - set(STATES):
             raise InputError(path, f"unknown state '{min(unknown)}'", f"its states are {', '.join(STATES)}")
@@ -128,14 +124,10 @@ class Scored:
         )
 
 
-@dataclass(frozen=True)
-class Condition:
-    """The samples of calibration and test.
+class Condition(NamedTuple):
+    """The rows (N,) that may be calibrated on, those that are tested, and the ways of calibration to compare.
 
-    Attributes:
-        name: ``families``, ``from_{source}``, ``milder``, ``harder`` or ``frames``: the calibration samples.
-        calibration, tested: (N,) masks of the rows that may be calibrated on, and of those that are tested.
-        variants: the ways of calibration that are compared.
+    The name is that of the calibration samples: ``families``, ``from_{source}``, ``milder``, ``harder`` or ``frames``.
     """
 
     name: str
@@ -197,20 +189,34 @@ def answers_of(scored: Scored, condition: Condition, settings: GuaranteeSettings
     """
     probabilities_N_5 = state_scores(scored.scores)
     family_N = np.unique(scored.family, return_inverse=True)[1]
+    limits = {name: getattr(settings, name) for name in ("level", "missed", "false_alarms", "nonconformity")}
+    risks = {"missed": settings.family_risk, "false_alarms": settings.family_risk}
     rows, sets, calls, counts = [], [], [], []
     for model in dict.fromkeys(scored.model[condition.tested].tolist()):
         model_N = scored.model == model
-        seen = np.flatnonzero(model_N & scored.seen)
+        failed_N = model_N & scored.seen & (scored.state != NOMINAL)
         for family in np.unique(family_N[model_N & condition.tested]):
-            tested = np.flatnonzero(model_N & condition.tested & (family_N == family))
-            calibration = np.flatnonzero(model_N & condition.calibration & (family_N != family))
-            sets_n, calls_n = _sets_and_calls(
-                probabilities_N_5, scored.state, family_N, calibration, seen, tested, condition, settings
-            )
-            rows.append(tested)
-            sets.append(sets_n)
-            calls.append(calls_n)
-            counts.append(len(np.unique(family_N[calibration])))
+            tested_N = model_N & condition.tested & (family_N == family)
+            calibration_N = model_N & condition.calibration & (family_N != family)
+            samples, families = (probabilities_N_5[calibration_N], scored.state[calibration_N]), family_N[calibration_N]
+            made = {
+                BY_SAMPLE: partial(calibrate, *samples, **limits),
+                BY_STATE: partial(calibrate, *samples, **limits, by_state=True),
+                CONFIDENT: partial(calibrate, *samples, **limits, confidence=settings.confidence),
+                BY_FAMILY: partial(calibrate, *samples, families, **limits | risks),
+            }
+            guarantees = {name: make() for name, make in made.items() if name in condition.variants}
+            tested_n_5 = probabilities_N_5[tested_N]
+            failure_n = 1 - tested_n_5[:, 0]
+            sets.append({name: each.sets(tested_n_5) for name, each in guarantees.items() if name in WITH_SETS})
+            calls.append({name: each.alarm(failure_n) for name, each in guarantees.items() if name in WITH_ALARM})
+            if PLAIN in condition.variants:
+                sets[-1][PLAIN] = plain_sets(tested_n_5, settings.level)
+                failures = 1 - probabilities_N_5[failed_N, 0]
+                threshold = plain_threshold(failures, settings.missed) if len(failures) else EVEN
+                calls[-1][PLAIN] = np.where(failure_n >= threshold, ALARM, GOOD)
+            rows.append(np.flatnonzero(tested_N))
+            counts.append(len(np.unique(families)))
     if not rows:
         return None
     return Answers(
@@ -219,32 +225,6 @@ def answers_of(scored: Scored, condition: Condition, settings: GuaranteeSettings
         {name: np.concatenate([part[name] for part in calls]) for name in calls[0]},
         min(counts),
     )
-
-
-def _sets_and_calls(
-    probabilities_N_5, state_N, family_N, calibration, seen, tested, condition: Condition, settings: GuaranteeSettings
-):
-    """Sets and calls (n, …) of the tested rows by variant; the other arguments in lower case are row numbers."""
-    tested_n_5 = probabilities_N_5[tested]
-    failure_n = 1 - tested_n_5[:, 0]
-    samples = (probabilities_N_5[calibration], state_N[calibration])
-    limits = {name: getattr(settings, name) for name in ("level", "missed", "false_alarms", "nonconformity")}
-    risks = {"missed": settings.family_risk, "false_alarms": settings.family_risk}
-    made = {
-        BY_SAMPLE: lambda: calibrate(*samples, **limits),
-        BY_STATE: lambda: calibrate(*samples, **limits, by_state=True),
-        CONFIDENT: lambda: calibrate(*samples, **limits, confidence=settings.confidence),
-        BY_FAMILY: lambda: calibrate(*samples, family_N[calibration], **limits | risks),
-    }
-    guarantees = {name: make() for name, make in made.items() if name in condition.variants}
-    sets = {name: guarantee.sets(tested_n_5) for name, guarantee in guarantees.items() if name in WITH_SETS}
-    calls = {name: guarantee.alarm(failure_n) for name, guarantee in guarantees.items() if name in WITH_ALARM}
-    if PLAIN in condition.variants:
-        sets[PLAIN] = plain_sets(tested_n_5, settings.level)
-        failed = seen[state_N[seen] != NOMINAL]
-        threshold = plain_threshold(1 - probabilities_N_5[failed, 0], settings.missed) if len(failed) else EVEN
-        calls[PLAIN] = np.where(failure_n >= threshold, ALARM, GOOD)
-    return sets, calls
 
 
 def plain_sets(probabilities_N_K: np.ndarray, level: float) -> np.ndarray:
@@ -279,9 +259,7 @@ def measures(asked: Scored, answers: Answers, settings: GuaranteeSettings) -> It
             yield variant, SIZE, concept, np.nan, size_A, counted_A
         yield variant, SINGLE, ALL, np.nan, (size_A == 1).astype(float), everything_A
     for variant, called_A in answers.calls.items():
-        missed, false_alarms = (
-            (settings.family_risk,) * 2 if variant == BY_FAMILY else (settings.missed, settings.false_alarms)
-        )
-        yield variant, MISSED, ALL, missed, (called_A == GOOD).astype(float), ~nominal_A
-        yield variant, FALSE_ALARMS, ALL, false_alarms, (called_A == ALARM).astype(float), nominal_A
+        risks = (settings.family_risk,) * 2 if variant == BY_FAMILY else (settings.missed, settings.false_alarms)
+        yield variant, MISSED, ALL, risks[0], (called_A == GOOD).astype(float), ~nominal_A
+        yield variant, FALSE_ALARMS, ALL, risks[1], (called_A == ALARM).astype(float), nominal_A
         yield variant, UNSURE, ALL, np.nan, (called_A == NOT_SURE).astype(float), everything_A

@@ -24,6 +24,7 @@ from gpca.evaluation.conformal import (
 
 SEVERAL = "several"
 STATES = (*LABELS, SEVERAL)
+BOUNDS = {"good_below": -inf, "failed_from": inf}  # of an alarm; the values stand as None in files
 REMEDY = "calibrate it again"
 
 
@@ -51,23 +52,22 @@ class Guarantee:
     def to_dict(self) -> dict[str, Any]:
         """Return numbers, words and lists, with None for infinite bounds."""
         sets, alarm = asdict(self.state_sets), asdict(self.failure_alarm)
-        sets |= {"states": list(self.state_sets.states), "limits": [_plain(x) for x in self.state_sets.limits]}
-        alarm |= {name: _plain(alarm[name]) for name in ("good_below", "failed_from")}
+        sets |= {"states": list(sets["states"]), "limits": [x if isfinite(x) else None for x in sets["limits"]]}
+        alarm |= {name: alarm[name] if isfinite(alarm[name]) else None for name in BOUNDS}
         return {"sets": sets, "alarm": alarm, "samples": self.samples, "families": self.families}
 
     @classmethod
     def from_dict(cls, plain: Mapping[str, Any]) -> Guarantee:
         """Invert :meth:`to_dict`; an InputError for missing or wrong values."""
         try:
-            sets, alarm = dict(plain["sets"]), dict(plain["alarm"])
-            sets |= {"states": tuple(sets["states"])}
-            sets |= {"limits": tuple(inf if x is None else float(x) for x in sets["limits"])}
-            alarm |= {"good_below": -inf if alarm["good_below"] is None else float(alarm["good_below"])}
-            alarm |= {"failed_from": inf if alarm["failed_from"] is None else float(alarm["failed_from"])}
-            read = cls(StateSets(**sets), FailureAlarm(**alarm), int(plain["samples"]), int(plain["families"]))
+            sets, alarm = plain["sets"], plain["alarm"]
+            limits = tuple(inf if x is None else float(x) for x in sets["limits"])
+            bounds = {name: none if alarm[name] is None else float(alarm[name]) for name, none in BOUNDS.items()}
+            state_sets = StateSets(**{**sets, "states": tuple(sets["states"]), "limits": limits})
+            read = cls(state_sets, FailureAlarm(**{**alarm, **bounds}), int(plain["samples"]), int(plain["families"]))
         except (KeyError, TypeError, ValueError) as fault:
             raise InputError("guarantee", f"is damaged ({type(fault).__name__}: {fault})", REMEDY) from fault
-        if len(read.state_sets.limits) != len(read.state_sets.states):
+        if len(limits) != len(state_sets.states):
             raise InputError("guarantee", "has not one limit for each state", REMEDY)
         return read
 
@@ -99,9 +99,6 @@ def calibrate(
         level: probability that a set contains the true state.
         missed, false_alarms, confidence: see :func:`gpca.evaluation.conformal.calibrate_alarm`.
         nonconformity, by_state: see :class:`gpca.evaluation.conformal.StateSets`.
-
-    Raises:
-        InputError: arrays of different lengths, unknown states, scores that are not finite, shares out of range.
     """
     state_N = np.asarray(state_N)
     if len(state_N) != len(scores_N_K) or (family_N is not None and len(family_N) != len(state_N)):
@@ -115,10 +112,6 @@ def calibrate(
     failed_n = state_n != states[0]
     alarm = calibrate_alarm(1 - scores_n_K[:, 0], failed_n, family_n, missed, false_alarms, confidence)
     return Guarantee(sets, alarm, len(state_n), 0 if family_n is None else len(np.unique(family_n)))
-
-
-def _plain(number: float) -> float | None:
-    return number if isfinite(number) else None
 
 
 def states_of(truth: Truth) -> np.ndarray:

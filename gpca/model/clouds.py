@@ -63,10 +63,6 @@ def read_points(path: Path, unit: str) -> tuple[np.ndarray, CanonicalFrame]:
 
     Returns:
         Points (N, 3) in that unit, and their canonical frame.
-
-    Raises:
-        InputError: missing or unreadable file, unsupported format, missing package, too few points, NaN, a mesh without
-            area, or a diameter out of range.
     """
     scale = mesh_folder.meters_per(unit)
     require_format(path)
@@ -83,11 +79,7 @@ def read_points(path: Path, unit: str) -> tuple[np.ndarray, CanonicalFrame]:
 
 
 def read_scan(path: Path) -> np.ndarray:
-    """Read a scan of any extent, or sample a mesh: points (N, 3) in the file's unit.
-
-    Raises:
-        InputError: as :func:`read_points`, except for the diameter.
-    """
+    """Read a scan of any extent, or sample a mesh: points (N, 3) in the file's unit."""
     require_format(path)
     if path.suffix.lower() not in mesh_folder.SUFFIXES:
         points = _cloud(path)
@@ -113,11 +105,7 @@ def _cloud(path: Path) -> np.ndarray:
 
 
 def read_pose(path: Path) -> np.ndarray:
-    """Read a pose (4, 4) from a text file of 16 numbers, row by row.
-
-    Raises:
-        InputError: missing file, wrong number of numbers, not a rigid transform.
-    """
+    """Read a pose (4, 4) from a text file of 16 numbers, row by row."""
     remedy = "give 4×4 numbers, row by row"
     require_file(path, "no such file", remedy, LARGEST_POSE_BYTES)
     try:

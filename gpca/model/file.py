@@ -112,11 +112,7 @@ class Model:
 
     @classmethod
     def load(cls, path: str | Path) -> Model:
-        """Read the file.
-
-        Raises:
-            InputError: missing, damaged or pickled file, not a model, another version, or impossible contents.
-        """
+        """Read the file."""
         require_model(path)
         try:
             content = read_tensors(path)

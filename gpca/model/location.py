@@ -23,9 +23,6 @@ def model_path(chosen: str | Path | None = None, results: Path = RESULTS) -> Pat
     """Return the path to use: the given one, that of the environment, a model of the workflow, or `SHIPPED`.
 
     Among the runs in `results`, ``full`` comes first, then ``default``, then the newest other run, and ``smoke`` last.
-
-    Raises:
-        InputError: there is none.
     """
     if chosen is not None:
         return Path(chosen)

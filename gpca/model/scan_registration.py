@@ -42,9 +42,6 @@ def voxel_size(clouds: Mapping[str, np.ndarray], unit: str) -> float:
 
     Args:
         clouds: by their names in messages.
-
-    Raises:
-        InputError: all points of a scan coincide, or their extent is too large.
     """
     spacings = []
     for name, points in clouds.items():

@@ -21,10 +21,6 @@ def page_comparison(path: str | Path, reference: str | Path | None = None) -> di
     Where no number of the run is judged, as on stand-ins, the rows are those of the reference, with the run's values as
     ``this_run``. Repeats of a value and standard deviations are counted apart. A table's title names its only objects;
     otherwise each row does, unless its name says so.
-
-    Args:
-        path: the file of the run.
-        reference: that of a run on real objects.
     """
     if not Path(path).is_file():
         return None
@@ -61,7 +57,12 @@ def _rows(path: str | Path) -> list[dict[str, str]]:
     """Return the entries as printed; texts stay as they are."""
     rows = []
     for row in read_csv(path, COMPARISON_COLUMNS).to_dict("records"):
-        printed = {name: _rounded(row[name], int(row["decimals"])) for name in _NUMBERS}
+        printed = {}
+        for name in _NUMBERS:  # numbers in round tens have -1 decimals
+            text, decimals = row[name], max(0, int(row["decimals"]))
+            value = float(text) if text not in ("", "nan") else None
+            short = value is not None and value and not round(value, decimals)  # would be printed as 0
+            printed[name] = "" if value is None else f"{value:.1g}" if short else f"{value:.{decimals}f}"
         upper, deviation = printed["upper"], printed["deviation"]
         apart = REPEAT if row["repeat_of"] else DEVIATION if row["statistic"] == "deviation" else ""
         repeat = f"repeat of {row['repeat_of']}" if row["repeat_of"] else ""
@@ -82,11 +83,3 @@ def _rows(path: str | Path) -> list[dict[str, str]]:
             }
         )
     return rows
-
-
-def _rounded(text: str, decimals: int) -> str:
-    """Return a number with as many digits as the printed one, or with one digit where that would give 0."""
-    if text in ("", "nan"):
-        return ""
-    value, decimals = float(text), max(0, decimals)  # numbers in round tens have -1
-    return f"{value:.{decimals}f}" if round(value, decimals) or not value else f"{value:.1g}"

@@ -30,14 +30,7 @@ FORMS = {".npz": "application/zip", ".pt": "application/zip"}  # unknown to Pyth
 
 
 def write_crate(folder: str | Path, run: str, sources: Iterable[str], seeds: Sequence[int]) -> None:
-    """Write ``ro-crate-metadata.json`` of a run from all provenance records below its folder ``results/{run}``.
-
-    Args:
-        sources: titles of its datasets.
-
-    Raises:
-        InputError: there is no record.
-    """
+    """Write ``ro-crate-metadata.json`` of a run from all provenance records below its folder ``results/{run}``."""
     description = (
         "Explanations of uncertain point cloud registrations: tables, figures and the numbers behind them, on "
         f"{', '.join(sources)}; seeds {', '.join(map(str, seeds))}."
@@ -89,9 +82,22 @@ def crate(jobs: Sequence[Mapping[str, Any]], name: str, description: str) -> dic
         for path, digest in hashes.items()
         if identifiers[path] != path
     ]
-    entities += [_software(job["code"], job["libraries"]) for job in jobs]
+    entities += [_software(job) for job in jobs]
     entities += [_library(*library) for job in jobs for library in job["libraries"].items()]
-    actions = [_action(job, identifiers) for job in jobs]
+    actions = []
+    for job in jobs:
+        first, *others = outputs = job["outputs"]
+        action = {
+            "@id": f"#job-{sha256(' '.join(outputs).encode()).hexdigest()[:16]}",
+            "@type": "CreateAction",
+            "name": f"Making {first}{f' and {len(others)} more' if others else ''}",
+            "description": f"{float(job['seconds']):g} s; settings and machine are in {first.rstrip('/')}{RECORD}",
+            "endTime": job["ended"].isoformat(),
+            "instrument": {"@id": _software(job)["@id"]},
+            "object": _references(identifiers[path] for path in job["inputs"]),
+            "result": _references(outputs),
+        }
+        actions.append(action)
     title = "Human-Interpretable Uncertainty Explanations for Point Cloud Registration"
     described: list[dict[str, Any]] = [
         {"@id": NAME, "@type": "CreativeWork", "about": {"@id": "./"}, "conformsTo": {"@id": SPECIFICATION}},
@@ -115,45 +121,24 @@ def crate(jobs: Sequence[Mapping[str, Any]], name: str, description: str) -> dic
     return {"@context": list(CONTEXT), "@graph": list(graph.values())}
 
 
-def _action(job: Mapping[str, Any], identifiers: Mapping[str, str]) -> dict[str, Any]:
-    first, *others = outputs = job["outputs"]
-    return {
-        "@id": f"#job-{sha256(' '.join(outputs).encode()).hexdigest()[:16]}",
-        "@type": "CreateAction",
-        "name": f"Making {first}{f' and {len(others)} more' if others else ''}",
-        "description": f"{float(job['seconds']):g} s; settings and machine are in {first.rstrip('/')}{RECORD}",
-        "endTime": job["ended"].isoformat(),
-        "instrument": {"@id": _software_id(job["code"])},
-        "object": _references(identifiers[path] for path in job["inputs"]),
-        "result": _references(outputs),
-    }
-
-
-def _software(code: Mapping[str, Any], libraries: Mapping[str, str]) -> dict[str, Any]:
+def _software(job: Mapping[str, Any]) -> dict[str, Any]:
     """Return the suite in one state of its code."""
+    code = job["code"]
     commit = f", commit {code['commit']}" if code["commit"] else ""
     changed = " with uncommitted changes" if code["dirty"] else ""
+    parts = ["gpca-bench", code["version"], (code["commit"] or "")[:12], "changed" if code["dirty"] else ""]
     return {
-        "@id": _software_id(code),
+        "@id": f"#{'-'.join(filter(None, parts))}",
         "@type": "SoftwareApplication",
         "name": "GP-CA Bench",
         "softwareVersion": f"{code['version']}{commit}{changed}",
-        "softwareRequirements": _references(_library(*library)["@id"] for library in libraries.items()),
+        "softwareRequirements": _references(_library(*library)["@id"] for library in job["libraries"].items()),
     }
-
-
-def _software_id(code: Mapping[str, Any]) -> str:
-    parts = ["gpca-bench", code["version"], (code["commit"] or "")[:12], "changed" if code["dirty"] else ""]
-    return "#" + "-".join(filter(None, parts))
 
 
 def _library(name: str, version: str) -> dict[str, Any]:
-    return {
-        "@id": f"#{name}-{version.replace('+', '-')}",
-        "@type": "SoftwareApplication",
-        "name": name,
-        "softwareVersion": version,
-    }
+    identifier = f"#{name}-{version.replace('+', '-')}"
+    return {"@id": identifier, "@type": "SoftwareApplication", "name": name, "softwareVersion": version}
 
 
 def _references(identifiers: Iterable[str]) -> dict[str, str] | list[dict[str, str]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -45,121 +45,97 @@ class Titles:
 
 
 def findings_of(folder: Path, titles: Titles, shown: Collection[str]) -> list[Finding]:
-    """Return the findings from the collected files in ``results/{run}``, if their results are shown.
-
-    Args:
-        shown: names of the results.
-
-    Raises:
-        InputError: an unusable file.
-    """
-    readers: dict[str, tuple[Callable, list[Callable]]] = {
-        "metrics.csv": (read_metrics, [_untrained, _protocol, _rival, _uncertain]),
-        "cause_intervals.csv": (read_clustered, [_causes, _regret]),
-        "real_world.csv": (read_together, [_frames]),
-        "active_learning.csv": (read_metrics, [_labels]),
-        "recovery.csv": (read_metrics, [_recovery]),
+    """Return the findings from the collected files in ``results/{run}`` whose results are shown."""
+    readers: dict[str, tuple[Callable, Callable[[pd.DataFrame, Titles], Iterator[Finding]]]] = {
+        "metrics.csv": (read_metrics, _concepts),
+        "cause_intervals.csv": (read_clustered, _causes),
+        "real_world.csv": (read_together, _frames),
+        "active_learning.csv": (read_metrics, _labels),
+        "recovery.csv": (read_metrics, _recovery),
     }
-    findings = []
-    for name, (read, finders) in readers.items():
+    findings: list[Finding] = []
+    for name, (read, find) in readers.items():
         if (folder / name).is_file():
-            rows = read(folder / name)
-            findings += [finding for find in finders if (finding := find(rows, titles))]
+            findings += find(read(folder / name), titles)
     return [finding for finding in findings if finding.result in shown]
 
 
-def _untrained(metrics: pd.DataFrame, titles: Titles) -> Finding | None:
+def _concepts(metrics: pd.DataFrame, titles: Titles) -> Iterator[Finding]:
     accuracies = _accuracies(metrics)
-    if RULE not in accuracies:
-        return None
-    span = _span(accuracies[RULE])
-    text = (
-        "An untrained rule names the perturbed concept of the paper's protocol in "
-        f"{span} of the test registrations, depending on the dataset: turned by ICP, pose; points missing, overlap; "
-        "otherwise noise. What a method adds is its lead over this rule."
-    )
-    return Finding(span, text, "table1_extended")
-
-
-def _protocol(metrics: pd.DataFrame, titles: Titles) -> Finding | None:
-    accuracies = _accuracies(metrics)
-    gpca = next((name for name in GPCA_FORMS if name in accuracies), None)
-    if gpca is None:
-        return None
-    rivals = [f"{words} {_span(accuracies[name])}" for name, words in PAPERS_RIVALS.items() if name in accuracies]
-    text = (
-        f"Under the paper's protocol, GP-CA names the perturbed concept in {_span(accuracies[gpca])} of the test "
-        f"registrations, depending on the dataset{''.join(f'; {rival}' for rival in rivals)}. Guessing gives a third."
-    )
-    return Finding(_span(accuracies[gpca]), text, "table1_single_baselines")
-
-
-def _rival(metrics: pd.DataFrame, titles: Titles) -> Finding | None:
-    means = {name: accuracies.mean() for name, accuracies in _accuracies(metrics).items()}
-    forms = {name: mean for name, mean in means.items() if name in GPCA_FORMS}
-    others = {name: means[name] for name, entry in titles.explainers.items() if name in means and not entry["oracle"]}
-    others = {name: mean for name, mean in others.items() if name not in forms and name not in UNTRAINED}
-    if not forms or not others:
-        return None
-    best, best_form = max(others, key=others.__getitem__), max(forms, key=forms.__getitem__)
-    text = (
-        f"{titles.explainers[best]['title']} comes first among the {len(others)} other explainers without access to "
-        f"the truth, with {_percent(others[best], 1)} on average over the datasets, where "
-        f"{titles.explainers[best_form]['title']} has {_percent(forms[best_form], 1)}."
-    )
-    return Finding(_percent(others[best], 1), text, "table1_extended")
-
-
-def _uncertain(metrics: pd.DataFrame, titles: Titles) -> Finding | None:
+    if RULE in accuracies:
+        text = (
+            "An untrained rule names the perturbed concept of the paper's protocol in "
+            f"{_span(accuracies[RULE])} of the test registrations, depending on the dataset: turned by ICP, pose; "
+            "points missing, overlap; otherwise noise. What a method adds is its lead over this rule."
+        )
+        yield Finding(_span(accuracies[RULE]), text, "table1_extended")
+    forms = {name: accuracies[name].mean() for name in GPCA_FORMS if name in accuracies}
+    if forms:
+        span = _span(accuracies[next(iter(forms))])
+        rivals = [f"{words} {_span(accuracies[name])}" for name, words in PAPERS_RIVALS.items() if name in accuracies]
+        text = (
+            f"Under the paper's protocol, GP-CA names the perturbed concept in {span} of the test registrations, "
+            f"depending on the dataset{''.join(f'; {rival}' for rival in rivals)}. Guessing gives a third."
+        )
+        yield Finding(span, text, "table1_single_baselines")
+    others = {
+        name: accuracies[name].mean()
+        for name, entry in titles.explainers.items()
+        if name in accuracies and not entry["oracle"] and name not in GPCA_FORMS and name not in UNTRAINED
+    }
+    if forms and others:
+        best, best_form = max(others, key=others.__getitem__), max(forms, key=forms.__getitem__)
+        text = (
+            f"{titles.explainers[best]['title']} comes first among the {len(others)} other explainers without access "
+            f"to the truth, with {_percent(others[best], 1)} on average over the datasets, where "
+            f"{titles.explainers[best_form]['title']} has {_percent(forms[best_form], 1)}."
+        )
+        yield Finding(_percent(others[best], 1), text, "table1_extended")
     gpca = next((name for name in GPCA_FORMS if (metrics["method"] == name).any()), None)
     rows = metrics[(metrics["method"] == gpca) & (metrics["concept"] == ALL)]
     counts = rows[rows["metric"].isin(("causal_samples", "test_samples"))].groupby("metric")["value"].sum()
-    if len(counts) < 2:
-        return None
-    share = _percent(counts["causal_samples"] / counts["test_samples"])
-    text = (
-        f"{share} of these registrations are more uncertain than 95 % of clean pairs. The labels of the protocol "
-        "say what was perturbed, not whether that did any harm."
-    )
-    return Finding(share, text, "table1_extended")
+    if len(counts) == 2:
+        share = _percent(counts["causal_samples"] / counts["test_samples"])
+        text = (
+            f"{share} of these registrations are more uncertain than 95 % of clean pairs. The labels of the protocol "
+            "say what was perturbed, not whether that did any harm."
+        )
+        yield Finding(share, text, "table1_extended")
 
 
-def _causes(intervals: pd.DataFrame, titles: Titles) -> Finding | None:
+def _causes(intervals: pd.DataFrame, titles: Titles) -> Iterator[Finding]:
+    words = titles.cause_explainers
     rows, trained = _pooled(intervals, titles, "balanced_accuracy")
-    if not trained:
-        return None
-    best = max(trained, key=lambda name: rows.loc[name, "value"])
-    row = rows.loc[best]
-    text = (
-        "Where the truth is measured, on objects that no explainer has seen, the best tells nominal registrations and "
-        f"the dominant causes of failed ones apart with a balanced accuracy of {_percent(row['value'])} "
-        f"(95 % interval {_bounds(row)} %): {titles.cause_explainers[best]}."
-    )
-    gains = intervals[(intervals["metric"] == "balanced_accuracy") & (intervals["against"] == "untrained")]
-    for gain in gains[(gains["source"] == row["source"]) & (gains["method"] == best)].to_dict("records"):
-        if gain["other"] in titles.cause_explainers:
-            text += (
-                f" The best untrained rival, {titles.cause_explainers[gain['other']]}, is "
-                f"{100 * gain['value']:.0f} points behind ({_bounds(gain)})."
-            )
-    if "gpca" in trained and best != "gpca":
-        text += f" {titles.cause_explainers['gpca']} has {_percent(rows.loc['gpca', 'value'])}."
-    if CEILING in rows.index:
-        text += f" The truth measured from other starts agrees in {_percent(rows.loc[CEILING, 'value'])}."
-    return Finding(_percent(row["value"]), text, "table9_causes")
-
-
-def _regret(intervals: pd.DataFrame, titles: Titles) -> Finding | None:
+    if trained:
+        best = max(trained, key=lambda name: rows.loc[name, "value"])
+        row = rows.loc[best]
+        text = (
+            "Where the truth is measured, on objects that no explainer has seen, the best tells nominal registrations "
+            f"and the dominant causes of failed ones apart with a balanced accuracy of {_percent(row['value'])} "
+            f"(95 % interval {_bounds(row)} %): {words[best]}."
+        )
+        gains = intervals[(intervals["metric"] == "balanced_accuracy") & (intervals["against"] == "untrained")]
+        for gain in gains[(gains["source"] == row["source"]) & (gains["method"] == best)].to_dict("records"):
+            if gain["other"] in words:
+                text += (
+                    f" The best untrained rival, {words[gain['other']]}, is {100 * gain['value']:.0f} points behind "
+                    f"({_bounds(gain)})."
+                )
+        if "gpca" in trained and best != "gpca":
+            text += f" {words['gpca']} has {_percent(rows.loc['gpca', 'value'])}."
+        if CEILING in rows.index:
+            text += f" The truth measured from other starts agrees in {_percent(rows.loc[CEILING, 'value'])}."
+        yield Finding(_percent(row["value"]), text, "table9_causes")
     rows, trained = _pooled(intervals, titles, "regret")
-    if not trained or RULE not in rows.index:
-        return None
-    best = min(trained, key=lambda name: rows.loc[name, "value"])
-    text = (
-        "Removing the cause that the best explainer names first leaves "
-        f"{_percent(rows.loc[best, 'value'])} of the error of a failed registration that removing the right one would "
-        f"take away ({titles.cause_explainers[best]}); the untrained rule leaves {_percent(rows.loc[RULE, 'value'])}."
-    )
-    return Finding(_percent(rows.loc[best, "value"]), text, "table9_causes")
+    if trained and RULE in rows.index:
+        best = min(trained, key=lambda name: rows.loc[name, "value"])
+        left = _percent(rows.loc[best, "value"])
+        text = (
+            f"Removing the cause that the best explainer names first leaves {left} of the error of a failed "
+            f"registration that removing the right one would take away ({words[best]}); the untrained rule leaves "
+            f"{_percent(rows.loc[RULE, 'value'])}."
+        )
+        yield Finding(left, text, "table9_causes")
 
 
 def _pooled(intervals: pd.DataFrame, titles: Titles, metric: str) -> tuple[pd.DataFrame, list[str]]:
@@ -172,39 +148,37 @@ def _pooled(intervals: pd.DataFrame, titles: Titles, metric: str) -> tuple[pd.Da
     return rows, [name for name in titles.cause_explainers if name in rows.index and name not in UNTRAINED]
 
 
-def _frames(metrics: pd.DataFrame, titles: Titles) -> Finding | None:
-    accuracies = {name: of.mean() for name, of in _accuracies(metrics).items() if "-" in name}  # backbone-reduction
-    if not accuracies:
-        return None
-    span = _span(np.array(list(accuracies.values())))
-    text = f"On objects in depth frames, GP-CA is right in {span} of the cases, depending on encoder and reduction."
-    return Finding(span, text, "table6_backbones")
+def _frames(metrics: pd.DataFrame, titles: Titles) -> Iterator[Finding]:
+    means = [
+        accuracies.mean() for name, accuracies in _accuracies(metrics).items() if "-" in name
+    ]  # backbone-reduction
+    if means:
+        span = _span(np.array(means))
+        text = f"On objects in depth frames, GP-CA is right in {span} of the cases, depending on encoder and reduction."
+        yield Finding(span, text, "table6_backbones")
 
 
-def _labels(metrics: pd.DataFrame, titles: Titles) -> Finding | None:
-    medians = {name: _median_labels(metrics, name) for name in ("bald_kmeans", "random")}
-    bald, random = medians["bald_kmeans"], medians["random"]
-    if bald is None or random is None:
-        return None
-    text = (
-        f"A concept that the classifier has never seen, {100 * JUDGED_SHARE:g} % of the pool, is known after {bald} "
-        f"chosen by BALD and k-means, and after {random} drawn at random (medians)."
-    )
-    return Finding(bald, text, "table3_active_learning")
+def _labels(metrics: pd.DataFrame, titles: Titles) -> Iterator[Finding]:
+    bald, random = (_median_labels(metrics, name) for name in ("bald_kmeans", "random"))
+    if bald and random:
+        text = (
+            f"A concept that the classifier has never seen, {100 * JUDGED_SHARE:g} % of the pool, is known after "
+            f"{bald} chosen by BALD and k-means, and after {random} drawn at random (medians)."
+        )
+        yield Finding(bald, text, "table3_active_learning")
 
 
-def _recovery(metrics: pd.DataFrame, titles: Titles) -> Finding | None:
+def _recovery(metrics: pd.DataFrame, titles: Titles) -> Iterator[Finding]:
     rows = metrics[(metrics["metric"] == f"recovered_within_{titles.budget}") & (metrics["concept"] == ALL)]
-    shares = rows.groupby("method")["value"].mean()
-    if "gpca" not in shares:
-        return None
-    others = {"random": "random actions", "oracle": "a policy that knows the cause"}
-    beside = [f"{words} {_percent(shares[name])}" for name, words in others.items() if name in shares]
-    text = (
-        f"In a closed loop on rendered tables, GP-CA's policy repairs {_percent(shares['gpca'])} of the failed "
-        f"registrations with at most {plural(titles.budget, 'action')}{''.join(f'; {each}' for each in beside)}."
-    )
-    return Finding(_percent(shares["gpca"]), text, "table8_recovery")
+    shares = {name: _percent(share) for name, share in rows.groupby("method")["value"].mean().items()}
+    if "gpca" in shares:
+        others = {"random": "random actions", "oracle": "a policy that knows the cause"}
+        beside = "".join(f"; {words} {shares[name]}" for name, words in others.items() if name in shares)
+        text = (
+            f"In a closed loop on rendered tables, GP-CA's policy repairs {shares['gpca']} of the failed "
+            f"registrations with at most {plural(titles.budget, 'action')}{beside}."
+        )
+        yield Finding(shares["gpca"], text, "table8_recovery")
 
 
 def _accuracies(metrics: pd.DataFrame) -> dict[str, np.ndarray]:

@@ -80,9 +80,6 @@ def write_page(folder: str | Path, run: Run) -> None:
 
     The page needs only the tables and figures beside it. It shows comparison and findings if the folder has the
     collected files, such as ``comparison.csv``.
-
-    Raises:
-        InputError: missing files (one line names all, and how to make them), or an unusable one.
     """
     folder = Path(folder)
     needed = [f"{each.kind}/{each.name}.{suffix}" for each in run.results for suffix in SUFFIXES[each.kind]]
@@ -99,6 +96,13 @@ def write_page(folder: str | Path, run: Run) -> None:
     key_figure = next((result for name in KEY_FIGURES for result in run.results if result.name == name), None)
     suffix = {"tables": "csv", "figures": "pdf"}
     recorded = [folder / f"{result.kind}/{result.name}.{suffix[result.kind]}" for result in run.results]
+    icp = run.config.get("registrations", {}).get("icp", {})
+    settings = CauseSettings.from_dict(dict(run.config["causes"]), icp)
+    reach, samples = ICPSettings(**icp).correspondence_distance, []
+    for source, files in run.samples.items():
+        samples += page_samples(files, run.sources[source], settings.limits, reach)
+    for source, files in run.causes.items():
+        samples += cause_samples(files, run.sources[source], settings)
     text = render(
         run=run,
         findings=findings_of(folder, run.titles, shown),
@@ -106,7 +110,7 @@ def write_page(folder: str | Path, run: Run) -> None:
         sections=sections,
         comparison=page_comparison(folder / "comparison.csv", run.reference),
         links=links,
-        samples=_samples(run),
+        samples=samples,
         provenance=read_provenance(recorded + run.sample_files),
     )
     with whole_file(folder / "index.html") as partial:
@@ -118,18 +122,12 @@ def render(template: str = "index.html.jinja", **content) -> str:
     import yaml
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-    def short(section: str) -> str:
-        """Return the title of a section for the menu."""
+    def short(section: str) -> str:  # for the menu
         words = section.removeprefix("Beyond the paper: ")
         return words[:1].upper() + words[1:]
 
-    environment = Environment(
-        loader=FileSystemLoader([TEMPLATES, ASSETS]),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    options = {"autoescape": True, "undefined": StrictUndefined, "trim_blocks": True, "lstrip_blocks": True}
+    environment = Environment(loader=FileSystemLoader([TEMPLATES, ASSETS]), **options)
     environment.filters["anchor"] = lambda title: re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-")
     environment.filters["short"] = short
     environment.filters["yaml"] = lambda value: yaml.safe_dump(value, sort_keys=False, allow_unicode=True, width=100)
@@ -163,19 +161,6 @@ def read_provenance(files: Iterable[Path]) -> dict[str, dict[str, int]]:
     return {fact: dict(counts.most_common()) for fact, counts in facts.items()}
 
 
-def _samples(run: Run) -> list[dict]:
-    """Return the registrations that the page shows in 3-D, those with measured causes last."""
-    icp = run.config.get("registrations", {}).get("icp", {})
-    settings = CauseSettings.from_dict(dict(run.config["causes"]), icp)
-    reach = ICPSettings(**icp).correspondence_distance
-    samples = []
-    for source, files in run.samples.items():
-        samples += page_samples(files, run.sources[source], settings.limits, reach)
-    for source, files in run.causes.items():
-        samples += cause_samples(files, run.sources[source], settings)
-    return samples
-
-
 def _content(folder: Path, result: Shown, run: Run, links: Links) -> dict:
     """Return one table or figure for the template."""
     from PIL import Image
@@ -193,10 +178,9 @@ def _content(folder: Path, result: Shown, run: Run, links: Links) -> dict:
 
 
 def in_groups(printed: Mapping) -> dict:
-    """Return a printed table (:meth:`gpca.reporting.tables.table.Table.printed`) with its rows in groups.
+    """Group consecutive rows of a printed table with the same first label, such as the dataset, as its ``title``.
 
-    Consecutive rows with the same first label, such as the dataset, form a group with that label as its ``title``. All
-    rows form one group without a title where groups would be small, labels come back later, or there is one label.
+    All rows form one group without a title where groups would be small, labels come back later, or there is one label.
     """
     rows, labels = printed["rows"], printed["label_columns"]
     runs = [(first, list(group)) for first, group in groupby(rows, key=lambda row: row[0][0])]
@@ -208,11 +192,7 @@ def in_groups(printed: Mapping) -> dict:
 
 
 def rendered_caption(name: str, caption: str):
-    """Return a caption, reStructuredText, as safe HTML.
-
-    Raises:
-        InputError: a fault in the caption of that table or figure.
-    """
+    """Return a caption, reStructuredText, as safe HTML."""
     from docutils.core import publish_parts
     from docutils.utils import SystemMessage
     from markupsafe import Markup
@@ -226,12 +206,7 @@ def rendered_caption(name: str, caption: str):
 
 
 class Links:
-    """Links the names in a text: pages of ``docs/``, CSV files beside the page, tables and figures on it.
-
-    Args:
-        folder: of the run.
-        results: names of its tables and figures.
-    """
+    """Links the names in a text: pages of ``docs/``, CSV files of a run's folder, tables and figures on its page."""
 
     def __init__(self, folder: Path, results: Collection[str]) -> None:
         docs = folder / DOCS
@@ -242,8 +217,7 @@ class Links:
     def in_text(self, text: str, without: str = ""):
         """Return a text as HTML: escaped, with backticks as code, and with links.
 
-        Args:
-            without: name of the table or figure that the text belongs to, which is not linked.
+        `without` names the table or figure that the text belongs to, which is not linked.
         """
         from markupsafe import Markup, escape
 

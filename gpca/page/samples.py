@@ -39,18 +39,14 @@ TRUTH = "pose:0"  # the view of the true pose
 def page_samples(files: Mapping[str, str | Path], source: Mapping, limits: Limits, reach: float) -> list[dict]:
     """Return the samples of one source by `RULE`, as JSON values for the page's 3-D view.
 
-    Each holds its ``scene`` (:func:`packed_registration`), object, concept, severity, scores with standard deviations,
-    fitness, ADD-S after ICP in % of the diameter and its state; and the uncertainty in nats with the 95th percentile of
-    clean pairs, where known.
+    The ADD-S after ICP is in % of the diameter, the uncertainty in nats, with the 95th percentile of clean pairs.
 
     Args:
         files: ``registrations`` and ``predictions`` of one source and seed, optionally ``uncertainty``.
         source: ``title``, and whether it is a ``stand_in``.
-        limits: of the states.
         reach: correspondence distance of ICP, in diameters.
 
-    Raises:
-        InputError: an unusable file, or a sample without prediction.
+    Raises InputError for an unusable file, or a sample without prediction.
     """
     registrations, predictions = Registrations.load(files["registrations"]), read_predictions(files["predictions"])
     u_S, clean = np.full(len(registrations), np.nan), np.nan
@@ -112,17 +108,14 @@ def severity_words(registrations: Registrations, row: int) -> str:
 def cause_samples(files: Mapping[str, str | Path], source: Mapping, settings: CauseSettings) -> list[dict]:
     """Return the samples of one source by `CAUSES_RULE`, as JSON values for the page's 3-D view.
 
-    Each holds its ``scene`` (:func:`packed_registration`), the object, the state and the shown registration's error;
-    in % of the diameter, the ``limit`` of failures, the share φ of each concept, and the mean error without each subset
-    of the causes.
+    In % of the diameter are the shown error, the limit of failures, the share φ of each concept, and the mean error
+    without each subset of the causes.
 
     Args:
         files: ``objects`` of the source, and ``causes`` of its first seed.
         source: ``title``, and whether it is a ``stand_in``.
-        settings: of the causes.
 
-    Raises:
-        InputError: an unusable file, or one of other settings.
+    Raises InputError for an unusable file, or one of other settings.
     """
     causes = Causes.load(files["causes"])
     rows = first_of_each_cause(causes)

@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from os.path import commonpath, relpath
 from pathlib import Path
+from typing import NamedTuple
 
 from gpca.errors import InputError
 from gpca.io.files import whole_file
@@ -51,8 +52,7 @@ class PrintedTable:
         return rows
 
 
-@dataclass(frozen=True)
-class PrintedNumber:
+class PrintedNumber(NamedTuple):
     """A number with the bounds of its interval, None where none is printed."""
 
     value: float
@@ -68,11 +68,7 @@ class PrintedNumber:
 
 
 def read_printed_table(path: Path) -> PrintedTable:
-    """Read the Markdown that :meth:`gpca.reporting.tables.table.Table.write` wrote.
-
-    Raises:
-        InputError: missing or unreadable file, or no such table in it.
-    """
+    """Read the Markdown that :meth:`gpca.reporting.tables.table.Table.write` wrote; an InputError for another file."""
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as fault:
@@ -128,9 +124,6 @@ def compare_tables(folders: Folders, titles: Mapping[str, str]) -> tuple[list[Tw
 
     Args:
         titles: of the tables, in the order of the page.
-
-    Raises:
-        InputError: a folder without tables, or an invalid table.
     """
     files = [{path.stem: path for path in folder.glob("tables/*.md")} for folder in folders]
     for folder, paths in zip(folders, files, strict=True):
@@ -162,12 +155,12 @@ def _shared(files: Sequence[Mapping[str, Path]], titles: Mapping[str, str]) -> l
 def _cell(one: str, other: str) -> dict[str, str]:
     if one == other:
         return {"one": one, "other": "", "difference": "", "kind": SAME}
-    cell = {"one": one, "other": other, "difference": "", "kind": DIFFERENT if one and other else ALONE}
     first, second = read_number(one), read_number(other)
     if first is None or second is None:
-        return cell
+        return {"one": one, "other": other, "difference": "", "kind": DIFFERENT if one and other else ALONE}
     difference = f"{second.value - first.value:+z.{max(first.decimals, second.decimals)}f}"
-    return cell | {"difference": difference, "kind": APART if first.is_apart(second) else DIFFERENT}
+    kind = APART if first.is_apart(second) else DIFFERENT
+    return {"one": one, "other": other, "difference": difference, "kind": kind}
 
 
 def write_comparison(
@@ -184,21 +177,29 @@ def write_comparison(
     if names[0] == names[1]:
         names = [relpath(each, commonpath(paths)) for each in paths]
     figures = [{figure.stem: figure for figure in folder.glob("figures/*.png")} for folder in folders]
-    one, other = figures
+    facts, sections, numbers = zip(*map(_recorded, folders), strict=True)
+    kinds = {kind: [", ".join(values.get(kind, ["–"])) for values in facts] for kind in {**facts[0], **facts[1]}}
+    judged = [key for key in numbers[0] if key in numbers[1]]
     text = render(
         "compare.html.jinja",
         names=names,
-        facts=_facts(folders),
-        sections=_differing_sections(folders),
-        verdicts=_verdicts(folders),
+        facts=[(kind, *values) for kind, values in kinds.items() if kind != CONFIG and values[0] != values[1]],
+        sections=sorted(
+            name for name in {**sections[0], **sections[1]} if sections[0].get(name) != sections[1].get(name)
+        ),
+        verdicts=[
+            {**numbers[0][key], "one": numbers[0][key], "other": numbers[1][key]}
+            for key in judged
+            if numbers[0][key]["verdict"] != numbers[1][key]["verdict"]
+        ],
         tables=tables,
         alone=alone,
         figures=[
             {
                 "name": name,
                 "title": titles.get(name, name),
-                "same": one[name].read_bytes() == other[name].read_bytes(),
-                "paths": [relpath(figure.resolve(), path.parent.resolve()) for figure in (one[name], other[name])],
+                "same": figures[0][name].read_bytes() == figures[1][name].read_bytes(),
+                "paths": [relpath(each[name].resolve(), path.parent.resolve()) for each in figures],
             }
             for name in _shared(figures, titles)
         ],
@@ -207,42 +208,15 @@ def write_comparison(
         partial.write_text(text, encoding="utf-8")
 
 
-def _recorded(folder: Path) -> list[Path]:
-    """Return the files whose records say how a run was made."""
-    return sorted([*folder.glob("tables/*.csv"), *folder.glob("*.csv")])
-
-
-def _facts(folders: Folders) -> list[tuple[str, str, str]]:
-    """Return the differing kinds of recorded facts, with the values of either run."""
-    one, other = (read_provenance(_recorded(folder)) for folder in folders)
-    kinds = [kind for kind in dict.fromkeys([*one, *other]) if kind != CONFIG]
-    lines = [(kind, ", ".join(one.get(kind, ["–"])), ", ".join(other.get(kind, ["–"]))) for kind in kinds]
-    return [line for line in lines if line[1] != line[2]]
-
-
-def _differing_sections(folders: Folders) -> list[str]:
-    """Return the sections of the config that differ, among those that files were made from."""
-    one: dict[str, set[str]] = {}
-    other: dict[str, set[str]] = {}
-    for folder, hashes in zip(folders, (one, other), strict=True):
-        for path in _recorded(folder):
-            record = path.with_name(f"{path.name}.provenance.json")
-            sections = json.loads(record.read_text(encoding="utf-8"))["config_sha256"] if record.is_file() else None
-            for section, digest in (sections or {}).items():
-                hashes.setdefault(section, set()).add(digest)
-    return sorted(section for section in one.keys() | other if one.get(section) != other.get(section))
-
-
-def _verdicts(folders: Folders) -> list[dict]:
-    """Return the printed numbers whose verdicts differ, where both runs were compared with the paper."""
-    one: dict[tuple[str, ...], dict] = {}
-    other: dict[tuple[str, ...], dict] = {}
-    for folder, rows in zip(folders, (one, other), strict=True):
-        compared = page_comparison(folder / "comparison.csv")
-        for table in compared["tables"] if compared else ():
-            rows |= {number_of(row): row for row in table["rows"]}
-    return [
-        {name: row[name] for name in ("table", "row", "column", "published")} | {"one": row, "other": other[key]}
-        for key, row in one.items()
-        if key in other and row["verdict"] != other[key]["verdict"]
-    ]
+def _recorded(folder: Path) -> tuple[dict[str, dict[str, int]], dict[str, set[str]], dict[tuple[str, ...], dict]]:
+    """Return the recorded facts of a run, hashes of the config's sections, and numbers compared with the paper's."""
+    files = sorted([*folder.glob("tables/*.csv"), *folder.glob("*.csv")])
+    hashes: dict[str, set[str]] = {}
+    for path in files:
+        record = path.with_name(f"{path.name}.provenance.json")
+        sections = json.loads(record.read_text(encoding="utf-8"))["config_sha256"] if record.is_file() else None
+        for section, digest in (sections or {}).items():
+            hashes.setdefault(section, set()).add(digest)
+    compared = page_comparison(folder / "comparison.csv")
+    rows = [row for table in (compared["tables"] if compared else ()) for row in table["rows"]]
+    return read_provenance(files), hashes, {number_of(row): row for row in rows}

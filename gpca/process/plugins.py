@@ -41,11 +41,7 @@ _INSTALLED = tuple(Path(sysconfig.get_path(name)).resolve() for name in ("pureli
 
 
 def use(plugins: Sequence[str]) -> None:
-    """Use files (``my_module.py``, relative to the working directory) and modules, here and in all jobs.
-
-    Raises:
-        InputError: no list of names; a file or module that is missing, cannot be imported or lists nothing.
-    """
+    """Use files (``my_module.py``, relative to the working directory) and modules, here and in all jobs."""
     if not isinstance(plugins, list | tuple) or not all(isinstance(name, str) and name for name in plugins):
         raise InputError(f"{plugins!r}", "is not a list of files or modules", "give one: [my_module.py]")
     for name in plugins:
@@ -67,9 +63,6 @@ def entries_outside(variable: str, kind: str, of: type, taken: Iterable[str]) ->
         kind: name of an entry in messages.
         of: type of an entry.
         taken: names of the suite's entries.
-
-    Raises:
-        InputError: a variable that is no mapping, an entry of another type, or a name that is taken.
     """
     group = next(group for group, variables in GROUPS.items() if variable in variables)
     names, outside = set(taken), {}
@@ -106,11 +99,7 @@ def is_outside(module: str) -> bool:
 
 
 def load(name: str) -> ModuleType:
-    """Import a file by its path, or a module that is installed or below the working directory.
-
-    Raises:
-        InputError: missing, a file with the name of another module, or a fault within it.
-    """
+    """Import a file by its path, or a module that is installed or below the working directory."""
     if not name.endswith(".py"):
         _extend_path(Path.cwd())
         module = _imported(name, name)

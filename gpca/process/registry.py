@@ -38,11 +38,7 @@ class Registry(Generic[Entry]):
         return {name: entry for entries in self.by_module().values() for name, entry in entries.items()}
 
     def entry(self, name: str) -> Entry:
-        """Return the entry of that name.
-
-        Raises:
-            InputError: an unknown name.
-        """
+        """Return the entry of that name."""
         entries = self.entries()
         require_known(self.kind, name, entries)
         return entries[name]
@@ -53,11 +49,7 @@ class Registry(Generic[Entry]):
         return next(module for module, entries in self.by_module().items() if name in entries)
 
     def by_module(self) -> dict[str, dict[str, Entry]]:
-        """Return the entries of each module.
-
-        Raises:
-            InputError: an unusable plugin (:mod:`gpca.process.plugins`).
-        """
+        """Return the entries of each module."""
         files = pkgutil.iter_modules(import_module(self._folder).__path__)
         names = sorted(f"{self._folder}.{file.name}" for file in files)
         by_module = {name: getattr(import_module(name), self._variable, {}) for name in (*self._first, *names)}
