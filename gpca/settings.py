@@ -131,8 +131,6 @@ def read_settings(kind: type[T], settings: Mapping[str, Any], subject: str = "se
     """Return an instance of a settings class from a section of a config.
 
     Args:
-        kind: the class, or another type that pydantic knows.
-        settings: text, numbers, booleans, None, lists and mappings.
         subject: precedes the name of a key in messages.
     """
     from pydantic import ValidationError

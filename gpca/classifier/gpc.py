@@ -45,7 +45,6 @@ class GPC:
         """Maximize the ELBO (variational parameters, inducing inputs, covariance parameters).
 
         Args:
-            h_N_d, labels_N: labeled embeddings.
             around_R_d: embeddings that determine the standardization and the start of inducing inputs and lengthscale;
                 by default the labeled ones.
         """

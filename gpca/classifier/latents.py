@@ -98,7 +98,6 @@ def refine(
     E_q[p_c (1 - p_c)] and mean gradient E_q[1{y = c} - p_c]. It converges in some ten steps without a tuned rate.
 
     Args:
-        projection, targets_N: the N labeled inputs and the indices of their classes.
         sites: the start; those of an earlier call, extended, continue from its result.
         iterations, tolerance: maximum number of steps, and change of a probability at which they end.
 

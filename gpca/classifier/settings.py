@@ -17,17 +17,14 @@ class GPCSettings:
     """Settings of the classifier and its fit; the defaults are the paper's.
 
     Attributes:
-        kernel: ``rbf``, ``matern32`` or ``polynomial`` (of degree 2).
         learning_rate, iterations: of Adam, on the ELBO of the whole training set.
-        inducing: number of shared inducing inputs N_Z.
-        draws: M, posterior draws per explanation.
     """
 
-    kernel: Kernel = "rbf"
+    kernel: Kernel = "rbf"  # ``rbf``, ``matern32`` or ``polynomial`` (of degree 2)
     learning_rate: LearningRate = 0.01
     iterations: Count = 100
-    inducing: Count = 64
-    draws: Draws = 1000
+    inducing: Count = 64  # number of shared inducing inputs N_Z
+    draws: Draws = 1000  # M, posterior draws per explanation
 
 
 GPCArguments = Annotated[Any, ArgumentsOf(GPCSettings)]  # keyword arguments passed on to it

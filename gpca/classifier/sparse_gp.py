@@ -110,9 +110,7 @@ class SparseGPs(nn.Module):
     """C independent GPs with shared inducing inputs, separate covariances and whitened posteriors N(mean, R Rᵀ).
 
     Args:
-        covariance: of batch shape (C,).
         inducing_M_d: initial inducing inputs, which are learned too.
-        random: draws the initial mean and the samples of the likelihood.
     """
 
     def __init__(self, covariance: gpytorch.kernels.ScaleKernel, inducing_M_d: Tensor, random: torch.Generator) -> None:
@@ -274,13 +272,11 @@ class Start:
     Attributes:
         covariance: its lengthscale is the median distance; with gpytorch's default, an RBF kernel on some hundred
             dimensions stays at chance.
-        inducing_M_d: k-means centers of the standardized inputs, at most as many as there are distinct inputs.
-        seed: of the initial variational mean and the samples of the likelihood.
     """
 
     covariance: gpytorch.kernels.ScaleKernel
-    inducing_M_d: Tensor
-    seed: int
+    inducing_M_d: Tensor  # k-means centers of the standardized inputs, at most as many as there are distinct inputs
+    seed: int  # of the initial variational mean and the samples of the likelihood
 
     @classmethod
     def of(cls, inputs_N_d: Tensor, n_classes: int, settings: GPCSettings, axes: tuple) -> Start:

@@ -73,11 +73,7 @@ class Source(NamedTuple):
 
 
 def _sources(model: Path, record: Mapping, title: str) -> Iterator[Source]:
-    """Yield the training objects of a model, read from ``objects/`` of its run, in the order of the record.
-
-    Args:
-        title: title of the depth frames, which the provenance of a dataset's objects does not name.
-    """
+    """Yield the training objects of a model, read from ``objects/`` of its run, in the order of the record."""
     files = [match.groups() for path in record["inputs_sha256"] if (match := _TRAINING_FILE.search(f"/{path}"))]
     if not files:
         raise InputError(_record_path(model), "lists nothing that a model learns from", REMEDY)
@@ -132,8 +128,6 @@ def card(
     """Return the card in Markdown; equal inputs give equal text.
 
     Args:
-        name, content: of the shipped file.
-        record: its provenance.
         scores: :func:`gpca.experiments.diagnosis.collect` of the run: values with intervals.
     """
     diagnoser, code = model.diagnoser, record["code"]

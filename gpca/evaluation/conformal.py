@@ -30,8 +30,6 @@ def upper_bound(value_N: np.ndarray, level: float, family_N: np.ndarray | None =
     arbitrary, has the same weight (hierarchical conformal prediction, Lee, Barber and Willett 2023).
 
     Args:
-        value_N: calibration values.
-        level: in (0, 1).
         family_N: family of each sample; None if samples are exchangeable one by one.
 
     Returns:
@@ -75,17 +73,13 @@ class StateSets:
     """Sets of states with limits on their nonconformity.
 
     Attributes:
-        states: names of the K columns of scores.
-        level: probability that a set contains the true state.
-        nonconformity: see :func:`nonconformity`.
-        by_state: whether the level holds for each state separately (Mondrian) instead of on average.
         limits: (K,) largest nonconformity of each state in a set; infinity if there were too few samples.
     """
 
-    states: tuple[str, ...]
-    level: float
-    nonconformity: Nonconformity
-    by_state: bool
+    states: tuple[str, ...]  # names of the K columns of scores
+    level: float  # probability that a set contains the true state
+    nonconformity: Nonconformity  # see :func:`nonconformity`
+    by_state: bool  # whether the level holds for each state separately (Mondrian) instead of on average
     limits: tuple[float, ...]
 
     def of(self, scores_M_K: np.ndarray) -> np.ndarray:
@@ -121,13 +115,7 @@ def calibrate_sets(
     kind: Nonconformity = PROBABILITY,
     by_state: bool = False,
 ) -> StateSets:
-    """Calibrate sets that contain the true state of a new sample with a probability of at least `level`.
-
-    Args:
-        scores_N_K: scores of samples that were not used for training.
-        state_N: their true states.
-        family_N: see :func:`upper_bound`.
-    """
+    """Calibrate sets that contain the true state of a new sample with a probability of at least `level`."""
     require_share("level of the sets", level)
     require_scores(scores_N_K, states)
     is_state_N_K = np.asarray(state_N)[:, None] == np.array(states)
@@ -145,19 +133,16 @@ class FailureAlarm:
     """An alarm with two thresholds; between them, it is not sure.
 
     Attributes:
-        missed: largest probability that a failed registration is called good.
-        false_alarms: largest probability that a good one is called failed.
         good_below: score of failure below which a registration is called good; negative infinity if there were too few
             failed samples.
-        failed_from: score from which it is called failed; infinity if there were too few good samples.
         confidence: confidence with which both risks hold for these thresholds; None if they hold on average over draws
             of the calibration samples.
     """
 
-    missed: float
-    false_alarms: float
+    missed: float  # largest probability that a failed registration is called good
+    false_alarms: float  # largest probability that a good one is called failed
     good_below: float
-    failed_from: float
+    failed_from: float  # score from which it is called failed; infinity if there were too few good samples
     confidence: float | None = None
 
     def of(self, failure_M: np.ndarray) -> np.ndarray:
@@ -182,8 +167,6 @@ def calibrate_alarm(
 
     Args:
         failure_N: score of failure of samples that were not used for training.
-        failed_N: whether each failed.
-        family_N: see :func:`upper_bound`.
         confidence: use :func:`confident_upper_bound` instead.
     """
     require_share("risk of missed failures", missed)

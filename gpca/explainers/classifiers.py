@@ -19,7 +19,6 @@ class ConceptClassifier:
 
     Args:
         classifier: an unfitted scikit-learn classifier or pipeline with ``predict_proba``.
-        labels: (C,) those of the columns.
     """
 
     def __init__(self, classifier, labels: tuple[str, ...] = CONCEPTS) -> None:
@@ -77,20 +76,13 @@ class BoostedQuestion:
     """Boosted trees for a binary question, fitted by scikit-learn but evaluated without loading it.
 
     Nodes of all trees are concatenated; a node's left child is the next node.
-
-    Attributes:
-        baseline: log odds before any tree.
-        roots: (T,) root node of each tree.
-        feature: (n,) compared feature; `LEAF` at a leaf.
-        number: (n,) threshold, at or below which the left child follows; log odds at a leaf.
-        right: (n,) right child; a leaf itself at a leaf.
     """
 
-    baseline: float
-    roots: np.ndarray
-    feature: np.ndarray
-    number: np.ndarray
-    right: np.ndarray
+    baseline: float  # log odds before any tree
+    roots: np.ndarray  # (T,) root node of each tree
+    feature: np.ndarray  # (n,) compared feature; `LEAF` at a leaf
+    number: np.ndarray  # (n,) threshold, at or below which the left child follows; log odds at a leaf
+    right: np.ndarray  # (n,) right child; a leaf itself at a leaf
 
     @classmethod
     def fit(cls, inputs_N_F: np.ndarray, yes_N: np.ndarray, *axes: object) -> BoostedQuestion:

@@ -153,21 +153,17 @@ class ExplainerEntry:
     """An explainer by name.
 
     Attributes:
-        title: its name in tables.
-        make: makes it from source, seed and the settings of the config.
-        sees: all that its answer depends on, of :data:`PARTS`; may be empty.
         reads: what it needs attached: ``embeddings`` of the encoder, ``uncertainty/<design>`` outcomes of a design
             (:mod:`gpca.uncertainty.designs`), or ``registrations``: nothing.
-        observed_only: of a design's outcomes it reads the first alone, that of the observed pair.
         oracle: whether it knows the truth about what it explains: an upper bound, which its title has to say.
     """
 
-    title: str
-    make: Callable[..., ConceptExplainer]
-    sees: Sees
+    title: str  # its name in tables
+    make: Callable[..., ConceptExplainer]  # makes it from source, seed and the settings of the config
+    sees: Sees  # all that its answer depends on, of :data:`PARTS`; may be empty
     reads: str = BARE
     oracle: bool = False
-    observed_only: bool = False
+    observed_only: bool = False  # of a design's outcomes it reads the first alone, that of the observed pair
 
     def __post_init__(self) -> None:
         if not isinstance(self.sees, tuple) or not set(self.sees) <= set(PARTS):
@@ -194,8 +190,6 @@ def icp_calls(sees: Collection[str], starts: int, descriptors: DescriptorSetting
     """Return the number of ICP runs that an explainer of causes needs beyond the explained one.
 
     Args:
-        starts: of each registration, including the observed one.
-        descriptors: settings of the registrations with remedies.
         reenactment: maximum number of runs of a re-enactment.
     """
     further = starts - 1 if "runs" in sees else 0

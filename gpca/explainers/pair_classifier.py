@@ -68,27 +68,18 @@ class NormalizedFeatures:
 
 @dataclass(frozen=True)
 class Judgment:
-    """The probabilities of N pairs.
+    """The probabilities of N pairs."""
 
-    Attributes:
-        failure_N: probability that the registration failed.
-        causes_N_3: probability that each concept is one of the causes.
-        causes_variances_N_3: their variances over the posterior draws (Eq. 5).
-        bald_N: the largest BALD of the four classifiers, nats (Eq. 7).
-    """
-
-    failure_N: np.ndarray
-    causes_N_3: np.ndarray
-    causes_variances_N_3: np.ndarray
-    bald_N: np.ndarray
+    failure_N: np.ndarray  # probability that the registration failed
+    causes_N_3: np.ndarray  # probability that each concept is one of the causes
+    causes_variances_N_3: np.ndarray  # their variances over the posterior draws (Eq. 5).
+    bald_N: np.ndarray  # the largest BALD of the four classifiers, nats (Eq. 7).
 
 
 class PairClassifier:
     """Independent binary Gaussian processes: one for failure, and one for each cause.
 
     Args:
-        settings: of each classifier.
-        axes: name the random numbers.
         trees: whether boosted trees are averaged with them.
     """
 

@@ -21,11 +21,10 @@ class Rival:
     """One explainer.
 
     Attributes:
-        make: returns a new one at every call.
         reads, observed_only: what it needs attached, as in :class:`gpca.explainers.interface.ExplainerEntry`.
     """
 
-    make: Callable[[], ConceptExplainer]
+    make: Callable[[], ConceptExplainer]  # returns a new one at every call
     reads: str
     observed_only: bool = False
 

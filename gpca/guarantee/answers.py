@@ -45,18 +45,15 @@ class GuaranteeSettings:
     """What is guaranteed.
 
     Attributes:
-        level: probability that a set holds the true state.
         missed, false_alarms: largest probabilities that a failed registration is called good, and a good one failed.
-        family_risk: both for calibration by family; there are too few families for a smaller one.
-        confidence: with which both hold for the thresholds themselves, in a row of its own.
         nonconformity: score of how badly a state fits (:func:`gpca.evaluation.conformal.nonconformity`).
     """
 
-    level: OpenShare = 0.9
+    level: OpenShare = 0.9  # probability that a set holds the true state
     missed: OpenShare = 0.05
     false_alarms: OpenShare = 0.05
-    family_risk: OpenShare = 0.1
-    confidence: OpenShare = 0.9
+    family_risk: OpenShare = 0.1  # both for calibration by family; there are too few families for a smaller one
+    confidence: OpenShare = 0.9  # with which both hold for the thresholds themselves, in a row of its own
     nonconformity: Literal["probability", "cumulative"] = "probability"
 
 
@@ -65,26 +62,19 @@ class Scored:
     """N scored samples: a sample occurs once for each model that scored it. Borderline samples are left out.
 
     Attributes:
-        model: (N,) name of the model. Scores of different models are never mixed.
         source, seed, sample: (N,) the sample.
-        family: (N,) of shapes, or the scene of a depth frame.
-        state: (N,) the true one, of :data:`gpca.guarantee.guarantee.STATES`.
-        seen: (N,) the model was trained on this sample.
-        severity: (N,) of its perturbations, as a share of the largest in any sample.
-        weight: (N,) of the sample in means.
-        scores: (N, 4) of nominal and of the causes.
     """
 
-    model: np.ndarray
+    model: np.ndarray  # (N,) name of the model. Scores of different models are never mixed.
     source: np.ndarray
     seed: np.ndarray
     sample: np.ndarray
-    family: np.ndarray
-    state: np.ndarray
-    seen: np.ndarray
-    severity: np.ndarray
-    weight: np.ndarray
-    scores: np.ndarray
+    family: np.ndarray  # (N,) of shapes, or the scene of a depth frame
+    state: np.ndarray  # (N,) the true one, of :data:`gpca.guarantee.guarantee.STATES`
+    seen: np.ndarray  # (N,) the model was trained on this sample
+    severity: np.ndarray  # (N,) of its perturbations, as a share of the largest in any sample
+    weight: np.ndarray  # (N,) of the sample in means
+    scores: np.ndarray  # (N, 4) of nominal and of the causes
 
     def __len__(self) -> int:
         return len(self.model)
@@ -138,19 +128,12 @@ class Condition(NamedTuple):
 
 @dataclass(frozen=True)
 class Answers:
-    """Sets and calls for A tested rows.
+    """Sets and calls for A tested rows."""
 
-    Attributes:
-        row: (A,) numbers of the rows.
-        sets: variant -> (A, 5) which states are in the set.
-        calls: variant -> (A,) of :data:`gpca.evaluation.conformal.OUTCOMES`.
-        families: the smallest number of families that any was calibrated on.
-    """
-
-    row: np.ndarray
-    sets: dict[str, np.ndarray]
-    calls: dict[str, np.ndarray]
-    families: int
+    row: np.ndarray  # (A,) numbers of the rows
+    sets: dict[str, np.ndarray]  # variant -> (A, 5) which states are in the set
+    calls: dict[str, np.ndarray]  # variant -> (A,) of :data:`gpca.evaluation.conformal.OUTCOMES`
+    families: int  # the smallest number of families that any was calibrated on
 
 
 def conditions(scored: Scored) -> list[Condition]:

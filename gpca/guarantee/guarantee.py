@@ -95,10 +95,7 @@ def calibrate(
         scores_N_K: scores of the states, as :func:`gpca.guarantee.guarantee.state_scores` returns them. The score of
             failure is 1 minus that of the first state, nominal.
         state_N: true states; ``borderline`` samples are left out.
-        family_N: family of each sample, or None.
-        level: probability that a set contains the true state.
         missed, false_alarms, confidence: see :func:`gpca.evaluation.conformal.calibrate_alarm`.
-        nonconformity, by_state: see :class:`gpca.evaluation.conformal.StateSets`.
     """
     state_N = np.asarray(state_N)
     if len(state_N) != len(scores_N_K) or (family_N is not None and len(family_N) != len(state_N)):

@@ -58,9 +58,6 @@ def require_format(path: Path) -> None:
 def read_points(path: Path, unit: str) -> tuple[np.ndarray, CanonicalFrame]:
     """Read a cloud, or sample a mesh.
 
-    Args:
-        unit: the file's: ``m``, ``cm`` or ``mm``.
-
     Returns:
         Points (N, 3) in that unit, and their canonical frame.
     """
@@ -124,19 +121,15 @@ class Clouds:
     """The two clouds of a registration, and its ICP.
 
     Attributes:
-        seen: (N, 3) the given source, thinned.
-        T_target_source_init: initial pose of ICP, in the user's unit.
-        frame: canonical frame of the target.
         source, target: (N, 3) and (P, 3) in that frame, the source at its initial pose.
-        icp: ICP to that target.
     """
 
-    seen: np.ndarray
-    T_target_source_init: np.ndarray
-    frame: CanonicalFrame
+    seen: np.ndarray  # (N, 3) the given source, thinned
+    T_target_source_init: np.ndarray  # initial pose of ICP, in the user's unit
+    frame: CanonicalFrame  # canonical frame of the target
     source: np.ndarray
     target: np.ndarray
-    icp: BatchedICP
+    icp: BatchedICP  # ICP to that target
 
     @classmethod
     def prepared(
@@ -153,8 +146,6 @@ class Clouds:
         """Check a user's clouds and bring them into the target's frame; see :meth:`gpca.Explainer.explain`.
 
         Args:
-            cloud_points: maximum number of points per cloud.
-            settings: of ICP.
             notes: receives a note on each cloud that was thinned.
         """
         from gpca.alignment.batched_icp import BatchedICP
@@ -231,11 +222,7 @@ class Familiarity:
 
     @classmethod
     def of(cls, pairs: Iterable[tuple[np.ndarray, np.ndarray]]) -> Familiarity:
-        """Measure the training samples.
-
-        Args:
-            pairs: source and target of each, in diameters.
-        """
+        """Measure the training samples."""
         measured = [measure(*pair) for pair in pairs]
         ends = ((1 - SHARE) / 2, (1 + SHARE) / 2)
         ranges = {}
@@ -280,9 +267,7 @@ def voids_of(source: np.ndarray, target: np.ndarray, fitness: float, familiar: F
     """Return the faults that leave an explanation without meaning, if any.
 
     Args:
-        source, target: (N, 3) and (M, 3) in diameters of the target.
         fitness: share of source points with a correspondence at the result.
-        familiar: ranges of the training clouds, if the model has them.
     """
     voids = []
     if (matches := round(fitness * len(source))) < FEWEST_MATCHES:

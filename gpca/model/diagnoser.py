@@ -175,23 +175,14 @@ class Diagnoser:
 
 @dataclass(frozen=True)
 class TrainingSet:
-    """N registrations with measured causes.
+    """N registrations with measured causes."""
 
-    Attributes:
-        features_N_F: :func:`gpca.reenactment.dataset.reenactment_features`.
-        label_N: nominal, a dominant cause, or borderline.
-        state_N: the label, but ``several`` for failures with several causes.
-        causes_N_3: whether each concept is a cause.
-        error_N: mean over the starts, diameters.
-        family_N: family of the shape.
-    """
-
-    features_N_F: np.ndarray
-    label_N: np.ndarray
-    state_N: np.ndarray
-    causes_N_3: np.ndarray
-    error_N: np.ndarray
-    family_N: np.ndarray
+    features_N_F: np.ndarray  # :func:`gpca.reenactment.dataset.reenactment_features`
+    label_N: np.ndarray  # nominal, a dominant cause, or borderline
+    state_N: np.ndarray  # the label, but ``several`` for failures with several causes
+    causes_N_3: np.ndarray  # whether each concept is a cause
+    error_N: np.ndarray  # mean over the starts, diameters
+    family_N: np.ndarray  # family of the shape
 
     @classmethod
     def of(cls, causes: Causes, reenactments: Reenactments) -> TrainingSet:

@@ -46,19 +46,15 @@ class Guaranteed:
     """Guarantees for one registration (:mod:`gpca.guarantee`).
 
     Attributes:
-        states: possible states of the registration.
-        level: probability that they contain the true one.
-        call: good, not sure or failed.
         missed, false_alarms: largest probability that a failure is called good, and a good registration failed.
-        families: number of families of shapes used for calibration; 0 if samples were exchangeable one by one.
     """
 
-    states: tuple[str, ...]
-    level: float
-    call: str
+    states: tuple[str, ...]  # possible states of the registration
+    level: float  # probability that they contain the true one
+    call: str  # good, not sure or failed
     missed: float
     false_alarms: float
-    families: int
+    families: int  # number of families of shapes used for calibration; 0 if samples were exchangeable one by one
 
     @classmethod
     def of(cls, guarantee: Guarantee, scores_1_K: np.ndarray) -> Guaranteed:
@@ -104,27 +100,16 @@ def state_probabilities(judged: Judgment) -> np.ndarray:
 
 @dataclass(frozen=True)
 class FittingPose:
-    """A hypothesis of the true pose.
+    """A hypothesis of the true pose."""
 
-    Attributes:
-        probability: among all hypotheses.
-        T_target_source: (4, 4); inside the canonical frame, relative to the initial pose.
-        registered: whether it equals the registration's result, up to the resolution of hypotheses.
-        apart: mean distance between the target's surface at this pose and at the result.
-        turn_deg: smallest rotation from the result, up to the target's symmetry.
-        axis: (3,) unit vector of that rotation in the target's frame.
-        shift: distance of the target's center from its place at the result.
-        error: v̂, mean error of re-enacted registrations if this pose is true.
-    """
-
-    probability: float
-    T_target_source: np.ndarray
-    registered: bool
-    apart: float
-    turn_deg: float
-    axis: tuple[float, ...]
-    shift: float
-    error: float
+    probability: float  # among all hypotheses
+    T_target_source: np.ndarray  # (4, 4); inside the canonical frame, relative to the initial pose
+    registered: bool  # whether it equals the registration's result, up to the resolution of hypotheses
+    apart: float  # mean distance between the target's surface at this pose and at the result
+    turn_deg: float  # smallest rotation from the result, up to the target's symmetry
+    axis: tuple[float, ...]  # (3,) unit vector of that rotation in the target's frame
+    shift: float  # distance of the target's center from its place at the result
+    error: float  # v̂, mean error of re-enacted registrations if this pose is true
 
     @classmethod
     def of(cls, enactment: Enactment, probability: float, T_result: np.ndarray, surface: ModelSurface) -> FittingPose:
@@ -173,19 +158,16 @@ class Reenacted:
     Lengths are in diameters, and poses in the target's canonical frame, until :meth:`outside` converts them.
 
     Attributes:
-        error: v̂ with all causes, the mean over the hypotheses.
-        effects: φ̂, the contribution of each cause to that error.
         noise, outliers, missing: standard deviation of the noise per axis, share of outliers, and share of the target
             that was not observed, under the most probable hypothesis.
-        poses: the hypotheses, most probable first.
     """
 
-    error: float
-    effects: dict[str, float]
+    error: float  # v̂ with all causes, the mean over the hypotheses
+    effects: dict[str, float]  # φ̂, the contribution of each cause to that error
     noise: float
     outliers: float
     missing: float
-    poses: tuple[FittingPose, ...]
+    poses: tuple[FittingPose, ...]  # the hypotheses, most probable first
 
     @classmethod
     def of(
@@ -257,31 +239,18 @@ class Reenacted:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """The diagnosis of one registration.
+    """The diagnosis of one registration."""
 
-    Attributes:
-        failure: probability of a failure.
-        threshold: probability from which the state is failed.
-        causes: probability of each concept to be a cause, given a failure.
-        variances: their variances over the posterior draws (Eq. 5).
-        bald: largest BALD among the questions, nats (Eq. 7).
-        expected_error: expected error of the pose: ADD, or ADD-S of a symmetric object.
-        unlikeness: distance to the training samples, scaled so that 1 % of them exceed 1.
-        void: whether the pair is such that no number here means anything (:mod:`gpca.model.clouds`).
-        guarantee: set of states and alarm; None in fast diagnoses.
-        reenacted: the counterfactuals.
-    """
-
-    failure: float
-    threshold: float
-    causes: dict[str, float]
-    variances: dict[str, float]
-    bald: float
-    expected_error: float
-    unlikeness: float
-    void: bool
-    guarantee: Guaranteed | None
-    reenacted: Reenacted
+    failure: float  # probability of a failure
+    threshold: float  # probability from which the state is failed
+    causes: dict[str, float]  # probability of each concept to be a cause, given a failure
+    variances: dict[str, float]  # their variances over the posterior draws (Eq. 5).
+    bald: float  # largest BALD among the questions, nats (Eq. 7).
+    expected_error: float  # expected error of the pose: ADD, or ADD-S of a symmetric object
+    unlikeness: float  # distance to the training samples, scaled so that 1 % of them exceed 1
+    void: bool  # whether the pair is such that no number here means anything (:mod:`gpca.model.clouds`)
+    guarantee: Guaranteed | None  # set of states and alarm; None in fast diagnoses
+    reenacted: Reenacted  # the counterfactuals
 
     @property
     def state(self) -> str:

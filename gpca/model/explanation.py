@@ -140,11 +140,7 @@ class Explanation(Page):
         return _plain(self) | {"diagnosis": self.diagnosis and self.diagnosis.as_dict(), "spread": spread}
 
     def html(self, names: Mapping[str, str] | None = None) -> str:
-        """Return a page that needs no other file: both clouds in 3-D, causes, poses, counterfactuals.
-
-        Args:
-            names: names of the files and the model, for the page's details.
-        """
+        """Return a page that needs no other file: both clouds in 3-D, causes, poses, counterfactuals."""
         scene, explained = self.scene, self.as_dict()
         if scene is not None and self.unknown:
             scene = replace(scene, enact=None)  # hypotheses mean nothing where scores mean nothing

@@ -36,7 +36,6 @@ def draw_explanation(explanation: Explanation, png_path: str | Path, names: str 
 
     Args:
         explanation: with its scene, as :meth:`gpca.model.explainer.Explainer.explain` returns it.
-        names: of the files, for the title.
     """
     if (scene := explanation.scene) is None:
         raise ValueError("an explanation that came as one of many has no clouds to draw")

@@ -57,29 +57,20 @@ class Model:
     """A diagnoser of registrations and the paper's GP-CA.
 
     Attributes:
-        diagnoser: reads the pair after ICP, trained on measured causes of all sources.
-        encoder: maps clouds (B, N, 3) to embeddings (B, d); in evaluation mode.
-        encoder_settings: number of points per draw and of draws per embedding, among others.
-        gpc: the classifier; its classes are the concepts.
-        icp: settings of ICP.
-        cloud_points: maximum number of points of source and target.
-        policy: maps causes to actions.
         title, stand_in: training objects of GP-CA, and whether the package generated them.
-        familiar: ranges of simple measures over GP-CA's training clouds.
-        learned_from: titles of the training objects of the diagnosis; empty if unknown.
     """
 
-    diagnoser: Diagnoser
-    encoder: nn.Module
-    encoder_settings: EncoderSettings
-    gpc: GPC
-    icp: ICPSettings
-    cloud_points: int
-    policy: RecoveryPolicy
+    diagnoser: Diagnoser  # reads the pair after ICP, trained on measured causes of all sources
+    encoder: nn.Module  # maps clouds (B, N, 3) to embeddings (B, d); in evaluation mode
+    encoder_settings: EncoderSettings  # number of points per draw and of draws per embedding, among others
+    gpc: GPC  # the classifier; its classes are the concepts
+    icp: ICPSettings  # settings of ICP
+    cloud_points: int  # maximum number of points of source and target
+    policy: RecoveryPolicy  # maps causes to actions
     title: str
     stand_in: bool
-    familiar: Familiarity
-    learned_from: tuple[str, ...] = ()
+    familiar: Familiarity  # ranges of simple measures over GP-CA's training clouds
+    learned_from: tuple[str, ...] = ()  # titles of the training objects of the diagnosis; empty if unknown
 
     @property
     def learning(self) -> str:

@@ -174,11 +174,7 @@ def failure_of(scans: Scans, enactments: Sequence[Enactment], T_found: np.ndarra
 
 
 def decision(state: str, reenacted: Reenacted, overlap: float) -> tuple[str, str]:
-    """Return what to do next, and why.
-
-    Args:
-        overlap: share of the source that lies on the target.
-    """
+    """Return what to do next, and why."""
     if state == NOMINAL:
         return NOTHING, "the scans lie close to each other, and no other pose fits as well"
     if overlap == 0:

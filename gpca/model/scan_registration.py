@@ -39,9 +39,6 @@ def voxel_size(clouds: Mapping[str, np.ndarray], unit: str) -> float:
     """Choose the edge of the voxels for scans (N, 3), in their unit.
 
     It is at least twice the larger median distance between neighbors, and leaves at most `MOST_VOXELS` points per scan.
-
-    Args:
-        clouds: by their names in messages.
     """
     spacings = []
     for name, points in clouds.items():
@@ -73,17 +70,11 @@ def in_voxels(points: np.ndarray, edge: float, name: str, unit: str) -> np.ndarr
 
 @dataclass(frozen=True)
 class Scans:
-    """Two scans, one point per voxel, centered on the target and in units of its extent.
+    """Two scans, one point per voxel, centered on the target and in units of its extent."""
 
-    Attributes:
-        source: (N, 3) at its initial pose.
-        target: (M, 3).
-        voxel: edge of a voxel.
-    """
-
-    source: np.ndarray
-    target: np.ndarray
-    voxel: float
+    source: np.ndarray  # (N, 3) at its initial pose
+    target: np.ndarray  # (M, 3)
+    voxel: float  # edge of a voxel
 
     def registered(self) -> Outcome:
         """Register by point-to-plane ICP, coarse to fine."""

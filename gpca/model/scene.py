@@ -31,15 +31,12 @@ class Possibility:
     """A hypothesis of the true pose, with its re-enacted registrations in the target's frame and in its diameters.
 
     Attributes:
-        probability: among all hypotheses.
-        T: (4, 4) maps the source at its initial pose to the hypothesis.
-        errors: v̂, the mean over the starts, for each subset of the causes that is left in.
         clouds: (P, 3) the source after one registration from the unperturbed start, for each subset.
     """
 
-    probability: float
-    T: np.ndarray
-    errors: tuple[float, ...]
+    probability: float  # among all hypotheses
+    T: np.ndarray  # (4, 4) maps the source at its initial pose to the hypothesis
+    errors: tuple[float, ...]  # v̂, the mean over the starts, for each subset of the causes that is left in
     clouds: tuple[np.ndarray, ...]
 
 
@@ -48,22 +45,16 @@ class Scene:
     """A registration in the target's canonical frame and in its diameters.
 
     Attributes:
-        source: (N, 3) at its initial pose.
-        target: (M, 3).
-        T_found: (4, 4) maps the source from the initial pose to the result.
-        frame: the target's, in the user's unit.
-        reach: correspondence distance of ICP, diameters.
-        limit: error above which a registration counts as failed, diameters.
         enact: repeats the re-enactment with the same random numbers; None if there was none. It runs only when the
             scene is drawn.
     """
 
-    source: np.ndarray
-    target: np.ndarray
-    T_found: np.ndarray
-    frame: CanonicalFrame
-    reach: float
-    limit: float
+    source: np.ndarray  # (N, 3) at its initial pose
+    target: np.ndarray  # (M, 3)
+    T_found: np.ndarray  # (4, 4) maps the source from the initial pose to the result
+    frame: CanonicalFrame  # the target's, in the user's unit
+    reach: float  # correspondence distance of ICP, diameters
+    limit: float  # error above which a registration counts as failed, diameters
     enact: Callable[[], tuple[list[Enactment], CauseSettings]] | None = None
 
     @property

@@ -47,27 +47,20 @@ class Run:
     """A run with what its page needs besides its results.
 
     Attributes:
-        seeds: of its repeats.
-        sources: name -> ``{"title": str, "stand_in": bool}``.
-        results: tables and figures, in order.
         samples: source -> files of the shown registrations (:func:`gpca.page.samples.page_samples`).
         causes: source -> files of the shown failures with causes (:func:`gpca.page.samples.cause_samples`).
-        titles: of the explainers.
-        reference: ``comparison.csv`` of a run on real objects, shown where nothing of this run is judged.
-        config: the whole configuration.
-        command: that makes what is missing.
     """
 
     name: str
-    seeds: Sequence[int]
-    sources: Mapping[str, Mapping]
-    results: Sequence[Shown]
+    seeds: Sequence[int]  # of its repeats
+    sources: Mapping[str, Mapping]  # name -> ``{"title": str, "stand_in": bool}``
+    results: Sequence[Shown]  # tables and figures, in order
     samples: Mapping[str, Mapping[str, str]]
     causes: Mapping[str, Mapping[str, str]]
-    titles: Titles
-    reference: str | None
-    config: Mapping
-    command: str
+    titles: Titles  # of the explainers
+    reference: str | None  # ``comparison.csv`` of a run on real objects, shown where nothing of this run is judged
+    config: Mapping  # the whole configuration
+    command: str  # that makes what is missing
 
     @property
     def sample_files(self) -> list[Path]:

@@ -43,7 +43,6 @@ def page_samples(files: Mapping[str, str | Path], source: Mapping, limits: Limit
 
     Args:
         files: ``registrations`` and ``predictions`` of one source and seed, optionally ``uncertainty``.
-        source: ``title``, and whether it is a ``stand_in``.
         reach: correspondence distance of ICP, in diameters.
 
     Raises InputError for an unusable file, or a sample without prediction.
@@ -113,7 +112,6 @@ def cause_samples(files: Mapping[str, str | Path], source: Mapping, settings: Ca
 
     Args:
         files: ``objects`` of the source, and ``causes`` of its first seed.
-        source: ``title``, and whether it is a ``stand_in``.
 
     Raises InputError for an unusable file, or one of other settings.
     """

@@ -27,19 +27,12 @@ Folders = tuple[Path, Path]  # results/{run} of two runs, or their references
 
 @dataclass(frozen=True)
 class PrintedTable:
-    """A table as readers see it.
+    """A table as readers see it."""
 
-    Attributes:
-        caption: the line above it.
-        heads: of the columns, those of names first.
-        labels: number of columns of names.
-        rows: of texts, one per head.
-    """
-
-    caption: str
-    heads: Sequence[str]
-    labels: int
-    rows: Sequence[Sequence[str]]
+    caption: str  # the line above it
+    heads: Sequence[str]  # of the columns, those of names first
+    labels: int  # number of columns of names
+    rows: Sequence[Sequence[str]]  # of texts, one per head
 
     def by_names(self, labels: int) -> dict[tuple, dict[str, str]]:
         """Return (names of a row, number of earlier rows with these names) -> head -> text."""
@@ -107,7 +100,6 @@ class TwoTables:
     Attributes:
         heads, labels: as in :class:`PrintedTable`; heads of the second alone come last.
         rows: the names of each row, and its cells ``{one, other, difference, kind}``.
-        counts: of the kinds.
     """
 
     name: str
@@ -116,15 +108,11 @@ class TwoTables:
     heads: Sequence[str]
     labels: int
     rows: Sequence[tuple[Sequence[str], Sequence[Mapping[str, str]]]]
-    counts: Mapping[str, int]
+    counts: Mapping[str, int]  # of the kinds
 
 
 def compare_tables(folders: Folders, titles: Mapping[str, str]) -> tuple[list[TwoTables], list[list[str]]]:
-    """Return the tables that both folders have, and the names of those that only the first or only the second has.
-
-    Args:
-        titles: of the tables, in the order of the page.
-    """
+    """Return the tables that both folders have, and the names of those that only the first or only the second has."""
     files = [{path.stem: path for path in folder.glob("tables/*.md")} for folder in folders]
     for folder, paths in zip(folders, files, strict=True):
         if not paths:
@@ -166,12 +154,7 @@ def _cell(one: str, other: str) -> dict[str, str]:
 def write_comparison(
     folders: Folders, tables: Sequence[TwoTables], alone: Sequence[Sequence[str]], titles: Mapping[str, str], path: Path
 ) -> None:
-    """Write the page of two runs, which refers to their figures.
-
-    Args:
-        tables, alone: as :func:`compare_tables` returns them.
-        titles: of the tables and figures.
-    """
+    """Write the page of two runs, which refers to their figures."""
     paths = [folder.resolve() for folder in folders]
     names = [each.name for each in paths]
     if names[0] == names[1]:

@@ -61,7 +61,6 @@ def entries_outside(variable: str, kind: str, of: type, taken: Iterable[str]) ->
 
     Args:
         kind: name of an entry in messages.
-        of: type of an entry.
         taken: names of the suite's entries.
     """
     group = next(group for group, variables in GROUPS.items() if variable in variables)

@@ -17,9 +17,7 @@ class Registry(Generic[Entry]):
     """All entries of a kind, such as registration methods; files that are new in the folder need no further listing.
 
     Args:
-        kind: name of an entry in messages.
         folder: package of the modules that list entries.
-        variable: of a module, its entries by name.
         first: modules elsewhere, whose entries come first.
         outside: type of the entries that modules of plugins may list, which come last; None for no plugins.
     """
