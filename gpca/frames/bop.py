@@ -52,23 +52,19 @@ def read_images(path: Path) -> dict[int, Any]:
 def read_camera(entry: Any, subject: str) -> tuple[np.ndarray, float]:
     """Return K (3, 3) in pixels and the millimeters per unit of depth; InputError for impossible values."""
     camera_3_3 = _numbers(entry, "cam_K", 9, subject).reshape(3, 3)
-    require_camera(camera_3_3, f"{subject}: cam_K")
+    of_camera = f"{subject}: cam_K"
+    if abs(camera_3_3[[1, 2, 2], [0, 0, 1]]).max() > 1e-6 or abs(camera_3_3[2, 2] - 1) > 1e-6:
+        raise InputError(of_camera, "is not a camera matrix", "give fx s cx, 0 fy cy, 0 0 1, row by row")
+    focal_px = np.diag(camera_3_3)[:2]
+    if not ((focal_px >= FOCAL_PX[0]) & (focal_px <= FOCAL_PX[1])).all():
+        lengths = " and ".join(f"{length:.6g}" for length in focal_px)
+        raise InputError(of_camera, f"has the focal lengths {lengths} px", "they must be positive; check fx and fy")
+    if abs(camera_3_3[:2]).max() > FOCAL_PX[1]:
+        raise InputError(of_camera, "has a skew or principal point outside any image", "give them in pixels")
     (scale,) = _numbers(entry, "depth_scale", 1, subject)
     if not DEPTH_SCALES[0] <= scale <= DEPTH_SCALES[1]:
         raise InputError(subject, f"depth_scale is {scale:.6g}", "give the millimeters per unit of the depth images")
     return camera_3_3, float(scale)
-
-
-def require_camera(camera_3_3: np.ndarray, subject: str) -> None:
-    """Raise an InputError that names `subject` unless K is upper triangular with possible focal lengths."""
-    if abs(camera_3_3[[1, 2, 2], [0, 0, 1]]).max() > 1e-6 or abs(camera_3_3[2, 2] - 1) > 1e-6:
-        raise InputError(subject, "is not a camera matrix", "give fx s cx, 0 fy cy, 0 0 1, row by row")
-    focal_px = np.diag(camera_3_3)[:2]
-    if not ((focal_px >= FOCAL_PX[0]) & (focal_px <= FOCAL_PX[1])).all():
-        lengths = " and ".join(f"{length:.6g}" for length in focal_px)
-        raise InputError(subject, f"has the focal lengths {lengths} px", "they must be positive; check fx and fy")
-    if abs(camera_3_3[:2]).max() > FOCAL_PX[1]:
-        raise InputError(subject, "has a skew or principal point outside any image", "give them in pixels")
 
 
 def read_pose(entry: Any, subject: str) -> tuple[int, np.ndarray]:
@@ -153,15 +149,34 @@ def read_frames(folders: Iterable[Path], split: str = "test") -> list[Frame]:
     if not scene_files:
         fault = f"has no {split}*/<scene>/scene_gt.json"
         raise InputError(", ".join(map(str, folders)), fault, "check location or split")
-    frames = [frame for path in scene_files for frame in _frames_of_scene(path.parent)]
+    frames: dict[tuple[int, int], Frame] = {}
+    for folder in (path.parent for path in scene_files):
+        try:
+            scene = whole(folder.name)
+        except ValueError as fault:
+            raise InputError(folder, "the name of a scene's folder is not a number", "name it like 000001") from fault
+        cameras, truths = (read_images(folder / f"scene_{name}.json") for name in ("camera", "gt"))
+        colors = folder / ("rgb" if (folder / "rgb").is_dir() else "gray")
+        for image, truth in truths.items():
+            if image not in cameras:
+                raise InputError(folder / "scene_camera.json", f"has no image {image}", REMEDY)
+            if not isinstance(truth, list):
+                raise InputError(folder / "scene_gt.json", f"image {image} has no list of objects", REMEDY)
+            camera = read_camera(cameras[image], f"{folder / 'scene_camera.json'}: image {image}")
+            depth, color = _image_file(folder / "depth", f"{image:06d}"), _find_image(colors, f"{image:06d}")
+            annotations = []
+            for n, entry in enumerate(truth):
+                subject = f"{folder / 'scene_gt.json'}: image {image}, object {n}"
+                pose = read_pose(entry, subject)
+                mask = _image_file(folder / "mask_visib", f"{image:06d}_{n:06d}")
+                annotations.append(Annotation(*pose, mask, subject))
+            frame = Frame(scene, image, *camera, depth, color, tuple(annotations))
+            if (same := frames.setdefault(frame.place, frame)) is not frame:
+                both = f"{same.depth} and {frame.depth}"
+                raise InputError(both, "are the same image of the same scene", "set split to the intended folder")
     if not frames:
         raise InputError(scene_files[0], "lists no image", REMEDY)
-    first: dict[tuple[int, int], Frame] = {}
-    for frame in frames:
-        if (same := first.setdefault(frame.place, frame)) is not frame:
-            both = f"{same.depth} and {frame.depth}"
-            raise InputError(both, "are the same image of the same scene", "set split to the intended folder")
-    return sorted(frames, key=lambda frame: frame.place)
+    return sorted(frames.values(), key=lambda frame: frame.place)
 
 
 def measured_points(frame: Frame, annotation: Annotation, depth_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -198,30 +213,6 @@ def _require_points(points: np.ndarray, annotation: Annotation) -> None:
 
 class TooFewPoints(InputError):
     """Hardly any points were measured on an object; a reader may skip it."""
-
-
-def _frames_of_scene(folder: Path) -> list[Frame]:
-    try:
-        scene = whole(folder.name)
-    except ValueError as fault:
-        raise InputError(folder, "the name of a scene's folder is not a number", "name it like 000001") from fault
-    cameras, truths = (read_images(folder / f"scene_{name}.json") for name in ("camera", "gt"))
-    colors = folder / ("rgb" if (folder / "rgb").is_dir() else "gray")
-    frames = []
-    for image, truth in truths.items():
-        if image not in cameras:
-            raise InputError(folder / "scene_camera.json", f"has no image {image}", REMEDY)
-        if not isinstance(truth, list):
-            raise InputError(folder / "scene_gt.json", f"image {image} has no list of objects", REMEDY)
-        camera_3_3, depth_scale = read_camera(cameras[image], f"{folder / 'scene_camera.json'}: image {image}")
-        depth, color = _image_file(folder / "depth", f"{image:06d}"), _find_image(colors, f"{image:06d}")
-        annotations = []
-        for n, entry in enumerate(truth):
-            subject = f"{folder / 'scene_gt.json'}: image {image}, object {n}"
-            pose = read_pose(entry, subject)
-            annotations.append(Annotation(*pose, _image_file(folder / "mask_visib", f"{image:06d}_{n:06d}"), subject))
-        frames.append(Frame(scene, image, camera_3_3, depth_scale, depth, color, tuple(annotations)))
-    return frames
 
 
 def _find_image(folder: Path, stem: str) -> Path | None:

@@ -10,13 +10,9 @@ import numpy as np
 
 from gpca.errors import InputError
 from gpca.frames.bop import Frame, read_frames
-from gpca.frames.initial_pose import (
-    PosesByObject,
-    read_bop_results,
-)
+from gpca.frames.initial_pose import PosesByObject, read_bop_results
 from gpca.frames.source import frame_files, patterns, resolve_datasets
 from gpca.objects import bop
-from gpca.objects.bop import read_symmetries
 from gpca.objects.camera import MeshScene
 from gpca.objects.canonical import DRAWN, EVALUATION, TRAINING, ObjectClouds, Place, bounding_center, read_scene_splits
 from gpca.objects.source import folders
@@ -50,19 +46,16 @@ class Dataset:
 
     def frames(self) -> list[Frame]:
         """Return its frames, or a draw of them; InputError for a scene that the splits lack."""
-        frames = [frame for frame in read_frames(self.folders, self.split) if self._is_read(frame)]
+        frames = read_frames(self.folders, self.split)
+        if self.places:
+            if unknown := [frame.scene for frame in frames if frame.scene not in self.places]:
+                remedy = "add it to the file of scenes, or set splits.scenes: null"
+                raise InputError(f"dataset {self.name}", f"scene {unknown[0]} is in no split", remedy)
+            frames = [frame for frame in frames if self.role in (EVALUATION, self.places[frame.scene].role)]
         if self.most_frames is None or len(frames) <= self.most_frames:
             return frames
         rows = generator(self.name, "frames").choice(len(frames), self.most_frames, replace=False)
         return [frames[row] for row in np.sort(rows)]
-
-    def _is_read(self, frame: Frame) -> bool:
-        if not self.places:
-            return True
-        if frame.scene not in self.places:
-            fault = f"scene {frame.scene} is in no split"
-            raise InputError(f"dataset {self.name}", fault, "add it to the file of scenes, or set splits.scenes: null")
-        return self.role == EVALUATION or self.places[frame.scene].role == self.role
 
     def place(self, scene: int) -> Place:
         """Return the place of a scene; by default it has the role of the frames and annotated poses."""
@@ -103,6 +96,11 @@ class CenteredModel:
     T_model_object: np.ndarray
     listed_symmetries: dict | None
 
+    @property
+    def shape(self) -> bytes:
+        """A key that is the same for models of the same shape."""
+        return np.asarray(self.surface.vertices_m).tobytes()
+
 
 def read_models(dataset: Dataset, frames: Iterable[Frame]) -> dict[int, CenteredModel]:
     """Return the models of the objects in the frames, by id; InputError where a model is missing or faulty."""
@@ -127,7 +125,7 @@ def models_of_ids(dataset: Dataset, ids: Iterable[int] | None = None) -> dict[in
         T_model_object[:3, 3] = bounding_center(surface)
         name = f"{dataset.name} {info[number].get('name', surface.name)}"
         centered = Surface(name, surface.vertices_m - T_model_object[:3, 3], surface.faces)
-        models[number] = CenteredModel(centered, T_model_object, read_symmetries(info, number))
+        models[number] = CenteredModel(centered, T_model_object, bop.read_symmetries(info, number))
     return models
 
 
@@ -137,11 +135,10 @@ def with_shared_models(models_of: Mapping[str, dict[int, CenteredModel]]) -> dic
     LINEMOD-Occlusion shows objects of LINEMOD: an object that training saw in one is not unseen in the other.
     """
     first: dict[bytes, str] = {}
-    shared: dict[str, dict[int, CenteredModel]] = {}
+    shared: dict[str, dict[int, CenteredModel]] = {name: {} for name in models_of}
     for name, models in models_of.items():
-        shared[name] = {}
         for number, model in models.items():
-            known = first.setdefault(shape_of(model), model.surface.name)
+            known = first.setdefault(model.shape, model.surface.name)
             shared[name][number] = replace(model, surface=replace(model.surface, name=known))
     return shared
 
@@ -149,12 +146,7 @@ def with_shared_models(models_of: Mapping[str, dict[int, CenteredModel]]) -> dic
 def distinct_surfaces(models_of: Mapping[str, dict[int, CenteredModel]]) -> list[Surface]:
     """Return the surfaces of all datasets' models, shared ones once."""
     models = [model for by_id in models_of.values() for model in by_id.values()]
-    return list({(model.surface.name, shape_of(model)): model.surface for model in models}.values())
-
-
-def shape_of(model: CenteredModel) -> bytes:
-    """Return a key that is the same for models of the same shape."""
-    return np.asarray(model.surface.vertices_m).tobytes()
+    return list({(model.surface.name, model.shape): model.surface for model in models}.values())
 
 
 MOST_FACES = 2000  # of a mesh; what decimation moves is far below the noise of depth
@@ -199,14 +191,14 @@ def untested_surfaces(datasets: Mapping[str, Dataset]) -> list[Surface]:
     """Return the models, shared ones once, of objects that no frame of a test fold shows."""
     models = with_shared_models({name: models_of_ids(dataset) for name, dataset in datasets.items()})
     tested = {
-        shape_of(models[name][annotation.object_id])
+        models[name][annotation.object_id].shape
         for name, dataset in datasets.items()
         for frame in dataset.frames()
         for annotation in frame.annotations
         if dataset.fold(frame.scene) != TRAINING and annotation.object_id in models[name]
     }
     untested = {
-        name: {number: model for number, model in by_id.items() if shape_of(model) not in tested}
+        name: {number: model for number, model in by_id.items() if model.shape not in tested}
         for name, by_id in models.items()
     }
     return distinct_surfaces(untested)

@@ -26,36 +26,26 @@ JUDGED_OBJECTS = 64
 # the limit above, and 2.0 to 2.7 times nearer when undone; correct data are no nearer in any other form.
 SHARED_NEARER = 1.5
 
-Undo = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
+Undo = tuple[Callable[[np.ndarray], np.ndarray] | None, float | tuple[float, float, float]]
 
-
-def _transposed(T_camera_model: np.ndarray) -> np.ndarray:
-    return rigid_motion(T_camera_model[:3, :3].T, T_camera_model[:3, 3])
-
-
-# Usual mistakes about a pose or a camera, and how to undo them, from T_camera_model and points in the camera's frame.
+# Usual mistakes about a pose or a camera, and what undoes them: of T_camera_model, and the factor of the points.
 FAULTS: dict[str, Undo] = {
-    "is cam_t_m2c in meters? the format requires millimeters": lambda T, points: (scale_translation(T, 1000), points),
-    "is cam_t_m2c in centimeters? the format requires millimeters": lambda T, points: (
-        scale_translation(T, 10),
-        points,
-    ),
-    "is cam_t_m2c in micrometers? the format requires millimeters": (
-        lambda T, points: (scale_translation(T, 0.001), points)
-    ),
-    "is cam_R_m2c listed by columns? the format requires rows": lambda T, points: (_transposed(T), points),
-    "is the pose from camera to model? the format requires model to camera": lambda T, points: (inverse(T), points),
+    "is cam_t_m2c in meters? the format requires millimeters": (lambda T: scale_translation(T, 1000), 1.0),
+    "is cam_t_m2c in centimeters? the format requires millimeters": (lambda T: scale_translation(T, 10), 1.0),
+    "is cam_t_m2c in micrometers? the format requires millimeters": (lambda T: scale_translation(T, 0.001), 1.0),
+    "is cam_R_m2c listed by columns? the format requires rows": (lambda T: rigid_motion(T[:3, :3].T, T[:3, 3]), 1.0),
+    "is the pose from camera to model? the format requires model to camera": (inverse, 1.0),
     "are the camera axes OpenGL's? the format's y points down and z forward": (
-        lambda T, points: (np.diag([1.0, -1.0, -1.0, 1.0]) @ T, points)
+        lambda T: np.diag([1.0, -1.0, -1.0, 1.0]) @ T,
+        1.0,
     ),
-    "is the image mirrored?": lambda T, points: (T, points @ np.diag([-1.0, 1.0, 1.0])),
+    "is the image mirrored?": (None, (-1.0, 1.0, 1.0)),
 }
 for factor in (0.001, 0.01, 0.1, 0.25, 0.5, 2, 4, 10, 100, 1000):
-    reason = f"is depth_scale wrong? the depth fits when it is {factor:g} times as large"
-    FAULTS[reason] = lambda T, points, factor=factor: (T, factor * points)  # type: ignore[misc]
+    FAULTS[f"is depth_scale wrong? the depth fits when it is {factor:g} times as large"] = (None, factor)
 for factor in (0.5, 0.67, 0.8, 0.85, 0.9, 0.95, 1.05, 1.1, 1.15, 1.25, 1.5, 2):
     reason = f"is cam_K wrong? the depth fits when its focal lengths are about {factor:g} times as long"
-    FAULTS[reason] = lambda T, points, factor=factor: (T, points / (factor, factor, 1.0))  # type: ignore[misc]
+    FAULTS[reason] = (None, (1 / factor, 1 / factor, 1.0))
 
 
 @dataclass(frozen=True)
@@ -69,16 +59,17 @@ class Observation:
     diameter_m: float
     points_m: np.ndarray
 
-    def distance(self, undo: Undo | None = None) -> float:
+    def distance(self, undo: Undo = (None, 1.0)) -> float:
         """Return the median distance from the points to the model in diameters, after undoing a fault."""
-        points_m = spread(self.points_m, JUDGED_POINTS)
-        T_camera_model, points_m = undo(self.T_camera_model, points_m) if undo else (self.T_camera_model, points_m)
+        of_pose, factor = undo
+        T_camera_model = of_pose(self.T_camera_model) if of_pose else self.T_camera_model
         T_object_camera = inverse(T_camera_model @ self.T_model_object)
+        points_m = spread(self.points_m, JUDGED_POINTS) * factor
         return median_distance(self.tree, transform(T_object_camera, points_m)) / self.diameter_m
 
-    def size(self, undo: Undo) -> float:
-        """Return the extent of the points in diameters, after undoing a fault."""
-        points_m = undo(self.T_camera_model, spread(self.points_m, JUDGED_POINTS))[1]
+    def size(self, factor: float | tuple[float, float, float]) -> float:
+        """Return the extent of the points in diameters, times a factor."""
+        points_m = spread(self.points_m, JUDGED_POINTS) * factor
         return float(np.linalg.norm(points_m.std(axis=0)) / self.diameter_m) + 1e-9
 
 
@@ -99,7 +90,7 @@ def require_plausible(observed: Observation) -> None:
         return
     undone = {reason: observed.distance(undo) for reason, undo in FAULTS.items()}
     # Relative to the cloud's size: a cloud that has shrunk to a point is near to anything.
-    likeliest = min(undone, key=lambda reason: undone[reason] / observed.size(FAULTS[reason]))
+    likeliest = min(undone, key=lambda reason: undone[reason] / observed.size(FAULTS[reason][1]))
     raise InputError(
         observed.subject,
         f"half of its measured points lie {1e3 * distance * observed.diameter_m:.0f} mm or more from the model in the "
@@ -119,7 +110,7 @@ def require_shared_form(dataset: str, observations: Sequence[Observation]) -> No
     diameters_m = np.array([observed.diameter_m for observed in judged])
     limits = np.maximum(FAR, FAR_M / diameters_m)
 
-    def median(undo: Undo | None = None) -> float:
+    def median(undo: Undo = (None, 1.0)) -> float:
         return float(np.median([observed.distance(undo) for observed in judged] / limits))
 
     undone = {reason: median(undo) for reason, undo in FAULTS.items()}

@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -116,7 +116,15 @@ def write_scenes(surfaces: Iterable[Surface], source: str, settings: SceneSettin
         for scene in progress(range(settings.count), f"scenes of {source}"):
             standing = lay_table(surfaces, settings, source, scene, resting)
             middle_m = np.mean([object_.T_world_object[:3, 3] for object_ in standing], axis=0)
-            views = camera_poses(settings, middle_m, source, scene)
+            # The cameras are on a hemisphere about the middle of the objects.
+            random = generator(source, "views", scene)
+            turn, views = random.uniform(0, 2 * np.pi), []
+            for view in range(settings.views):
+                azimuth = turn + 2 * np.pi * (view + random.uniform(-0.3, 0.3)) / settings.views
+                elevation = np.deg2rad(random.uniform(*settings.elevation_deg))
+                target_m = middle_m + np.append(random.uniform(-0.03, 0.03, size=2), 0.0)
+                eye_m = target_m + random.uniform(*settings.distance_m) * direction(azimuth, elevation)
+                views.append(look_at(eye_m, target_m))
             _write_scene(partial / f"test/{scene:06d}", surfaces, standing, views, settings, (source, scene))
 
 
@@ -138,37 +146,25 @@ def lay_table(
     random = generator(source, "scene", scene)
     count = min(int(random.integers(settings.objects[0], settings.objects[1] + 1)), len(surfaces))
     standing: list[Placed] = []
-    outlines: list = []
+    outlines: list[Any] = []
     for model in random.permutation(len(surfaces))[:count]:
         poses_n, probabilities_n = resting[model]
         T_world_object = rest(poses_n, probabilities_n, random)
         flat_m = transform(T_world_object, surfaces[model].vertices_m)[:, :2]
-        outline = MultiPoint(flat_m - (flat_m.min(axis=0) + flat_m.max(axis=0)) / 2).convex_hull
+        flat_center_m = (flat_m.min(axis=0) + flat_m.max(axis=0)) / 2
+        outline = MultiPoint(flat_m - flat_center_m).convex_hull
         azimuth = random.uniform(0, 2 * np.pi)
-        direction = np.array([np.cos(azimuth), np.sin(azimuth)])
-        ways = (distance_m * direction for distance_m in np.arange(0, TABLE_M, 0.005))
+        ways = (
+            distance_m * np.array([np.cos(azimuth), np.sin(azimuth)]) for distance_m in np.arange(0, TABLE_M, 0.005)
+        )
         free = (way for way in ways if all(translate(outline, *way).distance(o) >= settings.gap_m for o in outlines))
         if (at := next(free, None)) is None:
             fault = f"there is no room for {count} objects {settings.gap_m} m apart"
             raise InputError("scenes gap_m and objects", fault, "lower objects or gap_m")
-        T_world_object[:2, 3] += at - (flat_m.min(axis=0) + flat_m.max(axis=0)) / 2
+        T_world_object[:2, 3] += at - flat_center_m
         outlines.append(translate(outline, *at))
         standing.append(Placed(int(model), T_world_object))
     return standing
-
-
-def camera_poses(settings: SceneSettings, middle_m: np.ndarray, source: str, scene: int) -> list[np.ndarray]:
-    """Return ``T_world_camera`` of each view, on a hemisphere about the middle of the objects."""
-    random = generator(source, "views", scene)
-    turn = random.uniform(0, 2 * np.pi)
-    poses = []
-    for view in range(settings.views):
-        azimuth = turn + 2 * np.pi * (view + random.uniform(-0.3, 0.3)) / settings.views
-        elevation = np.deg2rad(random.uniform(*settings.elevation_deg))
-        target_m = middle_m + np.append(random.uniform(-0.03, 0.03, size=2), 0.0)
-        eye_m = target_m + random.uniform(*settings.distance_m) * direction(azimuth, elevation)
-        poses.append(look_at(eye_m, target_m))
-    return poses
 
 
 def center(surface: Surface) -> Surface:

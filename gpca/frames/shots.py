@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import product
 
 import numpy as np
@@ -30,20 +29,14 @@ class Sighting:
 
     def measured(self, pixels_V_2: np.ndarray) -> np.ndarray:
         """Return at which of these pixels (V, 2) the object was measured, (V,) bool."""
-        low_2, mask = self._mask
+        low_2 = self.pixels.min(axis=0)
+        mask = np.zeros(self.pixels.max(axis=0) - low_2 + 1, bool)  # within the bounding box
+        mask[tuple((self.pixels - low_2).T)] = True
         of_box_V_2 = pixels_V_2 - low_2
         inside_V = ((of_box_V_2 >= 0) & (of_box_V_2 < mask.shape)).all(axis=1)
         measured_V = np.zeros(len(pixels_V_2), bool)
         measured_V[inside_V] = mask[tuple(of_box_V_2[inside_V].T)]
         return measured_V
-
-    @cached_property
-    def _mask(self) -> tuple[np.ndarray, np.ndarray]:
-        """The first pixel of the bounding box, and the mask in it."""
-        low_2 = self.pixels.min(axis=0)
-        mask = np.zeros(self.pixels.max(axis=0) - low_2 + 1, bool)
-        mask[tuple((self.pixels - low_2).T)] = True
-        return low_2, mask
 
 
 MOST_PIXELS = 20_000  # of a rendered side, about; of more, every second or third row and column is looked at
@@ -144,8 +137,7 @@ class Shot:
 
     def other_points_m(self) -> np.ndarray:
         """Return the measured points (P, 3) that are not the object's, in the world."""
-        points_m, _ = back_project(self.depth_m, ~self.mask, self.camera.matrix_3_3)
-        return transform(self.T_world_camera, points_m)
+        return transform(self.T_world_camera, back_project(self.depth_m, ~self.mask, self.camera.matrix_3_3)[0])
 
     def project(self, points_m: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the pixels, v and u, and the depth (m) of points (P, 3) in the world; outside the image, (-1, -1)."""

@@ -146,9 +146,7 @@ class Situations:
     """Draws situations on the tables of one part of a run, e.g. ``("recovery", 0, "train")``; parts share no tables."""
 
     def __init__(self, shelf: Shelf, settings: SituationSettings, part: tuple) -> None:
-        self._shelf = shelf
-        self._settings = settings
-        self._part = part
+        self._shelf, self._settings, self._part = shelf, settings, part
         self._alone: dict[int, MeshScene] = {}
         self._tables: dict[int, list[Placed]] = {}
 
@@ -205,20 +203,15 @@ class Situations:
             return replace(clean, noise=replace(clean.noise, scale=scale), cause=cause)
         if cause == "pose":
             return self._misplaced(clean, random)
-        if cause == "overlap":
-            occluder = self._occluder(clean, random)
-            return replace(clean, standing=(*clean.standing, occluder), cause=cause) if occluder else None
-        raise InputError(f"cause '{cause}'", "unknown", "choose one of noise, pose, overlap")
-
-    def _occluder(self, clean: Situation, random: np.random.Generator) -> Placed | None:
-        """Return an object in front of the one in question that hides the wanted share, or None."""
-        low, high = self._settings.hidden
+        if cause != "overlap":
+            raise InputError(f"cause '{cause}'", "unknown", "choose one of noise, pose, overlap")
         visible = clean.visible()
         outlines = [self._shelf.outline(object_) for object_ in clean.standing]
+        low, high = settings.hidden
         for _ in range(OCCLUDERS):
             occluder = self._in_front(clean, outlines, random)
             if occluder and low <= (self._silhouette(clean, occluder) & visible).sum() / visible.sum() <= high:
-                return occluder
+                return replace(clean, standing=(*clean.standing, occluder), cause=cause)
         return None
 
     def _in_front(self, clean: Situation, outlines: list, random: np.random.Generator) -> Placed | None:

@@ -19,8 +19,25 @@ def resolve_datasets(datasets: Mapping[str, dict] | None, data_dir: str | None) 
     Entries marked ``optional`` are left out where no folder has them: they are not downloaded. InputError as in
     :func:`gpca.objects.source.resolve`, and for a missing results file.
     """
-    present = {name: entry for name, entry in (datasets or {}).items() if not _is_absent(entry, data_dir)}
-    return {name: _resolved(name, entry, data_dir) for name, entry in present.items()}
+    resolved = {}
+    for name, entry in (datasets or {}).items():
+        if entry.get("optional") and not any(path.is_dir() for path in places_of(entry["location"], data_dir)):
+            continue
+        files = patterns(entry.get("split", "test"))
+        of = resolve({"title": name, "kind": "bop", "files": files, **entry}, data_dir)
+        results = of.get("results") or []
+        named = [results] if isinstance(results, str) else results
+        of["results"] = [str(path) for pattern in named for path in _matching(data_dir, pattern)]
+        errors = _matching(data_dir, of["errors"]) if of.get("errors") else []
+        of["errors"] = str(errors[0]) if errors else None
+        if of.get("models"):
+            places = places_of(of["models"], data_dir)
+            of["models"] = str(next((path for path in places if path.is_dir()), places[0]))
+        for path in (*of["results"], of["errors"]):
+            if path and not Path(path).is_file():
+                raise InputError(path, "no such results file", f"correct results and errors of dataset {name}")
+        resolved[name] = of
+    return resolved
 
 
 def has_estimates(datasets: Mapping[str, dict]) -> bool:
@@ -48,26 +65,6 @@ def frame_files(datasets: Mapping[str, dict], data_dir: str | None) -> list[Path
         files += data_files(entry) + [Path(path) for path in (*entry["results"], entry["errors"]) if path]
         files += sorted(Path(entry["models"]).glob("models/*")) if entry.get("models") else []
     return files
-
-
-def _is_absent(entry: dict, data_dir: str | None) -> bool:
-    return bool(entry.get("optional")) and not any(path.is_dir() for path in places_of(entry["location"], data_dir))
-
-
-def _resolved(name: str, entry: dict, data_dir: str | None) -> dict:
-    resolved = resolve({"title": name, "kind": "bop", "files": patterns(entry.get("split", "test")), **entry}, data_dir)
-    results = resolved.get("results") or []
-    named = [results] if isinstance(results, str) else results
-    resolved["results"] = [str(path) for pattern in named for path in _matching(data_dir, pattern)]
-    errors = _matching(data_dir, resolved["errors"]) if resolved.get("errors") else []
-    if models := resolved.get("models"):
-        places = places_of(models, data_dir)
-        resolved["models"] = str(next((path for path in places if path.is_dir()), places[0]))
-    resolved["errors"] = str(errors[0]) if errors else None
-    for path in (*resolved["results"], resolved["errors"]):
-        if path and not Path(path).is_file():
-            raise InputError(path, "no such results file", f"correct results and errors of dataset {name}")
-    return resolved
 
 
 def _matching(data_dir: str | None, name: str) -> list[Path]:

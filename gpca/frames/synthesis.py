@@ -72,51 +72,44 @@ def make_frame_registrations(
         record |= {"sample": n, "split": split, "concept": concept}
         record |= {"cluster": str(cluster_I[i]), "fold": int(instances.fold[i])}
         records.append(record)
-        poses.append(_pose_row(instances, i, objects, record, trained) | {"lost_to": lost_to})
+        row = {"sample": n, "split": split, "concept": concept, "instance": i}
+        row |= {name: getattr(instances, name)[i] for name in ("dataset", "scene", "image")}
+        row |= {"object": record["object_name"], "in_training": record["object_index"] in trained}
+        row |= {"symmetric": bool(instances.symmetric[i]), "init_from": instances.init_from[i]}
+        model_m = objects.points(record["object_index"])[:JUDGED_POINTS]
+        T_source_target = inverse(record["T_target_source_true"])
+        for name in ("init", "icp"):
+            T_error = record[f"T_target_source_{name}"] @ T_source_target
+            error_m = pose_error(model_m, T_error, np.eye(4), row["symmetric"])
+            row[f"{name}_error"] = error_m / record["diameter_m"]
+        poses.append(row | {"lost_to": lost_to})
     return *as_registrations(records, (source, seed)), pd.DataFrame(poses)
 
 
 def _register_one(
     instances: Instances, i: int, objects: ObjectClouds, concept: str, settings: FrameSettings, random
 ) -> tuple[dict, str]:
+    """Return the aligned pair of an instance, and what its points were lost to."""
     index = int(instances.object_index[i])
     diameter_m = float(objects.diameters_m[index])
     registration = settings.registration
-    T_init_camera = inverse(instances.T_camera_object_init[i])
     rows = random.permutation(len(instances.cloud_m(i)))[: registration.cloud_points]
     target_rows = random.permutation(len(objects.points(index)))[: registration.cloud_points]
+    T_init_camera = inverse(instances.T_camera_object_init[i])
     points = transform(T_init_camera, instances.cloud_m(i)[rows].astype(np.float64)) / diameter_m
-    perturbed = None
-    lost_to = ""
-    if concept == "overlap":
-        if random.random() < settings.occluders:
-            share = random.uniform(*registration.severities.crop)
-            kept_P = occlude(instances, i, instances.pixels_of(i)[rows], share, random)
-            if kept_P is not None:
-                perturbed = Perturbed(points[kept_P], severity={"crop": float(1 - kept_P.mean())})
-        lost_to = HALF_SPACE if perturbed is None else OCCLUDER
-    perturbed = PERTURBATIONS[concept](points, registration.severities, random) if perturbed is None else perturbed
+    kept_P = None
+    if concept == "overlap" and random.random() < settings.occluders:
+        share = random.uniform(*registration.severities.crop)
+        kept_P = occlude(instances, i, instances.pixels_of(i)[rows], share, random)
+    if kept_P is None:
+        perturbed = PERTURBATIONS[concept](points, registration.severities, random)
+    else:
+        perturbed = Perturbed(points[kept_P], severity={"crop": float(1 - kept_P.mean())})
     T_object_init = inverse(instances.T_camera_object_true[i]) @ instances.T_camera_object_init[i]
     T_true = scale_translation(T_object_init, 1 / diameter_m) @ perturbed.T_target_source_true
-    return align_pair(
-        replace(perturbed, T_target_source_true=T_true), objects, index, target_rows, registration.icp
-    ), lost_to
-
-
-def _pose_row(instances: Instances, i: int, objects: ObjectClouds, record: dict, trained: set[int]) -> dict:
-    model_m = objects.points(record["object_index"])[:JUDGED_POINTS]
-    symmetric = bool(instances.symmetric[i])
-    T_source_target = inverse(record["T_target_source_true"])
-    errors = {
-        f"{name}_error": pose_error(model_m, record[f"T_target_source_{name}"] @ T_source_target, np.eye(4), symmetric)
-        / record["diameter_m"]
-        for name in ("init", "icp")
-    }
-    shown = {name: record[name] for name in ("sample", "split", "concept")}
-    seen = {name: getattr(instances, name)[i] for name in ("dataset", "scene", "image")}
-    in_training = {"object": record["object_name"], "in_training": record["object_index"] in trained}
-    started = {"symmetric": symmetric, "init_from": instances.init_from[i]}
-    return shown | {"instance": i, **seen, **in_training, **started, **errors}
+    perturbed = replace(perturbed, T_target_source_true=T_true)
+    lost_to = "" if concept != "overlap" else HALF_SPACE if kept_P is None else OCCLUDER
+    return align_pair(perturbed, objects, index, target_rows, registration.icp), lost_to
 
 
 def occlude(
@@ -145,17 +138,13 @@ def occlude(
         direction = np.array([np.cos(angle), np.sin(angle)])
         reach = np.linalg.norm(np.ptp(pixels_P_2, axis=0)) + np.linalg.norm(silhouette.shape)
         start = center - corner - np.array(silhouette.shape[::-1]) / 2
+        size_2 = np.array(silhouette.shape[::-1])
         for distance_px in np.arange(reach, 0, -STEP_PX):
-            covered_P = _covers(silhouette, pixels_P_2 - np.rint(corner + start + distance_px * direction).astype(int))
+            at_P_2 = pixels_P_2 - np.rint(corner + start + distance_px * direction).astype(int)
+            u, v = at_P_2.clip(0, size_2 - 1).T
+            covered_P = ((at_P_2 >= 0) & (at_P_2 < size_2)).all(axis=1) & silhouette[v, u]
             if covered_P.mean() >= share:
                 break
         if abs(covered_P.mean() - share) <= TOLERANCE:
             return ~covered_P
     return None
-
-
-def _covers(silhouette: np.ndarray, pixels_P_2: np.ndarray) -> np.ndarray:
-    height, width = silhouette.shape
-    u, v = pixels_P_2.T
-    inside = (u >= 0) & (u < width) & (v >= 0) & (v < height)
-    return inside & silhouette[v.clip(0, height - 1), u.clip(0, width - 1)]

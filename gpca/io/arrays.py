@@ -7,28 +7,19 @@ import math
 import zipfile
 from collections.abc import Collection, Mapping
 from pathlib import Path
-from typing import IO
 
 import numpy as np
 
 from gpca.errors import InputError
-from gpca.io.files import (
-    LARGEST_NUMBER,
-    SPLITS,
-    Axes,
-    is_bounded,
-    is_name,
-    require_axes,
-    require_file,
-    require_memory,
-    whole_file,
-)
+from gpca.io import files
+from gpca.io.files import LARGEST_NUMBER, SPLITS, Axes, is_name, require_axes, require_file, whole_file
 
 REGENERATE = "regenerate it with Snakemake"
 TEXT, WHOLE, REAL = "U", "iu", "iuf"  # what an array holds, in the letters of NumPy
 _KNOWN = f"b{REAL}{TEXT}"
 _FLOAT_BYTES = (4, 8)
 _LONGEST_HEADER = 10_000  # bytes; NumPy parses none that is longer
+_HEADERS = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
 
 
 def save_arrays(path: str | Path, arrays: Mapping[str, np.ndarray], axes: Axes | None = None) -> None:
@@ -53,7 +44,8 @@ def load_arrays(
     """Load the arrays of an npz that a stage needs, and no others.
 
     What their headers say is checked before any data is read, so that a small file cannot fill the memory. InputError
-    for a damaged file, another source or seed, and values that are wrong in any array (:func:`_fault_of`).
+    for a damaged file, another source or seed, and values that are wrong in any array: NaN, numbers that no sensor
+    measures, names of several lines, an unknown split.
 
     Args:
         shapes: for each needed array its shape; a number must match, a name (``"S"``) must be the same size wherever
@@ -65,17 +57,32 @@ def load_arrays(
     """
     path = Path(path)
     require_file(path, "no such file", "make it with Snakemake", math.inf)
-    shapes, kinds = _with_axes(shapes, kinds or {}, axes)
+    kinds = dict(kinds or {})
+    if axes is not None:
+        of = {"source": TEXT} | ({} if axes[1] is None else {"seed": WHOLE})
+        shapes, kinds = {**shapes, **dict.fromkeys(of, ())}, kinds | of
     try:
         with zipfile.ZipFile(path) as archive:
             members = _checked_members(archive, path, shapes, kinds, optional, remedy)
-            arrays = {name: _read_array(archive, info) for name, info in members.items()}
+            arrays = {}
+            for name, info in members.items():
+                with archive.open(info) as stream:
+                    arrays[name] = np.lib.format.read_array(stream, allow_pickle=False)
     except InputError:
         raise
     except Exception as fault:  # numpy and zipfile raise errors of many kinds for a damaged archive
         raise InputError(path, "is not a readable npz archive", remedy) from fault
     for name, array in arrays.items():
-        if (value_fault := _fault_of(name, array)) is not None:
+        value_fault = None
+        if array.dtype.kind == "f" and not (np.abs(array) <= LARGEST_NUMBER).all():
+            value_fault = f"numbers above {LARGEST_NUMBER:.0e}" if np.isfinite(array).all() else "NaN or infinity"
+        elif array.dtype.kind == TEXT:
+            words = set(array.ravel().tolist())
+            if not all(is_name(word) for word in words):
+                value_fault = "a name that is empty or does not fit on one line"
+            elif name == "split" and (unknown := words - set(SPLITS)):
+                value_fault = f"the split {min(unknown)!r}, which is neither train nor test"
+        if value_fault:
             raise InputError(path, f"array '{name}' contains {value_fault}", remedy)
     if axes is not None and "source" in arrays:
         require_axes(path, axes_in(arrays), axes)
@@ -85,27 +92,6 @@ def load_arrays(
 def axes_in(arrays: Mapping[str, np.ndarray]) -> Axes:
     """Return the source and the seed that arrays name; objects of a source have no seed."""
     return str(arrays["source"]), int(arrays["seed"]) if "seed" in arrays else None
-
-
-def _with_axes(shapes, kinds, axes: Axes | None) -> tuple[dict, dict]:
-    """Return the shapes and kinds of the arrays to read, those of the axes included where axes are expected."""
-    of: dict[str, str] = {}
-    if axes is not None:
-        of = {"source": TEXT} | ({} if axes[1] is None else {"seed": WHOLE})
-    return {**shapes, **dict.fromkeys(of, ())}, {**kinds, **of}
-
-
-def _fault_of(name: str, array: np.ndarray) -> str | None:
-    """Return the fault of an array's values, of those that are faults for any purpose; None if it has none."""
-    if array.dtype.kind == "f" and not (np.abs(array) <= LARGEST_NUMBER).all():
-        return "NaN or infinity" if not np.isfinite(array).all() else f"numbers above {LARGEST_NUMBER:.0e}"
-    if array.dtype.kind == TEXT:
-        words = set(array.ravel().tolist())
-        if not all(is_name(word) for word in words):
-            return "a name that is empty or does not fit on one line"
-        if name == "split" and (unknown := words - set(SPLITS)):
-            return f"the split {sorted(unknown)[0]!r}, which is neither train nor test"
-    return None
 
 
 def _checked_members(archive, path, shapes, kinds, optional, remedy) -> dict[str, zipfile.ZipInfo]:
@@ -119,10 +105,12 @@ def _checked_members(archive, path, shapes, kinds, optional, remedy) -> dict[str
         if count != 1:
             raise InputError(path, f"array '{name}' is {'duplicated' if count else 'missing'}", remedy)
         members[name] = info = archive.getinfo(f"{name}.npy")
-        if not is_bounded(info):
+        if not files.is_bounded(info):
             raise InputError(path, f"array '{name}' uses a compression that npz does not support", remedy)
         with archive.open(info) as stream:
-            actual, dtype, start = _npy_header(stream)
+            head = io.BytesIO(stream.read(_LONGEST_HEADER))  # which may claim to be gigabytes long itself
+        read = _HEADERS[np.lib.format.read_magic(head)]
+        actual, _, dtype = read(head)
         if dtype.hasobject:
             raise InputError(path, "contains pickled objects, which are never loaded", remedy)
         _check_shape(path, name, actual, shape, sizes, remedy)
@@ -131,24 +119,10 @@ def _checked_members(archive, path, shapes, kinds, optional, remedy) -> dict[str
         if (dtype.kind == "f" and dtype.itemsize not in _FLOAT_BYTES) or not dtype.isnative:
             # Half precision has lost digits, and neither torch nor LAPACK calculates with more than double.
             raise InputError(path, f"array '{name}' has type {dtype}, not float32 or float64", remedy)
-        if start + math.prod(actual) * dtype.itemsize != info.file_size:
+        if head.tell() + math.prod(actual) * dtype.itemsize != info.file_size:
             raise ValueError(f"array '{name}' is not as long as its header says")
-    require_memory(sum(info.file_size for info in members.values()), path.stat().st_size, path, remedy)
+    files.require_memory(sum(info.file_size for info in members.values()), path.stat().st_size, path, remedy)
     return members
-
-
-def _npy_header(stream: IO[bytes]) -> tuple[tuple[int, ...], np.dtype, int]:
-    """Return shape, type and length of the header of a member; it may claim to be gigabytes long itself."""
-    head = io.BytesIO(stream.read(_LONGEST_HEADER))
-    version = np.lib.format.read_magic(head)
-    read = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}[version]
-    shape, _, dtype = read(head)
-    return shape, dtype, head.tell()
-
-
-def _read_array(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> np.ndarray:
-    with archive.open(info) as stream:
-        return np.lib.format.read_array(stream, allow_pickle=False)
 
 
 def _check_shape(path, name, actual, shape, sizes, remedy) -> None:

@@ -115,7 +115,9 @@ class Container:
             **{name: arrays[name] for name in cls.array_fields()}, axes=axes_in(arrays) if "source" in arrays else axes
         )
         loaded.check(path)
-        return loaded if samples is None else loaded.aligned_with(samples, path)
+        if samples is not None:
+            require_same_samples(path, loaded.arrays, samples.arrays)
+        return loaded
 
     @classmethod
     def read(cls, path: str | Path, axes: Axes | None, **sizes: int) -> dict[str, Any]:
@@ -141,11 +143,6 @@ class Container:
                 raise InputError(path, f"unknown {name} {min(unknown)!r}", f"expected one of {', '.join(of.choices)}")
             if of.kind != TEXT and of.kind != FLAG and not ((values >= of.least) & (values <= of.most)).all():
                 raise InputError(path, f"'{name}' contains impossible values", self.remedy)
-
-    def aligned_with(self, samples: Container, path: str | Path) -> Self:
-        """Return this container if its samples, read from a file, are those of the other one."""
-        require_same_samples(path, self.arrays, samples.arrays)
-        return self
 
 
 def require_same_samples(

@@ -51,21 +51,18 @@ def read_csv(
         raise InputError(path, f"column '{unknown[0]}' is unknown", remedy)
     if rows.empty:
         raise InputError(path, "has no rows", remedy)
-    _require_entries(path, rows[ours], remedy)
-    return rows
-
-
-def _require_entries(path: str | Path, rows: pd.DataFrame, remedy: str) -> None:
-    """Raise an InputError for an entry that is invalid in any file."""
-    for name, entries in rows.items():
+    for name, entries in rows[ours].items():
         faults = [("a line break or another control character", entries.str.contains(_CONTROL))]
         if name in NAMES:
             faults.append(("an empty name", entries.str.strip() == ""))
         if name == "split":
             faults.append(("a split that is neither train nor test", ~entries.isin(SPLITS)))
-        for fault, at in faults:
+        for fault_of_entry, at in faults:
             if at.any():
-                raise InputError(f"{path}, line {at.argmax() + 2}", f"column '{name}' contains {fault}", remedy)
+                raise InputError(
+                    f"{path}, line {at.argmax() + 2}", f"column '{name}' contains {fault_of_entry}", remedy
+                )
+    return rows
 
 
 def numbers(path: str | Path, rows: pd.DataFrame, column: str, needed=True, least: float = -np.inf) -> pd.Series:

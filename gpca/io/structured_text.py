@@ -25,6 +25,7 @@ _ALIKE = {
     bool: re.compile("true|True|TRUE|false|False|FALSE"),
     type(None): re.compile("|~|null|Null|NULL"),
 }
+_UNPRINTABLE = r"[\x00-\x1f\x7f-\x9f\ud800-\udfff]"  # control characters, and halves of a surrogate pair
 LARGEST_JSON_BYTES = 2**26  # ten times the largest scene of the BOP benchmark
 
 
@@ -75,7 +76,7 @@ def require_plain(mapping: Mapping, subject: object) -> None:
         if not isinstance(path[-1], str | _Index):
             raise InputError(f"{subject} {key}", f"the key {path[-1]!r} is not text", f'write "{path[-1]}", in quotes')
         for text in (path[-1], value):
-            if isinstance(text, str) and not _printable(text):
+            if isinstance(text, str) and re.search(_UNPRINTABLE, text):
                 raise InputError(f"{subject} {key!r}", f"{text!r} contains a control character", "write it on one line")
         if not (value is None or isinstance(value, str | int | float | Mapping | list)):
             raise InputError(f"{subject} {key}", f"{value!r} is a {type(value).__name__}", "put it in quotes")
@@ -91,11 +92,6 @@ def _entries(value: Any, path: tuple = ()) -> Iterator[tuple[tuple, Any]]:
         for key, entry in pairs:
             yield (*path, key), entry
             yield from _entries(entry, (*path, key))
-
-
-def _printable(text: str) -> bool:
-    """Return whether a text has no control character and no half of a surrogate pair."""
-    return not any(ord(letter) < 32 or 127 <= ord(letter) < 160 or 0xD800 <= ord(letter) < 0xE000 for letter in text)
 
 
 def _parse_yaml(text: str, path: Path) -> Any:
@@ -120,7 +116,11 @@ def _size(node: yaml.Node, sizes: dict[int, int | None], path: Path) -> int:
     """Return the number of entries of a node with all aliases expanded."""
     line = f"line {node.start_mark.line + 1}"
     if isinstance(node, yaml.ScalarNode):
-        _require_alike(node, f"{path}: {line}")
+        if node.tag != _MERGE:
+            value = yaml.constructor.SafeConstructor().construct_object(node)
+            if (alike := _ALIKE.get(type(value))) and not alike.fullmatch(node.value):
+                remedy = f'write {json.dumps(value)}, or "{node.value}" in quotes'
+                raise InputError(f"{path}: {line}", f"YAML 1.1 reads {node.value} as {value}", remedy)
         return 1
     if (size := sizes.get(id(node), 0)) is None:
         raise InputError(path, f"{line}: the value that begins here contains itself", "remove the alias")
@@ -141,18 +141,6 @@ def _size(node: yaml.Node, sizes: dict[int, int | None], path: Path) -> int:
     return size
 
 
-def _require_alike(node: yaml.ScalarNode, subject: str) -> None:
-    if node.tag == _MERGE:
-        return
-    value = yaml.constructor.SafeConstructor().construct_object(node)
-    if (alike := _ALIKE.get(type(value))) and not alike.fullmatch(node.value):
-        raise InputError(
-            subject,
-            f"YAML 1.1 reads {node.value} as {value}",
-            f'write {json.dumps(value)}, or "{node.value}" in quotes',
-        )
-
-
 def read_json(path: Path, what: str, remedy: str) -> dict[str, Any]:
     """Return the object in a JSON file; InputError, "is not `what`", for a damaged one."""
     require_file(path, "no such file", remedy, LARGEST_JSON_BYTES)
@@ -167,8 +155,19 @@ def read_json(path: Path, what: str, remedy: str) -> dict[str, Any]:
 
 def parse_json(text: str) -> Any:
     """Return the value of a JSON text; ValueError for none (a JSONDecodeError), a repeated key, NaN or infinity."""
+
+    def without_duplicates(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        content = dict(pairs)
+        if len(content) < len(pairs):
+            twice = next(key for n, (key, _) in enumerate(pairs) if key in dict(pairs[:n]))
+            raise ValueError(f"key {twice[:40]!r} appears twice")
+        return content
+
+    def no_constant(name: str) -> NoReturn:
+        raise ValueError(f"{name} is not a number")
+
     try:
-        return json.loads(text, object_pairs_hook=_without_duplicates, parse_constant=_no_constant)
+        return json.loads(text, object_pairs_hook=without_duplicates, parse_constant=no_constant)
     except RecursionError as fault:
         raise ValueError("nested too deeply") from fault
 
@@ -185,16 +184,3 @@ def finite_numbers(value: Any, count: int, subject: object, name: str, remedy: s
     if len(numbers) != count:
         raise InputError(subject, f"{name} has {len(numbers)} numbers, not {count}", remedy)
     return np.array(numbers, float)
-
-
-def _without_duplicates(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    content: dict[str, Any] = {}
-    for key, value in pairs:
-        if key in content:
-            raise ValueError(f"key {key[:40]!r} appears twice")
-        content[key] = value
-    return content
-
-
-def _no_constant(name: str) -> NoReturn:
-    raise ValueError(f"{name} is not a number")

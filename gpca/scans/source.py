@@ -89,6 +89,16 @@ class ScanEntry:
         """Whether no sensor measured it."""
         return self.kind == "virtual"
 
+    @property
+    def scale(self) -> float:
+        """The meters in one unit of the files."""
+        return meters_per(self.unit)
+
+    def scan(self, points_m_N_3: np.ndarray, T_scene_scan: np.ndarray | None = None) -> Scan:
+        """Return a scan in meters, whose pose is in the unit of the files."""
+        T_m = None if T_scene_scan is None else scale_translation(T_scene_scan, self.scale)
+        return Scan(points_m_N_3, T_m, np.zeros(3) if self.sensor_at_origin else None)
+
 
 PAIRS = "pairs.csv"
 NPZ_REMEDY = "make it as docs/scans.md says"
@@ -104,41 +114,34 @@ def npz_scenes(entry: ScanEntry, place: Path) -> Iterator[Scene]:
         raise InputError(place, "the folder has no npz file", "correct location")
     listed = _read_pairs(files[0].parent / PAIRS)
     for path in files:
-        yield read_scene(path, entry, listed.get(path.stem, ()))
-
-
-def read_scene(path: Path, entry: ScanEntry, printed: tuple[Known, ...] = ()) -> Scene:
-    """Read one npz file; InputError for a missing array, another shape, NaN, or a pose that is not rigid."""
-    require_file(path, "no such file", "correct location", np.inf)
-    try:
-        with zipfile.ZipFile(path) as archive:
-            members = [name.removesuffix(".npy") for name in archive.namelist()]
-    except Exception as fault:  # zipfile raises errors of many kinds for a damaged archive
-        raise InputError(path, "is not a readable npz archive", "fetch it again") from fault
-    poses = next((name for name in NPZ_POSES if name in members), None)
-    if poses is None:
-        raise InputError(path, f"has neither {' nor '.join(NPZ_POSES)}", NPZ_REMEDY)
-    order = next((name for name in NAME_ARRAYS if name in members), None)
-    head = load_arrays(
-        path, {poses: ("F", 4, 4)} | ({order: ("F",)} if order else {}), {poses: REAL}, remedy=NPZ_REMEDY
-    )
-    names = [str(name) for name in (head[order] if order else range(len(head[poses])))]
-    if len(set(names)) < len(names):
-        raise InputError(path, f"array '{order}' names a cloud twice", NPZ_REMEDY)
-    wanted = {f"{CLOUD}{name}": (f"N{name}", 3) for name in names}
-    if missing := [name for name in wanted if name not in members]:
-        raise InputError(path, f"array '{missing[0]}' is missing", NPZ_REMEDY)
-    if more := [name for name in members if name.startswith(CLOUD) and name not in wanted]:
-        raise InputError(path, f"array '{more[0]}' has no pose", NPZ_REMEDY)
-    clouds = load_arrays(path, wanted, dict.fromkeys(wanted, REAL), remedy=NPZ_REMEDY)
-    scale, scans = meters_per(entry.unit), {}
-    for name, T_scene_scan in zip(names, head[poses].astype(np.float64), strict=True):
-        points_N_3 = clouds[f"{CLOUD}{name}"].astype(np.float64)
-        require_points(points_N_3, f"{path}, {CLOUD}{name}")
-        require_rigid(T_scene_scan, f"{path}, {poses} of {name}")
-        viewpoint_3 = np.zeros(3) if entry.sensor_at_origin else None
-        scans[name] = Scan(points_N_3 * scale, scale_translation(T_scene_scan, scale), viewpoint_3)
-    return Scene(path.stem, entry.scenes or NPZ_POSES[poses], scans, printed)
+        require_file(path, "no such file", "correct location", np.inf)
+        try:
+            with zipfile.ZipFile(path) as archive:
+                members = [name.removesuffix(".npy") for name in archive.namelist()]
+        except Exception as fault:  # zipfile raises errors of many kinds for a damaged archive
+            raise InputError(path, "is not a readable npz archive", "fetch it again") from fault
+        poses = next((name for name in NPZ_POSES if name in members), None)
+        if poses is None:
+            raise InputError(path, f"has neither {' nor '.join(NPZ_POSES)}", NPZ_REMEDY)
+        order = next((name for name in NAME_ARRAYS if name in members), None)
+        shapes: dict[str, tuple[int | str, ...]] = {poses: ("F", 4, 4)} | ({order: ("F",)} if order else {})
+        head = load_arrays(path, shapes, {poses: REAL}, remedy=NPZ_REMEDY)
+        names = [str(name) for name in (head[order] if order else range(len(head[poses])))]
+        if len(set(names)) < len(names):
+            raise InputError(path, f"array '{order}' names a cloud twice", NPZ_REMEDY)
+        wanted = {f"{CLOUD}{name}": (f"N{name}", 3) for name in names}
+        if missing := [name for name in wanted if name not in members]:
+            raise InputError(path, f"array '{missing[0]}' is missing", NPZ_REMEDY)
+        if more := [name for name in members if name.startswith(CLOUD) and name not in wanted]:
+            raise InputError(path, f"array '{more[0]}' has no pose", NPZ_REMEDY)
+        clouds = load_arrays(path, wanted, dict.fromkeys(wanted, REAL), remedy=NPZ_REMEDY)
+        scans = {}
+        for name, T_scene_scan in zip(names, head[poses].astype(np.float64), strict=True):
+            points_N_3 = clouds[f"{CLOUD}{name}"].astype(np.float64)
+            require_points(points_N_3, f"{path}, {CLOUD}{name}")
+            require_rigid(T_scene_scan, f"{path}, {poses} of {name}")
+            scans[name] = entry.scan(points_N_3 * entry.scale, T_scene_scan)
+        yield Scene(path.stem, entry.scenes or NPZ_POSES[poses], scans, listed.get(path.stem, ()))
 
 
 def _read_pairs(path: Path) -> dict[str, tuple[Known, ...]]:
@@ -166,13 +169,11 @@ def ply_scenes(entry: ScanEntry, place: Path) -> Iterator[Scene]:
     files = [place / POSES_FILE] if (place / POSES_FILE).exists() else sorted(place.glob(f"*/{POSES_FILE}"))
     if not files:
         raise InputError(place / POSES_FILE, "no such file", "give the poses of the scans as docs/scans.md says")
-    scale = meters_per(entry.unit)
     for path in files:
-        scans = {}
-        for name, T_scene_scan in read_poses(path).items():
-            points_N_3 = read_surface(path.with_name(f"{name}.ply"), scale).vertices_m
-            viewpoint_3 = np.zeros(3) if entry.sensor_at_origin else None
-            scans[name] = Scan(points_N_3, scale_translation(T_scene_scan, scale), viewpoint_3)
+        scans = {
+            name: entry.scan(read_surface(path.with_name(f"{name}.ply"), entry.scale).vertices_m, T_scene_scan)
+            for name, T_scene_scan in read_poses(path).items()
+        }
         yield Scene(path.absolute().parent.name, entry.scenes, scans)
 
 
@@ -211,7 +212,6 @@ def benchmark_scenes(entry: ScanEntry, place: Path) -> Iterator[Scene]:
     found = sorted({path.parent for path in folder.glob("*/cloud_bin_*.ply")})
     if not found:
         raise InputError(folder, "has no <scene>/cloud_bin_<number>.ply", "correct location")
-    scale = meters_per(entry.unit)
     for scene_folder in found:
         evaluation = f"{scene_folder.name}-evaluation"
         folders = (scene_folder, scene_folder.with_name(evaluation), place / "gt_result" / evaluation)
@@ -220,15 +220,12 @@ def benchmark_scenes(entry: ScanEntry, place: Path) -> Iterator[Scene]:
             raise InputError(scene_folder / "gt.log", "no such file", f"put it there, or into {evaluation} beside it")
         shares = _read_overlaps(log.with_name("gt_overlap.log"))
         printed = tuple(
-            Known(target, source, shares.get((target, source)), scale_translation(T, scale))
+            Known(target, source, shares.get((target, source)), scale_translation(T, entry.scale))
             for (target, source), T in read_log(log).items()
         )
         named = sorted({name for pair in printed for name in (pair.target, pair.source)}, key=int)
-        viewpoint_3 = np.zeros(3) if entry.sensor_at_origin else None
-        scans = {
-            name: Scan(read_surface(scene_folder / f"cloud_bin_{name}.ply", scale).vertices_m, None, viewpoint_3)
-            for name in named
-        }
+        files = {name: scene_folder / f"cloud_bin_{name}.ply" for name in named}
+        scans = {name: entry.scan(read_surface(path, entry.scale).vertices_m) for name, path in files.items()}
         yield Scene(scene_folder.name, entry.scenes or "room", scans, printed)
 
 

@@ -97,7 +97,7 @@ FAULTS = [
     ("real_world.initial_pose.form", "guess", "real_world.initial_pose.form: 'guess' should be 'results', "),
     ("real_world.reductions", ["tsne"], "real_world.reductions.0: 'tsne' should be "),
     ("sources.real_rgbd", folder(), "sources.real_rgbd: is reserved for the frames of real_world"),
-    ("methods.icp", {}, "methods.icp: registration method 'icp': unknown; choose one of fgr, "),
+    ("methods.icp", {}, "methods.icp: registration method 'icp': unknown; choose one of point_to_point, "),
     ("methods.gicp.voxel", 0.1, "methods.gicp: registration method 'gicp': setting voxel: unknown"),
     ("methods.huber.kernel", "Huber", "methods.huber: registration method 'huber': setting kernel: 'Huber' should be"),
     ("methods.teaser.noise", -1, "methods.teaser: registration method 'teaser': setting noise: -1 should be greater "),

@@ -212,13 +212,8 @@ class E57:
 
     def read_scan(self, number, ignore_missing_fields):
         assert ignore_missing_fields
-        return dict(
-            zip(
-                ("cartesianX", "cartesianY", "cartesianZ"),
-                SCANNER_FILES_POINTS[2 * number : 2 * number + 2].T,
-                strict=True,
-            )
-        )
+        xyz = SCANNER_FILES_POINTS[2 * number : 2 * number + 2].T
+        return {f"cartesian{axis}": values for axis, values in zip("XYZ", xyz, strict=True)}
 
     def close(self):
         pass
