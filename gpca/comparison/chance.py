@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -40,29 +39,19 @@ WITHIN: Mapping[str, Callable[[Number], tuple[str, ...]]] = {  # printed numbers
 }
 
 
-@dataclass(frozen=True)
-class Chance:
-    """Agreement by chance in one table.
+class Agreement(NamedTuple):
+    """Agreement with the numbers of one table, and by chance."""
 
-    Attributes:
-        agree: how many numbers are reproduced or close.
-        expected: the mean of that count with the run's values shuffled within the column.
-        p: share of the shuffles, the run's order included, with at least as many; NaN where no shuffle is possible.
-        rho: Spearman's rank correlation, with ranks within each column; NaN where no column has two values.
-    """
-
-    agree: int
-    expected: float
-    p: float
-    rho: float
+    agree: int  # numbers that are reproduced or close
+    expected: float  # mean of that count with the run's values shuffled within the column
+    p: float  # share of shuffles, the run's order included, with as many; NaN where none is possible
+    rho: float  # Spearman's rank correlation, with ranks within each column; NaN where no column has two values
 
 
-def chance(comparison: pd.DataFrame, tolerances: Mapping[str, Tolerance]) -> dict[str, Chance]:
-    """Return table (and `ALL`) -> :class:`Chance` of the judged means; repeats of a value are left out.
+def chance(comparison: pd.DataFrame, tolerances: Mapping[str, Tolerance]) -> dict[str, Agreement]:
+    """Return table (and `ALL`) -> agreement of the judged means, each value once.
 
-    Args:
-        comparison: as :func:`gpca.comparison.verdicts.compare` returns it, or as read from its file.
-        tolerances: by unit.
+    The comparison is what :func:`gpca.comparison.verdicts.compare` returns, or read from its file.
     """
     rows = judged_once(comparison)
     rows = rows[rows["verdict"].isin(JUDGED)]
@@ -86,27 +75,22 @@ def chance(comparison: pd.DataFrame, tolerances: Mapping[str, Tolerance]) -> dic
         p = float((1 + (hits_B >= agree).sum()) / (1 + SHUFFLES)) if movable else math.nan
         one_N, other_N = ranks_N_2.T
         norm = math.sqrt((one_N @ one_N) * (other_N @ other_N))
-        chances[name] = Chance(agree, float(expected), p, float(one_N @ other_N / norm) if norm else math.nan)
+        chances[name] = Agreement(agree, float(expected), p, float(one_N @ other_N / norm) if norm else math.nan)
     return chances
 
 
 def _fits(group: pd.DataFrame, tolerances: Mapping[str, Tolerance]) -> np.ndarray:
     """Return (K, K): whether the printed number i agrees with the run's value j."""
     rows = list(group.itertuples())
-    values = [
-        Reproduced(
-            row.reproduced, row.ci_low, row.ci_high, int(row.n), bool(row.at_least), row.cluster_low, row.cluster_high
-        )
-        for row in rows
-    ]
     fits_K_K = np.zeros((len(rows), len(rows)), dtype=bool)
     for i, row in enumerate(rows):
         upper = row.published if math.isnan(row.upper) else row.upper
         low, high = (row.published, upper) if math.isnan(row.paper_low) else (row.paper_low, row.paper_high)
         printed = Printed(row.published, upper, 0.5 * 10.0**-row.decimals, low, high)
-        for j, (measured, value) in enumerate(zip(rows, values, strict=True)):
-            in_unit = value.times(UNITS[row.unit].factor / UNITS[measured.unit].factor)
-            fits_K_K[i, j] = verdict_of(printed, in_unit, tolerances[row.unit]) in (REPRODUCED, CLOSE)
+        for j, run in enumerate(rows):
+            bounds = (run.ci_low, run.ci_high, int(run.n), bool(run.at_least), run.cluster_low, run.cluster_high)
+            value = Reproduced(run.reproduced, *bounds).times(UNITS[row.unit].factor / UNITS[run.unit].factor)
+            fits_K_K[i, j] = verdict_of(printed, value, tolerances[row.unit]) in (REPRODUCED, CLOSE)
     return fits_K_K
 
 

@@ -9,7 +9,7 @@ that is smaller than the margin is no refutation, and has a verdict of its own.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
@@ -41,8 +41,6 @@ CLAIM_COLUMNS = (
     *("claim", "sentence", "place", "test", "unit", "margin", "ratio", "source", "table", "one", "other"),
     *("value", "low", "high", "n", "at_floor", "verdict", "claim_verdict", "note", "margin_set", "values_known"),
 )
-Value = str | float | Mapping  # a method, a number, or the entries that differ from the claim's
-Bounds = tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -84,7 +82,7 @@ class Claim:
 
 
 @dataclass(frozen=True)
-class Difference:
+class ClaimDifference:
     """A difference of two values, or of their logarithms for a claim about a ratio.
 
     Attributes:
@@ -95,7 +93,7 @@ class Difference:
     """
 
     value: float
-    bounds: Mapping[float, Bounds]
+    bounds: Mapping[float, tuple[float, float]]
     n: int
     at_least: bool = False
     at_most: bool = False
@@ -104,33 +102,31 @@ class Difference:
 
 def read_claims() -> list[Claim]:
     """Return the claims, in the order of the file; a test checks it against the rules at its head."""
+
+    def value(shared: Mapping, entry: str | float | Mapping) -> Counterpart | float:
+        if isinstance(entry, int | float):
+            return float(entry)
+        full = {**shared, **(entry if isinstance(entry, Mapping) else {"method": entry})}
+        place = (full["in_file"], full["in_table"], (full["source"],))
+        methods, metrics = tuple(full["method"].split("+")), tuple(full["metric"].split("/"))
+        return Counterpart(*place, methods, metrics, full["concept"], "mean")
+
     claims = []
     for entry in load_own_yaml(CLAIMS):
-        compared = tuple(pair for each in entry.get("comparisons", ()) for pair in _pairs(entry["of"], **each))
-        fields = {name: value for name, value in entry.items() if name not in ("of", "comparisons")}
-        claims.append(Claim(**fields, compared=compared))
+        compared, of = [], entry.get("of", {})
+        listed = [each if isinstance(each, list) else [each] for each in (of.get("source"), of.get("in_table"))]
+        for comparison in entry.get("comparisons", ()):
+            for other, source, table in product(comparison["others"], *listed):
+                shared = {**of, "source": source, "in_table": table}
+                compared.append(Compared(value(shared, comparison["one"]), value(shared, other)))
+        fields = {name: each for name, each in entry.items() if name not in ("of", "comparisons")}
+        claims.append(Claim(**fields, compared=tuple(compared)))
     return claims
 
 
 def counterparts_of(claims: Iterable[Claim]) -> list[Counterpart]:
     """Return all values of a run that the claims compare."""
     return [counterpart for claim in claims for compared in claim.compared for counterpart in compared.counterparts]
-
-
-def _pairs(of: Mapping, one: Value, others: Sequence[Value]) -> Iterator[Compared]:
-    """Yield every pair of one comparison, by source and table."""
-    listed = (value if isinstance(value, list) else [value] for value in (of.get("source"), of.get("in_table")))
-    for other, source, table in product(others, *listed):
-        shared = {**of, "source": source, "in_table": table}
-        yield Compared(_value(shared, one), _value(shared, other))
-
-
-def _value(shared: Mapping, value: Value) -> Counterpart | float:
-    if isinstance(value, int | float):
-        return float(value)
-    full = {**shared, **(value if isinstance(value, Mapping) else {"method": value})}
-    methods, metrics = tuple(full["method"].split("+")), tuple(full["metric"].split("/"))
-    return Counterpart(full["in_file"], full["in_table"], (full["source"],), methods, metrics, full["concept"], "mean")
 
 
 def judge(
@@ -165,44 +161,56 @@ def judge(
         if not claim.compared:
             records.append({**fields, "verdict": NOT_RUN, "claim_verdict": NOT_RUN})
             continue
+        fields |= {name: getattr(claim, name) for name in ("test", "unit", "margin", "ratio")}
         rows, strict_verdicts = [], []
         strict = 1 - (1 - LEVEL) / len(claim.compared)
         for compared in claim.compared:
+            counterparts = compared.counterparts
+            row: dict[str, Any] = {"source": counterparts[0].sources[0], "table": counterparts[0].table}
+            row |= {"at_floor": False, **{each: _name(compared, each) for each in ("one", "other")}}
+            verdict = strict_verdict = NOT_RUN
             difference = difference_of(claim, compared, results, clusters, (LEVEL, strict), floors.get(claim.unit))
-            row, strict_verdict = _row(claim, compared, difference, objects, strict)
-            rows.append(fields | row)
+            if difference is not None:
+                shown = (difference.value, *difference.bounds[LEVEL])
+                for name, number in zip(("value", "low", "high"), shown, strict=True):
+                    row[name] = round(math.exp(number) if claim.ratio else number, 6)
+                row |= {"n": difference.n, "at_floor": difference.at_floor}
+                sources = (each.sources[0] for each in counterparts)
+                if any(objects[source]["stand_in"] for source in sources if source in objects):
+                    verdict = strict_verdict = NOT_COMPARABLE
+                elif difference.at_floor:
+                    verdict = strict_verdict = INCONCLUSIVE
+                else:
+                    verdict, strict_verdict = (_verdict(claim, difference, level) for level in (LEVEL, strict))
+            rows.append(fields | row | {"verdict": verdict})
             strict_verdicts.append(strict_verdict)
-        verdicts = [row["verdict"] for row in rows]
-        judged = set(verdicts) - {NOT_RUN, NOT_COMPARABLE}
-        if not judged:
-            claim_verdict = NOT_COMPARABLE if NOT_COMPARABLE in verdicts else NOT_RUN
-        else:
+        verdicts = {row["verdict"] for row in rows}
+        if judged := verdicts - {NOT_RUN, NOT_COMPARABLE}:
             against = (verdict for verdict in (REFUTED, SMALLER) if verdict in strict_verdicts)
             claim_verdict = next(against, SUPPORTED if judged == {SUPPORTED} else INCONCLUSIVE)
+        else:
+            claim_verdict = NOT_COMPARABLE if NOT_COMPARABLE in verdicts else NOT_RUN
         records += [row | {"claim_verdict": claim_verdict} for row in rows]
     return pd.DataFrame(records, columns=list(CLAIM_COLUMNS)).astype({"n": "Int64"})
 
 
-def _row(claim: Claim, compared: Compared, difference: Difference | None, objects, strict: float) -> tuple[dict, str]:
-    """Return the columns of a comparison, and its verdict by the stricter interval."""
-    counterparts = compared.counterparts
-    row: dict[str, object] = {
-        **{"test": claim.test, "unit": claim.unit, "margin": claim.margin, "ratio": claim.ratio},
-        **{"source": counterparts[0].sources[0], "table": counterparts[0].table, "at_floor": False},
-        **{name: _name(getattr(compared, name), counterparts) for name in ("one", "other")},
-    }
-    if difference is None:
-        return row | {"verdict": NOT_RUN}, NOT_RUN
-    (low, high), strict_bounds = (difference.bounds[level] for level in (LEVEL, strict))
-    shown = (math.exp(bound) if claim.ratio else bound for bound in (difference.value, low, high))
-    row |= {name: round(bound, 6) for name, bound in zip(("value", "low", "high"), shown, strict=True)}
-    row |= {"n": difference.n, "at_floor": difference.at_floor}
-    sources = (counterpart.sources[0] for counterpart in counterparts)
-    if any(objects[source]["stand_in"] for source in sources if source in objects):
-        return row | {"verdict": NOT_COMPARABLE}, NOT_COMPARABLE
-    if difference.at_floor:
-        return row | {"verdict": INCONCLUSIVE}, INCONCLUSIVE
-    # A censored difference may be larger or smaller than it looks, which leaves one of the answers open.
+def _name(compared: Compared, which: str) -> str:
+    """Name a value by what distinguishes it from the other: its method, or its metric where both have one method.
+
+    A value that is compared with a constant also names its concept.
+    """
+    value, counterparts = getattr(compared, which), compared.counterparts
+    if not isinstance(value, Counterpart):
+        return f"{value:g}"
+    if len(counterparts) == 1 and value.concept != ALL:
+        return f"{'+'.join(value.methods)} {value.concept}"
+    if len({counterpart.methods for counterpart in counterparts}) < len(counterparts):
+        return f"{value.concept} {value.metrics[0]}"
+    return "+".join(value.methods)
+
+
+def _verdict(claim: Claim, difference: ClaimDifference, level: float) -> str:
+    """Return the verdict by an interval; a censored difference leaves one of the answers open."""
     may_rise, may_fall = difference.at_least, difference.at_most
     if claim.test == "less":
         may_rise, may_fall = may_fall, may_rise
@@ -211,9 +219,8 @@ def _row(claim: Claim, compared: Compared, difference: Difference | None, object
         SMALLER: may_rise or may_fall,
         REFUTED: may_rise,
     }
-    verdicts = (verdict_of_interval(claim, *bounds) for bounds in ((low, high), strict_bounds))
-    verdict, strict_verdict = (INCONCLUSIVE if is_open.get(verdict) else verdict for verdict in verdicts)
-    return row | {"verdict": verdict}, strict_verdict
+    verdict = verdict_of_interval(claim, *difference.bounds[level])
+    return INCONCLUSIVE if is_open.get(verdict) else verdict
 
 
 def verdict_of_interval(claim: Claim, low: float, high: float) -> str:
@@ -234,20 +241,6 @@ def verdict_of_interval(claim: Claim, low: float, high: float) -> str:
     return SUPPORTED if supported else REFUTED if refuted else INCONCLUSIVE
 
 
-def _name(value: Counterpart | float, counterparts: Sequence[Counterpart]) -> str:
-    """Name a value by what distinguishes it from the other: its method, or its metric where both have one method.
-
-    A value that is compared with a constant also names its concept.
-    """
-    if not isinstance(value, Counterpart):
-        return f"{value:g}"
-    if len(counterparts) == 1 and value.concept != ALL:
-        return f"{'+'.join(value.methods)} {value.concept}"
-    if len({counterpart.methods for counterpart in counterparts}) < len(counterparts):
-        return f"{value.concept} {value.metrics[0]}"
-    return "+".join(value.methods)
-
-
 def difference_of(
     claim: Claim,
     compared: Compared,
@@ -255,27 +248,22 @@ def difference_of(
     clusters: Mapping[Counterpart, ShareDraws],
     levels: Iterable[float],
     floor: float | None = None,
-) -> Difference | None:
+) -> ClaimDifference | None:
     """Return a comparison's difference in the claim's unit, with intervals of these levels; None if the run lacks it.
 
-    Args:
-        floor: the minimum of the unit.
+    `floor` is the minimum of the unit.
     """
-    files = {counterpart.file for counterpart in compared.counterparts}
+    files, factor = {counterpart.file for counterpart in compared.counterparts}, UNITS[claim.unit].factor
     if not files <= set(results):
         return None
     if files == {RUNTIME}:
         return _runtime_difference(claim, compared, results[RUNTIME], levels)
-    values: list[Any] = []  # a series by seed, or a constant
-    censored = []
-    for value in (compared.one, compared.other):
+    values: list[Any] = [compared.one, compared.other]  # a series by seed, or a constant
+    censored = [False, False]
+    for i, value in enumerate(values):
         if isinstance(value, Counterpart):
-            value_R, at_least = values_by_seed(results[value.file], value)
-            values.append(value_R * UNITS[claim.unit].factor)
-            censored.append(at_least)
-        else:
-            values.append(value)
-            censored.append(False)
+            value_R, censored[i] = values_by_seed(results[value.file], value)
+            values[i] = value_R * factor
     with np.errstate(divide="ignore", invalid="ignore"):
         one, other = (np.log(value) for value in values) if claim.ratio else values
         difference_R = np.asarray((one - other).dropna(), dtype=float)
@@ -288,37 +276,37 @@ def difference_of(
         if np.ptp(difference_R) < NO_WIDTH:  # equal seeds do not show how wide the interval of a share is
             bounds = dict.fromkeys(bounds, (math.nan, math.nan))
         for level, (low, high) in bounds.items():
-            cluster_low, cluster_high = _cluster_bounds(claim, compared, clusters, level)
+            cluster_low, cluster_high = (factor * bound for bound in _cluster_bounds(compared, clusters, level, factor))
             bounds[level] = float(np.fmin(low, cluster_low)), float(np.fmax(high, cluster_high))
     at_floor = False
     if floor is not None and len(compared.counterparts) == 2:
         at_floor = bool(((values[0] <= floor) & (values[1] <= floor)).mean() >= 0.5)
-    at_least, at_most = censored
-    return Difference(float(difference_R.mean()), bounds, len(difference_R), at_least, at_most, at_floor)
+    return ClaimDifference(float(difference_R.mean()), bounds, len(difference_R), *censored, at_floor)
 
 
-def _cluster_bounds(claim: Claim, compared: Compared, clusters: Mapping[Counterpart, ShareDraws], level) -> Bounds:
-    """Return the bounds over clusters and seeds in the claim's unit; NaN where a value is no share of samples."""
-    factor = UNITS[claim.unit].factor
+def _cluster_bounds(
+    compared: Compared, clusters: Mapping[Counterpart, ShareDraws], level: float, factor: float
+) -> tuple[float, float]:
+    """Return the bounds over clusters and seeds; NaN where a value is no share of samples."""
     one, other = (
         clusters.get(value) if isinstance(value, Counterpart) else value / factor
         for value in (compared.one, compared.other)
     )
     match one, other:
         case ShareDraws(), ShareDraws():
-            low, high = one.bounds_of_difference(other, level)
+            return one.bounds(level, minus=other)
         case ShareDraws(), float():
-            low, high = (bound - other for bound in one.bounds(level))
+            low, high = one.bounds(level)
+            return low - other, high - other
         case float(), ShareDraws():
-            high, low = (one - bound for bound in other.bounds(level))
-        case _:
-            return math.nan, math.nan
-    return factor * low, factor * high
+            low, high = other.bounds(level)
+            return one - high, one - low
+    return math.nan, math.nan
 
 
 def _runtime_difference(
     claim: Claim, compared: Compared, rows: pd.DataFrame, levels: Iterable[float]
-) -> Difference | None:
+) -> ClaimDifference | None:
     """Compare mean seconds of independent measurements; logarithms by the delta method."""
     from scipy.stats import t as student_t
 
@@ -333,15 +321,11 @@ def _runtime_difference(
         factor = UNITS[claim.unit].factor
         value, error = factor * (one - other), factor * math.hypot(error, other_error)
     widths = {level: student_t.ppf((1 + level) / 2, n - 1) * error if n > 1 else math.nan for level in levels}
-    return Difference(value, {level: (value - width, value + width) for level, width in widths.items()}, n)
+    return ClaimDifference(value, {level: (value - width, value + width) for level, width in widths.items()}, n)
 
 
 def score_measures(claims: Sequence[Claim], prediction_files: Iterable[str | Path]) -> pd.DataFrame:
-    """Return the measures of scores in prediction files that the claims compare, tidy, by seed.
-
-    - ece: the expected calibration error.
-    - separability: :func:`separability`.
-    """
+    """Return tidy rows of ece and :func:`separability` of the scores in prediction files that the claims compare."""
     import pandas as pd
 
     wanted = {(c.sources[0], c.methods[0]) for c in counterparts_of(claims) if c.file == PREDICTIONS}
@@ -361,28 +345,18 @@ def score_measures(claims: Sequence[Claim], prediction_files: Iterable[str | Pat
 
 
 def separability(p_S_C: np.ndarray, target_S: np.ndarray) -> float:
-    """Return the mean pairwise AUROC of scores (S, C), over all ordered pairs of classes (Hand and Till 2001).
-
-    It is 0.5 by chance, and NaN for fewer than two classes.
-    """
+    """Return the mean pairwise AUROC of scores, over all ordered pairs of classes (Hand and Till 2001); NaN for one."""
     from sklearn.metrics import roc_auc_score
 
-    present = np.unique(target_S)
-    areas = [
-        roc_auc_score(target_S[pair_S] == one, p_S_C[pair_S, one])
-        for one in present
-        for other in present
-        if one != other
-        for pair_S in [np.isin(target_S, (one, other))]
-    ]
+    areas = []
+    for one, other in product(np.unique(target_S), repeat=2):
+        if one != other:
+            pair_S = np.isin(target_S, (one, other))
+            areas.append(roc_auc_score(target_S[pair_S] == one, p_S_C[pair_S, one]))
     return float(np.mean(areas)) if areas else math.nan
 
 
 def read_verdicts(path: str | Path) -> pd.DataFrame:
-    """Read what :func:`judge` returned; claims that were not run have no numbers.
-
-    Raises:
-        InputError: missing, empty or unreadable file, missing column, invalid number.
-    """
+    """Read what :func:`judge` returned; claims that were not run have no numbers."""
     measured = ("value", "low", "high", "n")
     return read_numbers(path, CLAIM_COLUMNS, measured, optional=measured)

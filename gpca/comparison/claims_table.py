@@ -18,11 +18,20 @@ if TYPE_CHECKING:
     import pandas as pd
 
 COMPONENTS = "components"  # of the runtime
+HEADS = {"claim": "The paper", "claim_verdict": "Verdict", "source": "Dataset", "table": "Samples"}
+HEADS |= {"compared": "Compared", "expected": "Expected", "verdict": "Holds"}
 _TESTS = {"greater": "greater", "less": "less", "not_worse": "not worse", "equivalent": "the same"}
+_RULE = (
+    "of differences of the same seed, or of accuracies the farther bounds of it and of one over clusters of objects or "
+    "scenes. A sentence is supported if all of its comparisons are, and refuted or smaller than the margin if one is, "
+    "by an interval that allows for their number. Smaller than the margin: not below 0, but below what is expected. "
+    "Floor: both are at the first labels, so the difference is unknown. Not worse and the same: the whole interval "
+    "lies within the margin. docs/comparison.md has the whole rule."
+)
 
 
 @dataclass(frozen=True)
-class Difference(Column):
+class DifferenceColumn(Column):
     """Shows a difference, or a factor, with the bounds of its interval and three digits."""
 
     def text(self, cell: Cell) -> str:
@@ -39,51 +48,43 @@ def claims(verdicts: pd.DataFrame, sources: Mapping[str, Mapping], titles: Mappi
         verdicts: as :func:`gpca.comparison.claims.read_verdicts` reads them.
         titles: method -> what the tables call it.
     """
-    table = TableBuilder(
-        "claims",
-        {
-            "claim": "The paper",
-            "claim_verdict": "Verdict",
-            "source": "Dataset",
-            "table": "Samples",
-            "compared": "Compared",
-            "expected": "Expected",
-            "verdict": "Holds",
-        },
-    )
+
+    def titled(name: str) -> str:
+        method, _, concept = name.partition(" ")
+        return f"{titles[method]} {concept}".rstrip() if method in titles else name
+
+    table = TableBuilder("claims", HEADS)
     seen: set[str] = set()
     for row in verdicts[verdicts["verdict"] != NOT_RUN].itertuples():
-        first = row.claim not in seen
+        first, margin = row.claim not in seen, float(row.margin)
         seen.add(row.claim)
-        compared = f"{_titled(row.one, titles)} against {_titled(row.other, titles)}"
-        source = title_of(sources[row.source]) if row.source in sources else row.source
+        unit = "" if row.unit in ("correlation", "risk", "share") else f" {row.unit}"
+        by = f", by × {margin:g}" if row.ratio == "True" else f", by {margin:g}{unit}" if margin else ""
         table.add_row(
             [
                 (row.claim, f"{row.sentence} ({row.place})" if first else ""),
                 (row.claim_verdict, row.claim_verdict if first else ""),
-                (row.source, source),
+                (row.source, title_of(sources[row.source]) if row.source in sources else row.source),
                 (row.table, row.table.rpartition("/")[2].replace("_", " ")),
-                (f"{row.one} against {row.other}", compared),
-                (row.test, _expected(row)),
+                (f"{row.one} against {row.other}", f"{titled(row.one)} against {titled(row.other)}"),
+                (row.test, _TESTS[row.test] + by),
                 (row.verdict, f"{row.verdict} (floor)" if row.at_floor == "True" else row.verdict),
             ],
             {"difference": Cell(row.value, row.high - row.value, int(row.n), 0, bounds=(row.low, row.high))},
         )
-    open_ones = verdicts[verdicts["claim_verdict"] == NOT_RUN].drop_duplicates("claim")
+    # The components' times are of repeats.
+    of_seeds = verdicts[verdicts["n"].notna() & (verdicts["table"] != COMPONENTS)]
+    seeds = plural(span(of_seeds["n"]), "seed") if len(of_seeds) else "repeats"
+    not_run = verdicts[verdicts["claim_verdict"] == NOT_RUN].drop_duplicates("claim").itertuples()
     return table.build(
         caption="What the paper says in sentences, and whether the differences in this run support it",
         column_head="quantity",
-        columns={"difference": Difference("First minus second, or their ratio", limits=(-math.inf, math.inf))},
+        columns={"difference": DifferenceColumn("First minus second, or their ratio", limits=(-math.inf, math.inf))},
         footnotes=(
             counted(verdicts),
-            f"In brackets: the 95 % interval over {_seeds(verdicts)} of differences of the same seed, or of accuracies "
-            "the farther bounds of it and of one over clusters of objects or scenes. A sentence is supported if all of "
-            "its comparisons are, and refuted or smaller than the margin if one is, by an interval that allows for "
-            "their number. Smaller than the margin: not below 0, but below what is expected. Floor: both are at the "
-            "first labels, so the difference is unknown. Not worse and the same: the whole interval lies within the "
-            "margin. docs/comparison.md has the whole rule.",
+            f"In brackets: the 95 % interval over {seeds} {_RULE}",
             *margins_in_words(verdicts),
-            *(_not_run(row) for row in open_ones.itertuples()),
+            *(f"Not run: {row.sentence} ({row.place}){': ' if row.note else ''}{row.note}." for row in not_run),
         ),
     )
 
@@ -98,33 +99,8 @@ def counted(verdicts: pd.DataFrame) -> str:
 def margins_in_words(verdicts: pd.DataFrame) -> list[str]:
     """Return a sentence on when the margins of the claims were set, and what was known by then."""
     once = verdicts.drop_duplicates("claim")
-    once = once[once["test"] != ""]
     phrases = []
-    for (day, known), claims_of_day in once.groupby(["margin_set", "values_known"], sort=True):
-        before = "after the differences had been seen" if known == "True" else "before the differences were looked at"
-        phrases.append(f"{len(claims_of_day)} on {day}, {before}")
+    for (day, seen), of_day in once[once["test"] != ""].groupby(["margin_set", "values_known"], sort=True):
+        before = "after the differences had been seen" if seen == "True" else "before the differences were looked at"
+        phrases.append(f"{len(of_day)} on {day}, {before}")
     return [f"Margins were set for {'; '.join(phrases)}."] if phrases else []
-
-
-def _seeds(verdicts: pd.DataFrame) -> str:
-    """Return over how many seeds the differences are; those of the components' times are of repeats."""
-    of_seeds = verdicts[verdicts["n"].notna() & (verdicts["table"] != COMPONENTS)]
-    return plural(span(of_seeds["n"]), "seed") if len(of_seeds) else "repeats"
-
-
-def _titled(name: str, titles: Mapping[str, str]) -> str:
-    """Return what the tables call a method, before the concept that it is of, if one is named."""
-    method, _, concept = name.partition(" ")
-    return f"{titles[method]} {concept}".rstrip() if method in titles else name
-
-
-def _expected(row) -> str:
-    margin = float(row.margin)
-    if row.ratio == "True":
-        return f"{_TESTS[row.test]}, by × {margin:g}"
-    unit = "" if row.unit in ("correlation", "risk", "share") else f" {row.unit}"
-    return f"{_TESTS[row.test]}, by {margin:g}{unit}" if margin else _TESTS[row.test]
-
-
-def _not_run(row) -> str:
-    return f"Not run: {row.sentence} ({row.place}){': ' if row.note else ''}{row.note}."

@@ -9,10 +9,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -21,8 +20,7 @@ from gpca.comparison.chance import WITHIN, is_close, p_value, permuted, weights
 from gpca.comparison.published import UNITS, Number
 from gpca.comparison.verdicts import Tolerance
 from gpca.errors import InputError
-from gpca.io.csv_file import numbers as number_column
-from gpca.io.csv_file import read_csv
+from gpca.io.csv_file import read_csv, read_numbers
 from gpca.settings import Distinct, Keys, OpenShare
 
 if TYPE_CHECKING:
@@ -91,29 +89,17 @@ def numbers_asked(numbers: Sequence[Number], sources: Sequence[str] | None = Non
     ]
 
 
-@dataclass(frozen=True)
-class Found:
-    """Result of a search.
+class Found(NamedTuple):
+    """Result of a search."""
 
-    Attributes:
-        joint: the first of the readings with the largest share, in the order of the grid.
-        share: that share, between 0 and 1.
-        close: (K,) which numbers are close under it.
-        best: the readings with the largest shares, first to last, each with its share.
-        equals: number of readings with the largest share.
-        readings: number of all readings.
-        protocol: the share of the grid's first reading, in which every choice has the protocol's value.
-        by_chance: way of permuting -> (D,) the largest share for each permutation of the printed numbers.
-    """
-
-    joint: Joint
+    joint: Joint  # the first of the readings with the largest share, in the order of the grid
     share: float
-    close: np.ndarray
-    best: list[tuple[Joint, float]]
-    equals: int
-    readings: int
-    protocol: float
-    by_chance: Mapping[str, np.ndarray]
+    close: np.ndarray  # (K,) which numbers are close under it
+    best: list[tuple[Joint, float]]  # readings with the largest shares
+    equals: int  # number of readings with the largest share
+    readings: int  # number of all
+    protocol: float  # share of the grid's first reading, in which every choice has the protocol's value
+    by_chance: Mapping[str, np.ndarray]  # way of permuting -> (D,) largest share for each permutation
 
 
 def search(
@@ -132,12 +118,8 @@ def search(
         printed: these and others, which take their places in permutations.
         measured: tidy rows of one source that stands for theirs, with `table` as :func:`part_name` has it.
         grid: the values of every choice, the protocol's first.
-        tolerances: of each unit.
         deals: number of permutations of the printed numbers.
         shown: number of readings in `best`.
-
-    Raises:
-        InputError: a number without values, or a value that the grid needs and the rows lack.
     """
     shape = tuple(len(grid[choice]) for choice in CHOICES)
     closes = [_closes(number, printed, measured, grid, tolerances) for number in numbers]
@@ -145,28 +127,20 @@ def search(
     index_K = np.array([printed.index(number) for number in numbers])
     share_G = _shares(closes, index_K, weight_K, shape)
     order = np.argsort(-np.round(share_G.ravel(), 9), kind="stable")
-    largest, best_at = float(share_G.ravel()[order[0]]), np.unravel_index(order[0], shape)
     best = []
     for index in order[:shown]:
         at = np.unravel_index(index, shape)
         joint = {choice: grid[choice][int(i)] for choice, i in zip(CHOICES, at, strict=True)}
         best.append((joint, float(share_G.ravel()[index])))
-    close_K = [
-        bool(np.broadcast_to(close[index], shape)[best_at]) for close, index in zip(closes, index_K, strict=True)
-    ]
-    by_chance = {
-        within: np.array(
-            [
-                _shares(closes, permuted_P[index_K], weight_K, shape).max()
-                for permuted_P in permuted(printed, within, deals)
-            ]
-        )
-        for within in WITHIN
-    }
-    equals = int((share_G >= largest - 1e-9).sum())
-    return Found(
-        best[0][0], largest, np.array(close_K), best, equals, share_G.size, float(share_G.ravel()[0]), by_chance
-    )
+    best_at = np.unravel_index(order[0], shape)
+    close_K = [np.broadcast_to(close[index], shape)[best_at] for close, index in zip(closes, index_K, strict=True)]
+    by_chance = {}
+    for within in WITHIN:
+        shares = (_shares(closes, dealt_P[index_K], weight_K, shape) for dealt_P in permuted(printed, within, deals))
+        by_chance[within] = np.array([share.max() for share in shares])
+    joint, largest = best[0]
+    equals, protocol = int((share_G >= largest - 1e-9).sum()), float(share_G.ravel()[0])
+    return Found(joint, largest, np.array(close_K), best, equals, share_G.size, protocol, by_chance)
 
 
 def values_of(number: Number, measured: pd.DataFrame) -> dict[str, tuple[float, bool]]:
@@ -212,12 +186,9 @@ def _closes(
 def _shares(
     closes: Sequence[np.ndarray], printed_K: np.ndarray, weight_K: np.ndarray, shape: tuple[int, ...]
 ) -> np.ndarray:
-    """Share of close numbers of every joint reading, if these printed numbers stand in the places of the numbers.
-
-    Numbers that depend on the same choices are added up before the whole grid is.
-    """
+    """Share of close numbers of every joint reading, if these printed numbers stand in the places of the numbers."""
     by_shape: dict[tuple[int, ...], np.ndarray] = {}
-    for k, close in enumerate(closes):
+    for k, close in enumerate(closes):  # those that depend on the same choices are added up before the whole grid is
         weighted = weight_K[k] * close[printed_K[k]]
         by_shape[weighted.shape] = by_shape.get(weighted.shape, 0) + weighted
     share_G = np.zeros(shape)
@@ -233,10 +204,7 @@ def scores(
     by_chance: Mapping[str, np.ndarray],
     method: str = EVALUATED,
 ) -> list[Record]:
-    """Numbers and close ones of each table and of all; the share of close ones with equal weights of the tables.
-
-    Of the permutations of the printed numbers, the mean share and p.
-    """
+    """Numbers and close ones of each table and of all, their share with equal weights of the tables, its chance."""
     records: list[Record] = []
     tables = np.array([number.table for number in numbers])
     for table in dict.fromkeys(tables):
@@ -258,12 +226,9 @@ def scores_of_values(
     method: str,
 ) -> list[Record]:
     """:func:`scores` of a value for each number, with whether it is a lower bound."""
-    close_K_K = np.array(
-        [
-            [printed.unit == number.unit and is_close(printed, *value, tolerances[number.unit]) for printed in numbers]
-            for number, value in zip(numbers, value_K, strict=True)
-        ]
-    )
+    close_K_K = np.zeros((len(numbers), len(numbers)), bool)
+    for (k, number), (i, printed) in product(enumerate(numbers), repeat=2):
+        close_K_K[k, i] = printed.unit == number.unit and is_close(printed, *value_K[k], tolerances[number.unit])
     index_K, weight_K = np.arange(len(numbers)), weights(numbers)
     by_chance = {
         within: np.array([close_K_K[index_K, printed_K] @ weight_K for printed_K in permuted(numbers, within, deals)])
@@ -284,15 +249,10 @@ def judge(
     """A row of `VERDICT_COLUMNS` for each number, and the scores of the joint reading and of the protocol.
 
     Args:
-        numbers: those that are judged.
         joint: tidy rows of the joint reading.
         comparison: text of the run's comparison: `reproduced`, `at_least`.
         readings: as :func:`gpca.comparison.readings.read_judged` reads them.
-        tolerances: of each unit.
         deals: number of permutations of the printed numbers.
-
-    Raises:
-        InputError: a number without a value of the joint reading.
     """
     of_run = comparison.set_index(["table", "row", "column"])[["reproduced", "at_least"]]
     counts = readings.groupby(["table", "row", "column"])["close"].agg(["size", "sum"])
@@ -302,20 +262,15 @@ def judge(
         measured = joint[joint["source"].isin(sources)]
         values = list(values_of(number, measured).values())
         if len(values) != 1:
-            fault = f"has {len(values)} values of {' / '.join(number.key)}"
-            raise InputError("joint reading", fault, "make it again")
+            raise InputError("joint reading", f"has {len(values)} values of {' / '.join(number.key)}", "make it again")
         [value] = values
         reproduced, at_least = of_run.loc[number.key]
         run_value = (float(reproduced or "nan"), at_least == "True")  # empty where the run has no such value
         upper = number.upper if number.upper > number.value else math.nan
-        rows.append(
-            (
-                *(*number.key, number.unit, number.value, upper),
-                *(*run_value, is_close(number, *run_value, tolerance)),
-                *(round(value[0], 6), value[1], is_close(number, *value, tolerance), measured["seed"].nunique()),
-                *([int(count) for count in counts.loc[number.key]] if number.key in counts.index else [0, 0]),
-            )
-        )
+        row = (*number.key, number.unit, number.value, upper, *run_value, is_close(number, *run_value, tolerance))
+        row += (round(value[0], 6), value[1], is_close(number, *value, tolerance), measured["seed"].nunique())
+        close = counts.loc[number.key].tolist() if number.key in counts.index else [0, 0]
+        rows.append((*row, *close))
         joint_values.append(value)
         run_values.append(run_value)
     records = scores_of_values(numbers, joint_values, tolerances, deals, EVALUATED)
@@ -323,25 +278,15 @@ def judge(
 
 
 def read_verdicts(path: str | Path) -> pd.DataFrame:
-    """Read the rows that :func:`judge` returned.
-
-    Raises:
-        InputError: missing, empty or unreadable file, missing column, something that is not a number.
-    """
-    rows = read_csv(path, VERDICT_COLUMNS)
-    for column in ("published", "joint", "n", "readings", "readings_close"):
-        rows[column] = number_column(path, rows, column)
-    for column in ("upper", "reproduced"):
-        rows[column] = number_column(path, rows, column, needed=rows[column] != "")
+    """Read the rows that :func:`judge` returned."""
+    optional = ("upper", "reproduced")
+    measured = ("published", "joint", "n", "readings", "readings_close", *optional)
+    rows = read_numbers(path, VERDICT_COLUMNS, measured, optional=optional)
     return rows.assign(**{column: rows[column] == "True" for column in FLAGS})
 
 
 def read_choices(path: str | Path) -> pd.DataFrame:
-    """Read the values of the joint reading's choices: `choice`, `value`.
-
-    Raises:
-        InputError: missing, empty or unreadable file, missing column, other choices than there are.
-    """
+    """Read the values of the joint reading's choices: `choice`, `value`."""
     rows = read_csv(path, ("choice", "value"))
     if rows["choice"].tolist() != list(CHOICES):
         raise InputError(path, f"has the choices {', '.join(rows['choice'])}", "make it again")

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
+from typing import NamedTuple
 
 PUBLISHED = Path(__file__).with_name("published.csv")
 HARDWARE = {"CPU": "Intel i7-12700K", "GPU": "NVIDIA RTX 3090"}  # of the paper's times (Sec. IV-E)
@@ -16,8 +17,7 @@ REASONS = PUBLISHED.with_name("reasons.csv")
 NONE_YET = "no reason found yet"
 
 
-@dataclass(frozen=True)
-class Unit:
+class Unit(NamedTuple):
     """A unit as printed: factor from the unit of the results' files, least and largest possible value."""
 
     factor: float
@@ -40,8 +40,7 @@ _SOURCES = ("Coffee Cup", "LINEMOD", "YCB")
 _REDUCTIONS = ("No Reduction", "PCA", "UMAP", "AE")
 
 
-@dataclass(frozen=True)
-class PaperTable:
+class PaperTable(NamedTuple):
     """A table of the paper: its subject, rows and columns."""
 
     title: str
@@ -88,15 +87,13 @@ TABLES = {
 
 @dataclass(frozen=True)
 class Counterpart:
-    """The value of a run that stands beside a printed number.
+    """The value of a run that stands beside a printed number; for ``runtime.csv``, of components, "model" and a device.
 
     Attributes:
         file: CSV file in ``results/{run}/``.
-        table: as in the tidy rows; "components" for ``runtime.csv``.
-        sources: averaged seed by seed; "model" for ``runtime.csv``.
+        sources: averaged seed by seed.
         methods: summed.
         metrics: one, or dividend and divisor.
-        concept: as in the tidy rows; the device for ``runtime.csv``.
         statistic: over the seeds, mean or deviation.
     """
 
@@ -157,24 +154,18 @@ def read_published() -> list[Number]:
             value=float(fields["value"]),
             upper=float(fields["upper"] or fields["value"]),
             decimals=int(fields["decimals"]),
-            counterpart=_counterpart(fields) if fields["in_file"] else None,
+            counterpart=Counterpart(
+                *(fields["in_file"], fields["in_table"], tuple(fields["source"].split())),
+                *(tuple(fields["method"].split("+")), tuple(fields["metric"].split("/"))),
+                *(fields["concept"], fields["statistic"]),
+            )
+            if fields["in_file"]
+            else None,
             paper_n=int(fields["paper_n"] or 0),
             same_as=tuple(filter(None, fields["same_as"].split(" / "))),
         )
         for fields in read_lines(PUBLISHED)
     ]
-
-
-def _counterpart(fields: dict[str, str]) -> Counterpart:
-    return Counterpart(
-        fields["in_file"],
-        fields["in_table"],
-        tuple(fields["source"].split()),
-        tuple(fields["method"].split("+")),
-        tuple(fields["metric"].split("/")),
-        fields["concept"],
-        fields["statistic"],
-    )
 
 
 def printed_seconds(numbers: Iterable[Number]) -> dict[str, Number]:
@@ -193,19 +184,13 @@ def read_lines(path: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(file, strict=True))
 
 
-@dataclass(frozen=True)
-class Reason:
+class Reason(NamedTuple):
     """A reason and the numbers that it applies to; `*` in row and column stands for any text."""
 
     table: str
     row: str
     column: str
     text: str
-
-    def fits(self, number: Number) -> bool:
-        """Return whether it applies to this number."""
-        patterns = (self.table, self.row, self.column)
-        return all(fnmatchcase(name, pattern) for name, pattern in zip(number.key, patterns, strict=True))
 
 
 def read_reasons() -> list[Reason]:
@@ -215,4 +200,5 @@ def read_reasons() -> list[Reason]:
 
 def reason_of(number: Number, reasons: Sequence[Reason]) -> str:
     """Return the first reason that applies to the number."""
-    return next((reason.text for reason in reasons if reason.fits(number)), NONE_YET)
+    fitting = (reason for reason in reasons if all(map(fnmatchcase, number.key, reason[:3])))
+    return next((reason.text for reason in fitting), NONE_YET)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from gpca.comparison.published import Number
 from gpca.comparison.values import value_of_run
 from gpca.comparison.verdicts import NOT_COMPARABLE, NOT_REPRODUCED, Tolerance, distance, exactly
-from gpca.io.csv_file import numbers as numbers_in
+from gpca.io import csv_file
 from gpca.io.csv_file import read_csv
 
 if TYPE_CHECKING:
@@ -30,16 +30,12 @@ def judge_readings(
 ) -> pd.DataFrame:
     """Return `READING_COLUMNS`, a row per printed number and reading that has a value in its place.
 
+    The distance is in units of the close tolerance, in logarithms for a ratio; the chance is that of :func:`chance_of`.
+
     Args:
         comparison: the rows that :func:`gpca.comparison.verdicts.compare` returned for the numbers.
         readings: tidy rows of ``readings.csv``; `table` holds the group and the values of its choices, joined by /,
             and the other columns are those of the counterpart in its file.
-        tolerances: by unit.
-
-    Returns:
-        value: in the number's unit. distance: from the printed number, in units of the close tolerance, in logarithms
-        for a ratio. close: whether the mean is within it, whatever its interval. chance: the share of the span of the
-        group's values that is within the tolerance of one of them.
     """
     import pandas as pd
 
@@ -75,11 +71,7 @@ def chance_of(values: Sequence[float], span: Sequence[float], tolerance: Toleran
     """Return the chance that a number drawn uniformly from the readings' span has a close reading.
 
     It is |∪_r [v_r - c, v_r + c] ∩ [v_min, v_max]| / (v_max - v_min), where c is the close tolerance, in logarithms for
-    a ratio; 1 for a span of no width.
-
-    Args:
-        values: of the readings that may be close, which excludes lower bounds.
-        span: values of all readings.
+    a ratio; 1 for a span of no width. The values of readings that are lower bounds are in the span alone.
     """
     scale = math.log if tolerance.factor else float
     # Zero has no logarithm, and counts as a hundredth of the smallest positive value.
@@ -97,31 +89,20 @@ def chance_of(values: Sequence[float], span: Sequence[float], tolerance: Toleran
     return round(covered / (most - least), 6)
 
 
-@dataclass(frozen=True)
-class GroupSummary:
-    """The values that the readings of one group give for one number.
-
-    Attributes:
-        readings: their count.
-        close: how many are close to the printed number.
-        least, most: range of their values.
-        nearest, value: the nearest reading, and its value.
-        chance: of having a close reading, as :func:`chance_of` defines it.
-        joint, fitted, touched: the group's reading that is close to the most of the `touched` numbers, to `fitted`.
-        inside: whether the printed number lies in the range.
-    """
+class GroupSummary(NamedTuple):
+    """The values that the readings of one group give for one number."""
 
     readings: int
-    close: int
-    least: float
+    close: int  # readings whose value is close to the printed number
+    least: float  # value, to the most
     most: float
-    nearest: str
+    nearest: str  # reading, and its value
     value: float
-    chance: float
-    joint: str
+    chance: float  # of having a close reading, as :func:`chance_of` defines it
+    joint: str  # the group's reading that is close to the most of the `touched` numbers, to `fitted`
     fitted: int
     touched: int
-    inside: bool
+    inside: bool  # the range holds the printed number
 
     @property
     def where(self) -> str:
@@ -194,15 +175,9 @@ def with_readings(comparison: pd.DataFrame, judged: pd.DataFrame, words: Words) 
 
 
 def read_judged(path: str | Path) -> pd.DataFrame:
-    """Read the rows that :func:`judge_readings` returned.
-
-    Raises:
-        InputError: missing, empty or unreadable file, missing column, invalid number.
-    """
+    """Read the rows that :func:`judge_readings` returned."""
     rows = read_csv(path, READING_COLUMNS)
     needed = {"distance": rows["distance"] != "-inf", "reproduced": rows["reproduced"] != ""}  # -inf: ratio of zero
     for column in ("published", "upper", "value", "n", "chance", "distance", "reproduced"):
-        rows[column] = numbers_in(path, rows, column, needed=needed.get(column, True))
-    for column in ("close", "at_least"):
-        rows[column] = rows[column] == "True"
-    return rows
+        rows[column] = csv_file.numbers(path, rows, column, needed=needed.get(column, True))
+    return rows.assign(**{column: rows[column] == "True" for column in ("close", "at_least")})

@@ -2,8 +2,7 @@
 
 Other libraries, or a processor below the common level, round otherwise, and a trained encoder then decides some samples
 otherwise. If two runs differ on a sample with probability d, the difference of two shares of n samples has the standard
-deviation √(d / n), which bounds the allowed difference (docs/comparison.md). Every value is judged by itself: one
-beyond its bound makes the file different.
+deviation √(d / n), which bounds the allowed difference (docs/comparison.md).
 """
 
 from __future__ import annotations
@@ -11,16 +10,16 @@ from __future__ import annotations
 import json
 import math
 from collections import defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 from gpca.errors import InputError
 from gpca.evaluation.intervals import mean_interval
-from gpca.evaluation.measures import TIDY_COLUMNS
+from gpca.evaluation.measures import KEYS, TIDY_COLUMNS
 from gpca.io.csv_file import ANY, finite_number, read_csv
 from gpca.settings import Keys, NotNegative, Share
 
@@ -52,22 +51,14 @@ SHARES_OF_RUNS = ("reached", "recognised")  # of the seeds' runs, not of the tes
 PARTS = ("predicted_as_*", "first_*", "acted_first")  # counts of samples out of these
 
 
-@dataclass(frozen=True)
-class Mean:
-    """A mean over the seeds.
-
-    Attributes:
-        half_width: of its 95 % interval; 0 where it has none.
-        quantity: name of the metric or column.
-        samples: of all seeds, of which it is a share or a count; 0 where unknown.
-        unit: its change when all samples change: 1 for a share, 100 in percent, 0 if neither.
-    """
+class Mean(NamedTuple):
+    """A mean over the seeds."""
 
     value: float
-    half_width: float
-    quantity: str
-    samples: int = 0
-    unit: float = 0.0
+    half_width: float  # of its 95 % interval; 0 where it has none
+    quantity: str  # name of the metric or column
+    samples: int = 0  # of all seeds, of which it is a share or a count; 0 where unknown
+    unit: float = 0.0  # its change when all samples change: 1 for a share, 100 in percent, 0 if neither
 
 
 @dataclass(frozen=True)
@@ -100,8 +91,7 @@ class Allowance:
         return max(allowed, self.half_widths * mean.half_width)
 
 
-@dataclass(frozen=True)
-class FileCheck:
+class FileCheck(NamedTuple):
     """The outcome of the comparison of one file: one of `VERDICTS`, and the differences."""
 
     file: str
@@ -110,11 +100,7 @@ class FileCheck:
 
 
 def check_reference(run: Path, reference: Path, allowance: Allowance) -> list[FileCheck]:
-    """Compare every CSV file of means in the reference's folder with that of the run's.
-
-    Raises:
-        InputError: no reference, or a file that cannot be read.
-    """
+    """Compare every CSV file of means in the reference's folder with that of the run's."""
     files = [str(path.relative_to(reference)) for path in sorted(reference.rglob("*.csv"))]
     files = [file for file in files if file not in NOT_COMPARED]
     if not files:
@@ -131,10 +117,8 @@ def check_reference(run: Path, reference: Path, allowance: Allowance) -> list[Fi
         verdict, detail = _compared(file, means_run, means_reference, allowance)
         # Other settings explain differing values. The record names the whole config, so equal values stay identical.
         # A section that the reference's record lacks is newer than the reference.
-        config_here, config_there = (
-            _provenance(folder / file).get("config_sha256") or {} for folder in (run, reference)
-        )
-        changed = sorted(name for name, of in config_there.items() if config_here and config_here.get(name) != of)
+        here, there = (_provenance(folder / file).get("config_sha256") or {} for folder in (run, reference))
+        changed = sorted(name for name, of in there.items() if here and here.get(name) != of)
         if changed and verdict != IDENTICAL:
             verdict, detail = DIFFERENT, f"{detail}; config differs in {', '.join(changed)}"
         outcomes.append(FileCheck(file, verdict, detail))
@@ -164,7 +148,7 @@ def _compared(file: str, here: Mapping[tuple, Mean], there: Mapping[tuple, Mean]
 
 
 def device_of(folder: Path, file: str) -> str:
-    """Return the processor that made a file, and the instruction level that its libraries were limited to."""
+    """Return the processor that made a file, and the instruction level of its libraries."""
     device = _provenance(folder / file).get("device", {})
     named = [device.get("name"), *(f"{name} {device[name]}" for name in ("family", "model") if device.get(name))]
     return ", ".join(filter(None, [*named, device.get("instructions")])) or "on an unrecorded processor"
@@ -179,22 +163,36 @@ def _provenance(path: Path) -> dict:
 def read_means(path: Path, samples_of_source: Mapping[str, int] = MappingProxyType({})) -> dict[tuple[str, ...], Mean]:
     """Return the means over the seeds in a tidy file or a table, without times.
 
-    Args:
-        samples_of_source: test samples of all seeds of a source, for tidy files that do not count them.
-
-    Raises:
-        InputError: empty, unreadable, neither tidy nor a table, invalid number.
+    `samples_of_source` counts the test samples of all seeds, for tidy files that do not.
     """
     table = read_csv(path, (), others=ANY)
-    heads = list(table)
-    rows = table.to_dict("records")
+    heads, rows, means = list(table), table.to_dict("records"), {}
     if tuple(heads) == TIDY_COLUMNS:
-        means = _tidy_means(path, rows, samples_of_source)
+        values: dict[tuple[str, ...], list[float]] = defaultdict(list)
+        for row in rows:
+            values[tuple(row[name] for name in KEYS)].append(finite_number(path, "value", row["value"]))
+        for key, values_R in values.items():
+            *place, quantity, concept = key
+            mean, low, _ = mean_interval(values_R)
+            counts = [(*place, name, part) for name in SAMPLE_COUNTS for part in (concept, "all")]
+            samples = next((sum(values[key]) for key in counts if key in values), samples_of_source.get(place[1], 0))
+            half_width = 0.0 if math.isnan(low) else mean - low
+            means[key] = _mean(path.name, mean, half_width, quantity, samples, len(values_R))
     elif "mean" in heads[1:]:
-        means = _table_means(path, rows, heads)
+        # A column of yes and no is a result that follows from the means, not a label.
+        labels = [name for name in heads[: heads.index("mean")] if not {row[name] for row in rows} <= {"yes", "no"}]
+        for row in rows:
+            mean, low, high = (
+                finite_number(path, name, row[name]) if row.get(name) else math.nan
+                for name in ("mean", "ci_low", "ci_high")
+            )
+            half_width = 0.0 if math.isnan(low) or math.isnan(high) else max(mean - low, high - mean)
+            samples = finite_number(path, "n_test", row.get("n_test") or "0")
+            key, seeds = tuple(row[name] for name in labels), int(row.get("n_seeds") or 1)
+            means[key] = _mean(f"tables/{path.name}", mean, half_width, key[-1], samples, seeds)
     else:
         raise InputError(path, "is neither tidy metrics nor a table", "regenerate it")
-    return {key: mean for key, mean in means if not fnmatchcase(mean.quantity, TIMES)}
+    return {key: mean for key, mean in means.items() if not fnmatchcase(mean.quantity, TIMES)}
 
 
 def kind_of(file: str, quantity: str) -> str:
@@ -202,41 +200,9 @@ def kind_of(file: str, quantity: str) -> str:
     return next(kind for files, names, kind in KINDS if fnmatchcase(file, files) and fnmatchcase(quantity, names))
 
 
-def _tidy_means(
-    path: Path, rows: list[dict], samples_of_source: Mapping[str, int]
-) -> Iterator[tuple[tuple[str, ...], Mean]]:
-    values: dict[tuple[str, ...], list[float]] = defaultdict(list)
-    for row in rows:
-        key = tuple(row[name] for name in ("table", "source", "method", "metric", "concept"))
-        values[key].append(finite_number(path, "value", row["value"]))
-    for (table, source, method, quantity, concept), values_R in values.items():
-        mean, low, _ = mean_interval(values_R)
-        counts = [(table, source, method, name, of) for name in SAMPLE_COUNTS for of in (concept, "all")]
-        samples = next((sum(values[key]) for key in counts if key in values), samples_of_source.get(source, 0))
-        samples = len(values_R) if quantity in SHARES_OF_RUNS else samples
-        half_width = 0.0 if math.isnan(low) else mean - low
-        unit = _unit(path.name, quantity, samples, len(values_R))
-        yield (table, source, method, quantity, concept), Mean(mean, half_width, quantity, int(samples), unit)
-
-
-def _table_means(path: Path, rows: list[dict], heads: list[str]) -> Iterator[tuple[tuple[str, ...], Mean]]:
-    # A column of yes and no is a result that follows from the means, not a label.
-    labels = [name for name in heads[: heads.index("mean")] if not {row[name] for row in rows} <= {"yes", "no"}]
-    for row in rows:
-        mean, low, high = (
-            finite_number(path, name, row[name]) if row.get(name) else math.nan
-            for name in ("mean", "ci_low", "ci_high")
-        )
-        half_width = 0.0 if math.isnan(low) or math.isnan(high) else max(mean - low, high - mean)
-        quantity, seeds = row[labels[-1]], int(row.get("n_seeds") or 1)
-        samples = finite_number(path, "n_test", row.get("n_test") or "0")
-        samples = seeds if quantity in SHARES_OF_RUNS else samples
-        unit = _unit(f"tables/{path.name}", quantity, samples, seeds)
-        yield tuple(row[name] for name in labels), Mean(mean, half_width, quantity, int(samples), unit)
-
-
-def _unit(file: str, quantity: str, samples: float, seeds: int) -> float:
-    """Return the change of a quantity when all its samples change; 0 if it is neither share nor count of them."""
+def _mean(file: str, value: float, half_width: float, quantity: str, samples: float, seeds: int) -> Mean:
+    samples = seeds if quantity in SHARES_OF_RUNS else samples
+    unit = {"share": 1.0, "percent": 100.0}.get(kind_of(file, quantity), 0.0)
     if any(fnmatchcase(quantity, pattern) for pattern in PARTS):
-        return samples / seeds
-    return {"share": 1.0, "percent": 100.0}.get(kind_of(file, quantity), 0.0)
+        unit = samples / seeds
+    return Mean(value, half_width, quantity, int(samples), unit)

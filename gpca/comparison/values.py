@@ -21,10 +21,9 @@ from gpca.active_learning.curves import CENSORED_BY
 from gpca.attribution.metrics import PREDICTED_AS
 from gpca.attribution.predictions import read_predictions
 from gpca.comparison.published import UNITS, Counterpart, Number
-from gpca.evaluation.intervals import LEVEL, interval, mean_interval, pigeonhole_weights
+from gpca.evaluation.intervals import LEVEL, Clustered, interval, mean_interval, weighted_mean
 from gpca.evaluation.measures import ALL, read_metrics, source_method_seed
 from gpca.evaluation.runtime_file import read_runtime
-from gpca.seeds import generator
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -65,7 +64,7 @@ class Reproduced:
 
 
 def read_results(paths: Iterable[str | Path]) -> dict[str, pd.DataFrame]:
-    """Read a run's collected files, by name; raises the InputError of a malformed one."""
+    """Read a run's collected files, by name."""
     return {Path(path).name: (read_runtime if Path(path).name == RUNTIME else read_metrics)(path) for path in paths}
 
 
@@ -91,10 +90,11 @@ def value_of_run(
     reproduced = summary(results[counterpart.file], counterpart)
     if reproduced is None:
         return None
-    draws = (clusters or {}).get(counterpart)
-    cluster_low, cluster_high = draws.bounds() if draws else (math.nan, math.nan)
+    if draws := (clusters or {}).get(counterpart):
+        cluster_low, cluster_high = draws.bounds()
+        reproduced = replace(reproduced, cluster_low=cluster_low, cluster_high=cluster_high)
     unit = UNITS[number.unit]
-    reproduced = replace(reproduced, cluster_low=cluster_low, cluster_high=cluster_high).times(unit.factor)
+    reproduced = reproduced.times(unit.factor)
     low, high = (
         bound if math.isnan(bound) else min(max(bound, unit.least), unit.most)
         for bound in (reproduced.low, reproduced.high)
@@ -142,17 +142,16 @@ def deviation_interval(deviation: float, n: int) -> tuple[float, float]:
 
 def _tidy_summary(rows: pd.DataFrame, counterpart: Counterpart) -> Reproduced | None:
     by_seed, at_least = values_by_seed(rows, counterpart)
-    value_R = by_seed.to_numpy()
-    n = len(value_R)
+    value_R, n = by_seed.to_numpy(), len(by_seed)
     if not n or np.isnan(value_R).any():
         return None
-    if counterpart.statistic == "deviation":
-        if n < 2:
-            return None
-        deviation = float(value_R.std(ddof=1))
-        return Reproduced(deviation, *deviation_interval(deviation, n), n)
-    mean, low, high = mean_interval(value_R)
-    return Reproduced(mean, math.nan, math.nan, n, True) if at_least else Reproduced(mean, low, high, n)
+    if counterpart.statistic == "mean":
+        mean, low, high = mean_interval(value_R)
+        return Reproduced(mean, math.nan, math.nan, n, True) if at_least else Reproduced(mean, low, high, n)
+    if n < 2:
+        return None
+    deviation = float(value_R.std(ddof=1))
+    return Reproduced(deviation, *deviation_interval(deviation, n), n)
 
 
 def _runtime_summary(rows: pd.DataFrame, counterpart: Counterpart) -> Reproduced | None:
@@ -170,9 +169,8 @@ def folder_behind(counterpart: Counterpart | None) -> Folder | None:
     if counterpart is None or counterpart.statistic != "mean" or counterpart.file not in FOLDERS:
         return None
     confusion = len(counterpart.metrics) == 2 and counterpart.metrics[0].startswith(PREDICTED_AS)
-    if not (counterpart.metrics == ("accuracy",) or confusion):
-        return None
-    return FOLDERS[counterpart.file], counterpart.sources[0], counterpart.methods[0]
+    is_share = confusion or counterpart.metrics == ("accuracy",)
+    return (FOLDERS[counterpart.file], counterpart.sources[0], counterpart.methods[0]) if is_share else None
 
 
 def folders_behind(counterparts: Iterable[Counterpart | None]) -> list[Folder]:
@@ -186,22 +184,18 @@ class ShareDraws:
 
     Attributes:
         share_B: (1 + B,) in [0, 1], of the samples themselves first; NaN in a draw without any sample.
-        weights_B_N: how often each draw has each sample of the folder.
+        samples: all of the folder.
         mask_N: the samples that the share counts.
     """
 
     share_B: np.ndarray
-    weights_B_N: np.ndarray
+    samples: Clustered
     mask_N: np.ndarray
 
-    def bounds(self, level: float = LEVEL) -> tuple[float, float]:
-        """Return the bounds of the share."""
-        return interval(self.share_B, self.weights_B_N[:, self.mask_N], level=level)[1:]
-
-    def bounds_of_difference(self, other: ShareDraws, level: float = LEVEL) -> tuple[float, float]:
-        """Return the bounds of the share minus another, draw by draw."""
-        weights_B_n = self.weights_B_N[:, self.mask_N]
-        return interval(self.share_B - other.share_B, weights_B_n, difference=True, level=level)[1:]
+    def bounds(self, level: float = LEVEL, minus: ShareDraws | None = None) -> tuple[float, float]:
+        """Return the bounds of the share, or of its difference from another, draw by draw."""
+        share_B = self.share_B - minus.share_B if minus else self.share_B
+        return interval(share_B, self.samples.weights[1:, self.mask_N], difference=minus is not None, level=level)[1:]
 
 
 def cluster_draws(
@@ -209,12 +203,8 @@ def cluster_draws(
 ) -> dict[Counterpart, ShareDraws]:
     """Return the shares by the pigeonhole bootstrap over clusters and seeds.
 
-    Args:
-        counterparts: those that are no shares of samples, or whose folder has no file, are left out.
-        prediction_files: named ``…/{predictions or learners}/{source}/{method}/seed{seed}.csv``.
-
-    Raises:
-        InputError: another form of name, or a file that :func:`gpca.attribution.predictions.read_predictions` refuses.
+    Counterparts that are no shares of samples, or whose folder has no file, are left out. Files of predictions are
+    named ``…/{predictions or learners}/{source}/{method}/seed{seed}.csv``.
     """
     import pandas as pd
 
@@ -226,29 +216,21 @@ def cluster_draws(
         if folder in asked.values():
             rows = read_predictions(path, ("set",) if folder[0] == "learners" else ())
             parts[folder].append(rows[rows["split"] == "test"].assign(seed=seed))
-    samples = {folder: pd.concat(tables, ignore_index=True) for folder, tables in parts.items()}
-    weights = {
-        folder: pigeonhole_weights(generator("printed", folder[1]), rows["seed"], rows["cluster"])
-        for folder, rows in samples.items()
+    tables = {folder: pd.concat(frames, ignore_index=True) for folder, frames in parts.items()}
+    samples = {
+        folder: Clustered.drawn(rows["seed"], rows["cluster"], "printed", folder[1]) for folder, rows in tables.items()
     }
-    return {
-        counterpart: _share_draws(counterpart, samples[folder], weights[folder])
-        for counterpart, folder in asked.items()
-        if folder in samples
-    }
-
-
-def _share_draws(counterpart: Counterpart, rows: pd.DataFrame, weights_B_N: np.ndarray) -> ShareDraws:
-    mask = (rows["concept_true"] == counterpart.concept) | (counterpart.concept == ALL)
-    if "set" in rows:
-        mask &= rows["set"] == counterpart.table.partition("/")[2]
-    target = rows["concept_true"]
-    if counterpart.metrics[0].startswith(PREDICTED_AS):
-        target = counterpart.metrics[0].removeprefix(PREDICTED_AS)
-    hits_N = ((rows["concept_predicted"] == target) & ~rows["abstained"]).to_numpy(float)
-    mask_N = mask.to_numpy()
-    weights_B_n = weights_B_N[:, mask_N]
-    with np.errstate(invalid="ignore"):  # a draw without any sample of the concept has no share
-        drawn_B = weights_B_n @ hits_N[mask_N] / weights_B_n.sum(axis=1)
-    share = hits_N[mask_N].mean() if mask_N.any() else math.nan
-    return ShareDraws(np.append(share, drawn_B), weights_B_N, mask_N)
+    draws = {}
+    for counterpart, folder in asked.items():
+        if (rows := tables.get(folder)) is None:
+            continue
+        mask = (rows["concept_true"] == counterpart.concept) | (counterpart.concept == ALL)
+        if "set" in rows:
+            mask &= rows["set"] == counterpart.table.partition("/")[2]
+        target, metric = rows["concept_true"], counterpart.metrics[0]
+        if metric.startswith(PREDICTED_AS):
+            target = metric.removeprefix(PREDICTED_AS)
+        hit_N, mask_N = ((rows["concept_predicted"] == target) & ~rows["abstained"]).to_numpy(float), mask.to_numpy()
+        share_B = weighted_mean(hit_N[mask_N], samples[folder].weights[:, mask_N])
+        draws[counterpart] = ShareDraws(share_B, samples[folder], mask_N)
+    return draws

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gpca.comparison.published import TIMES, UNITS, Counterpart, Number, Reason, reason_of
+from gpca.comparison.published import TIMES, Counterpart, Number, Reason, reason_of
 from gpca.comparison.values import RUNTIME, Reproduced, ShareDraws, deviation_interval, value_of_run
 from gpca.errors import InputError
 from gpca.objects.entry import STAND_IN, title_of
@@ -44,7 +44,7 @@ _SENTENCES = re.compile(r"(?<=\.) (?=[A-Z])")
 
 @dataclass(frozen=True)
 class Tolerance:
-    """Distances up to which a number counts as reproduced and as close, in its unit or, with `factor`, as a ratio."""
+    """Distances up to which a number is reproduced, and close, in its unit or, with `factor`, as a ratio."""
 
     reproduced: NotNegative
     close: NotNegative
@@ -64,17 +64,12 @@ class Tolerance:
 
 @dataclass(frozen=True)
 class Printed:
-    """A printed number, or the range from `value` to `upper`.
-
-    Attributes:
-        rounding: half of its last digit.
-        low, high: bounds of its 95 % interval; `value` and `upper` where its sampling error is unknown.
-    """
+    """A printed number, or the range from `value` to `upper`."""
 
     value: float
     upper: float
-    rounding: float
-    low: float
+    rounding: float  # half of its last digit
+    low: float  # of its 95 % interval, up to `high`; `value` and `upper` where its sampling error is unknown
     high: float
 
     def difference(self, value: float, tolerance: Tolerance) -> float:
@@ -92,13 +87,9 @@ def exactly(number: Number) -> Printed:
 def printed_of(number: Number, deviation: Number | None = None) -> Printed:
     """Return the number with its sampling interval.
 
-    Wilson's for a share of n samples, chi-square for a standard deviation of n repeats, Student's for a mean beside a
-    printed standard deviation.
-
-    Args:
-        deviation: the printed standard deviation of the same repeats.
+    Wilson's for a share of n samples, chi-square for a standard deviation of n repeats, Student's for a mean beside the
+    printed standard deviation of the same repeats.
     """
-    printed = exactly(number)
     if number.counterpart and number.counterpart.statistic == "deviation" and number.paper_n > 1:
         low, high = deviation_interval(number.value, number.paper_n)
     elif deviation and deviation.paper_n > 1:
@@ -114,8 +105,8 @@ def printed_of(number: Number, deviation: Number | None = None) -> Printed:
         # The printed share is rounded, and may lie beyond the interval of the count.
         low, high = min(100 * interval.low, number.value), max(100 * interval.high, number.value)
     else:
-        return printed
-    return replace(printed, low=float(low), high=float(high))
+        low, high = number.value, number.upper
+    return Printed(number.value, number.upper, number.rounding, float(low), float(high))
 
 
 def verdict_of(printed: Printed, reproduced: Reproduced, tolerance: Tolerance) -> str:
@@ -166,9 +157,6 @@ def compare(
         tolerances: by unit.
         hardware: the machine of the measured times, where their file does not say.
         clusters: counterpart -> its bootstrap draws (:func:`gpca.comparison.values.cluster_draws`).
-
-    Raises:
-        InputError: a unit without tolerance.
     """
     import pandas as pd
 
@@ -184,31 +172,42 @@ def compare(
         if counterpart and counterpart.statistic == "mean":  # its deviation is in its row, or in the equal number's
             deviation = deviations.get((number.same_as or number.key)[:2])
         printed = printed_of(number, deviation)
-        has_interval = (printed.low, printed.high) != (printed.value, printed.upper)
         reproduced = values[number.key] = value_of_run(number, results, clusters)
         verdict, reason = _judge(number, printed, reproduced, objects, tolerance, reasons)
         first = values.get(number.same_as)
         repeats = first and reproduced and (first.value, first.n) == (reproduced.value, reproduced.n)
         sources = counterpart.sources if counterpart else ()
-        records.append(
-            {
-                **dict(zip(("table", "row", "column"), number.key, strict=True)),
-                "statistic": counterpart.statistic if counterpart else "mean",
-                "unit": number.unit,
-                "published": number.value,
-                "upper": number.upper if number.upper > number.value else np.nan,
-                "decimals": number.decimals,
-                "paper_low": round(printed.low, 6) if has_interval else np.nan,
-                "paper_high": round(printed.high, 6) if has_interval else np.nan,
-                "deviation": deviation.value if deviation else np.nan,
-                **_columns(number, reproduced, tolerance),
-                "verdict": verdict,
-                "repeat_of": " / ".join(number.same_as) if repeats else "",
-                "reason": filled(reason, number, results),
-                "objects": ", ".join(title_of(objects[source]) for source in sources if source in objects),
-                "hardware": _hardware(number, results, hardware),
-            }
-        )
+        record = {
+            **{name: getattr(number, name) for name in ("table", "row", "column", "unit", "decimals")},
+            "statistic": counterpart.statistic if counterpart else "mean",
+            "published": number.value,
+            "upper": number.upper if number.upper > number.value else np.nan,
+            "deviation": deviation.value if deviation else np.nan,
+            "n": pd.NA,
+            "at_least": False,
+            "verdict": verdict,
+            "repeat_of": " / ".join(number.same_as) if repeats else "",
+            "reason": filled(reason, number, results),
+            "objects": ", ".join(title_of(objects[source]) for source in sources if source in objects),
+            "hardware": "",
+        }
+        if (printed.low, printed.high) != (printed.value, printed.upper):
+            record |= {"paper_low": round(printed.low, 6), "paper_high": round(printed.high, 6)}
+        if reproduced is not None:
+            nearest = min(max(reproduced.value, number.value), number.upper)
+            shown = {"reproduced": reproduced.value, "ci_low": reproduced.low, "ci_high": reproduced.high}
+            shown |= {name: getattr(reproduced, name) for name in ("cluster_low", "cluster_high")}
+            shown |= {"difference": reproduced.value - nearest}
+            shown |= {"factor": reproduced.value / nearest} if tolerance.factor else {}
+            record |= {name: round(value, 6) for name, value in shown.items()}
+            record |= {"n": reproduced.n, "at_least": reproduced.at_least}
+        if counterpart and counterpart.file in results and number.unit in TIMES:
+            record["hardware"] = hardware
+            if counterpart.file == RUNTIME:
+                timed = results[RUNTIME]
+                machines = timed.loc[timed["device"] == counterpart.concept, "hardware"].unique()
+                record["hardware"] = ", ".join(machines)
+        records.append(record)
     return pd.DataFrame(records, columns=list(COMPARISON_COLUMNS)).astype({"n": "Int64"})
 
 
@@ -237,53 +236,14 @@ def _judge(number, printed, reproduced, objects, tolerance, reasons) -> tuple[st
     return verdict, "" if verdict == REPRODUCED else reason_of(number, reasons)
 
 
-def _columns(number: Number, reproduced: Reproduced | None, tolerance: Tolerance) -> dict[str, object]:
-    """Return the run's value, its intervals, and its distance from the nearest end of the printed number."""
-    import pandas as pd
-
-    if reproduced is None:
-        return {"n": pd.NA, "at_least": False}
-    printed = min(max(reproduced.value, number.value), number.upper)
-    bounds = {"ci_low": reproduced.low, "ci_high": reproduced.high}
-    bounds |= {name: getattr(reproduced, name) for name in ("cluster_low", "cluster_high")}
-    return {
-        **{name: round(value, 6) for name, value in {"reproduced": reproduced.value, **bounds}.items()},
-        "n": reproduced.n,
-        "at_least": reproduced.at_least,
-        "difference": round(reproduced.value - printed, 6),
-        "factor": round(reproduced.value / printed, 6) if tolerance.factor else np.nan,
-    }
-
-
-def _hardware(number: Number, results: Mapping[str, pd.DataFrame], hardware: str) -> str:
-    """Return the hardware that a time was measured on; empty for all else."""
-    counterpart = number.counterpart
-    if counterpart is None or counterpart.file not in results or number.unit not in TIMES:
-        return ""
-    if counterpart.file != RUNTIME:
-        return hardware
-    rows = results[RUNTIME]
-    return ", ".join(rows.loc[rows["device"] == counterpart.concept, "hardware"].unique())
-
-
 def _minus(one: float, other: float) -> float:
     """Return one minus the other; 0 for equal infinities, such as logarithms of 0."""
     return 0.0 if one == other else one - other
 
 
 def citations(text: str) -> list[dict[str, str]]:
-    """Return the values that a reason cites, by `CITED`.
-
-    Raises:
-        ValueError: a citation that lacks a field, or has an unknown unit.
-    """
-    cited = []
-    for words in _CITATION.findall(text):
-        fields = dict(zip(CITED, words.split(), strict=True))
-        if fields["unit"] not in UNITS:
-            raise ValueError(f"unknown unit in {{{words}}}")
-        cited.append(fields)
-    return cited
+    """Return the values that a reason cites, by `CITED`; a citation that lacks a field raises ValueError."""
+    return [dict(zip(CITED, words.split(), strict=True)) for words in _CITATION.findall(text)]
 
 
 def cited_number(number: Number, fields: Mapping[str, str]) -> Number | None:

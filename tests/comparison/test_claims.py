@@ -26,6 +26,7 @@ from gpca.comparison.claims import (
 )
 from gpca.comparison.published import UNITS, read_published
 from gpca.comparison.values import ShareDraws, folders_behind
+from gpca.evaluation.intervals import Clustered
 from gpca.io.structured_text import load_own_yaml
 
 from .conftest import write
@@ -215,8 +216,9 @@ def test_both_at_the_first_batch_of_labels_say_nothing():
 
 
 def test_shares_have_the_farther_bounds_of_seeds_and_clusters():
-    draws = {place: ShareDraws(share_B, np.ones((4, 1)), np.array([True])) for place, share_B in
-             ((ACCURACY, np.array([0.75, 0.9, 0.8, 0.7, 0.6])), (OTHER, np.full(5, 0.7)))}  # fmt: skip
+    samples = Clustered(np.zeros(1), np.zeros(1), np.ones((5, 1)))
+    shares = {ACCURACY: np.array([0.75, 0.9, 0.8, 0.7, 0.6]), OTHER: np.full(5, 0.7)}
+    draws = {place: ShareDraws(share_B, samples, np.array([True])) for place, share_B in shares.items()}
     alike = {"metrics.csv": pd.concat(rows_of(5.0, 5.0, 5.0))}
     [row] = judge([CLAIM], alike, OBJECTS, clusters=draws).itertuples()
     assert (row.value, row.verdict) == (pytest.approx(5), "inconclusive")

@@ -165,4 +165,4 @@ def test_the_reasons_are_of_printed_numbers():
     assert len(reasons) > 20
     for reason in reasons:
         assert reason.text, reason
-        assert any(reason.fits(number) for number in NUMBERS), reason
+        assert any(reason_of(number, [reason]) == reason.text for number in NUMBERS), reason

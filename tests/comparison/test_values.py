@@ -189,4 +189,4 @@ def test_differences_are_of_the_same_draws(tmp_path):
     low, high = drawn[ACCURACY].bounds()
     assert high - low > 0.4  # objects differ
     # All objects have the same difference, so that its interval is that of a share in six objects and five seeds.
-    assert drawn[ACCURACY].bounds_of_difference(drawn[other]) == pytest.approx(wilson_interval(7.5, 30))
+    assert drawn[ACCURACY].bounds(minus=drawn[other]) == pytest.approx(wilson_interval(7.5, 30))
