@@ -3,10 +3,26 @@ import pytest
 
 from gpca.errors import InputError
 from gpca.evaluation.measures import ALL, COLUMNS, TIDY_COLUMNS
-from gpca.experiments.frame_tables import table6_backbones, table6_seen_unseen
+from gpca.experiments import frame_tables
+from gpca.experiments.plan import Run
 
-BACKBONES = {"dgcnn": 600_000, "pointnet": 150_000}
-CONDITIONS = {"real_rgbd": "True pose", "real_rgbd_estimated": "Pose estimators"}
+PARAMETERS = {"dgcnn": 600_000, "pointnet": 150_000, "dgcnn_1024": 750_000, "mine": 1000}
+CONFIG = {
+    **{"title": "Frames", "datasets": None, "initial_pose": {"form": "true_pose"}, "pretraining": {}, "virtual": None},
+    **{"conditions": {"estimated": {"form": "ppf"}}, "backbones": ["dgcnn", "pointnet"], "reductions": ["none", "pca"]},
+    **{"published": {}, "explainers": {}},
+}
+
+
+@pytest.fixture(autouse=True)
+def _known_numbers_of_parameters(monkeypatch):
+    monkeypatch.setattr(frame_tables, "make_encoder", lambda backbone, options: backbone)
+    monkeypatch.setattr(frame_tables, "parameter_count", PARAMETERS.get)
+
+
+def run(**changes):
+    encoders = {name: {"backbone": name} for name in PARAMETERS}
+    return Run({"real_world": CONFIG | changes, "encoders": encoders, "data_dir": None})
 
 
 def metrics(values, seeds=3):
@@ -41,9 +57,8 @@ VALUES = {
 }
 
 
-def make(values=VALUES, **changes):
-    of = intervals(values, **changes), metrics(values, **changes)
-    return table6_backbones(*of, "frames", BACKBONES, ("none", "pca"))
+def make(values=VALUES, seeds=3, **changes):
+    return frame_tables.table6_backbones(run(**changes), intervals(values, seeds), metrics(values, seeds))
 
 
 def test_rows_are_backbones_by_reductions_and_the_classic_features_last():
@@ -83,39 +98,39 @@ def test_what_was_not_run_has_no_row_and_nothing_at_all_is_refused():
 
 
 def test_the_note_says_what_encoders_were_pretrained_on():
-    of = intervals(VALUES), metrics(VALUES), "frames", BACKBONES, ("none", "pca")
-    assert "pretrained on whole objects, and GPC" in " ".join(table6_backbones(*of, "whole objects").footnotes)
-    assert "perturbations, encoder, and GPC" in " ".join(table6_backbones(*of).footnotes)
+    pretraining = {"pretraining": {"epochs": 1}}
+    assert "perturbations, encoder, and GPC" in make().footnotes[0]
+    assert "pretrained on whole objects, and GPC" in make(**pretraining).footnotes[0]
+    rendered = make(**pretraining, virtual={"objects": "all"})
+    assert "on whole objects and on frames rendered of the models of all objects, and GPC" in rendered.footnotes[0]
+    unseen = make(**pretraining, virtual={"objects": "training"})
+    assert "rendered of models of objects that no tested frame shows, and GPC" in unseen.footnotes[0]
 
 
 def test_untrained_explainers_stand_below_and_trained_ones_have_a_table_of_their_own():
     values = VALUES | {"chance": (0.3, 0.3, 0.4), "gpca_pair": (0.9, 0.9, 0.9)}
-    of = intervals(values), metrics(values), "frames", BACKBONES, ("none", "pca")
-    table = table6_backbones(*of, explainers={"chance": "Chance", "gpca_pair": "Pair"})
-    assert [row[0][1] for row in table.rows][-2:] == ["Classic features", "Chance"]
+    table = make(values, explainers={"chance": {}, "gpca_pair": {}})
+    assert [row[0][0] for row in table.rows][-2:] == ["analytical_gpc", "chance"]
     assert table.best() == make().best()
 
 
 def test_encoders_as_published_stand_below_the_judged_ones_and_are_never_the_best():
     values = VALUES | {"dgcnn_1024-none": (0.9, 0.9, 0.9), "dgcnn_1024-pca": (0.9, 0.9, 0.8)}
-    of = intervals(values), metrics(values), "frames", BACKBONES, ("none", "pca")
-    table = table6_backbones(*of, published={"dgcnn_1024": 750_000})
+    published = {"published": {"dgcnn": "dgcnn_1024"}}
+    table = make(values, **published)
     assert [tuple(key for key, _ in row) for row in table.rows][2:] == [
         ("pointnet", "none"), ("dgcnn_1024", "none"), ("dgcnn_1024", "pca"), ("analytical_gpc", "none"),
     ]  # fmt: skip
     assert table.cells[3, "parameters"].mean == 750 and table.best() == make().best()
     assert "DGCNN of 1024 features: readings of which architecture" in " ".join(table.footnotes)
     assert "readings of" not in " ".join(make(values).footnotes)
-    fewer = values | {"dgcnn_1024-none": (0.9, 0.9), "dgcnn_1024-pca": (0.9, 0.8)}
-    few = table6_backbones(intervals(fewer), metrics(fewer), *of[2:], published={"dgcnn_1024": 750_000})
-    assert "DGCNN of 1024 features, over the first 2 seeds: readings of" in " ".join(few.footnotes)
+    fewer = make(values | {"dgcnn_1024-none": (0.9, 0.9), "dgcnn_1024-pca": (0.9, 0.8)}, **published)
+    assert "DGCNN of 1024 features, over the first 2 seeds: readings of" in " ".join(fewer.footnotes)
 
 
 def test_a_backbone_without_a_title_has_its_name():
     values = {"mine-none": (0.8, 0.8, 0.8), "pointnet-none": (0.6, 0.7, 0.65)}
-    of = intervals(values), metrics(values)
-    table = table6_backbones(*of, "frames", {"mine": 1000, "pointnet": 150_000}, ("none",))
-    assert "| To mine (points) |" in table.markdown()
+    assert "| To mine (points) |" in make(values, backbones=["mine", "pointnet"], reductions=["none"]).markdown()
 
 
 def seen(values):
@@ -132,11 +147,9 @@ def seen(values):
     return pd.DataFrame(rows, columns=list(COLUMNS)), pd.DataFrame(scores, columns=list(TIDY_COLUMNS))
 
 
-def make_seen(values, **options):
-    explainers = {"gpca_pair": "GP-CA on the pair"}
-    sees = dict.fromkeys(("dgcnn-none", "analytical_gpc", "analytical_gpc_no_counts"), "aligned source")
-    sees["gpca_pair"] = "pair + motion"
-    return table6_seen_unseen(*seen(values), "frames", CONDITIONS, ["dgcnn-none"], explainers, sees, **options)
+def make_seen(values, **changes):
+    changes = {"backbones": ["dgcnn"], "reductions": ["none"], "explainers": {"gpca_pair": {}}} | changes
+    return frame_tables.table6_seen_unseen(run(**changes), *seen(values))
 
 
 def test_rows_are_conditions_by_methods_and_columns_what_was_seen():
@@ -161,15 +174,15 @@ def test_rows_are_conditions_by_methods_and_columns_what_was_seen():
     text = table.markdown()
     assert "40 % of the test samples" in text
     assert "| LINEMOD-Occlusion (%) |" in text
-    counts = "Test samples, True pose: All 200 (2 seeds), Seen objects 80 (2 seeds), Unseen objects 120 (2 seeds)"
-    assert f"{counts}, LINEMOD-Occlusion 30 (1 seed)." in text
-    assert "Test samples, Pose estimators: All 200 (2 seeds)." in text
+    counts = "Test samples, True pose, small error: All 200 (2 seeds), Seen objects 80 (2 seeds), Unseen objects 120"
+    assert f"{counts} (2 seeds), LINEMOD-Occlusion 30 (1 seed)." in text
+    assert "Test samples, Global registration: All 200 (2 seeds)." in text
 
 
 def test_the_note_says_that_the_pretraining_knows_the_models():
     values = {("real_rgbd", "attribution", "dgcnn-none"): (0.7, 100, 1)}
     assert "renders the models" not in " ".join(make_seen(values).footnotes)
-    assert "The pretraining renders the models of both." in " ".join(make_seen(values, rendered=True).footnotes)
+    assert "The pretraining renders the models of both." in " ".join(make_seen(values, virtual={"objects": "all"}).footnotes)
 
 
 def test_nothing_to_show_is_refused():
