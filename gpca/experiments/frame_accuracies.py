@@ -12,13 +12,10 @@ from gpca.attribution.diagnostics import brier_score, calibration_error, negativ
 from gpca.attribution.metrics import attribution_metrics
 from gpca.attribution.predictions import concepts_of, read_predictions
 from gpca.errors import InputError
-from gpca.evaluation.intervals import Clustered, Estimate
+from gpca.evaluation.intervals import Clustered
 from gpca.evaluation.measures import ALL, intervals, source_method_seed, tidy
 from gpca.experiments.frame_labels import collect_labels
-from gpca.experiments.frames import (
-    TOGETHER,
-    reduced_backbones,
-)
+from gpca.experiments.frames import TOGETHER, reduced_backbones
 from gpca.experiments.plan import Run
 from gpca.experiments.result import numbers
 from gpca.pairs.dataset import read_samples_of_frames
@@ -47,33 +44,21 @@ def collect(
     one_encoder_files: Iterable[str | Path] = (),
     label_files: Sequence[str | Path] = (),
 ) -> pd.DataFrame:
-    """Metrics by seed of prediction files named ``…/{source}/{method}/seed{seed}.csv``.
+    """Metrics by seed of prediction files.
 
-    The column `table` says of which test samples: ``attribution`` is all of them, ``seen`` those of objects that a
-    training sample shows, ``unseen`` the others, ``dataset/{name}`` those of one dataset's frames. What has no sample
-    has no row. Beside the metrics of :func:`gpca.attribution.metrics.collect` stand the calibration error `ece`, the
-    number of `objects`, and the proper scores `nll` (nats) and `brier`.
-
-    Args:
-        pose_files: named ``…/{source}/seed{seed}.csv``, of every source and seed among the predictions.
-        one_encoder_files: predictions of several classifiers on one encoder's embeddings, which are not parted.
-        label_files: of :func:`gpca.experiments.frame_labels.collect_labels`, whose metrics stand below.
-
-    Raises:
-        InputError: no files, a name of another form, files that do not belong together, what their readers refuse.
+    The column `table` says of which test samples (:func:`parts_by_file`). Beside the metrics of
+    :func:`gpca.attribution.metrics.collect` stand the calibration error `ece`, the number of `objects`, and the proper
+    scores `nll` (nats) and `brier`. Classifiers on one encoder's embeddings, and labels
+    (:func:`gpca.experiments.frame_labels.collect_labels`), stand below.
     """
     import pandas as pd
 
-    poses = {(Path(path).parts[-2], Path(path).stem): path for path in pose_files}
     records = []
-    for path in prediction_files:
-        source, method, seed = source_method_seed(path)
-        if (of_source := poses.get((source, f"seed{seed}"))) is None:
-            raise InputError(path, "has no pose file beside it", "regenerate both from the same config")
-        rows = read_predictions(path)
-        for name, test in parts_of_frames(path, rows[rows["split"] == "test"], of_source):
-            metrics = attribution_metrics(test, concepts_of(rows))
-            scores = _scores(test, concepts_of(rows))
+    for source, method, seed, concepts, parts in parts_by_file(prediction_files, pose_files):
+        for name, test in parts.items():
+            true_N = np.array([concepts.index(concept) for concept in test["concept_true"]])
+            scores = test[[f"score_{concept}" for concept in concepts]].to_numpy(float), true_N
+            metrics = attribution_metrics(test, concepts)
             metrics |= {"ece": {ALL: calibration_error(*scores)}, "objects": {ALL: test["object"].nunique()}}
             metrics |= {"nll": {ALL: negative_log_likelihood(*scores)}, "brier": {ALL: brier_score(*scores)}}
             for metric, of_concept in metrics.items():
@@ -83,69 +68,58 @@ def collect(
         rows = read_predictions(path)
         metrics = attribution_metrics(rows[rows["split"] == "test"], concepts_of(rows))
         records += [(TOGETHER, source, method, "accuracy", ALL, seed, metrics["accuracy"][ALL])]
-    metrics = tidy(records, "predictions")
-    if not label_files:
-        return metrics
-    labels = collect_labels(label_files, run.config["frame_labels"]["targets"])
-    return pd.concat([metrics, *labels], ignore_index=True)
+    labels = collect_labels(label_files, run.config["frame_labels"]["targets"]) if label_files else []
+    return pd.concat([tidy(records, "predictions"), *labels], ignore_index=True)
 
 
-def parts_of_frames(path, test: pd.DataFrame, pose_file: str | Path) -> Iterator[tuple[str, pd.DataFrame]]:
-    """Yield the test rows of a file of predictions: all together, and by what the column `table` of the metrics names.
+def parts_by_file(
+    prediction_files: Iterable[str | Path], pose_files: Iterable[str | Path]
+) -> Iterator[tuple[str, str, int, list[str], dict[str, pd.DataFrame]]]:
+    """Source, method, seed and concepts of each file of predictions, and its test rows by part.
+
+    ``attribution`` is all of them, ``seen`` those of objects that a training sample shows, ``unseen`` the others,
+    ``dataset/{name}`` those of one dataset's frames. A part without any row is left out.
 
     Raises:
-        InputError: no test rows, or other samples than in the file of poses.
+        InputError: files of other names, files that do not belong together, what their readers refuse.
     """
-    if test.empty:
-        raise InputError(path, "has no test rows", "regenerate it")
-    samples = read_samples_of_frames(pose_file)
-    samples = samples[samples["split"] == "test"].set_index("sample")
-    if not set(test["sample"]) <= set(samples.index):
-        raise InputError(pose_file, f"lacks samples of {path}", "regenerate both from the same config")
-    shown = samples.loc[test["sample"]]
-    in_training, dataset = shown["in_training"].to_numpy(bool), shown["dataset"].to_numpy()
-    yield TOGETHER, test
-    chosen = {SEEN: in_training, UNSEEN: ~in_training}
-    chosen |= {f"{DATASET}{name}": dataset == name for name in np.unique(dataset)}
-    yield from ((name, test[rows]) for name, rows in chosen.items() if rows.any())
-
-
-def _scores(test: pd.DataFrame, concepts: list[str]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the scores (N, C) and the numbers of the true concepts (N,)."""
-    scores_N_C = test[[f"score_{concept}" for concept in concepts]].to_numpy(float)
-    return scores_N_C, np.array([concepts.index(concept) for concept in test["concept_true"]])
+    poses = {(Path(path).parts[-2], Path(path).stem): path for path in pose_files}
+    for path in prediction_files:
+        source, method, seed = source_method_seed(path)
+        if (pose_file := poses.get((source, f"seed{seed}"))) is None:
+            raise InputError(path, "has no pose file beside it", "regenerate both from the same config")
+        rows = read_predictions(path)
+        test = rows[rows["split"] == "test"]
+        if test.empty:
+            raise InputError(path, "has no test rows", "regenerate it")
+        samples = read_samples_of_frames(pose_file)
+        samples = samples[samples["split"] == "test"].set_index("sample")
+        if not set(test["sample"]) <= set(samples.index):
+            raise InputError(pose_file, f"lacks samples of {path}", "regenerate both from the same config")
+        shown = samples.loc[test["sample"]]
+        in_training, dataset = shown["in_training"].to_numpy(bool), shown["dataset"].to_numpy()
+        chosen = {TOGETHER: np.ones(len(test), bool), SEEN: in_training, UNSEEN: ~in_training}
+        chosen |= {f"{DATASET}{name}": dataset == name for name in np.unique(dataset)}
+        yield source, method, seed, concepts_of(rows), {name: test[of_N] for name, of_N in chosen.items() if of_N.any()}
 
 
 @numbers("real_world_intervals.csv", **FRAME_FILES)
 def collect_intervals(
     run: Run, prediction_files: Iterable[str | Path], pose_files: Iterable[str | Path]
 ) -> pd.DataFrame:
-    """Return accuracies of `real_world.csv` over all seeds, with 95 % intervals (:mod:`gpca.evaluation.measures`).
+    """Accuracies of `real_world.csv` over all seeds, with 95 % intervals (:mod:`gpca.evaluation.measures`).
 
     - accuracy: of every part of the test samples that the column `table` names; of all of them by concept as well.
     - difference: of that of all from the first method's in the same seeds, on the same draws, where both have the same
       samples.
 
     Clusters are scenes; the draws of a source are the same for all methods.
-
-    Args:
-        prediction_files, pose_files: as for :func:`collect`.
-
-    Raises:
-        InputError: see there.
     """
     import pandas as pd
 
     first = reduced_backbones(run.config["real_world"])[0]
-
-    poses = {(Path(path).parts[-2], Path(path).stem): path for path in pose_files}
     frames: dict[tuple[str, str], list[pd.DataFrame]] = {}
-    for path in prediction_files:
-        source, method, seed = source_method_seed(path)
-        if (of_source := poses.get((source, f"seed{seed}"))) is None:
-            raise InputError(path, "has no pose file beside it", "regenerate both from the same config")
-        rows = read_predictions(path)
-        parts = dict(parts_of_frames(path, rows[rows["split"] == "test"], of_source))
+    for source, method, seed, _, parts in parts_by_file(prediction_files, pose_files):
         test = parts.pop(TOGETHER)
         is_in = {name: test.index.isin(part.index) for name, part in parts.items()}
         right = (test["concept_true"] == test["concept_predicted"]) & ~test["abstained"]
@@ -154,23 +128,17 @@ def collect_intervals(
     records = []
     for (source, method), rows in together.items():
         samples = Clustered.drawn(rows["seed"], rows["cluster"], "frame intervals", source)
-        for table, metric, concept, own, estimate in _estimates(rows, samples):
-            records.append(own.record((table, source, method, metric, concept), estimate))
+        right_N, concept = rows["right"].to_numpy(bool), rows["concept_true"]
+        chosen = {(TOGETHER, ALL): np.ones(len(rows), bool)}
+        chosen |= {(TOGETHER, name): concept.eq(name).to_numpy() for name in concept.unique()}
+        parts = rows.columns[rows.columns.get_loc("right") + 1 :]
+        chosen |= {(name, ALL): rows[name].eq(True).to_numpy() for name in parts}
+        for (table, part), of_N in chosen.items():
+            own = samples.subset(of_N)
+            records.append(own.record((table, source, method, "accuracy", part), own.share(right_N[of_N])))
         other = together.get((source, first), rows.iloc[:0])
         other = other[other["seed"].isin(rows["seed"])].reset_index(drop=True)  # some methods have fewer seeds
         if method != first and rows[SAMPLE].equals(other[SAMPLE]):
             apart = samples.difference(rows["right"].to_numpy(), other["right"].to_numpy())
             records.append(samples.record((TOGETHER, source, method, "difference", ALL), apart))
     return intervals(records, "predictions")
-
-
-def _estimates(rows: pd.DataFrame, samples: Clustered) -> Iterator[tuple[str, str, str, Clustered, Estimate]]:
-    """Yield table, metric, concept, the samples that it is over, and the estimate of each accuracy."""
-    right_N = rows["right"].to_numpy(bool)
-    of_parts = {(TOGETHER, ALL): np.ones(len(rows), bool)}
-    of_parts |= {(TOGETHER, name): rows["concept_true"].eq(name).to_numpy() for name in rows["concept_true"].unique()}
-    parts = rows.columns[rows.columns.get_loc("right") + 1 :]
-    of_parts |= {(name, ALL): rows[name].eq(True).to_numpy() for name in parts}
-    for (name, concept), of_N in of_parts.items():
-        own = samples.subset(of_N)
-        yield name, "accuracy", concept, own, own.share(right_N[of_N])

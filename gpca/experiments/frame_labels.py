@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -38,13 +38,11 @@ def check(config: dict, left_out: LeftOut) -> None:
 
     A third of the training samples is of each concept.
     """
-    key, encoders = "frame_labels.backbones", left_out("encoders")
-    require_names(key, config["frame_labels"]["backbones"], config["encoders"], "encoder", encoders)
-    targets = config["frame_labels"]["targets"]
-    if len(set(map(in_percent, targets))) < len(targets):
+    section, train = config["frame_labels"], config["real_world"]["train"]
+    require_names("frame_labels.backbones", section["backbones"], config["encoders"], "encoder", left_out("encoders"))
+    if len(set(map(in_percent, section["targets"]))) < len(section["targets"]):
         raise InputError("config key frame_labels.targets", "two are equal in whole percent", "remove one")
-    initial, train = config["frame_labels"]["initial"], config["real_world"]["train"]
-    if initial // 2 >= train // len(CONCEPTS):
+    if (initial := section["initial"]) // 2 >= train // len(CONCEPTS):
         fault = f"{initial} labeled samples of two concepts leave none of {train} training samples for the pool"
         raise InputError("config key frame_labels.initial", fault, "lower it or raise real_world.train")
 
@@ -84,18 +82,13 @@ LEARN = Step(
 )
 
 
-def collect_labels(label_files: Iterable[str | Path], targets: Iterable[float]) -> list[pd.DataFrame]:
-    """Metrics of learning curves on depth frames, by seed.
+def collect_labels(label_files: Sequence[str | Path], targets: Iterable[float]) -> list[pd.DataFrame]:
+    """Metrics of learning curves on depth frames, by seed, for targets of the accuracy on the test samples.
 
     The column `table` names the embedding, ``active_learning/{backbone}`` or ``active_learning/pair``. Metrics that
-    depend on the target accuracy have it in percent behind, ``active_learning/{backbone}/70``.
-
-    Args:
-        label_files: named ``…/{source}/{strategy}/seed{seed}.csv``.
-        targets: accuracies on the test samples.
+    depend on the target have it in percent behind, ``active_learning/{backbone}/70``.
     """
-    files = list(label_files)
-    by_target = {in_percent(target): collect_curves(files, target) for target in targets}
+    by_target = {in_percent(target): collect_curves(label_files, target) for target in targets}
     whole = next(iter(by_target.values()))
     return [whole[~whole["metric"].isin((*TO_TARGET, ONE_TARGET))]] + [
         curves[curves["metric"].isin(TO_TARGET)].assign(table=lambda rows, end=percent: rows["table"] + f"/{end}")
@@ -124,28 +117,19 @@ def table6_labels(run: Run, metrics: pd.DataFrame) -> Table:
     """Labels that BALD and random choice need, by target, and accuracies: embeddings × strategies."""
     section, frames = run.config["frame_labels"], run.config["real_world"]
     percents = [in_percent(target) for target in section["targets"]]
-    columns = {
-        f"{strategy}_{percent}": Column(title.format(percent), decimals=0, limits=(0, inf), least_is_best=True)
-        for percent in percents
-        for strategy, title in STRATEGIES.items()
-    }
-    columns |= {key: column for key, (_, _, column) in ENDS.items()}
-
-    def cell(name: str, metric: str, strategy: str, factor: float = 1, end: str = "") -> Cell | None:
-        rows = rows_where(metrics, source=REAL_WORLD, table=TABLE + name + end, method=strategy)
-        values_R = factor * rows_where(rows, metric=metric).groupby("seed")["value"].mean()
-        missed = bool(end) and bool((rows_where(rows, metric="reached")["value"] < 1).any())
-        return cell_of_repeats(values_R, frames["test"] * len(values_R), at_least=missed)
-
+    labels = {f"{strategy}_{percent}": (strategy, percent) for percent in percents for strategy in STRATEGIES}
     builder = TableBuilder("table6_labels", {"seen": "Seen by"})
     encoders = {name: encoder_title(name, "none") for name in frames["backbones"]}
     for name, title in {**encoders, PAIR: "Measurements of the pair"}.items():
-        cells = {
-            f"{strategy}_{percent}": cell(name, "labels_to_target", strategy, end=f"/{percent}")
-            for percent in percents
-            for strategy in STRATEGIES
-        }
-        cells |= {key: cell(name, metric, strategy, 100) for key, (metric, strategy, _) in ENDS.items()}
+
+        def cell(metric: str, strategy: str, factor: float = 1, end: str = "", of: str = TABLE + name) -> Cell | None:
+            rows = rows_where(metrics, source=REAL_WORLD, table=of + end, method=strategy)
+            values_R = factor * rows_where(rows, metric=metric).groupby("seed")["value"].mean()
+            missed = bool(end) and bool((rows_where(rows, metric="reached")["value"] < 1).any())
+            return cell_of_repeats(values_R, frames["test"] * len(values_R), at_least=missed)
+
+        cells = {key: cell("labels_to_target", of, end=f"/{percent}") for key, (of, percent) in labels.items()}
+        cells |= {key: cell(metric, strategy, 100) for key, (metric, strategy, _) in ENDS.items()}
         builder.add_row([(name, title)], cells)
     for percent in percents:
         builder.compare_across([f"{strategy}_{percent}" for strategy in STRATEGIES])
@@ -153,7 +137,11 @@ def table6_labels(run: Run, metrics: pd.DataFrame) -> Table:
     return builder.build(
         caption=f"Labels until a GPC to which {new} is new is as accurate on {title_of_frames(run.config)}",
         column_head="quantity",
-        columns=columns,
+        columns={
+            key: Column(STRATEGIES[strategy].format(percent), decimals=0, limits=(0, inf), least_is_best=True)
+            for key, (strategy, percent) in labels.items()
+        }
+        | {key: column for key, (_, _, column) in ENDS.items()},
         footnotes=(
             f"{mean_over(builder.most_seeds(), frames['test'])}. Bold: the fewer labels of the two to a target, "
             "whether or not their intervals overlap; neither where they are equal.",

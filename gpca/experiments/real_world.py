@@ -26,19 +26,16 @@ from gpca.frames.initial_pose import InitialPoseSettings
 from gpca.frames.rgbd_scene import SceneSettings
 from gpca.frames.source import ONE_ENCODER, REAL_WORLD, conditions_of, has_estimates, resolve_datasets
 from gpca.objects import procedural
-from gpca.objects.entry import Checksums, Name, Place, Text, Unit, Urls, title_of
+from gpca.objects.entry import Checksums, Name, Place, Text, Unit, Urls
 from gpca.pairs.synthesis import TestSamples, TrainSamples
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.settings import Bounds, Count, Distinct, OpenShare, Share, changes_of
 
-Pretraining = Annotated[dict, changes_of(EncoderSettings, without=("backbone", "options", "reading", "draws"))]
+FIXED = ("backbone", "options", "reading", "draws")
+Pretraining = Annotated[dict, changes_of(EncoderSettings, without=FIXED)]
 # The encoder then embeds draws of the size that it was last trained on.
-Training = Annotated[
-    dict, changes_of(EncoderSettings, without=("backbone", "options", "reading", "draw_points", "draws"))
-]
-
+Training = Annotated[dict, changes_of(EncoderSettings, without=(*FIXED, "draw_points"))]
 Reduction = Literal["none", "pca", "umap", "autoencoder"]
-
 # The same hypotheses cost the same everywhere.
 Reenactment = Annotated[dict, changes_of(ReenactmentSettings, without=("hypotheses",))]
 
@@ -121,7 +118,11 @@ def check(config: dict, left_out: LeftOut) -> None:
     if section["initial_pose"].get("form") == "results" and not has_estimates(datasets):
         fault = "form 'results' needs a dataset with results or errors"
         raise InputError("config key real_world.initial_pose", fault, "name the files or choose another form")
-    _check_published(config, encoders_left_out)
+    key, published = "real_world.published", list(section["published"].values())
+    require_names(key, list(section["published"]), section["backbones"], "backbone", encoders_left_out)
+    require_names(key, published, config["encoders"], "encoder", encoders_left_out)
+    if twice := [name for i, name in enumerate(published) if name in (*section["backbones"], *published[:i])]:
+        raise InputError(f"config key {key}", f"'{twice[0]}' has rows already", "name another encoder")
     _check_training(config)
     key, backbones = "real_world.condition_backbones", section["backbones"]
     require_names(key, section["condition_backbones"], backbones, "backbone", encoders_left_out)
@@ -129,41 +130,27 @@ def check(config: dict, left_out: LeftOut) -> None:
     require_names(key, section["condition_reductions"], reductions, "reduction", left_out("reductions"))
     for name, settings in (section["explainers"] or {}).items():
         with_key(f"real_world.explainers.{name}", require_settings, name, settings or {})
-    _check_reductions(config)
-
-
-def _check_published(config: dict, encoders_left_out: set[str]) -> None:
-    """Check that encoders as published stand beside judged ones, each under a name of its own."""
-    section, key = config["real_world"], "real_world.published"
-    require_names(key, list(section["published"]), section["backbones"], "backbone", encoders_left_out)
-    names = list(section["published"].values())
-    require_names(key, names, config["encoders"], "encoder", encoders_left_out)
-    if twice := [name for i, name in enumerate(names) if name in (*section["backbones"], *names[:i])]:
-        raise InputError(f"config key {key}", f"'{twice[0]}' has rows already", "name another encoder")
 
 
 def _check_training(config: dict) -> None:
-    """Check that the encoders take what they are trained with on frames."""
+    """Check that the encoders take what they are trained with on frames, and that embeddings have enough components.
+
+    The length of an embedding is known of the suite's own backbones only.
+    """
     section, encoders = config["real_world"], config["encoders"]
-    if section["virtual"]:
-        for needed, why in (("datasets", "it renders their models"), ("pretraining", "only this uses it")):
-            if not section[needed]:
-                fault = f"needs real_world.{needed}: {why}"
-                raise InputError("config key real_world.virtual", fault, f"set {needed}, or virtual to null")
+    for needed, why in (("datasets", "it renders their models"), ("pretraining", "only this uses it")):
+        if section["virtual"] and not section[needed]:
+            fault = f"needs real_world.{needed}: {why}"
+            raise InputError("config key real_world.virtual", fault, f"set {needed}, or virtual to null")
     require_names("real_world.training", list(section["training"] or {}), encoders, "encoder", set())
-    for name in (*section["backbones"], *section["published"].values()):
+    shown = (*section["backbones"], *section["published"].values())
+    for name in shown:
         changes = {"pretraining": pretraining_of(section, name), "training": (section["training"] or {}).get(name, {})}
         for part, settings in changes.items():
             with_key(f"real_world.{part}", lambda whole: EncoderSettings(**whole), encoders[name] | settings)
-
-
-def _check_reductions(config: dict) -> None:
-    """Check that embeddings have enough components; their length is known of the suite's own backbones only."""
-    section = config["real_world"]
     for name in section["reductions"]:
         reduction = make_reduction(name, config["reductions"].get(name) or {})
-        for backbone in (*section["backbones"], *section["published"].values()) if reduction else ():
-            encoder = EncoderSettings(**config["encoders"][backbone])
+        for encoder in (EncoderSettings(**encoders[backbone]) for backbone in shown) if reduction else ():
             options = OPTIONS.get(encoder.backbone)
             size = options(**encoder.options).embedding_size if options else None
             with_key(f"reductions.{name}", require_room, name, reduction, section["train"], size)
@@ -171,9 +158,9 @@ def _check_reductions(config: dict) -> None:
 
 def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
     """Rows of Table VI, conditions of the initial pose, and the files of their predictions."""
-    frames = config["real_world"]
+    frames, seeds = config["real_world"], list(config["seeds"])
     backbones, published = reduced_backbones(frames), published_backbones(frames)
-    seeds, published_seeds = list(config["seeds"]), list(config["seeds"])[: frames.get("published_seeds")]
+    published_seeds = seeds[: frames.get("published_seeds")]
     conditions = [f"{REAL_WORLD}_{name}" for name in conditions_of(config)]
     condition_backbones = [
         f"{name}-{reduction}" for name in frames["condition_backbones"] for reduction in frames["condition_reductions"]
@@ -208,27 +195,14 @@ def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
     }
 
 
-def shown(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
-    """Title of the frames, and settings of the encoders."""
-    source = frames_of(config)
-    encoders = {name: config["encoders"][name] for name in config["real_world"]["backbones"]}
-    return {"frames": source, "frames_title": title_of(source), "backbones": encoders}
-
-
 EXPERIMENT = Experiment(
     name="real_world",
     sections={"real_world": RealWorldSettings},
     beside=("frame_accuracies", "frame_tables", "frame_pictures"),
     names=names,
-    shown=shown,
+    shown=lambda config, _sources: {"frames": frames_of(config)},
     check=check,
     optional_entries={"real_world.datasets": Names("dataset"), "real_world.explainers": EXPLAINERS},
-    lists={
-        "real_world.backbones": "encoders",
-        "real_world.condition_backbones": "encoders",
-        "real_world.published": "encoders",
-        "real_world.training": "encoders",
-        "real_world.reductions": "reductions",
-        "real_world.condition_reductions": "reductions",
-    },
+    lists={f"real_world.{name}": "encoders" for name in ("backbones", "condition_backbones", "published", "training")}
+    | {f"real_world.{name}": "reductions" for name in ("reductions", "condition_reductions")},
 )
