@@ -14,17 +14,19 @@ from gpca.attribution.predictions import concepts_of, read_predictions
 from gpca.errors import InputError
 from gpca.evaluation.measures import source_method_seed
 from gpca.experiments.confusions import counts_and_shares, pooled_confusions
-from gpca.experiments.frame_views import draw_over_model, draw_scores, read_samples
+from gpca.experiments.frame_views import draw_scores
 from gpca.experiments.frames import encoder_title, read_together, title_of_frames, unreduced_methods
 from gpca.experiments.plan import Run
 from gpca.experiments.registration_stages import source_before_icp
 from gpca.experiments.result import figure
 from gpca.frames.instances import Instances
 from gpca.frames.synthesis import HALF_SPACE, OCCLUDER
+from gpca.io.container import require_same_samples
+from gpca.io.csv_file import numbers, read_csv
 from gpca.io.files import read_image
 from gpca.objects.canonical import ObjectClouds
-from gpca.pairs.dataset import Registrations
-from gpca.reporting.figures.cloud_views import legend_of_clouds
+from gpca.pairs.dataset import FRAME_COLUMNS, Registrations
+from gpca.reporting.figures.cloud_views import draw_clouds, legend_of_clouds
 from gpca.reporting.figures.panels import draw_percentages, panels, write_below
 from gpca.reporting.figures.reliability import reliability_figure
 from gpca.reporting.figures.style import (
@@ -48,6 +50,7 @@ LOST_TO = {OCCLUDER: "an occluder", HALF_SPACE: "a half-space"}
 HEIGHT_IN = 2.4
 SMALLEST_PART = 0.02  # Smaller parts of an object's pixels lie at its rim, where no point was drawn.
 AROUND = (2.5, 1.2)  # The first picture, and the two others, show this many times the object's extent.
+POSE_COLUMNS = ("sample", "split", "instance", "init_error", "icp_error", "lost_to")
 SHOWN = 10
 PANELS_PER_ROW = 5
 
@@ -80,63 +83,68 @@ def draw_real_world_example(
     """(a) A part of the frame with the object's region and what of it is covered, (b) its points at the initial
     pose over the model as the camera sees both, (c) after ICP, with the estimated axes, and (d) the concept scores.
 
-    The figure shows a failure that missing overlap caused: a test sample that an occluder covers and that is attributed
-    rightly, whose initial pose was right and whose pose after ICP is not, and of the half of such samples that are the
-    largest in their images the one with the median score. Where there is none such, the wishes are dropped from the
-    last on. A pose is right whose error is below the config's `success.error`, in diameters.
+    A pose is right whose error is below the config's `success.error`, in diameters.
     """
+    from matplotlib.patches import Rectangle
+    from matplotlib.patheffects import withStroke
+
     title, success = title_of_frames(run.config), run.config["success"]["error"]
-    instances = Instances.load(instances_npz)
-    objects = ObjectClouds.load(objects_npz)
+    instances, objects = Instances.load(instances_npz), ObjectClouds.load(objects_npz)
     registrations = Registrations.load(registrations_npz)
     samples = read_samples(poses_csv, predictions_csv)
     shown_px = np.where(instances.is_colored, np.diff(instances.offsets), 0)
     row = choose_sample(samples, predictions_csv, shown_px, success)
-    sample = samples.iloc[row]
+    sample, diameter_m = samples.iloc[row], registrations.diameter_m[row]
     i = int(sample["instance"])
-    camera = _Camera(instances, i, registrations, row)
-    from matplotlib.patches import Rectangle
-    from matplotlib.patheffects import withStroke
+    # The source frame is the object's at the initial pose, so a source point's place in the camera is known.
+    poses = {
+        pose: instances.T_camera_object_init[i] @ inverse(getattr(registrations, f"T_target_source_{pose}")[row])
+        for pose in ("init", "icp")
+    }
+
+    def project(pose: str, points_m: np.ndarray) -> np.ndarray:
+        """Pixels (P, 2) of points in the target's frame, where the estimate says that it is."""
+        seen = transform(poses[pose], points_m) @ instances.camera_3_3[i].T
+        return seen[:, :2] / seen[:, 2:]
 
     image = read_image(str(instances.colour[i]), "fetch the frames anew")
     drawing, [drawn] = panels(1, 4, HEIGHT_IN, width_ratios=(3, 3, 3, 2.2))
     model_m = objects.points(int(instances.object_index[i]))[:3000]
-    observed_m = registrations.diameter_m[row] * registrations.cloud(row)
-    initial_m = registrations.diameter_m[row] * source_before_icp(registrations, row)
-    poses = {pose: camera.T_camera_target(pose) for pose in ("init", "icp")}
+    observed_m = diameter_m * registrations.cloud(row)
     seen = {
-        (pose, name): camera.project(transform(poses[pose], points_m))
-        for pose, source_m in (("init", initial_m), ("icp", observed_m))
+        (pose, name): project(pose, points_m)
+        for pose, source_m in (("init", diameter_m * source_before_icp(registrations, row)), ("icp", observed_m))
         for name, points_m in (("model", model_m), ("source", source_m))
     }
     own_px = instances.pixels_of(i)
     everything = np.concatenate([own_px, *seen.values()])
+    low_2, high_2 = everything.min(axis=0), everything.max(axis=0)
+    size_2 = np.array(image.shape[1::-1])
+    lost = covered(own_px, seen["init", "source"], image.shape[:2])
+    drawn[0].add_patch(Rectangle(low_2, *(high_2 - low_2), fill=False, edgecolor=YELLOW, linewidth=1.2))
     for panel, times in zip(drawn, (AROUND[0], AROUND[1], AROUND[1]), strict=False):
         # Not interpolated, a photo makes the PNG a third as large.
         panel.imshow(image, alpha=1.0 if panel is drawn[0] else 0.55, interpolation="nearest")
-        _zoom(panel, everything, times, image.shape)
-    (left, top), (right, bottom) = everything.min(axis=0), everything.max(axis=0)
-    region = Rectangle((left, top), right - left, bottom - top, fill=False, edgecolor=YELLOW, linewidth=1.2)
-    drawn[0].add_patch(region)
-    for panel in drawn[:3]:
-        _shade(panel, covered(own_px, seen["init", "source"], image.shape[:2]))
+        half = min(times * np.max(high_2 - low_2), *size_2) / 2
+        u, v = np.clip((low_2 + high_2) / 2, half, size_2 - half)
+        panel.set(xlim=(u - half - 0.5, u + half - 0.5), ylim=(v + half - 0.5, v - half - 0.5))
+        if lost.any():
+            panel.contourf(lost, [0.5, 1.5], colors=BLACK, alpha=0.5)
+            panel.contour(lost, [0.5], colors=BLACK, linewidths=0.8)
     large = float(np.clip(2000 / len(observed_m), 1.1, 5))  # Few points are drawn larger.
-    looks: dict[str, dict[str, Any]] = {
-        "model": {"color": TARGET_COLOR, "s": 0.7},
-        "source": {"color": SOURCE_COLOR, "s": large},
-    }
     for panel, pose in ((drawn[1], "init"), (drawn[2], "icp")):
-        for name, look in looks.items():
-            panel.scatter(*seen[pose, name].T, linewidths=0, **look)
-    ends_m = np.vstack([np.zeros(3), 0.3 * registrations.diameter_m[row] * np.eye(3)])
-    origin, *tips = camera.project(transform(poses["icp"], ends_m))
+        panel.scatter(*seen[pose, "model"].T, linewidths=0, color=TARGET_COLOR, s=0.7)
+        panel.scatter(*seen[pose, "source"].T, linewidths=0, color=SOURCE_COLOR, s=large)
+    origin, *tips = project("icp", np.vstack([np.zeros(3), 0.3 * diameter_m * np.eye(3)]))
+    ends_2_2 = np.sort([drawn[2].get_xlim(), drawn[2].get_ylim()], axis=1)
+    margin_2 = 0.06 * np.ptp(ends_2_2, axis=1)  # A letter stands whole within the panel.
+    outline = [withStroke(linewidth=2.4, foreground="white")]
+    arrow: dict[str, Any] = {"arrowstyle": "-|>", "color": BLACK, "lw": 1.2, "mutation_scale": 7}
+    letter: dict[str, Any] = {"ha": "center", "va": "center", "path_effects": outline, "fontweight": "bold"}
     for tip, name in zip(tips, "xyz", strict=True):
-        outline = [withStroke(linewidth=2.4, foreground="white")]
-        arrow: dict[str, Any] = {"arrowstyle": "-|>", "color": BLACK, "lw": 1.2, "mutation_scale": 7}
         drawn[2].annotate("", tip, origin, arrowprops=arrow | {"shrinkA": 0, "path_effects": outline})
-        x, y = np.clip(tip + 0.15 * (tip - origin), *_inside(drawn[2]))
-        letter: dict[str, Any] = {"path_effects": outline, "fontweight": "bold"}
-        drawn[2].text(x, y, name, color=BLACK, ha="center", va="center", **letter)
+        place = np.clip(tip + 0.15 * (tip - origin), ends_2_2[:, 0] + margin_2, ends_2_2[:, 1] - margin_2)
+        drawn[2].text(*place, name, color=BLACK, **letter)
     draw_scores(drawn[3], sample)
     failed = ", failed" if sample["icp_error"] >= success else ""
     captions = (
@@ -148,15 +156,33 @@ def draw_real_world_example(
         panel.set_axis_off()
         write_below(panel, caption)
     drawn[3].set_xlabel("(d) Scores, the truth bold", labelpad=1)
-    lost = f"{100 * registrations.severity_crop[row]:.0f} % of the points lost to {LOST_TO[sample['lost_to']]}"
+    share = f"{100 * registrations.severity_crop[row]:.0f} % of the points lost to {LOST_TO[sample['lost_to']]}"
     name = str(registrations.object_name[row])
-    write_title(drawing, f"{title_of_frame(name, title)}: {object_of_frames(name)}, {lost}")
+    dataset = BOP_TITLES.get(name.partition(" ")[0], "")  # stands before the name of an object
+    title = f"{dataset} frame" if dataset and dataset in title else title
+    write_title(drawing, f"{title}: {object_of_frames(name)}, {share}")
     legend_of_clouds(drawing, "model", "measured", gap=0.1)
     return drawing
 
 
+def read_samples(poses_csv: str | Path, predictions_csv: str | Path) -> pd.DataFrame:
+    """Poses and predictions of all samples side by side, in the order of the registrations.
+
+    Raises InputError for an unusable file, or files of different samples.
+    """
+    poses, predictions = read_csv(poses_csv, POSE_COLUMNS, others=FRAME_COLUMNS), read_predictions(predictions_csv)
+    require_same_samples(poses_csv, poses, predictions, "predictions")
+    for name in ("instance", "init_error", "icp_error"):
+        poses[name] = numbers(poses_csv, poses, name)
+    return poses.join(predictions[[name for name in predictions.columns if name not in poses.columns]])
+
+
 def choose_sample(samples: pd.DataFrame, path: str | Path, pixels_I: np.ndarray, success: float) -> int:
-    """Return the row that is shown; see :func:`draw_real_world_example`. Instance i shows ``pixels_I[i]`` colors."""
+    """Row of the test sample of overlap that is shown; instance i shows ``pixels_I[i]`` colored pixels.
+
+    It is one that an occluder covers, that is attributed rightly, and that ICP moved to a wrong pose from a right one;
+    where there is none such, the wishes are dropped from the last on. Of the larger half, it has the median score.
+    """
     is_seen = pixels_I[samples["instance"].to_numpy(int)] > 0
     overlap = samples[is_seen & (samples["split"] == "test") & (samples["concept_true"] == "overlap")]
     if overlap.empty:
@@ -173,12 +199,6 @@ def choose_sample(samples: pd.DataFrame, path: str | Path, pixels_I: np.ndarray,
     sized = overlap.assign(pixels=pixels_I[overlap["instance"].to_numpy(int)])
     ranked = sized.nlargest((len(sized) + 1) // 2, "pixels").sort_values(["score_overlap", "sample"])
     return int(ranked.index[len(ranked) // 2])
-
-
-def title_of_frame(object_name: str, title: str) -> str:
-    """Return the title of the shown frame, by the dataset before its object's name; else the title of all frames."""
-    dataset = BOP_TITLES.get(object_name.partition(" ")[0], "")
-    return f"{dataset} frame" if dataset and dataset in title else title
 
 
 def covered(own_P_2: np.ndarray, kept_P_2: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
@@ -198,52 +218,6 @@ def covered(own_P_2: np.ndarray, kept_P_2: np.ndarray, shape: tuple[int, int]) -
     sizes = np.bincount(parts.ravel(), minlength=1)
     sizes[0] = 0
     return (sizes >= SMALLEST_PART * own.sum())[parts]
-
-
-class _Camera:
-    """Knows the camera of an instance, and where a sample's target frame is in it under each estimate."""
-
-    def __init__(self, instances: Instances, i: int, registrations: Registrations, row: int) -> None:
-        self._camera_3_3 = instances.camera_3_3[i]
-        self._T_camera_init = instances.T_camera_object_init[i]
-        self._registrations = registrations
-        self._row = row
-
-    def T_camera_target(self, which: str) -> np.ndarray:
-        """Return the pose of the target's frame that the estimate ``init`` or ``icp`` claims.
-
-        The source frame is the object's at the initial pose, so a source point's place in the camera is known.
-        """
-        T_target_source = getattr(self._registrations, f"T_target_source_{which}")[self._row]
-        return self._T_camera_init @ inverse(T_target_source)
-
-    def project(self, points_m: np.ndarray) -> np.ndarray:
-        """Return the pixels (P, 2) of points in the camera's frame."""
-        seen = points_m @ self._camera_3_3.T
-        return seen[:, :2] / seen[:, 2:]
-
-
-def _shade(panel, mask: np.ndarray) -> None:
-    """Darken a part of the image, and outline it."""
-    if mask.any():
-        panel.contourf(mask, [0.5, 1.5], colors=BLACK, alpha=0.5)
-        panel.contour(mask, [0.5], colors=BLACK, linewidths=0.8)
-
-
-def _zoom(panel, pixels_P_2: np.ndarray, times: float, shape: tuple[int, ...]) -> None:
-    """Show the square part of the image around the pixels, `times` their extent."""
-    size_2 = np.array(shape[1::-1])
-    low_2, high_2 = pixels_P_2.min(axis=0), pixels_P_2.max(axis=0)
-    half = min(times * np.max(high_2 - low_2), *size_2) / 2
-    u, v = np.clip((low_2 + high_2) / 2, half, size_2 - half)
-    panel.set(xlim=(u - half - 0.5, u + half - 0.5), ylim=(v + half - 0.5, v - half - 0.5))
-
-
-def _inside(panel) -> tuple[np.ndarray, np.ndarray]:
-    """Return the least and the largest pixel at which a letter stands whole within the panel."""
-    ends = np.sort([panel.get_xlim(), panel.get_ylim()], axis=1)
-    margin = 0.06 * np.ptp(ends, axis=1)
-    return ends[:, 0] + margin, ends[:, 1] - margin
 
 
 @figure(
@@ -303,30 +277,32 @@ def draw_real_world_failures(
     The three lists of files run through the seeds in the same order.
     """
     objects = ObjectClouds.load(objects_npz)
-    mistakes = _mistakes(poses_csv, predictions_csv)
-    shown = list(mistakes.head(SHOWN).iterrows())
+    shown = mistakes_of(poses_csv, predictions_csv).head(SHOWN)
     rows = max(1, -(-len(shown) // PANELS_PER_ROW))
     drawing = use_style().figure(figsize=(TEXT_WIDTH_IN, 0.22 + 2.1 * rows), layout="constrained")
     parts = drawing.subfigures(rows, PANELS_PER_ROW, squeeze=False).flat
-    loaded = {file: Registrations.load(registrations_npz[file]) for file in sorted({m["file"] for _, m in shown})}
-    for part, (_, mistake) in zip(parts, shown, strict=False):
-        registrations = loaded[mistake["file"]]
-        row = int(mistake["row"])
+    loaded = {file: Registrations.load(registrations_npz[file]) for file in sorted(set(shown["file"]))}
+    for part, (_, mistake) in zip(parts, shown.iterrows(), strict=False):
+        registrations, row = loaded[mistake["file"]], int(mistake["row"])
         above, below = part.subplots(2, 1, height_ratios=(2.5, 1))
         index = int(registrations.object_index[row])
-        model = objects.points(index)[:2048] / objects.diameters_m[index]
-        draw_over_model(above, model, registrations.cloud(row))
+        model, source = objects.points(index)[:2048] / objects.diameters_m[index], registrations.cloud(row)
+        # Seen from the side that was measured, which is nearer than the model's middle.
+        towards = (source - model.mean(axis=0)).mean(axis=0) + np.array([1e-6, 0, 0])
+        towards = towards / np.linalg.norm(towards)
+        right = np.cross([0.0, 0.0, 1.0] if abs(towards[2]) < 0.95 else [0.0, 1.0, 0.0], towards)
+        right /= np.linalg.norm(right)
+        view = np.array([right, np.cross(towards, right), towards])
+        draw_clouds(above, *(cloud[:: max(1, len(cloud) // 1500)] @ view.T for cloud in (model, source)), size=1.2)
         draw_scores(below, mistake)
-        name = object_of_frames(registrations.object_name[row])
         taken = f"{mistake['concept_true']} taken for {mistake['concept_predicted']}"
-        words = f"{name}\n{taken}\npose {100 * mistake['icp_error']:.0f} % $d$ off"
-        part.suptitle(words, fontsize=SMALL_PT, linespacing=1.15)
-    none = "" if shown else ": no mistake in any seed"
-    write_title(drawing, f"{title_of_frames(run.config)}{none}")
+        words = f"{object_of_frames(registrations.object_name[row])}\n{taken}\n"
+        part.suptitle(f"{words}pose {100 * mistake['icp_error']:.0f} % $d$ off", fontsize=SMALL_PT, linespacing=1.15)
+    write_title(drawing, f"{title_of_frames(run.config)}{'' if len(shown) else ': no mistake in any seed'}")
     return drawing
 
 
-def _mistakes(poses_csv: Sequence[str | Path], predictions_csv: Sequence[str | Path]) -> pd.DataFrame:
+def mistakes_of(poses_csv: Sequence[str | Path], predictions_csv: Sequence[str | Path]) -> pd.DataFrame:
     """Wrongly attributed test samples, the most confident first, one of each instance and concept."""
     import pandas as pd
 
@@ -336,8 +312,6 @@ def _mistakes(poses_csv: Sequence[str | Path], predictions_csv: Sequence[str | P
         wrong = (samples["split"] == "test") & (samples["concept_predicted"] != samples["concept_true"])
         scores = samples[[name for name in samples.columns if name.startswith("score_")]].max(axis=1)
         parts.append(samples.assign(file=file, score=scores, seed=source_method_seed(predictions)[2])[wrong])
-    if not parts:
-        raise InputError("real_world_failures", "has no files", "name at least one seed")
     mistakes = pd.concat(parts).sort_values(["score", "seed", "row"], ascending=[False, True, True])
     return mistakes.drop_duplicates(["instance", "concept_true"]).reset_index(drop=True)
 
@@ -355,11 +329,7 @@ def _mistakes(poses_csv: Sequence[str | Path], predictions_csv: Sequence[str | P
     prediction_files="predictions/{frames}/{unreduced}/seed{seed}.csv",
 )
 def draw_frame_reliability(run: Run, prediction_files: Iterable[str | Path]) -> Figure:
-    """Accuracy over confidence on the test samples of depth frames, all seeds together.
-
-    Args:
-        prediction_files: named ``…/{source}/{method}/seed{seed}.csv``, of one source.
-    """
+    """Accuracy over confidence on the test samples of depth frames, all seeds together."""
     methods = unreduced_methods(run.config["real_world"])
     parts: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {}
     for path in prediction_files:
@@ -368,11 +338,11 @@ def draw_frame_reliability(run: Run, prediction_files: Iterable[str | Path]) -> 
         scores_N_C = rows[[f"score_{concept}" for concept in concepts_of(rows)]].to_numpy(float)
         hit_N = (rows["concept_predicted"] == rows["concept_true"]).to_numpy()
         parts.setdefault(source_method_seed(path)[1], []).append((scores_N_C.max(axis=1), hit_N))
-    shown = [method for method in methods if method in parts]
-    if not shown:
+    samples = {
+        title: tuple(np.concatenate(columns) for columns in zip(*parts[method], strict=True))
+        for method, title in methods.items()
+        if method in parts
+    }
+    if not samples:
         raise InputError("predictions on depth frames", "cover none of these methods", "run them first")
-    samples = {}
-    for method in shown:
-        confidence_N, hit_N = (np.concatenate(columns) for columns in zip(*parts[method], strict=True))
-        samples[methods[method]] = confidence_N, hit_N
     return reliability_figure(samples, title_of_frames(run.config), BINS, least=1 / 3)

@@ -10,16 +10,16 @@ from gpca.attribution.scores import Attribution
 from gpca.errors import InputError
 from gpca.evaluation.measures import write_metrics
 from gpca.experiments.frame_pictures import (
-    _mistakes,
     choose_sample,
     covered,
     draw_frame_reliability,
     draw_real_world_confusions,
     draw_real_world_example,
     draw_real_world_failures,
-    title_of_frame,
+    mistakes_of,
+    read_samples,
 )
-from gpca.experiments.frame_views import draw_scores, read_samples
+from gpca.experiments.frame_views import draw_scores
 from gpca.experiments.frames import read_together
 from gpca.experiments.plan import Run
 from gpca.explainers.registry import explainer_entry
@@ -80,7 +80,7 @@ def results(tiny, tmp_path_factory):
 
 
 def test_the_most_confident_mistakes_come_first(results):
-    mistakes = _mistakes([results / "poses.csv"], [results / "real_rgbd/dgcnn-none/seed0.csv"])
+    mistakes = mistakes_of([results / "poses.csv"], [results / "real_rgbd/dgcnn-none/seed0.csv"])
     assert mistakes["sample"].tolist() == ["3", "0"]
     assert mistakes["score"].tolist() == pytest.approx([0.9, 0.6])
     assert (mistakes["split"] == "test").all()
@@ -114,19 +114,6 @@ def test_fig5_shows_a_registration_that_icp_made_wrong_where_there_is_one():
     assert choose_sample(samples, "predictions", np.array([300, 200, 100]), 0.03) == 2
     assert choose_sample(samples[:2], "predictions", np.array([300, 200]), 0.03) == 1
     assert choose_sample(samples[:1], "predictions", np.array([300]), 0.03) == 0
-
-
-@pytest.mark.parametrize(
-    ("name", "title"),
-    [
-        ("ycbv obj_000002", "YCB-Video frame"),
-        ("lmo obj_000001", "YCB-Video and LINEMOD frames"),
-        ("mine obj_000001", "YCB-Video and LINEMOD frames"),
-        ("mug", "YCB-Video and LINEMOD frames"),
-    ],
-)
-def test_fig5_names_the_dataset_of_its_frame_where_it_is_known(name, title):
-    assert title_of_frame(name, "YCB-Video and LINEMOD frames") == title
 
 
 def test_what_is_covered_is_what_lies_not_between_the_points_that_were_kept():

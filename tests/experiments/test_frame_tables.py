@@ -182,7 +182,9 @@ def test_rows_are_conditions_by_methods_and_columns_what_was_seen():
 def test_the_note_says_that_the_pretraining_knows_the_models():
     values = {("real_rgbd", "attribution", "dgcnn-none"): (0.7, 100, 1)}
     assert "renders the models" not in " ".join(make_seen(values).footnotes)
-    assert "The pretraining renders the models of both." in " ".join(make_seen(values, virtual={"objects": "all"}).footnotes)
+    assert "The pretraining renders the models of both." in " ".join(
+        make_seen(values, virtual={"objects": "all"}).footnotes
+    )
 
 
 def test_nothing_to_show_is_refused():
