@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,22 +13,12 @@ import numpy as np
 from gpca.attribution.predictions import read_predictions
 from gpca.causes.dataset import LABELS, Causes, labels_of
 from gpca.causes.judged import CEILING, MEASURES, Judged, ceiling_of, joined, judged_by, measure
-from gpca.causes.truth import BORDERLINE, FAILED, GEOMETRY, NOMINAL
-from gpca.encoders.registry import encoders
+from gpca.causes.truth import BORDERLINE, FAILED, GEOMETRY, NOMINAL, Truth
+from gpca.encoders.registry import encoder_module
 from gpca.errors import InputError
 from gpca.evaluation.intervals import REPEATS, Clustered, pigeonhole_weights
 from gpca.evaluation.measures import ALL, intervals
-from gpca.experiments.cause_tables import (
-    AGAIN,
-    COST_NOTE,
-    COSTS,
-    NOT_COMPARED,
-    POINTS,
-    SECTION,
-    SHOWN,
-    counts_and_calls,
-    reads,
-)
+from gpca.experiments import cause_tables as tables
 from gpca.experiments.diagnosis import TABLE, cause_costs, cause_titles, compared_samples
 from gpca.experiments.experiment import Experiment
 from gpca.experiments.frames import title_of_frames
@@ -46,9 +35,8 @@ from gpca.objects.canonical import BY_ICP
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.plugins import is_outside
 from gpca.reporting.sheet import Row, Sheet, show, where
-from gpca.reporting.tables.builder import TableBuilder
 from gpca.reporting.tables.cells import plain_cell
-from gpca.reporting.tables.table import Column
+from gpca.reporting.tables.table import Cell, Column
 from gpca.reporting.words import dataset_in_words, plural
 from gpca.seeds import generator, seed_of_file
 
@@ -83,12 +71,16 @@ def _asked(plan: Plan, explainers: Iterable[str]) -> dict[str, Any]:
     return section | {"icp": plan.config["registrations"]["icp"]} | asked
 
 
-def _encoder_module(plan: Plan) -> str:
-    return encoders()[plan.config["diagnosis"]["encoder"]["backbone"]].split(":")[0]
-
-
 def _inside(plan: Plan) -> list[str]:
     return [name for name in plan.config["diagnosis"]["explainers"] if name not in plan.names["outside_explainer"]]
+
+
+def _encoder_and(plan: Plan, explainers: Iterable[str]) -> list[str]:
+    """Modules of the encoder and of explainers."""
+    return [
+        encoder_module(plan.config["diagnosis"]["encoder"]),
+        *(explainer_module(each, CAUSES) for each in explainers),
+    ]
 
 
 def _if_enacted(plan: Plan, files: str) -> str | list[str]:
@@ -112,10 +104,7 @@ DIAGNOSE_FRAMES = Step(
     outputs={"predictions": "frame_diagnoses/seed{seed}.csv"},
     settings=lambda plan, wildcards: _asked(plan, _inside(plan)),
     params={"source": REAL_WORLD},
-    modules=lambda plan: [
-        _encoder_module(plan),
-        *(explainer_module(name, CAUSES) for name in _inside(plan)),
-    ],
+    modules=lambda plan: _encoder_and(plan, _inside(plan)),
 )
 # Explainers from outside have jobs of their own, so that an edit of one leaves the others as they are.
 DIAGNOSE_FRAMES_OUTSIDE = replace(
@@ -123,7 +112,7 @@ DIAGNOSE_FRAMES_OUTSIDE = replace(
     name="diagnose_frames_outside",
     outputs={"predictions": "frame_diagnoses/{outside_explainer}/seed{seed}.csv"},
     settings=lambda plan, wildcards: _asked(plan, [wildcards.outside_explainer]),
-    modules=lambda plan: [_encoder_module(plan)],
+    modules=lambda plan: _encoder_and(plan, ()),
     modules_of_job=lambda plan, wildcards: [explainer_module(wildcards.outside_explainer, CAUSES)],
 )
 
@@ -160,81 +149,66 @@ def collect(
 
     samples_of: dict[str, list[Judged]] = {}
     tested: list[pd.DataFrame] = []
-    outside = list(outside_files)
-    for seed, causes, samples, predictions in _seeds(causes_files, sample_files, prediction_files):
-        further = [_predictions(path, causes) for path in outside if seed_of_file(path) == seed]
-        predictions = pd.concat([predictions, *further])
-        for explainer, rows in predictions.groupby("explainer", sort=False):
-            samples_of.setdefault(str(explainer), []).append(judged_by(rows, causes, seed))
+    outside, files = list(outside_files), [list(each) for each in (causes_files, sample_files, prediction_files)]
+    if not files[0] or len(set(map(len, files))) > 1:
+        raise InputError("causes of frames", "need files of every seed", "give the same number of each kind")
+    for causes_file, sample_file, prediction_file in zip(*files, strict=True):
+        causes, seed = Causes.load(causes_file), seed_of_file(causes_file)
+        samples = read_csv(sample_file, SAMPLE_COLUMNS, others=ANY)[list(SAMPLE_COLUMNS)]
+        require_same_samples(sample_file, samples, causes.registrations.arrays, "causes", ("sample",))
+        for path in (prediction_file, *(each for each in outside if seed_of_file(each) == seed)):
+            for explainer, rows in read_predictions(path, labels=("explainer",)).groupby("explainer", sort=False):
+                require_same_samples(path, rows, causes.registrations.arrays, "causes", ("sample",))
+                samples_of.setdefault(str(explainer), []).append(judged_by(rows, causes, seed))
         samples_of.setdefault(CEILING, []).append(ceiling_of(causes, seed))
-        truth = causes.truth
-        state = np.where((truth.state == FAILED) & (truth.dominant == GEOMETRY), GEOMETRY, labels_of(truth))
-        tested.append(samples.assign(state=state, seed=seed, object=causes.registrations.object_name))
+        tested.append(samples.assign(end=ends_of(causes.truth), seed=seed, object=causes.registrations.object_name))
     judged = {explainer: joined(parts) for explainer, parts in samples_of.items()}
     together = pd.concat(tested, ignore_index=True)
     together["scene"] = together["dataset"] + " " + together["scene"]
-    records: list[tuple] = []
-    for kind, starts in _by_kind(together):
-        records += _counts(f"{REAL_WORLD}/{kind}", starts)
-        for dataset, subset in starts.groupby("dataset"):
-            records += _counts(f"{REAL_WORLD}/{kind}/{dataset}", subset)
-        if kind != PSEUDO:
-            records += _measures(kind, starts, {name: every.subset(starts.index) for name, every in judged.items()})
+    pseudo_N, records = together["truth"] == BY_ICP, []
+    chosen = {kind: together[(together["start"] == kind) & ~pseudo_N] for kind in KINDS} | {PSEUDO: together[pseudo_N]}
+    for kind, starts in ((kind, starts) for kind, starts in chosen.items() if len(starts)):
+        source = f"{REAL_WORLD}/{kind}"
+        of_datasets = {f"{source}/{dataset}": subset for dataset, subset in starts.groupby("dataset")}
+        for name, subset in ({source: starts} | of_datasets).items():
+            counts = count_ends(subset, ("instance", "scene", "object"), "starts")
+            sizes = subset["seed"].nunique(), counts["scenes"], len(subset)
+            records += [
+                (TABLE, name, TRUTH, f"count_{each}", ALL, "", "", *sizes, float(counts[each]), np.nan, np.nan)
+                for each in COUNTED
+            ]
+        if kind == PSEUDO:
+            continue
+        scene_N = starts["scene"].to_numpy(str)
+        drawn_B_N = pigeonhole_weights(generator("frame cause intervals", kind), scene_N)
+        draws = Clustered(starts["seed"].to_numpy(), scene_N, np.vstack([np.ones(len(starts)), drawn_B_N]))
+        once_N = 1 / starts.groupby("instance")["instance"].transform("size").to_numpy(float)
+
+        def measured(each: Judged, weights_B_N: np.ndarray, once_N: np.ndarray = once_N) -> dict[str, np.ndarray]:
+            # The number of samples also where nothing else can be measured.
+            return measure(each, weights_B_N * once_N) | {SAMPLES: np.full(len(weights_B_N), float(len(each)))}
+
+        of_kind = {name: every.subset(starts.index) for name, every in judged.items()}
+        records += compared_samples(source, of_kind, draws, measured, (SAMPLES, *MEASURES))
     return intervals(records, "causes of frames")
 
 
-def _by_kind(samples: pd.DataFrame) -> Iterator[tuple[str, pd.DataFrame]]:
-    """Samples of each kind of start that there are, and those that test no ICP."""
-    pseudo_N = samples["truth"] == BY_ICP
-    chosen = {kind: (samples["start"] == kind) & ~pseudo_N for kind in KINDS} | {PSEUDO: pseudo_N}
-    yield from ((kind, samples[rows]) for kind, rows in chosen.items() if rows.any())
+def ends_of(truth: Truth) -> np.ndarray:
+    """Label of each registration, `GEOMETRY` for those that failed without a cause."""
+    return np.where((truth.state == FAILED) & (truth.dominant == GEOMETRY), GEOMETRY, labels_of(truth))
 
 
-def _measures(kind: str, samples: pd.DataFrame, judged: dict[str, Judged]) -> list[tuple]:
-    scene_N = samples["scene"].to_numpy(str)
-    drawn_B_N = pigeonhole_weights(generator("frame cause intervals", kind), scene_N)
-    draws = Clustered(samples["seed"].to_numpy(), scene_N, np.vstack([np.ones(len(samples)), drawn_B_N]))
-    once_N = 1 / samples.groupby("instance")["instance"].transform("size").to_numpy(float)
-
-    def measured(each: Judged, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
-        # The number of samples also where nothing else can be measured.
-        return measure(each, weights_B_N * once_N) | {SAMPLES: np.full(len(weights_B_N), float(len(each)))}
-
-    return compared_samples(f"{REAL_WORLD}/{kind}", judged, draws, measured, (SAMPLES, *MEASURES))
+def count_ends(samples: pd.DataFrame, things: Iterable[str], whole: str) -> Counter[str]:
+    """Numbers of samples by their `end`, of different things among them, and of all, by the name `whole`."""
+    counts = Counter(samples["end"].tolist()) | Counter({f"{name}s": samples[name].nunique() for name in things})
+    return counts | Counter({whole: len(samples), "missed": int((samples["missed"] == "True").sum())})
 
 
-def _seeds(*file_lists: Iterable[str | Path]) -> Iterator[tuple[int, Causes, pd.DataFrame, pd.DataFrame]]:
-    files = [list(paths) for paths in file_lists]
-    if not files[0] or len({len(paths) for paths in files}) > 1:
-        raise InputError("causes of frames", "need files of every seed", "give the same number of each kind")
-    for causes_file, sample_file, prediction_file in zip(*files, strict=True):
-        causes = Causes.load(causes_file)
-        samples = read_csv(sample_file, SAMPLE_COLUMNS, others=ANY)
-        _require_same(sample_file, samples, causes)
-        yield seed_of_file(causes_file), causes, samples[list(SAMPLE_COLUMNS)], _predictions(prediction_file, causes)
-
-
-def _predictions(path: str | Path, causes: Causes) -> pd.DataFrame:
-    predictions = read_predictions(path, labels=("explainer",))
-    for _, rows in predictions.groupby("explainer"):
-        _require_same(path, rows, causes)
-    return predictions
-
-
-def _require_same(path: str | Path, rows: pd.DataFrame, causes: Causes) -> None:
-    require_same_samples(path, rows, causes.registrations.arrays, "causes", ("sample",))
-
-
-def _counts(source: str, samples: pd.DataFrame) -> list[tuple]:
-    """Rows of the number of starts in each of `COUNTED`, without an interval or a rival."""
-    counts = Counter(samples["state"].tolist())
-    counts |= Counter({f"{name}s": samples[name].nunique() for name in ("instance", "scene", "object")})
-    counts |= Counter(starts=len(samples), missed=int((samples["missed"] == "True").sum()))
-    sizes = samples["seed"].nunique(), counts["scenes"], len(samples)
-    return [
-        (TABLE, source, TRUTH, f"count_{kind}", ALL, "", "", *sizes, float(counts[kind]), np.nan, np.nan)
-        for kind in COUNTED
-    ]
+def counts_in(rows: pd.DataFrame) -> dict[str, int]:
+    """Counts by name, and the number that `failed` by a cause; nothing where there are none."""
+    named = zip(rows["metric"], rows["value"], strict=True)
+    counts = {metric.removeprefix("count_"): int(value) for metric, value in named}
+    return counts | {"failed": sum(counts[concept] for concept in CONCEPTS)} if counts else {}
 
 
 STARTS = {
@@ -244,18 +218,27 @@ STARTS = {
     LADDER: "Ladder of errors",
     PSEUDO: "Truth made by ICP",
 }
+ENDS = {NOMINAL: "Nominal", BORDERLINE: "Borderline", "failed": "Failed"}
+ENDS |= {**{name: f"By {name}" for name in CONCEPTS}, GEOMETRY: "Without a cause", "missed": "No correspondence"}
+MISSED_NOTE = (
+    "No correspondence: ICP found none from any start around this one, and so did not move. These count by their state "
+    "like all others."
+)
 MEASURED = {
     STATE: show(STATE, "State (%)"),
-    "gain": show(STATE, SHOWN["gain"].title, where={"against": "untrained"}, **POINTS),
-    "lead": show(STATE, SHOWN["lead"].title, where={"against": "rival"}, **POINTS),
-    **{key: SHOWN[key] for key in ("regret", "tied_accuracy", "dominant_accuracy")},
-    **{key: SHOWN[key] for key in ("false_alarm_rate", "auroc_failed", "average_precision", "spearman_attribution")},
-    **{key: SHOWN[key] for key in ("nominal_calibration", "icp_calls", "samples")},
+    "gain": show(STATE, tables.SHOWN["gain"].title, where={"against": "untrained"}, **tables.POINTS),
+    "lead": show(STATE, tables.SHOWN["lead"].title, where={"against": "rival"}, **tables.POINTS),
+    **{key: tables.SHOWN[key] for key in ("regret", "tied_accuracy", "dominant_accuracy")},
+    **{
+        key: tables.SHOWN[key]
+        for key in ("false_alarm_rate", "auroc_failed", "average_precision", "spearman_attribution")
+    },
+    **{key: tables.SHOWN[key] for key in ("nominal_calibration", "icp_calls", "samples")},
 }
 
 
 @table(
-    SECTION,
+    tables.SECTION,
     "Table IX on depth frames: nothing was perturbed",
     """Registrations of depth frames as they come: the sensor's own noise, what stands in front, and poses that
     estimators gave in that very image, in a neighboring one or elsewhere; beside these, the true pose with errors
@@ -267,22 +250,30 @@ MEASURED = {
 def table9_frames(run: Run, intervals):
     """How explainers that learned from simulated causes name those measured in frames, by kind of start."""
     explainers = cause_titles(run.config)
-    costs = cause_costs(run.config, explainers) | COSTS
-    counts = {kind: _counted(intervals, kind) for kind in STARTS if kind != PSEUDO}
-    titles = {kind: _title(kind, of_kind) for kind, of_kind in counts.items() if of_kind}
-    rows = [
-        Row(
-            [start, explainer, reads(costs[explainer[0]])],
-            {"source": f"{REAL_WORLD}/{start[0]}", "method": explainer[0]},
-            rival=explainer[0] != CEILING and _failed(counts[start[0]]) >= FEWEST_FAILURES,
+    costs, rows, counted = cause_costs(run.config, explainers) | tables.COSTS, [], []
+    for kind, title in STARTS.items():
+        source = {"source": f"{REAL_WORLD}/{kind}"}
+        of = counts_in(where(intervals, source | {"method": TRUTH}))
+        if kind == PSEUDO or not of:
+            continue
+        failed = of["failed"]
+        is_enough, most = failed >= FEWEST_FAILURES, max(of[concept] for concept in CONCEPTS)
+        start = (kind, f"{title} ({failed} failed{'' if is_enough else ', too few'})")
+        for explainer in (explainers | tables.AGAIN).items():
+            labels = [start, explainer, tables.reads(costs[explainer[0]])]
+            is_rival = explainer[0] != CEILING and is_enough
+            rows.append(Row(labels, source | {"method": explainer[0]}, rival=is_rival))
+        by_cause = ", ".join(f"{of[concept]} mostly by {concept}" for concept in CONCEPTS)
+        constant = f" One constant answer names {100 * most / failed:.0f} % of these." if failed else ""
+        counted.append(
+            f"{title}: {plural(of['starts'], 'start')} of {plural(of['instances'], 'instance')} in "
+            f"{plural(of['scenes'], 'scene')}; {of[NOMINAL]} nominal, {of[BORDERLINE]} borderline, "
+            f"{of[GEOMETRY]} off without a cause, {failed} failed: {by_cause}.{constant}"
         )
-        for start in titles.items()
-        for explainer in (explainers | AGAIN).items()
-    ]
     heads = {"start": "Starts", "explainer": "Explainer", "reads": "Reads"}
-    sheet = Sheet("table9_frames", heads, rows, MEASURED, intervals, more=counts_and_calls(costs))
+    sheet = Sheet("table9_frames", heads, rows, MEASURED, intervals, more=tables.counts_and_calls(costs))
     notes = (
-        *(_in_words(kind, counts[kind]) for kind in titles),
+        *counted,
         f"Too few: below {FEWEST_FAILURES} failures nothing is concluded, and no row is bold. The same holds for "
         "each cause by itself.",
         "An instance counts once, whatever its number of starts. In brackets: the 95 % interval of "
@@ -292,15 +283,17 @@ def table9_frames(run: Run, intervals):
         "or failed. The others as in Table IX. The rule counts points against the part of the model that the "
         "camera would see, which is not what it was made for: here it is a control. A re-enactment also reads "
         "the mesh, the camera and the pixels of the object.",
-        COST_NOTE,
+        tables.COST_NOTE,
     )
     frames = title_of_frames(run.config)
     caption = f"What is wrong with registrations of depth frames: {frames}; learned from simulated causes"
-    return sheet.table(caption, "metric", notes, bold=[key for key in MEASURED if key not in NOT_COMPARED], same=1)
+    return sheet.table(
+        caption, "metric", notes, bold=[key for key in MEASURED if key not in tables.NOT_COMPARED], same=1
+    )
 
 
 @table(
-    SECTION,
+    tables.SECTION,
     "What became of registrations of depth frames",
     """How many starts of each kind, on each dataset, ended where they should, and by which cause the others failed.""",
     after="table9_frames",
@@ -308,59 +301,36 @@ def table9_frames(run: Run, intervals):
 )
 def table9_frame_counts(run: Run, intervals):
     """How many registrations of each kind of start are nominal, borderline and failed, and by which cause."""
-    shown = {"starts": "Starts", "instances": "Instances", "scenes": "Scenes", NOMINAL: "Nominal"}
-    shown |= {BORDERLINE: "Borderline", "failed": "Failed"} | {name: f"By {name}" for name in CONCEPTS}
-    shown |= {GEOMETRY: "Without a cause", "missed": "No correspondence"}
-    builder = TableBuilder("table9_frame_counts", {"start": "Starts", "dataset": "Dataset"})
-    for kind, title in STARTS.items():
-        stem = f"{REAL_WORLD}/{kind}"
-        sources = intervals.loc[intervals["source"].str.startswith(f"{stem}/"), "source"].unique()
-        datasets = [name.removeprefix(f"{stem}/") for name in sorted(sources)]
-        words_of = {"": "All"} | {name: dataset_in_words(name) for name in datasets}
-        for dataset, words in words_of.items():
-            if of := _counted(intervals, f"{kind}/{dataset}".removesuffix("/")):
-                counts = {**of, "failed": _failed(of)}
-                cells = {name: plain_cell(counts[name], 1, of["starts"]) for name in shown}
-                builder.add_row([(kind, title), (dataset or "all", words)], cells)
-    return builder.build(
-        caption=f"What became of registrations of depth frames: {title_of_frames(run.config)}",
-        column_head="count",
-        columns={name: Column(title, 0, False, (0.0, inf)) for name, title in shown.items()},
-        footnotes=(
-            "Every estimator's pose of an instance is a start by itself. By a cause: it adds most to the error, as "
-            "Table IX measures it. Without a cause: off even with every cause removed; not among the failed.",
-            "No correspondence: ICP found none from any start around this one, and so did not move. These count by "
-            "their state like all others.",
-            "Truth made by ICP: the true poses were found by ICP themselves, so these test no ICP and are counted here "
-            "alone.",
-        ),
+    rows = []
+    for start in STARTS.items():
+        stem = f"{REAL_WORLD}/{start[0]}/"
+        datasets = sorted({name.removeprefix(stem) for name in intervals["source"] if name.startswith(stem)})
+        labels = [("all", "All"), *((name, dataset_in_words(name)) for name in datasets)]
+        sources = [stem.rstrip("/"), *(f"{stem}{name}" for name in datasets)]
+        each = zip(labels, sources, strict=True)
+        rows += [Row([start, label], {"source": source, "method": TRUTH}) for label, source in each]
+    titles = {"starts": "Starts", "instances": "Instances", "scenes": "Scenes"} | ENDS
+    notes = (
+        "Every estimator's pose of an instance is a start by itself. By a cause: it adds most to the error, as "
+        "Table IX measures it. Without a cause: off even with every cause removed; not among the failed.",
+        MISSED_NOTE,
+        "Truth made by ICP: the true poses were found by ICP themselves, so these test no ICP and are counted here "
+        "alone.",
     )
+    caption = f"What became of registrations of depth frames: {title_of_frames(run.config)}"
+    heads = {"start": "Starts", "dataset": "Dataset"}
+    return sheet_of_counts("table9_frame_counts", heads, rows, titles, intervals).table(caption, "count", notes)
 
 
-def _counted(intervals: pd.DataFrame, kind: str) -> dict[str, int]:
-    """Counts of a kind of start, by name; none where there are no such starts."""
-    rows = where(intervals, {"source": f"{REAL_WORLD}/{kind}", "method": TRUTH})
-    named = zip(rows["metric"], rows["value"], strict=True)
-    return {metric.removeprefix("count_"): int(value) for metric, value in named}
+def sheet_of_counts(
+    name: str, heads: Mapping[str, str], rows: Iterable[Row], titles: Mapping[str, str], measured: pd.DataFrame
+) -> Sheet:
+    """Sheet of the counts with these titles, of which the first is of all."""
+    whole = next(iter(titles))
 
+    def more(_row: Row, subset: pd.DataFrame) -> dict[str, Cell]:
+        counts = counts_in(subset)
+        return {key: plain_cell(counts[key], 1, counts[whole]) for key in titles}
 
-def _failed(counts: Mapping[str, int]) -> int:
-    return sum(counts[concept] for concept in CONCEPTS)
-
-
-def _title(kind: str, counts: Mapping[str, int]) -> str:
-    failed = _failed(counts)
-    few = ", too few" if failed < FEWEST_FAILURES else ""
-    return f"{STARTS[kind]} ({failed} failed{few})"
-
-
-def _in_words(kind: str, counts: Mapping[str, int]) -> str:
-    """Sentence that counts the starts of a kind."""
-    by_cause = ", ".join(f"{counts[concept]} mostly by {concept}" for concept in CONCEPTS)
-    most, failed = max(counts[concept] for concept in CONCEPTS), _failed(counts)
-    constant = f" One constant answer names {100 * most / failed:.0f} % of these." if failed else ""
-    return (
-        f"{STARTS[kind]}: {plural(counts['starts'], 'start')} of {plural(counts['instances'], 'instance')} in "
-        f"{plural(counts['scenes'], 'scene')}; {counts[NOMINAL]} nominal, {counts[BORDERLINE]} borderline, "
-        f"{counts[GEOMETRY]} off without a cause, {failed} failed: {by_cause}.{constant}"
-    )
+    columns = {key: Column(title, **tables.COUNTS) for key, title in titles.items()}
+    return Sheet(name, heads, rows, columns, measured, more=more)
