@@ -5,7 +5,6 @@ The tables and the figure stand in :mod:`gpca.experiments.scan_failures`.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
@@ -17,7 +16,7 @@ from pydantic import Field
 
 from gpca.alignment.methods.registry import method_module
 from gpca.attribution.predictions import read_predictions
-from gpca.causes.dataset import LABELS, Causes, labels_of
+from gpca.causes.dataset import LABELS, Causes
 from gpca.causes.judged import (
     CEILING,
     SHARES,
@@ -31,16 +30,17 @@ from gpca.causes.judged import (
 )
 from gpca.causes.scans import KINDS
 from gpca.causes.settings import SCANS, ScanSamples
-from gpca.causes.truth import BORDERLINE, FAILED, GEOMETRY
-from gpca.encoders.registry import encoders
+from gpca.causes.truth import BORDERLINE, GEOMETRY
+from gpca.encoders.registry import encoder_module
 from gpca.errors import InputError, with_key
 from gpca.evaluation.intervals import NO_OTHER, best_of, difference, interval, pigeonhole_weights
-from gpca.evaluation.measures import POOLED
+from gpca.evaluation.measures import ALL, POOLED
 from gpca.experiments.experiment import Experiment, LeftOut, Names
+from gpca.experiments.frame_causes import count_ends, ends_of
 from gpca.experiments.plan import Run
 from gpca.experiments.result import numbers
 from gpca.experiments.scans import EACH_SET, ChoiceSettings, files_of_set, place_of_set
-from gpca.experiments.step import Plan, Step
+from gpca.experiments.step import Step
 from gpca.explainers.registry import CAUSES as CAUSE_EXPLAINERS
 from gpca.explainers.registry import explainer_module, explainers, require_settings
 from gpca.io.container import require_same_samples
@@ -108,12 +108,7 @@ def measurement_settings(config: Mapping[str, Any], scan_set: str) -> dict[str, 
 def diagnosis_settings(
     config: Mapping[str, Any], explainers: Mapping[str, Sequence[str]], settings: Mapping[str, Mapping]
 ) -> dict[str, Any]:
-    """Settings of the step that explains scans.
-
-    Args:
-        explainers: name -> where it learns.
-        settings: of each.
-    """
+    """Settings of the step that explains scans: where each explainer learns, and the settings of each."""
     return {
         "samples": fields_of(config["scan_causes"], ScanSamples),
         "explainers": explainers,
@@ -154,12 +149,6 @@ MEASURE = Step(
 )
 
 
-def _modules(plan: Plan) -> list[str]:
-    backbone = plan.config["diagnosis"]["encoder"]["backbone"]
-    named = plan.config["scan_causes"]["explainers"]
-    return [encoders()[backbone].split(":")[0], *(explainer_module(name, CAUSE_EXPLAINERS) for name in named)]
-
-
 DIAGNOSE = Step(
     name="diagnose_scans",
     run="gpca.steps.scan_causes:diagnose",
@@ -178,7 +167,10 @@ DIAGNOSE = Step(
         plan.config, plan.config["scan_causes"]["explainers"], settings_of_explainers(plan.config)
     ),
     params={"source": "scans"},
-    modules=_modules,
+    modules=lambda plan: [
+        encoder_module(plan.config["diagnosis"]["encoder"]),
+        *(explainer_module(name, CAUSE_EXPLAINERS) for name in plan.config["scan_causes"]["explainers"]),
+    ],
     where={"seed": "scan_seed"},
 )
 
@@ -214,8 +206,8 @@ def collect(
 ) -> pd.DataFrame:
     """Measures with intervals over clusters of scenes and seeds, and counts.
 
-    Sources are data sets of scans, and all of them together. ``difference`` is the paired difference from the best
-    gate.
+    Sources are data sets of scans, and all of them together. Conditions are natural registrations of all starts or of
+    a kind, and those with noise added. ``difference`` is the paired difference from the best gate.
 
     Args:
         causes_files, sample_files: of each data set and seed, in the same order, named ``…/{scans}/seed{seed}.…``.
@@ -229,15 +221,22 @@ def collect(
     overlaps = list(run.config["scans"]["strata"])
     seen, judged = _read(causes_files, sample_files, prediction_files)
     seen["stratum"] = [stratum_of(overlap, overlaps) or "" for overlap in seen["overlap"]]
+    times, start, sources = seen["times"].to_numpy(), seen["start"].to_numpy(), list(dict.fromkeys(seen["scans"]))
+    conditions = {NATURAL: times <= 0, ADDED: times > 0}
+    conditions |= {f"{NATURAL}_{kind}": (times <= 0) & (start == kind) for kind in KINDS}
+    conditions |= {f"{ADDED}_{each:g}": times == each for each in sorted(set(times)) if each}
     rows: list[tuple] = []
-    for source in _sources(seen):
-        of_source = np.ones(len(seen), bool) if source == POOLED else (seen["scans"] == source).to_numpy()
-        for condition, rows_N in _conditions(seen).items():
-            of_N = of_source & rows_N
+    for source in [POOLED, *sources] if len(sources) > 1 else sources:
+        for condition, rows_N in conditions.items():
+            of_N = rows_N & ((seen["scans"] == source).to_numpy() | (source == POOLED))
             for stratum in (EVERY, *sorted(set(seen["stratum"]))):
-                in_stratum = of_N if stratum == EVERY else of_N & (seen["stratum"] == stratum).to_numpy()
-                if in_stratum.any():
-                    rows += _counts((source, condition, stratum), seen[in_stratum])
+                chosen = seen[of_N & ((seen["stratum"] == stratum).to_numpy() | (stratum == EVERY))]
+                if len(chosen):
+                    counts = count_ends(chosen, ("pair", "cluster"), "registrations")
+                    place = source, condition, stratum, SCANS, TRUTH
+                    own = (len(chosen), counts["clusters"], chosen["seed"].nunique())
+                    nothing = (np.nan, np.nan, *NO_OTHER)
+                    rows += [(*place, f"count_{kind}", *own, float(counts[kind]), *nothing) for kind in COUNTED]
             if condition in (NATURAL, ADDED) and of_N.any():
                 parts = {key: every.subset(of_N) for key, every in judged.items()}
                 rows += _measures((source, condition, EVERY), parts, seen["cluster"][of_N].to_numpy(str))
@@ -247,61 +246,41 @@ def collect(
 def read_scan_causes(path: str | Path) -> pd.DataFrame:
     """Read what :func:`collect` returned; a value may lack an interval, and a difference from a gate.
 
-    Raises:
-        InputError: missing, empty or unreadable file, missing column, a value that is no finite number.
+    Raises InputError for a missing, empty or unreadable file, a missing column, a value that is no finite number.
     """
-    return read_numbers(path, COLUMNS, NUMBERS, optional=NUMBERS[4:])
-
-
-def _sources(seen: pd.DataFrame) -> list[str]:
-    sources = list(dict.fromkeys(seen["scans"]))
-    return [POOLED, *sources] if len(sources) > 1 else sources
-
-
-def _conditions(seen: pd.DataFrame) -> dict[str, np.ndarray]:
-    """Masks (N,) of the conditions: natural registrations of all starts or of a kind, and those with noise added."""
-    added_N = seen["times"].to_numpy() > 0
-    of_kind = {f"{NATURAL}_{kind}": ~added_N & (seen["start"] == kind).to_numpy() for kind in KINDS}
-    of_times = {
-        f"{ADDED}_{times:g}": seen["times"].to_numpy() == times for times in sorted(set(seen["times"])) if times
-    }
-    return {NATURAL: ~added_N, ADDED: added_N} | of_kind | of_times
+    return read_numbers(path, COLUMNS, NUMBERS, optional=NUMBERS[4:]).assign(concept=ALL)
 
 
 def _read(causes_files, sample_files, prediction_files) -> tuple[pd.DataFrame, dict[tuple[str, str], Judged]]:
     """A row for each registration, and the answers of each explainer, by where it learned and its name."""
     import pandas as pd
 
-    answers = {seed_of_file(path): _by_explainer(path) for path in prediction_files}
+    answers = {
+        seed_of_file(path): read_predictions(path, labels=("scans", "learned", "explainer"))
+        for path in prediction_files
+    }
     seen: list[pd.DataFrame] = []
     judged: dict[tuple[str, str], list[Judged]] = {}
     for causes_file, sample_file in zip(causes_files, sample_files, strict=True):
         source, seed = Path(causes_file).parent.name, seed_of_file(causes_file)
         causes = Causes.load(causes_file, (source, seed))
-        samples = read_csv(sample_file, SAMPLE_COLUMNS, others=ANY)
-        samples = samples.assign(**{name: number_column(sample_file, samples, name) for name in ("overlap", "times")})
-        predicted = {key: rows[rows["scans"] == source] for key, rows in answers.get(seed, {}).items()}
-        for path, rows in ((sample_file, samples), *((causes_file, rows) for rows in predicted.values())):
-            require_same_samples(path, rows, causes.registrations.arrays, "causes or the predictions", ("sample",))
-        for key, rows in predicted.items():
+        same = causes.registrations.arrays, "causes or the predictions", ("sample",)
+        samples = read_csv(sample_file, SAMPLE_COLUMNS, others=ANY)[list(SAMPLE_COLUMNS)]
+        require_same_samples(sample_file, samples, *same)
+        for key, rows in answers[seed].groupby(["learned", "explainer"], sort=False) if seed in answers else ():
+            rows = rows[rows["scans"] == source]
+            require_same_samples(causes_file, rows, *same)
             judged.setdefault(key, []).append(judged_by(rows, causes, seed))
         judged.setdefault(("", CEILING), []).append(ceiling_of(causes, seed))
-        truth = causes.truth
-        label = np.where((truth.state == FAILED) & (truth.dominant == GEOMETRY), GEOMETRY, labels_of(truth))
+        read = {name: number_column(sample_file, samples, name) for name in ("overlap", "times")}
         pair = [f"{source} {name}" for name in causes.registrations.object_name]
-        seen.append(samples[list(SAMPLE_COLUMNS)].assign(scans=source, seed=seed, label=label, pair=pair))
+        seen.append(samples.assign(**read, scans=source, seed=seed, end=ends_of(causes.truth), pair=pair))
     if not seen:
         raise InputError("causes of scans", "no files were given", "name a data set of scans in the config")
     if short := [key for key, parts in judged.items() if len(parts) != len(seen)]:
         fault = f"explainer '{short[0][1]}' has no predictions of some data set or seed"
         raise InputError("predictions of scans", fault, "regenerate them")
     return pd.concat(seen, ignore_index=True), {key: joined(parts) for key, parts in judged.items()}
-
-
-def _by_explainer(path: str | Path) -> dict[tuple[str, str], pd.DataFrame]:
-    rows = read_predictions(path, labels=("scans", "learned", "explainer"))
-    groups = rows.groupby(["learned", "explainer"], sort=False)
-    return {(str(learned), str(name)): of_name for (learned, name), of_name in groups}
 
 
 def _measures(
@@ -314,7 +293,8 @@ def _measures(
     names = {key: "/".join(key).strip("/") for key in judged}
     for metric, key in product(MEASURED, judged):
         of_metric = {names[other]: of_other[metric] for other, of_other in values.items() if metric in of_other}
-        if names[key] not in of_metric or not np.isfinite(of_metric[names[key]][0]):
+        value_B = of_metric.get(names[key], np.array([np.nan]))
+        if not np.isfinite(value_B[0]):
             continue
         counted_N = counted_of_scans(any_samples, metric)
         drawn_B_n = drawn_B_N[:, counted_N] if metric in (*SHARES, CAUSES) else None
@@ -323,7 +303,6 @@ def _measures(
         if key[1] != CEILING and metric != SAMPLES:
             gate = best_of(of_metric, gates, metric in SMALLER_IS_BETTER)
             lead = difference(of_metric, names[key], gate, drawn_B_n)
-        value_B = of_metric[names[key]]
         counts = int(counted_N.sum()), len(set(cluster_N[counted_N])), len(set(any_samples.seed[counted_N].tolist()))
         yield (*place, *key, metric, *counts, *interval(value_B, drawn_B_n), *lead)
 
@@ -332,21 +311,15 @@ def scan_measures(samples: Judged, weights_B_N: np.ndarray) -> dict[str, np.ndar
     """Measures (B,) of a diagnosis, with those of scans alone, by weights of the samples (B, N)."""
     measures = measure(samples, weights_B_N)
     measures[SAMPLES] = np.full(len(weights_B_N), float((samples.label != BORDERLINE).sum()))
-    if samples.names_causes:
-        measures[CAUSES] = _cause_accuracy(samples, weights_B_N)
+    if samples.names_causes:  # mean over the causes with enough failures of the share whose cause has the largest score
+        named_N, recalls = np.array(CONCEPTS)[samples.scores.argmax(axis=1)], []
+        for concept in _frequent(samples):
+            of_N = samples.label == concept
+            with np.errstate(divide="ignore", invalid="ignore"):
+                right_B = (weights_B_N[:, of_N] * (named_N[of_N] == concept)).sum(axis=1)
+                recalls.append(right_B / weights_B_N[:, of_N].sum(axis=1))
+        measures[CAUSES] = np.mean(recalls, axis=0) if recalls else np.full(len(weights_B_N), np.nan)
     return measures
-
-
-def _cause_accuracy(samples: Judged, weights_B_N: np.ndarray) -> np.ndarray:
-    """Mean (B,) over the causes with enough failures of the share whose cause has the largest score."""
-    named_N = np.array(CONCEPTS)[samples.scores.argmax(axis=1)]
-    recalls = []
-    for concept in _frequent(samples):
-        of_N = samples.label == concept
-        with np.errstate(divide="ignore", invalid="ignore"):
-            right_B = (weights_B_N[:, of_N] * (named_N[of_N] == concept)).sum(axis=1)
-            recalls.append(right_B / weights_B_N[:, of_N].sum(axis=1))
-    return np.mean(recalls, axis=0) if recalls else np.full(len(weights_B_N), np.nan)
 
 
 def _frequent(samples: Judged) -> list[str]:
@@ -356,13 +329,3 @@ def _frequent(samples: Judged) -> list[str]:
 def counted_of_scans(samples: Judged, metric: str) -> np.ndarray:
     """Mask (N,) of the samples over which a measure is taken."""
     return np.isin(samples.label, _frequent(samples)) if metric == CAUSES else counted(samples, metric)
-
-
-def _counts(place: tuple[str, str, str], samples: pd.DataFrame) -> list[tuple]:
-    """Numbers of each of `COUNTED`, without an interval."""
-    counts = Counter(samples["label"].tolist())
-    counts |= Counter({f"{name}s": samples[name].nunique() for name in ("pair", "cluster")})
-    counts |= Counter(registrations=len(samples), missed=int((samples["missed"] == "True").sum()))
-    own = (len(samples), samples["cluster"].nunique(), samples["seed"].nunique())
-    nothing = (np.nan, np.nan, *NO_OTHER)
-    return [(*place, SCANS, TRUTH, f"count_{kind}", *own, float(counts[kind]), *nothing) for kind in COUNTED]

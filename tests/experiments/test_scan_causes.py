@@ -15,7 +15,7 @@ from gpca.errors import InputError
 from gpca.evaluation.measures import POOLED
 from gpca.experiments import scan_causes
 from gpca.experiments.scan_causes import ADDED, EVERY, NATURAL, collect, read_scan_causes
-from gpca.experiments.scan_failures import counted, scan_failures, table18_scan_causes, table18_scan_counts
+from gpca.experiments.scan_failures import counts_of, scan_failures, table18_scan_causes, table18_scan_counts
 from gpca.io.csv_file import write_csv
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.tables.cells import rows_where
@@ -112,17 +112,17 @@ def test_a_gate_names_no_cause_and_the_ceiling_has_no_rival(measured):
 def test_counts_are_of_data_sets_conditions_and_strata(measured, causes):
     tested = causes.subset(causes.rows("test"))
     label = labels_of(tested.truth)
-    of_all = counted(measured, "rooms", NATURAL, EVERY)
+    of_all = counts_of(measured, "rooms", NATURAL, EVERY)
     natural = np.arange(len(label)) % 4 != 3
     assert of_all["registrations"] == natural.sum() and of_all["clusters"] == 3
     assert of_all[NOMINAL] == (label[natural] == NOMINAL).sum()
     assert of_all["pose"] + of_all["noise"] + of_all["overlap"] <= (~np.isin(label, (NOMINAL, BORDERLINE))).sum()
-    pooled = counted(measured, POOLED, NATURAL, EVERY)
+    pooled = counts_of(measured, POOLED, NATURAL, EVERY)
     assert pooled["registrations"] == 2 * of_all["registrations"]
-    parts = [counted(measured, "rooms", NATURAL, stratum) for stratum in ("overlap_0.1_0.5", "overlap_0.5_1")]
+    parts = [counts_of(measured, "rooms", NATURAL, stratum) for stratum in ("overlap_0.1_0.5", "overlap_0.5_1")]
     assert sum(part["registrations"] for part in parts) == of_all["registrations"]
-    assert counted(measured, "rooms", f"{ADDED}_2", EVERY)["registrations"] == (~natural).sum()
-    kinds = [counted(measured, "rooms", f"{NATURAL}_{kind}", EVERY) for kind in ("ladder", "global")]
+    assert counts_of(measured, "rooms", f"{ADDED}_2", EVERY)["registrations"] == (~natural).sum()
+    kinds = [counts_of(measured, "rooms", f"{NATURAL}_{kind}", EVERY) for kind in ("ladder", "global")]
     assert sum(kind["registrations"] for kind in kinds) == of_all["registrations"]
 
 
@@ -156,7 +156,7 @@ def test_the_figure_has_a_panel_for_each_data_set_and_kind_of_start(measured):
     figure = scan_failures(run_of(), measured)
     titles = [panel.get_title() for panel in figure.axes]
     assert titles[0].replace("\n", " ") == "Rooms (procedural stand-in), started on the ladder" and len(titles) == 4
-    of = counted(measured, "rooms", f"{NATURAL}_ladder", "overlap_0.1_0.5")
+    of = counts_of(measured, "rooms", f"{NATURAL}_ladder", "overlap_0.1_0.5")
     widths = [patch.get_width() for patch in figure.axes[0].patches if patch.get_y() < 0.3]
     assert sum(widths) == pytest.approx(100)
     assert any(width == pytest.approx(100 * of[NOMINAL] / of["registrations"]) for width in widths)
