@@ -35,25 +35,19 @@ class Registrations(Container):
     """S registrations. Lengths are relative to the object's diameter unless the name ends in ``_m``.
 
     Attributes:
-        sample: (S,) number of the sample within its split.
-        split: (S,) ``train`` or ``test``.
-        concept: (S,) what was perturbed: ``noise``, ``pose`` or ``overlap``.
-        object_index, object_name, diameter_m: (S,) the object registered.
-        cluster, fold: (S,) samples that are alike: a family of shapes or a scene (:mod:`gpca.objects.canonical`).
-        severity_noise, severity_rotation_rad, severity_translation, severity_crop: (S,) as drawn, 0 where not applied.
-        T_target_source_true, T_target_source_init, T_target_source_icp: (S, 4, 4), translations in meters.
-        fitness, inlier_rmse: (S,) from ICP.
-        points: (ΣP, 3) float32, the ICP-aligned source clouds in the target's frame; cloud i is
-            ``points[offsets[i]:offsets[i + 1]]``.
-        target_points, target_offsets: the clean target clouds (ΣQ, 3) float32, in the same frame and kept the same way.
+        cluster, fold: samples that are alike: a family of shapes or a scene (:mod:`gpca.objects.canonical`).
+        severity_noise, severity_rotation_rad, severity_translation, severity_crop: as drawn, 0 where not applied.
+        T_target_source_true, T_target_source_init, T_target_source_icp: translations in meters.
+        points: the ICP-aligned source clouds in the target's frame, one after another; see :meth:`cloud`.
+        target_points: the clean target clouds in the same frame; see :meth:`target`.
         attached: arrays (S, …) from other files, for explainers that read them: ``embedding``, ``head_logits``, …
     """
 
     names_axes: ClassVar[bool] = True
 
-    sample: np.ndarray = array("S", WHOLE, least=0)
-    split: np.ndarray = array("S", TEXT)
-    concept: np.ndarray = array("S", TEXT, choices=CONCEPTS)
+    sample: np.ndarray = array("S", WHOLE, least=0)  # its number within its split
+    split: np.ndarray = array("S", TEXT)  # ``train`` or ``test``
+    concept: np.ndarray = array("S", TEXT, choices=CONCEPTS)  # what was perturbed
     object_index: np.ndarray = array("S", WHOLE, least=0)
     object_name: np.ndarray = array("S", TEXT)
     diameter_m: np.ndarray = array("S", least=SMALLEST_DIAMETER_M, most=LARGEST_DIAMETER_M)
@@ -100,7 +94,7 @@ class Registrations(Container):
         return np.flatnonzero(self.split == split)
 
     def subset(self, rows: np.ndarray) -> Registrations:
-        """Return the given rows, in the given order, with their attached arrays."""
+        """Return the given rows with their attached arrays."""
         return replace(super().subset(rows), attached={name: array[rows] for name, array in self.attached.items()})
 
     @classmethod

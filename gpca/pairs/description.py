@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from gpca.alignment.pose_error import displacements
 from gpca.alignment.rigid import inverse, log
+from gpca.pairs import distances as measured
 from gpca.pairs.dataset import Registrations
-from gpca.pairs.distances import (
-    CHANNELS,
-    LEVELS,
-    MatchedPair,
-    ObservedPair,
-    describe_distances,
-    describe_points,
-    log_of_ratio,
-    observed_once,
-)
+from gpca.pairs.distances import LEVELS, MatchedPair, ObservedPair
 from gpca.process.progress import progress
 from gpca.seeds import generator
 
@@ -38,30 +32,26 @@ def describe_registrations(registrations: Registrations, *axes: object, points: 
     - densities: logarithms of spacing and extent of the observed cloud relative to the model's.
     - points: (N, 2, points, 7) of :func:`gpca.pairs.distances.describe_points`.
 
-    Args:
-        registrations: N of them.
-        axes: name the draws, with split and number of a sample.
-        points: drawn from each cloud, as an encoder sees so many; all where there are fewer.
+    The axes name the draws, with split and number of a sample, of so many points of each cloud, as an encoder sees so
+    many; all where there are fewer.
     """
     rows = []
     for row in progress(range(len(registrations)), "descriptions of pairs"):
         random = generator(*axes, "pair", registrations.split[row], registrations.sample[row])
-        rows.append(_describe(observed_once(registrations, row, points, random), points))
-    groups = {name: np.array([row[name] for row in rows]).reshape(len(rows), width) for name, width in WIDTHS.items()}
-    of_points = [row[POINTS] for row in rows]
-    return groups | {POINTS: np.array(of_points, np.float32).reshape(len(rows), 2, points, CHANNELS)}
-
-
-def _describe(pair: ObservedPair, points: int) -> dict[str, np.ndarray]:
-    matched = MatchedPair.of(pair)
-    distances, planes = describe_distances(pair, matched)
-    spacing, model_spacing, extent, model_extent = np.log(np.maximum(planes[3 * QUANTILES :][:4], SMALLEST))
-    return {
-        "distances": distances,
-        "relations": relations(pair, distances, planes),
-        "densities": np.array([spacing - model_spacing, extent - model_extent]),
-        POINTS: describe_points(pair, matched, points),
+        pair = measured.observed_once(registrations, row, points, random)
+        matched = MatchedPair.of(pair)
+        distances, planes = measured.describe_distances(pair, matched)
+        spacing, model_spacing, extent, model_extent = np.log(np.maximum(planes[3 * QUANTILES :][:4], SMALLEST))
+        densities = [spacing - model_spacing, extent - model_extent]
+        of_points = measured.describe_points(pair, matched, points)
+        rows.append((distances, relations(pair, distances, planes), densities, of_points))
+    *groups, of_points = zip(*rows, strict=True) if rows else ((),) * 4
+    described = {
+        name: np.array(group, float).reshape(-1, width)
+        for (name, width), group in zip(WIDTHS.items(), groups, strict=True)
     }
+    shape = (-1, 2, points, measured.CHANNELS)
+    return described | {POINTS: np.array(of_points, np.float32).reshape(shape)}
 
 
 def relations(pair: ObservedPair, distances: np.ndarray, planes: np.ndarray) -> np.ndarray:
@@ -71,19 +61,14 @@ def relations(pair: ObservedPair, distances: np.ndarray, planes: np.ndarray) -> 
     relative to these, are alike for all objects: of the distances both ways to the model's spacing, of the distances
     from the planes both ways to the model's median thickness, of the observed thickness to the model's; then the
     quantiles of |cosine| between normals, and the motion: angle (radians), length and displacement (diameters),
-    fitness, and the inlier RMSE relative to the spacing.
-
-    Args:
-        pair: what was observed and its model.
-        distances, planes: what :func:`gpca.pairs.distances.describe_distances` says of it.
+    fitness, and the inlier RMSE relative to the spacing. The distances and planes are those of
+    :func:`gpca.pairs.distances.describe_distances`.
     """
     to_model, to_observed, from_plane, thickness = distances.reshape(4, QUANTILES)[:, COARSE]
     from_observed_plane, cosine, model_thickness = planes[: 3 * QUANTILES].reshape(3, QUANTILES)[:, COARSE]
     spacing, usual_thickness = planes[3 * QUANTILES + 1], np.median(model_thickness)
 
-    def log_ratio(lengths: np.ndarray, to: np.ndarray | float) -> np.ndarray:
-        return log_of_ratio(lengths, to, spacing)
-
+    log_ratio = partial(measured.log_of_ratio, spacing=spacing)
     moved = log(inverse(pair.T_init)[None])[0]
     return np.concatenate(
         [

@@ -8,6 +8,7 @@ and how thick the observed cloud is.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -28,24 +29,15 @@ ENTROPY = tuple(f"{what}_{radius:g}" for radius in RADII for what in ("joint", "
 
 @dataclass(frozen=True)
 class ObservedPair:
-    """The observed cloud and the model, both in the model's frame and in diameters.
+    """The observed cloud and the model, both in the model's frame and in diameters. Poses take the observed cloud."""
 
-    Attributes:
-        observed: (N, 3) points, where ICP put them.
-        model: (M, 3).
-        T_init: 4×4, takes the observed cloud from where ICP put it back to where ICP started.
-        T_runs: (n, 4, 4), takes it from there to what ICP found from other starts; the first is the identity.
-        fitness_n, inlier_rmse_n: (n,) of these runs.
-        axes: name what is random in describing it.
-    """
-
-    observed: np.ndarray
-    model: np.ndarray
-    T_init: np.ndarray
-    T_runs: np.ndarray
-    fitness_n: np.ndarray
+    observed: np.ndarray  # (N, 3) where ICP put them
+    model: np.ndarray  # (M, 3)
+    T_init: np.ndarray  # 4×4, from where ICP put it back to where ICP started
+    T_runs: np.ndarray  # (n, 4, 4), from there to what ICP found from other starts; the first is the identity
+    fitness_n: np.ndarray  # of these runs
     inlier_rmse_n: np.ndarray
-    axes: tuple
+    axes: tuple  # name what is random in describing it
 
     def cost_n(self, icp: ICPSettings) -> np.ndarray:
         """Return the mean squared distance of each run (n,), cut off at the correspondence distance."""
@@ -71,20 +63,13 @@ def observed_once(registrations: Registrations, row: int, points: int, random: n
 
 @dataclass(frozen=True)
 class LocalPlanes:
-    """A cloud with the plane around each of its points.
-
-    Attributes:
-        tree: of the points.
-        spacing: (N,) distance to the nearest other point.
-        normals: (N, 3), without a sign.
-        thickness, extent: (N,) root mean square distance of the neighbors from the plane, and along its longest axis.
-    """
+    """A cloud with the plane around each of its points."""
 
     tree: cKDTree
-    spacing: np.ndarray
-    normals: np.ndarray
-    thickness: np.ndarray
-    extent: np.ndarray
+    spacing: np.ndarray  # (N,) distance to the nearest other point
+    normals: np.ndarray  # (N, 3), without a sign
+    thickness: np.ndarray  # (N,) root mean square distance of the neighbors from the plane,
+    extent: np.ndarray  # (N,) and along its longest axis
 
     @classmethod
     def of(cls, points: np.ndarray) -> LocalPlanes:
@@ -112,25 +97,17 @@ def _dots(a_N_3: np.ndarray, b_N_3: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class MatchedPair:
-    """A pair whose points know their partners: the nearest points of the other cloud.
-
-    Attributes:
-        observed, model: the local planes of either cloud.
-        partner_N, partner_M: row of each point's partner in the other cloud.
-        to_model_N, to_observed_M: the distance there.
-        plane_N, plane_M: the distance from the partner's plane.
-        cosine_N: |cosine| between the normals of an observed point and its partner.
-    """
+    """A pair whose points know their partners: the nearest points of the other cloud."""
 
     observed: LocalPlanes
     model: LocalPlanes
-    partner_N: np.ndarray
+    partner_N: np.ndarray  # row of each point's partner in the other cloud
     partner_M: np.ndarray
-    to_model_N: np.ndarray
+    to_model_N: np.ndarray  # the distance there
     to_observed_M: np.ndarray
-    plane_N: np.ndarray
+    plane_N: np.ndarray  # the distance from the partner's plane
     plane_M: np.ndarray
-    cosine_N: np.ndarray
+    cosine_N: np.ndarray  # |cosine| between the normals of an observed point and its partner
 
     @classmethod
     def of(cls, pair: ObservedPair) -> MatchedPair:
@@ -145,11 +122,6 @@ class MatchedPair:
             cosine_N=np.abs(_dots(observed.normals, model.normals[partner_N])),
         )
 
-    @property
-    def cosine_M(self) -> np.ndarray:
-        """|cosine| (M,) between the normals of a point of the model and its partner."""
-        return np.abs(_dots(self.model.normals, self.observed.normals[self.partner_M]))
-
 
 def describe_distances(pair: ObservedPair, matched: MatchedPair | None = None) -> tuple[np.ndarray, np.ndarray]:
     """Return the 52 distances of the pair, and 45 further numbers of its local planes.
@@ -160,14 +132,13 @@ def describe_distances(pair: ObservedPair, matched: MatchedPair | None = None) -
     """
     matched = matched or MatchedPair.of(pair)
     observed, model = matched.observed, matched.model
-    spacings = [np.median(planes.spacing) for planes in (observed, model)]
-    extents = [np.median(planes.extent) for planes in (observed, model)]
+    widths = [np.median(getattr(planes, name)) for name in ("spacing", "extent") for planes in (observed, model)]
     counts = [np.log(len(cloud)) for cloud in (pair.observed, pair.model)]
     distances = [matched.to_model_N, matched.to_observed_M, matched.plane_N, observed.thickness]
     shapes = [matched.plane_M, matched.cosine_N, model.thickness]
     return (
         np.concatenate([np.quantile(values, LEVELS) for values in distances]),
-        np.concatenate([*(np.quantile(values, LEVELS) for values in shapes), spacings, extents, counts]),
+        np.concatenate([*(np.quantile(values, LEVELS) for values in shapes), widths, counts]),
     )
 
 
@@ -182,9 +153,7 @@ def describe_points(pair: ObservedPair, matched: MatchedPair, points: int) -> np
     usual_thickness = float(np.median(matched.model.thickness))
     observed, model = matched.observed, matched.model
 
-    def log_ratio(lengths: np.ndarray, to: np.ndarray | float) -> np.ndarray:
-        return log_of_ratio(lengths, to, spacing)
-
+    log_ratio = partial(log_of_ratio, spacing=spacing)
     of_observed = (
         log_ratio(matched.to_model_N, spacing),
         log_ratio(matched.plane_N, usual_thickness),
@@ -195,7 +164,7 @@ def describe_points(pair: ObservedPair, matched: MatchedPair, points: int) -> np
         log_ratio(matched.to_observed_M, spacing),
         log_ratio(matched.plane_M, usual_thickness),
         log_ratio(model.thickness, observed.thickness[matched.partner_M]),
-        matched.cosine_M,
+        np.abs(_dots(model.normals, observed.normals[matched.partner_M])),
     )
     sides = (np.column_stack([pair.observed, *of_observed]), np.column_stack([pair.model, *of_model]))
     return np.stack([side[np.arange(points) % len(side)] for side in sides]).astype(np.float32)
@@ -228,8 +197,7 @@ def describe_entropy(pair: ObservedPair) -> np.ndarray:
 
 def _entropies(points: np.ndarray, radius: float) -> np.ndarray:
     """Return ½ ln |2πe (Σ + εI)| (N,) of the points within a radius of each; NaN where there are too few."""
-    pairs = cKDTree(points).query_pairs(radius, output_type="ndarray")
-    itself = np.arange(len(points))
+    pairs, itself = cKDTree(points).query_pairs(radius, output_type="ndarray"), np.arange(len(points))
     rows, columns = (np.concatenate([pairs[:, i], pairs[:, 1 - i], itself]) for i in (0, 1))
     count_N = np.bincount(rows, minlength=len(points)).astype(float)
     sums_N_3 = [np.bincount(rows, points[columns, i], len(points)) for i in range(3)]

@@ -13,13 +13,10 @@ from gpca.pairs.dataset import Registrations
 
 
 class Judge:
-    """Judges poses of one object.
+    """Judges poses of one object, in diameters; the target's frame is the object's canonical one, its center the
+    origin.
 
-    All lengths are in diameters, and the target's frame is the object's canonical one, with the origin at its center.
-
-    Attributes:
-        symmetries: rotations that leave the shape as it is, as :func:`gpca.objects.bop.find_symmetries` has them.
-        symmetric: whether ADD-S counts.
+    Its symmetries are as :func:`gpca.objects.bop.find_symmetries` has them; where there is any, ADD-S counts.
     """
 
     def __init__(self, objects: ObjectClouds, index: int) -> None:
@@ -46,11 +43,7 @@ class Judges:
         self._made: dict[int, Judge] = {}
 
     def of(self, registrations: Registrations, row: int) -> Judge:
-        """Return the judge of a registration's object.
-
-        Raises:
-            InputError: the objects have another one in its place.
-        """
+        """Return the judge of a registration's object; InputError where the objects have another one in its place."""
         index, name = int(registrations.object_index[row]), str(registrations.object_name[row])
         if index >= len(self._objects) or str(self._objects.names[index]) != name:
             fault = f"object {index} is not '{name}', as in the registrations"

@@ -30,19 +30,12 @@ Hidden = Annotated[float, Bounds(minimum=0, maximum=0.95)]  # share; of what is 
 
 @dataclass(frozen=True)
 class Severities:
-    """Ranges (low, high) of the severities.
+    """Ranges (low, high) of the severities; lengths are relative to the diameter."""
 
-    Attributes:
-        noise: standard deviation of the Gaussian jitter, relative to the diameter.
-        rotation_deg: angle of the pose error about a random axis.
-        translation: length of the pose error in a random direction, relative to the diameter.
-        crop: share of the points cut off by a half-space in a random direction.
-    """
-
-    noise: tuple[Share, Share] = (0.01, 0.03)
-    rotation_deg: tuple[HalfTurn, HalfTurn] = (15.0, 60.0)
-    translation: tuple[Shift, Shift] = (0.05, 0.30)
-    crop: tuple[Hidden, Hidden] = (0.20, 0.60)
+    noise: tuple[Share, Share] = (0.01, 0.03)  # standard deviation of the Gaussian jitter
+    rotation_deg: tuple[HalfTurn, HalfTurn] = (15.0, 60.0)  # angle of the pose error about a random axis
+    translation: tuple[Shift, Shift] = (0.05, 0.30)  # its length in a random direction
+    crop: tuple[Hidden, Hidden] = (0.20, 0.60)  # of the points, cut off by a half-space in a random direction
 
     def __post_init__(self) -> None:
         for severity in fields(self):
@@ -53,17 +46,12 @@ class Severities:
 
 @dataclass(frozen=True)
 class Perturbed:
-    """A source cloud and how it was made.
+    """A source cloud and how it was made."""
 
-    Attributes:
-        points: (P, 3) in the source frame, relative to the diameter.
-        T_target_source_true: 4×4, takes the source back onto the target; identity unless the pose was perturbed.
-        severity: ``noise``, ``rotation_rad``, ``translation``, ``crop``; only those that were applied.
-    """
-
-    points: np.ndarray
+    points: np.ndarray  # (P, 3) in the source frame, relative to the diameter
+    # 4×4, takes the source back onto the target; identity unless the pose was perturbed.
     T_target_source_true: np.ndarray = field(default_factory=lambda: np.eye(4))
-    severity: dict[str, float] = field(default_factory=dict)
+    severity: dict[str, float] = field(default_factory=dict)  # of `SEVERITIES`, those that were applied
 
 
 def add_noise(points: np.ndarray, severities: Severities, random: np.random.Generator) -> Perturbed:
@@ -77,11 +65,8 @@ def misplace(points: np.ndarray, severities: Severities, random: np.random.Gener
     angle_rad = np.deg2rad(random.uniform(*severities.rotation_deg))
     distance = random.uniform(*severities.translation)
     T_source_target = misplacement(angle_rad, distance, random)
-    return Perturbed(
-        transform(T_source_target, points),
-        inverse(T_source_target),
-        {"rotation_rad": angle_rad, "translation": distance},
-    )
+    severity = {"rotation_rad": angle_rad, "translation": distance}
+    return Perturbed(transform(T_source_target, points), inverse(T_source_target), severity)
 
 
 def misplacement(angle_rad: float, distance: float, random: np.random.Generator) -> np.ndarray:
@@ -101,9 +86,8 @@ def crop(points: np.ndarray, severities: Severities, random: np.random.Generator
 
 
 def within_half_space(along_N: np.ndarray, share: float, fewest: int) -> np.ndarray:
-    """Return the rows, in order, that remain when a half-space takes a share of the points, at least `fewest`.
-
-    `along_N` is the position of each point along the normal of the plane, toward the half-space.
+    """Return the rows, in order, that remain when a half-space, toward which points lie `along`, takes a share of
+    them.
     """
     left = max(min(fewest, len(along_N)), round(len(along_N) * (1 - share)))
     return np.sort(np.argsort(along_N, kind="stable")[:left])

@@ -34,23 +34,16 @@ def with_training_like(shifted: str) -> str:
 
 @dataclass(frozen=True)
 class ShiftedSets(Container):
-    """S samples of all sets.
+    """S samples of all sets."""
 
-    Attributes:
-        set: (S,) name of the set, a key of `TRAINED_ON`.
-        split: (S,) ``train`` (fitted to) or ``test``.
-        sample, concept, object_name, cluster: (S,) as in :class:`gpca.pairs.dataset.Registrations`.
-        h: (S, d) embeddings by the encoder of the set.
-        distance: (S, 4) `DISTANCES` to the training samples of the set's encoder; 0 for these themselves.
-    """
-
-    set: np.ndarray = array("S", TEXT)
-    split: np.ndarray = array("S", TEXT)
+    set: np.ndarray = array("S", TEXT)  # name of the set, a key of `TRAINED_ON`
+    split: np.ndarray = array("S", TEXT)  # ``train`` (fitted to) or ``test``
     sample: np.ndarray = array("S", WHOLE)
     concept: np.ndarray = array("S", TEXT)
     object_name: np.ndarray = array("S", TEXT)
     cluster: np.ndarray = array("S", TEXT)
-    h: np.ndarray = array("S d")
+    h: np.ndarray = array("S d")  # embeddings by the encoder of the set
+    # `DISTANCES` to the training samples of the set's encoder; 0 for these themselves.
     distance: np.ndarray = array(f"S {len(DISTANCES)}")
 
     def rows(self, name: str, split: str) -> np.ndarray:
@@ -60,11 +53,9 @@ class ShiftedSets(Container):
     def registrations(self, rows: np.ndarray) -> Registrations:
         """Rows for explainers that read embeddings: without clouds and poses."""
         nan_S = np.full(len(rows), np.nan)
-        zeros_S = np.zeros(len(rows), int)
-        columns: dict[str, Any] = dict.fromkeys(REGISTRATION_COLUMNS, nan_S) | {"object_index": zeros_S}
+        columns: dict[str, Any] = dict.fromkeys(REGISTRATION_COLUMNS, nan_S)
         columns |= {name: np.full((len(rows), 4, 4), np.nan) for name in REGISTRATION_COLUMNS if name.startswith("T_")}
-        columns |= {
-            name: getattr(self, name)[rows] for name in ("sample", "split", "concept", "object_name", "cluster")
-        }
+        columns |= {name: self.arrays[name][rows] for name in ("sample", "split", "concept", "object_name", "cluster")}
+        columns["object_index"] = np.zeros(len(rows), int)
         nothing = [np.zeros((0, 3), np.float32)] * len(rows)
         return Registrations(**columns | ragged(nothing, nothing), attached={"embedding": self.h[rows]})

@@ -27,16 +27,11 @@ TestSamples = Annotated[int, Bounds(minimum=3)]
 
 @dataclass(frozen=True)
 class RegistrationSettings:
-    """Numbers of registrations and how they are made (docs/protocol.md).
+    """Numbers of registrations and how they are made (docs/protocol.md)."""
 
-    Attributes:
-        train, test: samples of each split, balanced over concepts and objects.
-        cloud_points: of source and of target (fewer where the object has fewer than twice as many).
-        severities: ranges of the perturbations.
-    """
-
-    train: TrainSamples = 800
+    train: TrainSamples = 800  # balanced over concepts and objects
     test: TestSamples = 200
+    # Of source and of target; fewer where the object has fewer than twice as many.
     cloud_points: Annotated[int, Bounds(minimum=64, maximum=65536)] = 2048
     severities: Severities = field(default_factory=Severities)
     icp: ICPSettings = field(default_factory=ICPSettings)
@@ -80,18 +75,14 @@ def make_registrations(
 def align_pair(
     perturbed: Perturbed, objects: ObjectClouds, object_index: int, target_rows: np.ndarray, icp_settings: ICPSettings
 ) -> dict:
-    """Align a perturbed cloud to points of its object's model, from the identity; return the columns of its row.
-
-    Args:
-        perturbed: the cloud in diameters, in the frame of the initial pose.
-        target_rows: rows of the object's canonical cloud.
+    """Align a perturbed cloud to the points of its object's canonical cloud in these rows; return the columns of its
+    row.
     """
     diameter_m = float(objects.diameters_m[object_index])
     target = objects.points(object_index)[target_rows] / diameter_m
-    T_init = np.eye(4)
     started = perf_counter()
     icp = ICP(target, objects.normals(object_index)[target_rows], icp_settings)
-    registration = icp.register(perturbed.points, T_init)
+    registration = icp.register(perturbed.points, np.eye(4))
     icp_seconds = perf_counter() - started
     return {
         "object_index": object_index,
@@ -102,7 +93,7 @@ def align_pair(
         "cloud": transform(registration.T_target_source, perturbed.points).astype(np.float32),
         "target": target.astype(np.float32),
         "T_target_source_true": scale_translation(perturbed.T_target_source_true, diameter_m),
-        "T_target_source_init": T_init,
+        "T_target_source_init": np.eye(4),
         "T_target_source_icp": scale_translation(registration.T_target_source, diameter_m),
         "icp_seconds": icp_seconds,
         "fitness": registration.fitness,
@@ -125,13 +116,8 @@ READINGS: tuple[str, ...] = get_args(Reading)
 def read_as(reading: str, registrations: Registrations, icp: ICPSettings) -> Registrations:
     """Return the registrations with the clouds that the encoder sees: the paper leaves open which it means.
 
-    Args:
-        reading: ``aligned`` as ICP left the observed cloud; ``observed`` at the initial pose, before ICP; ``reversed``
-            aligned by ICP from the model to it.
-        icp: for ``reversed``.
-
-    Raises:
-        InputError: an unknown reading.
+    ``aligned`` is the observed cloud as ICP left it, ``observed`` at the initial pose, before ICP; ``reversed`` is
+    aligned by ICP from the model to it. Raises InputError for another reading.
     """
     if reading == "aligned":
         return registrations
@@ -147,10 +133,7 @@ def read_as(reading: str, registrations: Registrations, icp: ICPSettings) -> Reg
 
 
 def registered_backwards(registrations: Registrations, settings: ICPSettings) -> Registrations:
-    """Return the pairs aligned by ICP from the model to the observed cloud.
-
-    The observed cloud is moved by the inverse of ICP's result into the frame of the model.
-    """
+    """Return the pairs, with the observed cloud moved by the inverse of what ICP finds from the model to it."""
     clouds, targets, poses, fits = [], [], [], []
     for row in range(len(registrations)):
         target = registrations.target(row).astype(np.float64)

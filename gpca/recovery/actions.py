@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Protocol
 
 import numpy as np
@@ -48,21 +49,13 @@ class Robot(Protocol):
 
 @dataclass(frozen=True)
 class Holding:
-    """A robot's state in a case.
+    """A robot's state in a case."""
 
-    Attributes:
-        shots: one per viewpoint.
-        T_world_object_init: initial pose of ICP.
-        T_world_object: result of ICP.
-        frames: number of frames per viewpoint.
-        filtered: whether statistical outliers are removed.
-    """
-
-    shots: tuple[Shot, ...]
-    T_world_object_init: np.ndarray
-    T_world_object: np.ndarray
-    frames: int = 1
-    filtered: bool = False
+    shots: tuple[Shot, ...]  # one per viewpoint
+    T_world_object_init: np.ndarray  # initial pose of ICP
+    T_world_object: np.ndarray  # and its result
+    frames: int = 1  # per viewpoint
+    filtered: bool = False  # whether statistical outliers are removed
 
 
 Action = Callable[..., Holding]
@@ -126,10 +119,10 @@ def look_around(
     azimuths: int = 8,
     elevations_deg: Sequence[float] = (20.0, 45.0, 70.0),
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return viewpoints ``T_world_camera`` (n, 4, 4), and which model points were and would be seen.
+    """Return viewpoints ``T_world_camera`` (n, 4, 4), and which model points were and would be seen, as
+    :func:`gpca.frames.shots.expected_surface` does.
 
-    The last two are those of :func:`gpca.frames.shots.expected_surface`. The viewpoints surround the measured points,
-    since the estimated center may be anywhere.
+    The viewpoints surround the measured points, since the estimated center may be anywhere.
     """
     from gpca.frames.shots import candidates, expected_surface
     from gpca.frames.situations import coarse
@@ -139,8 +132,7 @@ def look_around(
     distance_m = float(np.linalg.norm(center_m - first.T_world_camera[:3, 3]))
     poses_n = candidates(center_m, distance_m, azimuths, elevations_deg)
     points_m = robot.points_m[random.permutation(len(robot.points_m))[:MODEL_POINTS]]
-    shape = (robot.vertices_m, robot.faces, points_m)
-    pose = (holding.T_world_object, robot.diameter_m)
+    shape, pose = (robot.vertices_m, robot.faces, points_m), (holding.T_world_object, robot.diameter_m)
     return poses_n, *expected_surface(holding.shots, *shape, *pose, poses_n, coarse(first.camera))
 
 
@@ -156,13 +148,10 @@ def denoise(holding: Holding, robot: Robot, random: np.random.Generator, frames:
 def best_start(holding: Holding, robot: Robot, poses: Sequence[np.ndarray | None]) -> Holding:
     """Start from the pose with the best agreement with the shots: one of these, or the current estimate."""
     d = robot.diameter_m
-    step = max(1, len(robot.points_m) // MODEL_POINTS)
-    cloud_m = fuse(holding.shots, d, holding.filtered)
-    cloud_m = cloud_m[:: max(1, len(cloud_m) // CLOUD_POINTS)]
+    cloud_m = _thinned(fuse(holding.shots, d, holding.filtered), CLOUD_POINTS)
     if not len(cloud_m):
         return holding
-    model_m = robot.points_m[::step].astype(np.float64)
-    normals = robot.normals[::step]
+    model_m, normals = _thinned(robot.points_m, MODEL_POINTS).astype(np.float64), _thinned(robot.normals, MODEL_POINTS)
     candidates = [holding.T_world_object, *(pose for pose in poses if pose is not None)]
     shares = [sum(agreement(holding.shots, cloud_m, model_m, normals, T, d)[:2]) for T in candidates]
     return replace(holding, T_world_object_init=candidates[int(np.argmax(shares))])
@@ -172,8 +161,6 @@ ACTIONS: dict[str, Action] = {"reinitialize": reinitialize, "new_view": new_view
 
 
 def action_of(name: str, settings: Mapping[str, object]) -> Action:
-    from functools import partial
-
     require_known("recovery action", name, ACTIONS)
     require_arguments(f"recovery action '{name}'", ACTIONS[name], 3, settings)
     return partial(ACTIONS[name], **settings)
@@ -182,15 +169,12 @@ def action_of(name: str, settings: Mapping[str, object]) -> Action:
 def observe(holding: Holding, record: dict, robot: Robot, random: np.random.Generator) -> np.ndarray:
     """Return the numbers `OBSERVED` of a registration; lengths are in diameters.
 
-    Distances are those of the pair after ICP, in both directions: median and 90th percentile. Thickness is the measured
-    cloud's, by local planes; on_model, explained and hidden are the values of :func:`gpca.frames.shots.agreement`.
-    Rotation and translation are the motion of the model by ICP. Rivals are other poses, found by a short search: the
-    gain in agreement of the best one, its distance, and the share of results elsewhere. A right pose is found again
-    from other orientations; a wrong one loses to its rivals.
-
-    Args:
-        record: the registration's row, see :func:`gpca.pairs.synthesis.align_pair`.
-        random: draws the orientations of the search.
+    Distances are those of the pair (the registration's row, see :func:`gpca.pairs.synthesis.align_pair`) after ICP, in
+    both directions: median and 90th percentile. Thickness is the measured cloud's, by local planes; on_model, explained
+    and hidden are the values of :func:`gpca.frames.shots.agreement`. Rotation and translation are the motion of the
+    model by ICP. Rivals are other poses, found by a short search: the gain in agreement of the best one, its distance,
+    and the share of results elsewhere. A right pose is found again from other orientations; a wrong one loses to its
+    rivals.
     """
     from gpca.alignment.pose_error import adds_error
     from gpca.pairs.distances import LocalPlanes

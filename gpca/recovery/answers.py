@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache, partial
 from time import perf_counter
 from typing import Any, NamedTuple
 
@@ -41,14 +42,7 @@ class Answer(NamedTuple):
 
 
 class Answers:
-    """The answers so far.
-
-    Args:
-        episodes: each stands at the place of its number.
-        explain: for each explainer that the policies read, the function that attributes registrations.
-        actions: the names of all.
-        budget: how many actions an episode may take.
-    """
+    """The answers so far, of episodes that stand at the place of their number, by explainers that the policies read."""
 
     def __init__(
         self, episodes: Sequence[Episode], explain: Mapping[str, Explain], actions: Sequence[str], budget: int
@@ -76,12 +70,7 @@ class Answers:
 
 
 def record_of(episode: Episode, taken: tuple[str, ...], actions: Sequence[str], budget: int) -> dict:
-    """A registration's row; its sample number, which names random numbers, tells episode and actions taken.
-
-    Args:
-        actions: the names of all.
-        budget: how many of them an episode may take.
-    """
+    """A registration's row; its sample number, which names random numbers, tells episode and actions taken."""
     base = len(actions) + 1
     code = sum((1 + list(actions).index(action)) * base**place for place, action in enumerate(taken))
     return episode.outcomes[taken].record | {"sample": base**budget * episode.number + code, "split": "test"}
@@ -95,8 +84,8 @@ def starts_of(episodes: Sequence[Episode], actions: Sequence[str], budget: int) 
 def answers_of(attribution: Attribution) -> list[Answer]:
     """An attribution's rows as answers."""
     scores_N_C = as_shares(attribution.scores_N_C)
-    rows = zip(scores_N_C, attribution.variances_N_C, attribution.bald_N, attribution.seconds_N, strict=True)
-    return [Answer(scores_C, variances_C, float(bald), float(time)) for scores_C, variances_C, bald, time in rows]
+    bald_N, seconds_N = attribution.bald_N.tolist(), attribution.seconds_N.tolist()
+    return list(map(Answer, scores_N_C, attribution.variances_N_C, bald_N, seconds_N))
 
 
 def as_shares(scores_N_C: np.ndarray) -> np.ndarray:
@@ -109,21 +98,13 @@ def as_shares(scores_N_C: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class LoopExplainers:
-    """Explainers by name, and how well each does on the calibration samples.
+    """Explainers by name, and how well each does on the calibration samples."""
 
-    Attributes:
-        explain: for each name the function that attributes registrations without labels.
-        fitted: for each name the explainer itself.
-        attach: for each name the function that adds to registrations what the explainer reads.
-        calibration: for each name its predictions for the calibration samples.
-        concepts: (N,) the truth about those.
-    """
-
-    explain: Mapping[str, Explain]
-    fitted: Mapping[str, Any]
-    attach: Mapping[str, Attach]
-    calibration: Mapping[str, Attribution]
-    concepts: np.ndarray
+    explain: Mapping[str, Explain]  # attribute registrations without labels
+    fitted: Mapping[str, Any]  # the explainers themselves
+    attach: Mapping[str, Attach]  # add to registrations what an explainer reads
+    calibration: Mapping[str, Attribution]  # predictions for the calibration samples
+    concepts: np.ndarray  # (N,) the truth about those
 
     def right(self, name: str) -> np.ndarray:
         """Which calibration samples (N,) an explainer attributes rightly."""
@@ -142,54 +123,37 @@ def learn_explainers(
 ) -> LoopExplainers:
     """Train the encoder and fit every explainer on the split ``train``; the other split is for calibration.
 
-    Args:
-        names: explainers (:mod:`gpca.explainers.registry`) that read embeddings or the design ``removal``.
-        settings: explainer -> its settings.
-        most_remedied: training samples whose remedies are run, at most; Monte-Carlo ICP is slow.
+    Explainers (:mod:`gpca.explainers.registry`) read embeddings or the design ``removal``. Remedies of so many training
+    samples are run, at most; Monte-Carlo ICP is slow.
     """
     train, held_out = (registrations.subset(registrations.rows(split)) for split in ("train", "test"))
-    fitted, attached = {}, {}
-    model = None
+
+    @cache
+    def model() -> Any:
+        return train_encoder(registrations, source, seed, encoder)[0]
+
+    def embedded(given: Registrations) -> Registrations:
+        h_S_d, logits_S_C = embed(model(), given, source, seed, encoder)
+        return replace(given, attached={"embedding": h_S_d, "head_logits": logits_S_C})
+
+    def remedied(given: Registrations) -> Registrations:
+        outcomes, *seconds = evaluate_design("removal", given, source, seed, uncertainty)
+        return outcomes.attach_to(given, *seconds)
+
+    def timed(name: str, given: Registrations) -> Attribution:
+        started = perf_counter()
+        attribution = fitted[name].explain(attach[name](given))
+        # All get the same, as the encoder sees many at once; the explainer's own seconds hold what remedies took too.
+        each = (perf_counter() - started) / len(given)
+        return replace(attribution, seconds_N=np.full(len(given), each))
+
+    fitted, attach, explain = {}, {}, {}
     for name in names:
         entry = explainer_entry(name)
-        explainer = entry.make(source, seed, **(settings.get(name) or {}))
-        if entry.reads == "embeddings":
-            model = model or train_encoder(registrations, source, seed, encoder)[0]
-            attach = _embedding(model, source, seed, encoder)
-            learned = train
-        else:
-            attach = _remedies(source, seed, uncertainty)
-            learned = train.subset(np.arange(len(train))[:most_remedied])
-        explainer.fit(attach(learned))
-        fitted[name], attached[name] = explainer, attach
-    explain = {name: _timed(explainer, attached[name]) for name, explainer in fitted.items()}
+        fitted[name] = entry.make(source, seed, **(settings.get(name) or {}))
+        reads_embeddings = entry.reads == "embeddings"
+        attach[name], explain[name] = embedded if reads_embeddings else remedied, partial(timed, name)
+        learned = train if reads_embeddings else train.subset(np.arange(len(train))[:most_remedied])
+        fitted[name].fit(attach[name](learned))
     calibration = {name: of_name(held_out.without_labels()) for name, of_name in explain.items()}
-    return LoopExplainers(explain, fitted, attached, calibration, held_out.concept)
-
-
-def _timed(explainer, attach) -> Explain:
-    def explain(registrations: Registrations) -> Attribution:
-        started = perf_counter()
-        attached = attach(registrations)
-        attribution = explainer.explain(attached)
-        # All get the same, as the encoder sees many at once; the explainer's own seconds hold what remedies took too.
-        each = (perf_counter() - started) / len(registrations)
-        return replace(attribution, seconds_N=np.full(len(registrations), each))
-
-    return explain
-
-
-def _embedding(model, source: str, seed: int, settings: EncoderSettings):
-    def attach(registrations: Registrations) -> Registrations:
-        h_S_d, logits_S_C = embed(model, registrations, source, seed, settings)
-        return replace(registrations, attached={"embedding": h_S_d, "head_logits": logits_S_C})
-
-    return attach
-
-
-def _remedies(source: str, seed: int, settings: UncertaintySettings):
-    def attach(registrations: Registrations) -> Registrations:
-        outcomes, *seconds = evaluate_design("removal", registrations, source, seed, settings)
-        return outcomes.attach_to(registrations, *seconds)
-
-    return attach
+    return LoopExplainers(explain, fitted, attach, calibration, held_out.concept)

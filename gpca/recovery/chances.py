@@ -32,33 +32,30 @@ class FailureGate:
         return bool(self.failure(observed_F[None])[0] > self.threshold)
 
 
+def regression() -> Any:
+    """Return a logistic regression on standardized features, to be fitted."""
+    from gpca.explainers.classifiers import standardized_regression
+
+    return standardized_regression(INVERSE_REGULARIZATION)
+
+
 def learn_gate(
     observed_N_F: np.ndarray, failed_N: np.ndarray, table_N: Sequence[object], false_alarms: float
 ) -> FailureGate:
     """Train a gate; its threshold is set on good registrations, each judged by a classifier without their table.
 
-    Args:
-        observed_N_F: see :data:`gpca.recovery.actions.OBSERVED`.
-        table_N: table of each registration.
-        false_alarms: see :func:`alarm_threshold`.
-
-    Raises:
-        InputError: failed, or good, registrations from fewer than two tables.
+    False alarms are limited as :func:`alarm_threshold` says. Raises InputError for failed, or good, registrations from
+    fewer than two tables.
     """
     good_N = ~failed_N
     _, group_N = np.unique([str(table) for table in table_N], return_inverse=True)
     for kind, mask_N in (("failed", failed_N), ("good", good_N)):
         if (tables := len(set(group_N[mask_N]))) < 2:
-            fault = (
-                f"training registrations that are {kind} stand on {tables} of the two tables that a gate needs at least"
-            )
+            fault = f"{kind} training registrations stand on {tables} of the two tables that a gate needs at least"
             raise InputError("recovery", fault, "raise recovery.train, recovery.rehearsals or recovery.tables")
 
     def fitted(rows_N: np.ndarray) -> FailureGate:
-        from gpca.explainers.classifiers import standardized_regression
-
-        regression = standardized_regression(INVERSE_REGULARIZATION)
-        return FailureGate(regression.fit(observed_N_F[rows_N], failed_N[rows_N]))
+        return FailureGate(regression().fit(observed_N_F[rows_N], failed_N[rows_N]))
 
     fold_N = group_N % FOLDS
     failure_N = np.full(len(failed_N), np.nan)
@@ -72,25 +69,18 @@ def learn_gate(
 def alarm_threshold(failure_M: np.ndarray, false_alarms: float) -> float:
     """Return the threshold that a new good registration exceeds with at most this probability.
 
-    It is conformal over the M good registrations (:func:`gpca.evaluation.conformal.upper_bound`), or the largest
-    of their scores if M is too small.
+    It is conformal over the M good registrations, or the largest of their scores if M is too small.
     """
     return min(upper_bound(failure_M, 1 - false_alarms), float(failure_M.max()))
 
 
 @dataclass(frozen=True)
 class Trial:
-    """A rehearsed action.
+    """A rehearsed action."""
 
-    Attributes:
-        known_F: see :func:`gpca.recovery.rehearsal.known`.
-        action: its name; `NOTHING` if the registration was left as it was.
-        right: whether the pose was right afterwards.
-    """
-
-    known_F: np.ndarray
-    action: str
-    right: bool
+    known_F: np.ndarray  # see :func:`gpca.recovery.rehearsal.known`
+    action: str  # its name; `NOTHING` if the registration was left as it was
+    right: bool  # whether the pose was right afterwards
 
 
 class Chances:
@@ -99,11 +89,7 @@ class Chances:
     An action that always or never succeeded gets the rate of Laplace's rule of succession.
     """
 
-    def __init__(
-        self, trials: Sequence[Trial], actions: Sequence[str], inverse_regularization: float = INVERSE_REGULARIZATION
-    ) -> None:
-        from gpca.explainers.classifiers import standardized_regression
-
+    def __init__(self, trials: Sequence[Trial], actions: Sequence[str]) -> None:
         self._models: dict[str, Any] = {}
         for name in (NOTHING, *actions):
             rows = [trial for trial in trials if trial.action == name]
@@ -111,8 +97,7 @@ class Chances:
             if right_N.all() or not right_N.any():
                 self._models[name] = float((right_N.sum() + 1) / (len(right_N) + 2))
             else:
-                regression = standardized_regression(inverse_regularization)
-                self._models[name] = regression.fit(np.array([trial.known_F for trial in rows]), right_N)
+                self._models[name] = regression().fit(np.array([trial.known_F for trial in rows]), right_N)
 
     def of(self, name: str, known_F: np.ndarray) -> float:
         """Return the probability that the pose is right after the action, or as it is for `NOTHING`."""
@@ -135,21 +120,15 @@ class ExpectedUtility:
     probability p_a, the action gains (1 - p) p_a - p b - c_a over doing nothing, where b is the cost of acting
     needlessly. The k actions with the largest p_a also have the largest chance that any of them helps (if they are
     independent given the features), so that for equal costs one order is best for every budget.
-
-    Attributes:
-        chances: learned on the training tables.
-        costs: c_a of each action, in right poses.
-        needless: b, in right poses.
     """
 
-    chances: Chances
-    costs: Mapping[str, float]
-    needless: float = 0.0
+    chances: Chances  # p and p_a, learned on the training tables
+    costs: Mapping[str, float]  # c_a of each action, in right poses
+    needless: float = 0.0  # b
 
     def decide(self, known_F: np.ndarray, before: Iterable[str], alarmed: bool = False) -> Decision:
-        """Choose the next action; each action repeats only after all others.
-
-        After an action or an alarm, the pose is taken to be wrong.
+        """Choose the next action; each repeats only after all others. After an action or an alarm, the pose is taken to
+        be wrong.
         """
         before = list(before)
         wrong = alarmed or bool(before)
@@ -161,10 +140,6 @@ class ExpectedUtility:
         return Decision(QUEUE if wrong else NOTHING, "", f"no action is worth its cost: {best} {gains[best]:.2f}")
 
     def gains(self, known_F: np.ndarray, right: float) -> dict[str, float]:
-        """Return the gain of each action over doing nothing.
-
-        Args:
-            right: probability that the pose is right.
-        """
+        """Return the gain of each action over doing nothing, where the pose is right with this probability."""
         certain = right * self.needless
         return {a: (1 - right) * self.chances.of(a, known_F) - certain - cost for a, cost in self.costs.items()}

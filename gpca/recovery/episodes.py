@@ -33,19 +33,12 @@ MISPLACED = 40  # its starts that are tried in a situation until one fails; in e
 
 @dataclass(frozen=True)
 class Attempt:
-    """A registration: the robot's data, the columns of its row, the truth about it.
+    """A registration: the robot's data, the columns of its row, the truth about it."""
 
-    Attributes:
-        holding: the robot's measurements, with the pose that ICP ended at.
-        record: what :func:`gpca.pairs.synthesis.align_pair` returns, which lacks sample and split.
-        error: ADD, or ADD-S of symmetric objects, relative to the diameter. Never shown to a policy.
-        seconds: the time of ICP and of the action before it, without the camera.
-    """
-
-    holding: Holding
-    record: dict
-    error: float
-    seconds: float
+    holding: Holding  # with the pose that ICP ended at
+    record: dict  # of :func:`gpca.pairs.synthesis.align_pair`, which lacks sample and split
+    error: float  # ADD, or ADD-S of symmetric objects, relative to the diameter; never shown to a policy
+    seconds: float  # of ICP and of the action before it, without the camera
 
 
 class RobotIn:
@@ -101,8 +94,7 @@ def register_after(
 ) -> Attempt:
     """Take one action and register anew.
 
-    Args:
-        actions: names of all that were taken, this one included; they name the random numbers.
+    The names of all that were taken, this one included, name the random numbers.
     """
     robot = RobotIn(situation, actions)
     started = perf_counter()
@@ -119,9 +111,7 @@ def register_held(
 ) -> Attempt | None:
     """Align the object's fused points to its model by ICP, from the initial pose."""
     started = perf_counter()
-    objects = situation.shelf.objects
-    model = situation.model
-    d = situation.diameter_m
+    objects, model, d = situation.shelf.objects, situation.model, situation.diameter_m
     cloud_m = fuse(holding.shots, d, holding.filtered)
     if len(cloud_m) < FEWEST_POINTS:
         return None
@@ -129,19 +119,13 @@ def register_held(
     source_m = cloud_m[random.permutation(len(cloud_m))[:points]]
     target_rows = generator(*situation.axes, "target").permutation(len(objects.points(model)))[:points]
     T_init, T_true = holding.T_world_object_init, situation.T_world_object
-    perturbed = Perturbed(
-        transform(inverse(T_init), source_m) / d,
-        T_target_source_true=scale_translation(inverse(T_true) @ T_init, 1 / d),
-    )
+    T_target_source_true = scale_translation(inverse(T_true) @ T_init, 1 / d)
+    perturbed = Perturbed(transform(inverse(T_init), source_m) / d, T_target_source_true)
     record = align_pair(perturbed, objects, model, target_rows, icp)
     T_world_object = T_init @ inverse(record["T_target_source_icp"])
     error = pose_error(objects.points(model)[:JUDGED_POINTS], T_world_object, T_true, situation.shelf.symmetric[model])
-    return Attempt(
-        replace(holding, T_world_object=T_world_object),
-        record | {"concept": situation.cause},
-        error / d,
-        perf_counter() - started,
-    )
+    ended, record = replace(holding, T_world_object=T_world_object), record | {"concept": situation.cause}
+    return Attempt(ended, record, error / d, perf_counter() - started)
 
 
 Case = tuple[Situation, Attempt]
@@ -157,9 +141,7 @@ class Episode:
     """
 
     def __init__(self, number: int, situation: Situation, start: Attempt, success: float, tries: int = 1) -> None:
-        self.number = number
-        self.situation = situation
-        self.tries = tries
+        self.number, self.situation, self.tries = number, situation, tries
         self._success = success
         self.outcomes: dict[tuple[str, ...], Attempt] = {(): start}
         self._observed: dict[tuple[str, ...], np.ndarray] = {}
@@ -189,8 +171,7 @@ class Episode:
     def take(self, actions: tuple[str, ...], known: Mapping[str, Action], settings: LoopSettings) -> Attempt:
         """The outcome after these actions, of which all but the last were taken."""
         if actions not in self.outcomes:
-            before = self.outcomes[actions[:-1]]
-            action = known[actions[-1]]
+            before, action = self.outcomes[actions[:-1]], known[actions[-1]]
             outcome = register_after(self.situation, before, action, actions, settings.cloud_points, settings.icp)
             self.outcomes[actions] = outcome
         return self.outcomes[actions]
@@ -205,17 +186,12 @@ def find_episodes(situations: Situations, settings: LoopSettings) -> list[Episod
     """Draw situations of every cause until enough of their registrations have failed for it, and enough are good.
 
     Each situation gives one good registration at most: the disturbed one if it is right, or else that without the
-    cause. The failures of a cause come first.
-
-    Raises:
-        InputError: no failure at all.
+    cause. The failures of a cause come first. Raises InputError for no failure at all.
     """
     episodes: list[Episode] = []
     tries: dict[str, int] = {}
     for cause in CONCEPTS:
-        failures: list[Case] = []
-        good: list[Case] = []
-        tries[cause] = 0
+        failures, good, tries[cause] = [], [], 0
         for number in progress(range(settings.tries), f"failures by {cause}"):
             if len(failures) == settings.failures and len(good) >= settings.good:
                 break
@@ -238,10 +214,8 @@ def _try_situation(
 ) -> tuple[Case | None, Case | None, int]:
     """Register a disturbed situation, and the clean one where that failed; of bad poses, until one fails.
 
-    A pose error changes nothing but ICP's start, so several are tried on the same measurement and the same estimate.
-
-    Args:
-        misplaced: how many of these, at most.
+    A pose error changes nothing but ICP's start, so several are tried on the same measurement and the same estimate, at
+    most so many misplaced.
 
     Returns:
         the failure by the cause, and a good registration, each None where there is none; how many were made.
@@ -254,20 +228,15 @@ def _try_situation(
             return None, None, 1
         if is_right(start, success):
             return None, (disturbed, start), 1
-        without = register_first(clean, points, icp)
-        if without is None or not is_right(without, success):
-            return None, None, 1
-        return (disturbed, start), (clean, without), 1
-    estimated = register_first(clean, points, icp)
-    if estimated is None or not is_right(estimated, success):
+    without = register_first(clean, points, icp)
+    if without is None or not is_right(without, success):
         return None, None, 1
-    tried = 0
-    while True:
-        tried += 1
+    if cause != POSE:
+        return (disturbed, start), (clean, without), 1
+    for tried in range(1, misplaced + 1):
         situation = situations.misplaced(clean, tried)
-        attempt = register_misplaced(situation, estimated, points, icp)
-        assert attempt is not None  # the same points were registered before
-        if not is_right(attempt, success):
-            return (situation, attempt), (clean, estimated), tried
-        if tried == misplaced:
-            return None, (situation, attempt), tried
+        start = register_misplaced(situation, without, points, icp)
+        assert start is not None  # the same points were registered before
+        if not is_right(start, success):
+            return (situation, start), (clean, without), tried
+    return None, (situation, start), misplaced

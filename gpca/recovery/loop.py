@@ -15,7 +15,7 @@ from gpca.causes.settings import CauseSettings
 from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.progress import progress
-from gpca.recovery.actions import Action
+from gpca.recovery.actions import Action, Holding
 from gpca.recovery.answers import Answer, Answers, CaseKey, Explain
 from gpca.recovery.chances import alarm_threshold
 from gpca.recovery.episodes import Episode, RobotIn
@@ -35,54 +35,43 @@ UNEXPLAINED = Answer(NO_SCORES, NO_SCORES, np.nan, 0.0)
 
 
 class Reenactor:
-    """Re-enacts registrations of episodes on the tables of one run, from what their robots hold.
-
-    Args:
-        settings: what a robot believes of its starts.
-        counterfactuals: how it registers under each hypothesis.
-    """
+    """Re-enacts registrations of episodes on the tables of one run, from what their robots hold."""
 
     def __init__(self, settings: ReenactmentSettings, counterfactuals: CauseSettings) -> None:
-        self._settings = settings
-        self._counterfactuals = counterfactuals
+        self._settings, self._counterfactuals = settings, counterfactuals
         self._models: dict[int, KnownModel] = {}
         self._beliefs: dict[tuple[Episode, Taken], Belief] = {}
         self._reenacted: dict[tuple[Episode, Taken], Reenacted] = {}
 
     def believe(self, episode: Episode, actions: Taken = ()) -> Belief:
         """The hypotheses after these actions, which were taken."""
-        key = episode, actions
-        if key not in self._beliefs:
-            holding, known = episode.outcomes[actions].holding, self._known(episode)
-            axes = _axes(episode, actions)
-            self._beliefs[key] = believe(holding, known, self._settings, self._counterfactuals, axes)
+        if (key := (episode, actions)) not in self._beliefs:
+            self._beliefs[key] = believe(*self._held(episode, actions), self._settings, *self._how(episode, actions))
         return self._beliefs[key]
 
     def reenact(self, episode: Episode, actions: Taken = ()) -> Reenacted:
         """The counterfactuals of the registration after these actions, which were taken."""
-        key = episode, actions
-        if key not in self._reenacted:
-            belief, holding = self.believe(episode, actions), episode.outcomes[actions].holding
-            known, axes = self._known(episode), _axes(episode, actions)
-            self._reenacted[key] = reenact(belief, holding, known, self._counterfactuals, axes)
+        if (key := (episode, actions)) not in self._reenacted:
+            belief = self.believe(episode, actions)
+            self._reenacted[key] = reenact(belief, *self._held(episode, actions), *self._how(episode, actions))
         return self._reenacted[key]
 
-    def _known(self, episode: Episode) -> KnownModel:
+    def _held(self, episode: Episode, actions: Taken) -> tuple[Holding, KnownModel]:
         model = episode.situation.model
         if model not in self._models:
             name = episode.situation.shelf.objects.names[model]
             self._models[model] = KnownModel.of(RobotIn(episode.situation), generator("known model", name))
-        return self._models[model]
+        return episode.outcomes[actions].holding, self._models[model]
+
+    def _how(self, episode: Episode, actions: Taken) -> tuple[CauseSettings, tuple]:
+        return self._counterfactuals, (*episode.situation.axes, "re-enactment", *actions)
 
 
 def calibrated_alarm(episodes: Iterable[Episode], reenactor: Reenactor, false_alarms: float) -> float:
     """The probability of a failure that a further good registration exceeds with at most this probability.
 
     It is set on the good ones among these episodes, which were not used for training
-    (:func:`gpca.recovery.chances.alarm_threshold`).
-
-    Raises:
-        InputError: none of them is good.
+    (:func:`gpca.recovery.chances.alarm_threshold`); InputError where none is good.
     """
     good = [episode for episode in episodes if not episode.failed]
     if not good:
@@ -92,16 +81,11 @@ def calibrated_alarm(episodes: Iterable[Episode], reenactor: Reenactor, false_al
     return alarm_threshold(np.array(failures), false_alarms)
 
 
-def _axes(episode: Episode, actions: Taken) -> tuple:
-    return (*episode.situation.axes, "re-enactment", *actions)
-
-
 class Loop:
     """All policies on all episodes, step by step, so that explainers see what is new in one batch.
 
     Args:
         episodes: the failures, and what did not fail.
-        actions: each by its name.
         explain: for each explainer that the policies read, the function that attributes registrations.
         means: what the policies are made from.
         reenactor: for policies that re-enact registrations.
@@ -117,12 +101,8 @@ class Loop:
         axes: tuple,
         reenactor: Reenactor,
     ) -> None:
-        self.episodes = episodes
-        self._actions = actions
-        self._means = means
-        self._settings = settings
-        self._axes = axes
-        self._reenactor = reenactor
+        self.episodes, self._actions, self._means, self._settings = episodes, actions, means, settings
+        self._axes, self._reenactor = axes, reenactor
         self._answers = Answers(episodes, explain, tuple(actions), settings.budget)
 
     def run(self, policies: Sequence[str]) -> tuple[pd.DataFrame, pd.DataFrame]:
@@ -131,14 +111,10 @@ class Loop:
 
         entries = {name: policy_entry(name, tuple(self._actions)) for name in policies}
         decide = {name: entry.make(self._means) for name, entry in entries.items()}
-        taken: dict[tuple[int, str], tuple[str, ...]] = {
-            (episode.number, name): () for episode in self.episodes for name in policies
-        }
+        taken: dict[tuple[int, str], Taken] = {(e.number, name): () for e in self.episodes for name in policies}
         rows, seconds = [], []
         for step in range(1, self._settings.budget + 1):
-            self._answers.ask(
-                CaseKey(entries[name].explainer, number, actions) for (number, name), actions in taken.items()
-            )
+            self._answers.ask(CaseKey(entries[name].explainer, n, actions) for (n, name), actions in taken.items())
             following = {}
             for episode in self.episodes:
                 for name in policies:
@@ -154,7 +130,7 @@ class Loop:
         return pd.DataFrame([rows[n] for n in order]), pd.DataFrame([seconds[n] for n in order])
 
     def _step(
-        self, episode: Episode, name: str, entry: PolicyEntry, decide: Decide, before: tuple[str, ...]
+        self, episode: Episode, name: str, entry: PolicyEntry, decide: Decide, before: Taken
     ) -> tuple[dict, dict]:
         """Let one policy decide and act; return its row and its seconds."""
         history = self._answers.history(entry.explainer, episode.number, before) if entry.explainer else []
@@ -179,19 +155,19 @@ class Loop:
             after = (*before, decision.action)
             new = episode.take(after, self._actions, self._settings)
             action_seconds, recovered = new.seconds, episode.is_right(after)
-        shelf, model = episode.situation.shelf, episode.situation.model
+        situation = episode.situation
         row = {
             "episode": episode.number,
-            "cause": episode.situation.cause,
-            "object": shelf.objects.names[model],
-            "symmetric": shelf.symmetric[model],
-            "table": episode.situation.table,
+            "cause": situation.cause,
+            "object": situation.shelf.objects.names[situation.model],
+            "symmetric": situation.shelf.symmetric[situation.model],
+            "table": situation.table,
             "tries": episode.tries,
             "failed": episode.failed,
             "policy": name,
             "action": decision.action,
             "concept": decision.concept,
-            **{f"score_{concept}": score for concept, score in zip(CONCEPTS, last.scores_C, strict=True)},
+            **dict(zip((f"score_{concept}" for concept in CONCEPTS), last.scores_C, strict=True)),
             "bald": last.bald,
             "error_before": old.error,
             "error_after": (new or old).error,

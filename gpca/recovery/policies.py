@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import permutations
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -30,27 +30,16 @@ ERROR_ONLY = {True: "error_only_acting", False: "error_only"}  # by whether it i
 
 @dataclass(frozen=True)
 class Case:
-    """The inputs of a decision.
+    """The inputs of a decision."""
 
-    Attributes:
-        actions: actions taken so far.
-        scores_T_C, bald_T: output of the explainer at the start and after each action; None without an explainer.
-        observed_F: observation at the start (:data:`gpca.recovery.actions.OBSERVED`), for the gate.
-        known_F: all features of the registration (:func:`gpca.recovery.rehearsal.known`), for trained
-            policies.
-        cause: cause of the failure, for the oracle only; otherwise empty.
-        random: random numbers of the case, restarted for every decision.
-        reenacted: re-enactment of the current registration, for policies that read it.
-    """
-
-    actions: tuple[str, ...]
-    scores_T_C: np.ndarray | None
+    actions: tuple[str, ...]  # taken so far
+    scores_T_C: np.ndarray | None  # of the explainer at the start and after each action; None without one
     bald_T: np.ndarray | None
-    observed_F: np.ndarray | None
-    known_F: np.ndarray | None
-    cause: str
-    random: np.random.Generator
-    reenacted: Reenacted | None = None
+    observed_F: np.ndarray | None  # at the start (:data:`gpca.recovery.actions.OBSERVED`), for the gate
+    known_F: np.ndarray | None  # all features (:func:`gpca.recovery.rehearsal.known`), for trained policies
+    cause: str  # of the failure, for the oracle only; otherwise empty
+    random: np.random.Generator  # of the case, restarted for every decision
+    reenacted: Reenacted | None = None  # the current registration, for policies that read it
 
 
 Decide = Callable[[Case], Decision]
@@ -58,21 +47,14 @@ Decide = Callable[[Case], Decision]
 
 @dataclass(frozen=True)
 class Means:
-    """The ingredients of policies.
+    """The ingredients of policies."""
 
-    Attributes:
-        policy: thresholds and treatments of the robot.
-        actions: available actions.
-        utility, order: expected utility and best fixed order of actions on the rehearsals.
-        gate: separates failures from good registrations.
-        alarm: probability of a failure by the re-enactment above which a registration counts as failed.
-    """
-
-    policy: RecoveryPolicy
-    actions: Sequence[str]
-    utility: ExpectedUtility | None = None
-    order: Order = ()
-    gate: FailureGate | None = None
+    policy: RecoveryPolicy  # thresholds and treatments of the robot
+    actions: Sequence[str]  # that are available
+    utility: ExpectedUtility | None = None  # learned on the rehearsals, as is
+    order: Order = ()  # the best fixed order of actions
+    gate: FailureGate | None = None  # separates failures from good registrations
+    # Probability of a failure by the re-enactment above which a registration counts as failed.
     alarm: float | None = None
 
 
@@ -103,11 +85,7 @@ def never_queue(means: Means) -> Decide:
 
 
 def weigh_chances(means: Means, alarmed: bool = False) -> Decide:
-    """Maximize the expected utility (:class:`gpca.recovery.chances.ExpectedUtility`).
-
-    Args:
-        alarmed: whether it is given that the pose is wrong.
-    """
+    """Maximize the expected utility (:class:`gpca.recovery.chances.ExpectedUtility`), if alarmed of a wrong pose."""
     utility = means.utility
     assert utility is not None
 
@@ -126,19 +104,22 @@ def weigh_alarmed(means: Means) -> Decide:
 def act_at_random(means: Means) -> Decide:
     """Take a random action, possibly repeatedly."""
 
-    def drawn(case: Case) -> int:
+    def decide(case: Case) -> Decision:
         # The random numbers restart at every decision, so earlier draws are repeated.
-        return int(case.random.integers(len(means.actions), size=len(case.actions) + 1)[-1])
+        drawn = case.random.integers(len(means.actions), size=len(case.actions) + 1)[-1]
+        return Decision(means.actions[drawn], "", "at random")
 
-    return lambda case: Decision(means.actions[drawn(case)], "", "at random")
+    return decide
 
 
 def act_in_turn(means: Means) -> Decide:
     """Take all actions in turn, in a random order for each case."""
-    count = len(means.actions)
-    return lambda case: Decision(
-        means.actions[case.random.permutation(count)[len(case.actions) % count]], "", "in turn"
-    )
+
+    def decide(case: Case) -> Decision:
+        order = case.random.permutation(len(means.actions))
+        return Decision(means.actions[order[len(case.actions) % len(order)]], "", "in turn")
+
+    return decide
 
 
 def follow_rehearsed(means: Means) -> Decide:
@@ -161,38 +142,24 @@ def follow_reenactment(means: Means) -> Decide:
     return decide
 
 
-def gated(make: Callable[[Means], Decide]) -> Callable[[Means], Decide]:
-    """Let a policy act only if the gate raises an alarm at the start."""
-
-    def alarms(means: Means, case: Case) -> bool:
-        assert means.gate is not None and case.observed_F is not None
-        return means.gate.alarms(case.observed_F)
-
-    return _unless_good(make, alarms)
+def _gate_alarms(means: Means, case: Case) -> bool:
+    assert means.gate is not None and case.observed_F is not None
+    return means.gate.alarms(case.observed_F)
 
 
-def gated_by_reenactment(make: Callable[[Means], Decide]) -> Callable[[Means], Decide]:
-    """Let a policy act only if the re-enactment raises an alarm at the start."""
-
-    def alarms(means: Means, case: Case) -> bool:
-        assert means.alarm is not None and case.reenacted is not None
-        return case.reenacted.belief.failure > means.alarm
-
-    return _unless_good(make, alarms)
+def _reenactment_alarms(means: Means, case: Case) -> bool:
+    assert means.alarm is not None and case.reenacted is not None
+    return case.reenacted.belief.failure > means.alarm
 
 
-def _unless_good(make: Callable[[Means], Decide], alarms: Callable[[Means, Case], bool]) -> Callable[[Means], Decide]:
-    """Ask for the alarm at the start only: a later decision means that the pose is still wrong."""
+def gated(
+    make: Callable[[Means], Decide], alarms: Callable[[Means, Case], bool] = _gate_alarms
+) -> Callable[[Means], Decide]:
+    """Let a policy act only if there is an alarm at the start; a later decision means that the pose is still wrong."""
 
     def make_gated(means: Means) -> Decide:
-        decide = make(means)
-
-        def decide_gated(case: Case) -> Decision:
-            if case.actions or alarms(means, case):
-                return decide(case)
-            return Decision(NOTHING, "", "it is taken for good")
-
-        return decide_gated
+        decide, good = make(means), Decision(NOTHING, "", "it is taken for good")
+        return lambda case: decide(case) if case.actions or alarms(means, case) else good
 
     return make_gated
 
@@ -203,27 +170,9 @@ def follow_truth(means: Means) -> Decide:
     return lambda case: Decision(treatments.get(case.cause, NOTHING), case.cause, "told the cause")
 
 
-def always_act(action: str) -> Callable[[Means], Decide]:
-    return lambda means: lambda case: Decision(action, "", "always")
-
-
-def follow_sequence(order: Order) -> Callable[[Means], Decide]:
-    return lambda means: lambda case: Decision(next_of(order, case.actions), "", "next of a fixed sequence")
-
-
-def next_of(order: Order, taken: Sequence[str]) -> str:
-    return order[len(taken) % len(order)]
-
-
-def sequences(actions: Sequence[str]) -> dict[str, Order]:
-    """Return all sequences of at least two different actions, by the policy's name."""
-    lengths = range(2, len(actions) + 1)
-    orders = [order for length in lengths for order in permutations(actions, length)]
-    return {"_".join((SEQUENCE, *order)): order for order in orders}
-
-
-def title_of_sequence(order: Order) -> str:
-    return ", then ".join(action.replace("_", " ") for action in order).capitalize()
+def follow_sequence(order: Order, reason: str = "next of a fixed sequence") -> Callable[[Means], Decide]:
+    """Take the actions of a sequence in turn, whatever is observed."""
+    return lambda means: lambda case: Decision(order[len(case.actions) % len(order)], "", reason)
 
 
 def best_order(
@@ -231,12 +180,10 @@ def best_order(
 ) -> Order:
     """Return the greedy order of all actions: each solves the most of the remaining failures.
 
-    Ties go to the cheaper action, then to the first.
+    Ties go to the cheaper action, then to the first. Actions later than the budget are not compared.
 
     Args:
-        costs: cost of each action.
         solved: one function per rehearsed failure: whether a sequence solves it whose earlier actions did not.
-        budget: number of actions per failure; later actions are not compared.
     """
     order: Order = ()
     left, remaining = list(solved), list(actions)
@@ -254,57 +201,42 @@ def best_order(
 
 @dataclass(frozen=True)
 class PolicyEntry:
-    """A registered policy.
+    """A registered policy."""
 
-    Attributes:
-        title: title in tables.
-        make: makes the policy.
-        explainer: name of its explainer (:mod:`gpca.explainers.registry`), or empty.
-        queues: whether it leaves cases to a person, whose labels its explainer can learn.
-        learns: whether it uses the chances learned on the rehearsals.
-        rehearsed: whether it uses the best order on the rehearsals.
-        gated: whether it asks the gate first.
-        reenacts: whether it reads the re-enactment of the registration.
-        alarmed: whether it asks the re-enactment for an alarm first.
-        informed: it is given that the pose is wrong, so it would act on every good registration too.
-        oracle: whether it is given the cause.
-    """
-
-    title: str
+    title: str  # in tables
     make: Callable[[Means], Decide]
-    explainer: str = ""
-    queues: bool = False
-    learns: bool = False
-    rehearsed: bool = False
-    gated: bool = False
-    reenacts: bool = False
-    alarmed: bool = False
-    informed: bool = True
-    oracle: bool = False
+    explainer: str = ""  # its name (:mod:`gpca.explainers.registry`), or empty
+    queues: bool = False  # leaves cases to a person, whose labels its explainer can learn
+    learns: bool = False  # uses the chances learned on the rehearsals
+    rehearsed: bool = False  # uses the best order on the rehearsals
+    gated: bool = False  # asks the gate first
+    reenacts: bool = False  # reads the re-enactment of the registration
+    alarmed: bool = False  # asks the re-enactment for an alarm first
+    informed: bool = True  # it is given that the pose is wrong, so it would act on every good registration too
+    oracle: bool = False  # is given the cause
 
 
+_LEARNED: dict[str, Any] = {"explainer": "gpca", "learns": True}
+_GATED: dict[str, Any] = {"gated": True, "informed": False}
+_BY_REENACTMENT: dict[str, Any] = {"reenacts": True, "alarmed": True, "informed": False}
 POLICIES = {
     "gpca": PolicyEntry("GP-CA", follow_scores, explainer="gpca", queues=True, informed=False),
     "gpca_acting": PolicyEntry("GP-CA, never queued", never_queue, explainer="gpca"),
-    "gpca_gated": PolicyEntry("GP-CA, gated", gated(never_queue), explainer="gpca", gated=True, informed=False),
-    "utility": PolicyEntry("Expected utility, learned", weigh_chances, explainer="gpca", learns=True, informed=False),
-    "utility_acting": PolicyEntry("Expected utility, alarmed", weigh_alarmed, explainer="gpca", learns=True),
-    "utility_gated": PolicyEntry(
-        "Expected utility, gated", gated(weigh_alarmed), explainer="gpca", learns=True, gated=True, informed=False
-    ),
-    "error_only": PolicyEntry("Error only, gated", gated(follow_rehearsed), rehearsed=True, gated=True, informed=False),
+    "gpca_gated": PolicyEntry("GP-CA, gated", gated(never_queue), explainer="gpca", **_GATED),
+    "utility": PolicyEntry("Expected utility, learned", weigh_chances, **_LEARNED, informed=False),
+    "utility_acting": PolicyEntry("Expected utility, alarmed", weigh_alarmed, **_LEARNED),
+    "utility_gated": PolicyEntry("Expected utility, gated", gated(weigh_alarmed), **_LEARNED, **_GATED),
+    "error_only": PolicyEntry("Error only, gated", gated(follow_rehearsed), rehearsed=True, **_GATED),
     "error_only_acting": PolicyEntry("Error only, alarmed", follow_rehearsed, rehearsed=True),
     "reenact": PolicyEntry("Re-enactment", follow_reenactment, reenacts=True),
     "reenact_gated": PolicyEntry(
-        "Re-enactment, gated", gated_by_reenactment(follow_reenactment), reenacts=True, alarmed=True, informed=False
+        "Re-enactment, gated", gated(follow_reenactment, _reenactment_alarms), **_BY_REENACTMENT
     ),
     "error_only_reenact": PolicyEntry(
         "Error only, re-enactment's gate",
-        gated_by_reenactment(follow_rehearsed),
+        gated(follow_rehearsed, _reenactment_alarms),
         rehearsed=True,
-        reenacts=True,
-        alarmed=True,
-        informed=False,
+        **_BY_REENACTMENT,
     ),
     "shap_removal": PolicyEntry("SHAP, remedies, residual", never_queue, explainer="shap_removal_residual"),
     "softmax_head": PolicyEntry("Softmax head", never_queue, explainer="softmax_head"),
@@ -330,16 +262,20 @@ def is_fixed(name: str, actions: Sequence[str]) -> bool:
 
 
 def policies(actions: Sequence[str]) -> dict[str, PolicyEntry]:
-    """Return all policies by name, including those that always take one action or a sequence of them."""
-    always = {ALWAYS + a: PolicyEntry(f"Always: {a.replace('_', ' ')}", always_act(a)) for a in actions}
-    fixed = {
-        name: PolicyEntry(title_of_sequence(order), follow_sequence(order))
-        for name, order in sequences(actions).items()
-    }
-    return named_policies() | always | fixed
+    """Return all policies by name, including those that always take one action, or at least two of them in turn."""
+    entries = named_policies()
+    words = {action: action.replace("_", " ") for action in actions}
+    for action in actions:
+        entries[ALWAYS + action] = PolicyEntry(f"Always: {words[action]}", follow_sequence((action,), "always"))
+    for length in range(2, len(actions) + 1):
+        for order in permutations(actions, length):
+            title = ", then ".join(words[action] for action in order).capitalize()
+            entries["_".join((SEQUENCE, *order))] = PolicyEntry(title, follow_sequence(order))
+    return entries
 
 
 def policy_entry(name: str, actions: Sequence[str]) -> PolicyEntry:
+    """Return a policy by name; InputError where there is none such."""
     entries = policies(actions)
     require_known("recovery policy", name, entries)
     return entries[name]

@@ -7,8 +7,8 @@ pose's surface, and which surface no camera has seen.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import partial
 from time import perf_counter
 
 import numpy as np
@@ -66,19 +66,12 @@ class Appearance:
 
 @dataclass(frozen=True)
 class KnownModel:
-    """An object's model as a surface, in diameters.
+    """An object's model as a surface, in diameters."""
 
-    Attributes:
-        surface: `MODEL_POINTS` points. normals: (M, 3) theirs, outward.
-        scale: estimates noise.
-        mesh: in meters.
-        diameter_m: diameter of the object.
-    """
-
-    surface: ModelSurface
-    normals: np.ndarray
+    surface: ModelSurface  # of `MODEL_POINTS` points
+    normals: np.ndarray  # (M, 3) theirs, outward
     scale: NoiseScale
-    mesh: MeshScene
+    mesh: MeshScene  # in meters
     diameter_m: float
 
     @classmethod
@@ -91,22 +84,13 @@ class KnownModel:
 
 @dataclass(frozen=True)
 class Belief:
-    """Hypotheses of the object's pose after a registration.
+    """Hypotheses of the object's pose after a registration."""
 
-    Attributes:
-        hypotheses: K hypotheses, relative to the initial pose.
-        observed: (N, 3) measured points at the initial pose, in diameters.
-        weight_K: their probabilities.
-        error_K: v̂(all), error of the registration's result under each, in diameters.
-        failure_K: probability of a failure under each.
-        seconds: duration.
-    """
-
-    hypotheses: Sequence[Hypothesis]
-    observed: np.ndarray
-    weight_K: np.ndarray
-    error_K: np.ndarray
-    failure_K: np.ndarray
+    hypotheses: Sequence[Hypothesis]  # K, relative to the initial pose
+    observed: np.ndarray  # (N, 3) measured points at the initial pose, in diameters
+    weight_K: np.ndarray  # probabilities of the hypotheses
+    error_K: np.ndarray  # v̂(all), error of the registration's result under each, in diameters
+    failure_K: np.ndarray  # probability of a failure under each
     seconds: float
 
     @property
@@ -117,22 +101,16 @@ class Belief:
 
 @dataclass(frozen=True)
 class Reenacted:
-    """Counterfactuals of a registration under each hypothesis.
-
-    Attributes:
-        error_K_8: v̂ of every subset of the causes, mean over the starts, in diameters.
-        seconds: total duration.
-    """
+    """Counterfactuals of a registration under each hypothesis."""
 
     belief: Belief
-    error_K_8: np.ndarray
-    seconds: float
+    error_K_8: np.ndarray  # v̂ of every subset of the causes, mean over the starts, in diameters
+    seconds: float  # in total
 
     @property
     def phi_3(self) -> np.ndarray:
-        """φ̂, effect of each cause on the error, given a failure: the mean over the hypotheses.
-
-        Hypotheses are weighted by their probability times the probability of a failure under them.
+        """φ̂, effect of each cause on the error, given a failure: the mean over the hypotheses, weighted by P(it,
+        failure).
         """
         weight_K = self.belief.weight_K * self.belief.failure_K
         return (weight_K[:, None] * shapley_values(self.error_K_8)).sum(axis=0) / weight_K.sum()
@@ -141,12 +119,7 @@ class Reenacted:
 def believe(
     holding: Holding, shape: KnownModel, settings: ReenactmentSettings, truth: CauseSettings, axes: tuple
 ) -> Belief:
-    """Find hypotheses of the true pose; at the limit of a failed registration, a failure has probability 1/2.
-
-    Args:
-        truth: contains this limit.
-        axes: names of the random numbers.
-    """
+    """Find hypotheses of the true pose; at the limit of a failed registration, a failure has probability 1/2."""
     started = perf_counter()
     d, T_init = shape.diameter_m, holding.T_world_object_init
     random = generator(*axes, "hypotheses")
@@ -154,7 +127,13 @@ def believe(
     cloud_m = cloud_m[np.sort(random.permutation(len(cloud_m))[:OBSERVED_POINTS])]
     observed = transform(inverse(T_init), cloud_m) / d
     T_result = scale_translation(inverse(holding.T_world_object) @ T_init, 1 / d)
-    evidence = partial(_evidence, holding, shape, Appearance(holding.shots, shape.mesh))
+    appearance = Appearance(holding.shots, shape.mesh)
+
+    def evidence(T: np.ndarray, width: float) -> float:
+        """Return the log-probability of the pixels around the object under a hypothesis."""
+        explained = appearance.explained(_placed(holding, shape, T), d * max(NEAR, 2.5 * width))
+        return PIXELS * (explained * float(np.log(1 - UNEXPLAINED)) + (1 - explained) * float(np.log(UNEXPLAINED)))
+
     hypotheses = find_hypotheses(observed, shape.surface, T_result[None], settings, random, evidence)
     T_off_K = np.stack([T_result @ inverse(hypothesis.T) for hypothesis in hypotheses])
     error_K = capped(shape.surface.errors(T_off_K))
@@ -165,35 +144,29 @@ def believe(
 def reenact(belief: Belief, holding: Holding, shape: KnownModel, truth: CauseSettings, axes: tuple) -> Reenacted:
     """Register with every subset of the causes, under each hypothesis in turn.
 
-    Without noise or missing surface, the measurement is rebuilt (:func:`gpca.reenactment.enactment.rebuild`); without
-    a pose error, the registration starts from the hypothesis.
-
-    Args:
-        truth: settings of the counterfactual registrations.
-        axes: names of the random numbers.
+    Without noise or missing surface, the measurement is rebuilt (:func:`gpca.reenactment.enactment.rebuild`); without a
+    pose error, the registration starts from the hypothesis.
     """
     started = perf_counter()
-    random = generator(*axes, "clouds")
-    xi_n_6 = start_twists(axes, truth)
-    error_K_8 = []
-    for hypothesis in belief.hypotheses:
+    random, xi_n_6 = generator(*axes, "clouds"), start_twists(axes, truth)
+    error_K_8 = np.full((len(belief.hypotheses), len(SUBSETS)), LARGEST_ERROR)
+    for error_8, hypothesis in zip(error_K_8, belief.hypotheses, strict=True):
         observation = observe(belief.observed, hypothesis, shape.surface, shape.scale, random)
         covered_M = seen_surface(holding, shape, hypothesis, observation.noise)
         if covered_M.mean() >= LEAST_COVERED:
             observation = replace(observation, covered=covered_M)
         candidate = rebuild(hypothesis.T, observation, shape.surface, random)
         measured = Counterfactuals(Registrar(candidate, truth, misses=True), shape.surface.errors, xi_n_6, truth)
-        error_K_8.append([_error(measured, subset) for subset in range(len(SUBSETS))])
-    return Reenacted(belief, np.array(error_K_8), belief.seconds + perf_counter() - started)
+        for subset in range(len(SUBSETS)):
+            with suppress(Unmeasurable):
+                error_8[subset] = measured.error(subset)
+    return Reenacted(belief, error_K_8, belief.seconds + perf_counter() - started)
 
 
 def seen_surface(holding: Holding, shape: KnownModel, hypothesis: Hypothesis, noise: float) -> np.ndarray:
-    """Return which model points (M,) were measured by a shot, under a hypothesis.
+    """Return which model points (M,) were measured by a shot, with noise in diameters, under a hypothesis.
 
     Such a point faces the camera, and its pixel shows the object at the expected depth.
-
-    Args:
-        noise: standard deviation of the measurement, in diameters.
     """
     d, T = shape.diameter_m, _placed(holding, shape, hypothesis.T)
     placed_m, normals = transform(T, d * shape.surface.points), rotate(T, shape.normals)
@@ -209,17 +182,3 @@ def seen_surface(holding: Holding, shape: KnownModel, hypothesis: Hypothesis, no
 
 def _placed(holding: Holding, shape: KnownModel, T: np.ndarray) -> np.ndarray:
     return holding.T_world_object_init @ scale_translation(inverse(T), shape.diameter_m)
-
-
-def _evidence(holding: Holding, shape: KnownModel, appearance: Appearance, T: np.ndarray, width: float) -> float:
-    """Return the log-probability of the pixels around the object under a hypothesis."""
-    reach_m = shape.diameter_m * max(NEAR, 2.5 * width)
-    explained = appearance.explained(_placed(holding, shape, T), reach_m)
-    return PIXELS * (explained * float(np.log(1 - UNEXPLAINED)) + (1 - explained) * float(np.log(UNEXPLAINED)))
-
-
-def _error(measured: Counterfactuals, subset: int) -> float:
-    try:
-        return measured.error(subset)
-    except Unmeasurable:
-        return LARGEST_ERROR

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import asdict, dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -27,27 +27,22 @@ from gpca.seeds import generator
 
 if TYPE_CHECKING:
     import pandas as pd
+
 BATCH = 4  # cases that are labeled before anything is learned from them
 DRAWS = 5  # random orders
 
 
 @dataclass(frozen=True)
 class Rehearsal:
-    """Episodes of the training tables.
-
-    Attributes:
-        episodes: those that failed, and those that did not.
-        trials: of each by its number.
-        bald: of each by its number, at its start, in nats.
-    """
+    """Episodes of the training tables: those that failed, on which every action was tried, and those that did not."""
 
     episodes: Sequence[Episode]
-    trials: Mapping[int, Sequence[Trial]]
-    bald: Mapping[int, float] = field(default_factory=dict)
+    trials: Mapping[int, Sequence[Trial]]  # of each by its number
+    bald: Mapping[int, float] = field(default_factory=dict)  # of each by its number, at its start, in nats
 
     @property
     def failures(self) -> list[Episode]:
-        """The episodes that every action was tried on."""
+        """Those that failed."""
         return [episode for episode in self.episodes if episode.failed]
 
 
@@ -102,13 +97,11 @@ def rehearsed_gate(episodes: Mapping[str, Sequence[Episode]], false_alarms: floa
 
 
 def robot_policy(recovery: Mapping, rehearsal: Rehearsal | None) -> RecoveryPolicy:
-    """The declared thresholds, and the one that is chosen on the rehearsed failures unless it is declared.
+    """The thresholds that the config's section declares, and the one that is chosen on the rehearsed failures unless
+    declared.
 
-    Those are found like the failures that policies are judged by, on other tables. Without a rehearsal no
-    policy queues anything.
-
-    Args:
-        recovery: the config's section.
+    Those are found like the failures that policies are judged by, on other tables. Without a rehearsal no policy queues
+    anything.
     """
     bald_N = np.array([rehearsal.bald[episode.number] for episode in rehearsal.failures] if rehearsal else [np.inf])
     attempts = recovery["loop"]["budget"]
@@ -125,32 +118,14 @@ def summary(means: Means, explainers: LoopExplainers) -> dict:
         "treatments": dict(policy.treatments),
         "order": list(means.order),
         "calibration_samples": len(explainers.concepts),
-        "calibration_accuracy": {
-            name: round(float(explainers.right(name).mean()), 6) for name in explainers.calibration
-        },
+        "calibration_accuracy": {n: round(float(explainers.right(n).mean()), 6) for n in explainers.calibration},
     }
-
-
-class QueueLearner(Protocol):
-    """A learner that doubts queued cases, learns their labels, and decides about others."""
-
-    def doubts(self) -> np.ndarray:
-        """The doubt about each queued case (N,)."""
-
-    def learn(self, rows: np.ndarray) -> None:
-        """Learn the labels of these cases."""
-
-    def choose(self) -> list[str]:
-        """The learner's first action for each of the failures that it is judged by."""
 
 
 class ClassifierLearner:
     """Treats what the classifier names; its doubt is BALD.
 
-    Args:
-        explainer: fitted, and able to learn further labels; it is not changed.
-        queued, judged: registrations with what the explainer reads.
-        treatments: concept -> action.
+    The explainer is fitted, and able to learn further labels; it is not changed.
     """
 
     def __init__(
@@ -160,15 +135,15 @@ class ClassifierLearner:
         self._queued, self._judged, self._treatments = queued, judged, treatments
 
     def doubts(self) -> np.ndarray:
-        """BALD in nats."""
+        """BALD (N,) in nats, of the queued cases."""
         return self._explainer.explain(self._queued.without_labels()).bald_N
 
     def learn(self, rows: np.ndarray) -> None:
-        """Learn the causes."""
+        """Learn the causes of these cases."""
         self._explainer.learn(self._queued.subset(rows))
 
     def choose(self) -> list[str]:
-        """The treatments of the largest scores."""
+        """The treatments of the largest scores of the failures that it is judged by."""
         attribution = self._explainer.explain(self._judged.without_labels())
         return [self._treatments[CONCEPTS[column]] for column in attribution.scores_N_C.argmax(axis=1)]
 
@@ -176,10 +151,8 @@ class ClassifierLearner:
 class ChancesLearner:
     """Takes the action that is worth most; its doubt is how little the best one may help.
 
-    Args:
-        trials: of each queued case; the first tells what was known at its start.
-        judged_N_F: the known features of the failures that it is judged by.
-        costs: action -> its cost.
+    Of each queued case the first of its trials tells what was known at its start, as do the features of the failures
+    that it is judged by.
     """
 
     def __init__(
@@ -207,6 +180,9 @@ class ChancesLearner:
         return [max(gains, key=gains.__getitem__) for gains in gains_N]
 
 
+QueueLearner = ClassifierLearner | ChancesLearner
+
+
 def learners_of(
     policies: Sequence[str],
     means: Means,
@@ -217,15 +193,11 @@ def learners_of(
 ) -> dict[str, Callable[[], QueueLearner]]:
     """The makers of the learners, for those of these policies that queue cases or learn from rehearsals.
 
-    Args:
-        rehearsal: its failures are the queued cases; None where no policy learns.
-        judged: other failures.
-        budget: how many actions a failure may take.
+    The queued cases are the failures of the rehearsal, which is None where no policy learns; others are judged.
     """
     if rehearsal is None:
         return {}
     queued = rehearsal.failures
-    trials = [rehearsal.trials[episode.number] for episode in queued]
     entries = {name: policy_entry(name, means.actions) for name in policies}
     learners: dict[str, Callable[[], QueueLearner]] = {}
     for name, entry in entries.items():
@@ -233,12 +205,13 @@ def learners_of(
             continue  # policies of the same chances learn the same
         starts = [starts_of(episodes, means.actions, budget) for episodes in (queued, judged)]
         if entry.queues:
-            own, others = (explainers.attach[entry.explainer](registrations) for registrations in starts)
+            attached = map(explainers.attach[entry.explainer], starts)
             fitted, treatments = explainers.fitted[entry.explainer], means.policy.treatments
-            learners[name] = partial(ClassifierLearner, fitted, own, others, treatments)
+            learners[name] = partial(ClassifierLearner, fitted, *attached, treatments)
         elif means.utility is not None:
             answers = answers_of(explainers.explain[entry.explainer](starts[1].without_labels()))
             known_N_F = [known(e.observe(()), answer) for e, answer in zip(judged, answers, strict=True)]
+            trials = [rehearsal.trials[episode.number] for episode in queued]
             learners[name] = partial(ChancesLearner, trials, known_N_F, means.utility.costs)
     return learners
 
@@ -251,11 +224,8 @@ def error_by_labels(
 ) -> pd.DataFrame:
     """A row per learner, order and number of labels: how many of the judged failures its first action leaves.
 
-    Args:
-        learners: the maker of each by its name, without any label learned.
-        solved: of each judged failure, whether each action solves it.
-        rehearsal: its failures are the queued cases.
-        axes: names of the random orders.
+    Learners have no label learned when made; of each judged failure, `solved` says whether each action solves it. The
+    axes name the random orders of the queued cases.
     """
     import pandas as pd
 

@@ -21,77 +21,48 @@ from gpca.uncertainty.settings import UncertaintySettings
 
 @dataclass(frozen=True)
 class LoopSettings:
-    """Settings of the loop.
+    """Settings of the loop."""
 
-    Attributes:
-        failures, good: number of failed and of good registrations per cause.
-        tries: largest number of situations that are registered to find them, per cause.
-        budget: number of actions per failure.
-        success: error of the pose above which a registration failed, in diameters.
-        cloud_points: number of points of source and target.
-        icp: settings of ICP.
-    """
-
-    failures: Count = 8
-    good: Count = 8
-    tries: Count = 120
-    budget: Annotated[int, Bounds(minimum=1, maximum=9)] = 3
-    success: float = SuccessSettings.error
-    cloud_points: int = 2048
+    failures: Count = 8  # per cause
+    good: Count = 8  # registrations per cause
+    tries: Count = 120  # largest number of situations that are registered to find them, per cause
+    budget: Annotated[int, Bounds(minimum=1, maximum=9)] = 3  # actions per failure
+    success: float = SuccessSettings.error  # of the pose, above which a registration failed, in diameters
+    cloud_points: int = 2048  # of source and target
     icp: ICPSettings = field(default_factory=ICPSettings)
 
 
 @dataclass(frozen=True)
 class RecoverySettings:
-    """All settings of a run of the closed loop.
+    """All settings of a run of the closed loop."""
 
-    Attributes:
-        section: the config's section ``recovery``.
-        objects: entry of the source of the objects on the tables.
-        loop: settings of the loop.
-        situation: disturbances of the registrations, and scenes.
-        encoder, uncertainty: shared by the explainers.
-        explainers: settings of each explainer by name.
-        reenactment: search for the true pose.
-        counterfactuals: registrations under each hypothesis.
-    """
-
-    section: Mapping
-    objects: Mapping
+    section: Mapping  # the config's section ``recovery``
+    objects: Mapping  # entry of the source of the objects on the tables
     loop: LoopSettings
-    situation: SituationSettings
-    encoder: EncoderSettings
+    situation: SituationSettings  # disturbances of the registrations, and scenes
+    encoder: EncoderSettings  # shared by the explainers, as is
     uncertainty: UncertaintySettings
-    explainers: Mapping[str, Mapping]
-    reenactment: ReenactmentSettings
-    counterfactuals: CauseSettings
+    explainers: Mapping[str, Mapping]  # settings of each by name
+    reenactment: ReenactmentSettings  # search for the true pose
+    counterfactuals: CauseSettings  # registrations under each hypothesis
 
     @classmethod
     def from_sections(cls, sections: Mapping[str, dict]) -> RecoverySettings:
         """Build from the sections of the config, ``explainers`` and ``reenactment`` by name."""
         recovery, success = sections["recovery"], sections["success"]["error"]
         registration = RegistrationSettings.from_dict(sections["registrations"])
-        scenes = SceneSettings.from_dict(sections["scenes"])
+        camera, icp = Camera(**recovery["camera"]), registration.icp
+        scenes = replace(SceneSettings.from_dict(sections["scenes"]), count=recovery["tables"], camera=camera)
+        ranges = tuple(recovery["noise_scale"]), tuple(recovery["hidden"])
+        limits = Limits(min(Limits.nominal, success), success)
         return cls(
             section=recovery,
             objects=sections["objects"],
-            loop=LoopSettings(
-                **recovery["loop"],
-                success=success,
-                cloud_points=registration.cloud_points,
-                icp=registration.icp,
-            ),
-            situation=SituationSettings(
-                replace(scenes, count=recovery["tables"], camera=Camera(**recovery["camera"])),
-                noise_scale=tuple(recovery["noise_scale"]),
-                hidden=tuple(recovery["hidden"]),
-                severities=registration.severities,
-            ),
+            loop=LoopSettings(**recovery["loop"], success=success, cloud_points=registration.cloud_points, icp=icp),
+            situation=SituationSettings(scenes, *ranges, severities=registration.severities),
             encoder=EncoderSettings(**sections["encoder"]),
-            uncertainty=UncertaintySettings(**sections["uncertainty"], icp=registration.icp),
+            uncertainty=UncertaintySettings(**sections["uncertainty"], icp=icp),
             explainers=sections.get("explainers", {}),
             reenactment=ReenactmentSettings(**sections.get("reenactment", {})),
-            counterfactuals=CauseSettings(
-                icp=registration.icp, moved=OBSERVED, limits=Limits(min(Limits.nominal, success), success)
-            ),
+            counterfactuals=CauseSettings(icp=icp, moved=OBSERVED, limits=limits),
         )

@@ -10,8 +10,8 @@ from gpca.recovery.chances import Chances, ExpectedUtility, Trial, alarm_thresho
 COSTS = {"denoise": 0.02, "new_view": 0.03}
 
 
-@pytest.fixture(scope="module")
-def chances():
+@pytest.fixture
+def chances(monkeypatch):
     """The first number tells whether the pose is right, the second which action helps."""
     random = np.random.default_rng(0)
     trials = []
@@ -19,7 +19,8 @@ def chances():
         known_F = random.choice([-1.0, 1.0], 2)
         trials.append(Trial(known_F, NOTHING, known_F[0] > 0))
         trials += [Trial(known_F, "denoise", known_F[1] > 0), Trial(known_F, "new_view", known_F[1] < 0)]
-    return Chances(trials, tuple(COSTS), inverse_regularization=1.0)
+    monkeypatch.setattr("gpca.recovery.chances.INVERSE_REGULARIZATION", 1.0)
+    return Chances(trials, tuple(COSTS))
 
 
 def test_chances_follow_what_is_known(chances):
@@ -104,5 +105,5 @@ def test_the_threshold_has_the_rank_of_conformal_prediction():
     ("failed", "kind"), [([True] * 6, "good"), ([False] * 6, "failed"), ([True, True] + [False] * 4, "failed")]
 )
 def test_a_gate_needs_failures_and_good_ones_on_two_tables(failed, kind):
-    with pytest.raises(InputError, match=f"that are {kind} stand on . of the two tables"):
+    with pytest.raises(InputError, match=f"{kind} training registrations stand on . of the two tables"):
         learn_gate(np.zeros((6, 2)), np.array(failed), [0, 0, 1, 1, 2, 2], 0.05)

@@ -8,17 +8,7 @@ import pytest
 from gpca.causes.policy import NOTHING, QUEUE, RecoveryPolicy, Thresholds
 from gpca.errors import InputError
 from gpca.recovery.chances import Chances, ExpectedUtility, Trial
-from gpca.recovery.policies import (
-    Case,
-    Means,
-    best_order,
-    is_fixed,
-    next_of,
-    policies,
-    policy_entry,
-    sequences,
-    title_of_sequence,
-)
+from gpca.recovery.policies import SEQUENCE, Case, Means, best_order, is_fixed, policies, policy_entry
 from gpca.seeds import generator
 
 ACTIONS = ("reinitialize", "new_view", "denoise")
@@ -179,15 +169,15 @@ COSTS = {"a": 0.01, "b": 0.03, "c": 0.02}
 
 
 def test_all_orders_of_two_and_more_actions_have_a_name():
-    named = sequences(("a", "b_b", "c"))
+    named = {name: entry for name, entry in policies(("a", "b_b", "c")).items() if name.startswith(f"{SEQUENCE}_")}
     assert len(named) == 6 + 6
-    assert named["sequence_b_b_a"] == ("b_b", "a")
-    assert title_of_sequence(named["sequence_b_b_a"]) == "B b, then a"
-    assert sequences(("a",)) == {}
+    assert named["sequence_b_b_a"].title == "B b, then a"
+    assert not any(name.startswith(SEQUENCE) for name in policies(("a",)))
 
 
 def test_an_ended_sequence_begins_anew():
-    assert [next_of(("a", "b"), taken) for taken in ((), ("a",), ("a", "b"))] == ["a", "b", "a"]
+    decide = policies(("a", "b"))["sequence_a_b"].make(Means(POLICY, ("a", "b")))
+    assert [decide(case(taken)).action for taken in ((), ("a",), ("a", "b"))] == ["a", "b", "a"]
 
 
 def helped_by(*actions):
