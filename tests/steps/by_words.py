@@ -14,7 +14,6 @@ from gpca.process.code_files import ROOT
 from gpca.process.job import Job, as_process, call
 from gpca.process.processor import THREAD_VARIABLES
 
-IN = "gpca.experiments."
 SHARED = {  # module of gpca.steps -> the steps that it has, functions of their names
     "pairs": "objects registrations uncertainty train embed reduce attribute",
     "causes": "causes describe reenact train_on_causes model",
@@ -28,7 +27,7 @@ MODULES = {f: f"gpca.steps.{module}:{f}" for module, functions in SHARED.items()
     "without": "gpca.steps.active_learning:embed_without",
     "controls": "gpca.steps.controls:explain",
     "train_control": "gpca.steps.control_samples:train",
-    "estimate": IN + "estimators.step",
+    "estimate": "gpca.steps.estimates",
     "frame_labels": "gpca.steps.frame_labels",
     "gradients": "gpca.steps.gradients",
     "guarantee": "gpca.steps.guarantee",
@@ -59,7 +58,7 @@ LISTS = {  # which names of a step are lists, and not of one seed, file or name
     "controls": "retrained retrained_embeddings others other_registrations",
     "diagnose": "seeds causes read read_timings predictions timings",
     "diagnose_by_features": "seeds causes descriptors predictions",
-    "estimate": "seeds estimators causes other_objects other_causes samples rows timings",
+    "estimate": "seeds estimators estimates causes other_objects other_causes samples rows timings",
     "diagnose_frames": "causes descriptors reenactments encoders embeddings",
     "frame_labels": "backbones embeddings strategies out",
     "gradients": "seeds registrations encoders embeddings deletions maps tcav",

@@ -88,11 +88,6 @@ FAULTS = {
     "estimate": [
         (removed("causes.npz"), {}, "causes.npz: no such file"),
         (arrays_changed("objects.npz", names=reversed_order), {}, ANOTHER_NAME),
-        (
-            untouched,
-            section("estimate", "estimator_pairs", methods={"fgr": 3}),
-            "registration method 'fgr': is global, so its results have no spread",
-        ),
         (untouched, {"--samples": ["causes.npz"]}, "causes.npz"),
     ],
     "train_on_causes": [

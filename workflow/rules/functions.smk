@@ -27,24 +27,6 @@ def explainer_settings(wildcards):
     return config["explainers"].get(name) or REAL_WORLD["explainers"].get(name) or {}
 
 
-def estimator_settings(estimators):
-    """Return the settings of a job that asks some estimators about registrations with measured causes."""
-    names = ("estimator_pairs", "causes", "success")
-    asked = {name: config["estimators"][name] for name in estimators}
-    icp = {"icp": config["registrations"]["icp"]}
-    return as_json({name: config[name] for name in names} | icp | {"estimators": asked})
-
-
-def following_one(names, name):
-    return names[(names.index(name) + 1) % len(names)]
-
-
-def next_source(wildcards):
-    """Return the source after this one, by which estimators are taught otherwise; none where it is the only one."""
-    sources = list(SOURCES)
-    return [following_one(sources, wildcards.source)] if len(sources) > 1 else []
-
-
 def seeds_of_frame_row(method):
     """Return the seeds of a row on depth frames."""
     return NAMES["published_seed"] if method in NAMES["published"] else SEEDS

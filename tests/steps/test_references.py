@@ -11,7 +11,7 @@ from gpca.alignment.methods.registry import make_method
 from gpca.alignment.rigid import exp, transform
 from gpca.causes.candidate import draw_candidate
 from gpca.causes.settings import CauseSettings
-from gpca.experiments.estimators.references import Redraws, draw_twists
+from gpca.steps.references import Redraws, draw_twists
 from gpca.uncertainty.estimators.interface import RegisteredPair
 from gpca.uncertainty.estimators.starts import sample
 
@@ -111,7 +111,7 @@ def test_all_varies_the_starts_as_well(surface):
 def test_runs_of_planes_are_those_one_after_the_other(surface):
     from gpca.alignment.batched_icp import BatchedPlaneICP, register_each_to_planes
     from gpca.alignment.features import estimate_normals
-    from gpca.experiments.estimators.references import SETTINGS as ICP
+    from gpca.steps.references import SETTINGS as ICP
 
     pairs = list(islice(redraws_of(surface, True, True, False).clouds("a"), 4))
     icps = [BatchedPlaneICP(target, estimate_normals(target), ICP) for _, target in pairs]

@@ -1,47 +1,72 @@
-"""The files of the estimates: a row per registration, and the reference's results, which a figure shows."""
+"""Estimates of poses' covariances: which registrations they are of, and the files that hold them."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Literal, get_args
 
 import numpy as np
 
 from gpca.evaluation.measures import source_method_seed
-from gpca.experiments.estimators.settings import KINDS
 from gpca.io.arrays import TEXT, WHOLE
 from gpca.io.container import Container, array
 from gpca.io.csv_file import numbers, read_csv
+from gpca.settings import Bounds, PositiveShare
 
 if TYPE_CHECKING:
     import pandas as pd
 
+Kind = Literal["starts", "data", "all"]  # of a reference: what varies in it
+KINDS: tuple[Kind, ...] = get_args(Kind)
+REFERENCES = tuple(f"reference_{kind}" for kind in KINDS)  # by these names they have rows among the estimators
+OTHER_SOURCE, MILD = "other_source", "mild"  # what a learner is trained with, for its name
 SIXTH = np.triu_indices(6)
 # Upper triangle of Σ, row by row, in squared milliradians and thousandths of the diameter.
 COVARIANCE = tuple(f"covariance_{i + 1}{j + 1}" for i, j in zip(*SIXTH, strict=True))
 MILLI = 1e3
-KNOWN = ("sample", "object", "cluster", "method", "add_relative", "failed", "inlier_rmse", "fitness", "failure")
 OF_ROW = ("add_relative", "inlier_rmse", "fitness")  # numbers that a row has without an estimate
+KNOWN = ("sample", "object", "cluster", "method", "failed", "failure", *OF_ROW)
 COMPARED = ("kl_rotation", "kl_translation", "error_ratio", "mahalanobis", "covered")  # with each reference
 OF_REFERENCES = tuple(f"{name}_{kind}" for kind in KINDS for name in COMPARED)
 JUDGED = (*OF_REFERENCES, "error_ratio", "mahalanobis", "spread")  # the last three: by the true pose, and of none
 
 
-def reference_name(kind: str) -> str:
-    """Return the name by which a reference stands among the estimators."""
-    return f"reference_{kind}"
+@dataclass(frozen=True)
+class EstimatorPairSettings:
+    """The registrations whose covariance is estimated, and the reference that estimates are compared with.
+
+    Attributes:
+        methods: registration method -> test registrations of each source and seed, at most.
+        train: training registrations by each method, for estimators that learn, at most.
+        train_starts: runs of each of them, with other data and starts.
+        points: of source and of target (fewer where a cloud has fewer).
+        repeats: registrations of each reference.
+        start_rotation_deg, start_translation: root mean square angle and length of all starts' offsets.
+        floor: variance that is added to every covariance before it is judged; a spread below it counts as none.
+        failed: error from which a registration has failed, ADD or ADD-S in diameters: the config's ``success.error``.
+    """
+
+    methods: dict[str, Annotated[int, Bounds(minimum=1, maximum=100_000)]]
+    train: Annotated[int, Bounds(minimum=8)]
+    train_starts: Annotated[int, Bounds(minimum=7, maximum=1000)]
+    points: Annotated[int, Bounds(minimum=64, maximum=65536)]
+    repeats: Annotated[int, Bounds(minimum=20, maximum=100_000)]
+    start_rotation_deg: Annotated[float, Bounds(exclusiveMinimum=0, maximum=180)]
+    start_translation: Annotated[float, Bounds(exclusiveMinimum=0, maximum=10)]
+    floor: Annotated[float, Bounds(exclusiveMinimum=0, maximum=1)]
+    failed: PositiveShare
 
 
 def covariance_columns(covariance_6_6: np.ndarray | None) -> dict[str, float]:
-    """Return the columns of a covariance in radians and diameters; NaN without one."""
+    """Columns of a covariance in radians and diameters; NaN without one."""
     values = np.full(len(COVARIANCE), np.nan) if covariance_6_6 is None else MILLI**2 * covariance_6_6[SIXTH]
     return dict(zip(COVARIANCE, values.tolist(), strict=True))
 
 
 def covariance_of(row: pd.Series) -> np.ndarray:
-    """Return Σ (6, 6) of a row, in radians and diameters."""
+    """Σ (6, 6) of a row, in radians and diameters."""
     upper_6_6 = np.zeros((6, 6))
     upper_6_6[SIXTH] = row[list(COVARIANCE)].to_numpy(dtype=float) / MILLI**2
     return upper_6_6 + np.triu(upper_6_6, 1).T
@@ -59,7 +84,7 @@ def read_estimates(path: str | Path) -> pd.DataFrame:
 
 
 def read_estimate_files(files: Iterable[str | Path]) -> dict[tuple[str, str, int], pd.DataFrame]:
-    """Return the rows of files named `…/{source}/{estimator}/seed{seed}.csv` by these three."""
+    """Rows of files named ``…/{source}/{estimator}/seed{seed}.csv`` by these three."""
     return {source_method_seed(path): read_estimates(path) for path in files}
 
 
@@ -81,5 +106,5 @@ class ReferenceSamples(Container):
     true_twist: np.ndarray = array("S 6")
 
     def twists_of(self, i: int) -> np.ndarray:
-        """Return the twists (N, 6) of a row."""
+        """Twists (N, 6) of a row."""
         return self.part("twists", i).astype(np.float64)

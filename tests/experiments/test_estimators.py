@@ -6,25 +6,22 @@ import pytest
 from scipy.stats import trim_mean
 
 from gpca.errors import InputError
-from gpca.experiments.estimators.calibration import (
-    TRUTH,
-    collect_estimate_seconds,
-    collect_estimates,
-    collect_intervals,
-    measure,
-    read_intervals,
-    trimmed_mean,
-)
-from gpca.experiments.estimators.covariances import (
+from gpca.experiments import estimators
+from gpca.experiments.estimators import TRUTH, collect_estimate_seconds, measure, read_intervals, trimmed_mean
+from gpca.io.csv_file import write_csv
+from gpca.uncertainty.estimates import (
     JUDGED,
+    KINDS,
+    REFERENCES,
     ReferenceSamples,
     covariance_columns,
     covariance_of,
     read_estimates,
 )
-from gpca.experiments.estimators.settings import KINDS, REFERENCES
-from gpca.io.csv_file import write_csv
 
+from .runs import run_with
+
+RUN = run_with()
 SIGMA = 1e-4 * np.eye(6) + 1e-5
 
 
@@ -114,7 +111,7 @@ def test_what_has_no_estimate_is_counted_and_left_out_of_the_rest(file):
 
 def test_failed_and_other_registrations_stand_apart(file):
     wrong = rows(mahalanobis=np.where(np.arange(20) < 10, 1.0, 100.0))
-    tidy = collect_estimates([file(wrong)]).set_index(["metric", "concept"])["value"]
+    tidy = estimators.collect_estimates(RUN, [file(wrong)]).set_index(["metric", "concept"])["value"]
     assert tidy[f"coverage_{TRUTH}", "point_to_point/succeeded"] == 1
     assert tidy[f"coverage_{TRUTH}", "point_to_point/failed"] == 0
     assert tidy["test_samples", "point_to_point/failed"] == 10
@@ -124,12 +121,12 @@ def test_failed_and_other_registrations_stand_apart(file):
 
 
 def test_what_is_not_defined_has_no_row(file):
-    tidy = collect_estimates([file(rows(failed=False))])
+    tidy = estimators.collect_estimates(RUN, [file(rows(failed=False))])
     assert "auroc_failed" not in set(tidy["metric"])
     assert set(tidy["source"]) | set(tidy["method"]) == {"ycb", "brossard"}
     assert set(tidy["seed"]) == {3}
     without_reference = rows(kl_rotation_data=np.nan, covered_data=np.nan)
-    metrics = set(collect_estimates([file(without_reference)])["metric"])
+    metrics = set(estimators.collect_estimates(RUN, [file(without_reference)])["metric"])
     assert not {"kl_rotation_data", "coverage_data"} & metrics
     assert "kl_rotation_all" in metrics
 
@@ -142,7 +139,7 @@ def intervals_of(file, **of_estimators):
         for source in ("cups", "ycb")
         for seed in (0, 1)
     ]
-    return collect_intervals(paths)
+    return estimators.collect_intervals(RUN, paths)
 
 
 def test_intervals_are_over_all_sources_and_seeds(file, tmp_path):
@@ -173,7 +170,9 @@ def test_an_area_is_compared_with_the_best_gate_on_the_same_draws(file):
 
 def test_a_registration_without_correspondences_scores_worst_at_every_gate(file):
     lost = rows(fitness=np.where(np.arange(20) == 19, 0.0, 0.9), inlier_rmse=np.where(np.arange(20) == 19, 0.0, 0.01))
-    of = collect_intervals([file(lost, f"ycb/{REFERENCES[0]}/seed0.csv")]).set_index(["estimator", "metric"])
+    of = estimators.collect_intervals(RUN, [file(lost, f"ycb/{REFERENCES[0]}/seed0.csv")]).set_index(
+        ["estimator", "metric"]
+    )
     assert of.loc[("gate_rmse", "auroc_failed"), "value"] == pytest.approx(0.55)
 
 

@@ -9,13 +9,19 @@ from gpca.alignment.rigid import exp, inverse, transform
 from gpca.causes.drawing import draw_causes
 from gpca.causes.settings import CauseSettings
 from gpca.errors import InputError
-from gpca.experiments.estimators.covariances import COVARIANCE, covariance_of
-from gpca.experiments.estimators.estimation import mild, most_tested, reference_samples, try_estimators
-from gpca.experiments.estimators.judging import compared, mahalanobis, predicted_spread
-from gpca.experiments.estimators.references import Reference
-from gpca.experiments.estimators.settings import KINDS, REFERENCES, EstimatorPairSettings
-from gpca.experiments.estimators.situations import Situations
 from gpca.pairs.judge import Judges
+from gpca.steps.estimates import (
+    Situations,
+    compared,
+    mahalanobis,
+    mild,
+    most_tested,
+    predicted_spread,
+    reference_samples,
+    try_estimators,
+)
+from gpca.steps.references import Reference
+from gpca.uncertainty.estimates import COVARIANCE, KINDS, REFERENCES, EstimatorPairSettings, covariance_of
 from gpca.uncertainty.spread import divergence
 from tests.conftest import FEW_CAUSES
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import islice
 
 import numpy as np
 
@@ -21,9 +22,9 @@ from gpca.alignment.methods.registry import make_method
 from gpca.alignment.rigid import exp, transform
 from gpca.causes.candidate import Candidate
 from gpca.causes.settings import FEWEST_POINTS
-from gpca.experiments.estimators.settings import Kind
 from gpca.pairs.perturbation import within_half_space
 from gpca.seeds import generator
+from gpca.uncertainty.estimates import Kind
 from gpca.uncertainty.estimators.interface import POINT_TO_PLANE, POINT_TO_POINT, RegisteredPair
 from gpca.uncertainty.estimators.starts import sample
 
@@ -80,10 +81,9 @@ class Redraws:
 
 
 def draw_twists(kind: Kind, registered: RegisteredPair, redraws: Redraws, repeats: int, *axes: object) -> np.ndarray:
-    """Return the twists (n, 6) about the pose of the results of so many registrations, fewer where some are lost.
+    """Twists (n, 6) about the pose of the results of so many registrations, fewer where some are lost.
 
-    Raises:
-        FailedEstimate: too few found a correspondence.
+    Raises FailedEstimate where too few found a correspondence.
     """
     if kind == "starts":
         return sample(registered, repeats, *axes)
@@ -91,38 +91,28 @@ def draw_twists(kind: Kind, registered: RegisteredPair, redraws: Redraws, repeat
     deviation_6 = registered.deviation_6 if kind == "all" else np.zeros(6)
     xi_n_6 = generator(*axes, "starts").normal(size=(repeats, 6)) * deviation_6
     starts_n = exp(xi_n_6) @ registered.pair.T_target_source_init
-    clouds = redraws.clouds(*axes)
-    return registered.twists_of(*_register_each(registered.method, clouds, starts_n))
+    return registered.twists_of(*_register_each(registered.method, redraws.clouds(*axes), starts_n))
 
 
 def _register_each(method: str, clouds: Clouds, starts_n: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Register other clouds from each start (n, 4, 4); return the poses, and which found a correspondence (n,)."""
-    if method == POINT_TO_PLANE:
-        parts = [_to_planes(clouds, starts_n[at : at + AT_ONCE]) for at in range(0, len(starts_n), AT_ONCE)]
-    elif method == POINT_TO_POINT:
-        parts = [_to_points(next(clouds), start) for start in starts_n]
-    else:
-        register = make_method(method)
-        pairs = zip(clouds, starts_n, strict=False)  # the clouds are without end
-        outcomes = [register(Pair(source, target, start).with_normals()) for (source, target), start in pairs]
-        parts = [(each.T_target_source[None], np.array([each.fitness > 0])) for each in outcomes]
-    poses, found = zip(*parts, strict=True)
-    return np.concatenate(poses), np.concatenate(found)
-
-
-def _to_points(pair: tuple[np.ndarray, np.ndarray], start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    from gpca.alignment.batched_icp import BatchedICP
-
-    source, target = pair
-    pose_1, fitness_1, _ = BatchedICP(target, SETTINGS).register(source, start[None])
-    return pose_1, fitness_1 > 0
-
-
-def _to_planes(clouds: Clouds, starts_n: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    from gpca.alignment.batched_icp import BatchedPlaneICP, register_each_to_planes
+    """Poses of other clouds registered from each start (n, 4, 4), and which found a correspondence (n,)."""
+    from gpca.alignment.batched_icp import BatchedICP, BatchedPlaneICP, register_each_to_planes
     from gpca.alignment.features import estimate_normals
 
-    pairs = [next(clouds) for _ in starts_n]
-    icps = [BatchedPlaneICP(target, estimate_normals(target), SETTINGS) for _, target in pairs]
-    poses_n, fitness_n, _ = register_each_to_planes(icps, [source for source, _ in pairs], starts_n)
-    return poses_n, fitness_n > 0
+    parts = []
+    if method == POINT_TO_PLANE:
+        for at in range(0, len(starts_n), AT_ONCE):
+            starts_k = starts_n[at : at + AT_ONCE]
+            pairs = list(islice(clouds, len(starts_k)))
+            icps = [BatchedPlaneICP(target, estimate_normals(target), SETTINGS) for _, target in pairs]
+            parts.append(register_each_to_planes(icps, [source for source, _ in pairs], starts_k)[:2])
+    elif method == POINT_TO_POINT:
+        for start, (source, target) in zip(starts_n, clouds, strict=False):  # the clouds are without end
+            parts.append(BatchedICP(target, SETTINGS).register(source, start[None])[:2])
+    else:
+        register = make_method(method)
+        for start, (source, target) in zip(starts_n, clouds, strict=False):
+            outcome = register(Pair(source, target, start).with_normals())
+            parts.append((outcome.T_target_source[None], np.array([outcome.fitness])))
+    poses, fitness = zip(*parts, strict=True)
+    return np.concatenate(poses), np.concatenate(fitness) > 0

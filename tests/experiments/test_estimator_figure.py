@@ -6,14 +6,35 @@ import pytest
 from scipy.stats import chi2
 
 from gpca.errors import InputError
-from gpca.experiments.estimators.covariances import JUDGED, ReferenceSamples, covariance_columns, read_estimate_files
-from gpca.experiments.estimators.ellipses import STYLES, WIDEST, draw_ellipses, ellipse
-from gpca.experiments.estimators.figure import LEVELS, coverages, draw_estimators
-from gpca.experiments.estimators.settings import KINDS, REFERENCES
+from gpca.experiments.estimator_figure import (
+    LEVELS,
+    STYLES,
+    WIDEST,
+    coverages,
+    draw_ellipses,
+    draw_estimators,
+    ellipse,
+)
 from gpca.io.csv_file import write_csv
 from gpca.reporting.figures.style import GRAY
+from gpca.uncertainty.estimates import (
+    JUDGED,
+    KINDS,
+    REFERENCES,
+    ReferenceSamples,
+    covariance_columns,
+    read_estimate_files,
+)
+from gpca.uncertainty.estimators.registry import estimator_entry
 
-ESTIMATORS, METHODS = {"censi": "Censi", "own": "Own"}, {"point_to_point": "ICP"}
+from .runs import run_with
+
+ESTIMATORS = ("censi", "brossard")
+RUN = run_with(
+    estimators=dict.fromkeys(ESTIMATORS),
+    estimator_pairs={"methods": {"point_to_point": 8}},
+    figures={"source": "cups"},
+)
 
 
 @pytest.fixture
@@ -43,7 +64,7 @@ def files(tmp_path):
 
 
 def drawn(paths, samples):
-    return draw_estimators(read_estimate_files(paths), samples, ESTIMATORS, METHODS, "Cups")
+    return draw_estimators(RUN, read_estimate_files(paths), samples)
 
 
 def test_the_figure_is_the_same_bytes_each_time(files, same_bytes):
@@ -58,9 +79,10 @@ def test_samples_without_their_estimates_are_refused(files):
 
 def test_the_references_are_seen_above_and_the_axes_are_named(files):
     figure = drawn(*files)
+    titles = RUN.titles(estimator_entry, ESTIMATORS).values()
     names = [text.get_text() for text in figure.subfigs[0].legends[0].get_texts()]
     references = ["Other starts", "Other data", "Other starts and data"]
-    assert names[:5] == [*references, "Censi", "Own"]
+    assert names[:5] == [*references, *titles]
     assert names[5:] == ["results of other starts and data", "true pose", "succeeded", "failed"]
     upper = figure.axes[:4]
     assert [panel.get_ylabel() for panel in upper] == [

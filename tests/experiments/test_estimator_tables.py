@@ -4,19 +4,22 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from gpca.alignment.methods.registry import method_entry
 from gpca.errors import InputError
-from gpca.experiments.estimators.calibration import COLUMNS, GATES, TRUTH
-from gpca.experiments.estimators.settings import KINDS, REFERENCES
-from gpca.experiments.estimators.tables import table12_failures, table12_references, table12_uncertainty
+from gpca.experiments.estimator_tables import table12_failures, table12_references, table12_uncertainty
+from gpca.experiments.estimators import COLUMNS, GATES, TRUTH
+from gpca.uncertainty.estimates import KINDS, REFERENCES
+from gpca.uncertainty.estimators.registry import estimator_entry
 
-SOURCES = {"ycb": {"title": "YCB", "stand_in": False}, "cups": {"title": "Cups", "stand_in": True}}
-ESTIMATES = {
-    "censi": {"title": "Censi", "models": "data"},
-    "brossard": {"title": "Brossard", "models": "starts and data"},
-    "stein_icp": {"title": "Stein", "models": "posterior"},
-}
-METHODS = {"point_to_point": "ICP", "point_to_plane": "Plane"}
-PAIRS = {"repeats": 200, "failed": 0.03}
+from .runs import run_with
+
+ESTIMATES = ("censi", "brossard", "stein_icp")
+METHODS = ("point_to_point", "point_to_plane")
+RUN = run_with(
+    estimators=dict.fromkeys(ESTIMATES),
+    estimator_pairs={"repeats": 200, "methods": dict.fromkeys(METHODS, 9)},
+    success={"error": 0.03},
+)
 OF_KIND = {"starts": 1.0, "data": 2.0, "all": 4.0, TRUTH: 8.0}
 
 
@@ -50,7 +53,7 @@ def seconds():
 
 
 def test_an_estimator_is_judged_by_what_it_models_and_states_stand_apart(intervals):
-    table = table12_uncertainty(intervals, SOURCES, ESTIMATES, METHODS, PAIRS)
+    table = table12_uncertainty(RUN, intervals)
     names = [tuple(key for key, _ in labels) for labels in table.rows]
     assert names[:4] == [
         ("point_to_point", "succeeded", "censi", "data"),
@@ -70,7 +73,7 @@ def test_an_estimator_is_judged_by_what_it_models_and_states_stand_apart(interva
 
 
 def test_every_estimator_stands_beside_every_reference_and_these_beside_each_other(intervals):
-    table = table12_references(intervals, SOURCES, ESTIMATES, METHODS, PAIRS)
+    table = table12_references(RUN, intervals)
     names = [labels[1][0] for labels in table.rows]
     assert names[:6] == [*REFERENCES, *ESTIMATES]
     assert [table.cells[3, f"kl_rotation_{kind}"].mean for kind in KINDS] == pytest.approx([1.3, 2.3, 4.3])
@@ -82,9 +85,9 @@ def test_every_estimator_stands_beside_every_reference_and_these_beside_each_oth
 
 
 def test_an_alarm_stands_beside_the_gates(intervals, seconds):
-    table = table12_failures(intervals, seconds, SOURCES, ESTIMATES, METHODS)
+    table = table12_failures(RUN, intervals, seconds)
     assert [labels[1][0] for labels in table.rows] == [*ESTIMATES, *GATES] * 2
-    assert table.rows[0][0] == ("point_to_point", "ICP: 32 succeeded, 12 failed")
+    assert table.rows[0][0] == ("point_to_point", f"{method_entry(METHODS[0]).title}: 32 succeeded, 12 failed")
     lead = table.cells[0, "lead"]
     assert (lead.mean, lead.bounds) == (-0.1, (-0.2, 0.05))
     assert table.cells[0, "milliseconds"].mean == pytest.approx(20)
@@ -96,12 +99,13 @@ def test_an_alarm_stands_beside_the_gates(intervals, seconds):
 def test_an_estimator_that_refuses_all_has_no_row_and_is_named(intervals):
     refused = (intervals["estimator"] == "censi") & (intervals["method"] == "point_to_plane")
     left = intervals[~(refused & (intervals["metric"] != "no_estimate"))]
-    table = table12_uncertainty(left, SOURCES, ESTIMATES, METHODS, PAIRS)
+    table = table12_uncertainty(RUN, left)
     assert ("point_to_plane", "censi") not in {(labels[0][0], labels[2][0]) for labels in table.rows}
-    assert "Left out, as they refuse every registration: Censi, of Plane." in table.markdown()
-    assert "Left out" not in table12_uncertainty(intervals, SOURCES, ESTIMATES, METHODS, PAIRS).markdown()
+    censi, plane = estimator_entry("censi").title, method_entry("point_to_plane").title
+    assert f"Left out, as they refuse every registration: {censi}, of {plane}." in table.markdown()
+    assert "Left out" not in table12_uncertainty(RUN, intervals).markdown()
 
 
 def test_nothing_to_show_is_one_line(intervals):
     with pytest.raises(InputError, match="has nothing to show"):
-        table12_uncertainty(intervals[intervals["method"] == "none"], SOURCES, ESTIMATES, METHODS, PAIRS)
+        table12_uncertainty(RUN, intervals[intervals["method"] == "none"])

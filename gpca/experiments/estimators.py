@@ -1,0 +1,305 @@
+"""Estimators of a pose's covariance against further registrations and against the error (Table XII)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+
+from gpca.alignment.methods.registry import method_module, methods, require_local
+from gpca.causes.judged import ranking
+from gpca.errors import InputError, with_key
+from gpca.evaluation.intervals import interval, pigeonhole_weights
+from gpca.evaluation.measures import source_method_seed, tidy
+from gpca.experiments.experiment import ByName, Experiment, LeftOut, Names
+from gpca.experiments.plan import Run
+from gpca.experiments.result import numbers
+from gpca.experiments.step import Plan, Step, Wildcards
+from gpca.io import csv_file
+from gpca.process.plugins import is_outside
+from gpca.seeds import generator
+from gpca.settings import part_of
+from gpca.uncertainty.estimates import (
+    KINDS,
+    MILD,
+    OTHER_SOURCE,
+    REFERENCES,
+    EstimatorPairSettings,
+    read_estimate_files,
+)
+from gpca.uncertainty.estimators import registry
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+def check(config: dict, _left_out: LeftOut) -> None:
+    """Check that every estimator takes its settings, and that the methods are ones that start at an initial pose."""
+    for name, settings in config["estimators"].items():
+        with_key(f"estimators.{name}", registry.require_estimator_settings, name, settings or {})
+    if not config["estimator_pairs"]["methods"]:
+        raise InputError("config key estimator_pairs.methods", "is empty", "name a method, such as point_to_point")
+    for name in config["estimator_pairs"]["methods"]:
+        with_key(f"estimator_pairs.methods.{name}", require_local, name)
+
+
+def estimates(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str, dict[str, str]]:
+    """All that have files of estimates, but for the references: which estimator each is, its title, what it models."""
+    shifts = {MILD: "trained on mild severities"}
+    shifts |= {OTHER_SOURCE: "trained on another dataset"} if len(sources) > 1 else {}
+    entries = {name: registry.estimator_entry(name) for name in config["estimators"]}
+    found = {name: {"by": name, "title": each.title, "models": each.models} for name, each in entries.items()}
+    for name, entry in entries.items():
+        for shift, words in shifts.items() if entry.learn else ():
+            found[f"{name}_{shift}"] = found[name] | {"title": f"{entry.title}, {words}"}
+    return found
+
+
+EXPERIMENT = Experiment(
+    name="estimators",
+    beside=("estimator_tables", "estimator_figure"),
+    sections={
+        "estimators": ByName,
+        "estimator_pairs": Annotated[dict, part_of(EstimatorPairSettings, without=("failed",))],  # in success.error
+    },
+    names=lambda config, sources: {
+        "estimator": list(config["estimators"]),
+        "estimate": [*REFERENCES, *estimates(config, sources)],
+    },
+    check=check,
+    optional_entries={
+        "estimators": Names("estimator", registry.estimators),
+        "estimator_pairs.methods": Names("registration method", methods),
+    },
+)
+
+
+def _other(plan: Plan, wildcards: Wildcards) -> list[str]:
+    """The source after that of a job, by which estimators are trained otherwise; none where it is the only one."""
+    sources = list(plan.sources)
+    return [sources[(sources.index(wildcards.source) + 1) % len(sources)]] if len(sources) > 1 else []
+
+
+def _asked(plan: Plan) -> list[str]:
+    """Estimators whose estimates the jobs of a rule write."""
+    found = estimates(plan.config, plan.sources)
+    return list(dict.fromkeys(found[name]["by"] for name in plan.names["estimate"] if name in found))
+
+
+def _settings(plan: Plan, _wildcards: Wildcards) -> dict[str, Any]:
+    return {
+        **{name: plan.config[name] for name in ("estimator_pairs", "causes", "success")},
+        "icp": plan.config["registrations"]["icp"],
+        "estimators": {name: plan.config["estimators"][name] for name in _asked(plan)},
+    }
+
+
+ESTIMATE = Step(
+    name="estimate",
+    run="gpca.steps.estimates",
+    inputs={
+        "objects": "objects/{source}.npz",
+        "causes": "causes/{source}/seed{*seed}.npz",
+        "other_objects": lambda plan, wildcards: [f"objects/{name}.npz" for name in _other(plan, wildcards)],
+        "other_causes": lambda plan, wildcards: [
+            f"causes/{name}/seed{{*seed}}.npz" for name in _other(plan, wildcards)
+        ],
+    },
+    outputs={
+        "rows": "estimates/{source}/{*estimate}/seed{*seed}.csv",
+        "timings": "timings/{source}/estimator_{*estimate}/seed{*seed}.csv",
+        "samples": "reference_samples/{source}/seed{*seed}.npz",
+    },
+    settings=_settings,
+    params={
+        "other": lambda plan, wildcards: "".join(_other(plan, wildcards)),
+        "estimators": lambda plan, _wildcards: _asked(plan),
+    },
+    modules=lambda plan: [
+        *map(registry.estimator_module, _asked(plan)),
+        *map(method_module, plan.config["estimator_pairs"]["methods"]),
+    ],
+    apart=(
+        "estimate",
+        lambda plan: [
+            name
+            for name, entry in estimates(plan.config, plan.sources).items()
+            if is_outside(registry.estimator_module(entry["by"]))
+        ],
+    ),
+    target="estimates",
+    priority=2,
+)
+
+TABLE = "estimators"  # `table` of the tidy rows
+TRIMMED = 0.1  # share that means leave out at either end, as Brossard et al. (2020) do
+LEVEL = 0.95  # of the coverage
+TRUTH = "truth"  # in the place of a kind of reference: the error of the pose
+SUCCEEDED, FAILED, BOTH = "succeeded", "failed", "both"
+GATES = {"gate_rmse": "Inlier RMSE (gate)", "gate_fitness": "Fitness (gate)"}  # scores that need no estimator
+SPREAD_GATE = "monte_carlo"  # and the gate by the spread of the starts, which is an estimator as well
+FEWEST_FAMILIES = 3  # over which there is an interval
+OF_BOTH = ("auroc_failed", "spearman_error")  # metrics that need registrations of both kinds
+COLUMNS = (
+    *("method", "state", "estimator", "metric", "samples", "seeds", "value", "low", "high"),
+    *("rival", "difference", "difference_low", "difference_high"),
+)
+FILES = "estimates/{source}/{estimate}/seed{seed}.csv"
+
+
+@numbers("estimators.csv", rule="estimator_metrics", files=FILES)
+def collect_estimates(_run: Run, files: Iterable[str | Path]) -> pd.DataFrame:
+    """Metrics by source, estimator and seed; results/README.md lists them.
+
+    ``concept`` is the registration method and the state. A metric that is not defined, such as the area where all
+    registrations failed or none, has no row.
+    """
+    records = []
+    for (source, estimator, seed), rows in read_estimate_files(files).items():
+        for method, of_method in rows.groupby("method", sort=False):
+            for state, chosen_N in of_state(of_method).items():
+                metrics = measure(of_method, chosen_N[None].astype(float)) if chosen_N.any() else {}
+                for metric, value_1 in metrics.items():
+                    if np.isfinite(value_1[0]) and (state == BOTH) == (metric in OF_BOTH):
+                        concept = f"{method}/{state}"
+                        records.append((TABLE, source, estimator, metric, concept, seed, float(value_1[0])))
+    return tidy(records, "estimates")
+
+
+@numbers("estimator_intervals.csv", files=FILES)
+def collect_intervals(_run: Run, files: Iterable[str | Path]) -> pd.DataFrame:
+    """Metrics over all sources and seeds, with the 95 % interval of a bootstrap over families and seeds (`COLUMNS`).
+
+    Of the area under the ROC curve, the rival is the best gate on the same registrations, and the difference from it
+    is that of the same draws.
+    """
+    import pandas as pd
+
+    parts: dict[str, list[pd.DataFrame]] = {}
+    for (source, estimator, seed), rows in read_estimate_files(files).items():
+        parts.setdefault(estimator, []).append(rows.assign(source=source, seed=seed))
+    pooled = {estimator: pd.concat(own, ignore_index=True) for estimator, own in parts.items()}
+    records: list[tuple] = []
+    for method in pooled[REFERENCES[0]]["method"].unique():
+        of_method = {name: own[own["method"] == method].reset_index(drop=True) for name, own in pooled.items()}
+        records += _of_method(method, {name: own for name, own in of_method.items() if len(own)})
+    return pd.DataFrame(records, columns=list(COLUMNS))
+
+
+def _of_method(method: str, rows_of: Mapping[str, pd.DataFrame]) -> list[tuple]:
+    """Records of one method; all estimators have the same registrations in the same order."""
+    known = next(iter(rows_of.values()))
+    cluster_N = (known["source"] + "/" + known["cluster"]).to_numpy()
+    drawn_B_N = pigeonhole_weights(generator("estimator intervals", method), known["seed"].to_numpy(), cluster_N)
+    weights_B_N = np.vstack([np.ones(len(known)), drawn_B_N])
+    found = known["fitness"] > 0  # without correspondences, a gate's score is the largest
+    scores = {"gate_rmse": known["inlier_rmse"], "gate_fitness": -known["fitness"]}
+    gates = {name: known.assign(failure="", spread=score.where(found, np.inf)) for name, score in scores.items()}
+    rivals = gates | ({SPREAD_GATE: rows_of[SPREAD_GATE]} if SPREAD_GATE in rows_of else {})
+    records = []
+    for state, chosen_N in of_state(known).items():
+        for name, rows in {**rows_of, **gates}.items():
+            has_N = chosen_N & (rows["failure"] == "").to_numpy()
+            for metric, value_B in measure(rows, weights_B_N * chosen_N).items():
+                of_state_alone = (state == BOTH) == (metric in OF_BOTH) and (name not in GATES or metric in OF_BOTH)
+                if metric == "test_samples" or not of_state_alone or not np.isfinite(value_B[0]):
+                    continue
+                lead = ("", np.nan, np.nan, np.nan)
+                if metric == "auroc_failed":
+                    areas = {}
+                    for gate, of_gate in rivals.items():
+                        score_N = of_gate["spread"].fillna(np.inf).to_numpy()
+                        areas[gate] = ranking(score_N, known["failed"].to_numpy(), weights_B_N * has_N)["area"]
+                    best = max((gate for gate in areas if gate != name), key=lambda gate: areas[gate][0])
+                    lead = best, *interval(value_B - areas[best])
+                enough = len(set(cluster_N[has_N])) >= FEWEST_FAMILIES
+                own_n = drawn_B_N[:, has_N] if metric.startswith("coverage_") else None
+                estimate = interval(value_B, own_n) if enough else (value_B[0], np.nan, np.nan)
+                counted = int((chosen_N if metric == "no_estimate" else has_N).sum())
+                records.append((method, state, name, metric, counted, known["seed"].nunique(), *estimate, *lead))
+    return records
+
+
+def of_state(rows: pd.DataFrame) -> dict[str, np.ndarray]:
+    """Which rows (N,) are of each state."""
+    failed_N = rows["failed"].to_numpy()
+    return {SUCCEEDED: ~failed_N, FAILED: failed_N, BOTH: np.ones(len(rows), bool)}
+
+
+def measure(rows: pd.DataFrame, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
+    """Metrics (B,) of registrations by their weights (B, N); NaN where one is not defined.
+
+    Of each kind of reference, and of the true pose (`truth`) but for the divergences:
+
+    - kl_rotation, kl_translation: KL divergence of the estimate from the reference, nats, trimmed mean.
+    - nne: √ of the trimmed mean of |e|² / tr Σ, the normalized norm error; 1 is right, more is too sure.
+    - nees: trimmed mean of eᵀΣ⁻¹e / 6; 1 is right, more is too sure.
+    - coverage: share of the results, or of the true poses, within the 95 % region of Σ.
+
+    Of all: no_estimate, the share that it refused or failed at, which the others leave out; test_samples, all of them.
+    With registrations of both states: auroc_failed, how well the predicted spread tells failed registrations from the
+    others; spearman_error, of spread and error, unweighted.
+    """
+    from scipy.stats import chi2, spearmanr
+
+    has_N = (rows["failure"] == "").to_numpy()
+    total_B = weights_B_N.sum(axis=1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        metrics = {"no_estimate": 1 - weights_B_N[:, has_N].sum(axis=1) / total_B, "test_samples": total_B}
+    if not weights_B_N[:, has_N].any():
+        return metrics
+    rows, weights_B_N = rows[has_N], weights_B_N[:, has_N]
+    for kind in (*KINDS, TRUTH):
+        of = {name: rows[name if kind == TRUTH else f"{name}_{kind}"] for name in ("error_ratio", "mahalanobis")}
+        if kind != TRUTH:
+            for name in ("kl_rotation", "kl_translation"):
+                metrics[f"{name}_{kind}"] = trimmed_mean(rows[f"{name}_{kind}"], weights_B_N)
+        metrics[f"nne_{kind}"] = np.sqrt(trimmed_mean(of["error_ratio"], weights_B_N))
+        metrics[f"nees_{kind}"] = trimmed_mean(of["mahalanobis"], weights_B_N) / 6
+        within = of["mahalanobis"] <= chi2.ppf(LEVEL, 6) if kind == TRUTH else rows[f"covered_{kind}"]
+        metrics[f"coverage_{kind}"] = trimmed_mean(within.astype(float), weights_B_N, trimmed=0)
+    spread_N, error_N = rows["spread"].to_numpy(), rows["add_relative"].to_numpy()
+    metrics["auroc_failed"] = ranking(spread_N, rows["failed"].to_numpy(), weights_B_N)["area"]
+    metrics["spearman_error"] = np.full(len(weights_B_N), np.nan)
+    if len(rows) > 2 and min(len(set(spread_N)), len(set(error_N))) > 1:
+        metrics["spearman_error"][0] = spearmanr(spread_N, error_N).statistic
+    return metrics
+
+
+def trimmed_mean(values: pd.Series, weights_B_N: np.ndarray, trimmed: float = TRIMMED) -> np.ndarray:
+    """Means (B,) over the middle of the weight, a share left out at either end; NaNs are ignored."""
+    values_N = values.to_numpy(float)
+    known_n = np.flatnonzero(np.isfinite(values_N))
+    order_n = known_n[np.argsort(values_N[known_n], kind="stable")]
+    if not len(order_n):
+        return np.full(len(weights_B_N), np.nan)
+    upper_B_n = np.cumsum(weights_B_N[:, order_n], axis=1)
+    total_B_1 = upper_B_n[:, -1:]
+    lower_B_n = upper_B_n - weights_B_N[:, order_n]
+    kept_B_n = np.minimum(upper_B_n, (1 - trimmed) * total_B_1) - np.maximum(lower_B_n, trimmed * total_B_1)
+    kept_B_n = np.maximum(kept_B_n, 0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return (kept_B_n * values_N[order_n]).sum(axis=1) / kept_B_n.sum(axis=1)
+
+
+def read_intervals(path: str | Path) -> pd.DataFrame:
+    """Read what :func:`collect_intervals` returned; where there is no rival, the difference is NaN."""
+    return csv_file.read_numbers(path, COLUMNS, (*COLUMNS[4:9], *COLUMNS[10:]), optional=(*COLUMNS[7:9], *COLUMNS[10:]))
+
+
+def collect_estimate_seconds(files: Iterable[str | Path]) -> pd.DataFrame:
+    """Estimator, method and the median seconds of files ``…/{source}/estimator_{name}/seed{seed}.csv``.
+
+    Apart from the metrics, because times differ from run to run and metrics must not.
+    """
+    import pandas as pd
+
+    parts = []
+    for path in files:
+        rows = csv_file.read_csv(path, ("sample", "method", "seconds"))
+        seconds = csv_file.numbers(path, rows, "seconds", least=0)
+        estimator = source_method_seed(path)[1].removeprefix("estimator_")
+        parts.append(rows.assign(seconds=seconds, estimator=estimator))
+    return pd.concat(parts).groupby(["estimator", "method"], sort=False)["seconds"].median().reset_index()

@@ -1,0 +1,324 @@
+"""Step ``estimate``: every estimator says how uncertain the same registrations are, and its answers are measured.
+
+The registrations are test samples of the causes' track: objects that no training sample shows, and failures of every
+kind. They are held against references of three kinds (:mod:`gpca.steps.references`), and against the error of the
+pose. Estimators that learn are trained three times: with samples of the same source, with those of another source, and
+with the mild half of the own; the latter two show what a shift does to them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gpca.alignment.methods.interface import Pair
+from gpca.alignment.methods.registry import make_method
+from gpca.alignment.rigid import inverse, point_jacobians, transform
+from gpca.causes.candidate import drawn_again
+from gpca.causes.dataset import Causes
+from gpca.causes.descriptors import observed_pair
+from gpca.causes.settings import CauseSettings
+from gpca.errors import InputError
+from gpca.io.csv_file import write_csv
+from gpca.objects.canonical import ObjectClouds
+from gpca.pairs.judge import Judges
+from gpca.process.job import Job
+from gpca.process.progress import progress
+from gpca.process.provenance import record_provenance
+from gpca.seeds import generator, seed_of
+from gpca.steps.references import Redraws, Reference, draw_twists
+from gpca.uncertainty import estimates
+from gpca.uncertainty.estimates import KINDS, EstimatorPairSettings, ReferenceSamples
+from gpca.uncertainty.estimators.examples import Moved, describe, example, true_twist
+from gpca.uncertainty.estimators.interface import Estimate, Example, FailedEstimate, RegisteredPair
+from gpca.uncertainty.estimators.registry import estimator_entry, make_estimator
+from gpca.uncertainty.settings import start_deviation
+from gpca.uncertainty.spread import divergence
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+MOVED: Moved = "model"  # onto the observed cloud, as the causes' track has it
+LEVEL = 0.95  # of the region whose coverage is counted
+
+
+@dataclass(frozen=True)
+class Situations:
+    """Registrations of one source and seed with measured causes, and what it takes to draw them again.
+
+    Attributes:
+        drawn_by: the settings that the causes were drawn with.
+        objects, judges: of the source.
+    """
+
+    source: str
+    seed: int
+    causes: Causes
+    drawn_by: CauseSettings
+    objects: ObjectClouds
+    judges: Judges
+
+
+@dataclass(frozen=True)
+class EstimatedRow:
+    """A test registration by one method.
+
+    Attributes:
+        known: the columns of every row about it: sample, object, method, errors.
+        registered: the input of an estimator.
+        true_twist: (6,) of the true pose about that of the registration, the symmetric one that is nearest.
+        references: by their kind.
+    """
+
+    known: dict[str, object]
+    registered: RegisteredPair
+    true_twist: np.ndarray
+    references: Mapping[str, Reference]
+
+
+class Registering:
+    """Registers rows of the situations by one method."""
+
+    def __init__(self, situations: Situations, method: str, settings: EstimatorPairSettings) -> None:
+        self.situations, self.method, self._settings = situations, method, settings
+        self._axes = (situations.source, situations.seed, "estimators", method)
+        self._register = make_method(method)
+        self._examples: dict[int, Example] = {}
+
+    def case(self, row: int) -> EstimatedRow:
+        """A test registration with the references."""
+        registrations = self.situations.causes.registrations
+        judge = self.situations.judges.of(registrations, row)
+        registered, T_true, redraws = self._registered(row)
+        # ADD moves the object, which is the source here: errors are those of the inverse pose.
+        error = judge(inverse(registered.T_target_source), inverse(T_true))["add_relative"]
+        known = {
+            "sample": registrations.sample[row],
+            "object": registrations.object_name[row],
+            "cluster": registrations.cluster[row],
+            "method": self.method,
+            "add_relative": error,
+            "failed": bool(error >= self._settings.failed or not registered.outcome.fitness),
+            "inlier_rmse": registered.outcome.inlier_rmse,
+            "fitness": registered.outcome.fitness,
+        }
+        references: dict[str, Reference] = {}
+        for kind in KINDS:
+            started = perf_counter()
+            try:
+                twists_n_6 = draw_twists(kind, registered, redraws, self._settings.repeats, *self._axes, "reference")
+            except FailedEstimate:
+                twists_n_6 = np.empty((0, 6))
+            references[kind] = Reference(twists_n_6, perf_counter() - started)
+        return EstimatedRow(known, registered, true_twist(registered, T_true, judge, MOVED), references)
+
+    def example(self, row: int) -> Example:
+        """A training registration with the results of a few registrations of other data from other starts."""
+        if row not in self._examples:
+            registered, T_true, redraws = self._registered(row)
+            judge = self.situations.judges.of(self.situations.causes.registrations, row)
+            runs = self._settings.train_starts
+            draw = partial(draw_twists, "all", registered, redraws, runs, *self._axes, "examples")
+            self._examples[row] = example(registered, T_true, judge, MOVED, draw, runs)
+        return self._examples[row]
+
+    def _registered(self, row: int) -> tuple[RegisteredPair, np.ndarray, Redraws]:
+        """A registration of the model, the source, to the observed cloud; the true pose; what draws the clouds again.
+
+        The target's frame is the one in which the causes' track has put the observed cloud: near the model's. The true
+        pose takes what was observed there. Raises InputError where the row was drawn with other settings or objects.
+        """
+        of, settings = self.situations, self._settings
+        registrations = of.causes.registrations
+        observed = observed_pair(of.causes, row, *self._axes)
+        random = generator(*observed.axes, "clouds")
+        clouds = (observed.model, observed.observed)
+        source, target = (cloud[random.permutation(len(cloud))[: settings.points]] for cloud in clouds)
+        pair = Pair(source, target, inverse(observed.T_init), seed=seed_of(*observed.axes, "draws")).with_normals()
+        outcome = self._register(pair)
+        deviation_6 = start_deviation(settings.start_rotation_deg, settings.start_translation)
+        registered = RegisteredPair(pair, outcome, self.method, deviation_6, lambda: describe(pair, outcome, MOVED))
+        T_icp, T_true = (registrations.T_target_source(which, row) for which in ("icp", "true"))
+        T_true = T_icp @ inverse(T_true)
+        candidate, surface = drawn_again(of.objects, of.causes, row, of.source, of.seed, of.drawn_by)
+        return registered, T_true, Redraws(candidate, surface, T_true, settings.points)
+
+
+def run(job: Job) -> None:
+    """Ask every estimator, seed by seed; those that learn also after examples of another source, if one is given."""
+    settings = EstimatorPairSettings(**job.section("estimator_pairs"), failed=job.section("success")["error"])
+    drawn_by = CauseSettings.from_dict(job.section("causes"), job.section("icp"))
+    estimators = job.by_name("estimators", job.estimators)
+    named = {job.source: job.objects} | ({job.other: job.files("other_objects")[0]} if job.get("other") else {})
+    objects = {source: ObjectClouds.load(path, source) for source, path in named.items()}
+    judges = {source: Judges(of, f"objects of {source}") for source, of in objects.items()}
+
+    def situations(source: str, seed: int, path: Path) -> Situations:
+        causes = Causes.load(path, (source, seed))
+        return Situations(source, seed, causes, drawn_by, objects[source], judges[source])
+
+    others, samples = (job.files("other_causes") if job.get("other") else []), job.get("samples", [])
+    for i, (seed, path) in enumerate(job.per_seed("causes")):
+        of_seed = slice(i, None, len(job.seeds))
+        out, timings, sampled = job.rows[of_seed], job.timings[of_seed], samples[i : i + 1]
+        inputs = [*named.values(), path, *others[i : i + 1]]
+        with record_provenance([*out, *timings, *sampled], inputs, job.settings, seed=seed):
+            other = situations(job.other, seed, others[i]) if others else None
+            rows, cases = try_estimators(situations(job.source, seed, path), other, estimators, settings)
+            for file in sampled:
+                reference_samples(cases).save(file, (job.source, seed))
+            for name, own_out, own_timings in zip(job.estimates, out, timings, strict=True):
+                write_csv(own_out, rows[name].drop(columns="seconds"))
+                write_csv(own_timings, rows[name][["sample", "method", "seconds"]])
+
+
+def try_estimators(
+    situations: Situations,
+    other: Situations | None,
+    estimators: Mapping[str, Mapping],
+    settings: EstimatorPairSettings,
+) -> tuple[dict[str, pd.DataFrame], list[EstimatedRow]]:
+    """Rows, one per registration, of each reference and estimator by name; and the registrations.
+
+    Rows have the seconds of an estimate, with those of the descriptors that it reads, without those of learning. Those
+    that are trained otherwise have rows of the method with the most registrations alone.
+
+    Args:
+        situations: with test samples.
+        other: of another source, for learners; None where there is none.
+        estimators: name -> settings.
+
+    Raises:
+        InputError: an unknown estimator, method or setting, or other objects or settings than those of the causes.
+    """
+    import pandas as pd
+
+    records: dict[str, list[dict]] = {}
+    cases = []
+    learners = [name for name in estimators if estimator_entry(name).learn]
+    tested = situations.causes.rows("test")
+    if not len(tested):
+        raise InputError(f"causes of {situations.source}", "have no test samples", "raise causes.test")
+    for method, wanted in settings.methods.items():
+        own = Registering(situations, method, settings)
+        lessons = {"": (own, situations.causes.rows("train"))}
+        if method == most_tested(settings):
+            lessons[f"_{estimates.MILD}"] = own, mild(situations, situations.causes.rows("train"))
+            if other is not None:
+                lessons[f"_{estimates.OTHER_SOURCE}"] = Registering(other, method, settings), other.causes.rows("train")
+        examples = {
+            shift: [by.example(row) for row in spaced(of, settings.train)] if learners else []
+            for shift, (by, of) in lessons.items()
+        }
+        trained = {name: make_estimator(name, entry, examples[""]) for name, entry in estimators.items()}
+        for name in learners:
+            for shift in list(lessons)[1:]:
+                trained[f"{name}{shift}"] = make_estimator(name, estimators[name], examples[shift])
+        for row in progress(
+            spaced(tested, wanted), f"estimators on {situations.source}, seed {situations.seed}, {method}"
+        ):
+            case = own.case(row)
+            cases.append(case)
+            for kind, reference in case.references.items():
+                lost = "too few of the reference's runs found a correspondence"
+                answer = Estimate(reference.covariance_6_6, "" if len(reference.twists) else lost)
+                judgment = judged(case, answer, settings.floor) | {"seconds": reference.seconds}
+                records.setdefault(f"reference_{kind}", []).append(judgment)
+            for name, estimate in trained.items():
+                started = perf_counter()
+                answer = estimate(case.registered)
+                seconds = perf_counter() - started
+                records.setdefault(name, []).append(judged(case, answer, settings.floor) | {"seconds": seconds})
+    return {name: pd.DataFrame(of_estimator) for name, of_estimator in records.items()}, cases
+
+
+def most_tested(settings: EstimatorPairSettings) -> str:
+    """The method with the most registrations; of equals the first by name, as files keep no order of them."""
+    return min(settings.methods, key=lambda method: (-settings.methods[method], method))
+
+
+def mild(situations: Situations, rows: np.ndarray) -> np.ndarray:
+    """The half of the rows, in their order, whose strongest perturbation is weakest, in its range's maximum."""
+    registrations, ranges = situations.causes.registrations, situations.drawn_by.severities
+    strengths = [
+        registrations.severity_noise[rows] / ranges.noise[1],
+        registrations.severity_rotation_rad[rows] / np.deg2rad(ranges.rotation_deg[1]),
+        registrations.severity_translation[rows] / ranges.translation[1],
+        registrations.severity_crop[rows] / ranges.crop[1],
+    ]
+    return rows[np.sort(np.argsort(np.max(strengths, axis=0), kind="stable")[: (len(rows) + 1) // 2])]
+
+
+def spaced(rows: np.ndarray, wanted: int) -> np.ndarray:
+    """So many of the rows, evenly spaced: states that are rare come last."""
+    return rows[np.unique(np.linspace(0, len(rows) - 1, min(wanted, len(rows))).round().astype(int))]
+
+
+def reference_samples(cases: Sequence[EstimatedRow]) -> ReferenceSamples:
+    """The references' results for these registrations, as their file holds them."""
+    each = [(case, kind, case.references[kind].twists) for case in cases for kind in KINDS]
+    return ReferenceSamples(
+        sample=np.array([case.known["sample"] for case, _, _ in each]),
+        method=np.array([case.known["method"] for case, _, _ in each]),
+        kind=np.array([kind for _, kind, _ in each]),
+        twists=np.concatenate([twists for *_, twists in each]).astype(np.float32),
+        offsets=np.cumsum([0, *(len(twists) for *_, twists in each)], dtype=np.int64),
+        true_twist=np.array([case.true_twist for case, _, _ in each]),
+    )
+
+
+def judged(case: EstimatedRow, answer: Estimate, floor: float) -> dict[str, object]:
+    """Row of an estimate; numbers that it lacks are NaN."""
+    numbers = dict.fromkeys(estimates.JUDGED, np.nan)
+    if (sigma_6_6 := answer.covariance_6_6) is not None:
+        e_6 = case.true_twist
+        numbers["error_ratio"] = float(e_6 @ e_6 / np.trace(sigma_6_6 + floor * np.eye(6)))
+        numbers["mahalanobis"] = mahalanobis(e_6, sigma_6_6, floor)
+        points = transform(case.registered.T_target_source, case.registered.pair.source)
+        numbers["spread"] = predicted_spread(points, sigma_6_6)
+        for kind, reference in case.references.items():
+            numbers |= {f"{name}_{kind}": value for name, value in compared(sigma_6_6, reference, floor).items()}
+    return {**case.known, "failure": answer.failure} | numbers | estimates.covariance_columns(sigma_6_6)
+
+
+def compared(sigma_6_6: np.ndarray, reference: Reference, floor: float) -> dict[str, float]:
+    """How a covariance fits the results of a reference about their mean, with their own covariance S.
+
+    - kl_rotation, kl_translation: KL divergence of the 3×3 blocks, S the expected one, nats.
+    - error_ratio: tr S / tr Σ. mahalanobis: mean of dᵀΣ⁻¹d over the results' distances d from their mean, tr Σ⁻¹S.
+    - covered: share of the results within the 95 % region of Σ about their mean.
+
+    All with the floor added to both, so that a spread below it counts as none. Nothing where the reference has none.
+    """
+    from scipy.stats import chi2
+
+    if (S_6_6 := reference.covariance_6_6) is None:
+        return {}
+    floored_6_6, expected_6_6 = (matrix + floor * np.eye(6) for matrix in (sigma_6_6, S_6_6))
+    away_n_6 = reference.twists - reference.twists.mean(axis=0)
+    squares_n = np.einsum("ni,in->n", away_n_6, np.linalg.solve(floored_6_6, away_n_6.T))
+    return {
+        "kl_rotation": float(divergence(S_6_6[:3, :3], sigma_6_6[:3, :3], floor)),
+        "kl_translation": float(divergence(S_6_6[3:, 3:], sigma_6_6[3:, 3:], floor)),
+        "error_ratio": float(np.trace(expected_6_6) / np.trace(floored_6_6)),
+        "mahalanobis": float(np.trace(np.linalg.solve(floored_6_6, expected_6_6))),
+        "covered": float((squares_n <= chi2.ppf(LEVEL, 6)).mean()),
+    }
+
+
+def mahalanobis(true_twist_6: np.ndarray, covariance_6_6: np.ndarray, floor: float) -> float:
+    """Return eᵀ (Σ + εI)⁻¹ e, of χ² with six degrees where the covariance is right."""
+    return float(true_twist_6 @ np.linalg.solve(covariance_6_6 + floor * np.eye(6), true_twist_6))
+
+
+def predicted_spread(points_N_3: np.ndarray, covariance_6_6: np.ndarray) -> float:
+    """Root mean square distance by which points would move: √ mean tr(J Σ Jᵀ), in their unit."""
+    jacobians_N_3_6 = point_jacobians(points_N_3)
+    squares = np.einsum("nij,jk,nik->n", jacobians_N_3_6, covariance_6_6, jacobians_N_3_6)
+    return float(np.sqrt(max(squares.mean(), 0.0)))
