@@ -39,10 +39,7 @@ def draw_applied(settings: CauseSettings, random: np.random.Generator) -> np.nda
 
 @dataclass(frozen=True)
 class Candidate:
-    """A pair and all causes that may be applied to it.
-
-    Poses, 4×4, take what was observed to a wrong place in the model's frame.
-    """
+    """A pair and all causes that may be applied to it; poses take what was observed to a wrong place in the model."""
 
     applied: np.ndarray  # (3,) which of noise, pose and overlap are
     model: np.ndarray  # (P, 3)
@@ -139,10 +136,7 @@ class Unmeasurable(Exception):
 
 
 class Registrar:
-    """Registers one candidate from any starts; what several calls share is computed once.
-
-    With `misses`, runs may all find no correspondence, and so stay where they started; else that is refused.
-    """
+    """Registers one candidate from any starts; `misses`: all runs may stay where they started, else that is refused."""
 
     def __init__(self, candidate: Candidate, settings: CauseSettings, misses: bool = False) -> None:
         self.candidate = candidate
@@ -151,10 +145,10 @@ class Registrar:
         self._targets: dict[tuple[int, ...], BatchedICP] = {}
 
     def run(self, causes: tuple[int, ...], xi_n_6: np.ndarray) -> Runs:
-        """Register with these causes from the starts exp(ξ) T_init.
+        """Register with these causes from the starts exp(ξ) T_init; may raise Unmeasurable.
 
-        Poses take what was observed to the model: the identity is right. The inlier RMSE of a run without any
-        correspondence is the correspondence distance: 0 would be the best there is. Raises Unmeasurable.
+        Poses take what was observed to the model. The inlier RMSE of a run without any correspondence is the
+        correspondence distance: 0 would be the best there is.
         """
         starts_n = exp(xi_n_6) @ self.candidate.start(causes)
         observed, model = self.candidate.observed(causes), self.candidate.reference(causes)
@@ -181,10 +175,9 @@ class Registrar:
 
 
 class Counterfactuals:
-    """The errors and uncertainties of one candidate, each measured when it is first asked for.
+    """The errors and uncertainties of one candidate, measured when first asked for, which may raise Unmeasurable.
 
-    All may raise Unmeasurable. `errors` are those of poses (n, 4, 4) of the object's points, in diameters; the starts
-    exp(ξ) are the same for every subset.
+    `errors` are those of poses (n, 4, 4) of the object's points, in diameters; starts are the same for every subset.
     """
 
     def __init__(
@@ -248,9 +241,8 @@ def drawn_again(
 def replay(
     objects: ObjectClouds, causes: Causes, row: int, source: str, seed: int, settings: CauseSettings
 ) -> tuple[np.ndarray, list[np.ndarray]]:
-    """Return a sample's model, in diameters, and under each subset of its causes the cloud where ICP put it.
-
-    ICP starts from the initial pose itself. See :func:`drawn_again` for faults.
+    """Return a sample's model and, under each subset of its causes, the cloud where ICP put it from the initial
+    pose.
     """
     candidate, _ = drawn_again(objects, causes, row, source, seed, settings)
     registrar = Registrar(candidate, settings)

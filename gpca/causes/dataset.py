@@ -88,10 +88,7 @@ LIMITS = tuple(field.name for field in fields(Truth) if field.name not in MEASUR
 
 
 def labels_of(truth: Truth) -> np.ndarray:
-    """Return (S,) labels: nominal, the dominant cause of a failed registration, or ``borderline`` between the two.
-
-    A failure of the geometry has no label either, since none of `LABELS` is right: it counts as borderline.
-    """
+    """Return (S,) labels: nominal, a failure's dominant cause, or ``borderline``, also of a failure by geometry."""
     named_S = np.where(truth.state == FAILED, truth.dominant, truth.state)
     return np.where(np.isin(named_S, LABELS), named_S, BORDERLINE)
 
@@ -103,10 +100,7 @@ def observed_only(registrations: Registrations) -> Registrations:
 
 
 def labeled(causes: Causes) -> Registrations:
-    """Return the registrations as an explainer learns them, with their labels in the place of the concepts.
-
-    The attached ``causes`` (S, 3) are 1 where a concept is one of the causes.
-    """
+    """Return what an explainer learns: labels as the concepts, and ``causes`` (S, 3) attached, 1 where each is one."""
     own = causes.registrations
     attached = {**own.attached, "causes": causes.truth.causes.astype(float)}
     return replace(own, concept=labels_of(causes.truth), attached=attached)

@@ -205,9 +205,7 @@ def describe_all(
 
 
 def seen(arrays: Mapping[str, np.ndarray], sees: Collection[str], wanted: Columns = EVERYTHING) -> np.ndarray:
-    """Return the wanted columns of these arrays (N, F) that these parts (keys of `COLUMNS`) show, in the order of
-    `GROUPS`.
-    """
+    """Return those wanted columns of the arrays (N, F) that these keys of `COLUMNS` show, in the order of `GROUPS`."""
     chosen = []
     for group in (name for name in GROUPS if name in wanted):
         array_N_F = arrays[group]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ from gpca.causes.settings import CauseSettings, Shares
 from gpca.causes.truth import ALL, BORDERLINE, FAILED, GEOMETRY, NOMINAL, NONE, Truth
 from gpca.errors import InputError
 from gpca.io.csv_file import write_csv
+from gpca.io.files import SPLITS
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.progress import progress
@@ -66,10 +67,7 @@ class Quotas:
         return any(self.wants_state(state, applied) for state in (NOMINAL, BORDERLINE, GEOMETRY, FAILED))
 
     def wants_state(self, state: str, applied: np.ndarray) -> bool:
-        """Whether a candidate in this state with these causes (3,) could be wanted; its dominant cause is not known.
-
-        A cause that was not applied is never dominant, and several causes need as many that were applied.
-        """
+        """Whether a candidate in this state with these causes (3,), of which any may be dominant, could be wanted."""
         if state != FAILED:
             return self.wants((state, False))
         kinds = (False, True) if applied.sum() > 1 else (False,)
@@ -112,28 +110,19 @@ def group_of(truth: Truth) -> Group:
     return str(truth.dominant[0]), bool(truth.causes[0].sum() > 1)
 
 
-class Tally:
-    """How many candidates were kept and refused, by split, object and group.
+class Tally(Counter[tuple[str, str, str, bool, bool]]):
+    """Numbers of candidates by split, object, group, and whether they were kept.
 
-    A candidate that cannot be wanted is refused before any registration (group ``any``) or when its state is known
-    (``failed``). The other groups are those of `Quotas`, and the reasons that one has no truth.
+    Groups are those of `Quotas`, and why a candidate has no truth. It is refused as soon as that is known, before any
+    registration (``any``) or when the state is (``failed``).
     """
-
-    def __init__(self) -> None:
-        self._counts: Counter[tuple[str, str, str, bool, bool]] = Counter()
-
-    def count(self, split: str, name: str, group: Group, kept: bool) -> None:
-        """Count one candidate of the object `name`."""
-        self._counts[split, name, *group, kept] += 1
 
     def save(self, path: str | Path) -> None:
         """Write the CSV described in results/README.md."""
         import pandas as pd
 
-        rows = [
-            (*key[:3], int(key[3]), self._counts[*key, True], self._counts[*key, False])
-            for key in sorted({key[:-1] for key in self._counts})
-        ]
+        keys = sorted({key[:-1] for key in self})
+        rows = [(*key[:3], int(key[3]), self[*key, True], self[*key, False]) for key in keys]
         write_csv(path, pd.DataFrame(rows, columns=list(COLUMNS)))
 
 
@@ -146,20 +135,14 @@ def draw_causes(
     """Draw candidates, measure their causes and keep those that are wanted.
 
     The random numbers of a candidate come from generators named by source, seed, split and its number. Which candidates
-    are kept depends on how many samples are wanted.
+    are kept depends on how many samples are wanted. Raises InputError for too few objects, no clean pair that can be
+    registered, or a group that cannot be filled.
 
     Returns:
-        the registrations; how many candidates were kept and refused; the seconds (S,) that ICP took for the
-        registration of each from its initial pose and the other starts.
-
-    Raises:
-        InputError: too few objects, no clean pair that can be registered, or a group that cannot be filled.
+        the registrations; how many candidates were kept and refused; the seconds (S,) that ICP took for each.
     """
-    subjects, uncertainty_limit = measure_clean_pairs(read_subjects(objects), source, seed, settings)
-    drawing = _Drawing(source, seed, settings, Measuring(settings, uncertainty_limit))
-    records: list[dict[str, Any]] = []
-    for split, of_split in split_by_object(subjects, source, seed, settings).items():
-        records += drawing.of_split(split, of_split)
+    drawing = _Drawing(objects, source, seed, settings)
+    records = [record for split in SPLITS for record in drawing.of_split(split)]
     causes, icp_seconds_S = as_causes(records, (source, seed))
     return causes, drawing.tally, icp_seconds_S
 
@@ -171,18 +154,10 @@ def draw_geometry(
 
     Of each split, `most` candidates give so many samples at most; None where a split has none.
     """
-    subjects, uncertainty_limit = measure_clean_pairs(read_subjects(objects), source, seed, settings)
-    alone = replace(
-        settings,
-        present=0.0,
-        limits=replace(settings.limits, nominal=settings.limits.failed),
-        shares=Shares(0, 0, 0, 0, 0, geometry=1),
-    )
-    drawing = _Drawing(source, seed, alone, Measuring(alone, uncertainty_limit))
-    of_splits = [
-        drawing.up_to(most, split, of_split, Quotas(wanted[split], alone))
-        for split, of_split in split_by_object(subjects, source, seed, settings).items()
-    ]
+    limits = replace(settings.limits, nominal=settings.limits.failed)
+    alone = replace(settings, present=0.0, limits=limits, shares=Shares(0, 0, 0, 0, 0, geometry=1))
+    drawing = _Drawing(objects, source, seed, settings, alone)
+    of_splits = [drawing.up_to(most, split, Quotas(wanted[split], alone)) for split in SPLITS]
     if not all(of_splits):
         return None
     return as_causes([record for records in of_splits for record in records], (source, seed))[0]
@@ -191,45 +166,53 @@ def draw_geometry(
 def draw_further(
     objects: ObjectClouds, source: str, seed: int, settings: CauseSettings, chunk: int, wanted: int
 ) -> Causes:
-    """Draw training samples of the same objects as those of :func:`draw_causes`, and of the same states but borderline.
+    """Draw training samples of the same objects and states as those of :func:`draw_causes`, but borderline.
 
-    The settings are those of the other causes. The chunk names the draws: two have no candidate in common, and neither
-    depends on the other. Raises InputError as :func:`draw_causes` does.
+    The chunk names the draws: two have no candidate in common, and neither depends on the other.
     """
     shares = asdict(settings.shares) | {BORDERLINE: 0.0, GEOMETRY: 0.0}
     labeled = Shares(**{name: share / sum(shares.values()) for name, share in shares.items()})
     own = replace(settings, train=wanted, shares=labeled)
-    subjects, uncertainty_limit = measure_clean_pairs(read_subjects(objects), source, seed, settings)
-    drawing = _Drawing(source, seed, own, Measuring(own, uncertainty_limit), part=("further", chunk))
-    train = split_by_object(subjects, source, seed, settings)["train"]
-    return as_causes(drawing.of_split("train", train), (source, seed))[0]
+    drawing = _Drawing(objects, source, seed, settings, own, ("further", chunk))
+    return as_causes(drawing.of_split("train"), (source, seed))[0]
 
 
-@dataclass
 class _Drawing:
-    source: str
-    seed: int
-    settings: CauseSettings
-    measuring: Measuring
-    tally: Tally = field(default_factory=Tally)
-    part: tuple = ()  # more axes of the draws
+    """Draws by settings of its own, of objects that those of :func:`draw_causes` divide; `part` names the draws too."""
 
-    def of_split(self, split: str, subjects: list[Subject]) -> list[dict[str, Any]]:
+    def __init__(
+        self,
+        objects: ObjectClouds,
+        source: str,
+        seed: int,
+        settings: CauseSettings,
+        own: CauseSettings | None = None,
+        part: tuple = (),
+    ) -> None:
+        subjects, uncertainty_limit = measure_clean_pairs(read_subjects(objects), source, seed, settings)
+        self._subjects = split_by_object(subjects, source, seed, settings)
+        self._settings = own or settings
+        self._measuring = Measuring(self._settings, uncertainty_limit)
+        self._axes, self._part = (source, seed), part
+        self.tally = Tally()
+
+    def of_split(self, split: str) -> list[dict[str, Any]]:
         """Return the rows of one split; its candidates show its objects in turn."""
-        wanted = getattr(self.settings, split)
-        quotas, most = Quotas(wanted, self.settings), self.settings.candidates * wanted
-        records = self.up_to(most, split, subjects, quotas)
+        wanted = getattr(self._settings, split)
+        quotas, most = Quotas(wanted, self._settings), self._settings.candidates * wanted
+        records = self.up_to(most, split, quotas)
         if not quotas.all_filled():
-            raise quotas.refuse_to_go_on(self.source, self.seed, split, most)
+            raise quotas.refuse_to_go_on(*self._axes, split, most)
         return records
 
-    def up_to(self, most: int, split: str, subjects: list[Subject], quotas: Quotas) -> list[dict[str, Any]]:
+    def up_to(self, most: int, split: str, quotas: Quotas) -> list[dict[str, Any]]:
         """Return the rows that are wanted of so many candidates, or of fewer where nothing is wanted any more."""
         records: list[dict[str, Any]] = []
-        for number in progress(range(most), f"candidates of {self.source}, seed {self.seed}, {split}", total=None):
-            subject = subjects[number % len(subjects)]
+        source, seed = self._axes
+        for number in progress(range(most), f"candidates of {source}, seed {seed}, {split}", total=None):
+            subject = self._subjects[split][number % len(self._subjects[split])]
             record, group = self._try(split, number, subject, quotas)
-            self.tally.count(split, subject.name, group, kept=record is not None)
+            self.tally[split, subject.name, *group, record is not None] += 1
             if record is not None:
                 quotas.taken[group] += 1
                 records.append(record | {"sample": len(records), "split": split, "candidate": number})
@@ -239,25 +222,25 @@ class _Drawing:
 
     def _try(self, split: str, number: int, subject: Subject, quotas: Quotas) -> tuple[dict[str, Any] | None, Group]:
         """Return the row of a candidate and its group; no row where it is refused, as soon as it cannot be wanted."""
-        axes = (self.source, self.seed, "causes", *self.part, split, number)
+        settings, measuring = self._settings, self._measuring
+        axes = (*self._axes, "causes", *self._part, split, number)
         random = generator(*axes)
-        applied = draw_applied(self.settings, random)
+        applied = draw_applied(settings, random)
         if not quotas.wants_applied(applied):
             return None, UNSEEN
-        registrar = Registrar(draw_candidate(subject.surface, applied, self.settings, random), self.settings)
-        measured = self.measuring.counterfactuals(registrar, subject, axes, "starts")
+        registrar = Registrar(draw_candidate(subject.surface, applied, settings, random), settings)
+        measured = measuring.counterfactuals(registrar, subject, axes, "starts")
         try:
-            state = state_of(self.measuring.truth(measured, ENDS))
+            state = state_of(measuring.truth(measured, ENDS))
             if not quotas.wants_state(state, applied):
                 return None, (state, False)
-            truth = self.measuring.truth(measured)
+            truth = measuring.truth(measured)
             group = group_of(truth)
             if not quotas.wants(group):
                 return None, group
-            record = {**self.measuring.observed(registrar, subject, axes), "truth": truth}
+            record = {**measuring.observed(registrar, subject, axes), "truth": truth}
             if split == "test":
-                again = self.measuring.counterfactuals(registrar, subject, axes, "other starts")
-                record["again"] = self.measuring.truth(again)
+                record["again"] = measuring.truth(measuring.counterfactuals(registrar, subject, axes, "other starts"))
         except Unmeasurable as fault:
             return None, (str(fault), False)
         return record, group

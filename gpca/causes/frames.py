@@ -67,14 +67,10 @@ def measure_frames(
     settings: CauseSettings,
     points: int,
 ) -> tuple[Causes, pd.DataFrame]:
-    """Measure the causes of registrations from these starts.
+    """Measure the causes of registrations from these starts, as :func:`gpca.causes.measuring.measure_cases` does.
 
-    One that finds no correspondence is measured where it started. Those that cannot be measured, since the object's own
-    clean pairs are off or its mesh is not in sight, are left out and named on stderr; none left raises InputError.
-
-    Args:
-        meshes: of the objects that the instances show, see :func:`gpca.frames.dataset.meshes_of`.
-        points: of what was measured, at most, and of the model.
+    Those whose object's clean pairs are off or whose mesh is not in sight are left out. `points` of what was measured,
+    at most, and of the model are registered.
 
     Returns:
         the registrations, all of them test samples with the number of their start; a row for each of where it was
@@ -117,11 +113,7 @@ def frame_candidate(
     points: int,
     random: np.random.Generator,
 ) -> Candidate:
-    """Return an instance with everything that may be taken away from it, in diameters.
-
-    The registration starts from `T_init`, ``T_camera_object`` in meters. Raises Unmeasurable where no ray of its pixels
-    meets the mesh, or the model cannot be seen at the initial pose.
-    """
+    """Return an instance started at ``T_camera_object``, with all that may be taken away; may raise Unmeasurable."""
     diameter_m, sighting = subject.diameter_m, instances.sighting(i)
     T_true = instances.T_camera_object_true[i]
     outline_m = outline(subject)
@@ -155,11 +147,8 @@ def candidate_of_view(
 ) -> Candidate:
     """Return what was seen of an object at a pose that is taken for the true one, with all that may be taken away.
 
-    Args:
-        kept: rows of what was measured that are registered.
-        model, model_at_truth: (P, 3) diameters, what the camera would see where the registration starts, and at that
-            pose.
-        T_model_observed: 4×4, takes what was observed to where it lies in the model at the start, diameters.
+    Rows of what was measured are kept; models are what the camera would see where the registration starts, and at that
+    pose, in diameters as is the pose 4×4, which takes what was observed to where it lies in the model at the start.
     """
     most = round(len(kept) * (1 - view.share) / max(view.share, 1e-9))
     hidden = view.unmeasured[random.permutation(len(view.unmeasured))[:most]]

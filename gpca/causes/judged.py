@@ -33,9 +33,7 @@ BINS = 10  # of the calibration error
 
 @dataclass(frozen=True)
 class SampleTruth:
-    """N test samples with their truth, without their clouds; the attributes are those of
-    :class:`gpca.causes.dataset.Causes`.
-    """
+    """N test samples with their truth, as in :class:`gpca.causes.dataset.Causes`, without their clouds."""
 
     truth: Truth
     truth_again: Truth
@@ -79,11 +77,7 @@ class Judged:
 def read_judged(
     prediction_files: Iterable[str | Path], causes_files: Iterable[str | Path]
 ) -> dict[tuple[str, str, int], Judged]:
-    """Return the test samples of every source, explainer and seed, those of the ceiling first.
-
-    Predictions are named ``…/{source}/{explainer}/seed{seed}.csv``, causes ``…/{source}/seed{seed}.npz``. Raises
-    InputError for no files, a file that cannot be read, and predictions of other samples.
-    """
+    """Return the test samples of every source, explainer and seed, as paths name them, those of the ceiling first."""
     truths, judged = {}, {}
     for path in causes_files:
         source, seed = Path(path).parent.name, seed_of_file(path)
@@ -136,9 +130,8 @@ def judged_of(
     named_N: np.ndarray,
     alarm_N: np.ndarray | None = None,
 ) -> Judged:
-    """Return test samples with scores of :data:`gpca.causes.dataset.LABELS` and the labels named, empty for none.
-
-    The alarm is by default how far the score of "nominal" is from 1.
+    """Return test samples with scores of the labels and the label named, empty for none; alarms are 1 − nominal if
+    None.
     """
     truth, shown_N = tested.truth, tested.error_shown
     return Judged(
@@ -174,21 +167,27 @@ def _shown(samples: Judged) -> np.ndarray:
 
 # What :func:`measure` returns: the samples that each depends on, whether it is a share, and whether least is best.
 MEASURES: Mapping[str, Measure] = {
+    # The error that the best single removal would take away minus what the named cause's removal takes away, as a share
+    # of the error; mean. Naming nominal, or nothing, removes nothing.
     "regret": Measure(counted=_failed, limits=ANYTHING, least_is_best=True),
+    # As dominant_accuracy, but any cause counts whose φ is that of the dominant one up to the limit of a cause.
     "tied_accuracy": Measure(counted=_failed),
-    "named_right": Measure(counted=_labeled),
-    "balanced_accuracy": Measure(counted=_labeled),
-    "dominant_accuracy": Measure(counted=_failed),
-    "auroc_failed": Measure(counted=_labeled),
+    "named_right": Measure(counted=_labeled),  # whose label is named, causes counted as in tied_accuracy
+    "balanced_accuracy": Measure(counted=_labeled),  # mean over nominal and causes of the share that is named rightly
+    "dominant_accuracy": Measure(counted=_failed),  # whose dominant cause has the largest score among the causes
+    "auroc_failed": Measure(counted=_labeled),  # how well the alarm tells failed from nominal
     "auprc_failed": Measure(counted=_labeled),
+    # Share of the nominal above the alarm that finds 90 % of the failed.
     "false_alarm_rate": Measure(counted=lambda samples: samples.label == NOMINAL, least_is_best=True),
+    # Expected calibration error of the score of "nominal", in ten bins.
     "nominal_calibration": Measure(counted=_labeled, limits=ANYTHING, least_is_best=True),
-    "state_accuracy": Measure(counted=_labeled),
-    "state_accuracy_shown": Measure(counted=_shown),
-    "auroc_failed_shown": Measure(counted=_shown),
-    "average_precision": Measure(counted=_labeled),
-    "spearman_attribution": Measure(counted=_failed, limits=ANYTHING),
+    "state_accuracy": Measure(counted=_labeled),  # mean of the shares of the nominal and the failed that are called so
+    "state_accuracy_shown": Measure(counted=_shown),  # by the state of that registration alone,
+    "auroc_failed_shown": Measure(counted=_shown),  # whatever it does from other starts
+    "average_precision": Measure(counted=_labeled),  # of each cause's score for being one of the causes, mean
+    "spearman_attribution": Measure(counted=_failed, limits=ANYTHING),  # between scores and φ, mean
     "cosine_attribution": Measure(counted=_failed, limits=ANYTHING),
+    # Share of the error that goes when the cause named first is removed, mean.
     "deletion_gain": Measure(counted=_failed, limits=ANYTHING),
 }
 SHARES = tuple(name for name, each in MEASURES.items() if each.limits is SHARE)
@@ -196,25 +195,7 @@ SMALLER_IS_BETTER = tuple(name for name, each in MEASURES.items() if each.least_
 
 
 def measure(samples: Judged, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
-    """Return every measure (B,) of :data:`MEASURES` that the explainer has.
-
-    - regret: of a failed sample, the error that the best single removal would take away minus what the named
-      cause's removal takes away, as a share of the error; mean. Naming nominal, or nothing, removes nothing.
-    - tied_accuracy: as dominant_accuracy, but any cause counts whose φ is that of the dominant one up to the limit of a
-      cause.
-    - named_right: share of the nominal and the failed whose label is named, causes counted as in tied_accuracy.
-    - balanced_accuracy: mean over nominal and the three dominant causes of the share that is named rightly.
-    - dominant_accuracy: share of the failed whose dominant cause has the largest score among the causes.
-    - auroc_failed, auprc_failed: how well the alarm tells failed from nominal.
-    - false_alarm_rate: share of the nominal above the alarm that finds 90 % of the failed.
-    - state_accuracy: mean of the shares of the nominal and of the failed that are called so; of what is shown
-      (_shown), by the state of that registration alone, whatever it does from other starts.
-    - auroc_failed_shown: as auroc_failed, by the same state.
-    - nominal_calibration: expected calibration error of the score of "nominal", in ten bins.
-    - average_precision: of each cause's score for being one of the causes, mean over the causes.
-    - spearman_attribution, cosine_attribution: between scores and φ of a failed sample, mean.
-    - deletion_gain: share of the error of a failed sample that goes when the cause named first is removed, mean.
-    """
+    """Return every measure (B,) of :data:`MEASURES` that the explainer has."""
     from scipy.stats import rankdata
 
     labeled_N, shown_N, failed_N = _labeled(samples), _shown(samples), _failed(samples)

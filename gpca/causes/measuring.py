@@ -65,9 +65,7 @@ def read_subjects(objects: ObjectClouds) -> list[Subject]:
 def split_by_object(
     subjects: list[Subject], source: str, seed: int, settings: CauseSettings
 ) -> dict[str, list[Subject]]:
-    """Return the subjects of each split; those of one family are in the same. Raises InputError for fewer than two
-    families.
-    """
+    """Return the subjects of each split, families undivided; InputError for fewer than two of these."""
     family_N = np.array([subject.family for subject in subjects])
     if len(set(family_N.tolist())) < FEWEST_FAMILIES:
         fault = "has objects of one family alone, which cannot be split into training and test objects"
@@ -85,11 +83,8 @@ def measure_clean_pairs(
     """Measure clean pairs, of which no cause is more than small.
 
     An object of which nearly all clean pairs are off is left out, unless the settings ask for samples of that kind;
-    none left raises InputError.
-
-    Returns:
-        the subjects that are left; the limit of the uncertainty: the quantile `settings.limits.clean` of the divergence
-        between two clean pairs of the same object, with equal numbers of points, from the same starts.
+    none left raises InputError. The limit of the uncertainty, returned after the subjects that are left, is a quantile
+    of the divergence between two clean pairs of one object, with equal numbers of points, from the same starts.
     """
     off = f"an error of at least {100 * settings.limits.nominal:g} % of the diameter or cannot be registered"
     nominal, count = settings.limits.nominal, -(-settings.clean_pairs // len(subjects))
@@ -202,11 +197,8 @@ def measure_cases(cases: Iterable[Case], measuring: Measuring, axes: Axes, nothi
     """Measure registrations as test samples, from two sets of starts each.
 
     This is the one way to measure what happened in a world that gives cases: depth frames (:mod:`gpca.causes.frames`)
-    or scans (:mod:`gpca.causes.scans`). A world provides the cases, each with two clouds, everything that may be taken
-    away from them and the errors of poses; and a table of what else is known of the measured rows (:func:`found_in`).
-
-    A registration that finds no correspondence is measured where it started; one that cannot be measured is left out
-    and named on stderr. `nothing` is the fault if no case can be measured, and its remedy.
+    or scans (:mod:`gpca.causes.scans`). One that finds no correspondence is measured where it started; one that cannot
+    be measured is left out and named on stderr; `nothing` is the fault if there is no other, and its remedy.
     """
     records: list[dict[str, Any]] = []
     for case in cases:
@@ -239,8 +231,7 @@ def found_in(causes: Causes) -> tuple[dict[str, Any], dict[str, Any]]:
 def as_causes(records: list[dict[str, Any]], axes: Axes) -> tuple[Causes, np.ndarray]:
     """Return rows as registrations with their truth, and the seconds (S,) that ICP took for each.
 
-    A record is what :meth:`Measuring.observed` returned, with ``sample``, ``split``, ``candidate``, ``truth`` and, of
-    test samples, the truth ``again``.
+    A row is an explainer's view with ``sample``, ``split``, ``candidate``, ``truth`` and, of test samples, ``again``.
     """
 
     def joined(truths: list[Truth]) -> Truth:

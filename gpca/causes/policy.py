@@ -72,11 +72,7 @@ class RecoveryPolicy:
     def of_settings(
         cls, thresholds: Mapping[str, float | None], treatments: Mapping[str, str], attempts: int, bald_N: np.ndarray
     ) -> RecoveryPolicy:
-        """Build a policy from the config; `uncertain` is chosen on calibration samples if null.
-
-        Args:
-            bald_N: uncertainties of the calibration samples, see :func:`choose_uncertain`.
-        """
+        """Build a policy from the config; if null, `uncertain` is chosen on BALD of calibration samples."""
         declared = {name: value for name, value in thresholds.items() if value is not None}
         queued_share = declared.pop("queued_share")
         if "uncertain" not in declared:
@@ -86,14 +82,10 @@ class RecoveryPolicy:
     def decide(
         self, scores_C: np.ndarray, bald: float = 0, before: Sequence[Treated] = (), concepts: Sequence[str] = CONCEPTS
     ) -> Decision:
-        """Choose the branch of a case.
+        """Choose the branch of a case by scores ŝ_c that sum to one, and BALD in nats; 0 for explainers without one.
 
         Concepts whose treatment improved too little come last, the least often treated first; otherwise, the largest
         score leads.
-
-        Args:
-            scores_C: scores ŝ_c that sum to one.
-            bald: uncertainty in nats; 0 for explainers without one.
         """
         limits = self.thresholds
         stale = [treated.concept for treated in before if treated.fall < limits.improvement]
@@ -112,10 +104,7 @@ class RecoveryPolicy:
 
 
 def choose_uncertain(bald_N: np.ndarray, queued_share: float) -> float:
-    """Return the BALD in nats that at most this share of calibration samples, not used for training, exceeds.
-
-    So the share of cases for a person is declared, and the most uncertain ones are queued.
-    """
+    """Return the BALD in nats that at most this share, to be queued, of samples not used for training exceeds."""
     if not 0 <= queued_share < 1:
         raise InputError("recovery.thresholds.queued_share", f"{queued_share} is not in [0, 1)", "give a share")
     if not len(bald_N):

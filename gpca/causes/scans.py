@@ -28,6 +28,7 @@ from gpca.causes.measuring import Case, Measuring, Subject, found_in, measure_ca
 from gpca.causes.settings import FEWEST_POINTS, CauseSettings
 from gpca.causes.truth import NONE
 from gpca.objects.canonical import DRAWN
+from gpca.pairs.distances import dots
 from gpca.pairs.perturbation import CONCEPTS, NOISE, OVERLAP, POSE
 from gpca.process.progress import progress
 from gpca.scans.pair import ROOM_M, ScanPair, ScanSuccess
@@ -89,12 +90,7 @@ class DrawnScans:
 
     @classmethod
     def of(cls, pair: ScanPair, points: int, limit_m: float, failed: float, random: np.random.Generator) -> DrawnScans:
-        """Draw points of each scan, at most so many.
-
-        Args:
-            limit_m: RMSE from which a registration of this pair has failed.
-            failed: the error that this is to be.
-        """
+        """Draw points of each scan, at most so many; an RMSE of `limit_m` is to be an error of `failed`."""
         clouds = (pair.source_N_3, pair.target_M_3)
         rows_N, rows_M = (np.sort(random.permutation(len(cloud))[:points]) for cloud in clouds)
         center_3, unit_m = middle(pair), unit_of(pair)
@@ -152,10 +148,7 @@ class DrawnScans:
 
 
 def motion_between(pair: ScanPair, T_target_source_from: np.ndarray, T_target_source_to: np.ndarray) -> np.ndarray:
-    """Return the motion (4×4) of points of the source from one pose to another, in meters, as a pair is registered.
-
-    Of the pair its clouds are read, and not its true pose.
-    """
+    """Return the motion (4×4) of the source between two poses in meters, in the frame in which a pair is registered."""
     T_m, center_3 = T_target_source_to @ inverse(T_target_source_from), middle(pair)
     # Poses of data sets are rounded, so that the last row of a product may not be exact.
     return rigid_motion(T_m[:3, :3], (rotate(T_m, center_3) + T_m[:3, 3] - center_3) / unit_of(pair))
@@ -174,17 +167,15 @@ def middle(pair: ScanPair) -> np.ndarray:
 def sensor_noise_m(pair: ScanPair) -> float:
     """Return the standard deviation, in meters, of measured points across the surface.
 
-    It is that of the distances at the true pose of the source's common points from the planes of the target's nearest
-    points, by their median; both scans' noise adds up in it. Errors of the true pose and of the planes count too, so it
-    is an upper bound.
+    It is an upper bound: that of the distances at the true pose of the source's common points from the planes of the
+    target's nearest points, by their median; both scans' noise and errors of the true pose add up in it.
     """
     common = transform(pair.T_target_source, pair.source_N_3[pair.source_common_N].astype(np.float64))
     if not len(common):
         return 0.0
     target = pair.target_M_3.astype(np.float64)
     rows = cKDTree(target).query(common)[1]
-    offsets, normals = common - target[rows], estimate_normals(target)[rows]
-    across = offsets[:, 0] * normals[:, 0] + offsets[:, 1] * normals[:, 1] + offsets[:, 2] * normals[:, 2]
+    across = dots(common - target[rows], estimate_normals(target)[rows])
     return float(NORMAL_DEVIATION * np.median(np.abs(across)) / np.sqrt(2))
 
 
@@ -212,10 +203,9 @@ def measure_scans(
     success: ScanSuccess,
     points: int,
 ) -> tuple[Causes, pd.DataFrame]:
-    """Measure the causes of registrations from these starts, those of a pair one after another.
+    """Measure the causes of registrations from these starts, as :func:`gpca.causes.measuring.measure_cases` does.
 
-    One that finds no correspondence is measured where it started. Pairs of which too few points, of so many of each
-    scan at most, lie on surface that both see are left out and named on stderr; none left raises InputError.
+    Pairs of which too few points, of so many of each scan at most, lie on surface that both see are left out.
 
     Returns:
         the registrations, all of them test samples with the number of their start; a row for each of what it is and

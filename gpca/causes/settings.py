@@ -110,22 +110,16 @@ class Shares:
 
 @dataclass(frozen=True)
 class CauseSettings(UncertaintySettings):
-    """How many samples are drawn and how.
-
-    Attributes:
-        points: range of the number of points of a cloud, drawn for the model and for what is left of the observed one.
-        moved: the cloud that ICP moves onto the other: the ``model``, which has no partners where surface is missing,
-            or what was ``observed``, which has them everywhere.
-    """
+    """How many samples are drawn and how."""
 
     starts: Annotated[int, Bounds(minimum=FEWEST_STARTS)] = FEWEST_STARTS
     floor: Annotated[float, Bounds(exclusiveMinimum=0, maximum=1)] = 1e-4
     train: Annotated[int, Bounds(minimum=12)] = 600
     test: Annotated[int, Bounds(minimum=6)] = 300
     test_objects: OpenShare = 0.3  # that only test samples show, at least one
-    points: tuple[CloudPoints, CloudPoints] = (128, 1024)
+    points: tuple[CloudPoints, CloudPoints] = (128, 1024)  # of the model, and of what is left of the observed cloud
     present: OpenShare = 0.5  # probability of each cause
-    moved: Moved = MODEL
+    moved: Moved = MODEL  # onto the other cloud: the model lacks partners where surface is missing, the observed none
     severities: CauseSeverities = field(default_factory=CauseSeverities)
     small: Small = field(default_factory=Small)  # what there is of a cause that is not applied
     limits: Limits = field(default_factory=Limits)

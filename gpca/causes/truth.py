@@ -38,21 +38,14 @@ def shapley_values(worth_S_8: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Truth:
-    """The measurements of S registrations, and the limits that tell their states apart.
+    """The measurements of S registrations, and the limits that tell their states apart."""
 
-    Attributes:
-        error: (S, 8) v, mean over the starts of min(ADD(-S), d/2) / d, with only those causes applied.
-        uncertainty: (S, 8) u against the clean pair of the same sample, nats.
-        nominal_limit, failed_limit, cause_limit: of errors, see :class:`gpca.causes.settings.Limits`.
-        uncertainty_limit: of a nominal registration, nats.
-    """
-
-    error: np.ndarray
-    uncertainty: np.ndarray
-    nominal_limit: float
+    error: np.ndarray  # (S, 8) v, mean over the starts of min(ADD(-S), d/2) / d, with only those causes applied
+    uncertainty: np.ndarray  # (S, 8) u against the clean pair of the same sample, nats
+    nominal_limit: float  # of errors, see :class:`gpca.causes.settings.Limits`
     failed_limit: float
     cause_limit: float
-    uncertainty_limit: float
+    uncertainty_limit: float  # of a nominal registration, nats
 
     def __len__(self) -> int:
         return len(self.error)

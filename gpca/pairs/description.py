@@ -27,13 +27,10 @@ MOVED = slice(-MOTION, -FIT)
 def describe_registrations(registrations: Registrations, *axes: object, points: int) -> dict[str, np.ndarray]:
     """Return the groups of `WIDTHS`, each (N, F), of N registrations, and the features of their points.
 
-    - distances: the 52 of :func:`gpca.pairs.distances.describe_distances`, in diameters.
-    - relations: what of a pair does not depend on which object it is (:func:`relations`).
-    - densities: logarithms of spacing and extent of the observed cloud relative to the model's.
-    - points: (N, 2, points, 7) of :func:`gpca.pairs.distances.describe_points`.
-
-    The axes name the draws, with split and number of a sample, of so many points of each cloud, as an encoder sees so
-    many; all where there are fewer.
+    Distances and points are as :mod:`gpca.pairs.distances` describes them; relations (:func:`relations`) do not depend
+    on which object it is; densities are logarithms of spacing and extent of the observed cloud relative to the model's.
+    The axes name the draws, with split and number of a sample, of so many points of each cloud; all where there are
+    fewer.
     """
     rows = []
     for row in progress(range(len(registrations)), "descriptions of pairs"):

@@ -91,7 +91,8 @@ def second_moments(offsets_N_k_3: np.ndarray) -> np.ndarray:
     return np.moveaxis(np.array(rows), -1, 0)
 
 
-def _dots(a_N_3: np.ndarray, b_N_3: np.ndarray) -> np.ndarray:
+def dots(a_N_3: np.ndarray, b_N_3: np.ndarray) -> np.ndarray:
+    """Return the products (N,) of rows, summed from x to z."""
     return a_N_3[:, 0] * b_N_3[:, 0] + a_N_3[:, 1] * b_N_3[:, 1] + a_N_3[:, 2] * b_N_3[:, 2]
 
 
@@ -117,9 +118,9 @@ class MatchedPair:
         to_observed_M, partner_M = observed.tree.query(pair.model)
         return cls(
             *(observed, model, partner_N, partner_M, to_model_N, to_observed_M),
-            plane_N=np.abs(_dots(pair.observed - pair.model[partner_N], model.normals[partner_N])),
-            plane_M=np.abs(_dots(pair.model - pair.observed[partner_M], observed.normals[partner_M])),
-            cosine_N=np.abs(_dots(observed.normals, model.normals[partner_N])),
+            plane_N=np.abs(dots(pair.observed - pair.model[partner_N], model.normals[partner_N])),
+            plane_M=np.abs(dots(pair.model - pair.observed[partner_M], observed.normals[partner_M])),
+            cosine_N=np.abs(dots(observed.normals, model.normals[partner_N])),
         )
 
 
@@ -164,7 +165,7 @@ def describe_points(pair: ObservedPair, matched: MatchedPair, points: int) -> np
         log_ratio(matched.to_observed_M, spacing),
         log_ratio(matched.plane_M, usual_thickness),
         log_ratio(model.thickness, observed.thickness[matched.partner_M]),
-        np.abs(_dots(model.normals, observed.normals[matched.partner_M])),
+        np.abs(dots(model.normals, observed.normals[matched.partner_M])),
     )
     sides = (np.column_stack([pair.observed, *of_observed]), np.column_stack([pair.model, *of_model]))
     return np.stack([side[np.arange(points) % len(side)] for side in sides]).astype(np.float32)

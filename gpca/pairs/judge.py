@@ -13,11 +13,7 @@ from gpca.pairs.dataset import Registrations
 
 
 class Judge:
-    """Judges poses of one object, in diameters; the target's frame is the object's canonical one, its center the
-    origin.
-
-    Its symmetries are as :func:`gpca.objects.bop.find_symmetries` has them; where there is any, ADD-S counts.
-    """
+    """Judges poses of one object, in diameters, by ADD, or by ADD-S where a turn leaves its shape as it is."""
 
     def __init__(self, objects: ObjectClouds, index: int) -> None:
         diameter_m = float(objects.diameters_m[index])

@@ -86,9 +86,7 @@ def crop(points: np.ndarray, severities: Severities, random: np.random.Generator
 
 
 def within_half_space(along_N: np.ndarray, share: float, fewest: int) -> np.ndarray:
-    """Return the rows, in order, that remain when a half-space, toward which points lie `along`, takes a share of
-    them.
-    """
+    """Return the rows, in order, that remain where a half-space, along toward it, takes a share of the points."""
     left = max(min(fewest, len(along_N)), round(len(along_N) * (1 - share)))
     return np.sort(np.argsort(along_N, kind="stable")[:left])
 

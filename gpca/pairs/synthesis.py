@@ -50,8 +50,7 @@ def make_registrations(
     """Return the registrations of one source and seed, and the seconds (S,) of ICP.
 
     Samples 3t, 3t + 1 and 3t + 2 of a split show object t mod O under the three concepts in random order. Random
-    numbers of a sample are named by source, seed, split and number, so that it does not depend on how many samples
-    there are.
+    numbers are named by source, seed, split and number, so that a sample does not depend on how many there are.
     """
     require_open3d()  # here, so that the first sample's seconds do not include its import
     samples = [(split, n) for split in SPLITS for n in range(getattr(settings, split))]
@@ -75,9 +74,7 @@ def make_registrations(
 def align_pair(
     perturbed: Perturbed, objects: ObjectClouds, object_index: int, target_rows: np.ndarray, icp_settings: ICPSettings
 ) -> dict:
-    """Align a perturbed cloud to the points of its object's canonical cloud in these rows; return the columns of its
-    row.
-    """
+    """Align a perturbed cloud to these rows of its object's canonical cloud; return the columns of its row."""
     diameter_m = float(objects.diameters_m[object_index])
     target = objects.points(object_index)[target_rows] / diameter_m
     started = perf_counter()

@@ -67,10 +67,7 @@ def reinitialize(holding: Holding, robot: Robot, random: np.random.Generator, st
 
 
 def search(holding: Holding, robot: Robot, random: np.random.Generator, starts: int) -> list[np.ndarray]:
-    """Return the `JUDGED` results ``T_world_object`` of least cost of ICP with a larger reach; none for few points.
-
-    It starts from the current pose and from random orientations.
-    """
+    """Return the `JUDGED` best results of ICP with a larger reach from random orientations; none for few points."""
     from scipy.spatial.transform import Rotation
 
     from gpca.alignment.batched_icp import BatchedICP
@@ -119,10 +116,9 @@ def look_around(
     azimuths: int = 8,
     elevations_deg: Sequence[float] = (20.0, 45.0, 70.0),
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return viewpoints ``T_world_camera`` (n, 4, 4), and which model points were and would be seen, as
-    :func:`gpca.frames.shots.expected_surface` does.
+    """Return viewpoints ``T_world_camera`` (n, 4, 4), and which model points were and would be seen from them.
 
-    The viewpoints surround the measured points, since the estimated center may be anywhere.
+    They surround the measured points, since the estimated center may be anywhere.
     """
     from gpca.frames.shots import candidates, expected_surface
     from gpca.frames.situations import coarse

@@ -123,8 +123,7 @@ def learn_explainers(
 ) -> LoopExplainers:
     """Train the encoder and fit every explainer on the split ``train``; the other split is for calibration.
 
-    Explainers (:mod:`gpca.explainers.registry`) read embeddings or the design ``removal``. Remedies of so many training
-    samples are run, at most; Monte-Carlo ICP is slow.
+    Remedies of so many training samples are run, at most; Monte-Carlo ICP is slow.
     """
     train, held_out = (registrations.subset(registrations.rows(split)) for split in ("train", "test"))
 

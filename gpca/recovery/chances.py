@@ -44,8 +44,7 @@ def learn_gate(
 ) -> FailureGate:
     """Train a gate; its threshold is set on good registrations, each judged by a classifier without their table.
 
-    False alarms are limited as :func:`alarm_threshold` says. Raises InputError for failed, or good, registrations from
-    fewer than two tables.
+    Raises InputError for failed, or good, registrations from fewer than two tables.
     """
     good_N = ~failed_N
     _, group_N = np.unique([str(table) for table in table_N], return_inverse=True)
@@ -67,10 +66,7 @@ def learn_gate(
 
 
 def alarm_threshold(failure_M: np.ndarray, false_alarms: float) -> float:
-    """Return the threshold that a new good registration exceeds with at most this probability.
-
-    It is conformal over the M good registrations, or the largest of their scores if M is too small.
-    """
+    """Return the conformal threshold that so few new good registrations exceed, or the largest of a few scores."""
     return min(upper_bound(failure_M, 1 - false_alarms), float(failure_M.max()))
 
 
@@ -127,9 +123,7 @@ class ExpectedUtility:
     needless: float = 0.0  # b
 
     def decide(self, known_F: np.ndarray, before: Iterable[str], alarmed: bool = False) -> Decision:
-        """Choose the next action; each repeats only after all others. After an action or an alarm, the pose is taken to
-        be wrong.
-        """
+        """Choose the next action, each anew after all others; after one, or an alarm, the pose is taken to be wrong."""
         before = list(before)
         wrong = alarmed or bool(before)
         fewest = min(before.count(action) for action in self.costs)

@@ -92,10 +92,7 @@ def register_misplaced(situation: Situation, clean: Attempt, points: int, icp: I
 def register_after(
     situation: Situation, before: Attempt, action: Action, actions: tuple[str, ...], points: int, icp: ICPSettings
 ) -> Attempt:
-    """Take one action and register anew.
-
-    The names of all that were taken, this one included, name the random numbers.
-    """
+    """Take one action, named last of all that were taken, which name the random numbers, and register anew."""
     robot = RobotIn(situation, actions)
     started = perf_counter()
     holding = action(before.holding, robot, generator(*situation.axes, "action", *actions))
@@ -134,10 +131,7 @@ Case = tuple[Situation, Attempt]
 class Episode:
     """A registration that failed, or one that did not, and everything that was tried about it.
 
-    Args:
-        number: its own among all of a run.
-        success: error of the pose from which it is wrong, in diameters.
-        tries: registrations that were made for all failures of its cause.
+    Its error is wrong from `success` diameters on; `tries` were made for all failures of its cause.
     """
 
     def __init__(self, number: int, situation: Situation, start: Attempt, success: float, tries: int = 1) -> None:
@@ -214,11 +208,8 @@ def _try_situation(
 ) -> tuple[Case | None, Case | None, int]:
     """Register a disturbed situation, and the clean one where that failed; of bad poses, until one fails.
 
-    A pose error changes nothing but ICP's start, so several are tried on the same measurement and the same estimate, at
-    most so many misplaced.
-
-    Returns:
-        the failure by the cause, and a good registration, each None where there is none; how many were made.
+    A pose error changes nothing but ICP's start, so several are tried on one measurement and estimate. Returns the
+    failure by the cause, and a good registration, each None where there is none; how many were made.
     """
     points, icp, success = settings.cloud_points, settings.icp, settings.success
     disturbed, clean = situations.draw(cause, cause, number)

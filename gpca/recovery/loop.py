@@ -68,11 +68,7 @@ class Reenactor:
 
 
 def calibrated_alarm(episodes: Iterable[Episode], reenactor: Reenactor, false_alarms: float) -> float:
-    """The probability of a failure that a further good registration exceeds with at most this probability.
-
-    It is set on the good ones among these episodes, which were not used for training
-    (:func:`gpca.recovery.chances.alarm_threshold`); InputError where none is good.
-    """
+    """The probability of a failure that a further good registration exceeds with this probability, set on good ones."""
     good = [episode for episode in episodes if not episode.failed]
     if not good:
         fault = "has no good registration by which the alarm of the re-enactment can be set"
@@ -82,14 +78,7 @@ def calibrated_alarm(episodes: Iterable[Episode], reenactor: Reenactor, false_al
 
 
 class Loop:
-    """All policies on all episodes, step by step, so that explainers see what is new in one batch.
-
-    Args:
-        episodes: the failures, and what did not fail.
-        explain: for each explainer that the policies read, the function that attributes registrations.
-        means: what the policies are made from.
-        reenactor: for policies that re-enact registrations.
-    """
+    """All policies on all episodes, failed or not, step by step, so that explainers see what is new in one batch."""
 
     def __init__(
         self,

@@ -180,10 +180,8 @@ def best_order(
 ) -> Order:
     """Return the greedy order of all actions: each solves the most of the remaining failures.
 
-    Ties go to the cheaper action, then to the first. Actions later than the budget are not compared.
-
-    Args:
-        solved: one function per rehearsed failure: whether a sequence solves it whose earlier actions did not.
+    `solved` says of each whether a sequence solves it whose earlier actions did not. Ties go to the cheaper action,
+    then to the first. Actions later than the budget are not compared.
     """
     order: Order = ()
     left, remaining = list(solved), list(actions)

@@ -109,9 +109,7 @@ class Reenacted:
 
     @property
     def phi_3(self) -> np.ndarray:
-        """φ̂, effect of each cause on the error, given a failure: the mean over the hypotheses, weighted by P(it,
-        failure).
-        """
+        """φ̂, effect of each cause on the error, given a failure: a mean weighted by P(hypothesis, failure)."""
         weight_K = self.belief.weight_K * self.belief.failure_K
         return (weight_K[:, None] * shapley_values(self.error_K_8)).sum(axis=0) / weight_K.sum()
 

@@ -97,11 +97,9 @@ def rehearsed_gate(episodes: Mapping[str, Sequence[Episode]], false_alarms: floa
 
 
 def robot_policy(recovery: Mapping, rehearsal: Rehearsal | None) -> RecoveryPolicy:
-    """The thresholds that the config's section declares, and the one that is chosen on the rehearsed failures unless
-    declared.
+    """The thresholds that the section declares, and that of uncertainty by the rehearsed failures unless declared.
 
-    Those are found like the failures that policies are judged by, on other tables. Without a rehearsal no policy queues
-    anything.
+    Without a rehearsal no policy queues anything.
     """
     bald_N = np.array([rehearsal.bald[episode.number] for episode in rehearsal.failures] if rehearsal else [np.inf])
     attempts = recovery["loop"]["budget"]
@@ -123,10 +121,7 @@ def summary(means: Means, explainers: LoopExplainers) -> dict:
 
 
 class ClassifierLearner:
-    """Treats what the classifier names; its doubt is BALD.
-
-    The explainer is fitted, and able to learn further labels; it is not changed.
-    """
+    """Treats what a fitted classifier, which is not changed but learns labels in a copy, names; its doubt is BALD."""
 
     def __init__(
         self, explainer: Any, queued: Registrations, judged: Registrations, treatments: Mapping[str, str]
@@ -149,11 +144,7 @@ class ClassifierLearner:
 
 
 class ChancesLearner:
-    """Takes the action that is worth most; its doubt is how little the best one may help.
-
-    Of each queued case the first of its trials tells what was known at its start, as do the features of the failures
-    that it is judged by.
-    """
+    """Takes the action that is worth most by what was known at the start; it doubts where the best may not help."""
 
     def __init__(
         self, trials: Sequence[Sequence[Trial]], judged_N_F: Sequence[np.ndarray], costs: Mapping[str, float]
@@ -191,10 +182,7 @@ def learners_of(
     explainers: LoopExplainers,
     budget: int,
 ) -> dict[str, Callable[[], QueueLearner]]:
-    """The makers of the learners, for those of these policies that queue cases or learn from rehearsals.
-
-    The queued cases are the failures of the rehearsal, which is None where no policy learns; others are judged.
-    """
+    """The makers of the learners, for those of these policies that queue rehearsed failures or learn from them."""
     if rehearsal is None:
         return {}
     queued = rehearsal.failures
@@ -224,8 +212,7 @@ def error_by_labels(
 ) -> pd.DataFrame:
     """A row per learner, order and number of labels: how many of the judged failures its first action leaves.
 
-    Learners have no label learned when made; of each judged failure, `solved` says whether each action solves it. The
-    axes name the random orders of the queued cases.
+    `solved` says of each whether each action solves it; the axes name the random orders of the queued cases.
     """
     import pandas as pd
 

@@ -101,8 +101,8 @@ def reenact_all(
 ) -> tuple[Reenactments, np.ndarray, np.ndarray]:
     """Return the re-enactments of every row, the seconds (S,) that each took, and those of its registrations.
 
-    Of the causes it reads both clouds, the initial pose and what registrations found. `truth` says how counterfactuals
-    are registered, and the limits of the states; rows come from whole objects where no other world is given.
+    Of the causes it reads both clouds, the initial pose and what registrations found; rows are of whole objects by
+    default.
     """
     rows, seconds, icp_seconds = [], [], []
     for row in progress(range(len(causes)), f"re-enactments of {source}, seed {seed}"):

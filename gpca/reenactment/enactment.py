@@ -153,10 +153,7 @@ class Enactment:
 def reenact(
     pair: ObservedPair, settings: ReenactmentSettings, truth: CauseSettings, surface: ModelSurface | None = None
 ) -> list[Enactment]:
-    """Find hypotheses of the true pose and enact each, the most probable first.
-
-    `truth` says how counterfactuals are registered; what it says of candidates is not read.
-    """
+    """Find hypotheses of the true pose and enact each, the most probable first."""
     surface = surface or ModelSurface(pair.model)
     before = transform(pair.T_init, pair.observed)
     T_found_n = pair.T_runs @ inverse(pair.T_init)
@@ -190,11 +187,7 @@ def register(
     truth: CauseSettings,
     misses: bool = False,
 ) -> Enactment:
-    """Register every subset of a candidate's causes; what cannot be registered is as wrong as can be.
-
-    Args:
-        errors, misses: as for :class:`gpca.causes.candidate.Counterfactuals` and its registrar.
-    """
+    """Register every subset of a candidate's causes; what cannot be registered is as wrong as can be."""
     started = perf_counter()
     measured = Counterfactuals(Registrar(candidate, truth, misses), errors, xi_n_6, truth)
     error_8, uncertainty_8 = np.full(len(SUBSETS), LARGEST_ERROR), np.zeros(len(SUBSETS))

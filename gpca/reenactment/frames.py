@@ -81,18 +81,15 @@ class FrameView:
         return self.T_camera_start @ scale_translation(inverse(T), self.known.subject.diameter_m)
 
     def side(self, T: np.ndarray, most_pixels: int) -> tuple[np.ndarray, float]:
-        """Return the points (V, 3), in diameters, that the camera would see under a hypothesis, and the share that was
-        measured.
-        """
+        """Return the points (V, 3), diameters, that the camera would see under a hypothesis, and the share measured."""
         T_camera_object, known = self.T_camera_object(T), self.known
         side = rendered_side(known.mesh, self.camera_3_3, T_camera_object, known.outline_m, most_pixels)
         seen = self.sighting.measured(side.pixels).mean() if len(side) else 0.0
         return side.points_m / self.known.subject.diameter_m, float(seen)
 
     def candidate(self, T: np.ndarray, random: np.random.Generator) -> Candidate:
-        """Return the pair as a candidate of the truth's, as if a hypothesis were true.
-
-        Where none of its pixels shows the mesh then, nothing can be taken away but the pose error.
+        """Return the pair as a candidate, were a hypothesis true; where no pixel shows the mesh, only its pose is
+        wrong.
         """
         view = clean_view(self.sighting, self.T_camera_object(T), self.known.mesh, self.known.outline_m)
         if view is None:
@@ -166,11 +163,10 @@ def reenact_frames(
     settings: ReenactmentSettings,
     truth: CauseSettings,
 ) -> Reenactments:
-    """Return the re-enactments of every row, which starts and meshes are of as in
-    :func:`gpca.causes.frames.measure_frames`.
+    """Return the re-enactments of every row that :func:`gpca.causes.frames.measure_frames` made of these starts.
 
     Of the instances it reads pixels, camera and what the dataset says of symmetries; of the causes, both clouds, the
-    initial pose and what registrations found. Raises InputError where the starts are of other rows.
+    initial pose and what registrations found.
     """
     registrations = causes.registrations
     of_object = instances.object_index[starts.instance] if len(starts) == len(causes) else np.array([])

@@ -91,10 +91,8 @@ def find_hypotheses(
 ) -> list[Hypothesis]:
     """Return the probable hypotheses, the best first.
 
-    Args:
-        observed: (N, 3) before the registration, in the model's frame.
-        T_found_n: (n, 4, 4) poses that registrations ended at.
-        evidence: what else speaks for a pose, such as what a camera saw around the points.
+    Of points (N, 3) before the registration, in the model's frame, and of poses (n, 4, 4) that registrations ended at.
+    Evidence is what else speaks for a pose, such as what a camera saw around the points.
     """
     few, few_model = observed[np.sort(random.permutation(len(observed))[:FITTED])], surface.points[:FITTED_MODEL]
     few_spacing = surface.spacing * np.sqrt(len(surface.points) / len(few_model))

@@ -202,11 +202,7 @@ CELL = 0.15  # diameters; edge of the cubes that the model's points are sorted i
 
 @dataclass(frozen=True)
 class Anchor:
-    """A prior of a pose: normal around the identity, of the angle (radians) and the length per axis.
-
-    It acts as six points that stay where they are, so many that they hold the pose as firmly (:meth:`arm`), times a
-    factor.
-    """
+    """A normal prior of a pose around the identity, per axis, held by six points that stay, times `strength`."""
 
     rotation_rad: float
     translation: float

@@ -28,11 +28,7 @@ from gpca.seeds import generator
 def ask_oracles(
     objects: ObjectClouds, causes: Causes, source: str, seed: int, settings: ReenactmentSettings, truth: CauseSettings
 ) -> dict[str, Attribution]:
-    """Diagnose every row by a re-enactment, for each thing that it may know (:data:`gpca.reenactment.settings.KNOWN`).
-
-    `truth` says how counterfactuals are registered, and how the rows were drawn. Raises InputError where they were
-    drawn from other objects or with other settings.
-    """
+    """Diagnose every row by re-enactments that know more or less (:data:`gpca.reenactment.settings.KNOWN`)."""
     scores: dict[str, list[np.ndarray]] = {name: [] for name in KNOWN}
     for row in progress(range(len(causes)), f"oracles of {source}, seed {seed}"):
         pair = observed_pair(causes, row, source, seed, "reenactment")
@@ -82,12 +78,7 @@ def informed(
     """Return a rebuilt candidate with the truth about noise or overlap, or both, in the place of what was estimated.
 
     A cause that was not applied is none then. Surface that was missing is as noisy as the truth says, where that is
-    known, else as the rest was found to be.
-
-    Args:
-        rebuilt: of :func:`gpca.reenactment.enactment.rebuild`: the observed points come first.
-        T_model_true: 4×4, where the hypothesis puts what truly lies in the model: the identity if it is right.
-        true: the candidate that was observed.
+    known, else as the rest was found to be. The pose takes what truly lies in the model to where the hypothesis has it.
     """
     kept, hidden = true.seen, true.seen[:0]  # the rows that were observed, and those that overlap took away
     if true.applied[OVERLAP]:

@@ -36,10 +36,8 @@ def reenact_scans(
 ) -> Reenactments:
     """Return the re-enactments of every row; of the causes it reads what may be observed.
 
-    Args:
-        causes, error_factor_S: as :func:`gpca.causes.scans.measure_scans` returns them; the second says what fails.
-        T_found_S: (k, 4, 4) for each row, where else the source may belong: what global methods found takes it there
-            from where the registration began.
+    The factors turn distances into errors. Found poses (k, 4, 4) of each row are where else the source may belong: what
+    global methods found takes it there from where the registration began.
     """
 
     def world(pair: ObservedPair, row: int) -> list[Enactment]:
@@ -74,11 +72,7 @@ def reenact_scan(
 
 
 def cropped(hypothesis: Hypothesis, before: np.ndarray, surface: ModelSurface, scale: NoiseScale) -> ScanCandidate:
-    """Return the pair as a candidate of the truth's, as if a hypothesis were true.
-
-    Where hardly any point is common then, nothing can be cropped. The source (N, 3) lies in the target's frame, as
-    before the registration.
-    """
+    """Return the pair as a candidate, were a hypothesis true; where hardly any point is common, nothing is cropped."""
     points, reach = transform(hypothesis.T, before), REACH * surface.spacing
     common_N, common_M = near(points, surface.points, reach), near(surface.points, points, reach)
     share = float(common_N.mean())

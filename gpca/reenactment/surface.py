@@ -15,7 +15,7 @@ from gpca.alignment.batched_icp import make_target
 from gpca.alignment.icp_kernels import LISTED, nearest
 from gpca.causes.truth import LARGEST_ERROR
 from gpca.objects.bop import find_symmetries
-from gpca.pairs.distances import second_moments
+from gpca.pairs.distances import dots, second_moments
 from gpca.process.compilation import njit
 
 
@@ -80,8 +80,8 @@ class ModelSurface:
         self.centers, axes = _planes(around)
         others, other_axes = _planes(around[:, 1:])
         self.normals, self.tangents = axes[:, :, 0], np.swapaxes(axes[:, :, 1:], 1, 2)
-        own = _dots(self.points - self.centers, self.normals)
-        left_out = _dots(self.points - others, other_axes[:, :, 0])
+        own = dots(self.points - self.centers, self.normals)
+        left_out = dots(self.points - others, other_axes[:, :, 0])
         self.roughness = max(trimmed_square(left_out) - trimmed_square(own), 0.0)
 
     @cached_property
@@ -98,11 +98,12 @@ class ModelSurface:
         rows = rows_M[rows]
         if far.any():
             rows[far] = self.tree.query(points[far])[1]
-        return _dots(points - self.centers[rows], self.normals[rows]), rows
+        return dots(points - self.centers[rows], self.normals[rows]), rows
 
     def distances(self, points: np.ndarray) -> np.ndarray:
-        """Return the distances (N,) of points (N, 3) from the surface: from the plane of the nearest model point, and
-        along it as far as the points' spacing does not reach.
+        """Return the distances (N,) of points (N, 3) from the surface.
+
+        They are from the plane of the nearest model point, and along it as far as the points' spacing does not reach.
         """
         target, _, normals, reach = self._target
         distance_N = np.empty(len(points))
@@ -149,10 +150,6 @@ def _moved(T_n: np.ndarray, points: np.ndarray) -> np.ndarray:
     x, y, z = points.T
     rows = T_n[:, :3, :, None]
     return np.moveaxis(x * rows[:, :, 0] + y * rows[:, :, 1] + z * rows[:, :, 2] + rows[:, :, 3], 1, 2)
-
-
-def _dots(a_N_3: np.ndarray, b_N_3: np.ndarray) -> np.ndarray:
-    return a_N_3[:, 0] * b_N_3[:, 0] + a_N_3[:, 1] * b_N_3[:, 1] + a_N_3[:, 2] * b_N_3[:, 2]
 
 
 DIRECTIONS = 150

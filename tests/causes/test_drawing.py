@@ -45,7 +45,7 @@ def test_training_and_testing_share_no_object(causes):
 def test_refused_candidates_are_counted(drawn):
     causes, tally, seconds = drawn
     for split in ("train", "test"):
-        of_split = {key: count for key, count in tally._counts.items() if key[0] == split}
+        of_split = {key: count for key, count in tally.items() if key[0] == split}
         assert sum(of_split.values()) == causes.candidate[causes.rows(split)].max() + 1
         kept = Counter({key[2:4]: 0 for key in of_split})
         kept.update({(group, several): 0 for *_, group, several, _ in of_split})
@@ -108,7 +108,7 @@ def test_a_candidate_without_a_truth_is_counted_and_lost_to_no_quota(four, monke
     monkeypatch.setattr(Registrar, "run", run)
     causes, tally, _ = draw_causes(four, "four", 100, CauseSettings(**FEW))
     assert len(causes) == FEW["train"] + FEW["test"]
-    assert sum(count for key, count in tally._counts.items() if key[2] == "no correspondences") >= 2
+    assert sum(count for key, count in tally.items() if key[2] == "no correspondences") >= 2
 
 
 def test_symmetric_objects_are_judged_by_the_shape(four, monkeypatch):
@@ -276,8 +276,8 @@ def test_the_group_of_a_failed_sample_has_its_cause():
 def test_the_tally_says_what_became_of_every_candidate(tmp_path):
     tally = Tally()
     for kept in (True, False, False):
-        tally.count("train", "cup", ("pose", True), kept)
-    tally.count("test", "mug", ("no correspondences", False), kept=False)
+        tally["train", "cup", "pose", True, kept] += 1
+    tally["test", "mug", "no correspondences", False, False] += 1
     tally.save(tmp_path / "tally.csv")
     head, *lines = (tmp_path / "tally.csv").read_text().splitlines()
     assert head == "split,object,group,several,kept,refused"
