@@ -43,7 +43,6 @@ class Strategy:
     """A registered strategy.
 
     Attributes:
-        title: in tables and figures.
         choose: called with pool, batch size and generator; may return fewer rows, or repeated ones.
         oracle: whether it reads the true classes.
         needs_scores: whether it reads the classifier's scores.
@@ -111,10 +110,7 @@ def by_scores(method: str) -> Choose:
 
 
 def bald_kmeans(pool: Pool, batch: int, random: np.random.Generator) -> np.ndarray:
-    """Cluster the B·K samples of largest BALD into B clusters of K, and take the one nearest to each centroid.
-
-    The most uncertain of these comes first (Sec. III-C).
-    """
+    """Of B clusters of K samples, those of largest BALD, the nearest to each centroid, most uncertain first (III-C)."""
     candidates = top(pool.bald_N, batch * EXPANSION)
     h_n_d = pool.h_N_d[candidates]
     cluster_n, centers_B_d = balanced_kmeans(h_n_d, batch, random)

@@ -19,19 +19,14 @@ _SHARED = ("setting", "held_out", "labels", *_ACCURACIES)
 TABLE = "active_learning/"  # prefix of the setting in the column `table` of the tidy rows
 RANDOM = "random"  # strategy with which the others are compared, seed by seed
 # Counts that are lower bounds if this share is below 1: they end with the budget.
-CENSORED_BY = {
-    "labels_to_target": "reached",
-    "epochs_to_target": "reached",
-    "epochs_at_target": "reached",
-    "delay": "recognised",
-}
+CENSORED_BY = dict.fromkeys(("labels_to_target", "epochs_to_target", "epochs_at_target"), "reached")
+CENSORED_BY["delay"] = "recognised"
 RECOGNIZED = 0.5  # accuracy on a new concept's test samples from which it counts as recognized
 
 
 def write_curves(
     path: str | Path, curves: dict[tuple[str, str], list[dict[str, float]]], columns: Iterable[str]
 ) -> None:
-    """Write the curves of one source, strategy and seed by setting and held-out concept."""
     import pandas as pd
 
     rows = [
@@ -43,7 +38,6 @@ def write_curves(
 
 
 def read_curves(path: str | Path) -> dict[tuple[str, str], pd.DataFrame]:
-    """Read the curves of :func:`write_curves`."""
     rows = read_csv(path, _SHARED, others=(*POOL_COLUMNS, *STREAM_COLUMNS))
     for column in rows.columns[2:]:
         # Empty are the running accuracy before the first arrival, and accuracies without test samples.
@@ -62,9 +56,7 @@ def collect_curves(files: Iterable[str | Path], target: float) -> pd.DataFrame:
             at_random = baseline.get((setting, held_out))
             if at_random is not None and "area_under_curve" in values and strategy != RANDOM:
                 random_values = pool_metrics(at_random, target)
-                if (
-                    values["labels"] == random_values["labels"]
-                ):  # otherwise, the areas cover different numbers of labels
+                if values["labels"] == random_values["labels"]:  # or the areas cover different numbers of labels
                     values["area_gain"] = values["area_under_curve"] - random_values["area_under_curve"]
             key = (TABLE + setting, source, strategy)
             records += [(*key, metric, held_out, seed, float(value)) for metric, value in values.items()]

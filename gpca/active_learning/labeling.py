@@ -35,10 +35,8 @@ LONGEST_NAME = 200  # characters
 class Queue(Container):
     """S registrations without labels, in the canonical frames and the diameters of their targets.
 
-    Attributes:
-        object_name: (S,) the files, as ``source to target``.
-        h: (S, d) embedding of each aligned source.
-        points, offsets, target_points, target_offsets: the clouds, as in :class:`gpca.pairs.dataset.Registrations`.
+    The `object_name` is that of the files, as ``source to target``; clouds are kept as in
+    :class:`gpca.pairs.dataset.Registrations`, beside the embedding `h` of each aligned source.
     """
 
     remedy: ClassVar[str] = "queue the registrations again"
@@ -77,7 +75,6 @@ def add_to_queue(path: str | Path, aligned: np.ndarray, target: np.ndarray, h_1_
     Args:
         aligned, target: (N, 3) and (M, 3), in the target's canonical frame and diameters.
         h_1_d: (1, d) embedding of the aligned source (:meth:`gpca.model.explainer.Explainer.embed`).
-        name: description in one line.
     """
     path = Path(path)
     one = Queue(
@@ -102,7 +99,7 @@ class LabelFile:
 
     Args:
         path: the file; it need not exist.
-        samples: the samples that may be labeled.
+        samples: those that may be labeled.
     """
 
     def __init__(self, path: str | Path, samples: Mapping[Key, object]) -> None:
@@ -162,12 +159,10 @@ class Session:
     """A growing set of labels and the classifier trained on them; new concepts extend its classes.
 
     Args:
-        h_S_d: embeddings of all samples.
-        keys: split and number of each.
+        h_S_d, keys: embeddings of all samples, split and number of each.
         start: labels before the first question.
         labels: the file of answers; the classifier learns those that it contains at once.
-        settings: training of the classifier.
-        strategy: strategy of :mod:`gpca.active_learning.acquisition` that picks the questions.
+        strategy: of :mod:`gpca.active_learning.acquisition`; it picks the questions.
         gpc: a trained classifier to continue with; then `start` may be empty.
     """
 
@@ -182,11 +177,9 @@ class Session:
         seed: int = 0,
         gpc: GPC | None = None,
     ) -> None:
-        self.keys = keys
-        self.labels = labels
-        self._strategy = strategy
+        self.keys, self.labels, self.h_S_d = keys, labels, h_S_d
+        self._strategy, self._random = strategy, generator("label", seed)
         self._rows = {key: row for row, key in enumerate(keys)}
-        self._random = generator("label", seed)
         self._start = dict(start)
         self._earlier = [] if gpc is None else [gpc.learned_N_d]  # standardized inputs of earlier training
         if gpc is None:
@@ -197,7 +190,6 @@ class Session:
             gpc.fit(h_S_d[[self._rows[key] for key in start]], np.array(list(start.values())), h_S_d)
             gpc.refine()
         self.gpc = gpc
-        self.h_S_d = h_S_d
         self._learned: set[Key] = set()
         self.retrain()
 

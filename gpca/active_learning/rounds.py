@@ -109,10 +109,9 @@ def make_task(
 def initial_gpc(
     task: LabelingTask[np.ndarray], settings: ActiveLearningSettings, *axes: object, classes: tuple[str, ...] = CONCEPTS
 ) -> GPC:
-    """Fit the GPC on the initial labels.
+    """Fit the GPC on the initial labels, with scaling, inducing inputs and lengthscale initialized on the pool too.
 
-    Scaling, inducing inputs and lengthscale are initialized on the unlabeled pool too; otherwise, no inducing input
-    would be near the new concept.
+    Otherwise, no inducing input would be near the new concept.
     """
     gpc = GPC(classes, settings.gpc, *axes, "active_learning", task.held_out)
     around = np.concatenate([task.initial.h, task.pool.h])
@@ -172,7 +171,6 @@ def pool_of(
 
 
 def step_of(task: LabelingTask, gpc: GPC, queried: list[int], epochs: int) -> dict[str, float]:
-    """Return a step of :func:`rounds` after the labels of these rows of the pool."""
     accuracy, accuracy_new = accuracies(task, gpc)
     return {
         "labels": len(queried),
@@ -207,12 +205,7 @@ def answers(concept_N: np.ndarray, classes: tuple[str, ...], share: float, *axes
 
 @dataclass(frozen=True)
 class NewConceptTrial:
-    """A new concept in one embedding.
-
-    Attributes:
-        embedding: its name; ``samples`` are embedded by it.
-        errors: shares of wrong answers of further oracles, besides one without errors.
-    """
+    """A new concept in samples of one embedding, and shares of wrong answers of oracles besides the one without."""
 
     embedding: str
     samples: Embedded

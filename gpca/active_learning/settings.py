@@ -13,12 +13,10 @@ from gpca.settings import Bounds, Count, Different, Distinct, OpenShare, Positiv
 
 @dataclass(frozen=True)
 class ActiveLearningSettings:
-    """Rounds of labeling, equal for every strategy.
+    """Rounds of labeling, equal for every strategy: the budget is L `labels`, of which a round has a B, the `batch`.
 
     Attributes:
         initial: number of initial labels of the other concepts, balanced.
-        labels: L, the budget.
-        batch: B, labels per round.
         iterations, tolerance: largest number of passes over the labels in a retraining, and its convergence.
         gpc: the initial classifier; its kernel and inducing inputs are kept.
     """
@@ -47,8 +45,6 @@ class RetrainingSettings:
     Attributes:
         labels: the budget; the pool may be smaller.
         least: least number of labels, even if the target is reached earlier; later rounds have `late_batch`.
-        batch, late_batch: B, labels per round.
-        gpc: the classifier; by default, the paper's.
     """
 
     labels: Count = 60
@@ -84,7 +80,6 @@ class StreamSettings:
     """Arrivals of a stream and its budget of labels.
 
     Attributes:
-        arrivals: length of the stream.
         quiet: number of arrivals before the new concept, which is a third of the later ones.
         budget: share of labeled arrivals, on average.
         window: number of arrivals for the threshold on BALD and for the running accuracy.
@@ -112,12 +107,10 @@ class NewConceptSettings:
     """New concepts that no encoder was trained on.
 
     Attributes:
-        seeds: number of the run's seeds, from the first.
         embeddings: by an encoder trained on other samples of the source, or on another source; or descriptors of the
             pair.
         errors: shares of wrong answers of the oracle.
         erring: embeddings for which these oracles are asked.
-        points: points per cloud for the descriptors.
         causes: new concepts with measured truth: nominal, or a shape that cannot hold the pose.
         geometry_train, geometry_test: largest number of samples of the latter, beside those of the other causes.
         geometry_candidates: largest number of candidates for them per split.
@@ -144,15 +137,12 @@ class FrameLabelSettings:
     """Learning a new concept on depth frames, where it differs from a concept that is rare on whole objects.
 
     Attributes:
-        seeds: number of the run's seeds that are used, from the first.
         backbones: encoders whose embeddings are learned from, if the depth frames have them.
         held_out: the new concepts, in turn.
         initial: labeled samples of the other concepts before the first query, balanced.
         share: of the new concept in the pool.
-        labels: the budget of queries.
         least: least number of labels, even if all targets are reached earlier.
         targets: accuracies on the test samples to which labels are counted.
-        points: drawn from each cloud to describe a pair.
     """
 
     seeds: Count = 1

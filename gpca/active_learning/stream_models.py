@@ -21,9 +21,8 @@ class Node:
 
     Attributes:
         low_D, high_D: corners of the box.
-        time: time of the split; infinity for leaves.
+        time: of the split; infinity for leaves.
         counts_C: samples per class in a leaf; elsewhere, number of children with the class.
-        axis, place: the split.
         children: below and above the split; None for leaves.
         x_N_D, label_N: samples of a leaf.
     """
@@ -49,10 +48,8 @@ class MondrianForest:
     """
 
     def __init__(self, classes: int, random: np.random.Generator, trees: int) -> None:
-        self._classes = classes
-        self._random = random
+        self._classes, self._random, self._trees = classes, random, trees
         self._roots: list[Node] = []
-        self._trees = trees
 
     def learn(self, x_N_D: np.ndarray, label_N: np.ndarray) -> None:
         """Add samples and their classes to every tree."""
@@ -86,12 +83,9 @@ class MondrianForest:
         return Node(low_D, high_D, time, _tables(lower) + _tables(upper), axis, place, (lower, upper))
 
     def _extended(self, node: Node, earlier: float, x_D: np.ndarray, label: int) -> Node:
-        """Return the node that replaces this one after a new sample.
+        """Return the node that replaces this one after a new sample; the parent's split was earlier.
 
         A leaf of one class stays paused for samples of its class, and is drawn again for others.
-
-        Args:
-            earlier: time of the parent's split.
         """
         if node.children is None:
             return self._block(np.vstack([node.x_N_D, x_D]), np.append(node.label_N, label), earlier)
@@ -137,12 +131,8 @@ def _descend(
     """Add the class probabilities of samples at a node and below it to `total_R_C[rows_N]`.
 
     At every box, a sample may split off with a probability that grows with its distance outside; it then gets the
-    classes of the box mixed with the parent's. The remaining share gets the classes of the leaf.
-
-    Args:
-        earlier: time of the parent's split.
-        parent_C: posterior mean of the parent.
-        staying_N: probability that a sample has not split off above.
+    classes of the box mixed with the parent's, whose posterior mean is `parent_C`. The remaining share gets the classes
+    of the leaf. `staying_N` is the probability that a sample has not split off above.
     """
     discount = DISCOUNT * x_N_D.shape[1]
     lasting = node.time - earlier
@@ -177,7 +167,6 @@ class BayesianLayer:
 
     Args:
         width: F - 1; a constant is added to the features.
-        classes: C.
         deviation: of a logit by the prior, where the features have unit variance.
     """
 
@@ -188,8 +177,17 @@ class BayesianLayer:
 
     def learn(self, x_N_D: np.ndarray, label_N: np.ndarray) -> None:
         """Learn samples and their classes in order."""
-        for features_F, label in zip(_with_constant(x_N_D), label_N, strict=True):
-            self._learn(features_F, int(label))
+        classes, width = self._mean_C_F.shape
+        for features_F, label in zip(_with_constant(x_N_D), map(int, label_N), strict=True):
+            before_C = self._mean_C_F @ features_F
+            towards_P_C = (self._covariance_P_P.reshape(-1, classes, width) @ features_F).reshape(-1, classes)
+            prior_C_C = np.einsum("cfd,f->cd", towards_P_C.reshape(classes, width, classes), features_F)
+            logits_C, curvature_C_C = _settled(before_C, prior_C_C, label)
+            # Gradient of the log likelihood at the new logits.
+            gradient_C = np.eye(classes)[label] - softmax(logits_C)
+            self._mean_C_F = self._mean_C_F + (towards_P_C @ gradient_C).reshape(classes, width)
+            gain_C_C = curvature_C_C @ np.linalg.inv(np.eye(classes) + prior_C_C @ curvature_C_C)
+            self._covariance_P_P -= towards_P_C @ gain_C_C @ towards_P_C.T
 
     def logits(self, x_N_D: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return mean (N, C) and covariance (N, C, C) of the logits."""
@@ -207,18 +205,6 @@ class BayesianLayer:
         mean_N_C, covariance_N_C_C = self.logits(x_N_D)
         root_N_C_C = np.linalg.cholesky(covariance_N_C_C + 1e-9 * np.eye(covariance_N_C_C.shape[1]))
         return summarize_draws(mean_N_C + np.einsum("ncd,md->mnc", root_N_C_C, normal_M_C))
-
-    def _learn(self, features_F: np.ndarray, label: int) -> None:
-        classes, width = self._mean_C_F.shape
-        before_C = self._mean_C_F @ features_F
-        towards_P_C = (self._covariance_P_P.reshape(-1, classes, width) @ features_F).reshape(-1, classes)
-        prior_C_C = np.einsum("cfd,f->cd", towards_P_C.reshape(classes, width, classes), features_F)
-        logits_C, curvature_C_C = _settled(before_C, prior_C_C, label)
-        # Gradient of the log likelihood at the new logits.
-        gradient_C = np.eye(classes)[label] - softmax(logits_C)
-        self._mean_C_F = self._mean_C_F + (towards_P_C @ gradient_C).reshape(classes, width)
-        gain_C_C = curvature_C_C @ np.linalg.inv(np.eye(classes) + prior_C_C @ curvature_C_C)
-        self._covariance_P_P -= towards_P_C @ gain_C_C @ towards_P_C.T
 
 
 def _settled(before_C: np.ndarray, prior_C_C: np.ndarray, label: int) -> tuple[np.ndarray, np.ndarray]:

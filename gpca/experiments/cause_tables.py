@@ -8,11 +8,12 @@ from math import inf
 from typing import TYPE_CHECKING, Any
 
 from gpca.causes.judged import BINS, CEILING, joined, read_judged
+from gpca.causes.settings import CauseSettings
 from gpca.causes.truth import BORDERLINE, NOMINAL
 from gpca.errors import InputError
 from gpca.evaluation.intervals import REPEATS
 from gpca.evaluation.measures import POOLED
-from gpca.experiments.causes_example import draw_causes_example
+from gpca.experiments.cause_figures import draw_causes_example
 from gpca.experiments.confusions import draw_confusions_figure
 from gpca.experiments.diagnosis import CAUSES_FILES, DIAGNOSES, cause_costs, cause_titles
 from gpca.experiments.plan import Run
@@ -58,7 +59,6 @@ COST_NOTE = "Reads: what an explainer sees of a registration. ICP calls: runs be
 
 
 def reads(cost: Mapping) -> tuple[str, str]:
-    """Label of what an explainer sees."""
     return cost["sees"], cost["sees"]
 
 
@@ -92,7 +92,7 @@ def counts_and_calls(costs: Mapping[str, Mapping]) -> Callable[[Row, pd.DataFram
 )
 def causes_example(run: Run, objects_npz, causes_npz, predictions_csv):
     source = run.config["figures"]["source"]
-    truth = run.config["causes"] | {"icp": dict(run.config["registrations"]["icp"])}
+    truth = CauseSettings.from_dict(dict(run.config["causes"]), dict(run.config["registrations"]["icp"]))
     shown = run.source_titles[source], dataset_of(run.config["sources"][source])
     return draw_causes_example(objects_npz, causes_npz, predictions_csv, truth, cause_titles(run.config), *shown)
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from itertools import permutations
 from math import inf
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,7 +17,7 @@ from gpca.evaluation.measures import ALL, intervals, read_all_metrics, source_me
 from gpca.experiments.confusions import draw_confusions_figure
 from gpca.experiments.experiment import Experiment, Tidy
 from gpca.experiments.plan import Run
-from gpca.experiments.result import figure, table
+from gpca.experiments.result import Paths, figure, table
 from gpca.explainers.gpca import GPCA_FORMS
 from gpca.explainers.registry import explainer_entry
 from gpca.reporting.sheet import Sheet, crossed, show
@@ -43,7 +42,7 @@ EXPERIMENT = Experiment(
 )
 
 
-def collect_intervals(prediction_files: Iterable[str | Path], causal_files: Iterable[str | Path] = ()) -> pd.DataFrame:
+def collect_intervals(prediction_files: Paths, causal_files: Paths = ()) -> pd.DataFrame:
     """Accuracies of `metrics.csv` over all seeds, with 95 % intervals (:mod:`gpca.evaluation.measures`).
 
     - accuracy: of all test samples and of each concept; an abstained sample is wrong.
@@ -154,7 +153,6 @@ NOTES = {
     intervals=(collect_intervals, PREDICTIONS),
 )
 def table1_single_baselines(run: Run, intervals):
-    """Accuracy of single-concept attribution (Table I): sources × the paper's explainers."""
     explainers = titles(run)
     columns = {name: show("accuracy", title, where={"method": name}) for name, title in explainers.items()}
     axis = ("source", run.source_titles)
@@ -180,7 +178,6 @@ def table1_single_baselines(run: Run, intervals):
     intervals=(collect_intervals, PREDICTIONS),
 )
 def table2_per_concept(run: Run, intervals):
-    """Accuracy per concept (Table II): sources × GP-CA's settings, by concepts."""
     concepts = [concept for concept in intervals["concept"].unique() if concept != ALL]
     columns = {concept: show("accuracy", concept.capitalize(), concept) for concept in (*concepts, ALL)}
     rows = crossed(("source", run.source_titles), ("method", titles(run)))
@@ -204,7 +201,6 @@ def table2_per_concept(run: Run, intervals):
     metrics=(read_all_metrics, ("metrics.csv", "timings.csv")),
 )
 def table1_extended(run: Run, intervals, metrics):
-    """Every explainer on every source by the metrics that were measured; the best accuracy, oracles apart, is bold."""
     entries = {name: explainer_entry(name) for name in run.section("explainers")}
     table = TableBuilder("table1_extended", {"source": "Dataset", "explainer": "Explainer", "reads": "Reads"})
     for row in crossed(("source", run.source_titles), ("method", titles(run))):
@@ -240,7 +236,6 @@ def table1_extended(run: Run, intervals, metrics):
 
 
 def titles(run: Run) -> dict[str, str]:
-    """Titles of the explainers that are shown."""
     return run.titles(explainer_entry, run.section("explainers"))
 
 
@@ -263,5 +258,4 @@ def repeats(cells: Iterable[Cell]) -> str:
     metrics="metrics.csv",
 )
 def fig_attribution_confusions(run: Run, metrics):
-    """Matrix and predicted classes of each explainer on each source."""
     return draw_confusions_figure(metrics, run.source_titles, titles(run))

@@ -38,11 +38,7 @@ def draw_confusions_figure(metrics: pd.DataFrame, sources: Mapping[str, str], ex
 
     The matrix is the share in % of each true concept that is taken for each concept; what is missing to 100 is
     abstained. The bars are the predicted classes' shares of all test samples, with a dash at the true share; abstained
-    samples have one where any explainer abstains.
-
-    Args:
-        metrics: of :func:`gpca.attribution.metrics.collect`, or of other explainers with the same confusions.
-        sources, explainers: title of each name.
+    samples have one where any explainer abstains. `sources` and `explainers` are titles by name.
     """
     confusions = pooled_confusions(metrics)
     rows = [name for name in explainers if any((source, name) in confusions for source in sources)]
@@ -102,10 +98,7 @@ def pooled_confusions(metrics: pd.DataFrame) -> dict[tuple[str, str], pd.DataFra
 
 
 def counts_and_shares(confusion: pd.DataFrame) -> tuple[np.ndarray, np.ndarray]:
-    """Counts (C, C) of true concepts (rows) that are taken for each concept (columns), and shares of all of the row.
-
-    Abstained samples count in the whole of a row. The shares of a concept without samples are NaN.
-    """
+    """Counts (C, C) of true concepts (rows) that are taken for each (columns), and shares of the row with abstained."""
     counts_C_C1 = confusion.reindex(list(confusion.columns[:-1])).to_numpy(float)
     return counts_C_C1[:, :-1], counts_C_C1[:, :-1] / counts_C_C1.sum(axis=1, keepdims=True)
 

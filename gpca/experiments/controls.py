@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
@@ -17,7 +16,7 @@ from gpca.evaluation.measures import ALL, POOLED, TEST_SAMPLES, intervals, sourc
 from gpca.experiments.experiment import EXPLAINERS, ByName, Experiment, LeftOut
 from gpca.experiments.explained import explainer_settings, require_explained
 from gpca.experiments.plan import Run
-from gpca.experiments.result import numbers
+from gpca.experiments.result import Paths, numbers
 from gpca.experiments.step import Plan, Step, Wildcards
 from gpca.explainers.gpca import GPCA_FORMS
 from gpca.explainers.interface import BARE
@@ -73,7 +72,7 @@ def names(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str
 
 EXPERIMENT = Experiment(
     name="controls",
-    beside=("control_tables", "severity_curves"),
+    beside=("control_tables",),
     sections={"controls": Section},
     names=names,
     check=check,
@@ -167,7 +166,7 @@ EXPLAIN = Step(
 )
 
 
-def read_controls(files: Iterable[str | Path]) -> pd.DataFrame:
+def read_controls(files: Paths) -> pd.DataFrame:
     """Predictions of files named ``…/{source trained on}/seed{seed}.csv``; `source` is the one that is tested.
 
     ``cluster`` names the family with its source. An abstained sample is not ``right``. ``bald`` is NaN where there is
@@ -206,7 +205,7 @@ def auroc_error(rows: pd.DataFrame, score: str, weights_B_N: np.ndarray) -> np.n
 
 
 @numbers("controls.csv", rule="control_metrics", files="controls/{source}/seed{control_seed}.csv")
-def collect(run: Run, files: Iterable[str | Path]) -> pd.DataFrame:
+def collect(run: Run, files: Paths) -> pd.DataFrame:
     """Accuracy, and AUROC of errors by entropy and by BALD, by seed; ``table`` is the control.
 
     ``concept`` is ``all``, and for transfer the source that was trained on.
@@ -230,7 +229,7 @@ Values = dict[str, np.ndarray]  # metric -> values (1 + B,)
 
 
 @numbers("control_intervals.csv", files="controls/{source}/seed{control_seed}.csv")
-def collect_intervals(run: Run, files: Iterable[str | Path]) -> pd.DataFrame:
+def collect_intervals(run: Run, files: Paths) -> pd.DataFrame:
     """Accuracy and AUROC of every control and explainer over all seeds, with differences, by source and over all.
 
     Of transfer there is a row for each source trained on, and one for all others together. Draws of families and seeds

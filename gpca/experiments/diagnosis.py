@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
@@ -21,7 +20,7 @@ from gpca.evaluation.intervals import ANYTHING, UNTRAINED, Clustered
 from gpca.evaluation.measures import ALL, POOLED, Measure, Rivals, compared, intervals, tidy
 from gpca.experiments.experiment import ByName, Experiment, LeftOut, Names
 from gpca.experiments.plan import Run
-from gpca.experiments.result import numbers
+from gpca.experiments.result import Paths, numbers
 from gpca.experiments.step import Step, Wildcards
 from gpca.explainers.interface import BARE, REENACTED, icp_calls
 from gpca.explainers.registry import CAUSES, explainer_entry, explainer_module, explainers, require_settings
@@ -134,9 +133,7 @@ DIAGNOSES = "diagnoses/{source}/{cause_explainer}/seed{seed}.csv"
 @numbers(
     "causes.csv", "cause_intervals.csv", rule="cause_metrics", prediction_files=DIAGNOSES, causes_files=CAUSES_FILES
 )
-def collect(
-    run: Run, prediction_files: Iterable[str | Path], causes_files: Iterable[str | Path]
-) -> tuple[pd.DataFrame, pd.DataFrame]:
+def collect(run: Run, prediction_files: Paths, causes_files: Paths) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Confusions and measures of all test samples by seed, and the measures over all seeds with intervals.
 
     Borderline samples are in no confusion.
@@ -162,9 +159,7 @@ def collect(
     prediction_files="feature_diagnoses/{source}/{feature_explainer}/seed{seed}.csv",
     causes_files=CAUSES_FILES,
 )
-def collect_by_features(
-    run: Run, prediction_files: Iterable[str | Path], causes_files: Iterable[str | Path]
-) -> pd.DataFrame:
+def collect_by_features(run: Run, prediction_files: Paths, causes_files: Paths) -> pd.DataFrame:
     """Measures over all seeds with intervals, of learners that differ in what they read."""
     return compared_by_source(by_source(with_pooled(read_judged(prediction_files, causes_files))))
 
@@ -182,7 +177,6 @@ def with_pooled(judged: dict[tuple[str, str, int], Judged]) -> dict[tuple[str, s
 
 
 def by_source(judged: Mapping[tuple[str, str, int], Judged]) -> dict[str, dict[str, Judged]]:
-    """Samples of all seeds together, by source and explainer."""
     parts: dict[str, dict[str, list[Judged]]] = {}
     for (source, explainer, _), samples in judged.items():
         parts.setdefault(source, {}).setdefault(explainer, []).append(samples)

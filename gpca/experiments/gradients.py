@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,7 +12,7 @@ from gpca.errors import InputError
 from gpca.evaluation.measures import ALL, source_method_seed, tidy
 from gpca.experiments.experiment import Experiment, LeftOut
 from gpca.experiments.plan import Run
-from gpca.experiments.result import figure, numbers, table
+from gpca.experiments.result import Paths, figure, numbers, table
 from gpca.experiments.step import Step
 from gpca.io.arrays import REAL, WHOLE, load_arrays
 from gpca.io.csv_file import read_numbers
@@ -32,7 +31,6 @@ if TYPE_CHECKING:
 
 
 def check(config: dict, _left_out: LeftOut) -> None:
-    """Check that enough points are left for the encoder where most are deleted."""
     encoder = EncoderSettings(**config["encoders"][config["embedding"]["encoder"]])
     if encoder.backbone != "dgcnn":
         return
@@ -88,7 +86,7 @@ TCAV_VALUES = ("score", "chance", "p", "significant", "probe")
     deletions="saliency/{gradient_source}/seed{seed}.csv",
     tests="tcav/{gradient_source}/seed{seed}.csv",
 )
-def collect(run: Run, deletions: Iterable[str | Path], tests: Iterable[str | Path]) -> pd.DataFrame:
+def collect(run: Run, deletions: Paths, tests: Paths) -> pd.DataFrame:
     """Fall of the score by order and share of deleted points, and TCAV's tests, by source and seed."""
     records: list[tuple] = []
     for path in deletions:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import product
 from math import inf
@@ -17,7 +17,7 @@ from gpca.evaluation.measures import ALL, POOLED
 from gpca.experiments.experiment import Experiment, LeftOut
 from gpca.experiments.frame_causes import FEWEST_FAILURES
 from gpca.experiments.plan import Run
-from gpca.experiments.result import figure, numbers, table
+from gpca.experiments.result import Paths, figure, numbers, table
 from gpca.experiments.step import Step
 from gpca.explainers.interface import EMBEDDINGS, REENACTED
 from gpca.explainers.registry import CAUSES, explainer_entry, explainer_module
@@ -90,7 +90,7 @@ SCORE = Step(
 
 
 @numbers("guarantee.csv", rule="guarantee_metrics", score_files="guarantee/{guaranteed}.csv")
-def collect(run: Run, score_files: Iterable[str | Path]) -> pd.DataFrame:
+def collect(run: Run, score_files: Paths) -> pd.DataFrame:
     """Values with 95 % intervals of a bootstrap over families and seeds, from files named ``…/{explainer}.csv``."""
     import pandas as pd
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gpca.causes.judged import CEILING
@@ -12,10 +11,9 @@ from gpca.errors import InputError, require_names
 from gpca.evaluation.measures import source_method_seed, tidy
 from gpca.experiments.experiment import Experiment, LeftOut
 from gpca.experiments.plan import Run
-from gpca.experiments.result import figure, numbers
-from gpca.experiments.step import Plan, Step
-from gpca.io.csv_file import numbers as number_column
-from gpca.io.csv_file import read_csv
+from gpca.experiments.result import Paths, figure, numbers
+from gpca.experiments.step import Step
+from gpca.io.csv_file import read_numbers
 from gpca.settings import Distinct, read_settings
 from gpca.steps.learning_curve import CURVE_COLUMNS, MEASURED, CurveSettings, labeled_samples
 
@@ -34,7 +32,6 @@ class Section(CurveSettings):
 
 
 def check(config: dict, left_out: LeftOut) -> None:
-    """Check the names of the sources, and that there are enough samples."""
     section = config[NAME]
     require_names("learning_curve.sources", section["sources"], config["sources"], "source", left_out("sources"))
     pool = labeled_samples(config["causes"]) + section["further"]
@@ -49,18 +46,12 @@ def without_sources(config: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
-    """Sources, seeds and chunks."""
     settings = read_settings(CurveSettings, without_sources(config))
     return {
         "curve_source": list(config[NAME]["sources"]),
         "curve_seed": list(config["seeds"])[: settings.seeds],
         "chunk": list(range(len(settings.chunks()))),
     }
-
-
-def _drawn(plan: Plan, _wildcards: Any) -> dict[str, Any]:
-    icp = plan.config["registrations"]["icp"]
-    return {NAME: without_sources(plan.config), "causes": plan.config["causes"], "icp": icp}
 
 
 EXPERIMENT = Experiment(
@@ -71,7 +62,11 @@ DRAW = Step(
     run="gpca.steps.learning_curve:learning_samples",
     inputs={"objects": "objects/{source}.npz"},
     outputs={"samples": "learning_samples/{source}/seed{seed}/chunk{chunk}.npz"},
-    settings=_drawn,
+    settings=lambda plan, wildcards: {
+        NAME: without_sources(plan.config),
+        "causes": plan.config["causes"],
+        "icp": plan.config["registrations"]["icp"],
+    },
     priority=5,
 )
 LEARN = Step(
@@ -88,23 +83,21 @@ LEARN = Step(
 )
 
 
-def read_curves(files: Iterable[str | Path]) -> pd.DataFrame:
+def read_curves(files: Paths) -> pd.DataFrame:
     """Read files named ``…/{source}/seed{seed}.csv`` into one frame with the further columns `source` and `seed`."""
     import pandas as pd
 
     curves = []
     for path in files:
         _, source, seed = source_method_seed(path)
-        rows = read_csv(path, CURVE_COLUMNS)
-        columns = {name: number_column(path, rows, name) for name in CURVE_COLUMNS[1:]}
-        curves.append(rows.assign(**columns, source=source, seed=seed))
+        curves.append(read_numbers(path, CURVE_COLUMNS, CURVE_COLUMNS[1:]).assign(source=source, seed=seed))
     if not curves:
         raise InputError("learning curves", "no files were given", "name a source in learning_curve.sources")
     return pd.concat(curves, ignore_index=True)
 
 
 @numbers("learning_curve.csv", rule="learning_curve_metrics", files=FILES)
-def collect(_run: Run, files: Iterable[str | Path]) -> pd.DataFrame:
+def collect(_run: Run, files: Paths) -> pd.DataFrame:
     """Means over the orders; ``concept`` is the number of samples."""
     means = read_curves(files).groupby(["source", "learner", "samples", "seed"], sort=False)[list(MEASURED)].mean()
     records = [
@@ -129,7 +122,6 @@ def collect(_run: Run, files: Iterable[str | Path]) -> pd.DataFrame:
     curves=(read_curves, FILES),
 )
 def learning_curve(run: Run, curves):
-    """Balanced accuracy and regret by number of samples: means over orders and seeds, and their range as a band."""
     from matplotlib.ticker import NullLocator
 
     from gpca.reporting.figures.panels import in_lines, legend_below, panels
@@ -138,13 +130,13 @@ def learning_curve(run: Run, curves):
     lines = {"trees": ("Extremely randomized trees", BLUE), "gpca": ("GP-CA's classifier", ORANGE)}
     rows = {"balanced_accuracy": "balanced accuracy (%)", "regret": "regret (%)"}
     chosen = run.config[NAME]["sources"]
-    titles = {name: title for name, title in run.source_titles.items() if name in chosen}
-    shown = [name for name in titles if (curves["source"] == name).any()]
+    present = set(curves["source"]) & set(chosen)
+    shown = {name: title for name, title in run.source_titles.items() if name in present}
     if not shown:
         raise InputError("learning curves", "have no results for these sources", "run them first")
     page, axes = panels(len(rows), len(shown), 0.6 + 1.5 * len(rows), COLUMN_WIDTH_IN, sharex=True, sharey="row")
     ticks = sorted(curves.loc[curves["learner"] != CEILING, "samples"].unique())
-    for column, source in enumerate(shown):
+    for column, (source, title_of_source) in enumerate(shown.items()):
         curve = curves[curves["source"] == source]
         for row, (metric, label) in enumerate(rows.items()):
             panel = axes[row, column]
@@ -153,14 +145,13 @@ def learning_curve(run: Run, curves):
                 panel.plot(by_size.index, by_size["mean"], "o-", color=color, markersize=3, label=title)
                 panel.fill_between(by_size.index, by_size["min"], by_size["max"], color=color, alpha=0.2, linewidth=0)
             reached = 100 * curve.loc[curve["learner"] == CEILING, metric].mean()
-            truth = "truth from other starts (counterfactual access)"
-            panel.axhline(reached, color=GRAY, linestyle="--", label=truth)
+            panel.axhline(reached, color=GRAY, linestyle="--", label="truth from other starts (counterfactual access)")
             panel.set_xscale("log")
             panel.set_xticks(ticks, [f"{tick:g}" for tick in ticks], rotation=45)
             panel.xaxis.set_minor_locator(NullLocator())
             if column == 0:
                 panel.set_ylabel(label)
-        axes[0, column].set_title(in_lines(titles[source]))
+        axes[0, column].set_title(in_lines(title_of_source))
         axes[-1, column].set_xlabel("training samples")
     legend_below(page, axes[0, 0].get_lines(), columns=1)
     return page

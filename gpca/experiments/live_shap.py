@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from gpca.evaluation.measures import read_all_metrics
 from gpca.experiments.experiment import Experiment
 from gpca.experiments.plan import Run
-from gpca.experiments.result import numbers, table
+from gpca.experiments.result import Paths, numbers, table
 from gpca.experiments.step import Step
 from gpca.explainers.registry import explainer_module
 from gpca.reporting.tables.builder import TableBuilder, crossed
@@ -75,8 +74,7 @@ EXPLAIN = Step(
 
 
 @numbers("live_shap.csv", rule="live_shap_metrics", paths="live_shap/{live_source}/seed{live_seed}.csv")
-def collect(run: Run, paths: Iterable[str | Path]) -> pd.DataFrame:
-    """Rows of all sources and seeds."""
+def collect(run: Run, paths: Paths) -> pd.DataFrame:
     return read_all_metrics(paths)
 
 
@@ -90,7 +88,6 @@ def collect(run: Run, paths: Iterable[str | Path]) -> pd.DataFrame:
     metrics="live_shap.csv",
 )
 def live_shap(run: Run, metrics: pd.DataFrame) -> Table:
-    """How far the values of both ways lie apart, and what they cost: a row per source."""
     sheet = TableBuilder("live_shap", {"source": "Dataset"})
     for (source,), labels in crossed(run.source_titles):
         rows = rows_where(metrics, source=source)

@@ -9,38 +9,21 @@ import numpy as np
 
 from gpca.causes.policy import NOTHING, QUEUE, Decision, RecoveryPolicy
 from gpca.errors import InputError
+from gpca.experiments import registration_stages as stages_of
 from gpca.experiments.experiment import Experiment
 from gpca.experiments.frames import encoder_title
 from gpca.experiments.plan import Run
 from gpca.experiments.recovery_example import short_action
-from gpca.experiments.registration_stages import (
-    FILES,
-    Stages,
-    draw_embedding,
-    draw_scores_with_numbers,
-    severity_text,
-    source_before_icp,
-    title_of_sample,
-)
+from gpca.experiments.registration_stages import FILES, Stages, title_of_sample
 from gpca.experiments.result import figure
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS, SEVERITIES_OF
+from gpca.reporting.figures import style
 from gpca.reporting.figures.cloud_views import draw_clouds, legend_of_clouds, widest_views
 from gpca.reporting.figures.diagram import Canvas
 from gpca.reporting.figures.panels import panels, write_below
-from gpca.reporting.figures.style import (
-    BLACK,
-    BLUE,
-    COLUMN_WIDTH_IN,
-    CONCEPT_COLORS,
-    GRAY,
-    LIGHT_GRAY,
-    SOURCE_COLOR,
-    TARGET_COLOR,
-    TEXT_WIDTH_IN,
-    write_title,
-)
+from gpca.reporting.figures.style import BLUE, CONCEPT_COLORS, GRAY, write_title
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -50,7 +33,8 @@ SECTION = "IV-A Datasets and controlled perturbations"
 CONCEPT = "pose"  # of the sample that Fig. 2 shows, because before and after ICP differ to the eye
 CAPTIONS = {"init": "initial", "icp": "aligned"}
 CONCEPT_TITLES = {"noise": "Noise", "pose": "Pose error", "overlap": "Overlap"}
-THRESHOLD: dict[str, Any] = {"color": BLACK, "linestyle": (0, (3, 2)), "linewidth": 0.8}  # the look of its line
+NO_ACTION = "No action:\n$u$ is that of\na clean pair"
+THRESHOLD: dict[str, Any] = {"color": style.BLACK, "linestyle": (0, (3, 2)), "linewidth": 0.8}  # the look of its line
 
 
 @figure(
@@ -71,18 +55,13 @@ THRESHOLD: dict[str, Any] = {"color": BLACK, "linestyle": (0, (3, 2)), "linewidt
     **FILES,
 )
 def fig2_overview(run: Run, registrations: Path, embeddings: Path, predictions: Path, uncertainties: Path) -> Figure:
-    """Results of all stages for one registration, from its clouds to the decision that follows.
-
-    The figure shows the clouds before and after ICP, the embedding, the scores ± their deviations, BALD among all test
-    samples, and the decision: the action against the named concept, or a question to a person and a new training.
-    """
     treatments = dict(run.config["recovery"]["treatments"])
     stages = Stages.load(registrations, embeddings, predictions, uncertainties, run.config["causes"]["limits"])
     row = stages.choose(CONCEPT, registrations)
     sample = stages.predictions.iloc[row]
     if (named := sample["concept_predicted"]) not in treatments:
         raise InputError("recovery.treatments", f"has no action for '{named}'", "name one in the config")
-    canvas = Canvas(COLUMN_WIDTH_IN, 2.95)
+    canvas = Canvas(style.COLUMN_WIDTH_IN, 2.95)
 
     seen = stages.seen(row)
     corners = np.concatenate([np.concatenate(pair) for pair in seen.values()])
@@ -91,28 +70,35 @@ def fig2_overview(run: Run, registrations: Path, embeddings: Path, predictions: 
         canvas.text(left_in + 0.54, 1.74, f"{CAPTIONS[which]}: {stages.words(row, which)}", va="top")
     canvas.arrow((1.12, 2.24), (1.40, 2.24), words="ICP")
     canvas.arrow((2.52, 2.24), (2.96, 2.24), words=encoder_title(**run.config["embedding"]))
-    draw_embedding(canvas.panel(3.02, 1.86, 0.42, 0.76), stages.h_S_d[row])
+    stages_of.draw_embedding(canvas.panel(3.02, 1.86, 0.42, 0.76), stages.h_S_d[row])
     canvas.text(3.23, 1.74, rf"$\mathbf{{h}} \in \mathbb{{R}}^{{{stages.h_S_d.shape[1]}}}$", va="top")
 
     canvas.box(2.22, 1.14, 1.26, 0.25, "GP classifier", BLUE)
     canvas.arrow((3.23, 1.56), (3.23, 1.39))
     canvas.arrow((2.79, 1.14), (2.79, 0.97))
     scores = canvas.panel(2.58, 0.36, 0.42, 0.56)
-    draw_scores_with_numbers(scores, sample)
+    stages_of.draw_scores_with_numbers(scores, sample)
     canvas.text(2.79, 0.02, r"scores $\hat{s}_c \pm \sqrt{v_c}$", va="bottom")
 
     bald_N = stages.predictions.loc[stages.predictions["split"] == "test", "bald"].to_numpy()
     policy = RecoveryPolicy.of_settings(dict(run.config["recovery"]["thresholds"]), treatments, 1, bald_N)
     limit, action = policy.thresholds.uncertain, decide(stages, row, policy).action
     scores.axvline(policy.thresholds.dominant, **THRESHOLD)
-    _draw_bald(canvas.panel(1.26, 0.36, 0.72, 0.48), bald_N, float(sample["bald"]), limit)
+    axes = canvas.panel(1.26, 0.36, 0.72, 0.48)
+    axes.hist(bald_N, bins=12, color=style.LIGHT_GRAY)
+    axes.axvline(float(sample["bald"]), color=BLUE, linewidth=1.2)
+    axes.axvline(limit, **THRESHOLD)
+    axes.set(yticks=[])
+    axes.set_xlim(left=0)
+    axes.spines["left"].set_visible(False)
+    axes.tick_params(pad=1.5, length=2)
+    axes.locator_params(axis="x", nbins=3)
+    axes.margins(y=0)
     canvas.text(1.58, 0.02, f"BALD: ask above {limit:.2f} nats", va="bottom")
     canvas.arrow((2.2, 0.6), (2.02, 0.6))
     acts, asks = action not in (NOTHING, QUEUE), action == QUEUE
     canvas.arrow((1.22, 0.6), (0.96, 0.6), words="low", color=GRAY if asks else BLUE)
-    follows = f"Act on {named}:\n{short_action(treatments[named])}"
-    if action == NOTHING:
-        follows = "No action:\n$u$ is that of\na clean pair"
+    follows = f"Act on {named}:\n{short_action(treatments[named])}" if action != NOTHING else NO_ACTION
     canvas.box(0.02, 0.32, 0.92, 0.56, follows, CONCEPT_COLORS[named] if acts else GRAY, dashed=asks)
     canvas.arrow((1.62, 0.88), (1.62, 1.08), color=BLUE if asks else GRAY)
     canvas.text(1.66, 0.97, "high", ha="left", va="center")
@@ -121,7 +107,7 @@ def fig2_overview(run: Run, registrations: Path, embeddings: Path, predictions: 
     canvas.arrow((1.92, 1.265), (2.22, 1.265), words="retrain")
 
     write_title(canvas.figure, title_of_sample(run, sample["object"]))
-    for x_in, color, words in ((0.06, TARGET_COLOR, "target"), (0.5, SOURCE_COLOR, "source")):
+    for x_in, color, words in ((0.06, style.TARGET_COLOR, "target"), (0.5, style.SOURCE_COLOR, "source")):
         canvas.dot(x_in, 2.74, color, words)
     return canvas.figure
 
@@ -137,19 +123,6 @@ def decide(stages: Stages, row: int, policy: RecoveryPolicy) -> Decision:
     return policy.decide(np.array([float(sample[f"score_{name}"]) for name in CONCEPTS]), float(sample["bald"]))
 
 
-def _draw_bald(axes, bald_N: np.ndarray, value: float, limit: float) -> None:
-    """Draw the distribution of BALD over the test samples, with the sample's value and the threshold."""
-    axes.hist(bald_N, bins=12, color=LIGHT_GRAY)
-    axes.axvline(value, color=BLUE, linewidth=1.2)
-    axes.axvline(limit, **THRESHOLD)
-    axes.set(yticks=[])
-    axes.set_xlim(left=0)
-    axes.spines["left"].set_visible(False)
-    axes.tick_params(pad=1.5, length=2)
-    axes.locator_params(axis="x", nbins=3)
-    axes.margins(y=0)
-
-
 @figure(
     SECTION,
     "Figure 3: the three concepts",
@@ -163,10 +136,6 @@ def _draw_bald(axes, bald_N: np.ndarray, value: float, limit: float) -> None:
     registrations_file=FILES["registrations"],
 )
 def fig3_concepts(run: Run, objects_file: Path, registrations_file: Path) -> Figure:
-    """Target (vermilion) and perturbed source in its initial pose (blue) of one object, a panel for each concept.
-
-    All panels have one view, which shows the pose error and the cut from the side.
-    """
     objects, registrations = ObjectClouds.load(objects_file), Registrations.load(registrations_file)
     samples = choose_samples(registrations, registrations_file)
     name = str(registrations.object_name[samples["noise"]])
@@ -174,7 +143,7 @@ def fig3_concepts(run: Run, objects_file: Path, registrations_file: Path) -> Fig
         raise InputError(
             objects_file, f"has no object '{name}'", f"regenerate it and {registrations_file} from the same config"
         )
-    sources = {concept: source_before_icp(registrations, sample) for concept, sample in samples.items()}
+    sources = {concept: stages_of.source_before_icp(registrations, sample) for concept, sample in samples.items()}
     row = objects.names.index(name)
     points_shown = max(len(source) for source in sources.values())  # so that both clouds are equally dense
     target = objects.points(row)[:points_shown] / objects.diameters_m[row]
@@ -183,11 +152,11 @@ def fig3_concepts(run: Run, objects_file: Path, registrations_file: Path) -> Fig
     clouds = {concept: (target @ view.T, source @ view.T) for concept, source in sources.items()}
     corners = np.concatenate([np.concatenate(pair) for pair in clouds.values()])
     low, high = corners.min(axis=0), corners.max(axis=0)
-    height_in = TEXT_WIDTH_IN / len(clouds) * (high[1] - low[1]) / (high[0] - low[0]) + 0.45  # title and captions
+    height_in = style.TEXT_WIDTH_IN / len(clouds) * (high[1] - low[1]) / (high[0] - low[0]) + 0.45  # title and captions
     drawing, [drawn] = panels(1, len(clouds), height_in)
     for letter, panel, (concept, (target_view, source_view)) in zip("abc", drawn, clouds.items(), strict=True):
         draw_clouds(panel, target_view, source_view, corners=(low, high))
-        severity = severity_text(registrations, samples[concept], concept)
+        severity = stages_of.severity_text(registrations, samples[concept], concept)
         write_below(panel, f"({letter}) {CONCEPT_TITLES[concept]}: {severity}")
     legend_of_clouds(drawing, "target", "perturbed source, before ICP", gap=0.2)
     write_title(drawing, title_of_sample(run, name))
@@ -240,7 +209,6 @@ def choose_view(target: np.ndarray, sources: dict[str, np.ndarray]) -> np.ndarra
     objects_npz="objects/{source}.npz",
 )
 def objects_of_source(run: Run, objects_npz: Path, source: str) -> Figure:
-    """All objects of one source."""
     from gpca.reporting.figures.contact_sheet import draw_contact_sheet
 
     return draw_contact_sheet(objects_npz, run.source_titles[source], run.datasets[source])

@@ -5,20 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from functools import partial
 from math import inf
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
 from gpca.attribution import diagnostics, weighted
-from gpca.attribution.learner_predictions import (
-    estimates_of_scores,
-    probabilities,
-    read_learner_predictions,
-    scores_of,
-    sets_of,
-    wrong,
-)
+from gpca.attribution import learner_predictions as predicted
 from gpca.encoders.registry import EncoderChanges, require_draws
 from gpca.errors import InputError
 from gpca.evaluation.intervals import Clustered
@@ -26,7 +18,7 @@ from gpca.evaluation.measures import ALL, intervals, tidy
 from gpca.experiments.experiment import ByName, Experiment, LeftOut, Names
 from gpca.experiments.explained import explainer_settings, require_explained
 from gpca.experiments.plan import Run
-from gpca.experiments.result import numbers, table
+from gpca.experiments.result import Paths, numbers, table
 from gpca.experiments.step import Step
 from gpca.explainers.registry import explainer_entry, explainer_module, explainers
 from gpca.pairs.perturbation import Severities
@@ -126,9 +118,7 @@ FIT = Step(
     prediction_files="learners/{source}/{learner}/seed{seed}.csv",
     set_files="shifted/{source}/seed{seed}.npz",
 )
-def collect(
-    run: Run, prediction_files: Iterable[str | Path], set_files: Iterable[str | Path]
-) -> tuple[pd.DataFrame, pd.DataFrame]:
+def collect(run: Run, prediction_files: Paths, set_files: Paths) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Diagnostics of every source, learner and set: by seed, and over all seeds with intervals over families.
 
     In the second frame, means are over samples; areas, calibration errors and correlations are those of each seed.
@@ -137,9 +127,9 @@ def collect(
 
     by_seed, records = [], []
     of_learner: dict[tuple[str, str], list] = {}
-    for (source, learner, seed), rows in read_learner_predictions(prediction_files, set_files).items():
+    for (source, learner, seed), rows in predicted.read_learner_predictions(prediction_files, set_files).items():
         of_learner.setdefault((source, learner), []).append(rows.assign(seed=seed))
-        for name, subset in sets_of(rows).items():
+        for name, subset in predicted.sets_of(rows).items():
             values = correlations(subset)
             if "+" not in name:
                 values |= probability_metrics(subset)
@@ -147,13 +137,13 @@ def collect(
                 values |= bootstrap_bounds(subset, source, seed)
             by_seed += [(TABLE + name, source, learner, metric, ALL, seed, float(v)) for metric, v in values.items()]
     for (source, learner), parts in of_learner.items():
-        for name, subset in sets_of(pd.concat(parts, ignore_index=True)).items():
+        for name, subset in predicted.sets_of(pd.concat(parts, ignore_index=True)).items():
             samples = Clustered.drawn(subset["seed"], clusters_of(subset), "learner intervals", source, name)
-            score_S, wrong_S = subset["max_score"].to_numpy(float), wrong(subset)
+            score_S, wrong_S = subset["max_score"].to_numpy(float), predicted.wrong(subset)
             correlation = partial(_of_rows, weighted.rank_correlation, score_S, subset[DISTANCES[0]].to_numpy(float))
             estimates = {RHO: samples.over_seeds(correlation, (-1, 1))}
             if "+" not in name:
-                estimates |= estimates_of_scores(subset, samples)
+                estimates |= predicted.estimates_of_scores(subset, samples)
                 for area, function in AREAS.items():
                     measure = partial(_of_rows, function, -score_S, wrong_S)
                     estimates[f"{area}_max_score"] = samples.over_seeds(measure, (0, 1))
@@ -169,15 +159,15 @@ def _of_rows(function, first_S: np.ndarray, second_S: np.ndarray, rows: np.ndarr
 def correlations(rows: pd.DataFrame) -> dict[str, float]:
     return {
         f"rho_{score}_{distance}": diagnostics.rank_correlation(rows[score], rows[distance])
-        for score in scores_of(rows)
+        for score in predicted.scores_of(rows)
         for distance in DISTANCES
     }
 
 
 def probability_metrics(rows: pd.DataFrame) -> dict[str, float]:
     """Accuracy, calibration errors, proper scores and the areas under risk and coverage of one set."""
-    p_S_C, target_S = probabilities(rows)
-    wrong_S = wrong(rows)
+    p_S_C, target_S = predicted.probabilities(rows)
+    wrong_S = predicted.wrong(rows)
     values = {
         "accuracy": np.mean(~wrong_S),
         "confidence": p_S_C.max(axis=1).mean(),
@@ -188,7 +178,7 @@ def probability_metrics(rows: pd.DataFrame) -> dict[str, float]:
         "brier": diagnostics.brier_score(p_S_C, target_S),
         "test_samples": len(rows),
     }
-    for score in scores_of(rows):
+    for score in predicted.scores_of(rows):
         for area in AREAS:
             values[f"{area}_{score}"] = getattr(diagnostics, area)(-rows[score].to_numpy(), wrong_S)
     return values
@@ -196,14 +186,14 @@ def probability_metrics(rows: pd.DataFrame) -> dict[str, float]:
 
 def bootstrap_bounds(rows: pd.DataFrame, *axes: object) -> dict[str, float]:
     """Bounds ``…_low`` and ``…_high`` of 95 % of `RESAMPLES` draws of one seed's samples, the same for all learners."""
-    p_S_C, target_S = probabilities(rows)
+    p_S_C, target_S = predicted.probabilities(rows)
     statistics: dict[str, tuple] = {
         "ece": (diagnostics.calibration_error, p_S_C, target_S),
         "nll": (diagnostics.negative_log_likelihood, p_S_C, target_S),
         "brier": (diagnostics.brier_score, p_S_C, target_S),
     }
-    for score in [name for name in scores_of(rows) if name in ("max_score", "bald")]:
-        statistics[f"aurc_{score}"] = (diagnostics.aurc, -rows[score].to_numpy(), wrong(rows))
+    for score in [name for name in predicted.scores_of(rows) if name in ("max_score", "bald")]:
+        statistics[f"aurc_{score}"] = (diagnostics.aurc, -rows[score].to_numpy(), predicted.wrong(rows))
         name = f"rho_{score}_{DISTANCES[0]}"
         statistics[name] = (diagnostics.rank_correlation, rows[score].to_numpy(), rows[DISTANCES[0]].to_numpy())
     bounds: dict[str, float] = {}

@@ -2,30 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from math import inf
-from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from gpca.causes.judged import measure, read_judged
 from gpca.causes.settings import CauseSettings
 from gpca.errors import require_names
 from gpca.evaluation.intervals import REPEATS, Clustered
 from gpca.evaluation.measures import POOLED, intervals
-from gpca.experiments.cause_tables import AGAIN, SECTION, SHOWN
+from gpca.experiments.cause_figures import draw_reenactment
+from gpca.experiments.cause_tables import AGAIN, SECTION, SHOWN, counts_and_calls
 from gpca.experiments.diagnosis import by_source, compared_samples, with_pooled
 from gpca.experiments.experiment import Experiment, LeftOut
 from gpca.experiments.plan import Run
-from gpca.experiments.reenactment_example import draw_reenactment
-from gpca.experiments.result import figure, numbers, table
+from gpca.experiments.result import Paths, figure, numbers, table
 from gpca.experiments.step import Step
 from gpca.objects.entry import dataset_of
 from gpca.pairs.perturbation import NOISE, OVERLAP, POSE
 from gpca.reenactment.settings import EVERYTHING, KNOWN, NOTHING, ReenactmentSettings
-from gpca.reporting.sheet import Row, Sheet, crossed, show
-from gpca.reporting.tables.cells import plain_cell
-from gpca.reporting.tables.table import Cell
+from gpca.reporting.sheet import Sheet, crossed, show
+from gpca.reporting.tables.table import Column
 from gpca.reporting.words import plural
 from gpca.settings import Count, Distinct, read_settings
 
@@ -45,7 +42,6 @@ class Section:
 
 
 def check(config: dict, left_out: LeftOut) -> None:
-    """Check the names of the sources."""
     chosen = config["oracles"]["sources"]
     require_names("oracles.sources", chosen, config["sources"], "source", left_out("sources"))
 
@@ -63,7 +59,7 @@ EXPERIMENT = Experiment(
 )
 ORACLES = Step(
     name="oracles",
-    run="gpca.steps.oracles",
+    run="gpca.steps.causes:oracles",
     inputs={"objects": "objects/{source}.npz", "causes": "causes/{source}/seed{seed}.npz"},
     outputs={"predictions": "oracles/{source}/{*known}/seed{seed}.csv"},
     settings=lambda plan, wildcards: {
@@ -79,9 +75,7 @@ ORACLES = Step(
     prediction_files="oracles/{oracle_source}/{known}/seed{oracle_seed}.csv",
     causes_files="causes/{oracle_source}/seed{oracle_seed}.npz",
 )
-def collect_oracles(
-    run: Run, prediction_files: Iterable[str | Path], causes_files: Iterable[str | Path]
-) -> pd.DataFrame:
+def collect_oracles(run: Run, prediction_files: Paths, causes_files: Paths) -> pd.DataFrame:
     """`MEASURED` by source and by what is known, and differences from the estimate, with intervals."""
     rows: list[tuple] = []
     for source, samples_of in by_source(with_pooled(read_judged(prediction_files, causes_files))).items():
@@ -113,21 +107,11 @@ def in_words(name: str) -> str:
     reenactments_npz="reenactments/{shown_source}/seed{first_seed}.npz",
 )
 def reenactment(run: Run, causes_npz, reenactments_npz):
-    """Hypotheses, rebuilt clouds and errors of a usual case in doubt."""
     source = run.config["figures"]["source"]
     truth = CauseSettings.from_dict(dict(run.config["causes"]), dict(run.config["registrations"]["icp"]))
     settings = read_settings(ReenactmentSettings, dict(run.config["diagnosis"]["reenactment"]))
     shown = run.source_titles[source], dataset_of(run.config["sources"][source])
     return draw_reenactment(causes_npz, reenactments_npz, truth, settings, *shown)
-
-
-def _gain(metric: str, limit: float = 100.0):
-    return show(metric, "Over the estimate (points)", where={"against": "estimate"}, limits=(-limit, limit))
-
-
-def _counts(row: Row, subset: pd.DataFrame) -> dict[str, Cell]:
-    samples = int(subset["samples"].max())
-    return {"samples": plain_cell(samples, int(subset["seeds"].iloc[0]), samples)}
 
 
 @table(
@@ -140,22 +124,17 @@ def _counts(row: Row, subset: pd.DataFrame) -> dict[str, Cell]:
     oracles="oracle_intervals.csv",
 )
 def table9_oracle(run: Run, oracles):
-    """What the untrained re-enactment would reach if it knew parts of the truth, pooled and by source."""
     titles = {POOLED: "All together"} | run.source_titles
-    columns = {
-        "balanced_accuracy": SHOWN["balanced_accuracy"],
-        "balanced_accuracy_gain": _gain("balanced_accuracy"),
-        "dominant_accuracy": SHOWN["dominant_accuracy"],
-        "dominant_accuracy_gain": _gain("dominant_accuracy"),
-        "auroc_failed": SHOWN["auroc_failed"],
-        "regret": SHOWN["regret"],
-        "regret_gain": _gain("regret", inf),
-        "false_alarm_rate": SHOWN["false_alarm_rate"],
-        "samples": SHOWN["samples"],
-    }
+    gained = {"balanced_accuracy": 100.0, "dominant_accuracy": 100.0, "regret": inf}  # with the limits of the gain
+    columns: dict[str, Column] = {}
+    for metric in ("balanced_accuracy", "dominant_accuracy", "auroc_failed", "regret", "false_alarm_rate", "samples"):
+        columns[metric] = SHOWN[metric]
+        if limit := gained.get(metric):
+            look: dict[str, Any] = {"where": {"against": "estimate"}, "limits": (-limit, limit)}
+            columns[f"{metric}_gain"] = show(metric, "Over the estimate (points)", **look)
     rows = crossed(("source", titles), ("method", {name: in_words(name) for name in KNOWN} | AGAIN))
     heads = {"source": "Dataset", "known": "Known"}
-    sheet = Sheet("table9_oracle", heads, rows, columns, oracles, more=_counts)
+    sheet = Sheet("table9_oracle", heads, rows, columns, oracles, more=counts_and_calls({}))
     notes = (
         "Known: the hypothesis of the true pose is right; or each observed point is known without its noise, and "
         "how noisy it was; or the surface that was missing is known. The rest is estimated as ever, without any "

@@ -14,8 +14,9 @@ its names is empty. Functions must be importable without heavy packages.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from inspect import cleandoc
+from pathlib import Path
 from typing import Any, TypeVar
 
 from gpca.experiments.experiment import Tidy
@@ -23,6 +24,7 @@ from gpca.reporting.registry import Input, Result
 
 READ_ROWS = "gpca.evaluation.measures:read_rows"
 Given = str | tuple[Callable, str | Sequence[str] | Mapping[str, str]]
+Paths = Iterable[str | Path]  # of files that a function reads
 Function = TypeVar("Function", bound=Callable)
 
 

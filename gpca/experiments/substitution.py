@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,7 +17,7 @@ from gpca.experiments.experiment import EXPLAINERS, ByName, Experiment, LeftOut
 from gpca.experiments.explained import explainer_settings, require_explained
 from gpca.experiments.plan import Run
 from gpca.experiments.registration_methods import missing_methods
-from gpca.experiments.result import numbers, table
+from gpca.experiments.result import Paths, numbers, table
 from gpca.experiments.step import Plan, Step, Wildcards
 from gpca.explainers.registry import explainer_entry, explainer_module
 from gpca.pairs.perturbation import CONCEPTS
@@ -107,7 +106,7 @@ EXPLAIN = Step(
 )
 
 
-def answers(files: Iterable[str | Path]) -> pd.DataFrame:
+def answers(files: Paths) -> pd.DataFrame:
     """Predictions of all files, and whether each is right, and the same as with Monte-Carlo.
 
     A sample without an estimate is wrong. The cluster is the object's family in its source.
@@ -163,7 +162,7 @@ def _by_learned_method(rows: pd.DataFrame) -> Parts:
     rule="exchange_metrics",
     files="exchange/{exchange_source}/seed{exchange_seed}.csv",
 )
-def collect(run: Run, files: Iterable[str | Path]) -> tuple[pd.DataFrame, pd.DataFrame]:
+def collect(run: Run, files: Paths) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Measures by seed, and over all sources and seeds with intervals over families of objects.
 
     ``table`` is the explainer. For one that reads an uncertainty, ``method`` is the estimator and ``concept`` a

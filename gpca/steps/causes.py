@@ -5,7 +5,7 @@ from __future__ import annotations
 from time import perf_counter
 
 from gpca.alignment.icp import ICPSettings
-from gpca.attribution.predictions import read_timings, write_timings
+from gpca.attribution.predictions import read_timings, write_predictions, write_timings
 from gpca.causes.dataset import LABELS, Causes, with_label
 from gpca.causes.settings import CauseSettings, DescriptorSettings
 from gpca.encoders.registry import EncoderSettings
@@ -68,6 +68,21 @@ def reenact(job: Job) -> None:
         write_timings(job.timings, causes.registrations, seconds_S + own_S, icp_seconds_S + own_icp_S)
 
 
+def oracles(job: Job) -> None:
+    """Diagnose test samples by re-enactments that know parts of the truth -> ``oracles/{source}/{known}/seed….csv``."""
+    from gpca.reenactment.oracle import ask_oracles
+
+    settings = read_settings(ReenactmentSettings, job.section("reenactment"))
+    truth = CauseSettings.from_dict(job.section("causes"), job.section("icp"))
+    own = {path.parts[-2]: path for path in job.predictions}
+    with record_provenance(job.predictions, [job.objects, job.causes], job.settings, seed=job.seed):
+        objects = ObjectClouds.load(job.objects, job.source)
+        causes = Causes.load(job.causes, (job.source, job.seed))
+        tested = causes.subset(causes.rows("test"))
+        for name, attribution in ask_oracles(objects, tested, job.source, job.seed, settings, truth).items():
+            write_predictions(own[name], tested.registrations, attribution)
+
+
 def train_on_causes(job: Job) -> None:
     """Train an encoder to tell the labels of causes apart -> its weights and curve, and the embeddings of all samples.
 
@@ -111,10 +126,8 @@ def model(job: Job) -> None:
 
     inputs = [job.registrations, job.encoder, job.embeddings, *job.causes, *job.reenactments]
     with record_provenance([job.out], inputs, job.settings, seed=job.seed):
-        sets = []
-        for causes_file, reenactments_file in zip(job.causes, job.reenactments, strict=True):
-            causes = Causes.load(causes_file)
-            sets.append(TrainingSet.of(causes, Reenactments.load(reenactments_file, causes.registrations)))
+        loaded = [(Causes.load(path), enacted) for path, enacted in zip(job.causes, job.reenactments, strict=True)]
+        sets = [TrainingSet.of(each, Reenactments.load(enacted, each.registrations)) for each, enacted in loaded]
         icp, own = job.section("registrations").get("icp", {}), job.section("model")
         diagnoser, bald_N = learn(
             TrainingSet.joined(sets),

@@ -57,13 +57,12 @@ class ControlSettings:
     """The controls, and their sizes.
 
     Attributes:
-        controls: their names.
         encoders: other ways to train GP-CA's encoder, compared on training objects and on unseen ones.
         encoder_seeds: how many of `seeds`, from the first, train more encoders than those of `OF_EVERY_SEED`.
         seeds: how many of the run's seeds are used, from the first.
         draw_points: range of the random number of points of a cloud where density is matched.
-        folds: the number of folds of a source's objects, of which one is unseen.
-        bins: the number of equally wide bins of each severity.
+        folds: of a source's objects, of which one is unseen.
+        bins: of each severity, equally wide.
     """
 
     controls: Distinct[Control] = ("density", "unseen_objects", "label_noise_30", "shuffled", "transfer")
@@ -122,8 +121,7 @@ def variant(
 def thinned(registrations: Registrations, points: tuple[int, int], *axes: object) -> Registrations:
     """Registrations with a random number of points of each source cloud, whatever its concept.
 
-    A fixed number of points makes a cropped cloud denser than the others, and all points make it the smallest; a random
-    number hides both.
+    A fixed number makes a cropped cloud denser than the others, and all points make it the smallest.
     """
     clouds, targets = [], []
     for row in range(len(registrations)):
@@ -218,9 +216,8 @@ def encode(
 ) -> tuple[dict[str, np.ndarray], list[dict[str, float]]]:
     """Arrays of embeddings by an encoder that is trained like the paper's except for the control, and its curve.
 
-    With matched density every draw from a cloud has a random number of points; the clouds are whole, as each epoch
-    draws anew. An encoder for unseen objects, or one that is trained in another way, sees no sample of them. Hard
-    samples are of unseen objects already.
+    With matched density every draw from a cloud, which is whole, has a random number of points. An encoder for unseen
+    objects, or one that is trained in another way, sees no sample of them. Hard samples are of unseen objects already.
     """
     from gpca.encoders.training import embed, train_encoder
 

@@ -40,7 +40,6 @@ Attach = Callable[[Registrations], Registrations]
 
 
 def explain(job: Job) -> None:
-    """Let every explainer learn and explain under the paper's protocol and under each control."""
     rivals = make_rivals(job.section("explainers"), job.source, job.seed)
     settings = read_settings(samples.ControlSettings, job.section("controls"))
     encoder = EncoderSettings(**job.section("encoder"))

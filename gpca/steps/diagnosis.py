@@ -51,10 +51,7 @@ def diagnose(job: Job) -> None:
 
 
 def diagnose_by_features(job: Job) -> None:
-    """Let learners that see more and more of a pair learn and explain, seed by seed -> their predictions.
-
-    One job has all of a source, since each learner takes less time than a job needs to start.
-    """
+    """Let learners that see more and more of a pair learn and explain, seed by seed -> their predictions."""
     remedies = DescriptorSettings(**job.section("descriptors"))
     own = {(path.parts[-2], seed_of_file(path)): path for path in job.predictions}
     with record_provenance(job.predictions, [*job.causes, *job.descriptors], job.settings):
@@ -102,11 +99,7 @@ def explained(
 ) -> Attribution:
     """Let an explainer learn from the training rows and explain all, and count the runs of ICP that it needs.
 
-    Args:
-        registrations: with labels, and with what it reads attached.
-        causes, path: these registrations, and their file.
-        remedies: the settings of the registrations with remedies.
-        reenactment: those of the re-enactments, if it may see them.
+    The registrations have labels, and what it reads attached; `causes`, of the file `path`, are the same ones.
     """
     explainer.fit(registrations.subset(training_rows(registrations, path)))
     starts = causes.T_target_source_runs.shape[1]
@@ -153,22 +146,11 @@ class World(ABC):
         self._descriptors = DescriptorSettings(**job.section("descriptors"))
         calls = ReenactmentSettings(**job.section("reenactment")).calls(starts)
         self._calls = partial(icp_calls, starts=starts, descriptors=self._descriptors, reenactment=calls)
-        self._from_objects: dict[str, list[Registrations]] = {}
         self._prepared: dict[tuple[str, bool], list[tuple[Registrations, Registrations]]] = {}
 
     @abstractmethod
     def _read(self, reads: str) -> Registrations:
         """Return the registrations with their descriptors or re-enactments attached."""
-
-    def _training_sets(self, entry: ExplainerEntry, reads: str) -> list[Registrations]:
-        """Return the training rows of each source of objects, with what an explainer reads."""
-        if reads not in self._from_objects:
-            parts = []
-            for causes, path in zip(self._files["causes"], self._files[reads], strict=True):
-                registrations = with_what_it_reads(labeled(Causes.load(causes)), entry, path)
-                parts.append(registrations.subset(training_rows(registrations, causes)))
-            self._from_objects[reads] = parts
-        return self._from_objects[reads]
 
     def _sets(self, entry: ExplainerEntry, from_objects: bool = True) -> list[tuple[Registrations, Registrations]]:
         """Return what an explainer learns from, and the registrations it is asked about; the same twice if not objects.
@@ -178,7 +160,10 @@ class World(ABC):
         reads = entry.reads if entry.reads in (EMBEDDED, REENACTED) else DESCRIBED
         if (reads, from_objects) not in self._prepared:
             entry = explainer_entry("gpca_pair", CAUSES) if reads == DESCRIBED else entry
-            learned = self._training_sets(entry, reads) if from_objects else []
+            learned = []
+            for path, read in zip(self._files["causes"], self._files[reads], strict=True) if from_objects else ():
+                registrations = with_what_it_reads(labeled(Causes.load(path)), entry, read)
+                learned.append(registrations.subset(training_rows(registrations, path)))
             asked = self._embedded(learned) if reads == EMBEDDED else [self._read(reads)]
             if reads != EMBEDDED and from_objects:
                 learned = [Registrations.joined(learned)]
@@ -210,12 +195,7 @@ class World(ABC):
 
 
 class FramesToExplain(World):
-    """Registrations of frames to be explained; see :class:`World`.
-
-    Args:
-        enacted: the re-enactments of the frames.
-        learned: files of all sources, by what explainers read.
-    """
+    """Registrations of frames to be explained, and their re-enactments; see :class:`World`."""
 
     def __init__(self, job: Job, causes: Causes, enacted: Path | None, learned: dict[str, list[Path]]) -> None:
         super().__init__(job, learned, labeled(causes), causes.T_target_source_runs.shape[1])

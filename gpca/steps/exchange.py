@@ -48,11 +48,9 @@ class ExchangeSettings:
     """The methods and estimators, and the numbers of registrations.
 
     Attributes:
-        seeds: how many of the run's seeds are used, from the first.
         methods: registration methods, each used for training and for test registrations in turn.
         train, test: registrations of each source and seed, by each of them, at most.
         points: of source and of target that are registered, at most.
-        estimators: of the covariance, each in place of Monte-Carlo.
         estimated_train: training registrations whose covariance is estimated, and as many others from which estimators
             learn, at most.
         estimated_test: test registrations that are explained by their uncertainty, at most.
@@ -69,7 +67,6 @@ class ExchangeSettings:
 
 
 def run(job: Job) -> None:
-    """Train every explainer, and let it explain, with each method and each estimator, seed by seed."""
     from gpca.encoders.training import embed, load_model
 
     for name in job.section("explainers"):
@@ -110,7 +107,6 @@ class Exchange:
 
     Attributes:
         methods, estimators: name -> settings.
-        uncertainty: floor, points and spread of the starts, of the estimators.
         rivals: by name. Those that read an uncertainty get each estimator's, the others each method's registrations.
         embed: registrations and the name of their source -> embeddings and logits of the head by the run's encoder.
     """
@@ -125,7 +121,7 @@ class Exchange:
     embed: Embed
 
     def run(self, registrations: Registrations, judges: Judges) -> pd.DataFrame:
-        """Predictions of each explainer on the test samples by each method or estimator: `LABELS`, ..., `FAILURE`.
+        """Predictions of each explainer on the test samples: `LABELS`, the columns of a prediction file, `FAILURE`.
 
         For methods, ``learnt_from`` registered the training pairs and ``asked_of`` the test pairs; for estimators they
         are equal.

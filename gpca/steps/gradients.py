@@ -50,7 +50,7 @@ class GradientSettings:
 
     Attributes:
         samples: test samples of each source and seed whose points are deleted, balanced; all where there are fewer.
-        deleted: shares of a cloud's points that are deleted.
+        deleted: shares of a cloud's points.
         vectors: number of concept vectors of each concept, and of random ones.
         level: TCAV's level of significance, over all its tests of a source and seed.
     """
@@ -62,7 +62,6 @@ class GradientSettings:
 
 
 def run(job: Job) -> None:
-    """Fit GP-CA, delete points and test concepts, seed by seed."""
     from gpca.classifier.gpc import GPC
     from gpca.encoders.training import load_model
 
@@ -121,12 +120,11 @@ def saliencies(points_N_3: np.ndarray, gradient_N_3: np.ndarray) -> dict[str, np
 def orders(salient: Mapping[str, np.ndarray], *axes: object) -> dict[str, list[np.ndarray]]:
     """Orders (N,) in which points are deleted, by name; several random ones."""
     by_length = np.argsort(-salient[GRADIENT], kind="stable")
-    n = len(by_length)
     return {
         GRADIENT: [by_length],
         CENTER: [np.argsort(-salient[CENTER], kind="stable")],
         LEAST: [by_length[::-1]],
-        RANDOM: [generator(*axes, "deleted", again).permutation(n) for again in range(RANDOM_ORDERS)],
+        RANDOM: [generator(*axes, "deleted", again).permutation(len(by_length)) for again in range(RANDOM_ORDERS)],
     }
 
 

@@ -8,7 +8,7 @@ frames' causes.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -50,48 +50,17 @@ class Pool:
 
     Attributes:
         registrations: with their labels, and all inputs of explainers attached.
-        source, seed, split, sample, state: (N,) as in the files of causes.
+        samples: them as they are scored, without scores.
         part: (N,) of the family; models are trained on one part each.
     """
 
     registrations: Registrations
-    source: np.ndarray
-    seed: np.ndarray
-    split: np.ndarray
-    sample: np.ndarray
-    state: np.ndarray
+    samples: Scored
     part: np.ndarray
 
-    @property
-    def family(self) -> np.ndarray:
-        """(N,) family of shapes."""
-        return self.registrations.cluster
-
-    @property
-    def severity(self) -> np.ndarray:
-        """(N,) the largest severity of any cause, as a share of the most in any sample."""
-        each_N_4 = np.column_stack([getattr(self.registrations, name) for name in SEVERITIES])
-        return (each_N_4 / np.maximum(each_N_4.max(axis=0), 1e-12)).max(axis=1)
-
-    def scored(self, rows: np.ndarray, model: str, seen_N: np.ndarray, scores_N_4: np.ndarray) -> Scored:
-        """Scores that a model gave some rows.
-
-        Args:
-            rows: (n,) row numbers. seen_N, scores_N_4: of these rows.
-        """
-        names = zip(self.split[rows], self.sample[rows], strict=True)
-        return Scored(
-            model=np.full(len(rows), model),
-            source=self.source[rows],
-            seed=self.seed[rows],
-            sample=np.array([f"{split} {number}" for split, number in names]),
-            family=self.family[rows],
-            state=self.state[rows],
-            seen=seen_N,
-            severity=self.severity[rows],
-            weight=np.ones(len(rows)),
-            scores=scores_N_4,
-        )
+    def scored(self, rows: np.ndarray, model: str, seen_n: np.ndarray, scores_n_4: np.ndarray) -> Scored:
+        """Scores that a model gave n rows."""
+        return replace(self.samples.subset(rows), model=np.full(len(rows), model), seen=seen_n, scores=scores_n_4)
 
 
 def read_pool(causes_files: Sequence[Path], descriptors: Sequence[Path], reenactments: Sequence[Path]) -> Pool:
@@ -105,14 +74,26 @@ def read_pool(causes_files: Sequence[Path], descriptors: Sequence[Path], reenact
         registrations, again = labeled(causes), Reenactments.load(enacted, causes.registrations)
         measured = {"verdict": again.verdict, "reenactment": reenactment_features(again)}
         measured |= dict(Descriptors.load(described, causes.registrations).groups)
-        attached = {**registrations.attached, **measured}
-        registrations = replace(registrations, attached=attached).subset(rows)
-        parts.append(registrations)
-        column = {"split": registrations.split, "sample": registrations.sample, "state": state[rows]}
-        columns.append(column | {"source": np.full(len(rows), source), "seed": np.full(len(rows), seed)})
-    registrations = Registrations.joined(parts)
-    whole = {name: np.concatenate([column[name] for column in columns]) for name in columns[0]}
-    return Pool(registrations, **whole, part=parts_of(registrations.cluster, registrations.fold))
+        parts.append(replace(registrations, attached={**registrations.attached, **measured}).subset(rows))
+        keys = _keys(parts[-1].split, parts[-1].sample)  # as in the files; joined samples are numbered anew
+        columns.append((np.full(len(rows), source), np.full(len(rows), seed), keys, state[rows]))
+    registrations, count = Registrations.joined(parts), sum(map(len, parts))
+    source_N, seed_N, sample_N, state_N = (np.concatenate(column) for column in zip(*columns, strict=True))
+    # The largest severity of any cause, as a share of the most in any sample.
+    each_N_4 = np.column_stack([getattr(registrations, name) for name in SEVERITIES])
+    samples = Scored(
+        model=np.full(count, ""),
+        source=source_N,
+        seed=seed_N,
+        sample=sample_N,
+        family=registrations.cluster,
+        state=state_N,
+        seen=np.zeros(count, bool),
+        severity=(each_N_4 / np.maximum(each_N_4.max(axis=0), 1e-12)).max(axis=1),
+        weight=np.ones(count),
+        scores=np.zeros((count, len(LABELS))),
+    )
+    return Pool(registrations, samples, parts_of(registrations.cluster, registrations.fold))
 
 
 def axes_of(registrations: Registrations, path: Path) -> Axes:
@@ -132,7 +113,6 @@ def parts_of(family_N: np.ndarray, fold_N: np.ndarray) -> np.ndarray:
 
 
 def run(job: Job) -> None:
-    """Train every explainer and store its scores."""
     outputs = {path.stem: path for path in job.scores}
     frames = list(zip(job.frame_causes, job.frame_samples, job.frame_predictions, strict=True))
     inputs = [*job.causes, *job.descriptors, *job.reenactments, *job.diagnoses, *sum(frames, ())]
@@ -171,14 +151,12 @@ def scored_as_is(pool: Pool, prediction_files: Sequence[Path]) -> Iterator[Score
     """
     for path in prediction_files:
         source, seed = path.parts[-3], seed_of_file(path)
-        rows = np.flatnonzero((pool.source == source) & (pool.seed == seed))
-        predictions = read_predictions(path)
-        predicted = dict(_predicted(predictions))
-        keys = [(split, str(number)) for split, number in zip(pool.split[rows], pool.sample[rows], strict=True)]
+        rows = np.flatnonzero((pool.samples.source == source) & (pool.samples.seed == seed))
+        predicted, keys = _predicted(read_predictions(path)), pool.samples.sample[rows].tolist()
         if missing := [key for key in keys if key not in predicted]:
-            raise InputError(path, f"lacks the {missing[0][0]} sample {missing[0][1]}", "regenerate it")
-        scores_N_4 = np.array([predicted[key] for key in keys]).reshape(-1, len(LABELS))
-        yield pool.scored(rows, f"seed {seed}", pool.split[rows] == "train", scores_N_4)
+            raise InputError(path, "lacks the {} sample {}".format(*missing[0].split()), "regenerate it")
+        scores_n_4 = np.array([predicted[key] for key in keys]).reshape(-1, len(LABELS))
+        yield pool.scored(rows, f"seed {seed}", np.array([key.startswith("train") for key in keys]), scores_n_4)
 
 
 def scored_on_frames(frames: Sequence[tuple[Path, Path, Path]], name: str, as_is: Sequence[Scored]) -> Iterator[Scored]:
@@ -193,12 +171,12 @@ def scored_on_frames(frames: Sequence[tuple[Path, Path, Path]], name: str, as_is
     for causes_file, sample_file, prediction_file in frames:
         causes, samples = Causes.load(causes_file), read_csv(sample_file, FRAME_COLUMNS, others=ANY)
         predictions = read_predictions(prediction_file, labels=("explainer",))
-        predicted = dict(_predicted(predictions[predictions["explainer"] == name]))
+        predicted = _predicted(predictions[predictions["explainer"] == name])
         registrations, state = causes.registrations, states_of(causes.truth)
         _, seed = axes_of(registrations, causes_file)
         numbers = registrations.sample.astype(str)
         require_same_samples(sample_file, samples, registrations.arrays, "causes of frames", ("sample",))
-        if predicted and set(predicted) != {("test", number) for number in numbers}:
+        if predicted and set(predicted) != {f"test {number}" for number in numbers}:
             raise InputError(prediction_file, "its samples differ from those of the causes of frames", REGENERATE_BOTH)
         rows = np.flatnonzero((state != BORDERLINE) & (samples["truth"] != BY_ICP).to_numpy())
         if not (predicted and as_is and len(rows)):
@@ -219,12 +197,16 @@ def scored_on_frames(frames: Sequence[tuple[Path, Path, Path]], name: str, as_is
             seen=np.zeros(len(rows), bool),
             severity=np.zeros(len(rows)),
             weight=1 / size_K[number_n],
-            scores=np.array([predicted["test", numbers[row]] for row in rows]),
+            scores=np.array([predicted[f"test {numbers[row]}"] for row in rows]),
         )
 
 
-def _predicted(predictions: pd.DataFrame) -> Iterator[tuple[tuple[str, str], np.ndarray]]:
-    """Yield split and number of each sample, and its scores, which are equal where the explainer abstained."""
+def _keys(split_N: Iterable, number_N: Iterable) -> list[str]:
+    return [f"{split} {number}" for split, number in zip(split_N, number_N, strict=True)]
+
+
+def _predicted(predictions: pd.DataFrame) -> dict[str, np.ndarray]:
+    """Split and number of each sample -> its scores, which are equal where the explainer abstained."""
     scores_N_4 = predictions[list(SCORES)].to_numpy(float)
     scores_N_4 = np.where(predictions["abstained"].to_numpy()[:, None], 1 / len(LABELS), scores_N_4)
-    yield from zip(zip(predictions["split"], predictions["sample"], strict=True), scores_N_4, strict=True)
+    return dict(zip(_keys(predictions["split"], predictions["sample"]), scores_N_4, strict=True))

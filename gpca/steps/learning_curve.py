@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -46,12 +46,10 @@ class CurveSettings:
     """The training samples, and the learners of them.
 
     Attributes:
-        seeds: how many of the run's seeds, from the first.
         further: training samples of the same objects that are drawn besides those of the causes, all with a label.
         chunk: how many of them a job draws, at most.
         sizes: numbers of labeled training samples that are learned from.
         orders: number of orders of the samples; a size takes the first samples of each.
-        classifier: of GP-CA.
     """
 
     seeds: Count = 1
@@ -69,12 +67,7 @@ class CurveSettings:
 
 @dataclass(frozen=True)
 class LabeledSamples(Container):
-    """N labeled registrations.
-
-    Attributes:
-        distances, planes, motion, starts: (N, F) groups of descriptors.
-        label: (N,) nominal or the dominant cause.
-    """
+    """N labeled registrations, nominal or with the dominant cause: groups of descriptors (N, F)."""
 
     distances: np.ndarray = array(f"N {WIDTHS['distances']}")
     planes: np.ndarray = array(f"N {WIDTHS['planes']}")
@@ -86,9 +79,6 @@ class LabeledSamples(Container):
     def features(self) -> np.ndarray:
         """All groups side by side (N, F)."""
         return np.hstack([getattr(self, name) for name in GROUPS])
-
-
-Scores = Callable[[LabeledSamples], np.ndarray]  # (N, 4) of the labels
 
 
 def labeled_samples(causes: Mapping[str, Any]) -> int:
@@ -111,9 +101,10 @@ def learning_samples(job: Job) -> None:
 
 def describe(causes: Causes, icp: ICPSettings) -> LabeledSamples:
     """Labels of all rows, and those descriptors that need no further registration."""
-    source, seed = causes.registrations.axes or ("", 0)
     rows: list[tuple[np.ndarray, ...]] = []
-    for row in progress(range(len(causes)), f"descriptors of {source}, seed {seed}"):
+    for row in progress(
+        range(len(causes)), "descriptors of {}, seed {}".format(*(causes.registrations.axes or ("", 0)))
+    ):
         pair = observed_pair(causes, row)  # nothing in these is random
         rows.append((*describe_distances(pair), describe_motion(pair), describe_starts(pair, icp)))
     groups: dict[str, Any] = {name: np.array([row[i] for row in rows]) for i, name in enumerate(GROUPS)}
@@ -142,11 +133,8 @@ def learning_curve(
 ) -> pd.DataFrame:
     """Row of `CURVE_COLUMNS` for each learner, size and order, and one of the truth from other starts.
 
-    An order is a permutation of the pool; a smaller size is part of a larger one in the same order.
-
-    Args:
-        pool: all training samples.
-        tested, truth: the test samples, in the same order.
+    An order is a permutation of the pool; a smaller size is part of a larger one in the same order. The tested samples
+    are those of the truth.
     """
     import pandas as pd
 
@@ -165,32 +153,32 @@ def learning_curve(
     fits = [(name, size, i) for size in sorted(settings.sizes) for i in range(settings.orders) for name in LEARNERS]
     for name, size, i in progress(fits, f"learning curve of {source}, seed {seed}"):
         fit = _fit_trees if name == "trees" else _fit_gpca
-        scores = fit(pool.subset(orders[i][:size]), settings.classifier, source, seed, name, size, i)
-        attribution = Attribution.of_scores(LABELS, scores(tested), seconds=0.0)
+        learned, given = pool.subset(orders[i][:size]), (source, seed, "learning curve", name, size, i)
+        scores_N_4 = fit(learned, tested.features, settings.classifier, *given)
+        attribution = Attribution.of_scores(LABELS, scores_N_4, seconds=0.0)
         judged = judged_by(prediction_frame(truth.registrations, attribution), truth, seed)
         rows.append((name, size, i, *values(judged)))
     return pd.DataFrame(rows, columns=list(CURVE_COLUMNS))
 
 
-def _fit_trees(samples: LabeledSamples, _classifier: GPCSettings, source: str, seed: int, *axes: object) -> Scores:
-    """Extremely randomized trees (Geurts et al. 2006), as in the explainers of descriptors; `axes` name the draws."""
+def _fit_trees(learned: LabeledSamples, tested_N_F: np.ndarray, _settings: GPCSettings, *axes: object) -> np.ndarray:
+    """Scores (N, 4) by extremely randomized trees (Geurts et al. 2006), as in the explainers of descriptors."""
     from sklearn.ensemble import ExtraTreesClassifier
 
     from gpca.explainers.classifiers import ConceptClassifier
 
-    state = seed_of(source, seed, "learning curve", *axes) % 2**32
+    state = seed_of(*axes) % 2**32
     forest = ExtraTreesClassifier(TREES, min_samples_leaf=2, max_features=0.3, random_state=state)
-    fitted = ConceptClassifier(forest, LABELS).fit(samples.features, samples.label)
-    return lambda tested: fitted.scores(tested.features)
+    return ConceptClassifier(forest, LABELS).fit(learned.features, learned.label).scores(tested_N_F)
 
 
-def _fit_gpca(samples: LabeledSamples, classifier: GPCSettings, source: str, seed: int, *axes: object) -> Scores:
-    """The Gaussian process classifier on ranks of the descriptors, as in ``gpca_pair``."""
+def _fit_gpca(learned: LabeledSamples, tested_N_F: np.ndarray, settings: GPCSettings, *axes: object) -> np.ndarray:
+    """Scores (N, 4) by the Gaussian process classifier on ranks of the descriptors, as in ``gpca_pair``."""
     from gpca.classifier.gpc import GPC
     from gpca.explainers.pair_classifier import NormalizedFeatures
 
-    normalized = NormalizedFeatures(source, seed, "learning curve", *axes)
-    normalized.fit(samples.features)
-    gpc = GPC(LABELS, classifier, source, seed)
-    gpc.fit(normalized(samples.features), samples.label)
-    return lambda tested: gpc.attribute(normalized(tested.features))[0]
+    normalized = NormalizedFeatures(*axes)
+    normalized.fit(learned.features)
+    gpc = GPC(LABELS, settings, *axes[:2])
+    gpc.fit(normalized(learned.features), learned.label)
+    return gpc.attribute(normalized(tested_N_F))[0]

@@ -21,7 +21,6 @@ LOOKUP = "shap_additive"  # the compared explainer; its design has the coalition
 
 
 def run(job: Job) -> None:
-    """Explain some test samples both ways, seed by seed."""
     runs = {name: value for name, value in job.section("additive").items() if name != "samples"}
     settings = UncertaintySettings(**runs, icp=ICPSettings(**job.section("icp")))
     samples = job.section("live_shap")["samples"]

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
@@ -42,11 +42,11 @@ class ShiftSettings:
 
     Attributes:
         beyond: how the registrations with larger severities are made; their number is `beyond.test`.
-        encoder: how the encoder that never sees some objects is trained.
+        encoder: the one that never sees some objects.
         samples: the most samples of another source, and of objects that an encoder never saw.
         held_out_share: of the objects, at least one, that this encoder and the learners on it never see.
         train: training samples of that encoder, at most.
-        neighbours: number of nearest training samples in the mean distance.
+        neighbours: nearest training samples in the mean distance.
         shape_points: at which the local shape of a cloud is measured for the distances.
     """
 
@@ -70,7 +70,6 @@ class ShiftSettings:
 
 
 def shift(job: Job) -> None:
-    """Make the sets, seed by seed."""
     from gpca.encoders.training import load_model
 
     settings = ShiftSettings.from_dicts(**job.settings)
@@ -93,7 +92,6 @@ def shift(job: Job) -> None:
 
 
 def fit_learners(job: Job) -> None:
-    """Fit every learner and let it explain, seed by seed."""
     for learner in job.learners:
         if explainer_entry(learner).reads != "embeddings":
             raise InputError(f"learner '{learner}'", "does not read embeddings", "choose another")
@@ -110,15 +108,7 @@ def fit_learners(job: Job) -> None:
 
 
 def predict_sets(make: Callable[[], ConceptExplainer], sets: ShiftedSets) -> pd.DataFrame:
-    """Fit a learner to the training samples of each encoder and let it explain the test samples of its sets.
-
-    Args:
-        make: returns a new learner at every call.
-        sets: the samples.
-
-    Returns:
-        columns of a prediction file, after the column ``set``.
-    """
+    """Predictions, after the column ``set``: a new learner learns from the training samples of each encoder."""
     import pandas as pd
 
     frames = []
@@ -148,17 +138,34 @@ def make_sets(
 ) -> ShiftedSets:
     """Make, embed and measure all sets of one source and seed.
 
+    The sets of unseen objects are those of an encoder that never sees some families: the seed's fold, or a share of
+    all. They are left out where the source has a single family.
+
     Args:
-        objects: of the source.
         registrations: of the source, with the encoder's embeddings attached.
-        other: registrations of another source, whose test samples are the set ``source``; None leaves that set out. The
-            sets of unseen objects are left out where the source has a single family.
-        encoder, encoder_settings: the source's encoder.
+        other: registrations of another source, whose test samples are the set ``source``; None leaves that set out.
     """
+    from gpca.encoders.training import embed, train_encoder
+
     measured = [sets_of_encoder(objects, registrations, other, encoder, encoder_settings, source, seed, settings)]
-    held_out_S = held_out(registrations, settings.held_out_share, source, seed)
+    held_out_S = unseen(registrations.fold, seed)
+    if held_out_S is None:
+        held_out_S = drawn(registrations.cluster, settings.held_out_share, source, seed, "held-out objects")
     if held_out_S.any():
-        parts = _of_unseen_objects(registrations, held_out_S, source, seed, settings)
+        is_train_S = registrations.split == "train"
+        train = np.flatnonzero(~held_out_S & is_train_S)[: settings.train]
+        seen = registrations.subset(np.concatenate([train, np.flatnonzero(~held_out_S & ~is_train_S)]))
+        # Training samples of objects that were held out are as unseen as test samples, which are few.
+        rows = np.concatenate([np.flatnonzero(held_out_S & ~is_train_S), np.flatnonzero(held_out_S & is_train_S)])
+        parts = {"seen_objects": seen, "objects": registrations.subset(rows[: settings.samples])}
+        title = f"{source} without objects"
+        model, _ = train_encoder(seen, title, seed, settings.encoder)
+        for name, part in parts.items():
+            h_S_d, _ = embed(model, part, title, seed, settings.encoder)
+            parts[name] = replace(part, attached={"embedding": h_S_d})
+        # Numbered anew: samples of two splits of the registrations are test samples here.
+        count = len(parts["objects"])
+        parts["objects"] = replace(parts["objects"], split=np.full(count, "test"), sample=np.arange(count))
         measured.append(_measured(parts, source, seed, settings))
     return ShiftedSets.joined(measured)
 
@@ -173,49 +180,17 @@ def sets_of_encoder(
     seed: int,
     settings: ShiftSettings,
 ) -> ShiftedSets:
-    """Make, embed and measure the sets of the source's encoder; arguments as of :func:`make_sets`."""
+    """The sets of the source's encoder; arguments as of :func:`make_sets`."""
     from gpca.encoders.training import embed
 
     beyond, _ = make_registrations(objects, f"{source} severity", seed, settings.beyond)
     parts = {"in_distribution": registrations, "severity": beyond}
     if other is not None:
         parts["source"] = other.subset(other.rows("test")[: settings.samples])
-    for name in [name for name in parts if name != "in_distribution"]:
+    for name in list(parts)[1:]:
         h_S_d, _ = embed(encoder, parts[name], f"{source} {name}", seed, encoder_settings)
         parts[name] = replace(parts[name], attached={"embedding": h_S_d})
     return _measured(parts, source, seed, settings)
-
-
-def held_out(registrations: Registrations, share: float, source: str, seed: int) -> np.ndarray:
-    """Mask of the samples (S,) of families to be held out: the seed's fold, or a share of all; not the only one."""
-    is_unseen = unseen(registrations.fold, seed)
-    if is_unseen is None:
-        is_unseen = drawn(registrations.cluster, share, source, seed, "held-out objects")
-    return is_unseen
-
-
-def _of_unseen_objects(
-    registrations: Registrations, held_out_S: np.ndarray, source: str, seed: int, settings: ShiftSettings
-) -> dict[str, Registrations]:
-    """Samples of seen and of unseen objects, embedded by an encoder that never sees the latter."""
-    from gpca.encoders.training import embed, train_encoder
-
-    is_train_S = registrations.split == "train"
-    train = np.flatnonzero(~held_out_S & is_train_S)[: settings.train]
-    seen = registrations.subset(np.concatenate([train, np.flatnonzero(~held_out_S & ~is_train_S)]))
-    # Training samples of objects that were held out are as unseen as test samples, which are few.
-    rows = np.concatenate([np.flatnonzero(held_out_S & ~is_train_S), np.flatnonzero(held_out_S & is_train_S)])
-    unseen_objects = registrations.subset(rows[: settings.samples])
-    name = f"{source} without objects"
-    model, _ = train_encoder(seen, name, seed, settings.encoder)
-    embedded = [
-        replace(part, attached={"embedding": embed(model, part, name, seed, settings.encoder)[0]})
-        for part in (seen, unseen_objects)
-    ]
-    # Numbered anew: samples of two splits of the registrations are test samples here.
-    count = len(unseen_objects)
-    renamed: dict[str, Any] = {"split": np.full(count, "test"), "sample": np.arange(count)}
-    return {"seen_objects": embedded[0], "objects": replace(embedded[1], **renamed)}
 
 
 def _measured(parts: dict[str, Registrations], source: str, seed: int, settings: ShiftSettings) -> ShiftedSets:
@@ -229,7 +204,7 @@ def _measured(parts: dict[str, Registrations], source: str, seed: int, settings:
     }
     home = next(iter(parts))
     train = parts[home].rows("train")
-    joined = []
+    joined, kept = [], ("split", "sample", "concept", "object_name", "cluster")
     for name, part in parts.items():
         test = np.flatnonzero(part.split == "test")
         distance_S_K = np.zeros((len(part), 2 * len(SPACES)))
@@ -240,10 +215,8 @@ def _measured(parts: dict[str, Registrations], source: str, seed: int, settings:
                 features_N_F, query_S_F = principal_components(features_N_F, query_S_F)
             distance_S_K[test, 2 * i] = knn_distance(features_N_F, query_S_F, settings.neighbours)
             distance_S_K[test, 2 * i + 1] = mahalanobis_distance(features_N_F, query_S_F)
-        kept = ("split", "sample", "concept", "object_name", "cluster")
         columns = {column: getattr(part, column) for column in kept}
-        named = np.full(len(part), name)
-        joined.append(ShiftedSets(set=named, h=part.embedding, distance=distance_S_K, **columns))
+        joined.append(ShiftedSets(set=np.full(len(part), name), h=part.embedding, distance=distance_S_K, **columns))
     return ShiftedSets.joined(joined)
 
 

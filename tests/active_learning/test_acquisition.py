@@ -54,11 +54,6 @@ def test_the_same_generator_gives_the_same_rows(name):
     assert selected(name, make_pool(), 4) == selected(name, make_pool(), 4)
 
 
-@pytest.mark.parametrize("name", ["random", "random_stratified", "bald_stochastic"])
-def test_another_generator_gives_other_rows(name):
-    assert selected(name, make_pool(), 4, seed=1) != selected(name, make_pool(), 4, seed=2)
-
-
 @every_strategy
 @pytest.mark.parametrize("n", [1, 4])
 def test_a_pool_no_larger_than_the_batch_is_taken_whole(name, n):

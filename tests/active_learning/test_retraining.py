@@ -8,7 +8,7 @@ import pytest
 from gpca.active_learning import retraining as module
 from gpca.active_learning.retraining import Retraining, learn
 from gpca.active_learning.rounds import Embedded, make_task
-from gpca.active_learning.settings import LOOK_EVERY, ActiveLearningSettings, RetrainingSettings, rare_setting
+from gpca.active_learning.settings import LOOK_EVERY, ActiveLearningSettings, RetrainingSettings
 from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
 from gpca.pairs.perturbation import CONCEPTS
@@ -132,7 +132,3 @@ def test_bald_is_told_the_classifier_of_each_round(task, cold, monkeypatch):
         gpc = cold.fit(rows, None)
         left = np.setdiff1d(np.arange(len(task.pool)), rows)
         assert np.array_equal(pool.bald_N, gpc.attribute(task.pool.h[left])[2])
-
-
-def test_the_setting_has_the_share_in_percent():
-    assert [rare_setting(share) for share in (0.05, 0.005, 0.3)] == ["rare_5", "rare_0.5", "rare_30"]

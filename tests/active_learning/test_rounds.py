@@ -25,7 +25,6 @@ from gpca.pairs.perturbation import CONCEPTS
 
 QUICK = GPCSettings(learning_rate=0.05, iterations=30, inducing=12, draws=100)
 SETTINGS = ActiveLearningSettings(initial=12, labels=10, batch=4, gpc=QUICK)
-TIMES = ("select_s", "retrain_s")
 
 
 @pytest.fixture(scope="module")
@@ -49,9 +48,8 @@ def task(embedded, gpc):
 
 
 def learned(task, gpc, strategy="bald_kmeans", **changed):
-    """The steps of a run as a column per key, without the times."""
     steps = run_rounds(task, gpc, strategy, dataclasses.replace(SETTINGS, **changed), "tiny", 0)
-    return {name: [step[name] for step in steps] for name in steps[0] if name not in TIMES}
+    return {name: [step[name] for step in steps] for name in steps[0]}
 
 
 def count(samples):
@@ -76,24 +74,6 @@ def test_a_task_deals_out_every_sample_once(embedded, held_out):
     assert count(task.pool) == {concept: 12 if concept == held_out else 6 for concept in CONCEPTS}
 
 
-def test_a_task_does_not_depend_on_those_made_before(embedded):
-    first = make_task(embedded, "noise", SETTINGS, "tiny", 0)
-    for other, seed in (("pose", 0), ("noise", 1)):
-        make_task(embedded, other, SETTINGS, "tiny", seed)
-    again = make_task(embedded, "noise", SETTINGS, "tiny", 0)
-    for part in ("initial", "pool", "test"):
-        assert np.array_equal(getattr(first, part).h, getattr(again, part).h)
-
-
-@pytest.mark.parametrize("held_out, seed", [("noise", 1), ("pose", 0)])
-def test_another_seed_or_concept_labels_other_samples(embedded, held_out, seed):
-    one, other = (
-        make_task(embedded, "noise", SETTINGS, "tiny", 0),
-        make_task(embedded, held_out, SETTINGS, "tiny", seed),
-    )
-    assert rows_of(embedded, one.initial) != rows_of(embedded, other.initial)
-
-
 def test_a_rare_concept_has_its_share_of_the_pool_and_the_others_stay(embedded):
     common = make_task(embedded, "pose", SETTINGS, "tiny", 0)
     rare = make_task(embedded, "pose", SETTINGS, "tiny", 0, new_share=0.25)
@@ -109,11 +89,6 @@ def test_a_rare_concept_has_its_share_as_far_as_there_are_samples(embedded, init
     settings = dataclasses.replace(SETTINGS, initial=initial)
     counted = count(make_task(embedded, "overlap", settings, "tiny", 0, new_share=share).pool)
     assert (counted["noise"] + counted["pose"], counted["overlap"]) == left
-
-
-def test_a_share_that_leaves_no_sample_of_the_concept_is_named(embedded):
-    with pytest.raises(InputError, match="leaves none of"):
-        make_task(embedded, "overlap", SETTINGS, "tiny", 0, new_share=0.01)
 
 
 @pytest.mark.parametrize("initial", [24, 26, 200])
@@ -144,13 +119,7 @@ def test_the_first_classifier_knows_two_concepts_of_three(task, gpc):
 
 @pytest.mark.parametrize(
     "labels, batch, expected",
-    [
-        (8, 4, [0, 4, 8]),
-        (10, 4, [0, 4, 8, 10]),
-        (3, 5, [0, 3]),
-        (40, 10, [0, 10, 20, 24]),
-        (0, 4, [0]),
-    ],
+    [(8, 4, [0, 4, 8]), (10, 4, [0, 4, 8, 10]), (3, 5, [0, 3]), (40, 10, [0, 10, 20, 24]), (0, 4, [0])],
 )
 def test_labels_are_spent_by_the_batch_up_to_the_budget_or_the_pools_end(task, gpc, labels, batch, expected):
     assert learned(task, gpc, "random", labels=labels, batch=batch)["labels"] == expected
@@ -258,20 +227,14 @@ def curves(samples):
 
 
 def test_every_strategy_learns_from_every_oracle_and_all_labels_are_right(curves):
+    labels = [step["labels"] for step in curves["pair", "all_labels"]]
+    assert labels == [0, 36 - 16] and curves["pair", "all_labels"][-1]["accuracy_new"] == 1
+    # All start from the same samples and know nothing of the new concept.
+    assert {(curve[0]["accuracy"], curve[0]["accuracy_new"]) for curve in curves.values()} == {(16 / 18, 0)}
     assert list(curves) == [
         *(("pair", strategy) for strategy in NEW_CONCEPT_STRATEGIES),
         *(("pair_errors_25", strategy) for strategy in NEW_CONCEPT_STRATEGIES[:2]),
     ]
-
-
-def test_all_start_from_the_same_samples_and_know_nothing_of_the_new_concept(curves):
-    assert {(curve[0]["accuracy"], curve[0]["accuracy_new"]) for curve in curves.values()} == {(16 / 18, 0)}
-
-
-def test_the_new_concept_is_learned_with_all_labels_at_once(curves):
-    labels = [step["labels"] for step in curves["pair", "all_labels"]]
-    assert labels == [0, 36 - 16]
-    assert curves["pair", "all_labels"][-1]["accuracy_new"] == 1
 
 
 def test_wrong_answers_are_learned_and_counted_by_what_is_true(samples, curves):
@@ -281,12 +244,6 @@ def test_wrong_answers_are_learned_and_counted_by_what_is_true(samples, curves):
     right = curves["pair", "random"]
     assert [step["new_labels"] for step in wrong] == [step["new_labels"] for step in right]
     assert wrong[-1]["accuracy"] < right[-1]["accuracy"]
-
-
-def test_samples_follow_each_other(samples):
-    both = samples.followed_by(samples)
-    assert len(both.concept) == 108
-    assert both.rows("test").tolist() == [*samples.rows("test"), *(samples.rows("test") + 54)]
 
 
 def test_embeddings_with_an_erring_oracle_are_among_those_that_are_tried():
@@ -309,20 +266,10 @@ def test_that_share_of_the_answers_is_wrong(truth, share, wrong):
     named = answers(truth, NAMED, share, "tiny", 0)
     assert np.sum(named != truth) == wrong
     assert set(named.tolist()) <= set(NAMED)
-
-
-def test_every_other_concept_is_named_by_mistake(truth):
-    named = answers(truth, NAMED, 0.999, "tiny", 0)
-    assert set(named[truth == "pose"].tolist()) == {"noise", "overlap", "geometry"}
+    assert share < 0.9 or set(named[truth == "pose"].tolist()) == {"noise", "overlap", "geometry"}
 
 
 def test_a_worse_oracle_repeats_the_errors_of_a_better_one(truth):
     better, worse = (answers(truth, NAMED, share, "tiny", 0) for share in (0.1, 0.3))
     wrong = better != truth
     assert np.array_equal(better[wrong], worse[wrong])
-
-
-def test_errors_are_named_by_the_axes(truth):
-    first, again, other = (answers(truth, NAMED, 0.2, "tiny", seed) for seed in (0, 0, 1))
-    assert np.array_equal(first, again)
-    assert not np.array_equal(first, other)

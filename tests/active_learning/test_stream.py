@@ -67,11 +67,6 @@ def test_the_new_concept_arrives_all_along_after_the_quiet(plain):
     assert all(set(plain.pool.concept_N[part]) == {"noise", "pose"} for part in (order[:15], order[15:30]))
 
 
-def test_the_order_is_that_of_the_axes(plain):
-    one, again, other = (arrival_order(plain, STREAM, "blobs", seed).tolist() for seed in (0, 0, 1))
-    assert one == again != other
-
-
 @pytest.mark.parametrize("arrivals, quiet", [(181, 0), (150, 121), (220, 30), (30, 30), (30, 40), (31, 30)])
 def test_a_pool_too_small_for_the_stream_is_named(plain, arrivals, quiet):
     with pytest.raises(
@@ -240,11 +235,6 @@ def test_it_does_not_matter_whether_samples_come_at_once_or_one_by_one():
     backwards = forest(x_N_D, label_N, order=np.arange(30)[::-1], first=1, seed=1, trees=100).scores(asked)
     assert np.abs(at_once - backwards).max() < 0.2
     assert np.abs(at_once - backwards).mean() < 0.04
-
-
-def test_a_samples_scores_do_not_depend_on_the_others(grown):
-    asked = mondrian_blobs(9, 5)[0]
-    assert grown.scores(asked[[4]])[0] == pytest.approx(grown.scores(asked)[4], abs=1e-12)
 
 
 RANDOM = np.random.default_rng(0)

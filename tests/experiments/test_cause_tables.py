@@ -123,11 +123,6 @@ def test_how_near_to_chance_the_rule_is_among_the_failed_is_said(intervals, titl
     assert "| Dominant (%), chance 33.3 |" in text_of(0.36) and "| 36.0 (26.0 to 41.0) |" in text_of(0.36)
 
 
-def test_intervals_of_other_explainers_make_no_table(intervals):
-    with pytest.raises(InputError, match="has nothing to show"):
-        table9_causes(intervals[intervals["method"] == "other"])
-
-
 def test_the_figure_of_reliability_is_the_same_bytes_each_time(titles, same_bytes):
     titles["absent"] = "Absent"
     judged = {("ycb", "good", seed): random_judged(seed=seed) for seed in (100, 101)}

@@ -196,11 +196,8 @@ def test_the_page_is_given_the_words_of_the_table(metrics, tmp_path):
     table = made(table1_single_baselines, metrics)
     table.write(tmp_path / "t")
     printed = json.loads((tmp_path / "t.json").read_text(encoding="utf-8"))
-    assert (printed["caption"], printed["label_columns"], printed["footnotes"]) == (
-        table.caption,
-        1,
-        [*table.footnotes],
-    )
+    assert (printed["caption"], printed["label_columns"]) == (table.caption, 1)
+    assert printed["footnotes"] == [*table.footnotes]
     assert printed["heads"][0] == "Dataset"
     [row, *_] = printed["rows"]
     bold = " | ".join(f"**{text}**" if best else text for text, best in row)

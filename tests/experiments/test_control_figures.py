@@ -6,10 +6,9 @@ import pytest
 
 from gpca.errors import InputError
 from gpca.evaluation.measures import AGAINST, KEYS, NUMBERS
-from gpca.experiments.control_tables import transfer
+from gpca.experiments.control_tables import BINNED as SEVERITIES
+from gpca.experiments.control_tables import REGISTRATION, SAMPLES, SUCCEEDS, severity_curves, transfer
 from gpca.experiments.plan import Run
-from gpca.experiments.severity_curves import COLUMNS as SEVERITIES
-from gpca.experiments.severity_curves import REGISTRATION, SAMPLES, SUCCEEDS, severity_curves
 from gpca.explainers.registry import explainer_entry
 
 EXPLAINERS = {name: explainer_entry(name).title for name in ("gpca", "rule")}
@@ -38,10 +37,7 @@ def intervals():
     return pd.DataFrame(rows, columns=[*KEYS, *AGAINST, *NUMBERS])
 
 
-DRAWN = [
-    (lambda frame: severity_curves(RUN, frame), severities),
-    (lambda frame: transfer(RUN, frame), intervals),
-]
+DRAWN = [(lambda frame: severity_curves(RUN, frame), severities), (lambda frame: transfer(RUN, frame), intervals)]
 
 
 @pytest.mark.parametrize(("draw", "numbers"), DRAWN)

@@ -8,11 +8,10 @@ import pytest
 
 from gpca.errors import InputError
 from gpca.evaluation.measures import POOLED, read_clustered, write_metrics
-from gpca.experiments import severity_curves
-from gpca.experiments.control_tables import read_costs
+from gpca.experiments import control_tables
+from gpca.experiments.control_tables import REGISTRATION, read_costs, read_severities
 from gpca.experiments.controls import collect, collect_intervals, read_controls
 from gpca.experiments.plan import Run
-from gpca.experiments.severity_curves import REGISTRATION, read_severities
 from gpca.io.csv_file import write_csv
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.steps.control_samples import LABELS, sample_table
@@ -140,11 +139,6 @@ def test_intervals_are_over_clusters(files):
     assert set(read_controls(files)["cluster"]) == {f"{source}/part_{n}" for source in "ab" for n in range(5)}
 
 
-def test_no_files_are_refused():
-    with pytest.raises(InputError, match="no files were given"):
-        read_controls([])
-
-
 def severity_files(folder, paths, **changed):
     """The severities of the test samples: pose errors of the first half of the range, noise of all of it."""
     written = []
@@ -163,7 +157,7 @@ def severity_files(folder, paths, **changed):
 
 
 def test_success_and_accuracy_stand_in_the_same_bins(files, tmp_path):
-    found = severity_curves.collect(RUN, files, severity_files(tmp_path, files))
+    found = control_tables.collect(RUN, files, severity_files(tmp_path, files))
     write_metrics(found, tmp_path / "severities.csv")
     rows = read_severities(tmp_path / "severities.csv").set_index(["concept", "method"])
     assert rows.loc[("pose", REGISTRATION)]["value"].tolist() == [0, 0]
@@ -178,7 +172,7 @@ def test_success_and_accuracy_stand_in_the_same_bins(files, tmp_path):
 def test_severities_of_other_samples_are_refused(files, tmp_path):
     others = severity_files(tmp_path, files, sample=np.arange(30) + 1)
     with pytest.raises(InputError, match="lack test samples"):
-        severity_curves.collect(RUN, files, others)
+        control_tables.collect(RUN, files, others)
 
 
 def test_a_perfect_pose_has_no_error(registrations, objects):

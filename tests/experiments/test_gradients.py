@@ -64,21 +64,6 @@ def test_the_tables_show_them(metrics):
     assert "| Tiny | noise | 100.0 | 2 | 25.0 | 0 | 90.0 |" in text
 
 
-def test_metrics_of_something_else_make_no_table(metrics):
-    other = pd.DataFrame(metrics).assign(source="other")
-    for make in (saliency_deletion, tcav):
-        with pytest.raises(InputError, match="has nothing to show"):
-            make(RUN, other)
-
-
-def test_a_file_without_a_column_is_refused(tmp_path):
-    path = tmp_path / "tiny" / "seed0.csv"
-    path.parent.mkdir()
-    path.write_text("sample,order\n0,random\n")
-    with pytest.raises(InputError, match="column 'concept' is missing"):
-        collect(RUN, [path], [])
-
-
 @pytest.fixture
 def files(registrations, tmp_path):
     """Maps of two test samples of each concept, of which the second is named right; of noise neither is."""

@@ -14,7 +14,6 @@ from gpca.experiments.out_of_distribution import (
     TABLE,
     clusters_of,
     collect,
-    correlations,
     samples_of_seed,
     table5_compact,
     table5_learners,
@@ -133,18 +132,6 @@ def test_bad_predictions_are_one_line(files, change, message):
     edited(predictions[0], change)
     with pytest.raises(InputError, match=message):
         collect(None, predictions, set_files)[0]
-
-
-def test_no_files_are_a_fault():
-    with pytest.raises(InputError, match="no files were given"):
-        collect(None, [], [])
-
-
-def test_what_grows_with_the_distance_has_rho_one(files):
-    [rows, _] = read_learner_predictions(*files).values()
-    rows = rows[rows["set"] == "severity"]
-    rows = rows.assign(max_score=rows["knn_analytical"] ** 3)
-    assert correlations(rows)["rho_max_score_knn_analytical"] == pytest.approx(1)
 
 
 @pytest.fixture(scope="module")

@@ -12,9 +12,9 @@ from gpca.causes.judged import CEILING
 from gpca.causes.settings import CauseSettings
 from gpca.causes.truth import FAILED
 from gpca.errors import InputError
-from gpca.evaluation.measures import POOLED, read_clustered, write_metrics
+from gpca.evaluation.measures import POOLED
+from gpca.experiments.cause_figures import draw_reenactment, usual_failure
 from gpca.experiments.reenactment import EXPERIMENT, MEASURED, collect_oracles, in_words, table9_oracle
-from gpca.experiments.reenactment_example import choose_sample, draw_reenactment
 from gpca.reenactment.dataset import Reenactments, reenact_all
 from gpca.reenactment.settings import EVERYTHING, KNOWN, NOTHING, ReenactmentSettings
 from tests.conftest import FEW_CAUSES
@@ -57,7 +57,7 @@ def draw(paths):
 
 
 def test_the_sample_failed_by_several_causes_and_has_several_hypotheses_where_one_has(causes, enacted):
-    row = choose_sample(causes, enacted, "causes.npz")
+    row = usual_failure(causes, "causes.npz", enacted.weight[:, 1] > 0)
     tested = causes.rows("test")
     failed = tested[causes.truth.state[tested] == FAILED]
     several = failed[causes.truth.causes[failed].sum(axis=1) > 1]
@@ -67,16 +67,16 @@ def test_the_sample_failed_by_several_causes_and_has_several_hypotheses_where_on
     margins = causes.truth.margin[doubtful if len(doubtful) else several]
     assert (margins >= causes.truth.margin[row]).sum() == -(-len(margins) // 2) or len(margins) % 2 == 0
     certain = replace(enacted, weight=np.eye(3)[np.zeros(len(causes), int)])
-    assert choose_sample(causes, certain, "causes.npz") in several
+    assert usual_failure(causes, "causes.npz", certain.weight[:, 1] > 0) in several
     train = causes.rows("train")
     with pytest.raises(InputError, match="has no failed test sample"):
-        choose_sample(causes.subset(train), replace(enacted, weight=enacted.weight[train]), "causes.npz")
+        usual_failure(causes.subset(train), "causes.npz", enacted.weight[train, 1] > 0)
 
 
 def test_hypotheses_clouds_and_eight_errors_are_shown_with_their_words(causes, enacted, shown_files):
     figure = draw(shown_files)
     assert_words_are_large_enough_and_inside(figure)
-    words, row = words_of(figure), choose_sample(causes, enacted, shown_files[0])
+    words, row = words_of(figure), usual_failure(causes, shown_files[0], enacted.weight[:, 1] > 0)
     weights = enacted.weight[row][enacted.weight[row] > 0]
     assert {f"{k + 1}: {100 * weight:.0f} %" for k, weight in enumerate(weights)} <= set(words)
     assert {"as observed", "without noise", "completed", "both", "none", "all three", "measured"} <= set(words)
@@ -135,12 +135,6 @@ def test_differences_are_those_from_the_estimate_on_the_same_draws(oracles):
             assert gain.loc[metric, "value"] == pytest.approx(apart)
         assert gain.loc["regret", "value"] <= 0 < gain.loc["balanced_accuracy", "value"]
         assert np.isfinite(rows.loc[(source, CEILING, "estimate")]["value"]).all()
-
-
-def test_the_file_is_read_as_it_was_written(oracles, tmp_path):
-    path = tmp_path / "oracle_intervals.csv"
-    write_metrics(oracles, path)
-    assert read_clustered(path)["value"].tolist() == oracles["value"].tolist()
 
 
 def test_the_table_has_a_row_for_all_that_is_known_and_the_ceiling_last(oracles):

@@ -3,7 +3,6 @@
 import pandas as pd
 import pytest
 
-from gpca.errors import InputError
 from gpca.evaluation.measures import COLUMNS
 from gpca.experiments import registration_methods
 from gpca.experiments.substitution import collect, table14_estimator_explanations, table14_method_matrix
@@ -157,11 +156,3 @@ def test_the_matrix_has_a_row_for_each_method_of_the_training_pairs(intervals, m
     cells = "**90.0 (72.0 to 99.0)** | 60.0 (48.0 to 66.0) | 60.0 (48.0 to 66.0) |"
     assert f"| {title} | ICP, point-to-point | {cells}" in text
     assert "Left out, as the package is not installed: GICP (small_gicp) needs the package small_gicp" in text
-
-
-@pytest.mark.parametrize("table", [table14_method_matrix, table14_estimator_explanations])
-def test_nothing_to_show_is_refused(intervals, table):
-    exchange = {"sources": ["ycb"], "explainers": {"softmax_head": None}}
-    run = run_with(exchange=exchange | {"estimators": ESTIMATORS, "methods": METHODS})
-    with pytest.raises(InputError, match="has nothing to show"):
-        table(run, intervals)

@@ -37,7 +37,7 @@ MODULES = {f: f"gpca.steps.{module}:{f}" for module, functions in SHARED.items()
     "live_shap": "gpca.steps.live_shap",
     "new_concepts": "gpca.steps.new_concepts",
     "learners": "gpca.steps.shift:fit_learners",
-    "oracles": "gpca.steps.oracles",
+    "oracles": "gpca.steps.causes:oracles",
     "recover": "gpca.steps.recovery",
     "register_methods": "gpca.steps.registration_trials",
     "runtime": "gpca.steps.runtime",

@@ -159,11 +159,7 @@ def test_encoders_that_are_trained_otherwise_are_asked_about_known_and_unseen_ob
 
 @pytest.mark.parametrize(
     ("control", "head", "fewest_points"),
-    [
-        ("density", "linear", 32),
-        ("unseen_objects", "linear", None),
-        ("random_draws", "linear", 32),
-    ],
+    [("density", "linear", 32), ("unseen_objects", "linear", None), ("random_draws", "linear", 32)],
 )
 def test_an_encoder_is_trained_as_its_control_says(six, monkeypatch, control, head, fewest_points):
     given = []

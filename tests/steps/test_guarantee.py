@@ -157,6 +157,6 @@ def test_families_of_one_fold_are_one_part_wherever_they_are_and_others_are_deal
 
 def test_the_pool_has_no_borderline_sample(files, causes):
     pool = read_pool(files["causes"], files["descriptors"], files["reenactments"])
-    assert BORDERLINE not in pool.state and set(pool.registrations.concept) <= set(LABELS)
-    assert (pool.severity > 0).all() and (pool.severity <= 1).all()
+    assert BORDERLINE not in pool.samples.state and set(pool.registrations.concept) <= set(LABELS)
+    assert (pool.samples.severity > 0).all() and (pool.samples.severity <= 1).all()
     assert {"verdict", "reenactment", *GROUPS} <= set(pool.registrations.attached)

@@ -5,17 +5,15 @@ from gpca.causes.candidate import replay
 from gpca.causes.settings import CauseSettings
 from gpca.causes.truth import ALL, FAILED
 from gpca.errors import InputError
-from gpca.experiments.causes_example import CLEAR, GAP, TRUTH, _draw_scores, choose_sample, draw_causes_example
+from gpca.experiments.cause_figures import CLEAR, GAP, TRUTH, _draw_scores, draw_causes_example, is_clear, usual_failure
 from gpca.objects.canonical import write_objects
 from gpca.objects.procedural import surfaces
 from tests.conftest import FEW_CAUSES, FOUR
 from tests.judged import write_run
 
-SETTINGS = FEW_CAUSES | {"points": list(FEW_CAUSES["points"]), "icp": {}}
-
 
 def test_a_sample_is_drawn_again_where_it_lay(four, causes):
-    row = choose_sample(causes, "causes.npz")
+    row = usual_failure(causes, "causes.npz", is_clear(causes))
     model, observed_8 = replay(four, causes, row, "four", 100, CauseSettings(**FEW_CAUSES))
     assert observed_8[ALL] == pytest.approx(causes.registrations.cloud(row), abs=1e-5)
     assert np.array_equal(model.astype(np.float32), causes.registrations.target(row))
@@ -24,7 +22,7 @@ def test_a_sample_is_drawn_again_where_it_lay(four, causes):
 
 
 def test_the_sample_shown_failed_by_several_causes_of_which_one_is_as_clear_as_usual(causes):
-    row = choose_sample(causes, "causes.npz")
+    row = usual_failure(causes, "causes.npz", is_clear(causes))
     failed = causes.rows("test")[causes.truth.state[causes.rows("test")] == FAILED]
     several = failed[causes.truth.causes[failed].sum(axis=1) > 1]
     phi = np.maximum(causes.truth.phi, 0)
@@ -35,7 +33,7 @@ def test_the_sample_shown_failed_by_several_causes_of_which_one_is_as_clear_as_u
     assert causes.truth.margin[row] in margins[margins >= np.median(margins)]
     assert (margins >= causes.truth.margin[row]).mean() >= 0.5 or len(margins) == 1
     with pytest.raises(InputError, match="has no failed test sample"):
-        choose_sample(causes.subset(causes.rows("train")), "causes.npz")
+        usual_failure(causes.subset(causes.rows("train")), "causes.npz", is_clear(causes)[causes.rows("train")])
 
 
 def test_what_was_measured_stands_apart_from_the_scores_and_the_largest_of_a_row_is_bold():
@@ -54,4 +52,8 @@ def test_the_figure_is_the_same_bytes_each_time(causes, tmp_path, same_bytes):
     predictions, [truth] = write_run(tmp_path, causes)
     objects = tmp_path / "four.npz"
     write_objects((surface for surface in surfaces("ycb") if surface.name in FOUR), "four", objects, n_points=6000)
-    same_bytes(lambda: draw_causes_example(objects, truth, predictions, SETTINGS, {"right": "Right"}, "Four"))
+    same_bytes(
+        lambda: draw_causes_example(
+            objects, truth, predictions, CauseSettings(**FEW_CAUSES), {"right": "Right"}, "Four"
+        )
+    )
