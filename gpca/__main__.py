@@ -26,6 +26,7 @@ COMMANDS = {  # those for a registration of one's own first, then those for a ru
     "check-config": "check whether a run can use these configs",
     "check-reference": "check whether the numbers of a run agree with its reference",
 }
+WITH_SETTINGS = ("label", "bench", "check-reference")  # the others use none
 MODULES = {  # modules of gpca.commands with several commands; others have the name of their command
     **dict.fromkeys(("bench", "score", "leaderboard", "ship-predictions"), "tracks"),
     **dict.fromkeys(("compare", "check-config", "check-reference"), "runs"),
@@ -83,6 +84,8 @@ def _run(arguments: list[str], chosen: str | None) -> int:
     if not isinstance(options.settings, dict):
         raise InputError("--settings", "not a JSON object", 'give one, such as {"draw_points": 512}')
     require_plain(options.settings, "--settings")
+    if options.settings and chosen not in WITH_SETTINGS:
+        raise InputError("--settings", f"is not used by {chosen}", "leave it out")
     return options.run(options) or 0
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
-from dataclasses import fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from difflib import get_close_matches
 from functools import cache, partial
 from inspect import Parameter, isclass, signature
@@ -21,23 +21,18 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 LARGEST = {"int": 10**6, "float": 1e12}  # larger numbers are typos, which would end hours later or in no memory
+PYDANTIC = {  # JSON schema -> pydantic
+    **{"minimum": "ge", "maximum": "le", "exclusiveMinimum": "gt", "exclusiveMaximum": "lt"},
+    "multipleOf": "multiple_of",
+}
 UNKNOWN = ("unexpected_keyword_argument", "extra_forbidden")  # pydantic's faults
 
 
 class Bounds:
-    """The range of a number, by default up to `LARGEST`."""
+    """The range of a number in words of JSON schemas (`PYDANTIC`), by default up to `LARGEST`."""
 
-    def __init__(
-        self,
-        minimum: float | None = None,
-        maximum: float | None = None,
-        exclusiveMinimum: float | None = None,
-        exclusiveMaximum: float | None = None,
-        multipleOf: int | None = None,
-    ) -> None:
-        bounds = {"ge": minimum, "le": maximum, "gt": exclusiveMinimum, "lt": exclusiveMaximum}
-        bounds["multiple_of"] = multipleOf
-        self._bounds = {name: bound for name, bound in bounds.items() if bound is not None}
+    def __init__(self, **bounds: float) -> None:
+        self._bounds = {PYDANTIC[name]: bound for name, bound in bounds.items()}
 
     def __get_pydantic_core_schema__(self, kind: type, handler: GetCoreSchemaHandler) -> CoreSchema:
         """Add the range to the number's schema."""
@@ -120,11 +115,11 @@ def fields_of(section: Mapping[str, Any], *kinds: type) -> dict[str, Any]:
     return {name: value for name, value in section.items() if name in names}
 
 
+@dataclass(frozen=True)
 class ArgumentsOf:
     """Marks a function's ``**arguments`` as those of another function or class."""
 
-    def __init__(self, function: Callable) -> None:
-        self.function = function
+    function: Callable
 
 
 def read_settings(kind: type[T], settings: Mapping[str, Any], subject: str = "setting") -> T:
@@ -135,16 +130,14 @@ def read_settings(kind: type[T], settings: Mapping[str, Any], subject: str = "se
     """
     from pydantic import ValidationError
 
+    def as_json(value: Any) -> Any:  # what no config can hold becomes its text
+        return dict(value) if isinstance(value, Mapping) else repr(value)
+
     adapter: TypeAdapter = _adapter(kind)  # type: ignore[arg-type]
     try:
-        return adapter.validate_json(json.dumps([settings], default=_as_json))[0]
+        return adapter.validate_json(json.dumps([settings], default=as_json))[0]
     except ValidationError as fault:
         raise _input_error(fault.errors(), settings, adapter, subject) from None
-
-
-def _as_json(value: Any) -> Any:
-    """Other mappings than dictionaries as such; what no config can hold as its text."""
-    return dict(value) if isinstance(value, Mapping) else repr(value)
 
 
 def require_arguments(subject: str, function: Callable, leading: int, settings: Mapping[str, object]) -> None:

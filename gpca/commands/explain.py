@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import sys
 from argparse import ArgumentParser, Namespace
+from collections.abc import Callable
+from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -18,8 +20,6 @@ from gpca.objects.mesh_folder import METERS_PER_UNIT
 from gpca.process.arguments import length
 
 if TYPE_CHECKING:
-    import numpy as np
-
     from gpca.model.explainer import Explainer
     from gpca.model.explanation import Explanation, ScanExplanation
 
@@ -30,30 +30,21 @@ OBJECT_OPTIONS = ("model", "fast", "uncertainty", "estimator", "queue", "png")  
 
 
 def add_explain_arguments(parser: ArgumentParser) -> None:
-    parser.add_argument("source", type=Path, nargs="+", help=f"observed cloud or mesh ({FORMATS})")
-    parser.add_argument("target", type=Path, help="reference to which each source is aligned")
-    parser.add_argument("--init", type=Path, help="text file with the 4×4 matrix T_target_source, the initial pose")
-    parser.add_argument(
-        "--unit", choices=METERS_PER_UNIT, default="m", help="unit of the files and the pose (default m)"
-    )
-    parser.add_argument(
-        "--model", type=Path, help="model file (default: GPCA_MODEL, one in ./results/, or the package's)"
-    )
-    parser.add_argument("--method", help="registration method, such as gicp (default: the model's ICP)")
-    parser.add_argument(
-        "--uncertainty", action="store_true", help="measure how much the pose varies over other ICP starts"
-    )
-    parser.add_argument("--estimator", help="measure this by an estimator such as brossard (default: Monte-Carlo)")
-    parser.add_argument("--fast", action="store_true", help="re-enact fewer points and poses, without a guarantee")
-    parser.add_argument("--html", type=Path, metavar="FILE", help="write a page with all results and 3-D views")
-    parser.add_argument("--png", type=Path, metavar="FILE", help="write a figure of the results")
-    parser.add_argument(
-        "--queue", type=Path, metavar="FILE", help="add the registration, if queued, to a file for 'gpca label'"
-    )
-    parser.add_argument("--scans", action="store_true", help="both clouds are partial scans of any size")
-    parser.add_argument(
-        "--voxel", type=length, help="edge length of voxels for scans (default: from the point spacing)"
-    )
+    add = parser.add_argument
+    add("source", type=Path, nargs="+", help=f"observed cloud or mesh ({FORMATS})")
+    add("target", type=Path, help="reference to which each source is aligned")
+    add("--init", type=Path, help="text file with the 4×4 matrix T_target_source, the initial pose")
+    add("--unit", choices=METERS_PER_UNIT, default="m", help="unit of the files and the pose (default m)")
+    add("--model", type=Path, help="model file (default: GPCA_MODEL, one in ./results/, or the package's)")
+    add("--method", help="registration method, such as gicp (default: the model's ICP)")
+    add("--uncertainty", action="store_true", help="measure how much the pose varies over other ICP starts")
+    add("--estimator", help="measure this by an estimator such as brossard (default: Monte-Carlo)")
+    add("--fast", action="store_true", help="re-enact fewer points and poses, without a guarantee")
+    add("--html", type=Path, metavar="FILE", help="write a page with all results and 3-D views")
+    add("--png", type=Path, metavar="FILE", help="write a figure of the results")
+    add("--queue", type=Path, metavar="FILE", help="add the registration, if queued, to a file for 'gpca label'")
+    add("--scans", action="store_true", help="both clouds are partial scans of any size")
+    add("--voxel", type=length, help="edge length of voxels for scans (default: from the point spacing)")
     form = parser.add_mutually_exclusive_group()
     form.add_argument("--json", action="store_true", help="print one JSON object")
     form.add_argument("--json-lines", action="store_true", help="print one line of JSON per source")
@@ -62,15 +53,12 @@ def add_explain_arguments(parser: ArgumentParser) -> None:
 def run_explain(options: Namespace) -> int:
     """Read all files, then explain and print one source after the other; everything but results goes to stderr.
 
-    Files are read before heavy libraries are loaded, so that most mistakes are reported at once.
-
-    Returns:
-        `UNKNOWN_STATUS` if one of the explanations means nothing, otherwise 0.
+    Files are read before heavy libraries are loaded, so that most mistakes are reported at once. Returns
+    `UNKNOWN_STATUS` if one of the explanations means nothing, otherwise 0.
     """
     _require_options(options)
-    path = None
-    if not options.scans:
-        path = model_path(options.model)
+    path = None if options.scans else model_path(options.model)
+    if path is not None:
         require_model(path)
     for cloud in (*options.source, options.target):
         require_format(cloud)
@@ -90,44 +78,48 @@ def run_explain(options: Namespace) -> int:
         from gpca.uncertainty.estimators.registry import make_estimator
 
         make_estimator(options.estimator, {})
-    if path is None:
-        return _explain_scans(options, sources, target, T_init)
-    import torch
-
-    from gpca.model.explainer import Explainer
-    from gpca.model.file import Model
     from gpca.process.compilation import say_when_compiling
-    from gpca.uncertainty.settings import MONTE_CARLO, UncertaintySettings
 
-    torch.set_num_threads(options.threads)
     say_when_compiling()
-    model = Model.load(path)
-    requested = {
-        "uncertainty": UncertaintySettings() if options.uncertainty or options.estimator else None,
-        "estimator": options.estimator or MONTE_CARLO,
-        "method": options.method,
-        "fast": options.fast,
-    }
-    explainer = Explainer(model)
-    trained_on = f"{model.title} (procedural stand-in)" if model.stand_in else model.title
+    explain: Callable[..., Explanation | ScanExplanation]
+    names, extra = {"target": str(options.target)}, {}
+    if path is None:
+        from gpca.model.explanation import LEARNED as learned
+        from gpca.model.scan_explainer import explain_scans
+
+        explain = partial(explain_scans, voxel=options.voxel, method=options.method)
+    else:
+        import torch
+
+        from gpca.model.explainer import Explainer
+        from gpca.model.file import Model
+        from gpca.uncertainty.settings import MONTE_CARLO, UncertaintySettings
+
+        torch.set_num_threads(options.threads)
+        model = Model.load(path)
+        explainer, learned = Explainer(model), f"model {path}: {model.learning}"
+        names["model"] = str(path)
+        extra["trained_on"] = f"{model.title} (procedural stand-in)" if model.stand_in else model.title
+        uncertainty = UncertaintySettings() if options.uncertainty or options.estimator else None
+        estimator = options.estimator or MONTE_CARLO
+        asked = {"frame": frame, "uncertainty": uncertainty, "estimator": estimator, "method": options.method}
+        explain = partial(explainer.explain, **asked, fast=options.fast)
     status = 0
-    for name, source in zip(options.source, sources, strict=True):
+    for name, source in zip(map(str, options.source), sources, strict=True):
         try:
-            explanation = explainer.explain(source, target, T_init, options.unit, frame, **requested)
+            explanation = explain(source, target, T_init, options.unit)
         except InputError as fault:
             raise InputError(name, str(fault)) from fault
-        status = UNKNOWN_STATUS if explanation.unknown else status
-        names = {"source": str(name), "target": str(options.target), "model": str(path)}
-        _write(options, explanation, names, {"trained_on": trained_on})
-        _queue(options.queue, explainer, explanation, f"{name} to {options.target}")
-    print(f"model {path}: {model.learning}", file=sys.stderr)
+        _write(options, explanation, {"source": name, **names}, extra)
+        if path is not None:
+            status = UNKNOWN_STATUS if explanation.unknown else status
+            _queue(options.queue, explainer, explanation, f"{name} to {options.target}")
+    print(learned, file=sys.stderr)
     return status
 
 
 def _require_options(options: Namespace) -> None:
     """Reject options that exclude one another, and outputs that cannot be written."""
-    if options.settings:
-        raise InputError("--settings", "is not used by explain", "make another model to change its settings")
     if len(options.source) > 1 and not options.json_lines:
         raise InputError("explain", f"{len(options.source)} sources need one line each", "add --json-lines")
     for name in OBJECT_OPTIONS if options.scans else ("voxel",):
@@ -142,22 +134,6 @@ def _require_options(options: Namespace) -> None:
     read = [*options.source, options.target, options.init, options.model]
     outputs = [path for path in (options.html, options.png, options.queue) if path]
     require_outputs(outputs, [path for path in read if path])
-
-
-def _explain_scans(options: Namespace, sources: list[np.ndarray], target: np.ndarray, T_init: np.ndarray | None) -> int:
-    from gpca.model.explanation import LEARNED
-    from gpca.model.scan_explainer import explain_scans
-    from gpca.process.compilation import say_when_compiling
-
-    say_when_compiling()
-    for name, source in zip(options.source, sources, strict=True):
-        try:
-            explanation = explain_scans(source, target, T_init, options.unit, options.voxel, options.method)
-        except InputError as fault:
-            raise InputError(name, str(fault)) from fault
-        _write(options, explanation, {"source": str(name), "target": str(options.target)}, {})
-    print(LEARNED, file=sys.stderr)
-    return 0
 
 
 def _write(

@@ -35,23 +35,20 @@ COMMANDS = {"/retrain": "learn the answers so far", "/skip": "do not judge this 
 
 def add_label_arguments(parser: ArgumentParser) -> None:
     """Declare files and names; ``--settings`` are those of the classifier."""
-    parser.add_argument("registrations", type=Path, help="registrations of a run, or the queue of 'gpca explain'")
-    parser.add_argument("--embeddings", type=Path, help="embeddings of the registrations; a queue has its own")
-    parser.add_argument("--labels", required=True, type=Path, help="CSV to which the answers are appended")
-    parser.add_argument(
-        "--known", nargs="+", choices=CONCEPTS, default=CONCEPTS[:2], help="concepts labeled at the start"
-    )
-    parser.add_argument("--initial", type=COUNT, default=60, help="samples labeled at the start (default 60)")
-    parser.add_argument("--batch", type=COUNT, default=4, help="questions between retrainings (default 4)")
-    parser.add_argument("--questions", type=COUNT, default=20, help="largest number of questions (default 20)")
-    parser.add_argument(
-        "--strategy", default="bald_kmeans", help="strategy that picks the questions (default bald_kmeans)"
-    )
-    parser.add_argument("--picture", type=Path, default=Path("query.png"), help="image, redrawn for every question")
-    parser.add_argument("--answers", type=Path, help="file with one answer per line, instead of the terminal")
-    parser.add_argument("--predictions", type=Path, help="CSV of the classifier's final predictions for all samples")
-    parser.add_argument("--model", type=Path, help="model that explained a queue (default: that of 'gpca explain')")
-    parser.add_argument("--out", type=Path, help="model file to write, which has learned from a queue")
+    add = parser.add_argument
+    add("registrations", type=Path, help="registrations of a run, or the queue of 'gpca explain'")
+    add("--embeddings", type=Path, help="embeddings of the registrations; a queue has its own")
+    add("--labels", required=True, type=Path, help="CSV to which the answers are appended")
+    add("--known", nargs="+", choices=CONCEPTS, default=CONCEPTS[:2], help="concepts labeled at the start")
+    add("--initial", type=COUNT, default=60, help="samples labeled at the start (default 60)")
+    add("--batch", type=COUNT, default=4, help="questions between retrainings (default 4)")
+    add("--questions", type=COUNT, default=20, help="largest number of questions (default 20)")
+    add("--strategy", default="bald_kmeans", help="strategy that picks the questions (default bald_kmeans)")
+    add("--picture", type=Path, default=Path("query.png"), help="image, redrawn for every question")
+    add("--answers", type=Path, help="file with one answer per line, instead of the terminal")
+    add("--predictions", type=Path, help="CSV of the classifier's final predictions for all samples")
+    add("--model", type=Path, help="model that explained a queue (default: that of 'gpca explain')")
+    add("--out", type=Path, help="model file to write, which has learned from a queue")
 
 
 def run_label(options: Namespace) -> None:
@@ -101,18 +98,14 @@ def run_label(options: Namespace) -> None:
 
 def _require_fitting(options: Namespace, queued: bool) -> None:
     """Reject options that do not apply to a queue, or to a run."""
-    if queued:
-        for name in ("embeddings", "predictions"):
-            if getattr(options, name):
-                raise InputError(f"--{name}", "is not for the queue of an explanation", "leave it out")
-        if options.settings:
-            raise InputError("--settings", "are those of the model where a queue is labeled", "leave them out")
-    else:
-        if options.embeddings is None:
-            raise InputError("--embeddings", "is missing", "name the embeddings of the registrations")
-        for name in ("model", "out"):
-            if getattr(options, name):
-                raise InputError(f"--{name}", "is for the queue of an explanation alone", "leave it out")
+    place = "is not for the queue of an explanation" if queued else "is for the queue of an explanation alone"
+    for name in ("embeddings", "predictions") if queued else ("model", "out"):
+        if getattr(options, name):
+            raise InputError(f"--{name}", place, "leave it out")
+    if queued and options.settings:
+        raise InputError("--settings", "are those of the model where a queue is labeled", "leave them out")
+    if not queued and options.embeddings is None:
+        raise InputError("--embeddings", "is missing", "name the embeddings of the registrations")
 
 
 def _queued(options: Namespace) -> tuple[Queue, Model]:
@@ -175,7 +168,11 @@ def _finish(session: Session, registrations: Registrations | Queue, model: Model
     counts = ", ".join(f"{c} {list(answered.values()).count(c)}" for c in dict.fromkeys(answered.values())) or "none"
     print(f"\n{options.labels}: {counts}")
     if model is not None and options.out:
-        _write_model(model, session, options.out)
+        if new := [concept for concept in session.gpc.classes if concept not in CONCEPTS]:
+            fault = f"is not written: a model file cannot hold the new concept {', '.join(new)}"
+            raise InputError(options.out, fault, "the labels are kept; name one of " + ", ".join(CONCEPTS) + " instead")
+        replace(model, gpc=session.gpc).save(options.out)
+        print(f"{options.out}: the model whose GP-CA has learned them; the diagnosis is as before")
     if options.predictions and isinstance(registrations, Registrations):
         scores_N_C, variances_N_C, bald_N = session.gpc.attribute(session.h_S_d)
         attribution = Attribution.of_scores(session.gpc.classes, scores_N_C, seconds=0.0)
@@ -183,11 +180,3 @@ def _finish(session: Session, registrations: Registrations | Queue, model: Model
         inputs = [options.registrations, options.embeddings, *([options.labels] if options.labels.is_file() else [])]
         with record_provenance([options.predictions], inputs, options.settings):
             write_predictions(options.predictions, registrations, attribution)
-
-
-def _write_model(model: Model, session: Session, path: Path) -> None:
-    if new := [concept for concept in session.gpc.classes if concept not in CONCEPTS]:
-        fault = f"is not written: a model file cannot hold the new concept {', '.join(new)}"
-        raise InputError(path, fault, "the labels are kept; name one of " + ", ".join(CONCEPTS) + " instead")
-    replace(model, gpc=session.gpc).save(path)
-    print(f"{path}: the model whose GP-CA has learned them; the diagnosis is as before")

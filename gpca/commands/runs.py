@@ -12,7 +12,8 @@ CONFIG = Path("config/config.yaml")  # relative to the folder of the suite
 
 
 def add_check_config_arguments(parser: ArgumentParser) -> None:
-    parser.add_argument("configs", nargs="*", type=Path, help="config files, merged into the default in this order")
+    add = parser.add_argument
+    add("configs", nargs="*", type=Path, help="config files, merged into the default in this order")
 
 
 def run_check_config(options: Namespace) -> None:
@@ -24,19 +25,16 @@ def run_check_config(options: Namespace) -> None:
     from gpca.config.check import read
     from gpca.config.layers import read_file, with_defaults
 
-    if options.settings:
-        raise InputError("--settings", "is not used by check-config", "name a config file")
     config, sources = read(with_defaults(*map(read_file, options.configs)), {})
     print(f"run {config['run']}: valid; sources {', '.join(sources)}; seeds {', '.join(map(str, config['seeds']))}")
 
 
 def add_check_reference_arguments(parser: ArgumentParser) -> None:
     """Declare the folders; ``--settings`` replaces keys of the config's section ``reference``."""
-    parser.add_argument("folder", type=Path, help="folder of the run, such as results/full")
-    parser.add_argument(
-        "--reference", type=Path, help="its reference (default: reference/ and the same name, beside the run)"
-    )
-    parser.add_argument(
+    add = parser.add_argument
+    add("folder", type=Path, help="folder of the run, such as results/full")
+    add("--reference", type=Path, help="its reference (default: reference/ and the same name, beside the run)")
+    add(
         "--config",
         type=Path,
         default=CONFIG,
@@ -46,15 +44,7 @@ def add_check_reference_arguments(parser: ArgumentParser) -> None:
 
 def run_check_reference(options: Namespace) -> int:
     """Compare a run with its reference file by file; return 1 for different or missing files, otherwise 0."""
-    from gpca.comparison.reference import (
-        DIFFERENT,
-        MISSING,
-        ROUNDING,
-        VERDICTS,
-        Allowance,
-        check_reference,
-        device_of,
-    )
+    from gpca.comparison import reference as checks
     from gpca.io.structured_text import read_mapping
     from gpca.settings import read_settings
 
@@ -68,19 +58,21 @@ def run_check_reference(options: Namespace) -> int:
     if not isinstance(section, dict):
         raise InputError(config, "has no section 'reference'", f"name another file with --config, such as {CONFIG}")
     subject = "setting" if options.settings else f"{config}: setting"
-    outcomes = check_reference(folder, reference, read_settings(Allowance, section | options.settings, subject))
+    outcomes = checks.check_reference(
+        folder, reference, read_settings(checks.Allowance, section | options.settings, subject)
+    )
     width = max(len(outcome.file) for outcome in outcomes)
     for outcome in outcomes:
         print(f"{outcome.file:<{width}}  {outcome.verdict:<9}  {outcome.detail}".rstrip())
-    files = {verdict: [each.file for each in outcomes if each.verdict == verdict] for verdict in VERDICTS}
-    print(f"{folder} against {reference}: " + ", ".join(f"{len(files[name])} {name}" for name in VERDICTS))
-    if files[ROUNDING] or files[DIFFERENT]:
+    files = {verdict: [each.file for each in outcomes if each.verdict == verdict] for verdict in checks.VERDICTS}
+    print(f"{folder} against {reference}: " + ", ".join(f"{len(files[name])} {name}" for name in checks.VERDICTS))
+    if files[checks.ROUNDING] or files[checks.DIFFERENT]:
         for role, directory in (("reference", reference), ("run", folder)):
-            print(f"{role}: {device_of(directory, outcomes[0].file)}")
-    if files[MISSING]:
-        command = _snakemake(folder, [str(folder / file) for file in files[MISSING]])
-        print(f"{len(files[MISSING])} missing; make them with: {command}", file=sys.stderr)
-    return 1 if files[DIFFERENT] or files[MISSING] else 0
+            print(f"{role}: {checks.device_of(directory, outcomes[0].file)}")
+    if files[checks.MISSING]:
+        command = _snakemake(folder, [str(folder / file) for file in files[checks.MISSING]])
+        print(f"{len(files[checks.MISSING])} missing; make them with: {command}", file=sys.stderr)
+    return 1 if files[checks.DIFFERENT] or files[checks.MISSING] else 0
 
 
 def _snakemake(folder: Path, targets: list[str]) -> str:
@@ -91,9 +83,10 @@ def _snakemake(folder: Path, targets: list[str]) -> str:
 
 
 def add_compare_arguments(parser: ArgumentParser) -> None:
-    parser.add_argument("one", type=Path, help="folder of a run or a reference, such as results/default")
-    parser.add_argument("other", type=Path, help="folder of another run")
-    parser.add_argument("--out", type=Path, default=Path("compare.html"), help="the page (default: compare.html)")
+    add = parser.add_argument
+    add("one", type=Path, help="folder of a run or a reference, such as results/default")
+    add("other", type=Path, help="folder of another run")
+    add("--out", type=Path, default=Path("compare.html"), help="the page (default: compare.html)")
 
 
 def run_compare(options: Namespace) -> int:
@@ -102,8 +95,6 @@ def run_compare(options: Namespace) -> int:
     from gpca.io.files import require_outputs
     from gpca.page.two_runs import ALONE, APART, DIFFERENT, compare_tables, write_comparison
 
-    if options.settings:
-        raise InputError("--settings", "is not used by compare", "leave it out")
     folders = (options.one, options.other)
     for folder in folders:
         if not folder.is_dir():

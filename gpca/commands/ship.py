@@ -254,17 +254,14 @@ def _table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
 
 
 def add_ship_arguments(parser: ArgumentParser) -> None:
-    parser.add_argument(
-        "--model", required=True, type=Path, help="model in the folder of its run, such as results/full/model.pt"
-    )
-    parser.add_argument("--out", required=True, type=Path, help="the model to ship, such as gpca/model/shipped.pt")
-    parser.add_argument("--card", required=True, type=Path, help="its card, such as gpca/model/shipped.md")
+    add = parser.add_argument
+    add("--model", required=True, type=Path, help="model in the folder of its run, such as results/full/model.pt")
+    add("--out", required=True, type=Path, help="the model to ship, such as gpca/model/shipped.pt")
+    add("--card", required=True, type=Path, help="its card, such as gpca/model/shipped.md")
 
 
 def run_ship(options: Namespace) -> None:
     """Write both files or neither; the same run gives the same bytes."""
-    if options.settings:
-        raise InputError("--settings", "is not used by ship", "make another model to change its settings")
     scores = options.model.with_name("cause_intervals.csv")
     require_outputs([options.out, options.card], [options.model, scores])
     model = Model.load(options.model)

@@ -20,15 +20,16 @@ LARGEST_BYTES = 10**7  # of the published predictions of all tracks, which are k
 
 def add_bench_arguments(parser: ArgumentParser) -> None:
     """Declare the track and the method; ``--settings`` are the method's."""
-    parser.add_argument("track", help=f"one of {', '.join(TRACKS)}")
-    parser.add_argument("method", help="a file such as my_method.py, an installed module, or the name of an explainer")
-    parser.add_argument("--out", type=Path, help="CSV of its predictions, for gpca score and the leaderboard")
-    parser.add_argument("--authors", default="unknown", help="authors, for the head of that file")
-    parser.add_argument("--link", default="none", help="link to code or a paper, for that head")
-    parser.add_argument("--samples", type=Path, help="folder of the samples (default: the user's cache)")
-    parser.add_argument("--data-dir", type=Path, help="folder of data that the repository does not have (track scans)")
-    parser.add_argument("--learn-from", help="what it learns from, where there is a choice: scans (default) or objects")
-    parser.add_argument("--processes", type=COUNT, help="processes that make samples (default: one per core)")
+    add = parser.add_argument
+    add("track", help=f"one of {', '.join(TRACKS)}")
+    add("method", help="a file such as my_method.py, an installed module, or the name of an explainer")
+    add("--out", type=Path, help="CSV of its predictions, for gpca score and the leaderboard")
+    add("--authors", default="unknown", help="authors, for the head of that file")
+    add("--link", default="none", help="link to code or a paper, for that head")
+    add("--samples", type=Path, help="folder of the samples (default: the user's cache)")
+    add("--data-dir", type=Path, help="folder of data that the repository does not have (track scans)")
+    add("--learn-from", help="what it learns from, where there is a choice: scans (default) or objects")
+    add("--processes", type=COUNT, help="processes that make samples (default: one per core)")
 
 
 def run_bench(options: Namespace) -> None:
@@ -86,14 +87,13 @@ def _method_names(method: str, track: Track) -> list[str]:
 
 
 def add_score_arguments(parser: ArgumentParser) -> None:
-    parser.add_argument("track", help=f"one of {', '.join(TRACKS)}")
-    parser.add_argument("predictions", type=Path, help="CSV with a head of comments (docs/outside.md)")
+    add = parser.add_argument
+    add("track", help=f"one of {', '.join(TRACKS)}")
+    add("predictions", type=Path, help="CSV with a head of comments (docs/outside.md)")
 
 
 def run_score(options: Namespace) -> int:
     """Check and score predictions; faults are lines on stderr, with status 2."""
-    if options.settings:
-        raise InputError("--settings", "is not used by score", "leave it out")
     published = Published.load(track_of(options.track))
     submission, faults = read_submission(options.predictions, published)
     if submission is None:
@@ -104,18 +104,15 @@ def run_score(options: Namespace) -> int:
 
 
 def add_leaderboard_arguments(parser: ArgumentParser) -> None:
+    add = parser.add_argument
     folder = leaderboard.FOLDER
-    parser.add_argument(
-        "--submissions", type=Path, default=folder, help="folder of CSV files (default: results/leaderboard)"
-    )
-    parser.add_argument("--out", type=Path, help="the page (default: index.html in that folder)")
-    parser.add_argument("--check", action="store_true", help="only check the files")
+    add("--submissions", type=Path, default=folder, help="folder of CSV files (default: results/leaderboard)")
+    add("--out", type=Path, help="the page (default: index.html in that folder)")
+    add("--check", action="store_true", help="only check the files")
 
 
 def run_leaderboard(options: Namespace) -> int:
     """Check all submissions and write the page; faults are lines on stderr, with status 2."""
-    if options.settings:
-        raise InputError("--settings", "is not used by leaderboard", "leave it out")
     page = options.out or options.submissions / "index.html"
     if not options.check:
         require_outputs([page])
@@ -132,14 +129,13 @@ def run_leaderboard(options: Namespace) -> int:
 
 
 def add_ship_predictions_arguments(parser: ArgumentParser) -> None:
+    add = parser.add_argument
     folder = Path("results") / DEFAULT
-    parser.add_argument(
-        "--run", dest="folder", type=Path, default=folder, help=f"folder of the run (default: {folder})"
-    )
-    parser.add_argument("--out", type=Path, default=FOLDER, help="folder to write them to")
+    add("--run", dest="folder", type=Path, default=folder, help=f"folder of the run (default: {folder})")
+    add("--out", type=Path, default=FOLDER, help="folder to write them to")
     default_tracks = [name for name, track in TRACKS.items() if track.run == DEFAULT]
     words = "; ".join(f"{name} needs the run {track.run}" for name, track in TRACKS.items() if track.run != DEFAULT)
-    parser.add_argument(
+    add(
         "--tracks",
         nargs="+",
         default=default_tracks,
@@ -153,8 +149,6 @@ def run_ship_predictions(options: Namespace) -> None:
     from gpca.config.layers import read_file, with_defaults
     from gpca.tracks.shipping import collect
 
-    if options.settings:
-        raise InputError("--settings", "is not used by ship-predictions", "leave it out")
     total = 0
     for track in map(track_of, options.tracks):
         config, _ = read(with_defaults(*map(read_file, track.layers)), {})
