@@ -12,15 +12,8 @@ import numpy as np
 from gpca.causes.dataset import LABELS, labels_of
 from gpca.causes.truth import BORDERLINE, NOMINAL, Truth
 from gpca.errors import InputError
-from gpca.evaluation.conformal import (
-    PROBABILITY,
-    FailureAlarm,
-    Nonconformity,
-    StateSets,
-    calibrate_alarm,
-    calibrate_sets,
-    require_scores,
-)
+from gpca.evaluation import conformal
+from gpca.evaluation.conformal import FailureAlarm, Nonconformity, StateSets
 
 SEVERAL = "several"
 STATES = (*LABELS, SEVERAL)
@@ -81,7 +74,7 @@ def calibrate(
     level: float = 0.9,
     missed: float = 0.05,
     false_alarms: float = 0.05,
-    nonconformity: Nonconformity = PROBABILITY,
+    nonconformity: Nonconformity = conformal.PROBABILITY,
     by_state: bool = False,
     confidence: float | None = None,
 ) -> Guarantee:
@@ -105,9 +98,9 @@ def calibrate(
     clear_N = state_N != BORDERLINE
     family_n = None if family_N is None else np.asarray(family_N)[clear_N]
     scores_n_K, state_n = np.asarray(scores_N_K, float)[clear_N], state_N[clear_N]
-    sets = calibrate_sets(scores_n_K, state_n, family_n, states, level, nonconformity, by_state)
+    sets = conformal.calibrate_sets(scores_n_K, state_n, family_n, states, level, nonconformity, by_state)
     failed_n = state_n != states[0]
-    alarm = calibrate_alarm(1 - scores_n_K[:, 0], failed_n, family_n, missed, false_alarms, confidence)
+    alarm = conformal.calibrate_alarm(1 - scores_n_K[:, 0], failed_n, family_n, missed, false_alarms, confidence)
     return Guarantee(sets, alarm, len(state_n), 0 if family_n is None else len(np.unique(family_n)))
 
 
@@ -128,7 +121,7 @@ def state_scores(scores_N_4: np.ndarray) -> np.ndarray:
     two draws from the shares both give c, and several causes with 1 - Σ s_c². Sets are valid with any such rule; a
     better one would make them smaller.
     """
-    require_scores(scores_N_4, LABELS)
+    conformal.require_scores(scores_N_4, LABELS)
     nominal_N = np.clip(scores_N_4[:, 0], 0, 1)
     causes_N_3 = np.maximum(scores_N_4[:, 1:], 0)
     sum_N_1 = causes_N_3.sum(axis=1, keepdims=True)

@@ -11,18 +11,8 @@ from gpca.alignment.rigid import transform
 from gpca.causes.truth import BY_SIZE
 from gpca.model.explanation import Explanation
 from gpca.model.scene import Scene, distances, taken_out
+from gpca.reporting.figures import style
 from gpca.reporting.figures.cloud_views import thinned, widest_views
-from gpca.reporting.figures.style import (
-    BLUE,
-    CONCEPT_COLORS,
-    LIGHT_GRAY,
-    SMALL_PT,
-    TEXT_WIDTH_IN,
-    VERMILION,
-    save_png,
-    use_style,
-    write_title,
-)
 
 HEIGHT_IN = 5.0
 POINTS = 1500  # of each cloud; more hide one another
@@ -32,16 +22,20 @@ MOST_LINES = 14
 
 
 def draw_explanation(explanation: Explanation, png_path: str | Path, names: str = "") -> None:
-    """Write one explanation as a PNG of 300 dpi.
+    """Write one explanation as a PNG of 300 dpi; `names` of the files are its title.
 
-    Args:
-        explanation: with its scene, as :meth:`gpca.model.explainer.Explainer.explain` returns it.
+    Raises ValueError for an explanation without a scene.
     """
     if (scene := explanation.scene) is None:
         raise ValueError("an explanation that came as one of many has no clouds to draw")
-    figure = use_style().figure(figsize=(TEXT_WIDTH_IN, HEIGHT_IN), layout="constrained")
+    diagnosis = explanation.diagnosis
+    figure = style.use_style().figure(figsize=(style.TEXT_WIDTH_IN, HEIGHT_IN), layout="constrained")
     above, below = figure.subfigures(2, 1, height_ratios=(1.15, 1))
-    views = [("before", scene.source), ("after", scene.aligned), *_another(explanation, scene)]
+    views = [("before", scene.source), ("after", scene.aligned)]
+    if diagnosis and not explanation.unknown:
+        poses = zip(diagnosis.reenacted.poses, scene.possibilities, strict=True)
+        for other in [possibility for pose, possibility in poses if not pose.registered][:1]:  # the most probable
+            views.append((f"another pose (probability {other.probability:.2f})", transform(other.T, scene.source)))
     panels = above.subplots(1, len(views), squeeze=False)[0]
     view = widest_views(scene.target)[0]
     for panel, (title, source) in zip(panels, views, strict=True):
@@ -51,76 +45,25 @@ def draw_explanation(explanation: Explanation, png_path: str | Path, names: str 
     bar = above.colorbar(shown, ax=panels, location="right", shrink=0.8, extend="max", label=label)
     bar.outline.set_linewidth(0.4)
     left, middle, right = below.subplots(1, 3)
-    _draw_causes(left, explanation)
-    _draw_what_ifs(middle, scene, explanation.unit)
-    _write(right, explanation)
-    write_title(figure, names)
-    save_png(figure, png_path)
-
-
-def _another(explanation: Explanation, scene: Scene) -> list[tuple[str, np.ndarray]]:
-    """Return the most probable pose that is not the result, as a title and the source there; none where all are."""
-    reenacted = explanation.diagnosis.reenacted if explanation.diagnosis and not explanation.unknown else None
-    poses = zip(reenacted.poses, scene.possibilities, strict=True) if reenacted else ()
-    others = [possibility for pose, possibility in poses if not pose.registered]
-    if not others:
-        return []
-    title = f"another pose (probability {others[0].probability:.2f})"
-    return [(title, transform(others[0].T, scene.source))]
-
-
-def _draw_clouds(panel, scene: Scene, source: np.ndarray, view: np.ndarray):
-    """Draw the target in gray and the source by its distances, from back to front; return what has the colors."""
-    from matplotlib import colormaps
-    from matplotlib.colors import ListedColormap
-
-    colors = ListedColormap(colormaps["viridis"](np.linspace(BRIGHTEST, 0, 256)))
-    target, source = thinned(scene.target, POINTS), thinned(source, POINTS)
-    at, ahead = target @ view.T, source @ view.T
-    panel.scatter(at[:, 0], at[:, 1], s=1, c=LIGHT_GRAY, linewidths=0)
-    order = np.argsort(ahead[:, 2], kind="stable")
-    reach = scene.reach * scene.frame.diameter
-    far = distances(source, scene.target)[order] * scene.frame.diameter
-    look = {"cmap": colors, "vmin": 0, "vmax": reach, "linewidths": 0}
-    shown = panel.scatter(ahead[order, 0], ahead[order, 1], s=2, c=far, **look)
-    panel.set(aspect="equal")
-    panel.set_axis_off()
-    return shown
-
-
-def _draw_causes(panel, explanation: Explanation) -> None:
-    """Draw the probability of each cause with its standard deviation; without a diagnosis, GP-CA's scores."""
-    diagnosis = explanation.diagnosis
+    # Without a diagnosis, the scores of GP-CA stand for the probabilities of the causes.
     shares = diagnosis.causes if diagnosis else explanation.scores
     variances = diagnosis.variances if diagnosis else explanation.variances
-    places = np.arange(len(shares))[::-1]
     deviations = [float(np.sqrt(variances[name])) for name in shares]
-    colors = [CONCEPT_COLORS.get(name, LIGHT_GRAY) for name in shares]
-    panel.barh(places, [*shares.values()], xerr=deviations, color=colors, height=0.6, error_kw={"elinewidth": 0.8})
+    colors = [style.CONCEPT_COLORS.get(name, style.LIGHT_GRAY) for name in shares]
+    bars = {"xerr": deviations, "color": colors, "height": 0.6, "error_kw": {"elinewidth": 0.8}}
+    left.barh(np.arange(len(shares))[::-1], [*shares.values()], **bars)
     effects = diagnosis.reenacted.effects if diagnosis else {}
     labels = [f"{name}\n{effects[name]:+.2g} {explanation.unit}" if name in effects else name for name in shares]
-    panel.set_yticks(places, labels)
-    panel.set(xlim=(0, 1), xlabel="probability", title="causes, if it failed, and what each adds")
-
-
-def _draw_what_ifs(panel, scene: Scene, unit: str) -> None:
-    """Draw the mean error of the registrations that were re-enacted under the most probable pose."""
-    if not scene.possibilities:
-        panel.set_axis_off()
-        return
-    errors = [scene.frame.diameter * scene.possibilities[0].errors[subset] for subset in BY_SIZE]
-    places = np.arange(len(errors))
-    panel.barh(places, errors, color=BLUE, height=0.6)
-    panel.axvline(scene.limit * scene.frame.diameter, color=VERMILION, linewidth=0.8)
-    labels = [fill(taken_out(subset), 26) for subset in BY_SIZE]
-    panel.set_yticks(places, labels)
-    panel.set(xlabel=f"re-enacted error ({unit})", title="what if?")
-
-
-def _write(panel, explanation: Explanation) -> None:
-    """Write what was found, what is promised and what to do."""
-    panel.set_axis_off()
-    diagnosis = explanation.diagnosis
+    left.set_yticks(np.arange(len(shares))[::-1], labels)
+    left.set(xlim=(0, 1), xlabel="probability", title="causes, if it failed, and what each adds")
+    if scene.possibilities:
+        errors = [scene.frame.diameter * scene.possibilities[0].errors[subset] for subset in BY_SIZE]
+        middle.barh(np.arange(len(errors)), errors, color=style.BLUE, height=0.6)
+        middle.axvline(scene.limit * scene.frame.diameter, color=style.VERMILION, linewidth=0.8)
+        middle.set_yticks(np.arange(len(errors)), [fill(taken_out(subset), 26) for subset in BY_SIZE])
+        middle.set(xlabel=f"re-enacted error ({explanation.unit})", title="what if?")
+    else:
+        middle.set_axis_off()
     if explanation.unknown:
         lines = ["state: unknown"]
     elif diagnosis is None:
@@ -133,6 +76,26 @@ def _write(panel, explanation: Explanation) -> None:
     lines += [f"warning: {warning}" for warning in explanation.warnings]
     wrapped = [part for line in lines for part in wrap(line, LETTERS, subsequent_indent="   ")]
     text = "\n".join(wrapped[:MOST_LINES] + ["…"] * (len(wrapped) > MOST_LINES))
-    panel.text(
-        0, 1, text, va="top", ha="left", fontsize=SMALL_PT, transform=panel.transAxes, linespacing=1.4, in_layout=False
-    )
+    look = {"va": "top", "ha": "left", "fontsize": style.SMALL_PT, "linespacing": 1.4, "in_layout": False}
+    right.set_axis_off()
+    right.text(0, 1, text, transform=right.transAxes, **look)
+    style.write_title(figure, names)
+    style.save_png(figure, png_path)
+
+
+def _draw_clouds(panel, scene: Scene, source: np.ndarray, view: np.ndarray):
+    """Draw the target in gray and the source by its distances, from back to front; return what has the colors."""
+    from matplotlib import colormaps
+    from matplotlib.colors import ListedColormap
+
+    target, source = thinned(scene.target, POINTS), thinned(source, POINTS)
+    at, ahead = target @ view.T, source @ view.T
+    panel.scatter(at[:, 0], at[:, 1], s=1, c=style.LIGHT_GRAY, linewidths=0)
+    order = np.argsort(ahead[:, 2], kind="stable")
+    colors = ListedColormap(colormaps["viridis"](np.linspace(BRIGHTEST, 0, 256)))
+    look = {"cmap": colors, "vmin": 0, "vmax": scene.reach * scene.frame.diameter, "linewidths": 0}
+    far = distances(source, scene.target)[order] * scene.frame.diameter
+    shown = panel.scatter(ahead[order, 0], ahead[order, 1], s=2, c=far, **look)
+    panel.set(aspect="equal")
+    panel.set_axis_off()
+    return shown

@@ -40,13 +40,9 @@ def code_files(*modules: str) -> list[str]:
         files.update(_file_of(module).parent.glob(BESIDE[module]))
     working = Path.cwd().resolve()  # as ROOT is
     seen = ROOT.relative_to(working) if ROOT.is_relative_to(working) else ROOT
-    return sorted(
-        str(seen / file.relative_to(ROOT)) if file.is_relative_to(ROOT) else _from(working, file) for file in files
-    )
-
-
-def _from(working: Path, file: Path) -> str:
-    return str(file.relative_to(working) if file.is_relative_to(working) else file)
+    places = {ROOT: seen, working: Path()}  # where files are -> what their names begin with
+    inside = {file: next((place for place in places if file.is_relative_to(place)), None) for file in files}
+    return sorted(str(places[place] / file.relative_to(place) if place else file) for file, place in inside.items())
 
 
 _HOLD_STATEMENTS = (ast.stmt, ast.excepthandler, ast.match_case)  # imports are statements, not expressions
@@ -67,12 +63,18 @@ def _imports(module: str) -> tuple[str, ...]:
             nodes += (child for child in ast.iter_child_nodes(node) if isinstance(child, _HOLD_STATEMENTS))
         if isinstance(node, ast.Import):
             names |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and (base := _base(node, module, file)):
+        elif isinstance(node, ast.ImportFrom):
+            package = module.split(".") if file.stem == "__init__" else module.split(".")[:-1]
+            around = package[: len(package) - (node.level - 1)] if node.level else []  # of a relative import
+            base = ".".join([*around, *([node.module] if node.module else [])])
             names |= {base} | {f"{base}.{alias.name}" for alias in node.names}
     top = module.split(".")[0]
     if top not in PACKAGES:  # the packages around it run first
         names |= {module.rsplit(".", depth)[0] for depth in range(1, module.count(".") + 1)}
-        _know_beside(top, names)
+        if (folder := lone_root(top)) is not None:  # of a plugin that is a file, with modules beside it
+            for first in {name.split(".")[0] for name in names} - {*PACKAGES}:
+                if (folder / f"{first}.py").is_file() or (folder / first).is_dir():
+                    ROOTS.setdefault(first, folder)
     return tuple(sorted(name for name in names if _is_followed(name, top) and _file(name) is not None))
 
 
@@ -80,8 +82,8 @@ def _statements_for(tree: ast.Module, function: str) -> list[ast.AST]:
     """Return a function of a module, and the module's statements that bind the names that it uses, and so on."""
     binding: dict[str, ast.stmt] = {}
     for node in tree.body:
-        names = {node.name} if isinstance(node, (ast.FunctionDef, ast.ClassDef)) else _used_and_bound(node)[1]
-        binding |= dict.fromkeys(names, node)
+        is_named = isinstance(node, (ast.FunctionDef, ast.ClassDef))
+        binding |= dict.fromkeys({node.name} if is_named else _used_and_bound(node)[1], node)
     if function not in binding:
         raise AttributeError(f"the module has no function {function}")
     statements: dict[ast.AST, None] = {}
@@ -108,23 +110,6 @@ def _used_and_bound(node: ast.AST) -> tuple[set[str], set[str]]:
         elif isinstance(part, ast.arg):
             bound.add(part.arg)
     return used, bound
-
-
-def _base(node: ast.ImportFrom, module: str, file: Path) -> str:
-    """Return the absolute name of the module that names are imported from."""
-    if not node.level:
-        return node.module or ""
-    package = module.split(".") if file.stem == "__init__" else module.split(".")[:-1]
-    around = package[: len(package) - (node.level - 1)]
-    return ".".join([*around, *([node.module] if node.module else [])])
-
-
-def _know_beside(top: str, names: set[str]) -> None:
-    """Note the folder of modules that a single-file plugin imports from beside it."""
-    if (folder := lone_root(top)) is not None:
-        for first in {name.split(".")[0] for name in names} - {*PACKAGES}:
-            if (folder / f"{first}.py").is_file() or (folder / first).is_dir():
-                ROOTS.setdefault(first, folder)
 
 
 def _is_followed(name: str, importing: str) -> bool:

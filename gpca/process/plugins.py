@@ -64,8 +64,12 @@ def entries_outside(variable: str, kind: str, of: type, taken: Iterable[str]) ->
         taken: names of the suite's entries.
     """
     group = next(group for group, variables in GROUPS.items() if variable in variables)
+    modules = [load(name) for name in named()]
+    for package, name in _announced(group):
+        modules.append(_imported(name, f"plugin {name} of the package {package}"))
+        _remember(modules[-1])
     names, outside = set(taken), {}
-    for module_name, module in _modules(group).items():
+    for module_name, module in {module.__name__: module for module in modules}.items():
         entries = getattr(module, variable, {})
         if not isinstance(entries, Mapping):
             raise InputError(module_name, f"{variable} is not a mapping", f"give names, each with its {of.__name__}")
@@ -83,7 +87,7 @@ def entries_outside(variable: str, kind: str, of: type, taken: Iterable[str]) ->
 def joined_outside(variable: str, kind: str, of: type, entries: Mapping[str, Any]) -> dict[str, Any]:
     """Return the suite's entries of a kind and those of plugins, by name."""
     outside = entries_outside(variable, kind, of, entries)
-    return {**entries, **{name: entry for listed in outside.values() for name, entry in listed.items()}}
+    return dict(entries) | {name: entry for listed in outside.values() for name, entry in listed.items()}
 
 
 def module_outside(variable: str, kind: str, of: type, name: str) -> str | None:
@@ -100,7 +104,7 @@ def is_outside(module: str) -> bool:
 def load(name: str) -> ModuleType:
     """Import a file by its path, or a module that is installed or below the working directory."""
     if not name.endswith(".py"):
-        _extend_path(Path.cwd())
+        sys.path += [str(Path.cwd())] * (str(Path.cwd()) not in sys.path)  # searched last
         module = _imported(name, name)
         if is_outside(name):
             _remember(module)
@@ -110,9 +114,13 @@ def load(name: str) -> ModuleType:
         raise InputError(name, "no such file", "give a Python file relative to the working directory, or a module")
     if not path.stem.isidentifier():
         raise InputError(name, "has a name that Python cannot import", "rename it: letters, digits and underscores")
-    if (other := _file_of(path.stem)) not in (None, path):
+    loaded = sys.modules.get(path.stem)
+    origin = getattr(loaded, "__file__", None) if loaded else getattr(find_spec(path.stem), "origin", None)
+    builtin = path.stem if path.stem in sys.builtin_module_names else None  # and None for a folder without code
+    other = Path(origin).resolve() if origin else builtin
+    if other not in (None, path):
         raise InputError(name, f"has the name of another module, {other}", "rename it")
-    _extend_path(path.parent)
+    sys.path += [str(path.parent)] * (str(path.parent) not in sys.path)
     module = _imported(path.stem, name)
     _remember(module)
     return module
@@ -122,15 +130,6 @@ def lone_root(top: str) -> Path | None:
     """Return the folder of a plugin that is a file, with its helper modules; None for an installed package."""
     root = ROOTS.get(top)
     return None if root is None or root in _INSTALLED else root
-
-
-def _modules(group: str) -> dict[str, ModuleType]:
-    """Return the modules of the config, and those that installed packages announce for a group, by name."""
-    modules = [load(name) for name in named()]
-    for package, name in _announced(group):
-        modules.append(_imported(name, f"plugin {name} of the package {package}"))
-        _remember(modules[-1])
-    return {module.__name__: module for module in modules}
 
 
 @cache
@@ -156,21 +155,6 @@ def _remember(module: ModuleType) -> None:
         path = Path(file).resolve()
         package = path.parent if path.stem == "__init__" else path.with_suffix("")
         ROOTS[parts[0]] = package.parents[len(parts) - 1]
-
-
-def _file_of(stem: str) -> Path | None:
-    """Return the file that an import of this name finds; None also for a folder without code."""
-    loaded = sys.modules.get(stem)
-    origin = getattr(loaded, "__file__", None) if loaded else getattr(find_spec(stem), "origin", None)
-    if origin is None:
-        return Path(stem) if stem in sys.builtin_module_names else None
-    return Path(origin).resolve()
-
-
-def _extend_path(folder: Path) -> None:
-    """Let imports search a folder last."""
-    if str(folder) not in sys.path:
-        sys.path.append(str(folder))
 
 
 def _a(kind: type) -> str:

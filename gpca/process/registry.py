@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pkgutil
 from collections.abc import Sequence
+from dataclasses import dataclass
 from importlib import import_module
 from typing import Any, Generic, TypeVar
 
@@ -13,23 +14,15 @@ from gpca.process.plugins import entries_outside
 Entry = TypeVar("Entry")
 
 
+@dataclass(frozen=True)
 class Registry(Generic[Entry]):
-    """All entries of a kind, such as registration methods; files that are new in the folder need no further listing.
+    """All entries of a kind, such as registration methods; files that are new in the folder need no further listing."""
 
-    Args:
-        folder: package of the modules that list entries.
-        first: modules elsewhere, whose entries come first.
-        outside: type of the entries that modules of plugins may list, which come last; None for no plugins.
-    """
-
-    def __init__(
-        self, kind: str, folder: str, variable: str, first: Sequence[str] = (), outside: type[Entry] | None = None
-    ) -> None:
-        self.kind = kind
-        self._folder = folder
-        self._variable = variable
-        self._first = first
-        self._outside = outside
+    kind: str  # name of an entry in messages
+    folder: str  # package of the modules that list entries
+    variable: str  # of a module, its entries by name
+    first: Sequence[str] = ()  # modules elsewhere, whose entries come first
+    outside: type[Entry] | None = None  # type of the entries of plugins, which come last; None for no plugins
 
     def entries(self) -> dict[str, Entry]:
         """Return all entries by name."""
@@ -48,13 +41,13 @@ class Registry(Generic[Entry]):
 
     def by_module(self) -> dict[str, dict[str, Entry]]:
         """Return the entries of each module."""
-        files = pkgutil.iter_modules(import_module(self._folder).__path__)
-        names = sorted(f"{self._folder}.{file.name}" for file in files)
-        by_module = {name: getattr(import_module(name), self._variable, {}) for name in (*self._first, *names)}
-        if self._outside is None:
+        files = pkgutil.iter_modules(import_module(self.folder).__path__)
+        names = sorted(f"{self.folder}.{file.name}" for file in files)
+        by_module = {name: getattr(import_module(name), self.variable, {}) for name in (*self.first, *names)}
+        if self.outside is None:
             return by_module
         taken = [name for entries in by_module.values() for name in entries]
-        return by_module | entries_outside(self._variable, self.kind, self._outside, taken)
+        return by_module | entries_outside(self.variable, self.kind, self.outside, taken)
 
 
 def load(name: str) -> Any:
