@@ -29,11 +29,7 @@ def upper_bound(value_N: np.ndarray, level: float, family_N: np.ndarray | None =
     has the weight 1 / (K + 1), distributed equally over its samples; the new sample's family, whose values are
     arbitrary, has the same weight (hierarchical conformal prediction, Lee, Barber and Willett 2023).
 
-    Args:
-        family_N: family of each sample; None if samples are exchangeable one by one.
-
-    Returns:
-        The bound; infinity if there are too few samples or families.
+    It is infinity if there are too few samples or families. Without families, samples are exchangeable one by one.
     """
     if family_N is None:
         rank = ceil((len(value_N) + 1) * level - ROUNDING)
@@ -51,9 +47,7 @@ def confident_upper_bound(value_N: np.ndarray, level: float, confidence: float) 
     :func:`upper_bound` holds on average over draws of the calibration samples; this bound holds for the given ones,
     except for the share 1 - `confidence` of draws. It is the smallest of the sorted values above which the upper
     Clopper-Pearson bound of the share is at most 1 - `level`; samples have to be independent.
-
-    Returns:
-        The bound; infinity if there are too few samples.
+    It is infinity if there are too few samples.
     """
     from scipy.stats import binom
 
@@ -70,17 +64,13 @@ def highest_level(samples: int, family_N: np.ndarray | None = None) -> float:
 
 @dataclass(frozen=True)
 class StateSets:
-    """Sets of states with limits on their nonconformity.
-
-    Attributes:
-        limits: (K,) largest nonconformity of each state in a set; infinity if there were too few samples.
-    """
+    """Sets of states with limits on their nonconformity, which are infinity where there were too few samples."""
 
     states: tuple[str, ...]  # names of the K columns of scores
     level: float  # probability that a set contains the true state
     nonconformity: Nonconformity  # see :func:`nonconformity`
     by_state: bool  # whether the level holds for each state separately (Mondrian) instead of on average
-    limits: tuple[float, ...]
+    limits: tuple[float, ...]  # (K,) largest nonconformity of each state in a set
 
     def of(self, scores_M_K: np.ndarray) -> np.ndarray:
         """Return which states (M, K) are in the set of each of M samples; no set is empty."""
@@ -132,17 +122,14 @@ def calibrate_sets(
 class FailureAlarm:
     """An alarm with two thresholds; between them, it is not sure.
 
-    Attributes:
-        good_below: score of failure below which a registration is called good; negative infinity if there were too few
-            failed samples.
-        confidence: confidence with which both risks hold for these thresholds; None if they hold on average over draws
-            of the calibration samples.
+    The thresholds are infinite where there were too few samples. With a confidence, both risks hold for these
+    thresholds; without, on average over draws of the calibration samples.
     """
 
     missed: float  # largest probability that a failed registration is called good
     false_alarms: float  # largest probability that a good one is called failed
-    good_below: float
-    failed_from: float  # score from which it is called failed; infinity if there were too few good samples
+    good_below: float  # score of failure below which a registration is called good
+    failed_from: float  # score from which it is called failed
     confidence: float | None = None
 
     def of(self, failure_M: np.ndarray) -> np.ndarray:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -56,10 +56,10 @@ def require_format(path: Path) -> None:
 
 
 def read_points(path: Path, unit: str) -> tuple[np.ndarray, CanonicalFrame]:
-    """Read a cloud, or sample a mesh.
+    """Read a cloud, or sample a mesh: points (N, 3) in the file's unit, and their canonical frame.
 
-    Returns:
-        Points (N, 3) in that unit, and their canonical frame.
+    Raises InputError for a file that is missing, unreadable or of another format, a missing package, too few points,
+    NaN, a mesh without area, or a diameter out of range.
     """
     scale = mesh_folder.meters_per(unit)
     require_format(path)
@@ -96,9 +96,7 @@ def _cloud(path: Path) -> np.ndarray:
     suffix = path.suffix.lower()
     if suffix == ".pcd":
         return point_files.parse_pcd(path.read_bytes(), path)
-    if suffix in point_files.TABLE_READERS:
-        return point_files.read_table(path)
-    return point_files.read_scanner_file(path)
+    return (point_files.read_table if suffix in point_files.TABLE_READERS else point_files.read_scanner_file)(path)
 
 
 def read_pose(path: Path) -> np.ndarray:
@@ -224,14 +222,15 @@ class Familiarity:
     def of(cls, pairs: Iterable[tuple[np.ndarray, np.ndarray]]) -> Familiarity:
         """Measure the training samples."""
         measured = [measure(*pair) for pair in pairs]
-        ends = ((1 - SHARE) / 2, (1 + SHARE) / 2)
         ranges = {}
         for name in MEASURES:
             values = np.array([measures[name] for measures in measured])
             values = values[np.isfinite(values)]
-            low, high = np.quantile(values, ends).tolist() if len(values) else (0.0, np.inf)
+            ends = (0.0, np.inf)
+            if len(values):
+                ends = np.quantile(values, ((1 - SHARE) / 2, (1 + SHARE) / 2)).tolist()
             margin = SIZE_MARGIN if name == "size" else 1.0
-            ranges[name] = low / margin, high * margin
+            ranges[name] = ends[0] / margin, ends[1] * margin
         return cls(ranges)
 
     def warnings(self, source: np.ndarray, target: np.ndarray) -> list[str]:
@@ -252,8 +251,7 @@ class Familiarity:
         return [line for line, holds in lines.items() if holds]
 
 
-@dataclass(frozen=True)
-class Void:
+class Void(NamedTuple):
     """A fault of the pair, and what the user should check."""
 
     fault: str
@@ -263,7 +261,7 @@ class Void:
         return f"{self.fault}, so the scores are meaningless: check {self.check}"
 
 
-def voids_of(source: np.ndarray, target: np.ndarray, fitness: float, familiar: Familiarity | None) -> list[Void]:
+def voids_of(source: np.ndarray, target: np.ndarray, fitness: float, familiar: Familiarity) -> list[Void]:
     """Return the faults that leave an explanation without meaning, if any.
 
     Args:
@@ -273,10 +271,9 @@ def voids_of(source: np.ndarray, target: np.ndarray, fitness: float, familiar: F
     if (matches := round(fitness * len(source))) < FEWEST_MATCHES:
         ended = f"only {matches} of the source's points" if matches else "no source point"
         voids.append(Void(f"{ended} ended near the target", "the initial pose and the unit"))
-    if familiar is not None:
-        low, high = familiar.ranges["size"]
-        if not low / FOREIGN <= relative_size(source, target) <= high * FOREIGN:
-            voids.append(Void("source and target differ in scale", "the unit and scale of both"))
+    low, high = familiar.ranges["size"]
+    if not low / FOREIGN <= relative_size(source, target) <= high * FOREIGN:
+        voids.append(Void("source and target differ in scale", "the unit and scale of both"))
     # Twice the radius about the median that contains the share `BULK` of the points.
     bulk = 2 * float(np.quantile(np.linalg.norm(target - np.median(target, axis=0), axis=1), BULK))
     if bulk < SMALLEST_BULK:

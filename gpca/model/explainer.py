@@ -25,9 +25,9 @@ from gpca.causes.settings import Limits
 from gpca.causes.truth import NOMINAL
 from gpca.encoders.training import best_device
 from gpca.errors import InputError
-from gpca.model.clouds import OR_SCANS, Clouds, Void, voids_of
+from gpca.model.clouds import OR_SCANS, Clouds, voids_of
 from gpca.model.diagnoser import QUICK_HYPOTHESES, QUICK_POINTS
-from gpca.model.diagnosis import CHECK, Diagnosis
+from gpca.model.diagnosis import CHECK
 from gpca.model.explanation import Explanation, PoseSpread
 from gpca.model.file import Model
 from gpca.model.location import model_path
@@ -107,7 +107,10 @@ class Explainer:
                 unknown method or estimator, missing package, or an estimator that has to be trained.
         """
         register = None if method is None else make_method(method)
-        estimate = None if uncertainty is None else spread_estimator(estimator, uncertainty)
+        estimate = None
+        if uncertainty is not None:
+            options = {"starts": uncertainty.starts} if estimator == MONTE_CARLO else {}
+            estimate = make_estimator(estimator, options)
         started = perf_counter()
         seconds: dict[str, float] = {}
         notes: list[str] = []
@@ -146,7 +149,15 @@ class Explainer:
         if uncertainty is not None and estimate is not None:
             with _timed(seconds, "uncertainty"):
                 spread = self._spread(clouds, outcome, method, estimator, estimate, uncertainty, notes)
-        decision = self._decision(scores_C, float(bald), diagnosis, voids)
+        if voids:
+            decision = Decision(CHECK, "", ", ".join(void.check for void in voids))
+        elif diagnosis is None:
+            decision = self.policy.decide(scores_C, float(bald), concepts=self.model.gpc.classes)
+        elif diagnosis.state == NOMINAL:
+            decision = Decision(NOTHING, "", "nothing is wrong")
+        else:
+            causes = diagnosis.causes
+            decision = self.policy.decide(np.array([*causes.values()]), diagnosis.bald, concepts=(*causes,))
         return Explanation(
             T_target_source=clouds.frame.pose_outside(T_found) @ clouds.T_target_source_init,
             fitness=outcome.fitness,
@@ -259,16 +270,6 @@ class Explainer:
         starts = settings.starts if estimator == MONTE_CARLO else None
         return PoseSpread(estimated.covariance_6_6, diameter, estimator, starts)
 
-    def _decision(self, scores_C: np.ndarray, bald: float, diagnosis: Diagnosis | None, voids: list[Void]) -> Decision:
-        """Choose the action by the diagnosis if there is one, otherwise by GP-CA's scores."""
-        if voids:
-            return Decision(CHECK, "", ", ".join(void.check for void in voids))
-        if diagnosis is None:
-            return self.policy.decide(scores_C, bald, concepts=self.model.gpc.classes)
-        if diagnosis.state == NOMINAL:
-            return Decision(NOTHING, "", "nothing is wrong")
-        return self.policy.decide(np.array([*diagnosis.causes.values()]), diagnosis.bald, concepts=(*diagnosis.causes,))
-
     def _fits_inverted(self, clouds: Clouds, outcome: Outcome) -> bool:
         if outcome.fitness >= GOOD_FITNESS:
             return False
@@ -277,15 +278,6 @@ class Explainer:
         _, fitness_1, rmse_1 = clouds.icp.register(from_inverse, np.eye(4)[None])
         costs_2 = clipped_cost(np.append(outcome.fitness, fitness_1), np.append(outcome.inlier_rmse, rmse_1), distance)
         return bool(costs_2[1] < INVERSE_COST * costs_2[0])
-
-
-def spread_estimator(name: str, settings: UncertaintySettings) -> Callable[[RegisteredPair], Estimate]:
-    """Return an uncertainty estimator; Monte-Carlo uses the settings' number of starts.
-
-    Raises:
-        InputError: unknown name, or an estimator that has to be trained.
-    """
-    return make_estimator(name, {"starts": settings.starts} if name == MONTE_CARLO else {})
 
 
 @contextmanager

@@ -11,7 +11,6 @@ from gpca.io.files import require_file
 VARIABLE = "GPCA_MODEL"  # environment variable with the path of the model
 RESULTS = Path("results")  # in the working directory
 SHIPPED = Path(__file__).with_name("shipped.pt")  # written by `python -m gpca ship`
-BEST_FIRST = ("full", "default")  # preferred runs; the smoke run comes last, as its model is hardly trained
 REMEDY = "make one with 'make results', or by itself with 'snakemake -j2 results/default/model.pt'"
 
 
@@ -33,12 +32,10 @@ def model_path(chosen: str | Path | None = None, results: Path = RESULTS) -> Pat
 
     def rank(path: Path) -> tuple:
         run = path.parent.name
-        preferred = BEST_FIRST.index(run) if run in BEST_FIRST else len(BEST_FIRST)
-        return run == "smoke", preferred, -path.stat().st_mtime
+        return run == "smoke", run != "full", run != "default", -path.stat().st_mtime
 
     candidates = [*sorted(results.glob("*/model.pt"), key=rank), *([SHIPPED] if SHIPPED.is_file() else [])]
     if not candidates:
-        raise InputError(
-            "no model", f"none in {results.absolute()}", f"{REMEDY}, or name one with --model or {VARIABLE}"
-        )
+        remedy = f"{REMEDY}, or name one with --model or {VARIABLE}"
+        raise InputError("no model", f"none in {results.absolute()}", remedy)
     return candidates[0]

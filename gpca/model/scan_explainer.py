@@ -150,11 +150,7 @@ def _enacted(scans: Scans, pair: ObservedPair) -> tuple[list[Enactment], CauseSe
 
 
 def failure_of(scans: Scans, enactments: Sequence[Enactment], T_found: np.ndarray) -> float:
-    """Return the probability that the pose is off by more than the limit.
-
-    Args:
-        enactments: of refined hypotheses; errors are over the surface that is common at each.
-    """
+    """Return the probability of an error above the limit, over the surface that is common at each hypothesis."""
     found = scans.outcome(T_found)
     if not found.fitness > 0:
         return 1.0
