@@ -85,9 +85,14 @@ class ModelSurface:
         self.roughness = max(trimmed_square(left_out) - trimmed_square(own), 0.0)
 
     @cached_property
+    def symmetries(self) -> dict[str, list]:
+        """The turns that leave the shape as it is (:func:`gpca.objects.bop.find_symmetries`)."""
+        return find_symmetries(self.points, 1.0)
+
+    @property
     def symmetric(self) -> bool:
         """Whether some turn leaves the shape as it is; errors then are those of the nearest points."""
-        return bool(find_symmetries(self.points, 1.0))
+        return bool(self.symmetries)
 
     def residuals(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the signed distances (N,) of points (N, 3) from the plane of the nearest model point, and its row."""

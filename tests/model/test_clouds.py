@@ -260,6 +260,9 @@ def test_gpca_alone_knows_nothing_of_such_a_pair_either(explainer, pair):
     assert "state     unknown" in said.text()
 
 
+ANY_SIZE = Familiarity({"size": (0.0, np.inf)})
+
+
 def test_what_can_be_judged_is_not_void(explainer, pair):
     source, target = pair
     for known in (source, 1.3 * source, source[: len(source) // 2], np.r_[source, [[0.3, 0, 0]]]):
