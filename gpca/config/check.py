@@ -28,13 +28,9 @@ LARGEST_BYTES = 2**36  # a thousand times what five seeds of the paper's protoco
 def read(config: dict, command_line: Mapping, as_module: bool = False) -> tuple[dict, dict[str, dict]]:
     """Read the config of a run as Snakemake merged it; InputError as in :func:`check`.
 
-    Args:
-        command_line: the values given with ``--config``, whose numbers are still text.
-        as_module: whether another workflow gives it to this one as a module, so that it lacks the defaults.
-
-    Returns:
-        the config in the order of the defaults, without what it leaves out, with the limit of success in all sections;
-        the sources that :func:`check` returns.
+    `command_line` has the values given with ``--config``, whose numbers are still text. A config that another workflow
+    gives to this one as a module lacks the defaults. Returned are the config in the order of the defaults, without what
+    it leaves out, with the limit of success in all sections, and the sources that :func:`check` returns.
     """
     whole = in_order(with_types(with_defaults(config) if as_module else config, command_line))
     sources = check(whole)
@@ -54,24 +50,23 @@ def check(config: dict) -> dict[str, dict]:
     whole = with_success(whole)
     check_left_out(config)
     left_out = partial(names_left_out, config)
-    _check_folders(whole)
+    if whole["run"].lower() in RESERVED:
+        raise InputError("config key run", f"results/{whole['run']} is reserved", "choose another name")
+    if whole["data_dir"] is not None:
+        with_key("data_dir", require_place, whole["data_dir"])
+    folder = with_key("downloads", require_place, whole["downloads"])
+    existing = next((path for path in (folder, *folder.parents) if path.exists()), folder)
+    if not existing.is_dir():
+        raise InputError("config key downloads", f"{existing} is not a folder", "name a folder; it need not exist")
     _check_registrations(whole)
     _check_names(whole, left_out)
     for experiment in experiments():
         experiment.check(whole, left_out)
-    return resolve_sources(whole)
-
-
-def _check_folders(config: dict) -> None:
-    """Check the run's name, and the folders of data and downloads; reads no data."""
-    if config["run"].lower() in RESERVED:
-        raise InputError("config key run", f"results/{config['run']} is reserved", "choose another name")
-    if config["data_dir"] is not None:
-        with_key("data_dir", require_place, config["data_dir"])
-    folder = with_key("downloads", require_place, config["downloads"])
-    existing = next((path for path in (folder, *folder.parents) if path.exists()), folder)
-    if not existing.is_dir():
-        raise InputError("config key downloads", f"{existing} is not a folder", "name a folder; it need not exist")
+    return {
+        name: {"stand_in": entry["kind"] == "procedural"}
+        | with_key(f"sources.{name}", resolve, entry, whole["data_dir"])
+        for name, entry in whole["sources"].items()
+    }
 
 
 def _check_registrations(config: dict) -> None:
@@ -117,15 +112,6 @@ def _check_names(config: dict, left_out: LeftOut) -> None:
     require_names("figures.source", [config["figures"]["source"]], sources, "source", left_out("sources"))
     require_names("model.source", [model["source"]], (*sources, REAL_WORLD), "source", left_out("sources"))
     require_names("model.encoder", [model["encoder"]], encoders, "encoder", left_out("encoders"))
-
-
-def resolve_sources(config: dict) -> dict[str, dict]:
-    """Return the resolved entry of every source, by name, with ``stand_in`` set."""
-    return {
-        name: {"stand_in": entry["kind"] == "procedural"}
-        | with_key(f"sources.{name}", resolve, entry, config["data_dir"])
-        for name, entry in config["sources"].items()
-    }
 
 
 def with_success(config: Mapping[str, Any]) -> dict[str, Any]:

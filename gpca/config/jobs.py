@@ -13,6 +13,7 @@ import shutil
 import sys
 import sysconfig
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import IO
 
@@ -64,11 +65,21 @@ def clear_leftovers(temporary: Sequence[str | Path], main: bool = True, folder: 
     except OSError:  # not writable, which Snakemake reports itself
         return
     try:
-        if main and _is_alone(file):
-            file.seek(0)
-            _clear(folder, file.read().splitlines(), own_folders)
-            file.truncate(0)
         if main:
+            with suppress(BlockingIOError):
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)  # this one is alone
+                file.seek(0)
+                leftovers = [path for pattern in LEFTOVERS for path in folder.glob(pattern)]
+                # Of the recorded folders, only siblings of the present ones, with names as tempfile makes them.
+                kinds = {(path.parent, path.name[:-8], len(path.name)) for path in own_folders}
+                recorded = map(Path, file.read().splitlines())
+                leftovers += [path for path in recorded if (path.parent, path.name[:-8], len(path.name)) in kinds]
+                for path in leftovers:
+                    if path.is_dir() and not path.is_symlink():
+                        shutil.rmtree(path, ignore_errors=True)
+                    else:
+                        path.unlink(missing_ok=True)
+                file.truncate(0)
             file.writelines(f"{path}\n" for path in own_folders)
             file.flush()
         fcntl.flock(file, fcntl.LOCK_SH)
@@ -76,23 +87,3 @@ def clear_leftovers(temporary: Sequence[str | Path], main: bool = True, folder: 
         file.close()
     else:
         _locks.append(file)
-
-
-def _is_alone(file: IO[str]) -> bool:
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    return True
-
-
-def _clear(folder: Path, recorded: list[str], temporary: list[Path]) -> None:
-    leftovers = [path for pattern in LEFTOVERS for path in folder.glob(pattern)]
-    # Of the recorded folders, only siblings of the present ones are removed, with names as tempfile makes them.
-    kinds = {(path.parent, path.name[:-8], len(path.name)) for path in temporary}
-    leftovers += [path for path in map(Path, recorded) if (path.parent, path.name[:-8], len(path.name)) in kinds]
-    for path in leftovers:
-        if path.is_dir() and not path.is_symlink():
-            shutil.rmtree(path, ignore_errors=True)
-        else:
-            path.unlink(missing_ok=True)

@@ -92,23 +92,19 @@ def with_types(config: Mapping[str, Any], command_line: Mapping[str, Any]) -> di
     Snakemake reads values inside lists and mappings as text. Only those values of the command line that the config
     still has are converted: a workflow that uses this one as a module may have another config.
     """
-
-    def typed(value: Any, given: Any) -> Any:
-        if isinstance(value, Mapping) and isinstance(given, Mapping):
-            return with_types(value, given)
-        return _read(value) if value == given else value
-
     return {
-        name: typed(value, command_line[name]) if isinstance(command_line, Mapping) and name in command_line else value
-        for name, value in config.items()
+        name: _typed(value, command_line[name]) if name in command_line else value for name, value in config.items()
     }
 
 
-def _read(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {name: _read(entry) for name, entry in value.items()}
+def _typed(value: Any, given: Any) -> Any:
+    """Return a value as in a config file where it is the one that the command line gives."""
+    if isinstance(value, Mapping) and isinstance(given, Mapping):
+        return with_types(value, given)
+    if value != given:
+        return value
     if isinstance(value, list):
-        return [_read(entry) for entry in value]
+        return [_typed(entry, entry) for entry in value]
     return read_scalar(value) if isinstance(value, str) else value
 
 
@@ -123,7 +119,11 @@ def without_false(config: Mapping[str, Any]) -> dict[str, Any]:
     for key, names in left_out.items():
         _change(whole, key, partial(_without, gone=names))
     for key in SWITCHES:
-        _change(whole, key, partial(_switched_on, key))
+        switches = _at(config, key)
+        for name, switch in switches.items() if isinstance(switches, Mapping) else ():
+            if not isinstance(switch, bool):
+                raise InputError(f"config key {key}.{name}", f"{switch!r} is not a switch", "give true or false")
+        _change(whole, key, lambda switches: [name for name, switch in switches.items() if switch])
     for key, of in LISTED.items():
         gone = left_out[of] if isinstance(of, str) else of(lambda key: names_left_out(config, key))
         _change(whole, key, partial(_without, gone=gone), (list, dict))
@@ -146,13 +146,6 @@ def names_left_out(config: Mapping[str, Any], key: str) -> set[str]:
     """Return the names that are false in the mapping at a key, a path with dots."""
     mapping = _at(config, key)
     return {name for name, entry in mapping.items() if entry is False} if isinstance(mapping, Mapping) else set()
-
-
-def _switched_on(key: str, switches: Mapping[str, Any]) -> list[str]:
-    for name, switch in switches.items():
-        if not isinstance(switch, bool):
-            raise InputError(f"config key {key}.{name}", f"{switch!r} is not a switch", "give true or false")
-    return [name for name, switch in switches.items() if switch]
 
 
 def _at(config: Any, key: str) -> Any:

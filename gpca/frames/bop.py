@@ -163,12 +163,12 @@ def read_frames(folders: Iterable[Path], split: str = "test") -> list[Frame]:
             if not isinstance(truth, list):
                 raise InputError(folder / "scene_gt.json", f"image {image} has no list of objects", REMEDY)
             camera = read_camera(cameras[image], f"{folder / 'scene_camera.json'}: image {image}")
-            depth, color = _image_file(folder / "depth", f"{image:06d}"), _find_image(colors, f"{image:06d}")
+            depth, color = _needed_image(folder / "depth", f"{image:06d}"), _image(colors, f"{image:06d}")
             annotations = []
             for n, entry in enumerate(truth):
                 subject = f"{folder / 'scene_gt.json'}: image {image}, object {n}"
                 pose = read_pose(entry, subject)
-                mask = _image_file(folder / "mask_visib", f"{image:06d}_{n:06d}")
+                mask = _needed_image(folder / "mask_visib", f"{image:06d}_{n:06d}")
                 annotations.append(Annotation(*pose, mask, subject))
             frame = Frame(scene, image, *camera, depth, color, tuple(annotations))
             if (same := frames.setdefault(frame.place, frame)) is not frame:
@@ -215,13 +215,13 @@ class TooFewPoints(InputError):
     """Hardly any points were measured on an object; a reader may skip it."""
 
 
-def _find_image(folder: Path, stem: str) -> Path | None:
+def _image(folder: Path, stem: str) -> Path | None:
     files = (folder / f"{stem}{suffix}" for suffix in (".png", ".jpg", ".jpeg", ".tif"))
     return next((path for path in files if path.is_file()), None)
 
 
-def _image_file(folder: Path, stem: str) -> Path:
-    if (path := _find_image(folder, stem)) is None:
+def _needed_image(folder: Path, stem: str) -> Path:
+    if (path := _image(folder, stem)) is None:
         raise InputError(folder / f"{stem}.png", "no such image", REMEDY)
     return path
 

@@ -23,26 +23,18 @@ from gpca.seeds import generator
 
 @dataclass(frozen=True)
 class Dataset:
-    """A BOP dataset on disk.
+    """A BOP dataset on disk."""
 
-    Attributes:
-        name: seeds the draw of frames and prefixes the names of objects.
-        folders: the dataset's, or those that its archives were unpacked in.
-        errors: CSV of errors that estimators made elsewhere on its objects.
-        models: the folder of its models where that is not its own.
-        role: of the frames: other than for evaluation, only scenes of this role are read.
-    """
-
-    name: str
-    folders: tuple[Path, ...]
+    name: str  # seeds the draw of frames and prefixes the names of objects
+    folders: tuple[Path, ...]  # its own, or those that its archives were unpacked in
     unit: str = "mm"  # of the models' vertices
     split: str = "test"
     results: tuple[Path, ...] = ()  # BOP results files with initial poses, one of each estimator
-    errors: Path | None = None
-    models: Path | None = None
+    errors: Path | None = None  # CSV of errors that estimators made elsewhere on its objects
+    models: Path | None = None  # the folder of its models where that is not its own
     most_frames: int | None = 200  # of more frames, this many are drawn; None reads all
     places: Mapping[int, Place] = field(default_factory=dict)  # of its scenes, by number; none where no file says so
-    role: str = EVALUATION
+    role: str = EVALUATION  # of the frames: other than for evaluation, only scenes of this role are read
 
     def frames(self) -> list[Frame]:
         """Return its frames, or a draw of them; InputError for a scene that the splits lack."""

@@ -100,11 +100,9 @@ def estimates_of(
 ) -> list[tuple[str, np.ndarray]]:
     """Return the name of each estimator of a dataset that found an object, and its pose ``T_camera_model``.
 
-    Args:
-        place: scene, image, object id.
-        alone: whether no other object of this id is in the image. If false, an estimate farther than a diameter from
-            the measured points belongs to another one.
-        seen: ``points_m`` (P, 3) in the camera's frame, ``pixels`` (P, 2), ``camera_3_3`` and ``diameter_m``.
+    The `place` is (scene, image, object id). Where the object is not `alone`, an estimate farther than a diameter from
+    the measured points belongs to another one of this id. `seen` has ``points_m`` (P, 3), ``pixels`` (P, 2),
+    ``camera_3_3`` and ``diameter_m``.
     """
     estimates = []
     for name in sorted(poses_by_estimator):

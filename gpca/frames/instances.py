@@ -12,24 +12,9 @@ from scipy.spatial import cKDTree
 
 from gpca.alignment.rigid import inverse, transform
 from gpca.errors import InputError
+from gpca.frames import initial_pose, plausibility
 from gpca.frames.bop import Annotation, Frame, TooFewPoints, measured_points, without_background
 from gpca.frames.dataset import CenteredModel, Dataset
-from gpca.frames.initial_pose import (
-    EstimatorErrors,
-    GlobalRegistration,
-    InitialPoseSettings,
-    displace,
-    estimates_of,
-)
-from gpca.frames.plausibility import (
-    FARTHEST,
-    JUDGED_POINTS,
-    Observation,
-    median_distance,
-    require_plausible,
-    require_shared_form,
-    spread,
-)
 from gpca.frames.shots import Sighting
 from gpca.io.arrays import TEXT, WHOLE
 from gpca.io.container import FLAG, FLOAT, Container, array
@@ -43,32 +28,21 @@ NO_COLOR = "none"
 
 @dataclass(frozen=True)
 class Instances(Container):
-    """I objects in frames. The object frame is that of the canonical cloud, centered on its bounding box.
-
-    Attributes:
-        object_index: of the objects npz beside this file.
-        symmetric: a rotation exists that changes nothing about the object's shape.
-        init_from: where the initial pose is from: an estimator, ``errors`` of estimators, or another form.
-        camera_3_3: K in pixels.
-        colour: path of the color image; `NO_COLOR` where there is none.
-        fold: that the scene is tested with, `DRAWN` or `TRAINING` (:mod:`gpca.objects.canonical`).
-        points_m: float32, measured points in the camera's frame, of one instance after another.
-        pixels: int32, where each was seen, (u, v).
-    """
+    """I objects in frames. The object frame is that of the canonical cloud, centered on its bounding box."""
 
     dataset: np.ndarray = array("I", TEXT)
     scene: np.ndarray = array("I", WHOLE)
     image: np.ndarray = array("I", WHOLE)
-    object_index: np.ndarray = array("I", WHOLE)
-    symmetric: np.ndarray = array("I", FLAG)
-    T_camera_object_true: np.ndarray = array("I 4 4", FLOAT)
+    object_index: np.ndarray = array("I", WHOLE)  # in the objects npz beside this file
+    symmetric: np.ndarray = array("I", FLAG)  # a rotation leaves its shape as it is
+    T_camera_object_true: np.ndarray = array("I 4 4", FLOAT)  # meters
     T_camera_object_init: np.ndarray = array("I 4 4", FLOAT)
-    init_from: np.ndarray = array("I", TEXT)
-    camera_3_3: np.ndarray = array("I 3 3", FLOAT)
-    colour: np.ndarray = array("I", TEXT)
-    fold: np.ndarray = array("I", WHOLE)
-    points_m: np.ndarray = array("P 3", FLOAT, offsets="offsets", fewest=3)
-    pixels: np.ndarray = array("P 2", WHOLE, offsets="offsets", fewest=3)
+    init_from: np.ndarray = array("I", TEXT)  # an estimator, ``errors`` of estimators, or another form
+    camera_3_3: np.ndarray = array("I 3 3", FLOAT)  # in pixels
+    colour: np.ndarray = array("I", TEXT)  # path of the color image, or `NO_COLOR`
+    fold: np.ndarray = array("I", WHOLE)  # that its scene is tested with, `DRAWN` or `TRAINING`
+    points_m: np.ndarray = array("P 3", FLOAT, offsets="offsets", fewest=3)  # measured, in the camera's frame, float32
+    pixels: np.ndarray = array("P 2", WHOLE, offsets="offsets", fewest=3)  # where each was seen, (u, v), int32
     offsets: np.ndarray = array("I+1", WHOLE)
 
     def cloud_m(self, i: int) -> np.ndarray:
@@ -120,8 +94,9 @@ def points_on_model(instances: Instances, objects: ObjectClouds, most_points: in
     trees = {index: cKDTree(objects.points(index)) for index in np.unique(instances.object_index)}
     medians_m = []
     for i, index in enumerate(instances.object_index):
-        points_m = spread(instances.cloud_m(i), most_points or len(instances.points_m))
-        medians_m.append(median_distance(trees[index], transform(inverse(instances.T_camera_object_true[i]), points_m)))
+        points_m = plausibility.spread(instances.cloud_m(i), most_points or len(instances.points_m))
+        points_m = transform(inverse(instances.T_camera_object_true[i]), points_m)
+        medians_m.append(plausibility.median_distance(trees[index], points_m))
     return np.array(medians_m)
 
 
@@ -130,9 +105,9 @@ def require_of_objects(instances: Instances, objects: ObjectClouds, subject: obj
     remedy = "regenerate both files in one call"
     if instances.object_index.min() < 0 or instances.object_index.max() >= len(objects):
         raise InputError(subject, "shows objects that the object file does not contain", remedy)
-    medians_m = points_on_model(instances, objects, JUDGED_POINTS)
+    medians_m = points_on_model(instances, objects, plausibility.JUDGED_POINTS)
     distances = medians_m / objects.diameters_m[instances.object_index]
-    if distances.max() > FARTHEST:
+    if distances.max() > plausibility.FARTHEST:
         i = int(distances.argmax())
         name = objects.names[instances.object_index[i]]
         raise InputError(subject, f"instance {i} was measured {distances[i]:.2g} diameters from '{name}'", remedy)
@@ -141,7 +116,7 @@ def require_of_objects(instances: Instances, objects: ObjectClouds, subject: obj
 def read_instances(
     datasets: Mapping[str, tuple[Dataset, list[Frame], dict[int, CenteredModel]]],
     objects: ObjectClouds,
-    settings: InitialPoseSettings,
+    settings: initial_pose.InitialPoseSettings,
 ) -> Instances:
     """Return every object of the frames with enough measured points, with its true and its initial pose.
 
@@ -173,8 +148,8 @@ def read_instances(
                 try:
                     points_m, pixels = measured_points(frame, annotation, depth_m)
                     place = annotation.subject, T_camera_model, T_model_object, trees[number], diameter_m
-                    observed = Observation(*place, points_m)
-                    require_plausible(observed)
+                    observed = plausibility.Observation(*place, points_m)
+                    plausibility.require_plausible(observed)
                     points_m, pixels = without_background(points_m, pixels, annotation, diameter_m)
                 except TooFewPoints as fault:
                     left_out.append(str(fault))
@@ -194,7 +169,7 @@ def read_instances(
                 }
                 seen.append(_Seen(frame, n, T_model_object, diameter_m, row))
                 observations.append(replace(observed, points_m=row["points_m"]))
-        require_shared_form(dataset.name, observations)
+        plausibility.require_shared_form(dataset.name, observations)
     if not seen:
         reasons = f"; the first skipped: {left_out[0]}" if left_out else ""
         raise InputError(", ".join(datasets), f"no object is left in any frame{reasons}", "check masks and depth")
@@ -229,18 +204,20 @@ class _Seen(NamedTuple):
         return self.row["dataset"], *self.frame.place, self.n, use
 
 
-def _poses(seen: list[_Seen], objects: ObjectClouds, settings: InitialPoseSettings) -> list[tuple[str, np.ndarray]]:
+def _poses(
+    seen: list[_Seen], objects: ObjectClouds, settings: initial_pose.InitialPoseSettings
+) -> list[tuple[str, np.ndarray]]:
     """Return the form of the initial poses, and each of them, without asking an estimator."""
-    poses, registration = [], dict[tuple[str, int], GlobalRegistration]()
+    poses, registration = [], dict[tuple[str, int], initial_pose.GlobalRegistration]()
     for of in progress(seen, "initial poses"):
         axes, row = of.random_axes("initial pose"), of.row
         if settings.form == "true_pose":
-            T_init = displace(row["T_camera_object_true"], of.diameter_m, settings, generator(*axes))
+            T_init = initial_pose.displace(row["T_camera_object_true"], of.diameter_m, settings, generator(*axes))
         else:
             key = row["dataset"], of.annotation.object_id
             if key not in registration:
                 cloud = objects.clouds[row["object_index"]]
-                registration[key] = GlobalRegistration(*cloud, of.diameter_m, settings)
+                registration[key] = initial_pose.GlobalRegistration(*cloud, of.diameter_m, settings)
             T_init = registration[key].register(row["points_m"], seed_of(*axes))
         poses.append((settings.form, T_init))
     return poses
@@ -251,7 +228,7 @@ def _poses_from_results(
 ) -> list[tuple[str, np.ndarray]]:
     """Return a random estimator that found each object, and its pose; else ``errors``, and the truth with an error."""
     objects = [(of.row["dataset"], of.annotation.object_id) for of in seen]
-    errors = EstimatorErrors.read(
+    errors = initial_pose.EstimatorErrors.read(
         {name: (dataset.errors, models) for name, (dataset, _, models) in datasets.items()},
         {key for key, of in zip(objects, seen, strict=True) if of.row["symmetric"]},
     )
@@ -261,7 +238,7 @@ def _poses_from_results(
         alone = [each.object_id for each in of.frame.annotations].count(number) == 1
         random = generator(*of.random_axes("estimator"))
         shown = of.row | {"diameter_m": of.diameter_m}
-        found = estimates_of(estimators[name], (*of.frame.place, number), alone, shown)
+        found = initial_pose.estimates_of(estimators[name], (*of.frame.place, number), alone, shown)
         estimates.append(found[int(random.integers(len(found)))] if found else None)
         if found:
             errors.add((name, number), inverse(of.annotation.T_camera_model) @ estimates[-1][1])  # type: ignore[index]

@@ -50,10 +50,9 @@ def make_frame_registrations(
     object's at the initial pose, so that ICP starts at the identity. Errors of the initial pose and of the depth are in
     every sample, whatever its label.
 
-    Returns:
-        the registrations, the seconds (S,) of ICP, and a row per sample: its instance, whether any training sample
-            shows its object, and the errors of the initial and the aligned pose, ADD-S for symmetric objects and ADD
-            elsewhere, relative to the diameter.
+    Returned are the registrations, the seconds (S,) of ICP, and a row per sample: its instance, whether any training
+    sample shows its object, and the errors of the initial and the aligned pose, ADD-S for symmetric objects and ADD
+    elsewhere, relative to the diameter.
     """
     import pandas as pd
 

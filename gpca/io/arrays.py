@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 
 from gpca.errors import InputError
-from gpca.io import files
-from gpca.io.files import LARGEST_NUMBER, SPLITS, Axes, is_name, require_axes, require_file, whole_file
+from gpca.io.files import LARGEST_NUMBER, SPLITS, Axes, is_name, require_axes, require_file, require_memory, whole_file
 
 REGENERATE = "regenerate it with Snakemake"
 TEXT, WHOLE, REAL = "U", "iu", "iuf"  # what an array holds, in the letters of NumPy
+_BOUNDED = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)  # bzip2 and LZMA may give megabytes for a byte
 _KNOWN = f"b{REAL}{TEXT}"
 _FLOAT_BYTES = (4, 8)
 _LONGEST_HEADER = 10_000  # bytes; NumPy parses none that is longer
@@ -105,7 +105,7 @@ def _checked_members(archive, path, shapes, kinds, optional, remedy) -> dict[str
         if count != 1:
             raise InputError(path, f"array '{name}' is {'duplicated' if count else 'missing'}", remedy)
         members[name] = info = archive.getinfo(f"{name}.npy")
-        if not files.is_bounded(info):
+        if info.compress_type not in _BOUNDED:
             raise InputError(path, f"array '{name}' uses a compression that npz does not support", remedy)
         with archive.open(info) as stream:
             head = io.BytesIO(stream.read(_LONGEST_HEADER))  # which may claim to be gigabytes long itself
@@ -121,7 +121,7 @@ def _checked_members(archive, path, shapes, kinds, optional, remedy) -> dict[str
             raise InputError(path, f"array '{name}' has type {dtype}, not float32 or float64", remedy)
         if head.tell() + math.prod(actual) * dtype.itemsize != info.file_size:
             raise ValueError(f"array '{name}' is not as long as its header says")
-    files.require_memory(sum(info.file_size for info in members.values()), path.stat().st_size, path, remedy)
+    require_memory(sum(info.file_size for info in members.values()), path.stat().st_size, path, remedy)
     return members
 
 

@@ -26,22 +26,17 @@ REGENERATE_BOTH = "regenerate both from the same config"
 class ArrayField:
     """What one array of a container may hold.
 
-    Attributes:
-        shape: sizes, and names of dimensions, which have one size in a file; ``S+1`` is one more than S.
-        kind: `TEXT`, `WHOLE`, `REAL`, `FLOAT` or `FLAG`.
-        choices: its words.
-        offsets: for an array of all rows' parts one after another, the field with their limits: those of row i are
-            ``array[offsets[i]:offsets[i + 1]]``.
-        fewest: length of a part at least; where that is 0, there may be no parts at all.
+    The first axis of an array with `offsets` has all rows' parts one after another: those of row i are
+    ``array[offsets[i]:offsets[i + 1]]``.
     """
 
-    shape: tuple[int | str, ...]
-    kind: str = REAL
+    shape: tuple[int | str, ...]  # sizes, and names of dimensions, which have one size in a file; `S+1` is one more
+    kind: str = REAL  # TEXT, WHOLE, REAL, FLOAT or FLAG
     least: float = -np.inf
     most: float = np.inf
-    choices: tuple[str, ...] = ()
-    offsets: str = ""
-    fewest: int = 1
+    choices: tuple[str, ...] = ()  # its words
+    offsets: str = ""  # the field with the limits of the parts
+    fewest: int = 1  # length of a part at least; 0 allows none at all
 
 
 def array(shape: str, kind: str = REAL, **limits: Any) -> Any:

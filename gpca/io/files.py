@@ -12,7 +12,6 @@ import os
 import shutil
 import stat
 import warnings
-import zipfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -35,7 +34,6 @@ IMAGE_FORMATS = ("PNG", "JPEG", "TIFF")  # Pillow knows others by their content,
 SPLITS = ("train", "test")
 Axes = tuple[str, int | None]  # source and seed; the objects of a source have no seed
 _BREAKS = ("Cc", "Zl", "Zp")  # control characters, and separators of lines and paragraphs
-_BOUNDED = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 
 
 def require_file(path: str | Path, fault: str, remedy: str, largest_bytes: float = LARGEST_FILE_BYTES) -> None:
@@ -79,11 +77,6 @@ def require_memory(needed_bytes: int, file_bytes: int, subject: object, remedy: 
     if needed_bytes > memory_bytes / 2:
         fault = f"takes {needed_bytes / 1e9:.3g} GB, more than half of this machine's {memory_bytes / 1e9:.3g} GB"
         raise InputError(subject, fault, "use a machine with more memory, or smaller data")
-
-
-def is_bounded(info: zipfile.ZipInfo) -> bool:
-    """Return whether a member of a zip can be read in pieces; bzip2 and LZMA may give megabytes for a byte."""
-    return info.compress_type in _BOUNDED
 
 
 def is_name(text: str) -> bool:

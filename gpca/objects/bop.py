@@ -152,14 +152,9 @@ def find_symmetries(points_N_3: np.ndarray, diameter: float) -> dict[str, list]:
 
     A rotation is a symmetry where the mean distance from a turned point to its nearest neighbor exceeds the spacing of
     the points by at most `TOLERANCE` diameters. On their scans, this finds the two symmetric objects of LINEMOD. Shape
-    alone counts: a printed can is symmetric, since registration does not see the print.
-
-    Args:
-        points_N_3: a dense cloud of the whole surface, centered on its bounding box.
-
-    Returns:
-        ``symmetries_discrete``: 4×4 matrices row by row; ``symmetries_continuous``: axes with offsets. Only keys with
-        entries.
+    alone counts: a printed can is symmetric, since registration does not see the print. The cloud shows the whole
+    surface, centered on its bounding box. Only keys with entries are returned: ``symmetries_discrete``, 4×4 matrices
+    row by row, and ``symmetries_continuous``, axes with offsets.
     """
     from scipy.spatial import cKDTree
     from scipy.spatial.transform import Rotation

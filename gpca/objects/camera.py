@@ -105,10 +105,7 @@ class MeshScene:
 
 
 def planes(corners_F_3_3: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the unit normals (F, 3) of triangles (F, corner, 3) and the planes' offsets (F,), normal · corner.
-
-    A triangle without area gets the normal 0; no ray meets it.
-    """
+    """Return the unit normals (F, 3) of triangles (F, corner, 3), 0 where one has no area, and normal · corner (F,)."""
     a, b, c = np.moveaxis(corners_F_3_3, 1, 0)
     across = np.cross(b - a, c - a)
     lengths = np.linalg.norm(across, axis=1, keepdims=True)

@@ -8,15 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from manifold3d import CrossSection, Manifold, OpType
 
 from gpca.errors import InputError
 from gpca.objects.surface import Surface
-
-if TYPE_CHECKING:
-    from manifold3d import Manifold
 
 SEGMENTS, TUBE_SEGMENTS = 64, 24
 AXES = {"x": (0, 90, 0), "y": (-90, 0, 0), "z": (0, 0, 0)}  # degrees of the rotation that takes z to the axis
@@ -64,8 +62,6 @@ def mesh_of(solid: Manifold) -> tuple[np.ndarray, np.ndarray]:
 
 def box(extents: Point, at: Point = (0, 0, 0)) -> Manifold:
     """Return a box of full side lengths `extents` centered at `at`."""
-    from manifold3d import Manifold
-
     return Manifold.cube(np.asarray(extents, float), center=True).translate(at)
 
 
@@ -73,16 +69,12 @@ def cylinder(
     radius: float, height: float, at: Point = (0, 0, 0), axis: str = "z", top: float | None = None
 ) -> Manifold:
     """Return a cylinder centered at `at` along x, y or z; `top` is the upper radius of a cone frustum."""
-    from manifold3d import Manifold
-
     body = Manifold.cylinder(height, radius, radius if top is None else top, SEGMENTS, center=True)
     return body.rotate(AXES[axis]).translate(at)
 
 
 def ellipsoid(radii: float | Point, at: Point = (0, 0, 0)) -> Manifold:
     """Return an ellipsoid of semi-axes `radii` (one number: a ball) centered at `at`."""
-    from manifold3d import Manifold
-
     return Manifold.sphere(1, SEGMENTS).scale(np.broadcast_to(radii, 3)).translate(at)
 
 
@@ -94,15 +86,11 @@ def slab(extents: Point, corner: float, at: Point = (0, 0, 0)) -> Manifold:
 
 def revolved(profile_rz: Sequence[Point]) -> Manifold:
     """Return the solid of revolution about z of a closed profile (r, z), counterclockwise."""
-    from manifold3d import CrossSection, Manifold
-
     return Manifold.revolve(CrossSection([np.asarray(profile_rz, float)]), SEGMENTS)
 
 
 def tube(path: Sequence[Point], radii: float | Sequence[float]) -> Manifold:
     """Return a chain of capsules through the points (K, 3) of a path, of one radius or one for each point."""
-    from manifold3d import Manifold
-
     balls = [
         Manifold.sphere(radius, TUBE_SEGMENTS).translate(at)
         for at, radius in zip(path, np.broadcast_to(radii, len(path)), strict=True)
@@ -112,15 +100,11 @@ def tube(path: Sequence[Point], radii: float | Sequence[float]) -> Manifold:
 
 def hull(*solids: Manifold) -> Manifold:
     """Return the convex hull of all solids together."""
-    from manifold3d import Manifold
-
     return Manifold.batch_hull(list(solids))
 
 
 def union(*solids: Manifold) -> Manifold:
     """Return the union of all solids."""
-    from manifold3d import Manifold, OpType
-
     return Manifold.batch_boolean(list(solids), OpType.Add)
 
 

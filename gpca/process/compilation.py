@@ -29,28 +29,20 @@ def _cache_folder() -> Path:
     if given := os.environ.get(VARIABLE):  # by the user, or by the parent process with the state
         return Path(given) if Path(given).name == state else Path(given, state)
     user = Path(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"))
-    folders = (Path(__file__).parent / "__pycache__", user / "gpca")
-    return (next(filter(_writable, folders), None) or _temporary()) / state
-
-
-def _temporary() -> Path:
-    """Return a folder that only this user can write, since the code in it will be run."""
-    folder = Path(tempfile.gettempdir(), f"gpca-numba-{os.getuid()}")
+    for folder in (Path(__file__).parent / "__pycache__", user / "gpca"):
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryFile(dir=folder):
+                return folder / state
+        except OSError:  # not writable
+            continue
+    folder = Path(tempfile.gettempdir(), f"gpca-numba-{os.getuid()}")  # for this user alone, as the code in it is run
     try:
         folder.mkdir(mode=0o700, exist_ok=True)
-        ours = not folder.is_symlink() and folder.stat().st_uid == os.getuid()
+        is_ours = not folder.is_symlink() and folder.stat().st_uid == os.getuid()
     except OSError:
-        ours = False
-    return folder if ours else Path(tempfile.mkdtemp(prefix="gpca-numba-"))
-
-
-def _writable(folder: Path) -> bool:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            return True
-    except OSError:
-        return False
+        is_ours = False
+    return (folder if is_ours else Path(tempfile.mkdtemp(prefix="gpca-numba-"))) / state
 
 
 os.environ[VARIABLE] = str(_cache_folder())  # numba reads the variable when it is imported

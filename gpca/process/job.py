@@ -133,25 +133,21 @@ def as_process(name: str, function: Callable[[], int | None]) -> int:
 @contextmanager
 def _as_process(prefix: str = "") -> Iterator[SimpleNamespace]:
     """Give the block a `status` to set; faults that end in one line set it."""
-    process, begun = SimpleNamespace(status=0), False
+    process, begun, line = SimpleNamespace(status=0), False, None
     try:
         with certain_interrupts(), standard_streams():
             begun = True
             yield process
-    except (InputError, OSError) as fault:
-        say(f"{prefix}{fault}")
-        process.status = 2
-    except ModuleNotFoundError as fault:
-        if (line := missing(fault)) is None:
-            raise
-        say(f"{prefix}{line}")
-        process.status = 2
-    except MemoryError:
-        say(f"{prefix}this machine ran out of memory; use smaller settings or another machine")
-        process.status = 2
     except KeyboardInterrupt:
-        say(f"{prefix}stopped; repeat the command to continue")
-        process.status = 130
+        line, process.status = "stopped; repeat the command to continue", 130
+    except MemoryError:
+        line, process.status = "this machine ran out of memory; use smaller settings or another machine", 2
+    except (InputError, OSError, ModuleNotFoundError) as fault:
+        line, process.status = missing(fault) if isinstance(fault, ModuleNotFoundError) else str(fault), 2
+        if line is None:
+            raise
+    if line is not None:
+        say(f"{prefix}{line}")
     if not begun:  # the streams themselves are at fault
         sys.exit(process.status)
 

@@ -12,7 +12,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -42,6 +42,11 @@ def record_provenance(
     require_outputs(outputs, inputs, folders)
     started, added = time.perf_counter(), {}  # type: ignore[var-annotated]
     yield added
+    torch = sys.modules.get("torch")
+    versions = {}
+    for library in LIBRARIES:
+        with suppress(PackageNotFoundError):
+            versions[library] = version(library)
     record = added | {
         "seconds": round(time.perf_counter() - started, 3),
         "peak_memory_mb": round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024, 1),
@@ -52,9 +57,10 @@ def record_provenance(
         "inputs_sha256": {str(path): sha256_of_file(path) for path in inputs},
         "code": _code_version(),
         "environment_lock_sha256": sha256_of_file(lock) if (lock := ROOT / "environment.lock").is_file() else None,
-        "device": describe() | {"gpu": _gpu()},
+        "device": describe()
+        | {"gpu": torch.cuda.get_device_name() if torch is not None and torch.cuda.is_available() else None},
         "python": platform.python_version(),
-        "libraries": _library_versions(),
+        "libraries": versions,
     }
     for output in map(Path, outputs):
         with whole_file(output.with_name(output.name + ".provenance.json")) as partial:
@@ -86,19 +92,3 @@ def _git(*arguments: str) -> str | None:
     """Return the output of git in the folder of the package, or None where it fails."""
     done = subprocess.run(["git", "-C", str(ROOT), *arguments], capture_output=True, text=True, check=False)
     return None if done.returncode else done.stdout.strip()
-
-
-def _gpu() -> str | None:
-    """Return the name of the GPU, where torch was loaded and uses one."""
-    torch = sys.modules.get("torch")
-    return torch.cuda.get_device_name() if torch is not None and torch.cuda.is_available() else None
-
-
-def _library_versions() -> dict[str, str]:
-    versions = {}
-    for library in LIBRARIES:
-        try:
-            versions[library] = version(library)
-        except PackageNotFoundError:
-            continue
-    return versions

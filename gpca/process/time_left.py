@@ -23,12 +23,10 @@ _PROGRESS = "progress"  # Snakemake's event of its count of jobs
 
 
 class TimeLeft:
-    """Work that is left, in seconds of one core.
+    """Work that is left, in seconds of one core, on as many one-core jobs side by side as there are cores.
 
-    Args:
-        expected: path of a job's benchmark file -> expected seconds, None where unknown.
-        cores: number of one-core jobs side by side.
-        trust_s: core time that the expected speed is worth against that of the finished jobs.
+    `expected` has the seconds of each job's benchmark file, None where unknown. `trust_s` is the core time that the
+    expected speed is worth against that of the finished jobs.
     """
 
     def __init__(self, expected: Mapping[str, float | None], cores: int, trust_s: float = TRUST_S) -> None:

@@ -25,35 +25,20 @@ OVERLAP_M = 0.0375  # in a room: how close a point of the other scan counts as t
 
 @dataclass(frozen=True)
 class ScanPair:
-    """Two scans of one scene, in meters, each in the frame of its own sensor.
-
-    Attributes:
-        source_N_3, target_M_3: points as measured.
-        T_target_source: the true pose (4×4).
-        overlap: share of the target's points that the source has as well, in (0, 1]: as published, or :func:`overlap`.
-        scene: its name.
-        size_m: diagonal of the box around all scans of the scene; unused for a room.
-        source_name, target_name: of the scans in the scene.
-        source_viewpoint_3, target_viewpoint_3: position of the sensor in the frame of its scan, to which normals point;
-            None where unknown.
-        family: of scenes that are alike, as two data sets of one object; the scene itself if empty.
-
-    Raises:
-        InputError: fewer than three points, NaN, a pose that is not rigid, or a size that is not positive.
-    """
+    """Two scans of one scene, in meters, each in its sensor's frame; InputError for points or a pose that are none."""
 
     source_N_3: np.ndarray
     target_M_3: np.ndarray
     T_target_source: np.ndarray
-    overlap: float
+    overlap: float  # share of the target's points that the source has, in (0, 1], published or by `overlap`
     scene: str
     kind: Kind = "room"
-    size_m: float = ROOM_M
+    size_m: float = ROOM_M  # diagonal of the box around all scans of the scene; unused for a room
     source_name: str = "source"
     target_name: str = "target"
-    source_viewpoint_3: np.ndarray | None = None
+    source_viewpoint_3: np.ndarray | None = None  # of the sensor, to which normals point; None where unknown
     target_viewpoint_3: np.ndarray | None = None
-    family: str = ""
+    family: str = ""  # of scenes that are alike, as two data sets of one object
 
     def __post_init__(self) -> None:
         for name, points in ((self.source_name, self.source_N_3), (self.target_name, self.target_M_3)):
@@ -115,7 +100,6 @@ def overlap(source_N_3: np.ndarray, target_M_3: np.ndarray, T_target_source: np.
 def overlap_of_voxels(
     source_n_3: np.ndarray, target_m_3: np.ndarray, T_target_source: np.ndarray, scale: float = 1.0
 ) -> float:
-    """Return the overlap of clouds that were thinned to voxels before."""
     return float(near(target_m_3, transform(T_target_source, source_n_3), OVERLAP_M * scale).mean())
 
 

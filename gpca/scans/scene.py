@@ -29,7 +29,7 @@ class Scan:
 
 @dataclass(frozen=True)
 class Known:
-    """The published overlap in [0, 1] and true pose of a pair of scans, by their names; None where unpublished."""
+    """The overlap in [0, 1] and true pose of a pair of scans, by their names; None where they are not published."""
 
     target: str
     source: str
@@ -135,23 +135,14 @@ def choose_pairs(scenes: Iterable[Scene], edges: Sequence[float], most: int, *ax
 
 @dataclass(frozen=True)
 class ScanPairs(Container):
-    """Pairs of scans of one data set and seed: ``for pair in ScanPairs.load(path)``, ``pairs[3]``, ``len(pairs)``.
+    """Pairs of scans of one data set and seed: ``for pair in ScanPairs.load(path)``, ``pairs[3]``, ``len(pairs)``."""
 
-    Attributes:
-        points: (ΣN, 3) of all F scans one after another, in meters, each in its frame.
-        offsets: (F + 1,) where each scan begins, and where the last one ends.
-        scan: (F,) names.
-        viewpoint, viewpoint_known: (F, 3) m, 0 where it is unknown, and (F,) whether it is known.
-        target, source_scan: (K,) numbers of each pair's scans.
-        T_target_source, overlap, scene, kind, size_m, cluster: (K, …) as in :class:`gpca.scans.pair.ScanPair`.
-    """
-
-    points: np.ndarray = array("P 3", offsets="offsets", fewest=3)
+    points: np.ndarray = array("P 3", offsets="offsets", fewest=3)  # m, of one scan after another, each in its frame
     offsets: np.ndarray = array("F+1", WHOLE)
-    scan: np.ndarray = array("F", TEXT)
-    viewpoint: np.ndarray = array("F 3")
+    scan: np.ndarray = array("F", TEXT)  # names
+    viewpoint: np.ndarray = array("F 3")  # m; 0 where unknown
     viewpoint_known: np.ndarray = array("F", FLAG)
-    target: np.ndarray = array("K", WHOLE, least=0)
+    target: np.ndarray = array("K", WHOLE, least=0)  # numbers of its scans
     source_scan: np.ndarray = array("K", WHOLE, least=0)
     T_target_source: np.ndarray = array("K 4 4")
     overlap: np.ndarray = array("K")

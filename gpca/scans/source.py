@@ -45,38 +45,23 @@ Number = Annotated[int, Bounds(minimum=0, maximum=100)]
 
 @dataclass(frozen=True, kw_only=True)
 class ScanEntry:
-    """A data set of scans: one row of each method in every table.
+    """A data set of scans: one row of each method in every table."""
 
-    Attributes:
-        title: of the rows in tables.
-        kind: how the data is read; ``virtual`` is made by the package.
-        location: a file or a folder, relative to `data_dir` or to the repository's data.
-        scenes: whether its scenes are rooms or objects; npz files may say so themselves.
-        unit: of lengths in the files.
-        optional: a run does without it where its location is missing.
-        sensor_at_origin: the sensor stood at the origin of each scan's frame, to which normals point.
-        development: scenes on which settings were chosen; other runs leave them out.
-        families: of scenes that are alike, by the name of the scene.
-        benchmark: it is 3DMatch's, whose recalls others have published.
-        address, license: of the data.
-        rooms, objects, views: numbers of virtual scenes, and of the scans of each.
-    """
-
-    title: Text
-    kind: ScanKind
-    location: Place | None = None
-    scenes: Kind | None = None
-    unit: Unit = "m"
-    optional: bool = False
-    sensor_at_origin: bool = False
-    development: tuple[Text, ...] = ()
-    families: Mapping[str, Text] = field(default_factory=dict)
-    benchmark: bool = False
-    address: Text = ""
+    title: Text  # of the rows in tables
+    kind: ScanKind  # how the data is read; `virtual` is made by the package
+    location: Place | None = None  # a file or folder, relative to `data_dir` or to the repository's data
+    scenes: Kind | None = None  # npz files may say so themselves
+    unit: Unit = "m"  # of lengths in the files
+    optional: bool = False  # a run does without it where its location is missing
+    sensor_at_origin: bool = False  # of each scan's frame, to which normals point
+    development: tuple[Text, ...] = ()  # scenes on which settings were chosen; other runs leave them out
+    families: Mapping[str, Text] = field(default_factory=dict)  # of scenes that are alike, by the name of the scene
+    benchmark: bool = False  # it is 3DMatch's, whose recalls others have published
+    address: Text = ""  # of the data
     license: Text = ""
-    rooms: Number = 0
-    objects: Number = 0
-    views: Annotated[int, Bounds(minimum=2, maximum=100)] = 8
+    rooms: Number = 0  # virtual ones
+    objects: Number = 0  # virtual ones
+    views: Annotated[int, Bounds(minimum=2, maximum=100)] = 8  # scans of each virtual scene
 
     def __post_init__(self) -> None:
         if self.kind == "virtual" and not self.rooms + self.objects:

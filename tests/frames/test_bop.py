@@ -79,15 +79,8 @@ def test_an_object_of_which_little_was_measured_is_left_out_and_named(tiny, dama
         measured_points(frame, frame.annotations[1], frame.depth_m())
 
 
-DEPTH = f"{TABLE}/depth/000000.png"
-
-
 def edited(name, change):
     return lambda folder: edit(folder / TABLE / f"scene_{name}.json", change)
-
-
-def with_depth(pixels):
-    return lambda folder: save(folder / DEPTH, pixels)
 
 
 FAULTS = {
@@ -95,32 +88,9 @@ FAULTS = {
     "no mask": (lambda f: (f / TABLE / "mask_visib/000000_000002.png").unlink(), "000000_000002.png: no such image"),
     "no camera": (lambda f: (f / TABLE / "scene_camera.json").unlink(), "scene_camera.json: no such file"),
     "half unpacked": (lambda f: [p.unlink() for p in (f / TABLE / "depth").iterdir()], "may be half unpacked"),
-    "no scene": (lambda f: [p.unlink() for p in f.rglob("scene_gt.json")], "has no test"),
-    "broken JSON": (lambda f: (f / TABLE / "scene_gt.json").write_text("{"), "scene_gt.json: is not a scene's JSON"),
     "camera of another image": (edited("camera", lambda c: c.pop("1")), "scene_camera.json: has no image 1"),
     "camera without K": (edited("camera", lambda c: c["1"].pop("cam_K")), "scene_camera.json: image 1: has no cam_K"),
-    "depth of another size": (
-        with_depth(np.full((60, 80), 7000, np.uint16)),
-        "000000_000000.png: is 160×120 but depth is 80×60",
-    ),
-    "no measurement": (
-        with_depth(np.zeros((120, 160), np.uint16)),
-        "depth/000000.png: has no depth: every pixel is 0",
-    ),
-    "color for depth": (with_depth(np.ones((120, 160, 3), np.uint8)), "is a color image, not depth"),
-    "truncated depth": (
-        lambda f: (f / DEPTH).write_bytes((f / DEPTH).read_bytes()[:999]),
-        "depth/000000.png: is truncated",
-    ),
     "unknown object": (edited("gt", lambda g: g["0"][0].update(obj_id=77)), "tiny: object 77: has no model in"),
-    "no rotation": (
-        edited("gt", lambda g: g["0"][1].update(cam_R_m2c=[1, 0, 0, 0, 1, 0, 0, 0, -1])),
-        "scene_gt.json: image 0, object 1: the pose is not a rigid transform",
-    ),
-    "eight numbers": (
-        edited("gt", lambda g: g["0"][1].update(cam_R_m2c=[1, 0, 0, 0, 1, 0, 0, 0])),
-        "image 0, object 1: cam_R_m2c has 8 numbers, not 9",
-    ),
     "no models": (lambda f: [p.unlink() for p in (f / "models").glob("*.ply")], "has no models/obj_"),
 }
 
@@ -162,13 +132,11 @@ CAMERAS = {
     "huge focal length": ("cam_K", camera_values(1e200), "focal lengths 1e+200 and 150 px"),
     "NaN": ("cam_K", camera_values(math.nan), "NaN is not a number"),
     "infinity": ("cam_K", camera_values(u=-math.inf), "-Infinity is not a number"),
-    "an integer without end": ("cam_K", camera_values(10**400), NOT_FINITE),
     "rotated": ("cam_K", camera_values(below=3.0), "is not a camera matrix"),
     "principal point on the moon": ("cam_K", camera_values(u=1e9), "principal point outside any image"),
     "eight numbers": ("cam_K", camera_values()[:8], "cam_K has 8 numbers, not 9"),
     "a number for a list": ("cam_K", 150.0, "cam_K has 1 numbers, not 9"),
     "numbers as words": ("cam_K", ["150", *camera_values()[1:]], "cam_K contains '150', which is not a number"),
-    "lists in lists": ("cam_K", [[[150]], *camera_values()[1:]], "which is not a number"),
     "scale zero": ("depth_scale", 0, "depth_scale is 0"),
     "scale infinite": ("depth_scale", math.inf, "Infinity is not a number"),
     "scale huge": ("depth_scale", 1e30, "depth_scale is 1e+30"),
@@ -184,14 +152,11 @@ def test_a_camera_that_cannot_be(damaged, name):
 
 
 POSES = {
-    "R of NaN": ("cam_R_m2c", [math.nan] * 9, "NaN is not a number"),
     "R of zeros": ("cam_R_m2c", [0] * 9, "not orthogonal or not of unit length"),
     "R scaled": ("cam_R_m2c", [1.01, 0, 0, 0, 1.01, 0, 0, 0, 1.01], "not orthogonal or not of unit length"),
-    "R sheared": ("cam_R_m2c", [1, 0.1, 0, 0, 1, 0, 0, 0, 1], "not orthogonal"),
     "R mirrored": ("cam_R_m2c", [-1, 0, 0, 0, 1, 0, 0, 0, 1], "it is mirrored: its determinant is -1"),
     "R a quaternion": ("cam_R_m2c", [0, 0, 0, 1], "cam_R_m2c has 4 numbers, not 9"),
     "t of NaN": ("cam_t_m2c", [0, 0, math.nan], "NaN is not a number"),
-    "t beyond floats": ("cam_t_m2c", [0, 0, 10**400], NOT_FINITE),
     "t beyond sight": ("cam_t_m2c", [0, 0, 1e12], "cam_t_m2c is 1e+12 mm"),
     "t of two": ("cam_t_m2c", [0, 700], "cam_t_m2c has 2 numbers, not 3"),
     "id a fraction": ("obj_id", 1.5, "obj_id is 1.5"),
@@ -208,11 +173,6 @@ def test_an_annotation_that_cannot_be(damaged, name):
     refusal(instances(), damaged.parent, *where, words)
 
 
-def test_an_object_without_a_model(damaged):
-    edit(damaged.parent / TRUTH, lambda truth: truth["0"][1].update(obj_id=77))
-    refusal(instances(), damaged.parent, "object 77", "has no model in", "fetch the models again")
-
-
 TRUTHS = {
     "a list": ("[]", "its top level is not an object"),
     "nothing": ("", "is empty"),
@@ -224,7 +184,6 @@ TRUTHS = {
     "a negative image": ('{"-1": []}', "its key '-1' is not an image number"),
     "an image in other digits": ('{"١": []}', "is not an image number"),
     "a map of objects": ('{"0": {"1": 2}}', "image 0 has no list of objects"),
-    "null": ('{"0": null}', "image 0 has no list of objects"),
     "a word for an object": ('{"0": ["obj_id"]}', "image 0, object 0: has no cam_R_m2c"),
     "an image that is not there": ('{"7": []}', "has no image 7"),
     "a pose twice": ('{"0": [{"obj_id": 1, "obj_id": 2}]}', "key 'obj_id' appears twice"),

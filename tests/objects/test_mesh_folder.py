@@ -100,14 +100,6 @@ def test_truncated(kind, kept, tmp_path):
         read(path)
 
 
-@pytest.mark.parametrize("cut", [9, 20, 800])
-def test_truncated_cloud(cut, tmp_path):
-    path = tmp_path / "cloud.ply"
-    path.write_bytes(ascii_ply(np.full((70, 3), 0.12345))[:-cut])
-    with pytest.raises(InputError, match=r"cloud\.ply: is truncated"):
-        read(path)
-
-
 BROKEN = {
     "none.ply": (ascii_ply(np.zeros((0, 3))), "no points"),
     "nan.ply": (ascii_ply([(0, 0, 0), (0, "nan", 0), (1, 0, 0)], [(0, 1, 2)]), "NaN"),

@@ -38,11 +38,6 @@ def write_cups(data_dir, folders=("cups", "more")):
         BOX.copy().apply_scale(0.001).export(data_dir / folder / f"cup_{folder[0]}.ply")
 
 
-def test_procedural_needs_nothing():
-    entry = {"title": "Toy", "kind": "procedural", "family": "ycb"}
-    assert resolve(entry, None) == {**entry, "origin": "procedural"}
-
-
 def test_local_folder_comes_before_the_url(tmp_path):
     assert resolve(BOP, None) == {**BOP, "origin": "download"}
     assert resolve(BOP, str(tmp_path))["origin"] == "download"
