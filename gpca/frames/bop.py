@@ -2,8 +2,8 @@
 
 Format: https://github.com/thodan/bop_toolkit/blob/master/docs/bop_datasets_format.md. Lengths are millimeters in the
 files and meters here; cameras look along +z with x to the right and y down. A view is a cloud in the camera's frame,
-named ``obj_000014_48_1002`` by its object, the scene, and the image with the number of the annotation, so that all
-views of an object are one instance."""
+named ``obj_000014_48_1002`` by its object, the scene, and the image with the number of the annotation.
+"""
 
 from __future__ import annotations
 

@@ -155,7 +155,7 @@ def datasets_of(
     """Return the datasets of the config by name, or in their place the rendered scenes, of which all frames are read.
 
     `splits` is the file of scenes, `role` that of the frames (:mod:`gpca.objects.canonical`). InputError where neither
-    datasets nor scenes are given, or as in :func:`gpca.frames.source.resolve_datasets`.
+    datasets nor scenes are given.
     """
     if scenes:
         return {"scenes": Dataset("scenes", (scenes,), most_frames=None)}

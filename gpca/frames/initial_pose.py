@@ -1,8 +1,8 @@
 """Initial poses of ICP in frames: results of pose estimators, the truth with a declared error, or features.
 
-A results file is one of the BOP benchmark: https://github.com/thodan/bop_toolkit, "Evaluating your method",
-`scene_id,im_id,obj_id,score,R,t,time`. A pose error is ``T_true_estimated`` in the frame of the object's model: what
-takes the true pose to the estimated one."""
+Results are files of the BOP benchmark (https://github.com/thodan/bop_toolkit, "Evaluating your method"). A pose error
+is ``T_true_estimated`` in the frame of the object's model: what takes the true pose to the estimated one.
+"""
 
 from __future__ import annotations
 

@@ -66,10 +66,7 @@ def _size(number_of_bytes: float) -> str:
 
 
 def require_memory(needed_bytes: int, file_bytes: int, subject: object, remedy: str) -> None:
-    """Raise an InputError unless a file of `file_bytes` can plausibly hold `needed_bytes`, and the machine can.
-
-    The limit is half of the physical memory, as checks and conversions take as much again.
-    """
+    """Raise an InputError unless a file can plausibly hold what it says, and half of the machine's memory can."""
     if needed_bytes > max(SMALL_BYTES, LARGEST_RATIO * file_bytes):
         fault = f"would unpack to {needed_bytes / 1e9:.3g} GB, more than {LARGEST_RATIO} times its size"
         raise InputError(subject, fault, remedy)
@@ -98,10 +95,9 @@ def require_axes(path: str | Path, actual: Axes, expected: Axes | None) -> None:
 
 @contextmanager
 def whole_file(path: str | Path) -> Iterator[Path]:
-    """Yield a temporary path beside `path`, which is renamed to `path` on success and removed on failure.
+    """Yield a temporary path beside `path`, with its suffix, renamed to `path` on success and removed on failure.
 
-    A killed run leaves the old file, and a partial one with a fixed name that the next writer replaces. The name keeps
-    the suffix, by which several writers choose their format.
+    A killed run leaves the old file, and a partial one with a fixed name that the next writer replaces.
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -1,7 +1,8 @@
 """Meshes and clouds in a folder: PLY, OBJ, STL, OFF; one file is one object.
 
-trimesh reads a row that is too wide, a list of another length, an index 0, a misspelled keyword or a file that ends
-early as another mesh, without a word; so files of text are first checked to hold what they declare."""
+trimesh reads rows that are too wide, lists of another length, misspelled keywords or a file that ends early as another
+mesh, without a word; so files of text are first checked to hold what they declare.
+"""
 
 from __future__ import annotations
 

@@ -1,12 +1,11 @@
 """Point clouds in files: PCD (0.6, 0.7), npy, npz, xyz, csv, bin of KITTI, and LAS, LAZ, E57 by packages of their own.
 
-PCD: https://pointclouds.org/documentation/tutorials/pcd_file_format.html. Open3D's reader (0.19) takes a cut ascii
-file, a short row, a header without WIDTH or with an unknown TYPE for whole ones and fills the gaps with whatever the
-memory holds, and it reads a double after bytes as 0.
+PCD: https://pointclouds.org/documentation/tutorials/pcd_file_format.html. Open3D's reader (0.19) fills gaps of a cut
+file or a short row with whatever the memory holds, and reads a double after bytes as 0.
 
-As a kind of source, the UW RGB-D Object Dataset (Lai, Bo, Ren, Fox: A Large-Scale Hierarchical Multi-View RGB-D Object
-Dataset, ICRA 2011): single views of objects, already cut out, as PCD files or in the dataset's tars. A view is named
-<class>_<instance>_<sequence>_<frame>, e.g. coffee_mug_1_1_1; points are in meters in the camera's frame."""
+As a kind of source, the UW RGB-D Object Dataset (Lai, Bo, Ren, Fox, ICRA 2011): single views of objects, as PCD
+files or in the dataset's tars, named <class>_<instance>_<sequence>_<frame>; in meters, in the camera's frame.
+"""
 
 from __future__ import annotations
 

@@ -1,8 +1,7 @@
 """Configured sources of objects: where their data is, and their surfaces.
 
 A kind of source is a module with ``from_entry(entry, folder) -> Iterator[Surface]``; with ``require_entry(entry,
-folder)`` it can refuse an entry when a workflow loads, as far as names of files tell. Modules from outside list kinds
-in ``SOURCES``, each name with its module.
+folder)`` it can refuse an entry when a workflow loads. Plugins list kinds in ``SOURCES``, each with its module.
 """
 
 from __future__ import annotations
@@ -114,10 +113,7 @@ def folders(entry: dict, cache_folder: str | Path, unpack: bool = True) -> list[
 
 
 def data_files(entry: dict) -> list[Path]:
-    """Return the files that a resolved local entry is read from, sorted; none for other origins.
-
-    Without patterns these are all files of its folder and of `models` in it, as BOP lays them out, except texts.
-    """
+    """Return the files that a local entry is read from, sorted; without patterns, all but texts as BOP has them."""
     if entry["origin"] != "local":
         return []
     patterns = entry.get("files") or ["*", "models/*"]

@@ -133,6 +133,9 @@ def choose_pairs(scenes: Iterable[Scene], edges: Sequence[float], most: int, *ax
     return [pair for pairs in chosen.values() for pair in pairs]
 
 
+PER_PAIR = ("T_target_source", "overlap", "scene", "kind", "size_m", "cluster")  # as in ScanPair
+
+
 @dataclass(frozen=True)
 class ScanPairs(Container):
     """Pairs of scans of one data set and seed: ``for pair in ScanPairs.load(path)``, ``pairs[3]``, ``len(pairs)``."""
@@ -202,12 +205,7 @@ class ScanPairs(Container):
             viewpoint_known=np.array([at is not None for _, _, at in scans]),
             target=row_K_2[:, 1],
             source_scan=row_K_2[:, 0],
-            T_target_source=np.array([pair.T_target_source for pair in pairs]),
-            overlap=np.array([pair.overlap for pair in pairs]),
-            scene=np.array([pair.scene for pair in pairs]),
-            kind=np.array([pair.kind for pair in pairs]),
-            size_m=np.array([pair.size_m for pair in pairs]),
-            cluster=np.array([pair.cluster for pair in pairs]),
+            **{name: np.array([getattr(pair, name) for pair in pairs]) for name in PER_PAIR},
         )
 
     def check(self, path: str | Path) -> None:

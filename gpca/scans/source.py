@@ -1,17 +1,9 @@
-"""Configured data sets of scans: the entry in the config (docs/scans.md), where its files are, and their readers.
+"""Configured data sets of scans: the entry in the config, where its files are, and their readers (docs/scans.md).
 
-npz: one scene in each file, ``cloud_<name>`` (N, 3) and ``T_scene_cloud`` or, of an object, ``T_model_cloud``
-(F, 4, 4). The names are in ``name`` or ``index`` (F,), in the order of the poses; a file with neither has clouds 0 to
-F - 1. Beside the files, ``pairs.csv`` may list pairs: scene (file name without suffix), target, source, overlap.
-
-ply_folder: a folder with ``poses.txt`` is one scene, else each folder in it that has one. A line has the name of a PLY
-file without its suffix and the 16 numbers of its pose in the scene, row by row, in the unit of the points.
-
-threedmatch: the benchmark of Zeng et al. 2017, in the layout of Choi et al. 2015. Fragments are
-``<scene>/cloud_bin_<i>.ply``, in ``fragments/`` or in the location itself. ``gt.log`` has five lines for each pair
-(target, source, number of fragments; then T_target_source), in ``<scene>/``, ``<scene>-evaluation/`` or
-``gt_result/<scene>-evaluation/``. ``gt_overlap.log`` beside it has lines ``target,source,overlap``, as Huang et al.
-2021 made them for this benchmark and for 3DLoMatch.
+npz: one scene in each file; beside them, ``pairs.csv`` may list pairs. ply_folder: one scene in each folder with
+``poses.txt``. threedmatch: the benchmark of Zeng et al. 2017 in the layout of Choi et al. 2015, where ``gt.log`` has
+five lines for each pair (target, source, number of fragments; then T_target_source), and ``gt_overlap.log`` beside
+it lines ``target,source,overlap``, as Huang et al. 2021 made them for this benchmark and for 3DLoMatch.
 """
 
 from __future__ import annotations
@@ -166,25 +158,27 @@ def read_poses(path: Path) -> dict[str, np.ndarray]:
     """Return the pose (4×4) of each scan by name; InputError for a line other than a name and a rigid pose."""
     require_file(path, "no such file", POSES_REMEDY)
     poses: dict[str, np.ndarray] = {}
-    for number, line in enumerate(path.read_text("utf-8", errors="replace").splitlines(), 1):
-        if not (words := line.split("#")[0].split()):
-            continue
-        subject = f"{path}, line {number}"
-        if len(words) != 17:
-            raise InputError(subject, f"has {len(words)} words", POSES_REMEDY)
-        if Path(words[0]).name != words[0] or words[0] in poses:
-            raise InputError(
-                subject, f"'{words[0]}' is no name of a file beside it, or stands there twice", POSES_REMEDY
-            )
+    for subject, (name, *words) in _lines_of(path):
+        if len(words) != 16:
+            raise InputError(subject, f"has {1 + len(words)} words", POSES_REMEDY)
+        if Path(name).name != name or name in poses:
+            fault = f"'{name}' is no name of a file beside it, or stands there twice"
+            raise InputError(subject, fault, POSES_REMEDY)
         try:
-            T_scene_scan = np.array([decimal(word) for word in words[1:]]).reshape(4, 4)
+            poses[name] = np.array([decimal(word) for word in words]).reshape(4, 4)
         except ValueError as fault:
             raise InputError(subject, str(fault), POSES_REMEDY) from fault
-        require_rigid(T_scene_scan, subject)
-        poses[words[0]] = T_scene_scan
+        require_rigid(poses[name], subject)
     if not poses:
         raise InputError(path, "has no poses", POSES_REMEDY)
     return poses
+
+
+def _lines_of(path: Path) -> Iterator[tuple[str, list[str]]]:
+    """Yield the place and the words of each line that has any, without comments; commas separate, too."""
+    for number, line in enumerate(path.read_text("utf-8", errors="replace").splitlines(), 1):
+        if words := line.split("#")[0].replace(",", " ").split():
+            yield f"{path}, line {number}", words
 
 
 LINES_OF_PAIR = 5  # of a pair in gt.log
@@ -217,7 +211,7 @@ def benchmark_scenes(entry: ScanEntry, place: Path) -> Iterator[Scene]:
 def read_log(path: Path) -> dict[tuple[str, str], np.ndarray]:
     """Return ``T_target_source`` (4×4) of each pair of a ``gt.log``, by the numbers of target and source."""
     require_file(path, "no such file", BENCHMARK_REMEDY)
-    lines = [line.split() for line in path.read_text("utf-8", errors="replace").splitlines() if line.strip()]
+    lines = [words for _, words in _lines_of(path)]
     if not lines or len(lines) % LINES_OF_PAIR:
         raise InputError(path, f"has {len(lines)} lines, not {LINES_OF_PAIR} for each pair", BENCHMARK_REMEDY)
     poses = {}
@@ -239,20 +233,16 @@ def read_log(path: Path) -> dict[tuple[str, str], np.ndarray]:
 
 def _read_overlaps(path: Path) -> dict[tuple[str, str], float]:
     """Return the overlap of each pair in a file; none where there is no file."""
-    if not path.is_file():
-        return {}
     shares = {}
-    for number, line in enumerate(path.read_text("utf-8", errors="replace").splitlines(), 1):
-        if not (words := line.replace(",", " ").split()):
-            continue
+    for subject, words in _lines_of(path) if path.is_file() else ():
         try:
             if len(words) != 3:
                 raise ValueError(f"has {len(words)} numbers instead of target, source and overlap")
             target, source, share = str(whole(words[0])), str(whole(words[1])), decimal(words[2])
+            if not 0 <= share <= 1:
+                raise ValueError(f"the overlap {share:g} is no share")
         except ValueError as fault:
-            raise InputError(f"{path}, line {number}", str(fault), BENCHMARK_REMEDY) from fault
-        if not 0 <= share <= 1:
-            raise InputError(f"{path}, line {number}", f"the overlap {share:g} is no share", BENCHMARK_REMEDY)
+            raise InputError(subject, str(fault), BENCHMARK_REMEDY) from fault
         shares[target, source] = share
     return shares
 

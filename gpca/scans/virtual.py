@@ -1,9 +1,8 @@
 """Virtual scenes: furnished rooms and compound objects, scanned by the virtual depth camera from several places.
 
-They need no data. A scene is named by its number, from which all of it is drawn; those of development have numbers from
-100 on. A scan of a room is what a camera sees that turns on its way through the room; a scan of an object is what one
-sees on a circle around it. The camera has the noise of a structured-light sensor
-(:class:`gpca.objects.camera.DepthNoise`), in rooms half of it, as fragments of rooms are fused from many frames.
+A scene is named by its number, from which all of it is drawn; those of development have numbers from 100 on. A scan
+of a room is what a camera sees that turns on its way through the room; a scan of an object is what one sees on a
+circle around it. In rooms the camera has half of its noise, as fragments of rooms are fused from many frames.
 """
 
 from __future__ import annotations
