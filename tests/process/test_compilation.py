@@ -27,9 +27,9 @@ def package(tmp_path):
     """A package with a loop that calls one of another module."""
     for name in (
         "__init__.py",
-        "code_files.py",
+        "process/code_files.py",
         "errors.py",
-        "plugins.py",
+        "process/plugins.py",
         "process/__init__.py",
         "process/compilation.py",
     ):
