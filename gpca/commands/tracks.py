@@ -36,7 +36,7 @@ def run_bench(options: Namespace) -> None:
     """Fit a method, predict and score on the samples of a track; missing samples are made first."""
     from gpca.process.processor import cpu_name
     from gpca.tracks.published import Method
-    from gpca.tracks.samples import Samples
+    from gpca.tracks.samples import TrackSamples
     from gpca.tracks.submission import Submission
     from gpca.tracks.trial import try_method
 
@@ -48,7 +48,7 @@ def run_bench(options: Namespace) -> None:
         fault = f"lists {len(names)} methods for this track, and --out holds the predictions of one"
         raise InputError(options.method, fault, "give each a file of its own")
     training = track.training(options.learn_from)
-    samples = Samples.of(track, options.samples, options.processes, options.data_dir)
+    samples = TrackSamples.of(track, options.samples, options.processes, options.data_dir)
     published_names = {method.name for method in samples.published.methods}
     methods: dict[str, Method] = {}
     for name in names:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -58,12 +57,7 @@ GROUPS = {**STARTS, POOLED: "All together"}  # titles; data sets keep their name
 def table_of(
     published: Published, submitted: Mapping[str, Method], scores: pd.DataFrame, against: pd.DataFrame
 ) -> Table:
-    """Return the table of a track.
-
-    Args:
-        submitted: methods by name.
-        scores, against: as :func:`gpca.tracks.scoring.score` returns them.
-    """
+    """Return the table of a track with submitted methods, from what :func:`gpca.tracks.scoring.score` returns."""
     track, methods = published.track, {method.name: method for method in published.methods} | dict(submitted)
     columns = dict(COLUMNS[track.name])
     heads = {"group": track.groups} if track.groups else {}
@@ -72,7 +66,11 @@ def table_of(
     table = TableBuilder(f"bench_{track.name}", {**heads, "method": "Method", "reads": "Reads"})
     for group in dict.fromkeys(scores["group"]):
         group_scores = rows_where(scores, group=group)
-        for name in _best_first(group_scores, track.headline):
+        # The best first, then those without a headline, and the ceiling last.
+        values = rows_where(group_scores, metric=track.headline).set_index("method")["value"].to_dict()
+        sign = 1 if track.headline in SMALLER_IS_BETTER else -1
+        names = dict.fromkeys(group_scores["method"])
+        for name in sorted(names, key=lambda name: (name == CEILING, sign * values.get(name, sign * np.inf))):
             rows = rows_where(group_scores, method=name).set_index("metric")
             cells: dict[str, Cell | None] = {
                 metric: interval_cell(rows.loc[metric], factor=1 if metric in POINTS else 100)
@@ -112,15 +110,6 @@ def table_of(
     )
 
 
-def _best_first(rows: pd.DataFrame, headline: str) -> list[str]:
-    """Return the methods by their headline, those without one after them, the ceiling last."""
-    values = rows_where(rows, metric=headline).set_index("method")["value"].to_dict()
-    sign = 1 if headline in SMALLER_IS_BETTER else -1
-    names = [name for name in dict.fromkeys(rows["method"]) if name != CEILING]
-    names.sort(key=lambda name: sign * values.get(name, sign * float("inf")))
-    return names + ([CEILING] if CEILING in set(rows["method"]) else [])
-
-
 def _footnotes(published: Published, submitted: Mapping[str, Method]) -> tuple[str, ...]:
     track, source_N = published.track, published.rows.source
     notes = [f"In brackets: the 95 % interval of {REPEATS} bootstrap draws over {track.clusters}."]
@@ -153,36 +142,26 @@ def as_text_among(published: Published, submitted: Mapping[str, Method]) -> str:
 def as_text(table: Table) -> str:
     """Return a table as lines of aligned columns, for a terminal."""
     printed = table.printed()
-    rows = [[text for text, _ in row] for row in printed["rows"]]
-    widths = [max(map(len, column)) for column in zip(printed["heads"], *rows, strict=True)]
-    labels = printed["label_columns"]
-
-    def line(cells: Sequence[str]) -> str:
-        aligned = enumerate(zip(cells, widths, strict=True))
-        return "  ".join(
-            cell.ljust(width) if column < labels else cell.rjust(width) for column, (cell, width) in aligned
-        ).rstrip()
-
-    rule = "  ".join("-" * width for width in widths)
-    return "\n".join(
-        [printed["caption"], "", line(printed["heads"]), rule, *map(line, rows), "", *printed["footnotes"]]
-    )
+    rows = [printed["heads"], *([text for text, _ in row] for row in printed["rows"])]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    lines = []
+    for row in rows:
+        aligned = [
+            cell.ljust(width) if column < printed["label_columns"] else cell.rjust(width)
+            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ]
+        lines.append("  ".join(aligned).rstrip())
+    lines.insert(1, "  ".join("-" * width for width in widths))
+    return "\n".join([printed["caption"], "", *lines, "", *printed["footnotes"]])
 
 
-@dataclass(frozen=True)
-class Board:
-    """The table of a track, as the page shows it.
-
-    Attributes:
-        heads: of the columns.
-        labels: number of columns of text; the others are sorted as numbers.
-        rows: whether each is submitted, and its cells ``{text, value, link, bold}``.
-    """
+class Board(NamedTuple):
+    """The table of a track, as the page shows it."""
 
     title: str
-    heads: Sequence[str]
-    labels: int
-    rows: Sequence[tuple[bool, Sequence[Mapping[str, Any]]]]
+    heads: Sequence[str]  # of the columns
+    labels: int  # number of columns of text; the others are sorted as numbers
+    rows: Sequence[tuple[bool, Sequence[Mapping[str, Any]]]]  # whether it is submitted, cells {text, value, link, bold}
     notes: Sequence[str]
 
 

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gpca.causes.dataset import LABELS, Causes, labels_of
+from gpca.causes.dataset import Causes, labels_of
 from gpca.errors import InputError, require_known
 from gpca.io.files import SPLITS
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.tracks.samples import Samples
+from gpca.tracks.samples import TrackSamples
 from gpca.tracks.track import HARD_TRACK, track_of
 
 if TYPE_CHECKING:
@@ -120,13 +120,11 @@ def load(
         samples: folder of the samples, by default the user's cache.
         data_dir: folder of scans that the repository does not have.
 
-    Raises:
-        InputError: an unknown name, or samples that cannot be made or are not the published ones.
+    An unknown name, and samples that cannot be made or are not the published ones, raise an InputError.
     """
     folder, data = (Path(path) if path else None for path in (samples, data_dir))
-    chosen = Samples.of(track_of(track), folder, data_dir=data)
-    published = chosen.published
-    parts = [(name, number) for name, number, _ in published.rows.parts()]
+    chosen = TrackSamples.of(track_of(track), folder, data_dir=data)
+    parts = [(name, number) for name, number, _ in chosen.published.rows.parts()]
     source = source or parts[0][0]
     require_known("source", source, sorted({name for name, _ in parts}))
     if (source, seed) not in parts:
@@ -139,16 +137,7 @@ def load(
     [path] = chosen.files([chosen.track.file(source, seed)])
     causes = Causes.load(path, (source, seed))
     causes = causes.subset(causes.rows(split)) if split else causes
-    return TrackData(
-        track=track,
-        source=source,
-        split=split,
-        seed=seed,
-        version=published.version,
-        registrations=causes.registrations,
-        labels=CONCEPTS if track == HARD_TRACK else LABELS,
-        label=causes.registrations.concept if track == HARD_TRACK else labels_of(causes.truth),
-        error=causes.truth.error,
-        phi=causes.truth.phi,
-        causes=causes.truth.causes,
-    )
+    truth, registrations = causes.truth, causes.registrations
+    label_S = registrations.concept if track == HARD_TRACK else labels_of(truth)
+    about = (track, source, split, seed, chosen.published.version, registrations, chosen.track.labels)
+    return TrackData(*about, label_S, truth.error, truth.phi, truth.causes)

@@ -36,18 +36,7 @@ def require_clone(subject: str) -> None:
 
 @dataclass(frozen=True)
 class Rows:
-    """N test samples of a track, part by part, with their truth.
-
-    Attributes:
-        source, seed, sample: (N,) keys.
-        object, cluster, concept, symmetric: (N,) as in the files of samples.
-        start, instance, scene: (N,) of depth frames: kind of start, its instance, dataset and scene.
-        counted: (N,) whether the sample counts in measures, unlike scenes whose true poses were made by ICP, and scans
-            with added noise.
-        error, uncertainty: (N, 8) true ones; error_again, uncertainty_again from other starts.
-        error_shown: (N,) error of the shown registration.
-        uncertainty_limit: (N,) limit of nominal registrations, nats.
-    """
+    """N test samples of a track, part by part, with their truth; errors and uncertainties (N, 8), all others (N,)."""
 
     source: np.ndarray
     seed: np.ndarray
@@ -56,16 +45,16 @@ class Rows:
     cluster: np.ndarray
     concept: np.ndarray
     symmetric: np.ndarray
-    start: np.ndarray
+    start: np.ndarray  # of depth frames: kind of start, its instance, dataset and scene
     instance: np.ndarray
     scene: np.ndarray
-    counted: np.ndarray
+    counted: np.ndarray  # in measures, unlike scenes whose true poses were made by ICP, and scans with added noise
     error: np.ndarray
     uncertainty: np.ndarray
-    error_again: np.ndarray
+    error_again: np.ndarray  # from other starts
     uncertainty_again: np.ndarray
-    error_shown: np.ndarray
-    uncertainty_limit: np.ndarray
+    error_shown: np.ndarray  # of the shown registration
+    uncertainty_limit: np.ndarray  # of nominal registrations, nats
 
     def __len__(self) -> int:
         return len(self.sample)
@@ -79,21 +68,14 @@ class Rows:
 
 @dataclass(frozen=True)
 class Method:
-    """A method and its predictions for all rows.
-
-    Attributes:
-        reads: its inputs, in words; empty where unknown.
-        icp_calls: runs of ICP beyond the explained one, or `NO_CALLS`.
-        scores: (N, C) of the track's labels; NaN for sources without data.
-        named: (N,) number of the predicted label, or `NOTHING_NAMED`.
-    """
+    """A method and its predictions for all rows."""
 
     name: str
     title: str
-    reads: str
-    icp_calls: int
-    scores: np.ndarray
-    named: np.ndarray
+    reads: str  # its inputs, in words; empty where unknown
+    icp_calls: int  # runs of ICP beyond the explained one, or `NO_CALLS`
+    scores: np.ndarray  # (N, C) of the track's labels; NaN for sources without data
+    named: np.ndarray  # (N,) number of the predicted label, or `NOTHING_NAMED`
 
     def labels_named(self, labels: tuple[str, ...]) -> np.ndarray:
         """Return the predicted labels (N,), empty for none."""
@@ -148,11 +130,7 @@ class Published:
 
     @classmethod
     def load(cls, track: Track, path: Path | None = None) -> Published:
-        """Read what is shipped with a track.
-
-        Raises:
-            InputError: missing, damaged, or of another track.
-        """
+        """Read what is shipped with a track."""
         require_clone(f"track {track.name}")
         path = path or FOLDER / f"{track.name}.npz"
         if not path.is_file():
@@ -189,11 +167,7 @@ _SHAPES: Mapping[str, tuple[int | str, ...]] = {
 
 
 def sha256_of_arrays(path: str | Path) -> str:
-    """Return the hexadecimal SHA-256 of the arrays of an npz, their names, types and shapes, however it is packed.
-
-    Raises:
-        InputError: it cannot be read.
-    """
+    """Return the hexadecimal SHA-256 of the arrays of an npz, their names, types and shapes, however it is packed."""
     digest = hashlib.sha256()
     try:
         with np.load(path, allow_pickle=False) as arrays:

@@ -16,7 +16,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path, PurePosixPath
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -37,25 +37,19 @@ _IN_PROCESS = (
 
 
 @dataclass(frozen=True)
-class Samples:
-    """The samples of a track.
-
-    Attributes:
-        folder: holds them as the folder of a run does, which may serve as well.
-        processes: number of files that are made at a time.
-        data_dir: data that the repository does not have.
-    """
+class TrackSamples:
+    """The samples of a track."""
 
     track: Track
     published: Published
-    folder: Path
-    processes: int = 1
-    data_dir: Path | None = None
+    folder: Path  # holds them as the folder of a run does, which may serve as well
+    processes: int = 1  # number of files that are made at a time
+    data_dir: Path | None = None  # data that the repository does not have
 
     @classmethod
     def of(
         cls, track: Track, cache: Path | None = None, processes: int | None = None, data_dir: Path | None = None
-    ) -> Samples:
+    ) -> TrackSamples:
         """Return the samples of a track, in the user's cache or another folder."""
         published = Published.load(track)
         return cls(track, published, cache or cache_of(track), processes or os.cpu_count() or 1, data_dir)
@@ -72,21 +66,18 @@ class Samples:
 
     def parts(self) -> list[tuple[str, int, np.ndarray]]:
         """Return source, seed and row numbers of the published samples that are cached or whose data is available."""
-        return [part for part in self.published.rows.parts() if self._is_available(*part[:2])]
-
-    def _is_available(self, source: str, seed: int) -> bool:
-        if not self.track.may_lack(source) or (self.folder / self.track.file(source, seed)).is_file():
-            return True
         from gpca.experiments.scans import present
 
-        return source in present(self.config)
+        return [
+            (source, seed, rows)
+            for source, seed, rows in self.published.rows.parts()
+            if not self.track.may_lack(source)
+            or (self.folder / self.track.file(source, seed)).is_file()
+            or source in present(self.config)
+        ]
 
     def files(self, names: Iterable[str]) -> list[Path]:
-        """Return files by their paths below the folder; missing ones are made, and all are checked.
-
-        Raises:
-            InputError: a file that differs from the one behind the published rows, or that cannot be made.
-        """
+        """Return files by their paths below the folder; missing ones are made, and all are checked."""
         names = list(names)
         if self.folder == cache_of(self.track) and any(self._fault(name) for name in names):
             shutil.rmtree(self.folder)  # of an earlier version
@@ -105,9 +96,8 @@ class Samples:
         if expected is None or name.split("/")[0] in LEARNED or not path.is_file():
             return ""
         actual = sha256_of_arrays(path)
-        if actual == expected:
-            return ""
-        return f"differs from what the published rows were made with ({actual[:12]} is not {expected[:12]})"
+        fault = f"differs from what the published rows were made with ({actual[:12]} is not {expected[:12]})"
+        return "" if actual == expected else fault
 
 
 def cache_of(track: Track) -> Path:
@@ -117,31 +107,17 @@ def cache_of(track: Track) -> Path:
     return Path(pooch.os_cache("gpca-bench" if track.run == DEFAULT else f"gpca-bench-{track.run}"))
 
 
-@dataclass(frozen=True)
-class Recipe:
-    """How a file is made.
-
-    Attributes:
-        step: module of the step.
-        given: its names and settings.
-        inputs, outputs: by name, as paths below the folder of samples; an input that begins with ``/`` is data.
-    """
+class Recipe(NamedTuple):
+    """How files are made: paths are below the folder of samples, but for data, whose paths begin with ``/``."""
 
     step: str
-    given: Mapping[str, Any]
+    given: Mapping[str, Any]  # names and settings
     inputs: Mapping[str, str]
     outputs: Mapping[str, str]
 
 
 def make(files: Iterable[str], folder: Path, config: Mapping[str, Any], processes: int) -> None:
-    """Make missing files and their missing inputs, several at a time.
-
-    Args:
-        files: paths below the folder.
-
-    Raises:
-        InputError: the message of a step that failed.
-    """
+    """Make missing files, by their paths below the folder, and their missing inputs, several at a time."""
     steps: dict[str, Recipe] = {}  # by the first of their outputs
     open_files = list(files)
     while open_files:
@@ -194,12 +170,7 @@ def run_recipe() -> None:
 
 
 def recipe_of(file: str, config: Mapping[str, Any]) -> Recipe:
-    """Return how the rules of the workflow make a file.
-
-    Args:
-        file: path below the folder of a run, such as ``causes/ycb/seed0.npz``.
-        config: as :func:`gpca.config.check.read` returns it.
-    """
+    """Return how the rules of the workflow make a file of a run, such as ``causes/ycb/seed0.npz``."""
     kind, *rest = PurePosixPath(file).with_suffix("").parts
     data = {name: config[name] for name in ("data_dir", "downloads")}
     points = {"surface_points": config["objects"]["surface_points"]}

@@ -32,14 +32,7 @@ Key = tuple[str, str]  # name of an explainer, and its training data if there is
 
 
 def collect(track: Track, run: Path, config: Mapping[str, Any]) -> Published:
-    """Return what is shipped with a track, from the folder of a run.
-
-    Args:
-        config: of the run, as :func:`gpca.config.check.read` returned it.
-
-    Raises:
-        InputError: a file that is missing or damaged, samples of another config, predictions of other samples.
-    """
+    """Return what is shipped with a track, from the folder of a run and its config."""
     parts = [part for part in track.parts(config) if not track.may_lack(part[0]) or (run / track.file(*part)).is_file()]
     for part in parts if track.layers else ():  # otherwise nobody could make the samples again
         settings = _provenance(run / track.file(*part)).get("settings")
@@ -96,27 +89,21 @@ def _rows(track: Track, run: Path, tested: Mapping[Part, Causes]) -> Rows:
             "scene": registrations.cluster,
             "counted": np.ones(n, bool),
         }
-        if track.name == FRAMES_TRACK:
-            rows = _sample_rows(run / f"frame_causes/seed{seed}.csv", SAMPLE_COLUMNS, registrations.sample)
-            arrays |= {
-                "start": rows["start"].to_numpy(str),
-                "instance": rows["instance"].to_numpy(int),
-                "scene": (rows["dataset"] + " " + rows["scene"]).to_numpy(str),
-                "counted": (rows["truth"] != BY_ICP).to_numpy(),
-            }
-        if track.name == SCANS_TRACK:
-            path = run / f"scan_causes/{source}/seed{seed}.csv"
-            rows = _sample_rows(path, SCAN_COLUMNS, registrations.sample)
-            arrays |= {"start": rows["start"].to_numpy(str), "counted": numbers(path, rows, "times") == 0}
+        if track.name in (FRAMES_TRACK, SCANS_TRACK):
+            on_frames = track.name == FRAMES_TRACK
+            path = run / (f"frame_causes/seed{seed}.csv" if on_frames else f"scan_causes/{source}/seed{seed}.csv")
+            rows = read_csv(path, SAMPLE_COLUMNS if on_frames else SCAN_COLUMNS, others=ANY)
+            require_same_samples(path, rows, {"sample": registrations.sample}, "causes", ("sample",))
+            arrays["start"] = rows["start"].to_numpy(str)
+            if on_frames:
+                arrays["instance"] = rows["instance"].to_numpy(int)
+                arrays["scene"] = (rows["dataset"] + " " + rows["scene"]).to_numpy(str)
+                arrays["counted"] = (rows["truth"] != BY_ICP).to_numpy()
+            else:
+                arrays["counted"] = numbers(path, rows, "times") == 0
         for name, column in arrays.items():
             columns.setdefault(name, []).append(column)
     return Rows(**{name: np.concatenate(parts) for name, parts in columns.items()})
-
-
-def _sample_rows(path: Path, columns: tuple[str, ...], sample_N: np.ndarray) -> pd.DataFrame:
-    rows = read_csv(path, columns, others=ANY)
-    require_same_samples(path, rows, {"sample": sample_N}, "causes", ("sample",))
-    return rows
 
 
 def _predictions(

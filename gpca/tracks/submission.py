@@ -15,8 +15,8 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from itertools import takewhile
 from pathlib import Path
 
@@ -47,13 +47,9 @@ MOST_FAULTS = 20  # in the list
 
 @dataclass(frozen=True)
 class Submission:
-    """Predictions for the test samples of a track, or of some of its sources.
+    """Predictions for the test samples of a track, or of some of its sources."""
 
-    Attributes:
-        head: entries by the keys of `HEAD` and `OPTIONAL`.
-    """
-
-    head: Mapping[str, str]
+    head: Mapping[str, str]  # by the keys of `HEAD` and `OPTIONAL`
     method: Method
 
     def write(self, path: Path, published: Published) -> None:
@@ -69,137 +65,123 @@ class Submission:
                 writer.writerow([*keys, *(f"{value:.6f}" for value in self.method.scores[row]), named_N[row]])
 
 
-@dataclass
-class _Reader:
-    """Reads a submission and collects its faults, each a line."""
-
-    path: Path
-    published: Published
-    faults: list[str] = field(default_factory=list)
-
-    def fault(self, where: str, what: str, remedy: str) -> None:
-        self.faults.append(f"{self.path}{', ' if where else ''}{where}: {what}; {remedy}")
-
-    def read(self) -> Submission | None:
-        require_file(self.path, "no such file", "give a CSV file of predictions", LARGEST_BYTES)
-        try:
-            lines = self.path.read_text("utf-8-sig").splitlines()
-        except UnicodeDecodeError:
-            self.fault("", "is not a text file in UTF-8", "write it anew")
-            return None
-        length = next((number for number, line in enumerate(lines) if not line.startswith("#")), len(lines))
-        head = self._head(lines[:length])
-        predictions = self._rows(lines[length:], length)
-        if self.faults or predictions is None:
-            return None
-        calls = int(head["icp_calls"]) if head.get("icp_calls") else NO_CALLS
-        name = f"{self.path.stem} (submitted)"  # differs from the published ones
-        return Submission(head, Method(name, head["method"], head.get("reads", ""), calls, *predictions))
-
-    def _head(self, lines: list[str]) -> dict[str, str]:
-        head: dict[str, str] = {}
-        for number, line in enumerate(lines, 1):
-            key, colon, value = (part.strip() for part in line[1:].partition(":"))
-            if not colon or key not in {**HEAD, **OPTIONAL}:
-                continue  # any other comment
-            if key in head:
-                self.fault(f"line {number}", f"'{key}' stands there twice", "keep one of them")
-            head[key] = value
-        for key, words in HEAD.items():
-            if not is_name(head.get(key, "")):
-                self.fault("", f"its head lacks '{key}'", f"add a line '# {key}: …', {words}")
-        track, version = self.published.track.name, self.published.version
-        if head.get("track", track) != track:
-            self.fault("", f"is of the track '{head['track']}', not {track}", "name the track that it is of")
-        elif head.get("version", version) != version:
-            fault = f"is of version '{head['version']}' of the samples, and these are of {version}"
-            self.fault("", fault, "predict these: gpca.load makes them")
-        if (link := head.get("link", NO_LINK)) != NO_LINK and not link.startswith(("https://", "http://")):
-            self.fault("", f"'link' is '{link[:40]}'", f"give an address that begins with https://, or {NO_LINK}")
-        for key, read in (("seconds", decimal), ("icp_calls", whole)):
-            text = head.get(key, "")
-            try:
-                if text and read(text) < 0:
-                    raise ValueError
-            except ValueError:
-                self.fault("", f"'{key}' is '{text[:40]}'", "give a number of 0 or more")
-        return head
-
-    def _rows(self, lines: list[str], before: int) -> tuple[np.ndarray, np.ndarray] | None:
-        track, rows = self.published.track, self.published.rows
-        scores = [f"score_{label}" for label in track.labels]
-        table = csv.reader(lines)
-        columns = next(table, [])
-        wanted = [*KEYS, *scores]
-        for name in (name for name in wanted if columns.count(name) != 1):
-            fault = f"column '{name}' is {'missing' if name not in columns else 'there twice'}"
-            self.fault(f"line {before + 1}", fault, f"the columns are {', '.join(wanted)} and, if you like, {NAMED}")
-        for name in (name for name in columns if name not in (*wanted, NAMED)):
-            self.fault(f"line {before + 1}", f"column '{name}' is unknown", "remove it")
-        if self.faults and any(columns.count(name) != 1 for name in wanted):
-            return None
-        keys = zip(*(map(str, column.tolist()) for column in (rows.source, rows.seed, rows.sample)), strict=True)
-        row_of_key = {key: row for row, key in enumerate(keys)}
-        scores_N_C = np.full((len(rows), len(scores)), np.nan)
-        named_N = np.full(len(rows), NOTHING_NAMED)
-        seen: dict[int, int] = {}
-        for number, cells in enumerate(table, before + 2):
-            if not cells:
-                continue
-            line = f"line {number}"
-            if len(cells) != len(columns):
-                self.fault(line, f"has {len(cells)} entries, not {len(columns)}", "give one for each column")
-                continue
-            entry = dict(zip(columns, cells, strict=True))
-            row = row_of_key.get(tuple(entry[name].strip() for name in KEYS))
-            if row is None:
-                words = f"source {entry['source']}, seed {entry['seed']}, sample {entry['sample']}"
-                self.fault(line, f"{words} is no test sample", "give those of gpca.load with split='test'")
-                continue
-            if row in seen:
-                self.fault(line, f"is of the same sample as line {seen[row]}", "keep one of them")
-            seen[row] = number
-            for column, name in enumerate(scores):
-                try:
-                    scores_N_C[row, column] = decimal(entry[name].strip())
-                except ValueError:
-                    self.fault(line, f"'{name}' is '{entry[name][:40]}', no finite number", "give a number")
-            label = entry.get(NAMED, "").strip()
-            if NAMED not in entry:
-                named_N[row] = scores_N_C[row].argmax()
-            elif label in track.labels:
-                named_N[row] = track.labels.index(label)
-            elif label:
-                self.fault(line, f"'{label[:40]}' is no label", f"choose one of {', '.join(track.labels)}")
-        sources = {str(rows.source[row]) for row in seen}
-        needed = {key: row for key, row in row_of_key.items() if key[0] in sources or not track.may_lack(key[0])}
-        if missing := [key for key, row in needed.items() if row not in seen]:
-            source, seed, sample = missing[0]
-            words = f"{len(missing)} of {len(needed)} test samples are missing, first source {source}, seed {seed}"
-            self.fault("", f"{words}, sample {sample}", "give every sample once")
-        return scores_N_C, named_N
+Fault = Callable[[str, str, str], None]  # notes where, what, and the remedy
 
 
 def read_submission(path: Path, published: Published) -> tuple[Submission | None, list[str]]:
-    """Return a submission to a track, or None, and its faults, a line each, no more than `MOST_FAULTS`.
+    """Return a submission to a track, or None, and its faults, a line each, no more than `MOST_FAULTS`."""
+    faults: list[str] = []
 
-    Raises:
-        InputError: no such file, or one that cannot be read.
-    """
-    reader = _Reader(path, published)
-    submission = reader.read()
-    faults = reader.faults
+    def fault(where: str, what: str, remedy: str) -> None:
+        faults.append(f"{path}{', ' if where else ''}{where}: {what}; {remedy}")
+
+    require_file(path, "no such file", "give a CSV file of predictions", LARGEST_BYTES)
+    try:
+        lines = path.read_text("utf-8-sig").splitlines()
+    except UnicodeDecodeError:
+        fault("", "is not a text file in UTF-8", "write it anew")
+        return None, faults
+    length = next((number for number, line in enumerate(lines) if not line.startswith("#")), len(lines))
+    head = _read_head(lines[:length], published, fault)
+    predictions = _read_rows(lines[length:], length, published, fault)
     if len(faults) > MOST_FAULTS:
         faults = [*faults[:MOST_FAULTS], f"{path}: {len(faults) - MOST_FAULTS} faults more"]
-    return (None if faults else submission), faults
+    if faults or predictions is None:
+        return None, faults
+    calls = int(head["icp_calls"]) if head.get("icp_calls") else NO_CALLS
+    name = f"{path.stem} (submitted)"  # differs from the published ones
+    return Submission(head, Method(name, head["method"], head.get("reads", ""), calls, *predictions)), faults
+
+
+def _read_head(lines: list[str], published: Published, fault: Fault) -> dict[str, str]:
+    head: dict[str, str] = {}
+    for number, line in enumerate(lines, 1):
+        key, colon, value = (part.strip() for part in line[1:].partition(":"))
+        if not colon or key not in {**HEAD, **OPTIONAL}:
+            continue  # any other comment
+        if key in head:
+            fault(f"line {number}", f"'{key}' stands there twice", "keep one of them")
+        head[key] = value
+    for key, words in HEAD.items():
+        if not is_name(head.get(key, "")):
+            fault("", f"its head lacks '{key}'", f"add a line '# {key}: …', {words}")
+    track, version = published.track.name, published.version
+    if head.get("track", track) != track:
+        fault("", f"is of the track '{head['track']}', not {track}", "name the track that it is of")
+    elif head.get("version", version) != version:
+        other = f"is of version '{head['version']}' of the samples, and these are of {version}"
+        fault("", other, "predict these: gpca.load makes them")
+    if (link := head.get("link", NO_LINK)) != NO_LINK and not link.startswith(("https://", "http://")):
+        fault("", f"'link' is '{link[:40]}'", f"give an address that begins with https://, or {NO_LINK}")
+    for key, read in (("seconds", decimal), ("icp_calls", whole)):
+        text = head.get(key, "")
+        try:
+            if text and read(text) < 0:
+                raise ValueError
+        except ValueError:
+            fault("", f"'{key}' is '{text[:40]}'", "give a number of 0 or more")
+    return head
+
+
+def _read_rows(
+    lines: list[str], before: int, published: Published, fault: Fault
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """Return scores and named labels; None if columns are missing, so that no row can be read."""
+    track, rows = published.track, published.rows
+    scores = [f"score_{label}" for label in track.labels]
+    table = csv.reader(lines)
+    columns = next(table, [])
+    wanted = [*KEYS, *scores]
+    for name in (name for name in wanted if columns.count(name) != 1):
+        what = f"column '{name}' is {'missing' if name not in columns else 'there twice'}"
+        fault(f"line {before + 1}", what, f"the columns are {', '.join(wanted)} and, if you like, {NAMED}")
+    for name in (name for name in columns if name not in (*wanted, NAMED)):
+        fault(f"line {before + 1}", f"column '{name}' is unknown", "remove it")
+    if any(columns.count(name) != 1 for name in wanted):
+        return None
+    keys = zip(*(map(str, column.tolist()) for column in (rows.source, rows.seed, rows.sample)), strict=True)
+    row_of_key = {key: row for row, key in enumerate(keys)}
+    scores_N_C, named_N = np.full((len(rows), len(scores)), np.nan), np.full(len(rows), NOTHING_NAMED)
+    seen: dict[int, int] = {}
+    for number, cells in enumerate(table, before + 2):
+        if not cells:
+            continue
+        line = f"line {number}"
+        if len(cells) != len(columns):
+            fault(line, f"has {len(cells)} entries, not {len(columns)}", "give one for each column")
+            continue
+        entry = dict(zip(columns, cells, strict=True))
+        row = row_of_key.get(tuple(entry[name].strip() for name in KEYS))
+        if row is None:
+            words = f"source {entry['source']}, seed {entry['seed']}, sample {entry['sample']}"
+            fault(line, f"{words} is no test sample", "give those of gpca.load with split='test'")
+            continue
+        if row in seen:
+            fault(line, f"is of the same sample as line {seen[row]}", "keep one of them")
+        seen[row] = number
+        for column, name in enumerate(scores):
+            try:
+                scores_N_C[row, column] = decimal(entry[name].strip())
+            except ValueError:
+                fault(line, f"'{name}' is '{entry[name][:40]}', no finite number", "give a number")
+        label = entry.get(NAMED, "").strip()
+        if NAMED not in entry:
+            named_N[row] = scores_N_C[row].argmax()
+        elif label in track.labels:
+            named_N[row] = track.labels.index(label)
+        elif label:
+            fault(line, f"'{label[:40]}' is no label", f"choose one of {', '.join(track.labels)}")
+    sources = {str(rows.source[row]) for row in seen}
+    needed = {key: row for key, row in row_of_key.items() if key[0] in sources or not track.may_lack(key[0])}
+    if missing := [key for key, row in needed.items() if row not in seen]:
+        source, seed, sample = missing[0]
+        words = f"{len(missing)} of {len(needed)} test samples are missing, first source {source}, seed {seed}"
+        fault("", f"{words}, sample {sample}", "give every sample once")
+    return scores_N_C, named_N
 
 
 def track_in_head(path: Path) -> str:
-    """Return the track that the head of a submission names.
-
-    Raises:
-        InputError: no such file, no text, or a head that names no track.
-    """
+    """Return the track that the head of a submission names."""
     require_file(path, "no such file", "give a CSV file of predictions", LARGEST_BYTES)
     with path.open(encoding="utf-8-sig", errors="replace") as file:
         for line in takewhile(lambda line: line.startswith("#"), file):

@@ -28,52 +28,30 @@ LIKE_TABLE_9 = "The measures are those of Table IX (docs/causes.md); the last ro
 
 @dataclass(frozen=True)
 class Track:
-    """A track.
-
-    Attributes:
-        kind: of its explainers.
-        labels: in the order of the scores.
-        samples: pattern of the files of samples, below the folder of a run.
-        headline: the measure that ranks methods and is compared pair by pair.
-        draws: name of the bootstrap's random numbers, as in the table of the run's results.
-        clusters: what the bootstrap resamples, in words.
-        measures: footnote about the measures.
-        sources: of the samples; by default those at the config's key `listed`.
-        everywhere: sources that everyone has, if the others need further data.
-        seeds: key of the config that limits the number of seeds.
-        run: of the samples: ``default``, or the name of a config that overrides the default one.
-        predictions: pattern of a run's files of predictions, where one holds all methods.
-        labeled_by: the identifying columns of that file.
-        read: patterns of further files that methods may read.
-        training_folders: files of objects that methods learn from.
-        learn_from: choices of the training data, the default first.
-        without_training: what to learn from, where all samples are for testing.
-        groups: column head of the groups of samples that are scored separately; empty for one group.
-        required_states: nothing is concluded from a group with few samples of one of them.
-    """
+    """A track; patterns of files are below the folder of a run."""
 
     name: str
     title: str
-    kind: str
-    labels: tuple[str, ...]
-    samples: str
-    headline: str
-    draws: str
-    clusters: str
-    measures: str
-    sources: tuple[str, ...] = ()
+    kind: str  # of its explainers
+    labels: tuple[str, ...]  # in the order of the scores
+    samples: str  # pattern of the files of samples
+    headline: str  # the measure that ranks methods and is compared pair by pair
+    draws: str  # name of the bootstrap's random numbers, as in the table of the run's results
+    clusters: str  # what the bootstrap resamples, in words
+    measures: str  # footnote about the measures
+    sources: tuple[str, ...] = ()  # of the samples; by default those at the config's key `listed`
     listed: str = "sources"
-    everywhere: tuple[str, ...] = ()
-    seeds: str = ""
-    run: str = DEFAULT
-    predictions: str = ""
-    labeled_by: tuple[str, ...] = ()
-    read: tuple[str, ...] = ()
-    training_folders: tuple[str, ...] = ()
-    learn_from: tuple[str, ...] = ()
-    without_training: str = ""
-    groups: str = ""
-    required_states: tuple[str, ...] = ("failed",)
+    everywhere: tuple[str, ...] = ()  # sources that everyone has, if the others need further data
+    seeds: str = ""  # key of the config that limits the number of seeds
+    run: str = DEFAULT  # of the samples: or the name of a config that overrides the default one
+    predictions: str = ""  # pattern of a run's files of predictions, where one holds all methods
+    labeled_by: tuple[str, ...] = ()  # the identifying columns of that file
+    read: tuple[str, ...] = ()  # patterns of further files that methods may read
+    training_folders: tuple[str, ...] = ()  # files of objects that methods learn from
+    learn_from: tuple[str, ...] = ()  # choices of the training data, the default first
+    without_training: str = ""  # what to learn from, where all samples are for testing
+    groups: str = ""  # column head of the groups of samples that are scored separately; empty for one group
+    required_states: tuple[str, ...] = ("failed",)  # nothing is concluded from a group with few of one of them
 
     def parts(self, config: Mapping[str, Any]) -> list[tuple[str, int]]:
         """Return the source and the seed of each file of samples, seed by seed."""
@@ -94,11 +72,7 @@ class Track:
         return bool(self.everywhere) and source not in self.everywhere
 
     def training(self, asked: str | None) -> str:
-        """Return the choice of training data, by default the first one; empty where there is no choice.
-
-        Raises:
-            InputError: an unknown choice.
-        """
+        """Return the choice of training data, by default the first one; empty where there is no choice."""
         if asked is None:
             return next(iter(self.learn_from), "")
         if not self.learn_from:
@@ -115,87 +89,81 @@ class Track:
         return text if training in ("", *self.learn_from[:1]) else f"{text} (from {training})"
 
 
-TRACKS = {
-    track.name: track
-    for track in (
-        Track(
-            CAUSES_TRACK,
-            "What is wrong with a registration, if anything",
-            CAUSES,
-            LABELS,
-            "causes/{source}/seed{seed}.npz",
-            "balanced_accuracy",
-            draws="cause intervals",
-            clusters="families of objects and seeds",
-            measures=LIKE_TABLE_9,
-            read=READS,
-        ),
-        Track(
-            HARD_TRACK,
-            "Which perturbation of several adds most to the error",
-            CONCEPTS,
-            PERTURBATIONS,
-            "hard/{source}/seed{seed}.npz",
-            "accuracy",
-            draws="control intervals",
-            clusters="families of objects and seeds",
-            measures="AUROC of errors: how well the entropy of the scores tells wrong answers from right ones.",
-            seeds="controls.seeds",
-            predictions="controls/{source}/seed{seed}.csv",
-            labeled_by=("control", "tested", "explainer"),
-        ),
-        Track(
-            FRAMES_TRACK,
-            "What is wrong with registrations of depth frames; learned from simulated causes",
-            CAUSES,
-            LABELS,
-            "frame_causes/seed{seed}.npz",
-            "state_accuracy",
-            draws="frame cause intervals",
-            clusters="scenes",
-            measures=LIKE_TABLE_9,
-            sources=(REAL_WORLD,),
-            seeds="real_world.causes.seeds",
-            predictions="frame_diagnoses/seed{seed}.csv",
-            labeled_by=("explainer",),
-            read=READS[1:],
-            training_folders=TRAINING_FOLDERS,
-            without_training="learn from the track causes",
-            groups="Starts",
-        ),
-        Track(
-            SCANS_TRACK,
-            "What is wrong with registrations of scans to scans",
-            CAUSES,
-            LABELS,
-            "scan_causes/{source}/seed{seed}.npz",
-            "auroc_failed",
-            draws="scan cause intervals",
-            clusters="scenes",
-            measures="The measures are those of Table XVIII (docs/scans.md), of registrations to which no noise was "
-            "added; the last row has counterfactual access.",
-            listed="scans.datasets",
-            everywhere=("virtual_scans",),
-            seeds="scans.seeds",
-            run="full",
-            predictions="scan_diagnoses/seed{seed}.csv",
-            labeled_by=("scans", "learned", "explainer"),
-            read=("scan_descriptors/{source}/seed{seed}.npz", "scan_reenactments/{source}/seed{seed}.npz"),
-            training_folders=TRAINING_FOLDERS,
-            learn_from=(SCANS, OBJECTS),
-            without_training="learn from the samples of other scenes, which registrations.cluster names",
-            groups="Scans",
-            required_states=("failed", NOMINAL),
-        ),
-    )
-}
+_TRACKS = (
+    Track(
+        CAUSES_TRACK,
+        "What is wrong with a registration, if anything",
+        CAUSES,
+        LABELS,
+        "causes/{source}/seed{seed}.npz",
+        "balanced_accuracy",
+        draws="cause intervals",
+        clusters="families of objects and seeds",
+        measures=LIKE_TABLE_9,
+        read=READS,
+    ),
+    Track(
+        HARD_TRACK,
+        "Which perturbation of several adds most to the error",
+        CONCEPTS,
+        PERTURBATIONS,
+        "hard/{source}/seed{seed}.npz",
+        "accuracy",
+        draws="control intervals",
+        clusters="families of objects and seeds",
+        measures="AUROC of errors: how well the entropy of the scores tells wrong answers from right ones.",
+        seeds="controls.seeds",
+        predictions="controls/{source}/seed{seed}.csv",
+        labeled_by=("control", "tested", "explainer"),
+    ),
+    Track(
+        FRAMES_TRACK,
+        "What is wrong with registrations of depth frames; learned from simulated causes",
+        CAUSES,
+        LABELS,
+        "frame_causes/seed{seed}.npz",
+        "state_accuracy",
+        draws="frame cause intervals",
+        clusters="scenes",
+        measures=LIKE_TABLE_9,
+        sources=(REAL_WORLD,),
+        seeds="real_world.causes.seeds",
+        predictions="frame_diagnoses/seed{seed}.csv",
+        labeled_by=("explainer",),
+        read=READS[1:],
+        training_folders=TRAINING_FOLDERS,
+        without_training="learn from the track causes",
+        groups="Starts",
+    ),
+    Track(
+        SCANS_TRACK,
+        "What is wrong with registrations of scans to scans",
+        CAUSES,
+        LABELS,
+        "scan_causes/{source}/seed{seed}.npz",
+        "auroc_failed",
+        draws="scan cause intervals",
+        clusters="scenes",
+        measures="The measures are those of Table XVIII (docs/scans.md), of registrations to which no noise was "
+        "added; the last row has counterfactual access.",
+        listed="scans.datasets",
+        everywhere=("virtual_scans",),
+        seeds="scans.seeds",
+        run="full",
+        predictions="scan_diagnoses/seed{seed}.csv",
+        labeled_by=("scans", "learned", "explainer"),
+        read=("scan_descriptors/{source}/seed{seed}.npz", "scan_reenactments/{source}/seed{seed}.npz"),
+        training_folders=TRAINING_FOLDERS,
+        learn_from=(SCANS, OBJECTS),
+        without_training="learn from the samples of other scenes, which registrations.cluster names",
+        groups="Scans",
+        required_states=("failed", NOMINAL),
+    ),
+)
+TRACKS = {track.name: track for track in _TRACKS}
 
 
 def track_of(name: str) -> Track:
-    """Return the track of that name.
-
-    Raises:
-        InputError: an unknown one.
-    """
+    """Return the track of that name; an unknown one raises an InputError."""
     require_known("track", name, TRACKS)
     return TRACKS[name]

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -32,71 +31,53 @@ from gpca.steps.controls import ControlRun
 from gpca.steps.diagnosis import DESCRIBED, EMBEDDED, FramesToExplain, explained, with_what_it_reads
 from gpca.steps.scan_causes import diagnose as diagnose_scans
 from gpca.tracks.published import NOTHING_NAMED, Method
-from gpca.tracks.samples import Samples
+from gpca.tracks.samples import TrackSamples
 from gpca.tracks.track import CAUSES_TRACK, FRAMES_TRACK, SCANS_TRACK
 from gpca.uncertainty.settings import UncertaintySettings
 
 FOLDERS = {REENACTED: "reenactments", EMBEDDED: "cause_embeddings", DESCRIBED: "descriptors"}  # by an explainer's reads
 
 
-@dataclass(frozen=True)
-class Answer:
-    """A method's predictions for the test samples of a part.
+class PartPredictions(NamedTuple):
+    """A method's predictions for the n test samples of a part."""
 
-    Attributes:
-        scores: (n, C).
-        named: (n,) labels, empty for none.
-        calls: mean runs of ICP beyond the explained one.
-        seconds: of explaining, per registration; for depth frames and scans with learning.
-    """
-
-    scores: np.ndarray
-    named: np.ndarray
-    calls: float
-    seconds: float
+    scores: np.ndarray  # (n, C)
+    named: np.ndarray  # (n,) labels, empty for none
+    calls: float  # mean runs of ICP beyond the explained one
+    seconds: float  # of explaining, per registration; for depth frames and scans with learning
 
     @classmethod
-    def of(cls, attribution: Attribution, rows: np.ndarray, seconds: float) -> Answer:
-        """Return the answer in rows of an attribution."""
+    def of(cls, attribution: Attribution, seconds: float, rows: slice | np.ndarray = slice(None)) -> PartPredictions:
+        """Return those in rows of an attribution."""
         calls = float(attribution.icp_calls_N[rows].mean())
         return cls(attribution.scores_N_C[rows], attribution.predicted_N[rows], calls, seconds)
 
 
-@dataclass(frozen=True)
-class Trial:
-    """A method on a track.
+class MethodTrial(NamedTuple):
+    """A method on a track; `training` is what it learns from, on a track that has a choice."""
 
-    Attributes:
-        settings: of the method.
-        training: what it learns from, on a track that has a choice.
-    """
-
-    samples: Samples
+    samples: TrackSamples
     name: str
     entry: ExplainerEntry
     settings: dict[str, Any]
     training: str
 
 
-def try_method(samples: Samples, name: str, settings: Mapping[str, Any], training: str = "") -> tuple[Method, float]:
+def try_method(
+    samples: TrackSamples, name: str, settings: Mapping[str, Any], training: str = ""
+) -> tuple[Method, float]:
     """Return an explainer's predictions for all test samples of a track, and its seconds per registration.
 
     Its inputs are measured beforehand, and their time is not counted.
-
-    Args:
-        training: what it learns from, on a track that has a choice.
-
-    Raises:
-        InputError: unknown settings, samples that cannot be made, or a fault in the method.
     """
     track, rows = samples.track, samples.published.rows
     require_settings(name, settings, track.kind)
     entry = explainer_entry(name, track.kind)
     parts = samples.parts()
     samples.files([track.file(source, seed) for source, seed, _ in parts])  # together, so that several are made at once
-    trial = Trial(samples, name, entry, dict(settings), training)
+    trial = MethodTrial(samples, name, entry, dict(settings), training)
     if track.name == SCANS_TRACK:
-        answers = list(_scans(trial))
+        answers = _scans(trial)
     else:
         explain = {CAUSES_TRACK: _causes, FRAMES_TRACK: _frames}.get(track.name, _hard)
         answers = [explain(trial, source, seed) for source, seed, _ in parts]
@@ -115,7 +96,7 @@ def try_method(samples: Samples, name: str, settings: Mapping[str, Any], trainin
     return Method(name, title, entry.sight, calls, scores_N_C, named_N), seconds
 
 
-def _causes(trial: Trial, source: str, seed: int) -> Answer:
+def _causes(trial: MethodTrial, source: str, seed: int) -> PartPredictions:
     samples, entry = trial.samples, trial.entry
     [path] = samples.files([samples.track.file(source, seed)])
     causes, diagnosis = Causes.load(path, (source, seed)), samples.config["diagnosis"]
@@ -127,10 +108,10 @@ def _causes(trial: Trial, source: str, seed: int) -> Answer:
     reenactment = read_settings(ReenactmentSettings, diagnosis["reenactment"])
     explainer = entry.make(source, seed, **trial.settings)
     attribution = explained(explainer, entry, registrations, causes, descriptors, path, reenactment)
-    return Answer.of(attribution, causes.rows("test"), float(attribution.seconds_N.mean()))
+    return PartPredictions.of(attribution, float(attribution.seconds_N.mean()), causes.rows("test"))
 
 
-def _hard(trial: Trial, source: str, seed: int) -> Answer:
+def _hard(trial: MethodTrial, source: str, seed: int) -> PartPredictions:
     samples, config = trial.samples, trial.samples.config
     [path] = samples.files([samples.track.file(source, seed)])
     hard = Registrations.load(path, (source, seed))
@@ -152,21 +133,21 @@ def _hard(trial: Trial, source: str, seed: int) -> Answer:
         hard=hard,
     )
     attribution, seconds = run.explain_hard(trial.name)
-    return Answer.of(attribution, np.arange(len(attribution.scores_N_C)), seconds)
+    return PartPredictions.of(attribution, seconds)
 
 
 def _never(_registrations: Registrations, _source: str) -> tuple[np.ndarray, np.ndarray]:
     raise AssertionError("hard samples are embedded by an encoder of their own")
 
 
-def _frames(trial: Trial, source: str, seed: int) -> Answer:
+def _frames(trial: MethodTrial, source: str, seed: int) -> PartPredictions:
     samples, config, reads = trial.samples, trial.samples.config, trial.entry.reads
     [path] = samples.files([samples.track.file(source, seed)])
-    folders = {"causes": "causes", "descriptors": "descriptors"}
-    folders |= {"encoders": "cause_encoders", EMBEDDED: FOLDERS[EMBEDDED]} if reads == EMBEDDED else {}
-    folders |= {REENACTED: FOLDERS[REENACTED]} if reads == REENACTED else {}
-    enacted = None
+    folders, enacted = {"causes": "causes", "descriptors": "descriptors"}, None
+    if reads == EMBEDDED:
+        folders |= {"encoders": "cause_encoders", EMBEDDED: FOLDERS[EMBEDDED]}
     if reads == REENACTED:
+        folders |= {REENACTED: FOLDERS[REENACTED]}
         [enacted] = samples.files([f"reenactments/{REAL_WORLD}/seed{seed}.npz"])
     job = Job(source=source, seed=seed, settings={**config["diagnosis"], "icp": config["registrations"]["icp"]})
     causes = Causes.load(path, (source, seed))
@@ -174,46 +155,42 @@ def _frames(trial: Trial, source: str, seed: int) -> Answer:
     frames.prepare(trial.name)
     started = perf_counter()
     attribution = frames.attribution(trial.name, trial.settings)
-    seconds = (perf_counter() - started) / len(causes)
-    return Answer.of(attribution, np.arange(len(causes)), seconds)
+    return PartPredictions.of(attribution, (perf_counter() - started) / len(causes))
 
 
-def _scans(trial: Trial) -> Iterator[Answer]:
-    """Yield the answer for each data set; the data sets of a seed are learned and explained together."""
-    parts = trial.samples.parts()
-    predicted = {}
-    for seed in dict.fromkeys(seed for _, seed, _ in parts):
-        predicted[seed] = _predict_scans(trial, seed, [source for source, of, _ in parts if of == seed])
-    for source, seed, _ in parts:
-        rows, seconds = predicted[seed]
-        rows = rows[rows["scans"] == source]
-        scores_n_4 = rows[[f"score_{label}" for label in trial.samples.track.labels]].to_numpy(float)
-        named_n = np.where(rows["abstained"], "", rows["concept_predicted"].to_numpy(str))
-        yield Answer(scores_n_4, named_n, float(rows["icp_calls"].mean()), seconds)
-
-
-def _predict_scans(trial: Trial, seed: int, sets: list[str]):
-    """Return rows of predictions for data sets of scans, by the experiment's own step, and seconds per registration."""
-    samples, reads = trial.samples, trial.entry.reads
-    kinds = ("scan_causes", "scan_descriptors", "scan_reenactments")
-    files = {kind: samples.files(f"{kind}/{each}/seed{seed}.npz" for each in sets) for kind in kinds}
+def _scans(trial: MethodTrial) -> list[PartPredictions]:
+    """Return those for each data set; the data sets of a seed are learned and explained together, by a run's step."""
+    samples, reads, parts = trial.samples, trial.entry.reads, trial.samples.parts()
+    settings = diagnosis_settings(samples.config, {trial.name: [trial.training]}, {trial.name: trial.settings})
     folders = {"encoders": "cause_encoders"} if reads == EMBEDDED else {}
     if trial.training == OBJECTS:
         kind = reads if reads in FOLDERS else DESCRIBED
         folders |= {"causes": "causes", kind: FOLDERS[kind]}
-    settings = diagnosis_settings(samples.config, {trial.name: [trial.training]}, {trial.name: trial.settings})
-    with TemporaryDirectory() as folder:
-        path = Path(folder) / f"seed{seed}.csv"
+    predicted = {}
+    for seed in dict.fromkeys(seed for _, seed, _ in parts):
+        sets = [source for source, of, _ in parts if of == seed]
+        kinds = ("scan_causes", "scan_descriptors", "scan_reenactments")
+        files = {kind: samples.files(f"{kind}/{each}/seed{seed}.npz" for each in sets) for kind in kinds}
         files |= _training_files(samples, folders, seed)
-        job = Job(source="scans", seed=seed, settings=settings, predictions=path, **files)
-        started = perf_counter()
-        diagnose_scans(job)
-        seconds = perf_counter() - started
-        rows = read_predictions(path, labels=samples.track.labeled_by)
-    return rows, seconds / len(rows)
+        with TemporaryDirectory() as folder:
+            path = Path(folder) / f"seed{seed}.csv"
+            job = Job(source="scans", seed=seed, settings=settings, predictions=path, **files)
+            started = perf_counter()
+            diagnose_scans(job)
+            seconds = perf_counter() - started
+            rows = read_predictions(path, labels=samples.track.labeled_by)
+        predicted[seed] = rows, seconds / len(rows)
+    answers = []
+    for source, seed, _ in parts:
+        rows, seconds = predicted[seed]
+        rows = rows[rows["scans"] == source]
+        scores_n_4 = rows[[f"score_{label}" for label in samples.track.labels]].to_numpy(float)
+        named_n = np.where(rows["abstained"], "", rows["concept_predicted"].to_numpy(str))
+        answers.append(PartPredictions(scores_n_4, named_n, float(rows["icp_calls"].mean()), seconds))
+    return answers
 
 
-def _training_files(samples: Samples, folders: Mapping[str, str], seed: int) -> dict[str, list[Path]]:
+def _training_files(samples: TrackSamples, folders: Mapping[str, str], seed: int) -> dict[str, list[Path]]:
     """Return the files of all sources of objects that a method learns from, by kind."""
     return {
         kind: samples.files(

@@ -1,4 +1,4 @@
-"""Samples: hashed by what they hold, made where they are missing, refused where they differ; and as objects."""
+"""TrackSamples: hashed by what they hold, made where they are missing, refused where they differ; and as objects."""
 
 from dataclasses import replace
 
@@ -14,7 +14,7 @@ from gpca.frames.source import REAL_WORLD
 from gpca.steps.control_samples import HARD
 from gpca.tracks import samples as module
 from gpca.tracks.loading import NO_LABEL
-from gpca.tracks.samples import Samples, recipe_of, sha256_of_arrays
+from gpca.tracks.samples import TrackSamples, recipe_of, sha256_of_arrays
 from gpca.tracks.track import TRACKS
 
 from ..config.configs import load
@@ -36,12 +36,12 @@ def test_the_hash_is_of_the_arrays_and_not_of_how_they_are_packed(tmp_path):
 
 
 def test_samples_that_are_not_the_published_ones_are_refused(published, run, causes, tmp_path):
-    samples = Samples(TRACKS["causes"], published, run)
+    samples = TrackSamples(TRACKS["causes"], published, run)
     assert samples.files([FILE]) == [run / FILE]
     named = replace(causes.registrations, axes=(SOURCE, SEED), fitness=causes.registrations.fitness / 2)
     replace(causes, registrations=named).save(tmp_path / FILE)
     with pytest.raises(InputError, match=r"differs from what the published rows were made with .* remove it"):
-        Samples(TRACKS["causes"], published, tmp_path).files([FILE])
+        TrackSamples(TRACKS["causes"], published, tmp_path).files([FILE])
 
 
 @pytest.fixture(scope="module")
