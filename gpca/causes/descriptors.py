@@ -89,7 +89,7 @@ RESIDUALS: Columns = {"distances": slice(0, 3 * QUANTILES, 2), "motion": EVERY}
 
 _QUICK = {"outliers", "smoothed"} | {
     # The errors of the others are relative to the result with all remedies, a restart among them.
-    *(f"{what}_{i}" for what in ("moved", "cost", "fitness") for i, alone in enumerate(SUBSETS) if POSE in alone),
+    *(f"{what}_{i}" for what in ("moved", "cost", "fitness") for i, alone in enumerate(SUBSETS) if POSE in alone)
 }
 COLUMNS: Mapping[str, Columns] = {
     # The observed cloud's thickness, spacing, extent and number of points.

@@ -38,7 +38,7 @@ FAULTS = [
     ("error_again", lambda a: a[:-1], "array 'error_again' is 7×8, not 8×8"),
     ("applied", lambda a: a.astype(float), "array 'applied' has type float64"),
     ("T_target_source_runs", lambda a: a[:, :, :3], "array 'T_target_source_runs' is 20×13×3×4"),
-    ("truth", None, "array 'symmetric' is missing"),
+    ("symmetric", lambda a: None, "array 'symmetric' is missing"),
     ("concept", lambda a: np.full(len(a), "dust"), "unknown concept 'dust'"),
 ]
 
@@ -47,11 +47,8 @@ FAULTS = [
 def test_faulty_files_are_refused_with_their_name(file, name, damage, message):
     with np.load(file) as archive:
         arrays = dict(archive)
-    if damage is None:
-        del arrays["symmetric"]
-    else:
-        arrays[name] = damage(arrays[name])
-    save_arrays(file, arrays)
+    arrays[name] = damage(arrays[name])
+    save_arrays(file, {name: array for name, array in arrays.items() if array is not None})
     with pytest.raises(InputError, match=message) as caught:
         Causes.load(file)
     assert str(caught.value).startswith(f"{file}: ")

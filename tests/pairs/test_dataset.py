@@ -94,9 +94,8 @@ def test_source_and_target_share_no_point_and_icp_gives_the_stored_cloud(objects
 
 
 def test_a_subset_keeps_every_rows_cloud_and_columns(registrations):
-    with_embedding = dataclasses.replace(
-        registrations, attached={"embedding": np.arange(len(registrations))[:, None] * 1.0}
-    )
+    embedding = np.arange(len(registrations))[:, None] * 1.0
+    with_embedding = dataclasses.replace(registrations, attached={"embedding": embedding})
     rows = np.array([17, 2, 40, 2])
     chosen = with_embedding.subset(rows)
     assert len(chosen) == 4
@@ -166,11 +165,8 @@ def changed(array, index, value):
 )
 def test_faulty_files_are_refused_with_their_name(tmp_path, registrations, name, damage, expected):
     path = tmp_path / "seed0.npz"
-    arrays = (
-        registrations.arrays
-        | {"source": np.array("tiny"), "seed": np.array(0)}
-        | {name: damage(getattr(registrations, name))}
-    )
+    arrays = registrations.arrays | {"source": np.array("tiny"), "seed": np.array(0)}
+    arrays[name] = damage(arrays[name])
     np.savez(path, **{key: array for key, array in arrays.items() if array is not None})
     with pytest.raises(InputError, match=expected) as caught:
         Registrations.load(path)

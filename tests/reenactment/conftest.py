@@ -1,5 +1,7 @@
 """A drill, a can and what a camera might see of them, as a registration finds it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -34,6 +36,15 @@ def surface_of(objects, name):
 @pytest.fixture(scope="session")
 def model(drill):
     return ModelSurface(drill[:400])
+
+
+def without_truth(causes):
+    """The same rows without anything that only the truth knows."""
+    blank = {name: np.zeros_like(getattr(causes, name)) for name in ("applied", "severity_outliers", "error_shown")}
+    unknown = replace(causes.truth, error=causes.truth.error * np.nan, uncertainty=causes.truth.uncertainty * np.nan)
+    registrations = causes.registrations.without_labels()
+    assert np.isnan(registrations.T_target_source_true).all()
+    return replace(causes, registrations=registrations, truth=unknown, truth_again=unknown, **blank)
 
 
 def candidate_of(surface, *causes, seed=100, settings=TRUTH):

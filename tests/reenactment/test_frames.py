@@ -17,6 +17,7 @@ from gpca.reenactment.dataset import Reenactments
 from gpca.reenactment.frames import FrameView, KnownObject, reenact_frames
 from gpca.reenactment.settings import ReenactmentSettings
 from tests.frames.bracket import hidden, misplaced, models_in, most_seen, noisy, own_starts
+from tests.reenactment.conftest import without_truth
 
 NUMBERS = set(Reenactments.array_fields()) - {"sample", "split"}
 
@@ -90,11 +91,7 @@ def test_nothing_that_only_the_truth_knows_is_read(seen, objects, meshes):
     instances = hidden(misplaced(seen))
     instances = replace(instances, T_camera_object_init=misplaced(seen).T_camera_object_init)
     causes = measured(instances, objects, meshes)
-    blank = {name: np.zeros_like(getattr(causes, name)) for name in ("applied", "severity_outliers", "error_shown")}
-    unknown = replace(causes.truth, error=causes.truth.error * np.nan, uncertainty=causes.truth.uncertainty * np.nan)
-    registrations = causes.registrations.without_labels()
-    assert np.isnan(registrations.T_target_source_true).all()
-    without = replace(causes, registrations=registrations, truth=unknown, truth_again=unknown, **blank)
+    without = without_truth(causes)
     nowhere = replace(instances, T_camera_object_true=instances.T_camera_object_true * np.nan)
     nowhere = replace(nowhere, T_camera_object_init=nowhere.T_camera_object_true, init_from=np.array(["nobody"]))
     first = enacted(causes, instances, objects, meshes)

@@ -1,7 +1,5 @@
 """A corner of a room whose registrations are re-enacted by an observer who does not know the true pose."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -17,6 +15,7 @@ from gpca.reenactment.scans import cropped, reenact_scans
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface
 from gpca.scans.pair import ScanSuccess
+from tests.reenactment.conftest import without_truth
 from tests.scans.corner import corner_pair, start_off
 
 NUMBERS = set(Reenactments.array_fields()) - {"sample", "split"}
@@ -60,10 +59,7 @@ def test_the_best_hypothesis_is_the_true_pose(good_and_bad, enacted):
 
 def test_nothing_that_only_the_truth_knows_is_read(good_and_bad, enacted):
     causes, table = good_and_bad
-    blank = {name: np.zeros_like(getattr(causes, name)) for name in ("applied", "severity_outliers", "error_shown")}
-    unknown = replace(causes.truth, error=causes.truth.error * np.nan, uncertainty=causes.truth.uncertainty * np.nan)
-    registrations = causes.registrations.without_labels()
-    without = replace(causes, registrations=registrations, truth=unknown, truth_again=unknown, **blank)
+    without = without_truth(causes)
     again = reenact_scans(without, table["error_factor"].to_numpy(), SETTINGS, TRUTH)
     for name in NUMBERS:
         assert np.array_equal(getattr(enacted, name), getattr(again, name)), name
@@ -73,29 +69,32 @@ def at(T, points):
     return Hypothesis(T, np.ones(len(points)), 0.0, 0.02, 1.0, 0.0)
 
 
-def test_both_scans_are_cropped_to_what_they_have_in_common_under_a_hypothesis():
+@pytest.fixture
+def beside():
+    """Two flat scans: half of either lies beside the other."""
     random = np.random.default_rng(100)
     model, observed = (np.column_stack([random.uniform(0, 1, (400, 2)), np.zeros(400)]) for _ in range(2))
-    observed[:, 0] += 0.5  # half of either lies beside the other
+    observed[:, 0] += 0.5
     surface = ModelSurface(model)
-    scale = NoiseScale(surface, random)
-    candidate = cropped(at(np.eye(4), observed), observed, surface, scale)
+    return observed, surface, NoiseScale(surface, random)
+
+
+def test_both_scans_are_cropped_to_what_they_have_in_common_under_a_hypothesis(beside):
+    observed, *known = beside
+    candidate = cropped(at(np.eye(4), observed), observed, *known)
     assert len(candidate.seen) / 400 == pytest.approx(0.6, abs=0.15)
     assert candidate.clean[candidate.seen, 0].max() < 1.2 and candidate.reference(())[:, 0].min() > 0.3
     assert candidate.severity["crop"] == pytest.approx(0.45, abs=0.15)
     away = np.eye(4)
     away[0, 3] = 5.0
-    nothing = cropped(at(away, observed), observed, surface, scale)
+    nothing = cropped(at(away, observed), observed, *known)
     assert not nothing.applied[2] and len(nothing.seen) == 400
 
 
-def test_noise_is_taken_from_the_common_points_alone():
-    random = np.random.default_rng(100)
-    model, observed = (np.column_stack([random.uniform(0, 1, (400, 2)), np.zeros(400)]) for _ in range(2))
-    observed[:, 0] += 0.5
-    observed[:, 2] += 0.03 * random.normal(size=400)
-    surface = ModelSurface(model)
-    candidate = cropped(at(np.eye(4), observed), observed, surface, NoiseScale(surface, random))
+def test_noise_is_taken_from_the_common_points_alone(beside):
+    observed, *known = beside
+    observed[:, 2] += 0.03 * np.random.default_rng(1).normal(size=400)
+    candidate = cropped(at(np.eye(4), observed), observed, *known)
     moved = np.abs(candidate.clean - candidate.noisy).max(axis=1) > 0
     assert candidate.applied[0] and set(np.flatnonzero(moved)) <= set(candidate.seen)
     assert np.abs(candidate.clean[candidate.seen, 2]).mean() < 0.5 * np.abs(candidate.noisy[candidate.seen, 2]).mean()
