@@ -5,6 +5,8 @@ The same explainers name causes, with "nominal" as a further class.
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from gpca.causes.dataset import LABELS
@@ -21,18 +23,13 @@ class ConceptVectors(ScoringExplainer):
     TCAV's score describes a dataset; its basis can score a sample. A CAV is the normal of a linear probe between one
     concept and the others (TCAV's relative CAV) in the standardized embedding. The scores are the softmax over concepts
     of the projections on the CAVs, standardized on the training rows; a concept without training rows has score 0.
-    `inverse_regularisation` is scikit-learn's C of the probes. The probes are a convex problem without random numbers.
+    `inverse_regularisation` is scikit-learn's C of the probes, a convex problem without random numbers.
     """
 
     def __init__(self, source: str, seed: int, inverse_regularisation: Positive = 1.0) -> None:
         self._inverse_regularization = inverse_regularisation
 
     def fit(self, registrations: Registrations) -> None:
-        """Fit one probe for each concept among the labels.
-
-        Raises:
-            InputError: fewer than two concepts, or an embedding that is the same for all registrations.
-        """
         from sklearn.linear_model import LogisticRegression
         from sklearn.preprocessing import StandardScaler
 
@@ -48,7 +45,6 @@ class ConceptVectors(ScoringExplainer):
         self._projection_scaler = StandardScaler().fit(scaled_N_d @ self.vectors_K_d.T)
 
     def scores(self, registrations: Registrations) -> np.ndarray:
-        """Score every registration by its position along the CAVs."""
         from scipy.special import softmax
 
         scaled_N_d = self._embedding_scaler.transform(attached(registrations, "embedding"))
@@ -67,7 +63,6 @@ class SoftmaxHead(ScoringExplainer):
     trained_with_encoder = True
 
     def scores(self, registrations: Registrations) -> np.ndarray:
-        """Return the softmax of the logits."""
         from scipy.special import softmax
 
         return softmax(attached(registrations, "head_logits"), axis=1)
@@ -85,11 +80,12 @@ class CauseHead(SoftmaxHead):
     labels = LABELS
 
 
+_entry = partial(ExplainerEntry, sees=("source",), reads="embeddings")
 EXPLAINERS = {
-    "concept_vectors": ExplainerEntry("Concept activation vectors", ConceptVectors, ("source",), reads="embeddings"),
-    "softmax_head": ExplainerEntry("Softmax head", SoftmaxHead, ("source",), reads="embeddings"),
+    "concept_vectors": _entry("Concept activation vectors", ConceptVectors),
+    "softmax_head": _entry("Softmax head", SoftmaxHead),
 }
 CAUSE_EXPLAINERS = {
-    "softmax_head": ExplainerEntry("Softmax head (aligned source)", CauseHead, ("source",), reads="embeddings"),
-    "concept_vectors": ExplainerEntry("Concept activation vectors", CauseVectors, ("source",), reads="embeddings"),
+    "softmax_head": _entry("Softmax head (aligned source)", CauseHead),
+    "concept_vectors": _entry("Concept activation vectors", CauseVectors),
 }

@@ -41,23 +41,16 @@ class AnalyticalGPC(GPCA):
         super().__init__(source, seed, **settings)
         self._axes, self._point_count = (source, seed, "analytical"), point_count
         self._shape_points, self._neighbors = shape_points, neighbours
+        self._prefix = "_".join(map(str, (*self._axes, shape_points, neighbours, "")))
 
     def describe(self, registrations: Registrations) -> Registrations:
         """Attach the features, the point-count ratio last, unless they are attached already."""
         measure = partial(analytical_features, shape_points=self._shape_points, neighbors=self._neighbors)
         return measured(registrations, self._prefix, lambda: {"features": measure(registrations, *self._axes)})
 
-    def features(self, registrations: Registrations) -> np.ndarray:
-        """Return the features (N, F)."""
+    def _inputs(self, registrations: Registrations) -> np.ndarray:
         features_N_F = self.describe(registrations).attached[f"{self._prefix}features"]
         return features_N_F if self._point_count else features_N_F[:, :-1]
-
-    @property
-    def _prefix(self) -> str:
-        return "_".join(map(str, (*self._axes, self._shape_points, self._neighbors, "")))
-
-    def _inputs(self, registrations: Registrations) -> np.ndarray:
-        return self.features(registrations)
 
 
 EXPLAINERS = {

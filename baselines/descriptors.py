@@ -1,10 +1,15 @@
-"""Explainers of causes on the descriptors of a pair (:mod:`gpca.causes.descriptors`): regressions, trees, GP-CA.
+"""Explainers of causes on the descriptors of a pair (:mod:`gpca.causes.descriptors`) or on its re-enactment.
 
 ``pair_forest`` reads 52 distances, ICP's motion, fitness and spread; ``pair_boosting`` reads every descriptor.
 ``gpca_pair`` is GP-CA's multi-class classifier. ``gpca_multilabel`` has a Gaussian process for failure and one for each
 cause, so that several causes may have high scores. ``pair_committee`` averages a forest, boosting and GP-CA. Names that
 end in ``_clouds`` see the two clouds after ICP alone. ``trees_on_*`` and ``gpca_on_*`` measure what each part is worth,
 in the order of cost; runs from other starts and remedies without restarts cost the same with the default settings.
+
+``alarm_*`` say whether two clouds are aligned, and name no cause. ``alarm_entropies`` is CorAl (Adolfsson et al. 2021):
+a regression on the mean entropy of the clouds, joint and apart. ``alarm_features`` reads features like FACT's (Dillén,
+Forssén & Edstedt 2025): local features of both aligned clouds, their distances, and the share seen in both; boosted
+trees replace its network. ``reenact`` and ``reenact_committee`` read a re-enactment of the pair (docs/reenactment.md).
 """
 
 from __future__ import annotations
@@ -14,38 +19,38 @@ from functools import partial
 
 import numpy as np
 
+from baselines.gates import Alarm
 from gpca.causes.dataset import LABELS
 from gpca.causes.descriptors import EVERY, EVERYTHING, RESIDUALS, Columns, seen
 from gpca.causes.settings import DENSITIES
 from gpca.causes.truth import NOMINAL
-from gpca.classifier.settings import GPCArguments, LearningRate
+from gpca.classifier.settings import GPCArguments, GPCSettings, LearningRate
+from gpca.explainers import interface
 from gpca.explainers.classifiers import boosted_trees, known_concepts, standardized_regression
 from gpca.explainers.gpca import DescriptorGPCA
-from gpca.explainers.interface import (
-    ClassifierExplainer,
-    ConceptExplainer,
-    ExplainerEntry,
-    ScoringExplainer,
-    Sees,
-    attached,
-    in_words,
-)
+from gpca.explainers.interface import ExplainerEntry, Sees, attached
 from gpca.pairs.dataset import Registrations
+from gpca.pairs.distances import ENTROPY
+from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import seed_of
 from gpca.settings import Count, Positive
 
 CLOUDS: Sees = ("pair",)
 WITH_RUNS: Sees = ("pair", "motion", "runs")
 ALL: Sees = (*WITH_RUNS, "remedies")
+REENACTMENT: Sees = (*WITH_RUNS, "reenactment")
 WITHOUT = "clouds alone"  # in titles: no motion of ICP, no further runs, no remedies
+JOINT_AND_APART = [row for row, name in enumerate(ENTROPY) if name.startswith(("joint", "apart"))]
 
 
 def described(registrations: Registrations, sees: Sees, wanted: Columns = EVERYTHING) -> np.ndarray:
-    """Return the attached descriptors (:func:`gpca.causes.descriptors.seen`)."""
+    """Return the attached descriptors (:func:`gpca.causes.descriptors.seen`), or the numbers of the re-enactment."""
+    if "reenactment" in sees:
+        return attached(registrations, "reenactment")
     return seen({group: attached(registrations, group) for group in wanted}, sees, wanted)
 
 
-class DescriptorClassifier(ClassifierExplainer):
+class DescriptorClassifier(interface.ClassifierExplainer):
     """Probabilities of an unfitted scikit-learn classifier on the `wanted` columns of the parts it sees."""
 
     labels = LABELS
@@ -55,54 +60,30 @@ class DescriptorClassifier(ClassifierExplainer):
         self._sees, self._wanted = sees, wanted
 
     def features(self, registrations: Registrations) -> np.ndarray:
-        """Return the columns."""
         return described(registrations, self._sees, self._wanted)
 
 
-def residuals(sees: Sees, source: str, seed: int, inverse_regularisation: Positive = 1.0) -> DescriptorClassifier:
-    """Make a regression on residuals at several scales, in both directions, and the spread.
-
-    Quantiles of the distances are residuals of trimmed pairs, so they do not depend on the overlap.
-    """
-    return DescriptorClassifier(standardized_regression(inverse_regularisation), sees, RESIDUALS)
-
-
-def density(sees: Sees, source: str, seed: int, inverse_regularisation: Positive = 1.0) -> DescriptorClassifier:
-    """Make the control that reads spacings and numbers of points: the shortcut that a fixed draw of points opens."""
-    return DescriptorClassifier(standardized_regression(inverse_regularisation), sees, {"planes": DENSITIES})
-
-
-def entropies(sees: Sees, source: str, seed: int, inverse_regularisation: Positive = 1.0) -> DescriptorClassifier:
-    """Make a regression on the entropies of the clouds, joint and apart (CorAl, Adolfsson et al. 2021)."""
-    return DescriptorClassifier(standardized_regression(inverse_regularisation), sees, {"entropy": EVERY})
+def regression(
+    wanted: Columns, sees: Sees, source: str, seed: int, inverse_regularisation: Positive = 1.0
+) -> DescriptorClassifier:
+    return DescriptorClassifier(standardized_regression(inverse_regularisation), sees, wanted)
 
 
 def randomized_trees(source: str, seed: int, trees: int = 300, smallest_leaf: int = 2):
     """Return an unfitted forest of extremely randomized trees (Geurts et al. 2006)."""
     from sklearn.ensemble import ExtraTreesClassifier
 
-    return ExtraTreesClassifier(
-        trees,
-        min_samples_leaf=smallest_leaf,
-        max_features=0.3,
-        random_state=seed_of(source, seed, "randomised trees") % 2**32,
-    )
+    random_state = seed_of(source, seed, "randomised trees") % 2**32
+    return ExtraTreesClassifier(trees, min_samples_leaf=smallest_leaf, max_features=0.3, random_state=random_state)
 
 
-def pair_forest(
-    sees: Sees, source: str, seed: int, trees: Count = 300, smallest_leaf: Count = 2
+def forest(
+    wanted: Columns, sees: Sees, source: str, seed: int, trees: Count = 300, smallest_leaf: Count = 2
 ) -> DescriptorClassifier:
-    wanted = {"distances": EVERY, "motion": EVERY}
     return DescriptorClassifier(randomized_trees(source, seed, trees, smallest_leaf), sees, wanted)
 
 
-def forest_of_all(
-    sees: Sees, source: str, seed: int, trees: Count = 300, smallest_leaf: Count = 2
-) -> DescriptorClassifier:
-    return DescriptorClassifier(randomized_trees(source, seed, trees, smallest_leaf), sees)
-
-
-def pair_boosting(
+def boosting(
     sees: Sees, source: str, seed: int, iterations: Count = 150, learning_rate: LearningRate = 0.06
 ) -> DescriptorClassifier:
     classifier = boosted_trees(source, seed, iterations=iterations, learning_rate=learning_rate)
@@ -115,21 +96,20 @@ class CausePairGPCA(DescriptorGPCA):
     labels = LABELS
 
     def __init__(self, sees: Sees, source: str, seed: int, **settings: GPCArguments) -> None:
-        super().__init__((source, seed, "causes"), source, seed, **settings)
+        axes = (source, seed, "reenactment" if "reenactment" in sees else "causes")
+        super().__init__(axes, source, seed, **settings)
         self._sees = sees
 
     def features(self, registrations: Registrations) -> np.ndarray:
-        """Return the descriptors."""
         return described(registrations, self._sees)
 
 
-class MultiLabelGPCA(ScoringExplainer):
+class MultiLabelGPCA(interface.ScoringExplainer):
     """Binary GPs for failure and for each cause; a cause's score is its probability times that of a failure."""
 
     labels = LABELS
 
     def __init__(self, sees: Sees, source: str, seed: int, **settings: GPCArguments) -> None:
-        from gpca.classifier.settings import GPCSettings
         from gpca.explainers.pair_classifier import PairClassifier
 
         self._sees = sees
@@ -142,34 +122,72 @@ class MultiLabelGPCA(ScoringExplainer):
         self._classifier.fit(described(registrations, self._sees), registrations.concept != NOMINAL, causes_N_3)
 
     def scores(self, registrations: Registrations) -> np.ndarray:
-        """Return the probabilities of no failure, and of each cause with a failure."""
         judged = self._classifier.judge(self._classifier.normalized(described(registrations, self._sees)))
         return np.column_stack([1 - judged.failure_N, judged.failure_N[:, None] * judged.causes_N_3])
 
 
-class Committee(ScoringExplainer):
+class Committee(interface.ScoringExplainer):
     """The mean of three explainers of different kinds, whose errors differ."""
 
     labels = LABELS
 
     def __init__(self, sees: Sees, source: str, seed: int) -> None:
-        self._members: list[ConceptExplainer] = [
+        self._members: list[interface.ConceptExplainer] = [
             DescriptorClassifier(randomized_trees(source, seed), sees),
             DescriptorClassifier(boosted_trees(source, seed), sees),
             CausePairGPCA(sees, source, seed, learning_rate=0.1, iterations=200),
         ]
 
     def fit(self, registrations: Registrations) -> None:
-        """Fit every member."""
         for member in self._members:
             member.fit(registrations)
 
     def scores(self, registrations: Registrations) -> np.ndarray:
-        """Return the mean of the members' scores."""
         return np.mean([member.explain(registrations).scores_N_C for member in self._members], axis=0)
 
 
-def entry(title: str, make: Callable[..., ConceptExplainer], sees: Sees) -> ExplainerEntry:
+class Reenact(interface.ScoringExplainer):
+    """Scores are the probabilities of the re-enactment itself (:mod:`gpca.reenactment.dataset`)."""
+
+    labels = LABELS
+
+    def scores(self, registrations: Registrations) -> np.ndarray:
+        return attached(registrations, "verdict")
+
+
+class AlignmentClassifier(Alarm):
+    """Probability of a failure by an unfitted scikit-learn classifier on the `wanted` columns of the parts it sees."""
+
+    def __init__(self, classifier, sees: Sees, wanted: Columns = EVERYTHING) -> None:
+        self._classifier, self._sees, self._wanted = classifier, sees, wanted
+
+    def fit(self, registrations: Registrations) -> None:
+        """Learn from labeled registrations; if all are nominal, or all failed, predict the same for all."""
+        failed_N = registrations.concept != NOMINAL
+        self._constant = float(failed_N.mean()) if failed_N.all() or not failed_N.any() else None
+        if self._constant is None:
+            self._classifier.fit(described(registrations, self._sees, self._wanted), failed_N)
+
+    def scores(self, registrations: Registrations) -> np.ndarray:
+        """Return scores (N, 4) with sum one; at a failure probability of 0.5, each cause equals nominal."""
+        if self._constant is None:
+            features_N_F = described(registrations, self._sees, self._wanted)
+            failure_N = self._classifier.predict_proba(features_N_F)[:, 1]
+        else:
+            failure_N = np.full(len(registrations), self._constant)
+        scores_N_4 = np.column_stack([1 - failure_N, *(failure_N for _ in CONCEPTS)])
+        return scores_N_4 / scores_N_4.sum(axis=1, keepdims=True)
+
+
+def alarm_entropies(sees: Sees, source: str, seed: int, inverse_regularisation: Positive = 1.0) -> AlignmentClassifier:
+    return AlignmentClassifier(standardized_regression(inverse_regularisation), sees, {"entropy": JOINT_AND_APART})
+
+
+def alarm_features(sees: Sees, source: str, seed: int, iterations: Count = 150) -> AlignmentClassifier:
+    return AlignmentClassifier(boosted_trees(source, seed, "alignment", iterations=iterations), sees)
+
+
+def entry(title: str, make: Callable[..., interface.ConceptExplainer], sees: Sees) -> ExplainerEntry:
     """Return the entry of an explainer whose first argument is what it sees."""
     return ExplainerEntry(title, partial(make, sees), sees, reads="descriptors")
 
@@ -182,24 +200,34 @@ LEVELS: dict[str, Sees] = {
     "quick_remedies": ("pair", "motion", "quick_remedies"),
     "everything": ALL,
 }
+# Residuals at several scales, in both directions, and the spread. Quantiles of the distances are residuals of trimmed
+# pairs, so they do not depend on the overlap.
+_residuals = partial(regression, RESIDUALS)
+# Spacings and numbers of points: the shortcut that a fixed draw of points opens.
+_density = partial(regression, {"planes": DENSITIES})
+_distances = partial(forest, {"distances": EVERY, "motion": EVERY})
+_reenacted = partial(ExplainerEntry, sees=REENACTMENT, reads=interface.REENACTED)
 CAUSE_EXPLAINERS = {
-    "residuals": entry("Residuals (regression)", residuals, WITH_RUNS),
-    "residuals_clouds": entry(f"Residuals (regression), {WITHOUT}", residuals, CLOUDS),
-    "density": entry("Density alone (control)", density, CLOUDS),
-    "entropies": entry("Entropies, CorAl (regression)", entropies, CLOUDS),
-    "pair_forest": entry("Distances of the pair (forest)", pair_forest, WITH_RUNS),
-    "pair_forest_clouds": entry(f"Distances of the pair (forest), {WITHOUT}", pair_forest, CLOUDS),
-    "pair_boosting": entry("All descriptors (boosting)", pair_boosting, ALL),
-    "pair_boosting_clouds": entry(f"Descriptors (boosting), {WITHOUT}", pair_boosting, CLOUDS),
+    "alarm_entropies": entry("Aligned or not by entropies, CorAl", alarm_entropies, CLOUDS),
+    "alarm_features": entry("Aligned or not by local features, after FACT", alarm_features, CLOUDS),
+    "residuals": entry("Residuals (regression)", _residuals, WITH_RUNS),
+    "residuals_clouds": entry(f"Residuals (regression), {WITHOUT}", _residuals, CLOUDS),
+    "density": entry("Density alone (control)", _density, CLOUDS),
+    "entropies": entry("Entropies, CorAl (regression)", partial(regression, {"entropy": EVERY}), CLOUDS),
+    "pair_forest": entry("Distances of the pair (forest)", _distances, WITH_RUNS),
+    "pair_forest_clouds": entry(f"Distances of the pair (forest), {WITHOUT}", _distances, CLOUDS),
+    "pair_boosting": entry("All descriptors (boosting)", boosting, ALL),
+    "pair_boosting_clouds": entry(f"Descriptors (boosting), {WITHOUT}", boosting, CLOUDS),
     "gpca_pair": entry("GP-CA on the pair", CausePairGPCA, ALL),
     "gpca_pair_clouds": entry(f"GP-CA on the pair, {WITHOUT}", CausePairGPCA, CLOUDS),
     "gpca_multilabel": entry("GP-CA on the pair, multi-label", MultiLabelGPCA, ALL),
     "gpca_multilabel_clouds": entry(f"GP-CA on the pair, multi-label, {WITHOUT}", MultiLabelGPCA, CLOUDS),
     "pair_committee": entry("Committee on the pair", Committee, ALL),
     "pair_committee_clouds": entry(f"Committee on the pair, {WITHOUT}", Committee, CLOUDS),
-    **{f"trees_on_{name}": entry(f"Forest on {in_words(sees)}", forest_of_all, sees) for name, sees in LEVELS.items()},
-    **{
-        f"gpca_on_{name}": entry(f"GP-CA's classifier on {in_words(sees)}", CausePairGPCA, sees)
-        for name, sees in LEVELS.items()
-    },
+    "reenact": _reenacted("Re-enactment (untrained)", Reenact),
+    "reenact_committee": _reenacted("Committee on the re-enactment", partial(Committee, REENACTMENT)),
 }
+for level, sight in LEVELS.items():
+    words = interface.in_words(sight)
+    CAUSE_EXPLAINERS[f"trees_on_{level}"] = entry(f"Forest on {words}", partial(forest, EVERYTHING), sight)
+    CAUSE_EXPLAINERS[f"gpca_on_{level}"] = entry(f"GP-CA's classifier on {words}", CausePairGPCA, sight)

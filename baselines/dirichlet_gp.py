@@ -34,7 +34,6 @@ class DirichletGP(DrawingExplainer):
         self._iterations, self._learning_rate = iterations, learning_rate
 
     def fit(self, registrations: Registrations) -> None:
-        """Fit to the labeled embeddings; fewer than two concepts among the labels raise an InputError."""
         import torch
         from sklearn.preprocessing import StandardScaler
 
@@ -63,7 +62,6 @@ class DirichletGP(DrawingExplainer):
         self._factors = [self._factor(*concept)[1:] for concept in data]
 
     def summary(self, registrations: Registrations) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Summarize draws from the posterior at every embedding."""
         normal_M_C = generator(*self._axes, "draws").normal(size=(self._draws, len(CONCEPTS)))
         return summarize_marginals(*self._posterior(registrations), normal_M_C)
 
@@ -123,6 +121,5 @@ def _squared_distances(a_A_d: np.ndarray, b_B_d: np.ndarray) -> np.ndarray:
     return squared_distances(torch.from_numpy(a_A_d), torch.from_numpy(b_B_d)).numpy()
 
 
-EXPLAINERS = {
-    "learner_dirichlet_gp": ExplainerEntry("Dirichlet exact GP", DirichletGP, ("source",), reads="embeddings")
-}
+_entry = ExplainerEntry("Dirichlet exact GP", DirichletGP, ("source",), reads="embeddings")
+EXPLAINERS = {"learner_dirichlet_gp": _entry}

@@ -26,17 +26,13 @@ assert LABELS[0] == NOMINAL  # scores have its column first
 class NominalThreshold:
     """Turns an alarm (larger is worse) and the scores of the causes into scores over `LABELS`.
 
-    Attributes:
-        accuracy: balanced accuracy of the threshold on the labeled samples; 0.5 if undefined.
+    `accuracy` is the balanced accuracy of the threshold on the labeled samples; 0.5 if undefined.
     """
 
     accuracy = 0.5
 
     def fit(self, alarm_N: np.ndarray, label_N: np.ndarray) -> NominalThreshold:
-        """Find the threshold with the best balanced accuracy, and the scale of the alarm.
-
-        Without nominal or without failed samples, the threshold is the median.
-        """
+        """Find the scale of the alarm, and the threshold with the best balanced accuracy; the median if undefined."""
         nominal_N = label_N == NOMINAL
         order = np.argsort(alarm_N, kind="stable")
         if nominal_N.all() or not nominal_N.any():
@@ -59,10 +55,8 @@ class NominalThreshold:
         from scipy.special import expit
 
         wrong_N = expit((alarm_N - self._threshold) / self._scale)
-        largest_N = shares_N_3.max(axis=1)
-        nominal_N = (1 - wrong_N) * largest_N
-        causes_N_3 = wrong_N[:, None] * shares_N_3
-        scores_N_4 = np.column_stack([nominal_N, causes_N_3])
+        nominal_N = (1 - wrong_N) * shares_N_3.max(axis=1)
+        scores_N_4 = np.column_stack([nominal_N, wrong_N[:, None] * shares_N_3])
         return scores_N_4 / scores_N_4.sum(axis=1, keepdims=True)
 
 
@@ -72,15 +66,12 @@ class Alarm(ScoringExplainer):
     labels = LABELS
 
     def fit(self, registrations: Registrations) -> None:
-        """Learn the threshold."""
         self._threshold = NominalThreshold().fit(self.alarm(registrations), registrations.concept)
 
     def explain(self, registrations: Registrations) -> Attribution:
-        """Score every registration, and abstain from naming causes."""
         return replace(super().explain(registrations), abstained_N=np.ones(len(registrations), bool))
 
     def scores(self, registrations: Registrations) -> np.ndarray:
-        """Score nominal by the alarm, and all causes equally."""
         even_N_3 = np.full((len(registrations), len(CONCEPTS)), 1 / len(CONCEPTS))
         return self._threshold.scores(self.alarm(registrations), even_N_3)
 
@@ -96,7 +87,6 @@ class Gate(Alarm):
         self._name = name
 
     def alarm(self, registrations: Registrations) -> np.ndarray:
-        """Return the number (N,), large if bad."""
         return motion_alarm(registrations, self._name)
 
 
@@ -108,18 +98,14 @@ def motion_alarm(registrations: Registrations, name: str) -> np.ndarray:
 class CovarianceGate(Alarm):
     """The alarm is ln |Σ + εI| of the covariance that an estimator gives at the result of ICP.
 
-    A registration without an estimate, as nothing holds it, counts as one of covariance I.
-
-    Args:
-        estimator: the name of one that needs no training.
-        floor: ε, of the variances.
+    The estimator needs no training. A registration without an estimate, as nothing holds it, counts as one of
+    covariance I.
     """
 
     def __init__(self, estimator: str, source: str, seed: int, floor: Positive = 1e-12) -> None:
         self._estimator, self._floor = estimator, floor
 
     def alarm(self, registrations: Registrations) -> np.ndarray:
-        """Return the log-determinant (N,)."""
         from gpca.alignment.methods.interface import Outcome, Pair
         from gpca.uncertainty.estimators.interface import POINT_TO_POINT, RegisteredPair
         from gpca.uncertainty.estimators.registry import make_estimator

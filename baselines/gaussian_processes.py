@@ -21,11 +21,9 @@ class GpytorchGPCA(DrawingExplainer):
         self._gpc = GpytorchGPC(self.labels, GPCSettings(**settings), source, seed)
 
     def fit(self, registrations: Registrations) -> None:
-        """Fit to the labeled embeddings; as many samples as concepts raise an InputError."""
         self._gpc.fit(registrations.embedding, registrations.concept)
 
     def summary(self, registrations: Registrations) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Summarize draws from the posterior at every embedding."""
         return self._gpc.attribute(registrations.embedding)
 
 

@@ -7,6 +7,7 @@ Monte-Carlo dropout (Gal & Ghahramani 2016), or Laplace's approximation over the
 
 from __future__ import annotations
 
+from functools import partial
 from itertools import pairwise
 from typing import Annotated, Any
 
@@ -55,12 +56,10 @@ class Heads:
         from sklearn.preprocessing import StandardScaler
 
         self._scaler = StandardScaler().fit(h_N_d)
-        inputs_N_d = self._inputs(h_N_d)
-        targets_N = torch.from_numpy(target_N)
+        inputs_N_d, targets_N = self._inputs(h_N_d), torch.from_numpy(target_N)
         random = torch.Generator().manual_seed(seed_of(*self._axes))
-        widths = (h_N_d.shape[1], self._hidden, len(CONCEPTS))
         self._layers = []
-        for width, outputs in pairwise(widths):
+        for width, outputs in pairwise((h_N_d.shape[1], self._hidden, len(CONCEPTS))):
             weight = torch.randn((self._heads, width, outputs), generator=random) * (2 / width) ** 0.5
             self._layers += [weight.requires_grad_(), torch.zeros((self._heads, 1, outputs), requires_grad=True)]
         # Fused, because the plain form takes torch.sqrt, whose last bit depends on the processor's vendor.
@@ -82,17 +81,13 @@ class Heads:
 
     def hidden(self, h_N_d: np.ndarray) -> np.ndarray:
         """Return the hidden units (E, N, H) of the embeddings."""
-        import torch
-
-        with torch.no_grad():
-            return self._hidden_units(self._inputs(h_N_d)).numpy()
+        return self._hidden_units(self._inputs(h_N_d)).detach().numpy()
 
     def logits(self, hidden_E_N_H: np.ndarray) -> np.ndarray:
         """Return the last layer's logits (E, N, C)."""
         import torch
 
-        with torch.no_grad():
-            return self._last_layer(torch.from_numpy(hidden_E_N_H)).numpy()
+        return self._last_layer(torch.from_numpy(hidden_E_N_H)).detach().numpy()
 
     def _inputs(self, h_N_d: np.ndarray):
         import torch
@@ -119,13 +114,11 @@ class HeadLearner(DrawingExplainer):
         self._heads = Heads(*self._axes, **training)
 
     def fit(self, registrations: Registrations) -> None:
-        """Train on the labeled embeddings; fewer than two concepts among the labels raise an InputError."""
         known_concepts(registrations.concept)
         target_N = np.array([CONCEPTS.index(concept) for concept in registrations.concept])
         self._train(attached(registrations, "embedding"), target_N)
 
     def summary(self, registrations: Registrations) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Summarize draws of the logits of every registration."""
         return summarize_draws(self._draw_logits(attached(registrations, "embedding")))
 
     def _train(self, h_N_d: np.ndarray, target_N: np.ndarray) -> None:
@@ -176,8 +169,7 @@ class LastLayerLaplace(HeadLearner):
 
     def _train(self, h_N_d: np.ndarray, target_N: np.ndarray) -> None:
         order_N = generator(*self._axes, "validation").permutation(len(target_N))
-        validation = order_N[::5]
-        rest = np.delete(order_N, np.s_[::5])
+        validation, rest = order_N[::5], np.delete(order_N, np.s_[::5])
         precision = self.PRECISIONS[0]
         if len(rest):
             super()._train(h_N_d[rest], target_N[rest])
@@ -191,16 +183,31 @@ class LastLayerLaplace(HeadLearner):
         self._approximate(h_N_d, target_N, precision)
 
     def _approximate(self, h_N_d: np.ndarray, target_N: np.ndarray, precision: float) -> None:
-        features_N_F = self._features(h_N_d)
-        wanted_N_C = np.eye(len(CONCEPTS))[target_N]
-        self._weights_F_C = _regularized_weights(features_N_F, wanted_N_C, precision)
-        p_N_C = np.exp(_log_softmax(features_N_F @ self._weights_F_C))
-        eigenvalues, self._vectors = np.linalg.eigh(_gauss_newton(features_N_F, p_N_C))
+        """Find the weights (F, C) that minimize cross-entropy + precision / 2 · |weights|², and the curvature there."""
+        from scipy.optimize import minimize
+        from scipy.special import log_softmax
+
+        features_N_F, wanted_N_C = self._features(h_N_d), np.eye(len(CONCEPTS))[target_N]
+        shape = (features_N_F.shape[1], len(CONCEPTS))
+
+        def loss(flat: np.ndarray) -> tuple[float, np.ndarray]:
+            weights_F_C = flat.reshape(shape)
+            log_p_N_C = log_softmax(features_N_F @ weights_F_C, axis=1)
+            gradient_F_C = features_N_F.T @ (np.exp(log_p_N_C) - wanted_N_C) + precision * weights_F_C
+            return -np.sum(wanted_N_C * log_p_N_C) + 0.5 * precision * flat @ flat, gradient_F_C.ravel()
+
+        found = minimize(loss, np.zeros(shape).ravel(), jac=True, method="L-BFGS-B")
+        self._weights_F_C = found.x.reshape(shape)
+        p_N_C = np.exp(log_softmax(features_N_F @ self._weights_F_C, axis=1))
+        blocks = []  # of the curvature (C·F, C·F), classes first
+        for p_N, one_hot_C in zip(p_N_C.T, np.eye(len(CONCEPTS)), strict=True):
+            curvature_N_C = p_N[:, None] * (one_hot_C - p_N_C)
+            blocks.append([(features_N_F * curvature_N[:, None]).T @ features_N_F for curvature_N in curvature_N_C.T])
+        eigenvalues, self._vectors = np.linalg.eigh(np.block(blocks))
         self._deviations = 1 / np.sqrt(np.maximum(eigenvalues, 0) + precision)
 
     def _draw_logits(self, h_N_d: np.ndarray) -> np.ndarray:
-        features_N_F = self._features(h_N_d)
-        n_classes = len(CONCEPTS)
+        features_N_F, n_classes = self._features(h_N_d), len(CONCEPTS)
         # The weights have the covariance W Wᵀ with W (C·F, K), a sample's logits R Rᵀ with R (C, K).
         roots_C_F_K = (self._vectors * self._deviations).reshape(n_classes, features_N_F.shape[1], -1)
         roots_C_N_K = features_N_F @ roots_C_F_K
@@ -214,40 +221,9 @@ class LastLayerLaplace(HeadLearner):
         return np.column_stack([hidden_N_H, np.ones(len(hidden_N_H))])
 
 
-def _regularized_weights(features_N_F: np.ndarray, wanted_N_C: np.ndarray, precision: float) -> np.ndarray:
-    """Return the weights (F, C) that minimize cross-entropy + precision / 2 · |weights|²."""
-    from scipy.optimize import minimize
-
-    shape = (features_N_F.shape[1], wanted_N_C.shape[1])
-
-    def loss(flat):
-        weights_F_C = flat.reshape(shape)
-        log_p_N_C = _log_softmax(features_N_F @ weights_F_C)
-        gradient_F_C = features_N_F.T @ (np.exp(log_p_N_C) - wanted_N_C) + precision * weights_F_C
-        return -np.sum(wanted_N_C * log_p_N_C) + 0.5 * precision * flat @ flat, gradient_F_C.ravel()
-
-    return minimize(loss, np.zeros(shape).ravel(), jac=True, method="L-BFGS-B").x.reshape(shape)
-
-
-def _gauss_newton(features_N_F: np.ndarray, p_N_C: np.ndarray) -> np.ndarray:
-    """Return the curvature (C·F, C·F) of the cross-entropy in the weights, classes first."""
-    rows = []
-    for c, p_N in enumerate(p_N_C.T):
-        curvature_N_C = p_N[:, None] * (np.eye(p_N_C.shape[1])[c] - p_N_C)
-        rows.append([(features_N_F * curvature_N[:, None]).T @ features_N_F for curvature_N in curvature_N_C.T])
-    return np.block(rows)
-
-
-def _log_softmax(logits_N_C: np.ndarray) -> np.ndarray:
-    from scipy.special import log_softmax
-
-    return log_softmax(logits_N_C, axis=1)
-
-
+_entry = partial(ExplainerEntry, sees=("source",), reads="embeddings")
 EXPLAINERS = {
-    "learner_ensemble": ExplainerEntry("Deep ensemble of heads", Ensemble, ("source",), reads="embeddings"),
-    "learner_dropout": ExplainerEntry("MC dropout of the head", Dropout, ("source",), reads="embeddings"),
-    "learner_laplace_head": ExplainerEntry(
-        "Last-layer Laplace of the head", LastLayerLaplace, ("source",), reads="embeddings"
-    ),
+    "learner_ensemble": _entry("Deep ensemble of heads", Ensemble),
+    "learner_dropout": _entry("MC dropout of the head", Dropout),
+    "learner_laplace_head": _entry("Last-layer Laplace of the head", LastLayerLaplace),
 }

@@ -37,7 +37,6 @@ class LearnedPairGPCA(PairDescription, GPCA):
 
     Args:
         motion: whether the encoder reads how far ICP moved the cloud.
-        source, seed: name the random numbers.
         points: of each cloud, each described by its relation to the other cloud.
         draw_points, epochs, encoder_learning_rate: of the encoder's training; each epoch draws other points.
         settings: those of the GPC.
@@ -56,7 +55,8 @@ class LearnedPairGPCA(PairDescription, GPCA):
     ) -> None:
         PairDescription.__init__(self, source, seed, "relations", points, motion)
         GPCA.__init__(self, source, seed, **settings)
-        self._training = (min(draw_points, points), epochs, encoder_learning_rate)
+        self._training = {"epochs": epochs, "learning_rate": encoder_learning_rate}
+        self._draw_points = min(draw_points, points)
         self._embedding = f"{self._prefix}embedding_by_{ENCODER}" + ("" if motion else "_without_motion")
         self._embed: Callable[[Registrations], Registrations] | None = None
 
@@ -66,19 +66,16 @@ class LearnedPairGPCA(PairDescription, GPCA):
         from gpca.encoders.registry import EncoderSettings
         from gpca.encoders.training import TrainingTask, embed, train_encoder
 
-        points, motion = self._prefix + "points", self._prefix + "encoder_motion"
+        motion = self._prefix + "encoder_motion"
 
         def seen(pairs: Registrations) -> Registrations:
             described = self.describe(pairs)
             return replace(described, attached={**described.attached, motion: self.motion(described)})
 
         labeled = seen(registrations)
-        draw_points, epochs, learning_rate = self._training
         options = {"motion": labeled.attached[motion].shape[1]}
-        settings = EncoderSettings(
-            ENCODER, draw_points, draws=2, epochs=epochs, learning_rate=learning_rate, options=options
-        )
-        draw = partial(draw_pairs, points, motion)
+        settings = EncoderSettings(ENCODER, self._draw_points, draws=2, options=options, **self._training)
+        draw = partial(draw_pairs, self._prefix + "points", motion)
         task = TrainingTask(self.labels, make=lambda: PAIR_ENCODERS[ENCODER](**options), draw=draw)
         all_rows = replace(labeled, split=np.full(len(labeled), "train"))
         model, _ = train_encoder(all_rows, *self._axes, settings, task=task)
@@ -126,8 +123,7 @@ def draw_pairs(
     drawn = []
     for row in rows:
         random = generator(*axes, registrations.split[row], registrations.sample[row])
-        chosen_2_T = [random.choice(points_S_2_P_F.shape[2], n_points, False, shuffle=False) for _ in range(2)]
-        drawn.append([cloud[chosen] for cloud, chosen in zip(points_S_2_P_F[row], chosen_2_T, strict=True)])
+        drawn.append([random.choice(cloud, n_points, replace=False, shuffle=False) for cloud in points_S_2_P_F[row]])
     motion_B_M = registrations.attached[motion][rows]
     return [torch.from_numpy(np.array(drawn, np.float32)), torch.from_numpy(motion_B_M.astype(np.float32))]
 
@@ -156,12 +152,10 @@ class CauseLearnedPairGPCA(LearnedPairGPCA):
         self._normalized = NormalizedFeatures(source, seed, "pair encoder")
 
     def learn_encoder(self, registrations: Registrations) -> Callable[[Registrations], Registrations]:
-        """Learn the ranks, train the encoder, and return a function that attaches its embeddings."""
         self._normalized.fit(descriptors.described(registrations, self._sees, NUMBERS))
         return super().learn_encoder(registrations)
 
     def motion(self, registrations: Registrations) -> np.ndarray:
-        """Return the normalized numbers of motion and runs (N, M)."""
         return self._normalized(descriptors.described(registrations, self._sees, NUMBERS))
 
 

@@ -20,7 +20,6 @@ class Learner(ClassifierExplainer):
     """A scikit-learn classifier on the embeddings."""
 
     def features(self, registrations: Registrations) -> np.ndarray:
-        """Return the embeddings."""
         return attached(registrations, "embedding")
 
 
@@ -37,7 +36,6 @@ class ProbableSVM(Learner):
         self._kernel = kernel
 
     def fit(self, registrations: Registrations) -> None:
-        """Fit to the labeled embeddings; a concept with a single sample raises an InputError."""
         from sklearn.calibration import CalibratedClassifierCV
         from sklearn.svm import SVC
 
@@ -59,7 +57,6 @@ class Nearest(Learner):
         super().__init__(_standardized(KNeighborsClassifier(neighbours)))
 
     def fit(self, registrations: Registrations) -> None:
-        """Fit to the labeled embeddings; fewer samples than neighbors raise an InputError."""
         if self._neighbors > len(registrations):
             fault = f"{self._neighbors} neighbors are too many for {len(registrations)} training samples"
             raise InputError("learner_nearest", fault, "lower neighbours")

@@ -40,14 +40,12 @@ class PairDescription:
         self._prefix = f"pair_{source}_{seed}_{points}_"
 
     def describe(self, registrations: Registrations) -> Registrations:
-        """Attach the descriptors, unless they are attached already."""
         from gpca.pairs.description import describe_registrations
 
         describe = partial(describe_registrations, registrations, *self._axes, points=self._points)
         return measured(registrations, self._prefix, describe)
 
     def features(self, registrations: Registrations) -> np.ndarray:
-        """Return the group (N, F)."""
         from gpca.pairs.description import MOVED
 
         features_N_F = self.describe(registrations).attached[self._prefix + self._group]

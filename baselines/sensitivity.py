@@ -81,21 +81,17 @@ def _single_remedies(errors_N_8: np.ndarray) -> np.ndarray:
 
 # The paper uses local derivatives at the observed pair.
 sa_local_additive = partial(KnobValues, local_derivatives, STEPS)
-sa_prcc_additive = partial(KnobValues, partial(_over_settings, partial_rank_correlations, "latin"), None)
-sa_sobol_additive = partial(KnobValues, partial(_over_settings, total_indices, "saltelli"), None)
-sa_local_removal = partial(ScaledValues, single_drops, ONE_AT_A_TIME)
-sa_supervised = partial(LearnedValues, single_drops, ONE_AT_A_TIME)
+_prcc = partial(KnobValues, partial(_over_settings, partial_rank_correlations, "latin"), None)
+_sobol = partial(KnobValues, partial(_over_settings, total_indices, "saltelli"), None)
 _removal = partial(ExplainerEntry, sees=("remedies",), reads="uncertainty/removal")
+_drops = partial(ScaledValues, single_drops, ONE_AT_A_TIME)
 EXPLAINERS = {
     "sa_local_additive": ExplainerEntry("SA", sa_local_additive, ("runs",), reads="uncertainty/additive"),
-    "sa_prcc_additive": ExplainerEntry("SA, PRCC", sa_prcc_additive, ("runs",), reads="uncertainty/latin"),
-    "sa_sobol_additive": ExplainerEntry("SA, Sobol", sa_sobol_additive, ("runs",), reads="uncertainty/saltelli"),
-    "sa_local_removal": _removal("SA, remedies", sa_local_removal),
-    "sa_local_removal_residual": _removal("SA, remedies, residual", sa_local_removal),
-    "sa_supervised": _removal("SA, remedies, learned", sa_supervised),
+    "sa_prcc_additive": ExplainerEntry("SA, PRCC", _prcc, ("runs",), reads="uncertainty/latin"),
+    "sa_sobol_additive": ExplainerEntry("SA, Sobol", _sobol, ("runs",), reads="uncertainty/saltelli"),
+    "sa_local_removal": _removal("SA, remedies", _drops),
+    "sa_local_removal_residual": _removal("SA, remedies, residual", _drops),
+    "sa_supervised": _removal("SA, remedies, learned", partial(LearnedValues, single_drops, ONE_AT_A_TIME)),
 }
-CAUSE_EXPLAINERS = {
-    "sa_removal": ExplainerEntry(
-        "SA, remedies", partial(RemovalValues, _single_remedies), ("remedies",), reads="descriptors"
-    )
-}
+_causes = partial(RemovalValues, _single_remedies)
+CAUSE_EXPLAINERS = {"sa_removal": ExplainerEntry("SA, remedies", _causes, ("remedies",), reads="descriptors")}

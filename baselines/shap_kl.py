@@ -15,7 +15,7 @@ import numpy as np
 from baselines.values import KnobValues, LearnedValues, RemovalValues, ScaledValues
 from gpca.explainers.interface import ExplainerEntry
 
-ALL_CORNERS = list(range(8))
+ALL_CORNERS = list(range(8))  # with which the designs of knobs begin
 
 
 def shapley_values(worth_N_8: np.ndarray) -> np.ndarray:
@@ -33,25 +33,17 @@ def shapley_values(worth_N_8: np.ndarray) -> np.ndarray:
     return np.reshape(explainer.shap_values(np.ones((1, 3)), l1_reg=False, silent=True), (3, -1)).T
 
 
-def _of_corners(uncertainty_N_K: np.ndarray) -> np.ndarray:
-    return shapley_values(uncertainty_N_K[:, :8])  # the designs of knobs begin with the eight corners
-
-
-shap_over_knobs = partial(KnobValues, _of_corners, ALL_CORNERS)
-shap_removal = partial(ScaledValues, shapley_values, ALL_CORNERS)
-shap_supervised = partial(LearnedValues, shapley_values, ALL_CORNERS)
+shap_over_knobs = partial(KnobValues, lambda uncertainty_N_K: shapley_values(uncertainty_N_K[:, :8]), ALL_CORNERS)
 _removal = partial(ExplainerEntry, sees=("remedies",), reads="uncertainty/removal")
+_drops = partial(ScaledValues, shapley_values, ALL_CORNERS)
 EXPLAINERS = {
     "shap_additive": ExplainerEntry("SHAP", shap_over_knobs, ("runs",), reads="uncertainty/additive"),
     "shap_oracle": ExplainerEntry(
         "SHAP (oracle)", shap_over_knobs, ("runs", "truth"), reads="uncertainty/oracle", oracle=True
     ),
-    "shap_removal": _removal("SHAP, remedies", shap_removal),
-    "shap_removal_residual": _removal("SHAP, remedies, residual", shap_removal),
-    "shap_supervised": _removal("SHAP, remedies, learned", shap_supervised),
+    "shap_removal": _removal("SHAP, remedies", _drops),
+    "shap_removal_residual": _removal("SHAP, remedies, residual", _drops),
+    "shap_supervised": _removal("SHAP, remedies, learned", partial(LearnedValues, shapley_values, ALL_CORNERS)),
 }
-CAUSE_EXPLAINERS = {
-    "shap_removal": ExplainerEntry(
-        "SHAP, remedies", partial(RemovalValues, shapley_values), ("remedies",), reads="descriptors"
-    )
-}
+_causes = partial(RemovalValues, shapley_values)
+CAUSE_EXPLAINERS = {"shap_removal": ExplainerEntry("SHAP, remedies", _causes, ("remedies",), reads="descriptors")}

@@ -28,7 +28,6 @@ class Chance(ScoringExplainer):
         self._axes = (source, seed, "chance")
 
     def scores(self, registrations: Registrations) -> np.ndarray:
-        """Draw an order of the labels for each sample, by its split and number."""
         samples = zip(registrations.split, registrations.sample, strict=True)
         ranks_N_C = [generator(*self._axes, *sample).permutation(len(self.labels)) for sample in samples]
         scores_N_C = 1 + TILT * np.array(ranks_N_C).reshape(len(registrations), len(self.labels))
@@ -39,20 +38,16 @@ class MostFrequent(ScoringExplainer):
     """Scores are the shares of the labels in training; of equal ones, the first is named."""
 
     def fit(self, registrations: Registrations) -> None:
-        """Count the labels."""
         self._shares_C = np.array([(registrations.concept == label).mean() for label in self.labels])
 
     def scores(self, registrations: Registrations) -> np.ndarray:
-        """Return the same shares for all."""
         return np.tile(self._shares_C, (len(registrations), 1))
 
 
 class Rule(ScoringExplainer):
-    """ICP turned the observed cloud by more than an angle: pose; it has too few points: overlap; else noise.
+    """ICP turned the observed cloud by more than `turned_deg`: pose; it has too few points: overlap; else noise.
 
-    Args:
-        turned_deg: the angle between the initial pose and that of ICP.
-        complete: minimum share of the model's points in an observed cloud without missing parts.
+    A cloud without missing parts has at least the share `complete` of the model's points.
     """
 
     def __init__(self, source: str, seed: int, turned_deg: HalfTurn = 5.0, complete: PositiveShare = 0.95) -> None:
@@ -60,10 +55,8 @@ class Rule(ScoringExplainer):
         self._complete = complete
 
     def scores(self, registrations: Registrations) -> np.ndarray:
-        """Return 1 for the concept that the rule names."""
-        R_init_N_3_3, R_icp_N_3_3 = (
-            getattr(registrations, f"T_target_source_{name}")[:, :3, :3] for name in ("init", "icp")
-        )
+        R_init_N_3_3 = registrations.T_target_source_init[:, :3, :3]
+        R_icp_N_3_3 = registrations.T_target_source_icp[:, :3, :3]
         cosine_N = ((R_init_N_3_3 * R_icp_N_3_3).sum(axis=(1, 2)) - 1) / 2
         points_N = np.diff(registrations.offsets) / np.diff(registrations.target_offsets)
         name_N = np.select([cosine_N < self._cosine, points_N < self._complete], ["pose", "overlap"], "noise")

@@ -27,21 +27,13 @@ from gpca.encoders.layers import BatchNorm, linear
 
 @dataclass(frozen=True)
 class Groups:
-    """M groups of k points in each of B clouds.
+    """M groups of k points in each of B clouds."""
 
-    Attributes:
-        centers_B_M_3: origins of the groups' coordinates.
-        neighbors_B_M_k: indices of the groups' points in the cloud.
-        counts_B_M: numbers of distinct points; the other slots repeat the first one.
-        radius: unit of the relative coordinates.
-        is_whole: each cloud is one group of all its points in their order, around the origin.
-    """
-
-    centers_B_M_3: torch.Tensor
-    neighbors_B_M_k: torch.Tensor
-    counts_B_M: torch.Tensor
-    radius: float = 1.0
-    is_whole: bool = False
+    centers_B_M_3: torch.Tensor  # origins of the groups' coordinates
+    neighbors_B_M_k: torch.Tensor  # indices of the groups' points in the cloud
+    counts_B_M: torch.Tensor  # numbers of distinct points; the other slots repeat the first one
+    radius: float = 1.0  # unit of the relative coordinates
+    is_whole: bool = False  # each cloud is one group of all its points in their order, around the origin
 
     @classmethod
     def whole(cls, points_B_N_3: torch.Tensor) -> Groups:
@@ -55,10 +47,8 @@ class Groups:
 class GroupMLP(nn.Module):
     """Layers of linear map, batch norm and ReLU on the slots of each group, then their maximum.
 
-    Args:
-        in_features: features per point, beside its coordinates relative to the group's center.
-        widths: output features of the layers.
-        last_relu: False omits the ReLU after the last batch norm, for a residual to be added first.
+    Points have `in_features` beside their coordinates relative to the group's center. Without `last_relu`, a residual
+    can be added before the last ReLU.
     """
 
     def __init__(self, in_features: int, widths: tuple[int, ...], last_relu: bool = True) -> None:
@@ -75,7 +65,12 @@ class GroupMLP(nn.Module):
         batch, n_groups, _ = groups.centers_B_M_3.shape
         edges = _Edges(groups, points_B_N_3)
         (first, norm), *others = self._layers()
-        y_E_F = self._first_layer(first.weight, points_B_N_3, x_B_N_F, groups, edges)
+        inputs = points_B_N_3 / groups.radius
+        inputs = inputs if x_B_N_F is None else torch.cat([inputs, x_B_N_F], dim=-1)
+        y_E_F = linear(inputs.flatten(0, 1), first.weight)
+        if not groups.is_whole:  # else around the origin, so that C is zero
+            c_G_F = linear(groups.centers_B_M_3.flatten(0, 1), first.weight[:, :3] / -groups.radius)
+            y_E_F = _Gather.apply(y_E_F, c_G_F, edges)
         for layer, next_norm in others:
             y_E_F = linear(self._normalize(norm, y_E_F, edges), layer.weight)
             norm = next_norm
@@ -98,15 +93,6 @@ class GroupMLP(nn.Module):
     def _layers(self) -> list[tuple[nn.Linear, BatchNorm]]:
         linears, norms = cast("list[nn.Linear]", self.linears), cast("list[BatchNorm]", self.norms)
         return list(zip(linears, norms, strict=True))
-
-    def _first_layer(self, weight: torch.Tensor, points_B_N_3, x_B_N_F, groups: Groups, edges: _Edges) -> torch.Tensor:
-        inputs = points_B_N_3 / groups.radius
-        inputs = inputs if x_B_N_F is None else torch.cat([inputs, x_B_N_F], dim=-1)
-        a_P_F = linear(inputs.flatten(0, 1), weight)
-        if groups.is_whole:  # around the origin: C is zero
-            return a_P_F
-        c_G_F = linear(groups.centers_B_M_3.flatten(0, 1), weight[:, :3] / -groups.radius)
-        return _Gather.apply(a_P_F, c_G_F, edges)
 
     def _normalize(self, norm: BatchNorm, y_E_F: torch.Tensor, edges: _Edges, pool: bool = False) -> torch.Tensor:
         if not self.training:
@@ -176,9 +162,9 @@ class _Normalize(torch.autograd.Function):
 
 
 def farthest_points(points_B_N_3: torch.Tensor, n_centers: int) -> torch.Tensor:
-    """Return the indices (B, M) of farthest-point sampling from point 0 (PointNet++, Sec. 3.2).
+    """Return the indices (B, M) of farthest-point sampling from point 0 (PointNet++, Sec. 3.2), M at most N.
 
-    Clouds are random draws, so point 0 is random. M is the smaller of `n_centers` and N.
+    Clouds are random draws, so point 0 is random.
     """
     points_B_N_3 = points_B_N_3.detach()
     batch, n, _ = points_B_N_3.shape

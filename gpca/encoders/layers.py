@@ -68,14 +68,11 @@ class _Linear(torch.autograd.Function):
         return product(x_N_I, weight_O_I.T)
 
     @staticmethod
-    def backward(ctx: Any, *grads: torch.Tensor) -> tuple[torch.Tensor | None, torch.Tensor | None]:
-        (grad_N_O,) = grads
-        x_N_I, weight_O_I = ctx.saved_tensors
+    def backward(ctx: Any, *grads: torch.Tensor) -> tuple[torch.Tensor | None, ...]:
+        (grad_N_O,), (x_N_I, weight_O_I) = grads, ctx.saved_tensors
         wanted_x, wanted_weight = ctx.needs_input_grad
-        return (
-            product(grad_N_O, weight_O_I) if wanted_x else None,
-            product(grad_N_O.T, x_N_I) if wanted_weight else None,
-        )
+        by_x = product(grad_N_O, weight_O_I) if wanted_x else None
+        return by_x, product(grad_N_O.T, x_N_I) if wanted_weight else None
 
 
 class _StackedProduct(torch.autograd.Function):

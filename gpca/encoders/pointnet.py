@@ -35,11 +35,8 @@ class PointNet(nn.Module):
 class PointNetTNet(nn.Module):
     """The published PointNet: T-Net on the points, layers 64, 64, T-Net on these, layers 64, 128, 1024, maximum.
 
-    The first T-Net starts at the identity, but can learn to turn a cloud and so erase the pose concept.
-
-    Attributes:
-        penalty: 0.001 · ‖I - AAᵀ‖² of the feature transforms A, averaged over the last training batch; training adds
-            it to the loss.
+    The first T-Net starts at the identity, but can learn to turn a cloud and so erase the pose concept. `penalty` is
+    0.001 · ‖I - AAᵀ‖² of the feature transforms A, averaged over the last training batch; training adds it to the loss.
     """
 
     def __init__(self, width: int = 64) -> None:
@@ -124,10 +121,7 @@ class PointNet2(nn.Module):
     are in the published network): relative coordinates alone hide where a ball lies until the last level. And relative
     coordinates are divided by the radius: ten times smaller than the absolute ones, they would be learned late.
 
-    Args:
-        centroids: of the first level, at most; the second has a quarter.
-        radius: of the first level's balls, in diameters; the second's is twice as large.
-        neighbours: points of a ball on the first level, at most; twice as many on the second.
+    The second level has a quarter of the centroids, and balls twice as large, in diameters, of twice as many points.
     """
 
     def __init__(
@@ -140,8 +134,7 @@ class PointNet2(nn.Module):
     ) -> None:
         super().__init__()
         w = width
-        self.embedding_size = 16 * w
-        self.centroids = centroids
+        self.embedding_size, self.centroids = 16 * w, centroids
         self.balls = ((radius, neighbours), (2 * radius, 2 * neighbours))
         self.as_published = as_published
         first = GroupMLP(0 if as_published else 3, (w, w, 2 * w))
@@ -171,8 +164,7 @@ class SetAbstraction(nn.Module):
 
     def __init__(self, in_features: int, out_features: int, radius: float, neighbors: int) -> None:
         super().__init__()
-        self.radius = radius
-        self.neighbors = neighbors
+        self.radius, self.neighbors = radius, neighbors
         self.layers = GroupMLP(in_features, (out_features // 2, out_features), last_relu=False)
         self.skip = PointLinear(in_features, out_features)
 
@@ -190,7 +182,7 @@ class PointNeXt(nn.Module):
 
     Each stage halves the points and doubles the channels. The first radius of 0.15 is for clouds of diameter 2, so here
     0.075 diameters, growing by 1.5 with each stage. As published, absolute coordinates enter the stem, so every stage
-    sees the frame. `neighbours` is the maximum number of points in a ball.
+    sees the frame.
     """
 
     def __init__(self, width: int = 32, radius: float = 0.075, neighbours: int = 32) -> None:

@@ -38,7 +38,7 @@ class PCA:
 class UMAP:
     """Uniform manifold approximation and projection (McInnes et al. 2018) by umap-learn.
 
-    A graph of some hundred samples fills only a few components; more add noise. `neighbours` are those in the graph.
+    A graph of some hundred samples fills only a few components; more add noise.
     """
 
     components: Count = 16
@@ -109,13 +109,8 @@ REDUCTIONS = {"none": None, "pca": PCA, "umap": UMAP, "autoencoder": Autoencoder
 def reduce(name: str, h_train_N_d: np.ndarray, h_S_d: np.ndarray, settings: dict, *axes: object) -> np.ndarray:
     """Fit a reduction on training embeddings and apply it: (S, components), float32; ``none`` returns (S, d) unchanged.
 
-    Args:
-        settings: the reduction's fields that differ from their defaults.
-        axes: name the random numbers of UMAP and the autoencoder.
-
-    Raises:
-        InputError: unknown reduction or setting; embeddings with NaN or infinity; identical training embeddings; more
-            components or neighbors than training embeddings or dimensions.
+    The axes name the random numbers. An InputError rejects unknown reductions and settings, embeddings with NaN or
+    infinity, identical training embeddings, and more components or neighbors than these have rows or dimensions.
     """
     reduction = make_reduction(name, settings)
     for h, role in ((h_train_N_d, "training embeddings"), (h_S_d, "embeddings")):
@@ -155,10 +150,10 @@ def make_reduction(name: str, settings: dict):
     require_known("reduction", name, REDUCTIONS)
     reduction = REDUCTIONS[name]
     names = [field.name for field in fields(reduction)] if reduction else []
-    if unknown := [key for key in settings if key not in names]:
-        raise InputError(
-            f"reduction '{name}'", f"has no setting '{unknown[0]}'", f"its settings are {', '.join(names) or 'none'}"
-        )
+    for key in settings:
+        if key not in names:
+            remedy = f"its settings are {', '.join(names) or 'none'}"
+            raise InputError(f"reduction '{name}'", f"has no setting '{key}'", remedy)
     return reduction(**settings) if reduction else None
 
 

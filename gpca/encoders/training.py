@@ -61,13 +61,14 @@ class Classifier(nn.Sequential):
         super().__init__(OrderedDict(encoder=encoder, head=head))
 
 
-def make_model(settings: EncoderSettings, classes: tuple[str, ...] = CONCEPTS) -> Classifier:
-    """Return a new encoder of the registry with a head over the classes."""
-    return with_head(make_encoder(settings.backbone, settings.options), settings, classes)
+def make_model(
+    settings: EncoderSettings, classes: tuple[str, ...] = CONCEPTS, encoder: Any | None = None
+) -> Classifier:
+    """Return an encoder, by default a new one of the registry, with a new head over the classes.
 
-
-def with_head(encoder: Any, settings: EncoderSettings, classes: tuple[str, ...] = CONCEPTS) -> Classifier:
-    """Return an encoder with a new head: a linear layer, or DGCNN's usual kind without its first layer."""
+    The head is a linear layer, or DGCNN's usual kind without its first layer.
+    """
+    encoder = encoder or make_encoder(settings.backbone, settings.options)
     d, n_classes = encoder.embedding_size, len(classes)
     if settings.head == "linear":
         return Classifier(encoder, nn.Linear(d, n_classes))
@@ -110,8 +111,7 @@ def train_encoder(
         with validation validation_loss and validation_accuracy.
     """
     torch.manual_seed(seed_of(source, seed, "encoder", settings.backbone))
-    model = with_head(task.make(), settings, task.classes) if task.make else make_model(settings, task.classes)
-    model = model.to(best_device())
+    model = make_model(settings, task.classes, task.make and task.make()).to(best_device())
     if start is not None:
         model.load_state_dict(start)
     rows, held_out = _held_out(registrations, source, seed, settings.validation_share, group_S)
@@ -120,7 +120,7 @@ def train_encoder(
     training = _Training(model, registrations, rows, task, (source, seed), settings)
     best = deepcopy(model) if len(held_out) else model
     state = training.state | ({"best": best} if len(held_out) else {})
-    identity = repr((source, seed, asdict(settings), _fingerprint(registrations), _fingerprint_of_weights(start)))
+    identity = repr((source, seed, asdict(settings), *_fingerprints(registrations, start or {})))
     curve = _resume(checkpoint, identity, state)
 
     epochs = range(len(curve), settings.epochs)
@@ -227,18 +227,13 @@ def best_device() -> torch.device:
     return torch.device("cuda" if torch.cuda.is_available() else "cpu")
 
 
-def _fingerprint(registrations: Registrations) -> str:
-    digest = hashlib.sha256(registrations.points.tobytes())
+def _fingerprints(registrations: Registrations, weights: Mapping[str, torch.Tensor]) -> tuple[str, str]:
+    of_samples, of_weights = hashlib.sha256(registrations.points.tobytes()), hashlib.sha256()
     for column in (registrations.offsets, registrations.concept, registrations.split, registrations.sample):
-        digest.update(repr(column.tolist()).encode())
-    return digest.hexdigest()
-
-
-def _fingerprint_of_weights(weights: Mapping[str, torch.Tensor] | None) -> str:
-    digest = hashlib.sha256()
-    for name, tensor in (weights or {}).items():
-        digest.update(name.encode() + tensor.numpy().tobytes())
-    return digest.hexdigest()
+        of_samples.update(repr(column.tolist()).encode())
+    for name, tensor in weights.items():
+        of_weights.update(name.encode() + tensor.numpy().tobytes())
+    return of_samples.hexdigest(), of_weights.hexdigest()
 
 
 def _resume(checkpoint: Path | None, identity: str, state: dict) -> list[dict]:

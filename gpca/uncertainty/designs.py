@@ -41,19 +41,15 @@ Clouds = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 class Design:
     """A list of K conditions.
 
-    Attributes:
-        evaluate: pair, twists of the starts, settings and random numbers of a sample -> the outcomes of all conditions.
-        conditions: (K,) their names.
-        reference: number of the clean condition.
-        splits: which rows are evaluated.
-        oracle: whether it needs to know what was perturbed.
+    `evaluate` takes the pair, the twists of the starts, the settings and the random numbers of a sample, and returns
+    the outcomes of all conditions.
     """
 
     evaluate: Callable[[RegisteredRow, np.ndarray, UncertaintySettings, np.random.Generator], list[Spread]]
     conditions: tuple[str, ...]
-    reference: int = 0
-    splits: tuple[str, ...] = ("test",)
-    oracle: bool = False
+    reference: int = 0  # number of the clean condition
+    splits: tuple[str, ...] = ("test",)  # which rows are evaluated
+    oracle: bool = False  # whether it needs to know what was perturbed
 
 
 class RegisteredRow:
@@ -173,15 +169,6 @@ def design_rows(registrations: Registrations, design: str, samples: int | None) 
     return np.flatnonzero(chosen)
 
 
-def knob_runs(
-    registrations: Registrations, row: int, source: str, seed: int, settings: UncertaintySettings
-) -> KnobRuns:
-    """Return the function of the knobs that design ``additive`` evaluates for a registration, by the same numbers."""
-    xi_n_6, random = _random_numbers(registrations, row, source, seed, settings)
-    pair = RegisteredRow(registrations.without_labels(), row)
-    return KnobRuns(*pair.observed(settings.icp_points, random), xi_n_6, settings, random)
-
-
 def _random_numbers(
     registrations: Registrations, row: int, source: str, seed: int, settings: UncertaintySettings
 ) -> tuple[np.ndarray, np.random.Generator]:
@@ -220,17 +207,16 @@ class LiveUncertainty:
     """u(noise, spread, overlap) of an observed pair in nats; nothing is kept from one call to the next.
 
     Its random numbers are those of the sample in design ``additive``, so it gives what the design's table holds.
-
-    Attributes:
-        icp_calls: runs of ICP so far, those of the clean run included.
+    `icp_calls` counts the runs of ICP so far, those of the clean run included.
     """
 
     def __init__(
         self, registrations: Registrations, row: int, source: str, seed: int, settings: UncertaintySettings
     ) -> None:
-        self.icp_calls = 0
-        self._floor = settings.floor
-        self._runs = knob_runs(registrations, row, source, seed, settings)
+        self.icp_calls, self._floor = 0, settings.floor
+        xi_n_6, random = _random_numbers(registrations, row, source, seed, settings)
+        pair = RegisteredRow(registrations.without_labels(), row)
+        self._runs = KnobRuns(*pair.observed(settings.icp_points, random), xi_n_6, settings, random)
         self._clean_6_6 = self._covariance(UNTOUCHED)
 
     def __call__(self, knobs: Knobs) -> float:

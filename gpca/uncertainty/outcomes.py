@@ -17,22 +17,14 @@ from gpca.pairs.dataset import Registrations
 
 @dataclass(frozen=True)
 class Outcomes(Container):
-    """S registrations under K conditions.
-
-    Attributes:
-        sample, split: (S,) which registrations.
-        covariance: (S, K, 6, 6) of the pose twists, radians and diameters.
-        uncertainty: (S, K) u of the condition against the design's clean one, nats.
-        residual: (S, K) log distance from the target to the source, diameters.
-        degenerate: (S, K) whether the covariance says nothing: no correspondences in any run, or one pose in all.
-        icp_calls: (S, K) runs of ICP.
-    """
+    """S registrations under K conditions."""
 
     sample: np.ndarray = array("S", WHOLE)
     split: np.ndarray = array("S", TEXT)
-    covariance: np.ndarray = array("S K 6 6")
-    uncertainty: np.ndarray = array("S K")
-    residual: np.ndarray = array("S K")
+    covariance: np.ndarray = array("S K 6 6")  # of the pose twists, radians and diameters
+    uncertainty: np.ndarray = array("S K")  # u of the condition against the design's clean one, nats
+    residual: np.ndarray = array("S K")  # log distance from the target to the source, diameters
+    # Whether the covariance says nothing: no correspondences in any run, or one pose in all.
     degenerate: np.ndarray = array("S K", FLAG)
     icp_calls: np.ndarray = array("S K", WHOLE)
 
@@ -52,8 +44,7 @@ class Outcomes(Container):
         rows = [row_of.get(key) for key in zip(self.split, self.sample, strict=True)]
         if None in rows:
             raise InputError("uncertainty", "holds samples that the registrations lack", "regenerate both")
-        names = ("covariance", "uncertainty", "residual", "degenerate", "icp_calls")
-        own = {name: getattr(self, name) for name in names}
+        own = {name: getattr(self, name) for name in self.array_fields() if name not in ("sample", "split")}
         seconds = {"seconds": seconds_S_K, "icp_seconds": icp_seconds_S_K}
         chosen = registrations.subset(np.array(rows))
         return replace(chosen, attached={**chosen.attached, **own, **seconds})
@@ -71,11 +62,7 @@ def write_seconds(path: str | Path, outcomes: Outcomes, seconds_S_K: np.ndarray,
 
 
 def read_seconds(path: str | Path, outcomes: Outcomes) -> tuple[np.ndarray, np.ndarray]:
-    """Return seconds (S, K) and seconds inside ICP (S, K).
-
-    Raises:
-        InputError: missing or damaged file, or other samples than the outcomes'.
-    """
+    """Return seconds (S, K) and seconds inside ICP (S, K) of the outcomes' samples."""
     columns = ("sample", "split", "condition", "seconds", "icp_seconds")
     rows = read_numbers(path, columns, ("seconds", "icp_seconds"))
     shape = outcomes.uncertainty.shape

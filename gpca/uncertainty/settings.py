@@ -22,25 +22,19 @@ def start_deviation(rotation_deg: float, translation: float) -> np.ndarray:
 
 @dataclass(frozen=True)
 class UncertaintySettings:
-    """Settings of how the spread is measured.
+    """Settings of how the spread is measured."""
 
-    Attributes:
-        starts: n, initial poses per condition.
-        start_rotation_deg, start_translation: root mean square angle and length of the starts' offsets.
-        icp_points: of source and of target in these runs (fewer where a cloud has fewer).
-        floor: ε, variance below which a spread is no uncertainty: (1e-3)² is 0.06° and a thousandth of the diameter.
-        icp: how ICP runs.
-    """
-
-    starts: Annotated[int, Bounds(minimum=FEWEST_STARTS)] = 50
+    starts: Annotated[int, Bounds(minimum=FEWEST_STARTS)] = 50  # n, initial poses per condition
+    # Root mean square angle and length of the starts' offsets.
     start_rotation_deg: Annotated[float, Bounds(exclusiveMinimum=0, maximum=180)] = 10.0
     start_translation: Annotated[float, Bounds(exclusiveMinimum=0, maximum=10)] = 0.05
-    icp_points: Annotated[int, Bounds(minimum=16, maximum=65536)] = 512
+    icp_points: Annotated[int, Bounds(minimum=16, maximum=65536)] = 512  # of each cloud in these runs, at most
+    # ε, variance below which a spread is no uncertainty: (1e-3)² is 0.06° and a thousandth of the diameter.
     floor: Annotated[float, Bounds(exclusiveMinimum=0, maximum=1)] = 1e-6
     icp: ICPSettings = field(default_factory=ICPSettings)
 
     def deviation_6(self) -> np.ndarray:
-        """Standard deviations (σ_rot ×3, σ_t ×3) of a start's twist, in radians and diameters."""
+        """Return the standard deviations (σ_rot ×3, σ_t ×3) of a start's twist, in radians and diameters."""
         return start_deviation(self.start_rotation_deg, self.start_translation)
 
 

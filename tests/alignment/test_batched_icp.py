@@ -173,15 +173,6 @@ def test_a_run_does_not_depend_on_the_others_nor_on_earlier_calls(objects):
             assert np.array_equal(array, expected[rows])
 
 
-def test_another_source_in_between_changes_nothing(objects):
-    source, target, _ = clouds(objects, 0)
-    icp = BatchedICP(target, ICPSettings())
-    before = icp.register(source, starts(5))
-    icp.register(transform(starts(1, seed=9, spread=3.0)[0], source[:100]), starts(20, seed=5, spread=4.0))
-    for array, expected in zip(icp.register(source, starts(5)), before, strict=True):
-        assert np.array_equal(array, expected)
-
-
 def test_with_few_lists_the_poses_are_the_same(objects, monkeypatch):
     source, target, _ = clouds(objects, 2)
     expected = BatchedICP(target, ICPSettings()).register(source, starts(5))

@@ -184,27 +184,11 @@ def test_beyond_half_a_turn_log_takes_the_shorter_way_to_the_same_motion(angle):
     assert np.allclose(exp(xi_n_6), T_n, atol=1e-6)
 
 
-def test_motions_are_rigid_and_turn_by_the_twists_angle():
-    for angle in (1e-3, 0.5, 3.0):
-        T_n = exp(twists(angle))
-        R_n = T_n[:, :3, :3]
-        assert np.allclose(R_n @ np.swapaxes(R_n, 1, 2), np.eye(3), atol=1e-12)
-        assert np.array_equal(T_n[:, 3], np.tile([0, 0, 0, 1], (len(T_n), 1)))
-        assert [rotation_angle_rad(T) for T in T_n] == pytest.approx([angle] * len(T_n), rel=1e-6)
-
-
 def test_the_identity_and_pure_translations():
     assert np.array_equal(exp(np.zeros((1, 6))), np.eye(4)[None])
     assert np.array_equal(log(np.eye(4)[None]), np.zeros((1, 6)))
     T = exp(np.array([[0, 0, 0, 1.0, -2.0, 3.0]]))[0]
     assert np.array_equal(T[:3, 3], [1, -2, 3]) and np.array_equal(T[:3, :3], np.eye(3))
-
-
-def test_half_of_a_twist_twice_is_the_whole():
-    xi_n_6 = twists(1.5)
-    half_n = exp(xi_n_6 / 2)
-    assert np.allclose(half_n @ half_n, exp(xi_n_6), atol=1e-12)
-    assert np.allclose(exp(xi_n_6) @ exp(-xi_n_6), np.eye(4), atol=1e-12)
 
 
 def test_the_adjoint_takes_a_twist_to_another_frame():

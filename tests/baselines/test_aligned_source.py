@@ -70,11 +70,6 @@ def test_an_embedding_that_tells_nothing_is_refused(embedded):
         ConceptVectors("tiny", 0).fit(replace(train, attached={"embedding": np.ones((36, 4))}))
 
 
-def test_one_concept_alone_is_refused(embedded):
-    with pytest.raises(InputError, match="fewer than two concepts"):
-        ConceptVectors("tiny", 0).fit(embedded.subset(np.flatnonzero(embedded.concept == "noise")))
-
-
 def by_head(registrations, logits):
     entry = explainer_entry("softmax_head")
     assert entry.reads == "embeddings"

@@ -28,7 +28,7 @@ def test_it_names_the_concept_and_needs_no_label_and_no_other_sample(registratio
 
 
 def test_the_point_count_ratio_is_the_last_feature_of_the_one_and_none_of_the_other(registrations):
-    with_counts, without = (explainer_entry(name).make("tiny", 0, **QUICK).features(registrations) for name in NAMES)
+    with_counts, without = (explainer_entry(name).make("tiny", 0, **QUICK)._inputs(registrations) for name in NAMES)
     ratio_S = np.diff(registrations.offsets) / np.diff(registrations.target_offsets)
     assert np.array_equal(with_counts[:, -1], ratio_S)
     assert np.array_equal(with_counts[:, :-1], without)
@@ -36,10 +36,10 @@ def test_the_point_count_ratio_is_the_last_feature_of_the_one_and_none_of_the_ot
 
 
 def test_the_points_drawn_are_named_by_split_and_sample(registrations):
-    features_S_F = AnalyticalGPC("tiny", 0, **QUICK).features(registrations)
+    features_S_F = AnalyticalGPC("tiny", 0, **QUICK)._inputs(registrations)
     rows = np.array([50, 7, 20])
-    assert np.array_equal(AnalyticalGPC("tiny", 0, **QUICK).features(registrations.subset(rows)), features_S_F[rows])
-    assert not np.array_equal(AnalyticalGPC("tiny", 1, **QUICK).features(registrations), features_S_F)
+    assert np.array_equal(AnalyticalGPC("tiny", 0, **QUICK)._inputs(registrations.subset(rows)), features_S_F[rows])
+    assert not np.array_equal(AnalyticalGPC("tiny", 1, **QUICK)._inputs(registrations), features_S_F)
 
 
 @pytest.mark.parametrize("name", NAMES)

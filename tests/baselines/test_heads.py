@@ -39,10 +39,6 @@ def test_an_ensemble_has_a_draw_per_member_and_dropout_one_per_pass():
     assert DirectDropout("a", 0, passes=7, hidden=8).drawn(H[:5]).shape == (7, 5, 3)
 
 
-def test_without_dropout_all_passes_agree():
-    assert DirectDropout("a", 0, rate=0.0, passes=7, hidden=8).drawn(H).std(axis=0).max() < 1e-6
-
-
 class DirectLaplace(_Direct, LastLayerLaplace):
     pass
 

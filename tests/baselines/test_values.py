@@ -1,12 +1,11 @@
 from dataclasses import replace
-from time import perf_counter
 
 import numpy as np
 import pytest
 
 from baselines.sensitivity import ONE_AT_A_TIME, single_drops
 from baselines.shap_kl import ALL_CORNERS
-from baselines.values import WORTHS, ScaledValues, charged, corners
+from baselines.values import WORTHS, KnobValues
 from gpca.errors import InputError
 from gpca.explainers.registry import explainer_entry, require_settings
 from gpca.pairs.perturbation import CONCEPTS
@@ -86,22 +85,6 @@ def test_test_rows_do_not_touch_the_scaling(name, attached):
     assert not np.isclose(scores_changed[test], scores[test]).any(axis=1).all()
 
 
-def test_a_remedy_without_effect_in_training_scores_a_finite_number(attached):
-    uncertainty = attached.attached["uncertainty"].copy()
-    uncertainty[:, 1] = uncertainty[:, 0]  # the first remedy alone changes nothing
-    still = with_arrays(attached, uncertainty=uncertainty)
-    scores = fitted("sa_local_removal", still).explain(still).scores_N_C
-    assert (scores[:, 0] == 0).all()
-    assert np.isfinite(scores).all()
-
-
-def test_an_unknown_worth_is_refused():
-    with pytest.raises(InputError, match=r"setting 'worth': unknown 'fitness'; choose one of uncertainty, residual"):
-        ScaledValues(single_drops, ONE_AT_A_TIME, "tiny", 0, "fitness")
-    with pytest.raises(InputError, match="setting 'worth'"):
-        explainer_entry("shap_removal").make("tiny", 0, worth="")
-
-
 @pytest.mark.parametrize("name", LEARNED)
 def test_learning_separates_the_concepts_by_either_worth(name, attached):
     nothing = np.random.default_rng(1).normal(size=(len(attached), 8))
@@ -153,10 +136,10 @@ def test_only_the_corners_that_it_needs_are_charged(name, attached):
 
 
 def test_a_charge_is_that_of_its_conditions_and_the_time_since_the_start_shared_out(attached, monkeypatch):
-    n = len(attached)
+    n, times = len(attached), iter([100.0, 154.0])
     scores = np.random.default_rng(0).normal(size=(n, 3))
-    monkeypatch.setattr("baselines.values.perf_counter", lambda: 154.0)
-    attribution = charged(attached, scores, [1, 3], started=100.0)
+    monkeypatch.setattr("baselines.values.perf_counter", lambda: next(times))
+    attribution = KnobValues(lambda _: scores, [1, 3], "tiny", 0).explain(attached)
     assert attribution.icp_calls_N.tolist() == [2 * i + 2 + 8 for i in range(n)]
     assert attribution.icp_seconds_N == pytest.approx(1e-3 * attribution.icp_calls_N)
     own = attribution.seconds_N - 2e-3 * attribution.icp_calls_N
@@ -168,18 +151,20 @@ def test_a_charge_is_that_of_its_conditions_and_the_time_since_the_start_shared_
 def test_equal_scores_name_no_concept_but_two_equal_largest_do(attached):
     scores = np.tile([[1.0, 2.0, 3.0]], (len(attached), 1))
     scores[4], scores[9], scores[11] = 0.0, -2.5, [2.0, 2.0, 0.0]
-    attribution = charged(attached, scores, [0], perf_counter())
+    attribution = KnobValues(lambda _: scores, [0], "tiny", 0).explain(attached)
     assert np.flatnonzero(attribution.abstained_N).tolist() == [4, 9]
     assert attribution.predicted_N[[4, 9, 11]].tolist() == ["", "", CONCEPTS[0]]
 
 
 def test_corners_are_the_first_eight_conditions(attached):
     eleven = np.arange(len(attached) * 11, dtype=float).reshape(-1, 11)
-    assert np.array_equal(corners(with_arrays(attached, uncertainty=eleven), "uncertainty"), eleven[:, :8])
+    read = KnobValues(lambda worth: -worth, None, "tiny", 0).of_remedies
+    assert np.array_equal(read(with_arrays(attached, uncertainty=eleven), "uncertainty"), eleven[:, :8])
 
 
 @pytest.mark.parametrize("name", (*SCALED, *LEARNED))
 def test_the_config_may_set_what_they_take_and_no_more(name):
     require_settings(name, {"worth": "residual"} if name in SCALED else {"inverse_regularisation": 0.1})
-    with pytest.raises(InputError, match=f"explainer '{name}'"):
-        require_settings(name, {"inverse_regularisation": 0.1} if name in SCALED else {"worth": "residual"})
+    for wrong in ("fitness", "") if name in SCALED else ("residual",):
+        with pytest.raises(InputError, match=f"explainer '{name}'"):
+            require_settings(name, {"worth": wrong})

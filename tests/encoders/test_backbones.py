@@ -1,4 +1,4 @@
-"""What every rival of DGCNN must keep to, and the published sizes of each."""
+"""What every encoder must keep to, and the published sizes of each."""
 
 import dataclasses
 
@@ -12,6 +12,7 @@ from gpca.pairs.perturbation import Severities
 from gpca.pairs.synthesis import RegistrationSettings, make_registrations
 
 SMALL = {
+    "dgcnn": {"k": 8, "point_features": 64},
     "pointnet": {"width": 8},
     "pointnet_tnet": {"width": 8},
     "pointnet2": {"width": 8, "centroids": 32},
@@ -34,13 +35,15 @@ def encoder(request):
     return encoder.eval()
 
 
-def test_these_and_dgcnn_are_all():
-    assert {*SMALL, "dgcnn"} == set(ENCODERS)
+def test_these_are_all():
+    assert set(SMALL) == set(ENCODERS)
 
 
 @backbones
 @pytest.mark.parametrize("n", [1, 20, 96])
 def test_a_cloud_of_any_size_becomes_one_embedding(backbone, n):
+    if (backbone, n) == ("dgcnn", 1):
+        pytest.skip("a point alone has no neighbors")
     encoder = make_encoder(backbone, SMALL[backbone])
     h = encoder(clouds(3, n))
     assert h.shape == (3, encoder.embedding_size) == (3, 128)
@@ -200,6 +203,7 @@ def test_concepts_are_learned_and_embeddings_repeat(easy, backbone):
     assert (embed(again, easy, "tiny", 0, settings)[0] == h_S_d).all()
     in_other_batches, _ = embed(model, easy, "tiny", 0, dataclasses.replace(settings, batch_size=5))
     assert abs(in_other_batches - h_S_d).max() < 1e-4
+    assert h_S_d.dtype == "float32" and not model.training
 
 
 @backbones

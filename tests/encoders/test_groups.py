@@ -1,4 +1,3 @@
-import copy
 import os
 import subprocess
 import sys
@@ -61,13 +60,6 @@ def test_a_ball_holds_no_more_points_than_the_cloud():
     neighbors, counts = ball_query(points, points, 2.0, 32)
     assert neighbors.tolist() == [[[0, 1, 2, 3, 4, 5]] * 6]
     assert counts.tolist() == [[6] * 6]
-
-
-def test_rows_are_taken_from_their_own_cloud():
-    points = clouds(2, 7)
-    index = torch.tensor([[[3, 0], [1, 1]], [[6, 2], [0, 5]]])
-    assert torch.equal(take(points, index)[1, 0, 1], points[1, 2])
-    assert take(points, index).shape == (2, 2, 2, 3)
 
 
 def test_a_whole_cloud_is_one_group_around_the_origin():
@@ -191,21 +183,3 @@ def test_a_repeat_counts_in_the_statistics():
     y_9_F = made.linears[0](relative).detach()
     torch.testing.assert_close(made.norms[0].running_mean, 0.1 * y_9_F.mean(dim=0), **TOLERANCE)
     torch.testing.assert_close(made.norms[0].running_var, 0.9 + 0.1 * y_9_F.var(dim=0), **TOLERANCE)
-
-
-def test_the_order_of_the_points_does_not_matter():
-    made = layers()
-    points, x = inputs()
-    made(points, x, Groups.whole(points))
-    made.eval()
-    order = torch.randperm(points.shape[1])
-    whole = made(points, x, Groups.whole(points))
-    torch.testing.assert_close(made(points[:, order], x[:, order], Groups.whole(points)), whole, **TOLERANCE)
-
-
-def test_a_copy_keeps_what_was_learned():
-    made = layers()
-    points, x = inputs()
-    made(points, x, balls(points))
-    other = copy.deepcopy(made).eval()
-    assert torch.equal(other(points, x, balls(points)), made.eval()(points, x, balls(points)))

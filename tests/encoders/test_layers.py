@@ -4,7 +4,7 @@ import pytest
 import torch
 from torch import nn
 
-from gpca.encoders.layers import PointLinear, linear, product
+from gpca.encoders.layers import PointLinear, linear
 
 
 @pytest.mark.parametrize("shape", [(7, 5), (3, 7, 5), (2, 3, 7, 5)])
@@ -39,8 +39,3 @@ def test_a_gradient_that_nobody_wants_is_not_computed():
     weight = torch.ones(4, 5, requires_grad=True)
     linear(torch.ones(3, 5), weight).sum().backward()
     assert torch.equal(weight.grad, torch.full((4, 5), 3.0))
-
-
-def test_stacked_products():
-    a, b = torch.randn(3, 4, 5), torch.randn(3, 5, 2)
-    assert torch.allclose(product(a, b), a @ b, atol=1e-6)

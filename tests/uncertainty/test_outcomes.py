@@ -1,5 +1,3 @@
-from dataclasses import replace
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -108,26 +106,6 @@ def test_what_is_attached_belongs_to_the_sample(registrations, of_registrations)
             assert np.array_equal(attached.attached[name], getattr(outcomes, name))
         assert np.array_equal(attached.attached["seconds"], seconds)
         assert np.array_equal(attached.attached["icp_seconds"], icp_seconds)
-
-
-def test_what_was_attached_before_stays_with_its_rows(registrations, of_registrations):
-    rows, outcomes, seconds, icp_seconds = of_registrations
-    embedding = np.arange(2.0 * len(registrations)).reshape(-1, 2)
-    given = replace(registrations, attached={"embedding": embedding})
-    attached = outcomes.attach_to(given, seconds, icp_seconds)
-    assert np.array_equal(attached.embedding, embedding[rows])
-    assert np.array_equal(attached.attached["uncertainty"], outcomes.uncertainty)
-    assert set(given.attached) == {"embedding"}
-
-
-def test_outcomes_survive_file_and_attaching_together(tmp_path, registrations, of_registrations):
-    rows, outcomes, seconds, icp_seconds = of_registrations
-    outcomes.save(tmp_path / "seed0.npz", ("tiny", 0))
-    write_seconds(tmp_path / "seed0.csv", outcomes, seconds, icp_seconds)
-    loaded = Outcomes.load(tmp_path / "seed0.npz")
-    attached = loaded.attach_to(registrations, *read_seconds(tmp_path / "seed0.csv", loaded))
-    assert attached.object_name.tolist() == registrations.object_name[rows].tolist()
-    assert np.array_equal(attached.attached["seconds"], seconds)
 
 
 @pytest.mark.parametrize(("sample", "split"), [(99, "test"), (20, "test"), (0, "validate")])

@@ -25,21 +25,14 @@ class FailedRegistration(Exception):
 
 @dataclass(frozen=True)
 class Pair:
-    """Two clouds to be aligned; an InputError rejects normals of another shape, NaN, and poses that are not rigid.
+    """Two clouds to be aligned; an InputError rejects normals of another shape, NaN, and poses that are not rigid."""
 
-    Attributes:
-        source, target: (N, 3) and (P, 3) points, at least three.
-        T_target_source_init: start of local methods; global ones ignore it.
-        source_normals, target_normals: unit vectors in the frame of their cloud, or None (:meth:`with_normals`).
-        seed: of a method's random numbers.
-    """
-
-    source: np.ndarray
-    target: np.ndarray
-    T_target_source_init: np.ndarray = field(default_factory=lambda: np.eye(4))
-    source_normals: np.ndarray | None = None
+    source: np.ndarray  # (N, 3), at least three points
+    target: np.ndarray  # (P, 3)
+    T_target_source_init: np.ndarray = field(default_factory=lambda: np.eye(4))  # global methods ignore it
+    source_normals: np.ndarray | None = None  # unit vectors in the frame of their cloud (:meth:`with_normals`)
     target_normals: np.ndarray | None = None
-    seed: int = 0
+    seed: int = 0  # of a method's random numbers
 
     def __post_init__(self) -> None:
         for name in ("source", "target"):
@@ -78,19 +71,12 @@ class Pair:
 
 @dataclass(frozen=True)
 class Outcome:
-    """The result of a registration method.
+    """The result of a registration method."""
 
-    Attributes:
-        T_target_source: the pose (4×4); the initial one if there is no other.
-        fitness: share of source points with a target point within the correspondence distance at the pose.
-        inlier_rmse: over those points; 0 without any.
-        failure: why the registration failed; empty if it did not.
-    """
-
-    T_target_source: np.ndarray
-    fitness: float
-    inlier_rmse: float
-    failure: str = ""
+    T_target_source: np.ndarray  # the pose (4×4); the initial one if there is no other
+    fitness: float  # share of source points with a target point within the correspondence distance at the pose
+    inlier_rmse: float  # over those points; 0 without any
+    failure: str = ""  # why the registration failed; empty if it did not
 
     @property
     def converged(self) -> bool:
@@ -110,15 +96,9 @@ class Outcome:
 
 @dataclass(frozen=True)
 class MethodEntry:
-    """A method in the registry.
-
-    Attributes:
-        align: ``align(pair, **settings)`` returns an :class:`Outcome` or raises :class:`FailedRegistration`.
-        is_global: whether it needs no initial pose.
-        package: a required module that the suite does not install, if any.
-    """
+    """A method in the registry."""
 
     title: str
-    align: Callable[..., Outcome]
-    is_global: bool = False
-    package: str = ""
+    align: Callable[..., Outcome]  # ``align(pair, **settings)`` returns an outcome or raises FailedRegistration
+    is_global: bool = False  # whether it needs no initial pose
+    package: str = ""  # a required module that the suite does not install, if any

@@ -15,6 +15,7 @@ from typing import Any, Literal
 import numpy as np
 
 from gpca.alignment.batched_icp import BatchedICP
+from gpca.alignment.features import NEIGHBORS
 from gpca.alignment.icp import ICP, ICPSettings, Method
 from gpca.alignment.methods.interface import (
     CORRESPONDENCE_DISTANCE,
@@ -28,8 +29,8 @@ from gpca.alignment.rigid import transform
 from gpca.process.environment import require_open3d
 
 Kernel = Literal["HuberLoss", "CauchyLoss", "GMLoss", "TukeyLoss"]
-# Diameters. At 0.02, the middle of the protocol's noise, a poor start makes most points outliers: on a development
-# seed, Tukey aligned half of the pairs with a pose error, and nearly all at 0.05.
+# k, in diameters. At 0.02, the middle of the protocol's noise, a poor start makes most points outliers: on a
+# development seed, Tukey aligned half of the pairs with a pose error, and nearly all at 0.05.
 SCALE = 0.05
 # Open3D does not report which rule stopped it. When fitness and RMSE have converged, poses still oscillate by up to
 # 4e-3 diameters, as correspondences change; poses stopped by the number of iterations move more.
@@ -67,14 +68,13 @@ def align_by_open3d(
 
 
 def align_robust(
-    pair: Pair,
     kernel: Kernel,
-    scale: float = SCALE,
+    pair: Pair,
     correspondence_distance: float = CORRESPONDENCE_DISTANCE,
     max_iterations: int = MAX_ITERATIONS,
 ) -> Outcome:
-    """Minimize one of Open3D's robust kernels of the distances to planes; `scale` is k, in diameters."""
-    constant = scale**2 if kernel == "GMLoss" else scale  # Open3D's Geman-McClure takes its square
+    """Minimize one of Open3D's robust kernels of the distances to planes."""
+    constant = SCALE**2 if kernel == "GMLoss" else SCALE  # Open3D's Geman-McClure takes its square
     loss = getattr(require_open3d().pipelines.registration, kernel)(constant)
     return _align_by_open3d("point_to_plane", pair, correspondence_distance, max_iterations, loss)
 
@@ -93,12 +93,9 @@ def _align_by_open3d(method: Method, pair: Pair, distance: float, max_iterations
 
 
 def align_by_small_gicp(
-    pair: Pair,
-    neighbours: int = 20,
-    correspondence_distance: float = CORRESPONDENCE_DISTANCE,
-    max_iterations: int = MAX_ITERATIONS,
+    pair: Pair, correspondence_distance: float = CORRESPONDENCE_DISTANCE, max_iterations: int = MAX_ITERATIONS
 ) -> Outcome:
-    """Run generalized ICP of small_gicp (Koide 2024), with planes of `neighbours` points.
+    """Run generalized ICP of small_gicp (Koide 2024).
 
     Clouds and tree are made here, because small_gicp thins plain arrays to cells of 0.25 units, a quarter of an object.
     Its limits of the last step are for scans in meters; here they are smaller. Noisy clouds never reach them, so one
@@ -107,8 +104,8 @@ def align_by_small_gicp(
     package = import_module("small_gicp")
     source, target = package.PointCloud(pair.source), package.PointCloud(pair.target)
     tree = package.KdTree(target, num_threads=1)
-    package.estimate_covariances(target, tree, num_neighbors=neighbours, num_threads=1)
-    package.estimate_covariances(source, num_neighbors=neighbours, num_threads=1)
+    package.estimate_covariances(target, tree, num_neighbors=NEIGHBORS, num_threads=1)
+    package.estimate_covariances(source, num_neighbors=NEIGHBORS, num_threads=1)
 
     def step(T_target_source: np.ndarray, iterations: int) -> np.ndarray:
         result = package.align(
@@ -133,10 +130,10 @@ METHODS = {
     "point_to_point": MethodEntry("ICP, point-to-point", align_compiled),
     "point_to_point_open3d": MethodEntry("ICP, point-to-point (Open3D)", partial(align_by_open3d, "point_to_point")),
     "point_to_plane": MethodEntry("ICP, point-to-plane", partial(align_by_open3d, "point_to_plane")),
-    "huber": MethodEntry("ICP, point-to-plane, Huber", partial(align_robust, kernel="HuberLoss")),
-    "cauchy": MethodEntry("ICP, point-to-plane, Cauchy", partial(align_robust, kernel="CauchyLoss")),
-    "geman_mcclure": MethodEntry("ICP, point-to-plane, Geman-McClure", partial(align_robust, kernel="GMLoss")),
-    "tukey": MethodEntry("ICP, point-to-plane, Tukey", partial(align_robust, kernel="TukeyLoss")),
+    "huber": MethodEntry("ICP, point-to-plane, Huber", partial(align_robust, "HuberLoss")),
+    "cauchy": MethodEntry("ICP, point-to-plane, Cauchy", partial(align_robust, "CauchyLoss")),
+    "geman_mcclure": MethodEntry("ICP, point-to-plane, Geman-McClure", partial(align_robust, "GMLoss")),
+    "tukey": MethodEntry("ICP, point-to-plane, Tukey", partial(align_robust, "TukeyLoss")),
     "gicp": MethodEntry("GICP", partial(align_by_open3d, "generalized")),
     "gicp_small": MethodEntry("GICP (small_gicp)", align_by_small_gicp, package="small_gicp"),
 }

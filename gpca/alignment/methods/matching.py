@@ -21,8 +21,9 @@ from gpca.alignment.methods.interface import (
 )
 from gpca.alignment.rigid import rigid_motion
 from gpca.process.environment import require_open3d
-from gpca.settings import Share
 
+EDGE_SIMILARITY = 0.9  # minimum ratio of the edges of the two triangles of RANSAC
+CONFIDENCE = 0.999  # at which it stops
 VOXEL = 0.08  # diameters; on a development seed the best for some 500 points (0.05 for 2000)
 # Somewhat more than KISS-Matcher needs: three neighbors within three voxels at each remaining point.
 NEAR, NEIGHBORS, FEATURES = 2.0, 4, 10
@@ -32,18 +33,13 @@ def align_by_ransac(
     pair: Pair,
     feature_radius: float = RADIUS,
     inlier_distance: float = 0.05,
-    edge_similarity: Share = 0.9,
     iterations: int = 20_000,
-    confidence: Share = 0.999,
     correspondence_distance: float = CORRESPONDENCE_DISTANCE,
     feature_neighbors: int = MOST_NEIGHBORS,
 ) -> Outcome:
     """Return the pose of three matches that agrees with most others (Fischler & Bolles 1981).
 
-    Args:
-        feature_radius, inlier_distance: of a feature and of an agreeing match, in diameters.
-        edge_similarity: minimum ratio of the edges of the two triangles.
-        iterations, confidence: stopping rules.
+    `feature_radius` and `inlier_distance`, of an agreeing match, are in diameters.
     """
     registration = require_open3d().pipelines.registration
     clouds, features = fpfh_of_pair(pair, feature_radius, feature_neighbors)
@@ -56,10 +52,10 @@ def align_by_ransac(
         estimation_method=registration.TransformationEstimationPointToPoint(False),
         ransac_n=FEWEST,
         checkers=[
-            registration.CorrespondenceCheckerBasedOnEdgeLength(edge_similarity),
+            registration.CorrespondenceCheckerBasedOnEdgeLength(EDGE_SIMILARITY),
             registration.CorrespondenceCheckerBasedOnDistance(inlier_distance),
         ],
-        criteria=registration.RANSACConvergenceCriteria(iterations, confidence),
+        criteria=registration.RANSACConvergenceCriteria(iterations, CONFIDENCE),
     )
     if len(result.correspondence_set) < FEWEST:
         raise FailedRegistration(f"fewer than {FEWEST} correspondences agree")
@@ -70,18 +66,12 @@ def align_by_fgr(
     pair: Pair,
     feature_radius: float = RADIUS,
     inlier_distance: float = 0.05,
-    tuple_similarity: Share = 0.95,
-    tuples: int = 1000,
-    iterations: int = 64,
     correspondence_distance: float = CORRESPONDENCE_DISTANCE,
     feature_neighbors: int = MOST_NEIGHBORS,
 ) -> Outcome:
     """Minimize a robust cost over all matches in agreeing triples (Zhou et al. 2016).
 
-    Args:
-        feature_radius, inlier_distance: radius of a feature and final scale of the robust cost, in diameters.
-        tuple_similarity: minimum ratio of the edges of the two triangles of a triple.
-        tuples: maximum number of triples.
+    `feature_radius` and `inlier_distance`, the final scale of the cost, are in diameters.
     """
     registration = require_open3d().pipelines.registration
     clouds, features = fpfh_of_pair(pair, feature_radius, feature_neighbors)
@@ -90,9 +80,9 @@ def align_by_fgr(
         use_absolute_scale=True,
         decrease_mu=True,
         maximum_correspondence_distance=inlier_distance,
-        iteration_number=iterations,
-        tuple_scale=tuple_similarity,
-        maximum_tuple_count=tuples,
+        iteration_number=64,
+        tuple_scale=0.95,  # minimum ratio of the edges of the two triangles of a triple
+        maximum_tuple_count=1000,
     )
     try:
         result = registration.registration_fgr_based_on_feature_matching(*clouds, *features, option)

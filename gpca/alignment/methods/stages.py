@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache, partial
-from typing import Annotated, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -27,35 +27,30 @@ from gpca.alignment.methods.interface import (
 from gpca.alignment.methods.local import failure_of_a_step
 from gpca.alignment.rigid import best_motion, plane_step, rotate, transform
 from gpca.seeds import generator
-from gpca.settings import Bounds, PositiveShare, Share
+from gpca.settings import Share
 
 Metric = Literal["point_to_point", "point_to_plane"]
-Sampling = Literal["all", "random", "normal_space"]
-Criterion = Literal["none", "distance", "normals", "trimming"]
-Weighting = Literal["none", "distance", "normals"]
 ROUNDING = 1 + 1e-9  # the tree may sum a square in another order
+SAMPLED = 0.5  # share of the source's points
 DIRECTIONS = 64  # bins of normals, evenly on the sphere: about 25 degrees apart
+DEVIATIONS = 2.5  # standard deviations above the mean, beyond which a distance is rejected (Masuda 1996)
+ANGLE_DEG = 45.0  # between normals, beyond which a pair is rejected
+WORST = 0.1  # share of the pairs that is rejected (Pulli 1999)
 LEAST_OVERLAP = 0.4  # lower end of the search for the overlap, as in the paper of trimmed ICP
 EXPONENT = 2.0  # λ of that paper, the preference for a larger overlap
 
 
 @dataclass(frozen=True)
 class Matches:
-    """Source points (n, 3) at a pose, each with its nearest target point.
-
-    Attributes:
-        source_rows, rows: (n,) of source and target.
-        distance: (n,) between the two.
-        limit: of the distances.
-    """
+    """Source points (n, 3) at a pose, each with its nearest target point."""
 
     pair: Pair
     T_target_source: np.ndarray
-    source_rows: np.ndarray
+    source_rows: np.ndarray  # (n,)
     source: np.ndarray
-    rows: np.ndarray
-    distance: np.ndarray
-    limit: float
+    rows: np.ndarray  # (n,) of the target
+    distance: np.ndarray  # (n,) between the two
+    limit: float  # of the distances
 
     @property
     def rmse(self) -> float:
@@ -75,22 +70,14 @@ class Matches:
 
 @dataclass(frozen=True)
 class Stages:
-    """The exchangeable stages; the defaults are plain ICP.
+    """The exchangeable stages; the defaults are plain ICP."""
 
-    Attributes:
-        rows: participating source points, or None for all.
-        share: of the source's points, those with the smallest distances, that are kept.
-        weigh: from matches to their weights (n,).
-        metric: the minimized distance.
-        distance: farther points are no match.
-    """
-
-    rows: np.ndarray | None = None
-    share: float = 1.0
+    rows: np.ndarray | None = None  # participating source points, or None for all
+    share: float = 1.0  # of the source's points, those with the smallest distances, that are kept
     reject: Callable[[Matches], Matches] = lambda matches: matches
     weigh: Callable[[Matches], np.ndarray] = lambda matches: np.ones(len(matches.distance))
     metric: Metric = "point_to_point"
-    distance: float = np.inf
+    distance: float = np.inf  # farther points are no match
 
     def match(self, pair: Pair, T_target_source: np.ndarray, before: Matches | None = None) -> Matches:
         """Return the kept matches at a pose; those at the previous pose only bound the search radius."""
@@ -169,88 +156,79 @@ def align_trimmed(
 
 
 def align_variant(
+    stage: str,
+    change: Callable,
     pair: Pair,
-    sampling: Sampling = "all",
-    rejection: Criterion = "none",
-    weighting: Weighting = "none",
-    metric: Metric = "point_to_plane",
-    sampled: PositiveShare = 0.5,
-    deviations: float = 2.5,
-    angle_deg: Annotated[float, Bounds(minimum=0, maximum=180)] = 45.0,
-    worst: Annotated[float, Bounds(minimum=0, exclusiveMaximum=1)] = 0.1,
     correspondence_distance: float = CORRESPONDENCE_DISTANCE,
     max_iterations: int = MAX_ITERATIONS,
 ) -> Outcome:
-    """Run one variant; without sampling, rejection and weighting it is plain ICP.
-
-    Args:
-        sampling: random, or even over the directions of the normals; drawn once per pair.
-        rejection: of distances more than `deviations` standard deviations above their mean (Masuda 1996), of normals
-            at an angle above `angle_deg`, or of the `worst` share (Pulli 1999).
-        weighting: 1 - d / d_max (Godin 1994), or the cosine between the normals.
-        sampled: share of the source's points.
-    """
-    rows = None if sampling == "all" else sample(pair, sampling, sampled)
-    stages = Stages(
-        rows=rows,
-        reject=partial(reject, criterion=rejection, deviations=deviations, angle_deg=angle_deg, worst=worst),
-        weigh=partial(weigh, weighting=weighting),
-        metric=metric,
-        distance=correspondence_distance,
-    )
+    """Run point-to-plane ICP with one stage changed; rows are drawn once per pair."""
+    changed = {stage: change(pair) if stage == "rows" else change}
+    stages = Stages(metric="point_to_plane", distance=correspondence_distance, **changed)
     T, _, failure = run_stages(pair, stages, max_iterations)
     return Outcome.at(pair, T, correspondence_distance, failure)
 
 
-def sample(pair: Pair, sampling: Sampling, share: float) -> np.ndarray:
-    """Return the rows of a share of the source's points, at random or evenly over the directions of their normals.
+def sample_at_random(pair: Pair) -> np.ndarray:
+    """Return the rows of a share of the source's points."""
+    order_N = generator("sampling", "random", pair.seed).permutation(len(pair.source))
+    return np.sort(order_N[: max(1, round(SAMPLED * len(order_N)))])
 
-    Evenly means one point of each direction in turn, so that flat parts get no more than others. The directions are on
-    a Fibonacci spiral; each normal counts to the nearest.
+
+def sample_normal_space(pair: Pair) -> np.ndarray:
+    """Return the rows of a share of the source's points, even over the directions of their normals.
+
+    There is one point of each direction in turn, so that flat parts get no more than others. The directions are on a
+    Fibonacci spiral; each normal counts to the nearest.
     """
-    random, points = generator("sampling", sampling, pair.seed), len(pair.source)
-    order_N = random.permutation(points)
-    if sampling == "normal_space":
-        d_D = np.arange(DIRECTIONS) + 0.5
-        polar_D, azimuth_D = np.arccos(1 - 2 * d_D / DIRECTIONS), np.pi * (1 + 5**0.5) * d_D
-        x_D, y_D, z_D = np.cos(azimuth_D) * np.sin(polar_D), np.sin(azimuth_D) * np.sin(polar_D), np.cos(polar_D)
-        cosines_N_D = np.einsum("ni,di->nd", pair.normals("source"), np.stack([x_D, y_D, z_D], axis=1))
-        direction_N = cosines_N_D.argmax(axis=1)[order_N]
-        sizes_D = np.bincount(direction_N, minlength=DIRECTIONS)
-        turn_N = np.empty(points, np.int64)
-        turn_N[np.argsort(direction_N, kind="stable")] = np.arange(points) - np.repeat(
-            np.cumsum(sizes_D) - sizes_D, sizes_D
-        )
-        order_N = order_N[np.argsort(turn_N, kind="stable")]
-    return np.sort(order_N[: max(1, round(share * points))])
+    order_N = generator("sampling", "normal_space", pair.seed).permutation(len(pair.source))
+    d_D = np.arange(DIRECTIONS) + 0.5
+    polar_D, azimuth_D = np.arccos(1 - 2 * d_D / DIRECTIONS), np.pi * (1 + 5**0.5) * d_D
+    x_D, y_D, z_D = np.cos(azimuth_D) * np.sin(polar_D), np.sin(azimuth_D) * np.sin(polar_D), np.cos(polar_D)
+    cosines_N_D = np.einsum("ni,di->nd", pair.normals("source"), np.stack([x_D, y_D, z_D], axis=1))
+    direction_N = cosines_N_D.argmax(axis=1)[order_N]
+    sizes_D = np.bincount(direction_N, minlength=DIRECTIONS)
+    first_N = np.repeat(np.cumsum(sizes_D) - sizes_D, sizes_D)
+    turn_N = np.empty(len(order_N), np.int64)
+    turn_N[np.argsort(direction_N, kind="stable")] = np.arange(len(order_N)) - first_N
+    return np.sort(order_N[np.argsort(turn_N, kind="stable")][: max(1, round(SAMPLED * len(order_N)))])
 
 
-def reject(matches: Matches, criterion: Criterion, deviations: float, angle_deg: float, worst: float) -> Matches:
-    """Return the matches that a criterion keeps."""
+def reject_distance(matches: Matches) -> Matches:
+    """Keep distances that are not far above their mean."""
     distance_n = matches.distance
-    if criterion == "distance" and len(distance_n):
-        return matches.kept(distance_n <= distance_n.mean() + deviations * distance_n.std())
-    if criterion == "normals":
-        return matches.kept(matches.cosines() >= np.cos(np.deg2rad(angle_deg)))
-    if criterion == "trimming":
-        return matches.kept(nearest(distance_n, round((1 - worst) * len(distance_n))))
-    return matches
+    return matches.kept(distance_n <= distance_n.mean() + DEVIATIONS * distance_n.std()) if len(distance_n) else matches
 
 
-def weigh(matches: Matches, weighting: Weighting) -> np.ndarray:
-    """Return the weights (n,) of the matches."""
-    if weighting == "distance":
-        return 1 - matches.distance / matches.limit
-    return np.clip(matches.cosines(), 0, 1) if weighting == "normals" else np.ones(len(matches.distance))
+def reject_normals(matches: Matches) -> Matches:
+    """Keep pairs whose normals differ by a limited angle."""
+    return matches.kept(matches.cosines() >= np.cos(np.deg2rad(ANGLE_DEG)))
 
 
-METHODS = {
-    "trimmed": MethodEntry("Trimmed ICP", align_trimmed),
-    "random_sampling": MethodEntry("ICP, random sampling", partial(align_variant, sampling="random")),
-    "normal_space": MethodEntry("ICP, normal-space sampling", partial(align_variant, sampling="normal_space")),
-    "reject_distance": MethodEntry("ICP, rejection by distance", partial(align_variant, rejection="distance")),
-    "reject_normals": MethodEntry("ICP, rejection by normals", partial(align_variant, rejection="normals")),
-    "reject_worst": MethodEntry("ICP, rejection of the worst", partial(align_variant, rejection="trimming")),
-    "weight_distance": MethodEntry("ICP, weights by distance", partial(align_variant, weighting="distance")),
-    "weight_normals": MethodEntry("ICP, weights by normals", partial(align_variant, weighting="normals")),
+def reject_worst(matches: Matches) -> Matches:
+    """Keep all but the largest distances."""
+    return matches.kept(nearest(matches.distance, round((1 - WORST) * len(matches.distance))))
+
+
+def weigh_distance(matches: Matches) -> np.ndarray:
+    """Return the weights 1 - d / d_max (n,) of Godin (1994)."""
+    return 1 - matches.distance / matches.limit
+
+
+def weigh_normals(matches: Matches) -> np.ndarray:
+    """Return the cosines between the normals (n,) as weights."""
+    return np.clip(matches.cosines(), 0, 1)
+
+
+VARIANTS: dict[str, tuple[str, str, Callable]] = {  # title, and what one stage does instead
+    "random_sampling": ("ICP, random sampling", "rows", sample_at_random),
+    "normal_space": ("ICP, normal-space sampling", "rows", sample_normal_space),
+    "reject_distance": ("ICP, rejection by distance", "reject", reject_distance),
+    "reject_normals": ("ICP, rejection by normals", "reject", reject_normals),
+    "reject_worst": ("ICP, rejection of the worst", "reject", reject_worst),
+    "weight_distance": ("ICP, weights by distance", "weigh", weigh_distance),
+    "weight_normals": ("ICP, weights by normals", "weigh", weigh_normals),
+}
+METHODS = {"trimmed": MethodEntry("Trimmed ICP", align_trimmed)} | {
+    name: MethodEntry(title, partial(align_variant, stage, change)) for name, (title, stage, change) in VARIANTS.items()
 }

@@ -50,7 +50,7 @@ class Matches:
 
     @property
     def variance(self) -> float:
-        """Of a coordinate of a residual, with the six that the pose has taken subtracted."""
+        """Of a coordinate of a residual; the pose has taken six."""
         squares = np.square(self.residuals)
         return float(squares.sum() / max(squares.size - 6, 1))
 
@@ -64,21 +64,13 @@ class Matches:
 
 @dataclass(frozen=True)
 class RegisteredPair:
-    """A registration whose covariance is asked for.
+    """A registration whose covariance is asked for."""
 
-    Attributes:
-        pair: the clouds, where the registration started, and a seed for what an estimator draws.
-        outcome: what the method found.
-        method: its name in the registry of methods.
-        deviation_6: standard deviations of the initial pose's twist.
-        describe: returns the pair's descriptors (F,), for estimators that have learned from others.
-    """
-
-    pair: Pair
+    pair: Pair  # with where the registration started, and a seed for what an estimator draws
     outcome: Outcome
-    method: str
-    deviation_6: np.ndarray
-    describe: Callable[[], np.ndarray] | None = None
+    method: str  # its name in the registry of methods
+    deviation_6: np.ndarray  # standard deviations of the initial pose's twist
+    describe: Callable[[], np.ndarray] | None = None  # returns descriptors (F,), for estimators that have learned
 
     @property
     def T_target_source(self) -> np.ndarray:
@@ -164,18 +156,12 @@ Estimator = Callable[[RegisteredPair], np.ndarray]
 
 @dataclass(frozen=True)
 class EstimatorEntry:
-    """An estimator in the registry: it has the one or the other function.
-
-    Attributes:
-        models: what the covariance is that of, by which it is judged.
-        estimate: ``estimate(registered, **settings)`` returns Σ (6, 6) or raises :class:`FailedEstimate`.
-        learn: ``learn(examples, **settings)`` returns such a function of a registered pair.
-    """
+    """An estimator in the registry: it has the one or the other function."""
 
     title: str
-    models: Modeled
-    estimate: Callable[..., np.ndarray] | None = None
-    learn: Callable[..., Estimator] | None = None
+    models: Modeled  # what the covariance is that of, by which it is judged
+    estimate: Callable[..., np.ndarray] | None = None  # of a registered pair and settings, or raises FailedEstimate
+    learn: Callable[..., Estimator] | None = None  # of examples and settings, returns such a function
 
 
 def inverse_hessian(hessian_6_6: np.ndarray) -> np.ndarray:

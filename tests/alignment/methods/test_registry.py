@@ -173,14 +173,8 @@ def test_an_unknown_name_lists_the_known():
         ("teaser", {"noise": float("nan")}, "noise: nan should be a finite number"),
         ("trimmed", {"overlap": -0.5}, "overlap: -0.5 should be greater than or equal to"),
         ("trimmed", {"overlap": 5}, "overlap: 5 should be less than or equal to 1"),
-        ("reject_worst", {"worst": 1}, "worst: 1 should be less than 1"),
-        ("huber", {"scale": "wide"}, "scale: 'wide' should be a valid number"),
-        (
-            "random_sampling",
-            {"metric": "point_to_line"},
-            "metric: 'point_to_line' should be 'point_to_point' or",
-        ),
-        ("tukey", {"kernel": "Tukey"}, "kernel: 'Tukey' should be 'HuberLoss', 'CauchyLoss', 'GMLoss' or 'TukeyLoss'"),
+        ("huber", {"correspondence_distance": "wide"}, "correspondence_distance: 'wide' should be a valid number"),
+        ("tukey", {"kernel": "HuberLoss"}, "setting kernel: unknown"),
     ],
 )
 def test_settings_that_a_method_does_not_take_are_refused(name, settings, words):

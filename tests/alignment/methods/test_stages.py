@@ -5,9 +5,10 @@ from itertools import combinations, product
 import numpy as np
 import pytest
 
+from gpca.alignment.methods import stages
 from gpca.alignment.methods.interface import FailedRegistration, Pair
 from gpca.alignment.methods.registry import make_method
-from gpca.alignment.methods.stages import Stages, nearest, reject, run_stages, sample, weigh
+from gpca.alignment.methods.stages import VARIANTS, Stages, nearest, run_stages
 from gpca.alignment.rigid import exp, inverse, transform
 from gpca.pairs.perturbation import CONCEPTS
 
@@ -62,11 +63,11 @@ def test_normals_of_the_source_turn_with_it(objects):
 @pytest.mark.parametrize("share", [0.3, 0.6, 0.95])
 def test_a_search_that_knows_the_matches_before_finds_the_same(objects, share):
     pair, T_true = perturbed(objects, 0, "overlap")
-    stages = Stages(share=share)
+    shared = Stages(share=share)
     for T in (np.eye(4), T_true):
-        before = stages.match(pair, T)
-        for T_next in (T, stages.step(before) @ T, np.linalg.inv(T_true)):
-            bounded, free = stages.match(pair, T_next, before), stages.match(pair, T_next)
+        before = shared.match(pair, T)
+        for T_next in (T, shared.step(before) @ T, np.linalg.inv(T_true)):
+            bounded, free = shared.match(pair, T_next, before), shared.match(pair, T_next)
             for name in ("source_rows", "rows", "distance"):
                 np.testing.assert_array_equal(getattr(bounded, name), getattr(free, name))
 
@@ -81,64 +82,55 @@ def test_a_share_counts_all_points_of_the_source(objects):
     assert 0 < len(Stages(share=0.5, distance=distance).match(pair, T_true).distance) <= len(pair.source) / 2
 
 
-OFF = {
-    "random_sampling": {"sampled": 1.0},
-    "normal_space": {"sampled": 1.0},
-    "reject_distance": {"deviations": 1e6},
-    "reject_normals": {"angle_deg": 180.0},
-    "reject_worst": {"worst": 0.0},
-    "weight_distance": {"weighting": "none"},
-    "weight_normals": {"weighting": "none"},
-}
+OFF = {"SAMPLED": 1.0, "DEVIATIONS": 1e6, "ANGLE_DEG": 180.0, "WORST": 0.0}
 
 
-@pytest.mark.parametrize("name", OFF)
-@pytest.mark.parametrize("metric", ["point_to_point", "point_to_plane"])
-def test_a_variant_that_is_switched_off_is_plain_icp(objects, name, metric):
+@pytest.mark.parametrize("name", [name for name, (_, stage, _) in VARIANTS.items() if stage != "weigh"])
+def test_a_variant_that_is_switched_off_is_plain_icp(objects, monkeypatch, name):
     pair, _ = perturbed(objects, 0, "noise")
-    plain = make_method(metric)(pair)
-    off = make_method(name, OFF[name] | {"metric": metric})(pair)
+    for constant, value in OFF.items():
+        monkeypatch.setattr(stages, constant, value)
+    off, plain = (make_method(each)(pair) for each in (name, "point_to_plane"))
     np.testing.assert_allclose(off.T_target_source, plain.T_target_source, rtol=0, atol=1e-6)
     assert off.fitness == pytest.approx(plain.fitness)
-    on = make_method(name, {"metric": metric})(pair)
-    assert np.abs(on.T_target_source - plain.T_target_source).max() > 1e-4
 
 
 def test_every_variant_ends_at_a_pose_of_its_own(objects):
     pair, _ = perturbed(objects, 0, "noise")
-    poses = [make_method(name)(pair).T_target_source for name in OFF]
-    assert len(np.unique(np.round(poses, 5), axis=0)) == len(OFF)
+    poses = [make_method(name)(pair).T_target_source for name in ("point_to_plane", *VARIANTS)]
+    assert len(np.unique(np.round(poses, 5), axis=0)) == 1 + len(VARIANTS)
 
 
-def test_samples_in_normal_space_are_even_over_directions():
+def test_samples_in_normal_space_are_even_over_directions(monkeypatch):
     """A floor of 900 points and two walls of 50: half of the random points would be floor, here a third is."""
     normals = np.repeat(np.eye(3), [900, 50, 50], axis=0)
     pair = Pair(np.random.default_rng(0).normal(size=(1000, 3)), np.eye(3), source_normals=normals)
-    rows = sample(pair, "normal_space", 0.12)
+    monkeypatch.setattr(stages, "SAMPLED", 0.12)
+    rows = stages.sample_normal_space(pair)
     assert np.array_equal(rows, np.unique(rows)) and len(rows) == 120
     assert np.array_equal(normals[rows].sum(axis=0), [40, 40, 40])
-    assert normals[sample(pair, "normal_space", 0.3)].sum(axis=0).tolist() == [200, 50, 50]  # all there are
-    assert normals[sample(pair, "random", 0.12)].sum(axis=0)[0] > 90
+    assert normals[stages.sample_at_random(pair)].sum(axis=0)[0] > 90
+    monkeypatch.setattr(stages, "SAMPLED", 0.3)
+    assert normals[stages.sample_normal_space(pair)].sum(axis=0).tolist() == [200, 50, 50]  # all there are
 
 
 def test_samples_are_drawn_by_the_seed_of_the_pair(objects):
     pair, _ = small_motion(objects)
     other = Pair(pair.source, pair.target, source_normals=pair.source_normals, seed=1)
-    for sampling in ("random", "normal_space"):
-        assert np.array_equal(sample(pair, sampling, 0.3), sample(pair, sampling, 0.3))
-        assert not np.array_equal(sample(pair, sampling, 0.3), sample(other, sampling, 0.3))
+    for sample in (stages.sample_at_random, stages.sample_normal_space):
+        assert np.array_equal(sample(pair), sample(pair))
+        assert not np.array_equal(sample(pair), sample(other))
 
 
 def test_rejections_keep_what_they_say(objects):
     pair, _ = perturbed(objects, 0, "noise")
     matches = Stages(distance=0.1).match(pair, np.eye(4))
-    limits = {"deviations": 1.5, "angle_deg": 30.0, "worst": 0.2}
-    d = matches.distance
-    kept = {criterion: reject(matches, criterion, **limits) for criterion in ("distance", "normals", "trimming")}
-    assert np.array_equal(kept["distance"].distance, d[d <= d.mean() + 1.5 * d.std()])
-    assert np.array_equal(kept["normals"].rows, matches.rows[matches.cosines() >= np.cos(np.pi / 6)])
-    assert np.array_equal(np.sort(kept["trimming"].distance), np.sort(d)[: round(0.8 * len(d))])
-    for part in kept.values():
+    d, cosines = matches.distance, matches.cosines()
+    by_distance, by_normals, worst = (VARIANTS[f"reject_{by}"][2](matches) for by in ("distance", "normals", "worst"))
+    assert np.array_equal(by_distance.distance, d[d <= d.mean() + 2.5 * d.std()])
+    assert np.array_equal(by_normals.rows, matches.rows[cosines >= np.cos(np.pi / 4)])
+    assert np.array_equal(np.sort(worst.distance), np.sort(d)[: round(0.9 * len(d))])
+    for part in (by_normals, worst):
         assert 0 < len(part.distance) < len(d)
         np.testing.assert_allclose(np.linalg.norm(pair.target[part.rows] - part.source, axis=1), part.distance)
 
@@ -146,8 +138,8 @@ def test_rejections_keep_what_they_say(objects):
 def test_weights_fall_with_distance_and_angle(objects):
     pair, _ = perturbed(objects, 0, "noise")
     matches = Stages(distance=0.1).match(pair, np.eye(4))
-    np.testing.assert_allclose(weigh(matches, "distance"), 1 - matches.distance / 0.1)
-    weights, cosines = weigh(matches, "normals"), matches.cosines()
+    np.testing.assert_allclose(stages.weigh_distance(matches), 1 - matches.distance / 0.1)
+    weights, cosines = stages.weigh_normals(matches), matches.cosines()
     assert np.array_equal(weights[cosines > 0], np.minimum(cosines[cosines > 0], 1)) and not weights[cosines < 0].any()
 
 

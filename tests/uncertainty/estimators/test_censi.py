@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from scipy.optimize import minimize
 
 from gpca.alignment.rigid import best_motion, exp, log, transform
 from gpca.uncertainty.estimators.analytic import censi, hessian, mixed_derivatives
@@ -94,8 +93,3 @@ def test_a_hessian_that_leaves_a_turn_open_is_named():
 def test_another_method_is_refused():
     with pytest.raises(FailedEstimate, match="that of point-to-point, not of 'gicp'"):
         censi(registered("gicp"))
-
-
-def test_the_least_of_the_cost_is_where_the_fixture_says(matches):
-    found = minimize(lambda xi: cost(xi, matches.source, matches.target), np.full(6, 0.01), tol=1e-12)
-    assert np.abs(found.x).max() < 1e-5
