@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from baselines import dirichlet_gp, heads, learners
+from baselines.dirichlet_gp import JITTER, DirichletGP
+from baselines.heads import Dropout, Ensemble, Heads, LastLayerLaplace
 from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS
 
@@ -128,3 +130,86 @@ def test_few_samples_of_a_concept_are_enough_for_an_svm_but_not_one(name, embedd
     assert np.isfinite(explained(name, embedded, np.array(few)).scores_N_C).all()
     with pytest.raises(InputError, match="have a single sample of a concept; give at least two"):
         explained(name, embedded, np.array(few[:7]))
+
+
+def exact_gp(embedded, **settings):
+    learner = DirichletGP("tiny", 0, **settings)
+    learner.fit(embedded.subset(embedded.rows("train")))
+    return learner
+
+
+def test_the_posterior_is_the_textbooks(embedded):
+    """Mean m + k (K + S)^-1 (y - m) and variance k(x, x) - k (K + S)^-1 k, targets and noise from Milios et al."""
+    learner, alpha = exact_gp(embedded, iterations=3, alpha=0.1), 0.1
+    train, test = (embedded.subset(embedded.rows(split)) for split in ("train", "test"))
+    scale, length = np.exp(learner._log_scale_C.detach().numpy()), np.exp(learner._log_lengthscale_C.detach().numpy())
+    x, z = (learner._scaler.transform(part.embedding) for part in (train, test))
+    squares = {name: ((a[:, None] - b) ** 2).sum(axis=2) for name, a, b in (("xx", x, x), ("zx", z, x))}
+    mean_N_C, deviation_N_C = learner._posterior(test)
+    for c, concept in enumerate(CONCEPTS):
+        concentration = alpha + (train.concept == concept)
+        noise = np.log(1 / concentration + 1)
+        y = np.log(concentration) - noise / 2
+        K = scale[c] * np.exp(-squares["xx"] / (2 * length[c] ** 2)) + np.diag(noise + JITTER)
+        k = scale[c] * np.exp(-squares["zx"] / (2 * length[c] ** 2))
+        m = learner._mean_C[c].item()
+        assert mean_N_C[:, c] == pytest.approx(m + k @ np.linalg.solve(K, y - m), abs=1e-5)
+        variance = scale[c] - np.einsum("nt,tn->n", k, np.linalg.solve(K, k.T))
+        assert deviation_N_C[:, c] ** 2 == pytest.approx(variance, abs=1e-5)
+
+
+def test_a_smaller_alpha_is_more_confident(embedded):
+    test = embedded.subset(embedded.rows("test"))
+    small, large = (
+        exact_gp(embedded, alpha=alpha).explain(test).scores_N_C.max(axis=1).mean() for alpha in (0.01, 0.5)
+    )
+    assert small > large
+
+
+def test_far_away_the_posterior_is_the_prior(embedded):
+    learner, test = exact_gp(embedded), embedded.subset(embedded.rows("test"))
+    far = dataclasses.replace(test, attached={"embedding": test.embedding + 1e4})
+    assert learner.explain(far).bald_N.min() > learner.explain(test).bald_N.mean()
+
+
+RANDOM = np.random.default_rng(0)
+TARGETS = np.arange(60) % 3
+H = 2 * RANDOM.normal(size=(3, 8))[TARGETS] + RANDOM.normal(size=(60, 8))
+
+
+@pytest.mark.parametrize("heads", [1, 3])
+def test_longer_training_fits_better(heads):
+    def error(steps):
+        head = Heads("a", heads=heads, hidden=16, steps=steps)
+        head.fit(H, TARGETS)
+        return np.mean(head.logits(head.hidden(H)).argmax(axis=2) != TARGETS)
+
+    assert error(300) < 0.05 < 0.3 < error(0)
+
+
+def direct(learner, h):
+    """Draw the logits without registrations around them."""
+    learner._train(H, TARGETS)
+    return learner._draw_logits(h)
+
+
+def test_an_ensemble_has_a_draw_per_member_and_dropout_one_per_pass():
+    assert direct(Ensemble("a", 0, members=4, hidden=8), H[:5]).shape == (4, 5, 3)
+    assert direct(Dropout("a", 0, passes=7, hidden=8), H[:5]).shape == (7, 5, 3)
+
+
+def test_laplace_draws_have_the_covariance_of_the_linearised_last_layer():
+    laplace = LastLayerLaplace("a", 0, draws=5000, hidden=6)
+    drawn_M_N_C = direct(laplace, H[:4])
+    covariance = (laplace._vectors * laplace._deviations**2) @ laplace._vectors.T
+    features = laplace._features(H[:4])
+    for n in range(4):
+        jacobian_C_P = np.kron(np.eye(3), features[n])
+        expected = jacobian_C_P @ covariance @ jacobian_C_P.T
+        assert np.cov(drawn_M_N_C[:, n].T) == pytest.approx(expected, rel=0.1, abs=0.05 * expected.max())
+    assert drawn_M_N_C.mean(axis=0) == pytest.approx(features @ laplace._weights_F_C, abs=0.1)
+
+
+def test_laplace_is_less_certain_far_from_the_training_samples():
+    drawn = direct(LastLayerLaplace("a", 0, hidden=16), np.concatenate([H, 20 * H]))
+    assert drawn[:, 60:].std(axis=0).min() > drawn[:, :60].std(axis=0).mean()
