@@ -79,7 +79,6 @@ EXPERIMENT = Experiment(
     name=NAME,
     sections={"active_learning": Section},
     names=names,
-    shown=lambda config, sources: {"strategies": titles(config["active_learning"]["strategies"])},
     check=check,
     switches={"active_learning.strategies": Names("strategy", titles)},
 )

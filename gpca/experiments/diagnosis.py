@@ -82,7 +82,6 @@ EXPERIMENT = Experiment(
         "cause_explainer": list(config[NAME]["explainers"]),
         "feature_explainer": list(config[NAME]["by_features"]),
     },
-    shown=lambda config, sources: {"cause_explainers": cause_titles(config)},
     check=check,
     optional_entries={
         f"diagnosis.{key}": Names("explainer", lambda: explainers(CAUSES)) for key in ("explainers", "by_features")

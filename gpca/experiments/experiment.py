@@ -1,7 +1,7 @@
 """The declaration of an experiment, so that the config, the workflow and the page need not know it.
 
-It stands as ``EXPERIMENT`` in ``gpca/experiments/{name}/experiment.py``, which imports nothing heavy. Beside it
-are the steps that run it; ``results.yaml``, its part of the registry of tables and figures; and what makes these.
+It stands as ``EXPERIMENT`` in ``gpca/experiments/{name}.py``, which imports nothing heavy, beside its steps, numbers,
+tables and figures.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import reduce
 from operator import getitem
-from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import Field
@@ -92,7 +91,6 @@ class Experiment:
         tidy: its files of numbers, which every run makes that has the experiment.
         needs: names that must not be empty, or a run does without it.
         names: what it adds to the names in the braces of paths (:func:`gpca.experiments.run.names_of`).
-        shown: what it adds to the settings that results show (:func:`gpca.experiments.run.settings_of`).
         check: refuses, with an InputError, sections that their types allow and that no run can use.
         optional_entries: keys of mappings of which any entry may be false -> names that they have.
         switches: keys of mappings name -> true or false, which are read as the list of the names that are true.
@@ -107,17 +105,11 @@ class Experiment:
     tidy: tuple[Tidy, ...] = ()
     needs: tuple[str, ...] = ()
     names: ByRun = lambda config, sources: {}
-    shown: ByRun = lambda config, sources: {}
     check: Callable[[dict, LeftOut], None] = lambda config, left_out: None
     optional_entries: Mapping[str, Names] = field(default_factory=dict)
     switches: Mapping[str, Names] = field(default_factory=dict)
     lists: Mapping[str, str | Callable[[LeftOut], Collection[str]]] = field(default_factory=dict)
     notices: Callable[[Mapping[str, Any]], Iterable[str]] = lambda config: ()
-
-    @property
-    def results(self) -> Path:
-        """Its part of the registry of tables and figures."""
-        return Path(__file__).parent / self.name / "results.yaml"
 
     @property
     def has_rules(self) -> bool:

@@ -68,7 +68,6 @@ EXPERIMENT = Experiment(
     beside=("uncertainty_curves",),
     sections={"learners": ByName, "shift": Shift},
     names=lambda config, sources: {"learner": list(config["learners"])},
-    shown=lambda config, sources: {"learners": learner_titles(config)},
     check=check,
     optional_entries={"learners": Names("learner", explainers)},
 )

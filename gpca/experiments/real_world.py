@@ -15,7 +15,6 @@ from gpca.errors import InputError, require_names, with_key
 from gpca.experiments.experiment import EXPLAINERS, Experiment, LeftOut, Names
 from gpca.experiments.frames import (
     CLASSIC,
-    frames_of,
     pretraining_of,
     published_backbones,
     reduced_backbones,
@@ -200,7 +199,6 @@ EXPERIMENT = Experiment(
     sections={"real_world": RealWorldSettings},
     beside=("frame_accuracies", "frame_tables", "frame_pictures"),
     names=names,
-    shown=lambda config, _sources: {"frames": frames_of(config)},
     check=check,
     optional_entries={"real_world.datasets": Names("dataset"), "real_world.explainers": EXPLAINERS},
     lists={f"real_world.{name}": "encoders" for name in ("backbones", "condition_backbones", "published", "training")}

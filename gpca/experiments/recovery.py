@@ -144,15 +144,10 @@ def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
     return {"learning_policy": [name for name, entry in entries.items() if entry.learns or entry.queues]}
 
 
-def shown(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
-    """Titles of policies, treatments, thresholds, and the number of actions, for results of other experiments."""
+def policy_titles(config: Mapping[str, Any]) -> dict[str, str]:
+    """Titles of the policies."""
     recovery = config["recovery"]
-    return {
-        "policies": {name: policy_entry(name, tuple(recovery["actions"])).title for name in recovery["policies"]},
-        "treatments": recovery["treatments"],
-        "policy_thresholds": recovery["thresholds"],
-        "budget": recovery["loop"]["budget"],
-    }
+    return {name: policy_entry(name, tuple(recovery["actions"])).title for name in recovery["policies"]}
 
 
 EXPERIMENT = Experiment(
@@ -160,7 +155,6 @@ EXPERIMENT = Experiment(
     beside=("recovery_measures", "recovery_example", "recovery_curves"),
     sections={"recovery": RecoverySettings},
     names=names,
-    shown=shown,
     check=check,
     optional_entries={"recovery.actions": Names("action", lambda: ACTIONS)},
     switches={"recovery.policies": Names("policy", lambda: policies(tuple(ACTIONS)))},

@@ -1,4 +1,4 @@
-"""All experiments, by their folders, and their tables and figures: a new folder is found at the next call."""
+"""All experiments, their steps, tables and figures: a new file of this folder is found at the next call."""
 
 from __future__ import annotations
 
@@ -9,31 +9,45 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from gpca import reporting
 from gpca.experiments.experiment import Experiment
 from gpca.experiments.step import Step
-from gpca.reporting.registry import Names, Result, read_results
+from gpca.reporting.registry import Names, Result
 
-REGISTRY = Path(reporting.__file__).with_name("results.yaml")
+BEYOND = "Beyond the paper"
+SECTIONS = (  # of the page, the paper's first
+    "III Gaussian process concept attribution",
+    "IV-A Datasets and controlled perturbations",
+    "IV-B Concept attribution accuracy",
+    "IV-C Active learning via BALD",
+    "IV-D Ablation studies",
+    "IV-E Real-world validation",
+    "V Robotic deployment for action recovery",
+    "What the paper says in sentences",
+    "What the paper leaves unstated",
+    f"{BEYOND}: what made a registration fail",
+    f"{BEYOND}: what explainers look at, and whether it carries over",
+    f"{BEYOND}: registration methods",
+    f"{BEYOND}: scans registered to scans",
+    f"{BEYOND}: how uncertain a pose is",
+    f"{BEYOND}: explanations with another method or estimator",
+    f"{BEYOND}: concepts that no encoder has seen",
+)
 
 
 @cache
 def experiments() -> tuple[Experiment, ...]:
-    """Return the experiments, by their names."""
-    folder = Path(__file__).parent
-    modules = {path.parent.name: f"{path.parent.name}.experiment" for path in folder.glob("*/experiment.py")}
-    modules |= {path.stem: path.stem for path in folder.glob("*.py")}
+    """All experiments, by their names."""
     declared = []
-    for _, name in sorted(modules.items()):
-        module = import_module(f"{__package__}.{name}")
-        if (experiment := getattr(module, "EXPERIMENT", None)) is not None:
+    for path in sorted(Path(__file__).parent.glob("*.py")):
+        experiment = getattr(import_module(f"{__package__}.{path.stem}"), "EXPERIMENT", None)
+        if experiment is not None:
             tidy = tuple(function.tidy for function in _declared(experiment, "tidy"))
             declared.append(replace(experiment, tidy=(*experiment.tidy, *tidy)))
     return tuple(declared)
 
 
 def steps() -> list[Step]:
-    """Return the steps that experiments declare."""
+    """Steps that experiments declare."""
     return [
         value
         for experiment in experiments()
@@ -44,13 +58,11 @@ def steps() -> list[Step]:
 
 
 def _modules(experiment: Experiment) -> list[ModuleType]:
-    single = (Path(__file__).parent / f"{experiment.name}.py").is_file()
-    names = (experiment.name if single else f"{experiment.name}.experiment", *experiment.beside)
-    return [import_module(f"{__package__}.{name}") for name in names]
+    return [import_module(f"{__package__}.{name}") for name in (experiment.name, *experiment.beside)]
 
 
 def _declared(experiment: Experiment, kind: str) -> list[Any]:
-    """Return the functions of an experiment's modules that declare a ``result``, or ``tidy`` files."""
+    """Functions of an experiment's modules that declare a ``result``, or ``tidy`` files."""
     return [
         value
         for module in _modules(experiment)
@@ -61,17 +73,9 @@ def _declared(experiment: Experiment, kind: str) -> list[Any]:
 
 @cache
 def registered() -> tuple[Result, ...]:
-    """Return every entry, section by section, as the first file orders them, and in these by experiment.
-
-    Entries that say which they stand below stand there.
-    """
-    sections: dict[str, list[Result]] = {}
-    for section, results in read_results(REGISTRY):
-        sections.setdefault(section, []).extend(results)
+    """All tables and figures, by section and experiment; those that say after which one they come stand there."""
+    sections: dict[str, list[Result]] = {section: [] for section in SECTIONS}
     for experiment in experiments():
-        if experiment.results.is_file():
-            for section, results in read_results(experiment.results):
-                sections.setdefault(section, []).extend(results)
         for function in _declared(experiment, "result"):
             sections.setdefault(function.result.section, []).append(function.result)
     for results in sections.values():
@@ -83,11 +87,7 @@ def registered() -> tuple[Result, ...]:
 
 
 def results_of(names: Names) -> list[Result]:
-    """Return the tables and figures that a run with these names makes, in the order of the registry.
-
-    Args:
-        names: the values for the braces of the registry's patterns; ``source`` lists the sources.
-    """
+    """Tables and figures that a run with these values of names in braces makes, in the order of the page."""
     results = []
     for entry in registered():
         of_entry = [entry.of_source(source) for source in names["source"]] if "{source}" in entry.name else [entry]

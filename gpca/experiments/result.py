@@ -86,12 +86,10 @@ def _declared(
             caption=cleandoc(caption),
             builder=f"{function.__module__}:{function.__name__}",
             inputs=tuple(_input(argument, given) for argument, given in inputs.items()),
-            settings={},
             only=only or {},
             needs=needs,
             paper=paper,
             after=after,
-            takes_run=True,
         )
         return function
 

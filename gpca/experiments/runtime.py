@@ -11,9 +11,10 @@ from gpca.comparison.published import HARDWARE, Number, printed_seconds, read_pu
 from gpca.errors import InputError
 from gpca.evaluation.runtime_file import COMPONENTS, OF_ONE_EXPLANATION, read_runtime
 from gpca.experiments.experiment import Experiment, Tidy
-from gpca.experiments.frames import title_of_frames
+from gpca.experiments.frames import frames_of
 from gpca.experiments.plan import Run
 from gpca.experiments.result import figure, table
+from gpca.objects.entry import title_of
 from gpca.reporting.figures.panels import legend_below, panels
 from gpca.reporting.figures.style import BLUE, GRAY, GREEN, ORANGE, SMALL_PT, write_title
 from gpca.reporting.tables.builder import TableBuilder
@@ -167,7 +168,4 @@ def stages_of(runtime: pd.DataFrame, published: Iterable[Number]) -> dict[str, d
 
 def model_title(run: Run) -> str:
     """Title of what the model learned from: a source, or the depth frames."""
-    source = run.config["model"]["source"]
-    if source in run.sources:
-        return run.source_titles[source]
-    return title_of_frames(run.config)
+    return title_of(run.sources.get(run.config["model"]["source"]) or frames_of(run.config))

@@ -6,13 +6,9 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
-from functools import reduce
 from itertools import product
-from operator import getitem
-from pathlib import Path
 from typing import Any
 
-from gpca.io.structured_text import load_own_yaml
 from gpca.process.registry import load
 
 SUFFIXES = {"tables": ("md", "csv", "tex", "json"), "figures": ("png", "pdf")}  # the files of each kind
@@ -45,12 +41,11 @@ class Result:
         section, title, caption: its place on the page, and the words above and below it.
         builder: ``module:function`` that makes it.
         inputs: the builder's arguments that come from files.
-        settings: the builder's other arguments -> place of the value among the settings of a run.
         only: name of a list -> those of its members that are shown.
         needs: names that must not be empty, besides those of the inputs.
         paper: it is a table or figure of the paper.
         after: name of the result of another experiment below which it stands in their section.
-        takes_run: the builder's first argument is the run, and it has no settings.
+        source: the one that it is of, where each has its own.
     """
 
     name: str
@@ -60,12 +55,11 @@ class Result:
     caption: str
     builder: str
     inputs: tuple[Input, ...]
-    settings: Mapping[str, str]
     only: Mapping[str, tuple[str, ...]]
     needs: tuple[str, ...]
     paper: bool
     after: str = ""
-    takes_run: bool = False
+    source: str = ""
 
     @property
     def modules(self) -> list[str]:
@@ -112,19 +106,10 @@ class Result:
         patterns = [pattern for source in self.inputs for of_key in source.files.values() for pattern in of_key]
         return all(shown[name] for name in (*self.needs, *_braced(patterns)))
 
-    def arguments(self, settings: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the builder's arguments from the settings of a run, e.g. ``source_titles.ycb`` of them.
-
-        Where the result shows members of a list alone, it is given the settings of these alone: ``explainers`` of its
-        explainers, so that those of others change nothing of it.
-        """
-        if self.takes_run:
-            return dict(self.settings)
-        shown = dict(settings)
-        for name, members in self.only.items():
-            if isinstance(of_all := settings.get(f"{name}s"), Mapping):
-                shown[f"{name}s"] = {key: value for key, value in of_all.items() if key in members}
-        return {argument: reduce(getitem, place.split("."), shown) for argument, place in self.settings.items()}
+    @property
+    def arguments(self) -> dict[str, str]:
+        """The builder's arguments besides the run and what files give."""
+        return {"source": self.source} if self.source else {}
 
     def of_source(self, source: str) -> Result:
         """Return the result of one source, where the name has ``{source}`` in it."""
@@ -136,21 +121,11 @@ class Result:
             replace(each, files={key: tuple(map(named, patterns)) for key, patterns in each.files.items()})
             for each in self.inputs
         )
-        settings = {argument: named(place) for argument, place in self.settings.items()}
-        settings |= {"source": source} if self.takes_run else {}
-        return replace(self, name=named(self.name), title=named(self.title), inputs=inputs, settings=settings)
+        return replace(self, name=named(self.name), title=named(self.title), inputs=inputs, source=source)
 
     def _shown(self, names: Names) -> dict[str, Any]:
         kept = {key: [name for name in names[key] if name in members] for key, members in self.only.items()}
         return {**names, **kept}
-
-
-def read_results(path: Path) -> list[tuple[str, list[Result]]]:
-    """Return the sections of a file of the registry, each with its results."""
-    return [
-        (section["section"], [_result(section["section"], entry) for entry in section.get("results", ())])
-        for section in load_own_yaml(path)
-    ]
 
 
 def targets(results: Iterable[Result]) -> dict[str, Result]:
@@ -199,45 +174,15 @@ def build(
     readers: Mapping[str, Mapping],
     files: Mapping[str, Any],
     arguments: Mapping[str, Any],
-    run: Any = None,
+    run: Any,
 ) -> Any:
-    """Read the inputs (:attr:`Result.readers`, :meth:`Result.files`) and call the builder, with the run if it takes it.
-
-    Its arguments are the run, what is read of the inputs, and the other arguments.
-    """
+    """Read the inputs (:attr:`Result.readers`, :meth:`Result.files`) and call the builder: run, inputs, arguments."""
     inputs = {}
     for argument, reader in readers.items():
         given = {keyword: files[name] for keyword, name in reader["keywords"].items()}
         read = load(reader["function"]) if reader["function"] else lambda path: path
         inputs[argument] = read(given[""]) if "" in given else read(**given)
-    return load(builder)(*([] if run is None else [run]), **inputs, **arguments)
-
-
-def _result(section: str, entry: Mapping) -> Result:
-    kind = "tables" if "table" in entry else "figures"
-    return Result(
-        name=entry["table" if kind == "tables" else "figure"],
-        kind=kind,
-        section=section,
-        title=entry["title"],
-        caption=entry["caption"].strip(),
-        builder=entry["builder"],
-        inputs=tuple(_input(argument, source) for argument, source in entry["inputs"].items()),
-        settings=entry.get("settings", {}),
-        only={key: tuple(members) for key, members in entry.get("only", {}).items()},
-        needs=tuple(entry.get("needs", ())),
-        paper=entry.get("paper", False),
-        after=entry.get("after", ""),
-    )
-
-
-def _input(argument: str, source: str | Mapping) -> Input:
-    if isinstance(source, str):
-        return Input(argument, {"": (source,)})
-    files = source.get("from", {})
-    of_key = files if isinstance(files, Mapping) else {"": files}
-    patterns = {key: (each,) if isinstance(each, str) else tuple(each) for key, each in of_key.items()}
-    return Input(argument, patterns, source.get("read", ""))
+    return load(builder)(run, **inputs, **arguments)
 
 
 def _braced(patterns: Iterable[str]) -> list[str]:

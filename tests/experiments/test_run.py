@@ -7,9 +7,11 @@ import pytest
 
 from gpca.config.check import check
 from gpca.config.layers import without_false
-from gpca.experiments.frame_tables import pretrained_on
+from gpca.experiments.claims import compared_sources
+from gpca.experiments.plan import Run
 from gpca.experiments.registry import results_of
-from gpca.experiments.run import explainer_of, files_behind, names_of, settings_of
+from gpca.experiments.run import explainer_of, files_behind, names_of
+from gpca.objects.entry import title_of
 from gpca.process.registry import load as load_function
 from gpca.reporting.registry import input_name
 
@@ -32,10 +34,9 @@ def sources(config):
 
 
 def test_every_place_that_the_registry_names_is_there(config, sources):
-    names, settings = names_of(config, sources), settings_of(config, sources)
+    names = names_of(config, sources)
     for result in results_of(names):
         assert all(files for files in result.files(names).values())
-        result.arguments(settings)
 
 
 def test_a_reader_of_one_file_is_given_one_and_a_reader_of_many_a_list(config, sources):
@@ -103,25 +104,5 @@ def test_an_explainer_of_uncertainties_is_given_its_design(config, sources):
 
 
 def test_a_stand_in_says_so_wherever_its_title_stands(stand_ins):
-    settings = settings_of(stand_ins, check(deepcopy(stand_ins)))
-    for title in (*settings["source_titles"].values(), settings["frames_title"], settings["model_title"]):
-        assert "procedural stand-in" in title
-
-
-@pytest.mark.parametrize(
-    ("changes", "told"),
-    [
-        ({"pretraining": None}, ""),
-        ({}, "whole objects"),
-        (
-            {"virtual": {"objects": "all", "count": 2, "views": 1, "train": 9}},
-            "whole objects and on frames rendered of the models of all objects",
-        ),
-        (
-            {"virtual": {"objects": "training", "count": 2, "views": 1, "train": 9}},
-            "whole objects and on frames rendered of models of objects that no tested frame shows",
-        ),
-    ],
-)
-def test_tables_tell_what_encoders_of_frames_were_pretrained_on(stand_ins, changes, told):
-    assert pretrained_on(stand_ins["real_world"] | changes) == told
+    check(deepcopy(stand_ins))
+    assert all("procedural stand-in" in title_of(entry) for entry in compared_sources(Run(stand_ins)).values())

@@ -14,7 +14,7 @@ ENTRIES = {result.name: result for result in registered()}
 
 
 def result(*inputs, **fields):
-    nothing = {"settings": {}, "only": {}, "needs": (), "paper": False}
+    nothing = {"only": {}, "needs": (), "paper": False}
     head = {"name": "table9_mine", "kind": "tables", "section": "S", "title": "T", "caption": "C.", "builder": "m:f"}
     return Result(**head | {"inputs": inputs} | nothing | fields)
 
@@ -27,9 +27,8 @@ def given(pattern, **fields):
 def test_every_builder_and_reader_takes_what_its_entry_gives(name):
     entry = ENTRIES[name]
     builder = inspect.signature(load(entry.builder))
-    of_source = {"source"} if entry.takes_run and "{source}" in entry.name else set()
-    arguments = {each.argument for each in entry.inputs} | set(entry.settings) | of_source
-    builder.bind(*[None] * entry.takes_run, **dict.fromkeys(arguments))
+    of_source = {"source"} if "{source}" in entry.name else set()
+    builder.bind(None, **dict.fromkeys({each.argument for each in entry.inputs} | of_source))
     for each in entry.inputs:
         if each.read:
             keywords = {key: None for key in each.files if key}
@@ -79,34 +78,25 @@ def test_a_result_of_which_a_name_is_empty_is_left_out():
 
 
 def test_one_entry_stands_for_a_figure_of_each_source(monkeypatch):
-    objects = result(
-        given("objects/{source}.npz"),
-        name="objects_{source}",
-        title="Objects: {source}",
-        settings={"title": "source_titles.{source}"},
-    )
+    objects = result(given("objects/{source}.npz"), name="objects_{source}", title="Objects: {source}")
     monkeypatch.setattr(registry, "registered", lambda: (objects,))
     ycb, mine = results_of(NAMES)
     assert (ycb.name, mine.title) == ("objects_ycb", "Objects: mine")
     assert ycb.files(NAMES) == {"metrics": "objects/ycb.npz"}
-    assert mine.arguments({"source_titles": {"ycb": "YCB", "mine": "Mine"}}) == {"title": "Mine"}
+    assert (mine.arguments, objects.arguments) == ({"source": "mine"}, {})
 
 
-def test_a_result_of_some_explainers_is_shown_the_titles_of_these_alone():
-    entry = result(only={"explainer": ("gpca", "gone")}, settings={"names": "explainers", "seeds": "n"})
-    settings = {"explainers": {"gpca": "GP-CA", "forest": "Forest"}, "n": 3}
-    assert entry.arguments(settings) == {"names": {"gpca": "GP-CA"}, "seeds": 3}
-
-
-def test_a_builder_is_given_what_was_read_and_what_the_run_shows(tmp_path):
+def test_a_builder_is_given_the_run_and_what_was_read(tmp_path):
     path = tmp_path / "given.json"
     path.write_text("[1, 2]")
     readers = {
         "iterable": {"function": "tests.reporting.test_registry:read", "keywords": {"": "iterable"}},
         "key": {"function": "", "keywords": {"": "key"}},
     }
-    built = build("tests.reporting.test_registry:show", readers, {"iterable": str(path), "key": "a"}, {"reverse": True})
-    assert built == ([1, 2], "a", True)
+    built = build(
+        "tests.reporting.test_registry:show", readers, {"iterable": str(path), "key": "a"}, {"source": "ycb"}, "run"
+    )
+    assert built == ("run", [1, 2], "a", "ycb")
 
 
 def read(path):
@@ -114,15 +104,15 @@ def read(path):
         return json.load(file)
 
 
-def show(iterable, key, reverse):
-    return iterable, key, reverse
+def show(run, iterable, key, source):
+    return run, iterable, key, source
 
 
 def test_a_reader_of_several_kinds_of_files_is_given_each_by_its_keyword():
     both = Input("learned", {"a": ("a.csv",), "b": ("b.csv",)}, "tests.reporting.test_registry:joined")
     entry = result(both)
     assert entry.files(NAMES) == {"learned_a": "a.csv", "learned_b": "b.csv"}
-    built = build("tests.reporting.test_registry:only", entry.readers, entry.files(NAMES), {})
+    built = build("tests.reporting.test_registry:only", entry.readers, entry.files(NAMES), {}, None)
     assert built == "a.csv and b.csv"
 
 
@@ -130,7 +120,7 @@ def joined(a, b):
     return f"{a} and {b}"
 
 
-def only(learned):
+def only(_run, learned):
     return learned
 
 

@@ -22,7 +22,7 @@ for experiment in experiments():
             params:
                 **tidy.settings(config),
                 collector=tidy.collector,
-                config=token_of(tidy.file, tidy.takes_run),
+                config=token_of(tidy.file) if tidy.takes_run else "",
             script:
                 "../scripts/collect.py"
 

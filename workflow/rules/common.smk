@@ -3,6 +3,7 @@ import json
 from pathlib import Path
 
 from gpca.experiments.active_learning import learning_settings
+from gpca.experiments.claims import compared_sources
 from gpca.explainers.interface import BARE, REENACTED
 from gpca.explainers.registry import CAUSES, explainer_entry, explainer_module
 from gpca.alignment.methods.registry import method_module
@@ -11,7 +12,7 @@ from gpca.encoders.registry import encoders
 from gpca.objects.source import find_file
 from gpca.experiments.frames import pretraining_of
 from gpca.experiments.plan import Run, config_token
-from gpca.experiments.run import names_of, settings_of
+from gpca.experiments.run import names_of
 from gpca.experiments.step import Plan
 from gpca.frames.source import VIRTUAL
 
@@ -27,8 +28,8 @@ for name, entry in SOURCES.items():
     config["sources"].setdefault(name, entry)  # of a rule
 NAMES = names_of(config, SOURCES)
 PLAN = Plan(Run(config), NAMES, SOURCES)
+TITLED = compared_sources(PLAN.run)
 LEARNING_SETTINGS = learning_settings(PLAN)
-SHOWN = settings_of(config, SOURCES)
 FRAMES = NAMES["frames"]
 EMBEDDING = NAMES["embedding"]
 REDUCTIONS = [name for name in config["reductions"] if name != "none"]
@@ -102,7 +103,7 @@ def below_results(files):
     return {name: below(paths) for name, paths in files.items()}
 
 
-def token_of(file, takes_run):
-    """Return the token of the config for what is given the run (gpca/experiments/plan.py), and nothing for others."""
+def token_of(file):
+    """Return the token of the config for a file whose function is given the run (gpca/experiments/plan.py)."""
     sidecar = f"results/{config['run']}/{file}.provenance.json"
-    return (lambda wildcards: config_token(config, sidecar)) if takes_run else ""
+    return lambda wildcards: config_token(config, sidecar)

@@ -5,7 +5,9 @@ from gpca.process.code_files import ROOT
 from gpca.comparison.claims import counterparts_of, read_claims
 from gpca.comparison.published import read_published
 from gpca.comparison.values import folders_behind
+from gpca.experiments.diagnosis import cause_titles
 from gpca.experiments.registry import experiments
+from gpca.frames.source import ONE_ENCODER
 
 COLLECTED = [
     file
@@ -82,12 +84,7 @@ rule comparison:
     conda:
         "../envs/gpca.yaml"
     params:
-        objects={
-            **SHOWN["sources"],
-            FRAMES: SHOWN["frames"],
-            "model": SHOWN["model"],
-            "recovery": SHOWN["compared_sources"]["recovery"],
-        },
+        objects={name: entry for name, entry in TITLED.items() if name != ONE_ENCODER},
         tolerances=config["comparison"]["tolerances"],
         floors={"labels": 1},
     script:
@@ -136,9 +133,15 @@ rule page:
         uncertain=UNCERTAIN,
         measured=MEASURED,
         titles={
-            name: SHOWN[name] for name in ("explainers", "cause_explainers", "budget")
+            "explainers": {
+                name: {"title": entry.title, "oracle": entry.oracle}
+                for name in config["explainers"]
+                for entry in [explainer_entry(name)]
+            },
+            "cause_explainers": cause_titles(config),
+            "budget": config["recovery"]["loop"]["budget"],
         },
-        sources={**SHOWN["sources"], FRAMES: SHOWN["frames"]},
+        sources={name: TITLED[name] for name in (*SOURCES, FRAMES)},
         # Not where data lie: that changes no number, and is nobody's business.
         config={
             key: value

@@ -11,7 +11,7 @@ rule encoders:
         ),
         collect(
             f"<results>/encoders/{FRAMES}/{{encoder}}/seed{{seed}}.pt",
-            encoder=SHOWN["backbones"],
+            encoder=config["real_world"]["backbones"],
             seed=SEEDS,
         ),
 

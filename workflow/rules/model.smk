@@ -82,14 +82,13 @@ rule model:
     conda:
         "../envs/gpca.yaml"
     params:
+        **TITLED["model"],
         step="gpca.steps.causes:model",
         source=MODEL_SOURCE,
         seed=SEEDS[0],
-        title=SHOWN["model"]["title"],
-        stand_in=SHOWN["model"]["stand_in"],
         learned_from=[
             of["title"] + " (procedural stand-in)" * of["stand_in"]
-            for of in (SHOWN["sources"][source] for source in SOURCES)
+            for of in (TITLED[source] for source in SOURCES)
         ],
         settings=as_json(MODEL_SETTINGS),
     script:

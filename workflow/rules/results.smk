@@ -1,4 +1,4 @@
-# Every table and figure of the registry, gpca/reporting/results.yaml: a rule of its name for each.
+# Every table and figure that an experiment declares: a rule of its name for each.
 from gpca.experiments.registry import results_of
 from gpca.reporting.registry import SUFFIXES
 
@@ -42,9 +42,9 @@ for result in RESULTS:
             kind=result.kind,
             builder=result.builder,
             readers=result.readers,
-            arguments=result.arguments(SHOWN),
+            arguments=result.arguments,
             only=result.only,
-            config=token_of(result.main_file, result.takes_run),
+            config=token_of(result.main_file),
             caption=result.caption,
         script:
             "../scripts/result.py"

@@ -11,10 +11,9 @@ from gpca.reporting.registry import build
 with workflow_script(snakemake) as added:
     entry, out = snakemake.params, snakemake.output
     config = Recorded(snakemake.config)
-    run = Run(config, entry.only, names_of) if entry.config else None
+    run = Run(config, entry.only, names_of)
     made = build(entry.builder, entry.readers, files_by_name(snakemake.input), entry.arguments, run)
-    if run:
-        added[READ] = config.record(entry.config)
+    added[READ] = config.record(entry.config)
     if entry.kind == "tables":
         made.write(Path(out.csv).with_suffix(""))
     else:
