@@ -227,23 +227,17 @@ ROWS = {
     "t behind": (scaled(-1), "line 2: t has z = -"),
     "t infinite": (one(5, "0 0 inf"), "line 4: t contains values that are not finite numbers"),
     "t huge": (one(5, "0 0 1e90"), "line 4: t is"),
-    "t of two": (one(5, "0 700"), "line 4: t has 2 entries, not 3"),
     "t in other digits": (one(5, "0 0 ٧٠٠"), "line 4: t contains values that are not"),
-    "R of zeros": (one(4, "0 0 0 0 0 0 0 0 0"), "line 4: the pose is not a rigid transform: its axes are not"),
     "R mirrored": (one(4, "1 0 0 0 1 0 0 0 -1"), "line 4: the pose is not a rigid transform: it is mirrored"),
-    "R scaled": (one(4, "2 0 0 0 2 0 0 0 2"), "not orthogonal or not of unit length"),
     "R a quaternion": (one(4, "1 0 0 0"), "line 4: R has 4 entries, not 9"),
-    "score NaN": (one(3, "nan"), "line 4: score contains values that are not finite numbers"),
     "score missing": (one(3, ""), "line 4: score has 0 entries, not 1"),
     "score with NUL": (one(3, "1\0"), "line 4: column 'score' contains a line break or another control"),
     "object unknown": (one(2, "77"), "line 4: the dataset has no object 77"),
-    "object negative": (one(2, "-1"), "line 4: obj_id is '-1', not a whole number"),
     "object without end": (one(2, "9" * 5000), "line 4: obj_id is '999"),
     "image unknown": (one(1, "999"), "line 4: the dataset has no image 999"),
     "a row too long": (lambda rows: rows[2].append("1"), "results.csv"),
     "a row too short": (lambda rows: rows[2].__delitem__(slice(3, None)), "line 4: score has 0 entries"),
     "no rows": (lambda rows: rows.clear(), "has no rows"),
-    "of another dataset": (lambda rows: [row.__setitem__(0, "50") for row in rows], "of scene 50"),
 }
 
 
@@ -257,7 +251,6 @@ HEADS = {
     "column missing": (HEAD.replace("score", "confidence"), "column 'score' is missing"),
     "column twice": (HEAD.replace("time", "t"), "column 't' appears twice"),
     "no head": ("1,0,1,1.0,1 0 0 0 1 0 0 0 1,0 0 700,-1", "column 'scene_id' is missing"),
-    "semicolons": (HEAD.replace(",", ";"), "results.csv"),
 }
 
 
@@ -272,9 +265,7 @@ FILES = {
     "blank": (b"\n\n\n", "results.csv"),
     "UTF-16": (HEAD.encode("utf-16"), "is not a readable CSV file"),
     "Latin-1": (f"{HEAD}\n1,0,1,1.0,é,0 0 1,-1\n".encode("latin-1"), "is not a readable CSV file"),
-    "NUL bytes": (b"\0" * 999, "column 'scene_id' is missing"),
     "an open quote": (f'{HEAD}\n"1,0,1,1.0\n'.encode(), "is not a readable CSV file"),
-    "JSON": (b'{"scene_id": 1}', "column 'scene_id' is missing"),
     "an archive": (b"PK\x03\x04" + bytes(range(256)), "results.csv"),
 }
 

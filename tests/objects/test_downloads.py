@@ -1,6 +1,5 @@
 """Archives that would fill the memory or leave their folder, through the command line."""
 
-import gzip
 import hashlib
 import io
 import json
@@ -246,44 +245,33 @@ def test_no_archive(tmp_path):
 
 
 VIEW = "mug_1_1_1.pcd"
-GB = 10**9
 
 
-def header(kind, size, name=VIEW):
-    info = tarfile.TarInfo(name)
-    info.type, info.size = kind, size
-    return info.tobuf(tarfile.GNU_FORMAT)
+def holding(size):
+    """A tar that says that it holds so much, which is a hole."""
+
+    def write(path):
+        info = tarfile.TarInfo(VIEW)
+        info.size = size
+        with path.open("wb") as file:
+            file.write(info.tobuf(tarfile.GNU_FORMAT))
+            file.truncate(512 + -(-size // 512) * 512 + 1024)
+
+    return write
 
 
-def said_to_hold(path, kind, size):
-    """A tar that says that it holds so much: a hole in an uncompressed one, and nothing in a compressed one."""
-    if path.suffix == ".tgz":
-        path.write_bytes(gzip.compress(header(kind, size) + bytes(10240)))
-        return
-    with path.open("wb") as file:
-        file.write(header(kind, size))
-        file.truncate(512 + -(-size // 512) * 512 + 1024)
-
-
-def zipped(path, method=zipfile.ZIP_DEFLATED, content=b"x"):
-    with zipfile.ZipFile(path, "w", method) as file:
-        file.writestr(VIEW, content)
-
-
-def with_member(path, name, kind=tarfile.REGTYPE):
-    info = tarfile.TarInfo(name)
-    info.type, info.size, info.linkname = kind, 1 if kind == tarfile.REGTYPE else 0, "/etc/passwd"
-    with tarfile.open(path, "w") as file:
-        file.addfile(info, io.BytesIO(b"x"))
+def link(path):
+    info = tarfile.TarInfo(VIEW)
+    info.type, info.linkname = tarfile.SYMTYPE, "/etc/passwd"
+    pack(path, {}, [info])
 
 
 ARCHIVES = {
-    "member.tar": lambda path: said_to_hold(path, tarfile.REGTYPE, 3 * GB),
-    "members.tar": lambda path: said_to_hold(path, tarfile.REGTYPE, 30 * GB),
-    "bytes missing.tgz": lambda path: said_to_hold(path, tarfile.REGTYPE, 3 * GB),
-    "link.tar": lambda path: with_member(path, VIEW, tarfile.SYMTYPE),
-    "no cloud.tar": lambda path: with_member(path, "mug.txt"),
-    "damaged cloud.tar": lambda path: with_member(path, VIEW),
+    "member.tar": holding(3 * 10**9),
+    "members.tar": holding(30 * 10**9),
+    "link.tar": link,
+    "no cloud.tar": lambda path: pack(path, {"mug.txt": b"x"}),
+    "damaged cloud.tar": lambda path: pack(path, {VIEW: b"x"}),
 }
 
 
@@ -296,7 +284,7 @@ def test_an_archive_of_views_is_refused(name, tmp_path):
 
 
 def test_a_disk_that_is_too_small_is_named_before_anything_is_written(tmp_path, monkeypatch):
-    zipped(tmp_path / "a.zip", content=bytes(5 * 10**6))
+    pack(tmp_path / "a.zip", {VIEW: bytes(5 * 10**6)})
     monkeypatch.setattr(downloads.shutil, "disk_usage", lambda folder: type("Usage", (), {"free": 10**6}))
     with pytest.raises(InputError, match=r"a\.zip: unpacks to 0\.005 GB, but 0\.001 GB of the disk are free"):
         unpack(tmp_path / "a.zip", tmp_path / "target")

@@ -105,12 +105,7 @@ BROKEN = {
     "nan.ply": (ascii_ply([(0, 0, 0), (0, "nan", 0), (1, 0, 0)], [(0, 1, 2)]), "NaN"),
     "inf.obj": (b"v 0 0 0\nv 0 inf 0\nv 1 0 0\nf 1 2 3\n", "NaN or infinity"),
     "wild.ply": (ascii_ply([(0, 0, 0), (0, 1, 0), (1, 0, 0)], [(0, 1, 3)]), "refers to a missing vertex"),
-    "wild.obj": (b"v 0 0 0\nv 0 1 0\nv 1 0 0\nf 1 2 9\n", "readable"),
-    "points.obj": (b"v 0 0 0\nv 0 1 0\nv 1 0 0\n", "no faces"),
     "text.ply": (b"hello\n", "readable"),
-    "text.stl": (b"hello\n", "neither begins"),
-    "text.off": (b"hello\n", "readable"),
-    "underline.off": (b"OFF\n3 1 0\n1_0 0 0\n0 1 0\n0 0 1\n3 0 1 2\n", "'1_0' is not a finite decimal number"),
     "digits.off": ("OFF\n3 1 0\n٣ 0 0\n0 1 0\n0 0 1\n3 0 1 2\n".encode(), "'٣' is not a finite decimal number"),
 }
 
@@ -216,50 +211,39 @@ LAST_LIST = -13  # bytes of a triangle
 BOMB = b"\x00A" + b"\xe0\xff\x00" * 3_000_000  # LZF: each three bytes copy 264
 MESHES = {
     # rows that are too wide: the coordinates would be others
-    "every_wide.ply": ply([f"1051 {row}" for row in VERTICES]),
     "one_wide.ply": ply(changed(VERTICES, f"1051 {VERTICES[5]}")),
-    "words.ply": ply(changed(VERTICES, "1 2 x")),
     "list_too_long.ply": ply(faces=changed(MESHES_FACES, "4 1 2 3")),
     "two_corners.ply": ply(faces=changed(MESHES_FACES, "2 1 2")),
     "negative_corner.ply": ply(faces=changed(MESHES_FACES, "3 1 2 -1")),
     "far_corner.ply": ply(faces=changed(MESHES_FACES, "3 1 2 162")),
     # counts
-    "more_rows.ply": ply(n_faces=len(MESHES_FACES) - 5),
     "fewer_rows.ply": ply(n_faces=len(MESHES_FACES) + 5),
     "negative_count.ply": ply(n_vertices=-5),
     "huge_count.ply": ply(n_vertices=10**15),
-    "no_vertices.ply": ply([], []),
     "two_axes.ply": ply(
         [row.rsplit(" ", 1)[0] for row in VERTICES], properties=MESHES_XYZ.replace("property float z\n", "")
     ),
     "no_end.ply": ply()[:100],
     "vertices_twice.ply": ply().replace("element face", f"element vertex {len(VERTICES)}\n{MESHES_XYZ}element face"),
     "x_twice.ply": ply([f"{row} 1" for row in VERTICES], properties=f"{MESHES_XYZ}property float x\n"),
-    "property_of_nothing.ply": ply().replace("element vertex", "property float x\nelement vertex"),
     "middle_endian.ply": binary(lambda content, start: write(content, 0, content[:40].replace(b"little", b"middle"))),
     "no_format.ply": binary(lambda content, start: write(content, 4, b"comment")),
     "two_corners_binary.ply": cornered(2),
     # numbers
-    "nan.ply": ply(changed(VERTICES, "nan 0 0")),
     "infinite.ply": ply(changed(VERTICES, "1e39 0 0")),
     "huge.ply": ply([f"{row}e30" for row in VERTICES]),
     "one_point.ply": ply(["1 2 3"] * len(VERTICES)),
-    "binary_count.ply": binary(lambda content, start: write(content, 0, content[:start].replace(b" 162", b" 163"))),
     "binary_list.ply": binary(lambda content, start: write(content, len(content) + LAST_LIST, b"\x04")),
     "binary_corner.ply": binary(lambda content, start: write(content, len(content) - 4, b"\xff\xff\xff\x7f")),
     "binary_cut.ply": binary(lambda content, start: content.__delitem__(slice(len(content) - 130, None))),
     # OFF
-    "every_wide.off": off([f"1051 {row}" for row in VERTICES]),
     "two_corners.off": off(faces=changed(MESHES_FACES, "2 1 2")),
     "list_too_long.off": off(faces=changed(MESHES_FACES, "5 1 2 3")),
     "more_rows.off": off(faces=[*MESHES_FACES, *MESHES_FACES]),
     "cut.off": off(faces=MESHES_FACES[:-1]),
-    "nan.off": off(changed(VERTICES, "nan 0 0")),
-    "not.off": off(head="ABC"),
     # OBJ
     "index_0.obj": obj(faces=BALL.faces),
     "cut_between_faces.obj": obj(faces=BALL.faces[:160] + 1),
-    "far_corner.obj": obj(faces=[*(BALL.faces + 1), [1, 2, 163]]),
     "counts_back.obj": obj(faces=BALL.faces - 162) + "v 1 2 3\n",
     "weights.obj": obj([f"1051 {row}" for row in VERTICES]),
     "zeros.obj": "\0" * 3_000_000,
@@ -267,11 +251,9 @@ MESHES = {
     "cut.stl": stl_text()[:4000],
     "cut_between_faces.stl": "\n".join(stl_text().splitlines()[:351]),
     "nan_text.stl": stl_text().replace("vertex", "vertex nan", 1),
-    "count_too_high.stl": stl(lambda content: write(content, 80, (10**9).to_bytes(4, "little"))),
     "count_too_low.stl": stl(lambda content: write(content, 80, (10).to_bytes(4, "little"))),
     "binary_cut.stl": stl(lambda content: content.__delitem__(slice(84 + 2000, None))),
     "misspelled_vertex.stl": stl_text().replace("vertex", "vertx"),
-    "misspelled_normal.stl": stl_text().replace("facet normal", "facet norml", 1),
     "two_vertices.stl": re.sub("vertex .*\n", "", stl_text(), count=1),
     "two_numbers.stl": re.sub(r"(vertex \S+ \S+) \S+", r"\1", stl_text(), count=1),
     "no_end.stl": stl_text().replace("endsolid", ""),
@@ -298,7 +280,6 @@ FAULTS = {
     "two_corners_binary.ply": "element face has rows of 2 corners",
     "two_corners.off": f"face 6 of {len(MESHES_FACES)} has 2 corners",
     "misspelled_vertex.stl": "line 4: 'vertx' stands where 'vertex' should",
-    "misspelled_normal.stl": "line 2: 'facet norml' stands where 'facet normal' should",
     "two_numbers.stl": "line 4: 'vertex' has 2 numbers",
     "zeros.obj": "a line is longer than 1048576 bytes, so it is not text",
 }
