@@ -74,8 +74,7 @@ class SharedSections:
     causes: Annotated[dict, part_of(CauseSettings, without=NOT_OF_CAUSES)]
     explainers: ByName
     model: Annotated[  # of `gpca explain`
-        dict,
-        required(source=str, encoder=str, causes=ModelCauses, classifier=GPCSettings, false_alarms=OpenShare),
+        dict, required(source=str, encoder=str, causes=ModelCauses, classifier=GPCSettings, false_alarms=OpenShare)
     ]
     comparison: Annotated[dict, required(tolerances=Tolerances)]
     reference: Allowance

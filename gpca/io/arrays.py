@@ -113,7 +113,17 @@ def _checked_members(archive, path, shapes, kinds, optional, remedy) -> dict[str
         actual, _, dtype = read(head)
         if dtype.hasobject:
             raise InputError(path, "contains pickled objects, which are never loaded", remedy)
-        _check_shape(path, name, actual, shape, sizes, remedy)
+        expected: list[int | str] = []
+        for number, size in enumerate(shape):
+            if isinstance(size, str):
+                dimension, _, more = size.partition("+")
+                if len(actual) == len(shape):
+                    sizes.setdefault(dimension, actual[number] - int(more or 0))
+                size = sizes[dimension] + int(more or 0) if dimension in sizes else size
+            expected.append(size)
+        if list(actual) != expected:
+            wanted = "×".join(map(str, expected)) or "scalar"
+            raise InputError(path, f"array '{name}' is {'×'.join(map(str, actual)) or 'scalar'}, not {wanted}", remedy)
         if math.prod(actual) and dtype.kind not in kinds.get(name, _KNOWN):
             raise InputError(path, f"array '{name}' has type {dtype}", remedy)
         if (dtype.kind == "f" and dtype.itemsize not in _FLOAT_BYTES) or not dtype.isnative:
@@ -123,17 +133,3 @@ def _checked_members(archive, path, shapes, kinds, optional, remedy) -> dict[str
             raise ValueError(f"array '{name}' is not as long as its header says")
     require_memory(sum(info.file_size for info in members.values()), path.stat().st_size, path, remedy)
     return members
-
-
-def _check_shape(path, name, actual, shape, sizes, remedy) -> None:
-    expected: list[int | str] = []
-    for number, size in enumerate(shape):
-        if isinstance(size, str):
-            dimension, _, more = size.partition("+")
-            if len(actual) == len(shape):
-                sizes.setdefault(dimension, actual[number] - int(more or 0))
-            size = sizes[dimension] + int(more or 0) if dimension in sizes else size
-        expected.append(size)
-    if list(actual) != expected:
-        wanted = "×".join(map(str, expected)) or "scalar"
-        raise InputError(path, f"array '{name}' is {'×'.join(map(str, actual)) or 'scalar'}, not {wanted}", remedy)

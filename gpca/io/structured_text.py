@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -69,29 +69,19 @@ def read_scalar(text: str) -> Any:
     return value if alike and alike.fullmatch(text.strip()) else text
 
 
-def require_plain(mapping: Mapping, subject: object) -> None:
+def require_plain(part: Mapping | list, subject: object, path: tuple = ()) -> None:
     """Raise an InputError for a key that is not text, a value that JSON lacks, or a control character in a text."""
-    for path, value in _entries(mapping):
-        key = ".".join(map(str, path))
-        if not isinstance(path[-1], str | _Index):
-            raise InputError(f"{subject} {key}", f"the key {path[-1]!r} is not text", f'write "{path[-1]}", in quotes')
-        for text in (path[-1], value):
+    for name, value in part.items() if isinstance(part, Mapping) else enumerate(part):
+        key = ".".join(map(str, (*path, name)))
+        if isinstance(part, Mapping) and not isinstance(name, str):
+            raise InputError(f"{subject} {key}", f"the key {name!r} is not text", f'write "{name}", in quotes')
+        for text in (name, value):
             if isinstance(text, str) and re.search(_UNPRINTABLE, text):
                 raise InputError(f"{subject} {key!r}", f"{text!r} contains a control character", "write it on one line")
-        if not (value is None or isinstance(value, str | int | float | Mapping | list)):
+        if isinstance(value, Mapping | list):
+            require_plain(value, subject, (*path, name))
+        elif not (value is None or isinstance(value, str | int | float)):
             raise InputError(f"{subject} {key}", f"{value!r} is a {type(value).__name__}", "put it in quotes")
-
-
-class _Index(int):
-    """Place in a list."""
-
-
-def _entries(value: Any, path: tuple = ()) -> Iterator[tuple[tuple, Any]]:
-    if isinstance(value, Mapping | list):
-        pairs = value.items() if isinstance(value, Mapping) else ((_Index(i), entry) for i, entry in enumerate(value))
-        for key, entry in pairs:
-            yield (*path, key), entry
-            yield from _entries(entry, (*path, key))
 
 
 def _parse_yaml(text: str, path: Path) -> Any:

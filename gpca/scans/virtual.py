@@ -130,10 +130,7 @@ def _furniture(at_2: np.ndarray, extent_3: np.ndarray, random: np.random.Generat
         solids = [cylinder(min(width, depth) / 2, height, (u, v, height / 2))]
     else:
         height = 0.45
-        solids = [
-            box((0.5, 0.5, height), (u, v, height / 2)),
-            box((0.5, 0.1, 0.6), (u, v + 0.2, height + 0.3)),
-        ]
+        solids = [box((0.5, 0.5, height), (u, v, height / 2)), box((0.5, 0.1, 0.6), (u, v + 0.2, height + 0.3))]
     for _ in range(random.integers(0, 4) if height < 1.3 else 0):
         w, d, h = random.uniform(0.08, 0.3, 3)
         spot = (u + random.uniform(-0.3, 0.3) * width, v + random.uniform(-0.3, 0.3) * depth)

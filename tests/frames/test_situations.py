@@ -11,8 +11,7 @@ from gpca.pairs.perturbation import CONCEPTS
 from .tiny import scene_settings, surfaces
 
 SETTINGS = SituationSettings(
-    scenes=scene_settings(noise=DepthNoise(), objects=(3, 3), count=2, camera=Camera(160, 120, 285)),
-    hidden=(0.3, 0.9),
+    scenes=scene_settings(noise=DepthNoise(), objects=(3, 3), count=2, camera=Camera(160, 120, 285)), hidden=(0.3, 0.9)
 )
 
 
