@@ -13,19 +13,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from gpca.comparison import verdicts
 from gpca.comparison.published import TIMES, UNITS, Number
 from gpca.comparison.values import Reproduced
-from gpca.comparison.verdicts import (
-    CLOSE,
-    JUDGED,
-    REPRODUCED,
-    Printed,
-    Tolerance,
-    distance,
-    exactly,
-    judged_once,
-    verdict_of,
-)
+from gpca.comparison.verdicts import Printed, Tolerance
 from gpca.seeds import generator
 
 if TYPE_CHECKING:
@@ -53,8 +44,8 @@ def chance(comparison: pd.DataFrame, tolerances: Mapping[str, Tolerance]) -> dic
 
     The comparison is what :func:`gpca.comparison.verdicts.compare` returns, or read from its file.
     """
-    rows = judged_once(comparison)
-    rows = rows[rows["verdict"].isin(JUDGED)]
+    rows = verdicts.judged_once(comparison)
+    rows = rows[rows["verdict"].isin(verdicts.JUDGED)]
     kinds = rows["unit"].where(~rows["unit"].isin(TIMES), "time")
     columns: dict[str, list[tuple]] = {}  # per table: counts of agreement and centered ranks of each column
     for (table, column, _), group in rows.groupby(["table", "column", kinds], sort=False):
@@ -90,13 +81,14 @@ def _fits(group: pd.DataFrame, tolerances: Mapping[str, Tolerance]) -> np.ndarra
         for j, run in enumerate(rows):
             bounds = (run.ci_low, run.ci_high, int(run.n), bool(run.at_least), run.cluster_low, run.cluster_high)
             value = Reproduced(run.reproduced, *bounds).times(UNITS[row.unit].factor / UNITS[run.unit].factor)
-            fits_K_K[i, j] = verdict_of(printed, value, tolerances[row.unit]) in (REPRODUCED, CLOSE)
+            verdict = verdicts.verdict_of(printed, value, tolerances[row.unit])
+            fits_K_K[i, j] = verdict in (verdicts.REPRODUCED, verdicts.CLOSE)
     return fits_K_K
 
 
 def is_close(number: Number, value: float, at_least: bool, tolerance: Tolerance) -> bool:
     """Return whether a value, in the number's unit, lies within the close tolerance; a lower bound never does."""
-    return not at_least and abs(distance(exactly(number), value, tolerance)) <= 1
+    return not at_least and abs(verdicts.distance(verdicts.exactly(number), value, tolerance)) <= 1
 
 
 def weights(numbers: Sequence[Number]) -> np.ndarray:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -43,8 +43,7 @@ CLAIM_COLUMNS = (
 )
 
 
-@dataclass(frozen=True)
-class Compared:
+class Compared(NamedTuple):
     """Two values that a claim compares: a run's, or a constant in the claim's unit."""
 
     one: Counterpart | float
@@ -53,51 +52,36 @@ class Compared:
     @property
     def counterparts(self) -> list[Counterpart]:
         """Return those of the two values that a run has to provide."""
-        return [value for value in (self.one, self.other) if isinstance(value, Counterpart)]
+        return [value for value in self if isinstance(value, Counterpart)]
 
 
 @dataclass(frozen=True)
 class Claim:
-    """A claim of the paper in one sentence.
-
-    Attributes:
-        test: greater, less, not_worse or equivalent.
-        margin: the smallest difference that counts, in `unit`; with `ratio`, a factor.
-        margin_set: the day on which the margin entered git.
-        values_known: whether the differences had been seen by then.
-        compared: the comparisons, all of which have to hold; empty where nothing was run, and then `note` says why.
-    """
+    """A claim of the paper in one sentence."""
 
     name: str
     sentence: str
     place: str
-    test: str = ""
-    margin: float = 0.0
+    test: str = ""  # greater, less, not_worse or equivalent
+    margin: float = 0.0  # the smallest difference that counts, in `unit`; with `ratio`, a factor
     unit: str = ""
     ratio: bool = False
-    margin_set: str = FIRST_SET
-    values_known: bool = True
-    compared: tuple[Compared, ...] = ()
+    margin_set: str = FIRST_SET  # the day on which the margin entered git
+    values_known: bool = True  # whether the differences had been seen by then
+    compared: tuple[Compared, ...] = ()  # all have to hold; empty where nothing was run, and then `note` says why
     note: str = ""
 
 
 @dataclass(frozen=True)
 class ClaimDifference:
-    """A difference of two values, or of their logarithms for a claim about a ratio.
-
-    Attributes:
-        bounds: of its interval, by level.
-        n: repeats.
-        at_least, at_most: the difference is a lower or an upper bound, as some repeats were censored.
-        at_floor: both values are at the unit's minimum in at least half of the repeats.
-    """
+    """A difference of two values, or of their logarithms for a claim about a ratio."""
 
     value: float
-    bounds: Mapping[float, tuple[float, float]]
-    n: int
-    at_least: bool = False
+    bounds: Mapping[float, tuple[float, float]]  # of its interval, by level
+    n: int  # repeats
+    at_least: bool = False  # the difference is a lower or an upper bound, as some repeats were censored
     at_most: bool = False
-    at_floor: bool = False
+    at_floor: bool = False  # both values are at the unit's minimum in at least half of the repeats
 
 
 def read_claims() -> list[Claim]:
@@ -167,7 +151,7 @@ def judge(
         for compared in claim.compared:
             counterparts = compared.counterparts
             row: dict[str, Any] = {"source": counterparts[0].sources[0], "table": counterparts[0].table}
-            row |= {"at_floor": False, **{each: _name(compared, each) for each in ("one", "other")}}
+            row |= {"at_floor": False, "one": _name(compared.one, compared), "other": _name(compared.other, compared)}
             verdict = strict_verdict = NOT_RUN
             difference = difference_of(claim, compared, results, clusters, (LEVEL, strict), floors.get(claim.unit))
             if difference is not None:
@@ -194,12 +178,9 @@ def judge(
     return pd.DataFrame(records, columns=list(CLAIM_COLUMNS)).astype({"n": "Int64"})
 
 
-def _name(compared: Compared, which: str) -> str:
-    """Name a value by what distinguishes it from the other: its method, or its metric where both have one method.
-
-    A value that is compared with a constant also names its concept.
-    """
-    value, counterparts = getattr(compared, which), compared.counterparts
+def _name(value: Counterpart | float, compared: Compared) -> str:
+    """Name a value by what distinguishes it from the other: its method, its metric if they share that, its concept."""
+    counterparts = compared.counterparts
     if not isinstance(value, Counterpart):
         return f"{value:g}"
     if len(counterparts) == 1 and value.concept != ALL:
@@ -258,7 +239,7 @@ def difference_of(
         return None
     if files == {RUNTIME}:
         return _runtime_difference(claim, compared, results[RUNTIME], levels)
-    values: list[Any] = [compared.one, compared.other]  # a series by seed, or a constant
+    values: list[Any] = [*compared]  # a series by seed, or a constant
     censored = [False, False]
     for i, value in enumerate(values):
         if isinstance(value, Counterpart):
@@ -288,10 +269,7 @@ def _cluster_bounds(
     compared: Compared, clusters: Mapping[Counterpart, ShareDraws], level: float, factor: float
 ) -> tuple[float, float]:
     """Return the bounds over clusters and seeds; NaN where a value is no share of samples."""
-    one, other = (
-        clusters.get(value) if isinstance(value, Counterpart) else value / factor
-        for value in (compared.one, compared.other)
-    )
+    one, other = (clusters.get(each) if isinstance(each, Counterpart) else each / factor for each in compared)
     match one, other:
         case ShareDraws(), ShareDraws():
             return one.bounds(level, minus=other)

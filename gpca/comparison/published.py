@@ -87,33 +87,20 @@ TABLES = {
 
 @dataclass(frozen=True)
 class Counterpart:
-    """The value of a run that stands beside a printed number; for ``runtime.csv``, of components, "model" and a device.
+    """The value of a run beside a printed number; ``runtime.csv`` has components, "model" and a device as concept."""
 
-    Attributes:
-        file: CSV file in ``results/{run}/``.
-        sources: averaged seed by seed.
-        methods: summed.
-        metrics: one, or dividend and divisor.
-        statistic: over the seeds, mean or deviation.
-    """
-
-    file: str
+    file: str  # CSV file in ``results/{run}/``
     table: str
-    sources: tuple[str, ...]
-    methods: tuple[str, ...]
-    metrics: tuple[str, ...]
+    sources: tuple[str, ...]  # averaged seed by seed
+    methods: tuple[str, ...]  # summed
+    metrics: tuple[str, ...]  # one, or dividend and divisor
     concept: str
-    statistic: str
+    statistic: str  # over the seeds, mean or deviation
 
 
 @dataclass(frozen=True)
 class Number:
-    """One printed number, or the range from `value` to `upper`, with `decimals` digits (-1: in tens).
-
-    Attributes:
-        paper_n: samples of a share, or repeats of a standard deviation; 0 where unknown.
-        same_as: key of an earlier number that has the same counterpart.
-    """
+    """One printed number, or the range from `value` to `upper`, with `decimals` digits (-1: in tens)."""
 
     table: str
     row: str
@@ -126,8 +113,8 @@ class Number:
     place: str
     counterpart: Counterpart | None
     note: str
-    paper_n: int = 0
-    same_as: tuple[str, ...] = ()
+    paper_n: int = 0  # samples of a share, or repeats of a standard deviation; 0 where unknown
+    same_as: tuple[str, ...] = ()  # key of an earlier number that has the same counterpart
 
     @property
     def key(self) -> tuple[str, str, str]:

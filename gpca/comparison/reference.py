@@ -63,21 +63,13 @@ class Mean(NamedTuple):
 
 @dataclass(frozen=True)
 class Allowance:
-    """The largest difference allowed between two means: section ``reference`` of the config.
-
-    Attributes:
-        tolerances: the largest difference, for each kind in :data:`KINDS`.
-        half_widths: multiple of the half-width of the reference's 95 % interval, for all but shares of samples.
-        flipped: share of the samples that another rounding may decide otherwise.
-        deviations: number of standard deviations of the balance of flipped samples.
-        ratio: allowed share of a count of labels or epochs, as a target may be reached a step later.
-    """
+    """The largest difference allowed between two means: section ``reference`` of the config."""
 
     tolerances: Annotated[dict, Keys({kind: NotNegative for *_, kind in KINDS}, required=[kind for *_, kind in KINDS])]
-    half_widths: NotNegative
-    flipped: Share
-    deviations: NotNegative
-    ratio: Share
+    half_widths: NotNegative  # multiple of those of the reference's 95 % intervals, for all but shares of samples
+    flipped: Share  # share of the samples that another rounding may decide otherwise
+    deviations: NotNegative  # number of standard deviations of the balance of flipped samples
+    ratio: Share  # allowed share of a count of labels or epochs, as a target may be reached a step later
 
     def limit(self, file: str, mean: Mean) -> float:
         """Return the largest difference from a mean of the reference's file that rounding explains."""

@@ -35,21 +35,14 @@ Folder = tuple[str, str, str]  # e.g. ("predictions", "ycb", "gpca_paper")
 
 @dataclass(frozen=True)
 class Reproduced:
-    """A run's value.
-
-    Attributes:
-        low, high: 95 % interval over the repeats; NaN where there is none.
-        n: repeats.
-        at_least: the value is a lower bound.
-        cluster_low, cluster_high: 95 % interval over clusters and seeds; NaN without predictions of single samples.
-    """
+    """A run's value."""
 
     value: float
-    low: float
+    low: float  # 95 % interval over the repeats; NaN where there is none
     high: float
-    n: int
-    at_least: bool = False
-    cluster_low: float = math.nan
+    n: int  # repeats
+    at_least: bool = False  # the value is a lower bound
+    cluster_low: float = math.nan  # 95 % interval over clusters and seeds; NaN without predictions of single samples
     cluster_high: float = math.nan
 
     def interval(self) -> tuple[float, float]:
@@ -180,17 +173,11 @@ def folders_behind(counterparts: Iterable[Counterpart | None]) -> list[Folder]:
 
 @dataclass(frozen=True)
 class ShareDraws:
-    """A share of samples in every bootstrap draw of clusters and seeds; shares of one source have common draws.
+    """A share of samples in every bootstrap draw of clusters and seeds; shares of one source have common draws."""
 
-    Attributes:
-        share_B: (1 + B,) in [0, 1], of the samples themselves first; NaN in a draw without any sample.
-        samples: all of the folder.
-        mask_N: the samples that the share counts.
-    """
-
-    share_B: np.ndarray
-    samples: Clustered
-    mask_N: np.ndarray
+    share_B: np.ndarray  # (1 + B,) in [0, 1], of the samples themselves first; NaN in a draw without any sample
+    samples: Clustered  # all of the folder
+    mask_N: np.ndarray  # the samples that the share counts
 
     def bounds(self, level: float = LEVEL, minus: ShareDraws | None = None) -> tuple[float, float]:
         """Return the bounds of the share, or of its difference from another, draw by draw."""

@@ -38,25 +38,15 @@ Rivals = Callable[[str, Collection[str]], Collection[str]]  # of a method, among
 
 @dataclass(frozen=True)
 class Measure:
-    """A statistic of samples, by default the mean of a column or of a function of the samples.
+    """A statistic of samples, by default the mean of a column or of a function of the samples."""
 
-    Attributes:
-        of: column, or function that returns a value per sample (N,).
-        limits: least and greatest possible value; `SHARE` for a share of samples, which has its own interval.
-        only: parts of the samples that it is taken over; all if empty.
-        statistic: function of samples and weights (1 + B, N) that returns values (1 + B,), instead of a mean.
-        counted: mask of the samples that it depends on (N,); all if None.
-        least_is_best: of two values, the smaller one is better.
-        factor: from the mean to the measure's unit.
-    """
-
-    of: str | Callable[[pd.DataFrame], np.ndarray] = ""
-    limits: tuple[float, float] | None = SHARE
-    only: tuple[str, ...] = ()
-    statistic: Callable[[pd.DataFrame, np.ndarray], np.ndarray] | None = None
-    counted: Callable[[pd.DataFrame], np.ndarray] | None = None
-    least_is_best: bool = False
-    factor: float = 1.0
+    of: str | Callable[[pd.DataFrame], np.ndarray] = ""  # column, or function that returns a value per sample (N,)
+    limits: tuple[float, float] | None = SHARE  # least and greatest value; a share of samples has its own interval
+    only: tuple[str, ...] = ()  # parts of the samples that it is taken over; all if empty
+    statistic: Callable[[pd.DataFrame, np.ndarray], np.ndarray] | None = None  # of samples and weights (1 + B, N)
+    counted: Callable[[pd.DataFrame], np.ndarray] | None = None  # mask of the samples that it depends on (N,)
+    least_is_best: bool = False  # of two values, the smaller one is better
+    factor: float = 1.0  # from the mean to the measure's unit
 
     def values(self, samples: pd.DataFrame, weights_B_N: np.ndarray | None = None) -> np.ndarray:
         """Values (B,) by weights of the samples; without weights, that of the samples themselves."""

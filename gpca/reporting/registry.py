@@ -17,49 +17,29 @@ Names = Mapping[str, Any]  # what stands in braces -> its one value, or the list
 
 @dataclass(frozen=True)
 class Input:
-    """The source of one argument of a builder.
+    """The source of one argument of a builder."""
 
-    Attributes:
-        argument: its name.
-        files: keyword of the reader -> patterns below the folder of a run; the key is empty where the reader takes
-            the files themselves.
-        read: ``module:function`` that turns the files into the argument; empty for the paths themselves.
-    """
-
-    argument: str
-    files: Mapping[str, tuple[str, ...]]
-    read: str = ""
+    argument: str  # its name
+    files: Mapping[str, tuple[str, ...]]  # keyword of the reader, or "" -> patterns below the folder of a run
+    read: str = ""  # ``module:function`` that turns the files into the argument; empty for the paths themselves
 
 
 @dataclass(frozen=True)
 class Result:
-    """A table or figure.
+    """A table or figure."""
 
-    Attributes:
-        name: of its files, without suffix.
-        kind: ``tables`` or ``figures``, the folder that it goes to.
-        section, title, caption: its place on the page, and the words above and below it.
-        builder: ``module:function`` that makes it.
-        inputs: the builder's arguments that come from files.
-        only: name of a list -> those of its members that are shown.
-        needs: names that must not be empty, besides those of the inputs.
-        paper: it is a table or figure of the paper.
-        after: name of the result of another experiment below which it stands in their section.
-        source: the one that it is of, where each has its own.
-    """
-
-    name: str
-    kind: str
-    section: str
+    name: str  # of its files, without suffix
+    kind: str  # ``tables`` or ``figures``, the folder that it goes to
+    section: str  # its place on the page, and the words above and below it
     title: str
     caption: str
-    builder: str
-    inputs: tuple[Input, ...]
-    only: Mapping[str, tuple[str, ...]]
-    needs: tuple[str, ...]
-    paper: bool
-    after: str = ""
-    source: str = ""
+    builder: str  # ``module:function`` that makes it
+    inputs: tuple[Input, ...]  # the builder's arguments that come from files
+    only: Mapping[str, tuple[str, ...]]  # name of a list -> those of its members that are shown
+    needs: tuple[str, ...]  # names that must not be empty, besides those of the inputs
+    paper: bool  # it is a table or figure of the paper
+    after: str = ""  # name of the result of another experiment below which it stands in their section
+    source: str = ""  # the one that it is of, where each has its own
 
     @property
     def modules(self) -> list[str]:

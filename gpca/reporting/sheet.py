@@ -18,17 +18,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Show(Column):
-    """A column, and where its cells are found.
+    """A column, and where its cells are found."""
 
-    Attributes:
-        where: entries of the numbers' rows, besides those of the table's row.
-        factor: from the measure's unit to the column's.
-        frame: name of a frame of values by seed, which are averaged over the seeds; empty for that of intervals.
-    """
-
-    where: Mapping[str, str] = field(default_factory=dict)
-    factor: float = 100
-    frame: str = ""
+    where: Mapping[str, str] = field(default_factory=dict)  # entries of the numbers' rows, besides those of the row
+    factor: float = 100  # from the measure's unit to the column's
+    frame: str = ""  # name of a frame of values by seed, which are averaged over the seeds; empty for that of intervals
 
 
 def show(metric: str, title: str, part: str = "all", where: Mapping[str, str] | None = None, **options: Any) -> Show:

@@ -84,20 +84,14 @@ class Method:
 
 @dataclass(frozen=True)
 class Published:
-    """All that is shipped with a track.
-
-    Attributes:
-        limits: common limits of errors (:class:`gpca.causes.truth.Truth`).
-        hashes: SHA-256 of the arrays of every file of samples, by its path below the folder of a run.
-        commit: of the run; empty where unknown.
-    """
+    """All that is shipped with a track."""
 
     track: Track
     rows: Rows
-    limits: Mapping[str, float]
+    limits: Mapping[str, float]  # common limits of errors (:class:`gpca.causes.truth.Truth`)
     methods: tuple[Method, ...]
-    hashes: Mapping[str, str]
-    commit: str = ""
+    hashes: Mapping[str, str]  # SHA-256 of the arrays of every file of samples, by its path below the folder of a run
+    commit: str = ""  # of the run; empty where unknown
 
     @cached_property
     def version(self) -> str:

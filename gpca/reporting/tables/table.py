@@ -23,43 +23,29 @@ _SCALED_DOWN = r"\resizebox{\ifdim\width>\textwidth\textwidth\else\width\fi}{!}{
 
 @dataclass(frozen=True)
 class Cell:
-    """A mean over `seeds` repeats with the half-width of its 95 % t-interval, and the test samples of all.
-
-    Attributes:
-        half_width: NaN where there is no interval, as over fewer than `LEAST_SEEDS`.
-        at_least: the mean is a lower bound without interval, as some repeats were stopped before they were done.
-        bounds: of another interval than that over the seeds (a bootstrap's, Wilson's), which is printed instead.
-        clusters: combinations of a seed and a cluster that the samples are of; 0 where their number is not known.
-    """
+    """A mean over `seeds` repeats with the half-width of its 95 % t-interval, and the test samples of all."""
 
     mean: float
-    half_width: float
+    half_width: float  # NaN where there is no interval, as over fewer than `LEAST_SEEDS`
     seeds: int
     test_samples: int
-    at_least: bool = False
-    bounds: tuple[float, float] | None = None
-    clusters: int = 0
+    at_least: bool = False  # a lower bound without interval, as some repeats were stopped before they were done
+    bounds: tuple[float, float] | None = None  # of another interval (a bootstrap's, Wilson's), printed instead
+    clusters: int = 0  # combinations of a seed and a cluster that the samples are of; 0 where their number is not known
 
 
 @dataclass(frozen=True)
 class Column:
-    """How one quantity is shown: its title, the digits after the point, with an interval or without.
-
-    Attributes:
-        limits: least and largest possible value; the bounds in the CSV are clipped to them.
-        beside: another column, behind whose cells these stand with their sign in brackets; the CSV holds both.
-        heavy_tail: an interval wider than the mean is not printed, as it would reach below zero.
-        of_samples: False for percentages that are no shares of samples, such as mean confidences.
-    """
+    """How one quantity is shown: its title, the digits after the point, with an interval or without."""
 
     title: str
     decimals: int = 1
     interval: bool = True
-    limits: tuple[float, float] = SHARE
+    limits: tuple[float, float] = SHARE  # least and largest possible value; the bounds in the CSV are clipped to them
     least_is_best: bool = False
-    beside: str = ""
-    heavy_tail: bool = False
-    of_samples: bool = True
+    beside: str = ""  # another column, behind whose cells these stand with their sign in brackets; the CSV holds both
+    heavy_tail: bool = False  # an interval wider than the mean is not printed, as it would reach below zero
+    of_samples: bool = True  # False for percentages that are no shares of samples, such as mean confidences
 
     def text(self, cell: Cell) -> str:
         """Return e.g. ``97.7 ± 0.4``, ``97.7 (96.9 to 98.2)`` or ``> 52.0``; beside another ``+1.2; 0.4 to 1.9``."""
@@ -76,25 +62,17 @@ class Column:
 
 @dataclass(frozen=True)
 class Table:
-    """Rows by columns of cells; every name has a key for the CSV and a title for the reader.
-
-    Attributes:
-        row_heads: title of each row label by key, e.g. ``{"source": "Dataset"}``.
-        rows: labels of each row, a key and a title for each row head.
-        column_head: key of what the columns are, e.g. ``explainer``.
-        cells: by row number and column key; a missing one is shown as a dash.
-        compared: groups of such keys; the best printed mean of each group is set in bold.
-    """
+    """Rows by columns of cells; every name has a key for the CSV and a title for the reader."""
 
     name: str
     caption: str
-    row_heads: Mapping[str, str]
-    rows: tuple[tuple[tuple[str, str], ...], ...]
-    column_head: str
+    row_heads: Mapping[str, str]  # title of each row label by key, e.g. ``{"source": "Dataset"}``
+    rows: tuple[tuple[tuple[str, str], ...], ...]  # labels of each row, a key and a title for each row head
+    column_head: str  # key of what the columns are, e.g. ``explainer``
     columns: Mapping[str, Column]
-    cells: Mapping[tuple[int, str], Cell]
+    cells: Mapping[tuple[int, str], Cell]  # by row number and column key; a missing one is shown as a dash
     footnotes: tuple[str, ...] = ()
-    compared: tuple[Sequence[tuple[int, str]], ...] = ()
+    compared: tuple[Sequence[tuple[int, str]], ...] = ()  # groups of such keys, of which the best mean is bold
 
     def best(self) -> set[tuple[int, str]]:
         """Return the keys of the cells with the best printed mean of their group, which takes seeds for an interval.
