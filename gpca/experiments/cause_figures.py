@@ -109,8 +109,6 @@ def _scores(causes: Causes, row: int, files: Sequence[str | Path], explainers: M
         _, name, _ = source_method_seed(path)
         rows = read_predictions(path)
         of_sample = (rows["split"] == registrations.split[row]) & (rows["sample"] == str(registrations.sample[row]))
-        if of_sample.sum() != 1:
-            raise InputError(path, "lacks the sample that is shown", "regenerate it from the same config")
         prediction = rows[of_sample].iloc[0]
         if not prediction["abstained"]:
             by_name[name] = [prediction[f"score_{label}"] for label in LABELS]

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 from gpca.causes.judged import BINS, CEILING, joined, read_judged
 from gpca.causes.settings import CauseSettings
 from gpca.causes.truth import BORDERLINE, NOMINAL
-from gpca.errors import InputError
 from gpca.evaluation.intervals import REPEATS
 from gpca.evaluation.measures import POOLED
 from gpca.experiments.cause_figures import draw_causes_example
@@ -227,7 +226,5 @@ def nominal_reliability(run: Run, judged):
             labeled_S = together.label != BORDERLINE
             samples[title] = together.nominal[labeled_S], together.label[labeled_S] == NOMINAL
             sources |= {source for source, _, _ in parts}
-    if not samples:
-        raise InputError("diagnoses", "have no predictions of these sources and explainers", "run them first")
     title = ", ".join(title for name, title in titles.items() if name in sources)
     return reliability_figure(samples, title, BINS, 'score of "nominal"', "share", "share that is nominal")

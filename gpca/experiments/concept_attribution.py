@@ -50,10 +50,6 @@ def collect_intervals(prediction_files: Paths, causal_files: Paths = ()) -> pd.D
     - causal_accuracy: of the causal samples, where there are causal files.
 
     The draws of a source are the same for all explainers that explain the same samples.
-
-    Args:
-        prediction_files: named `…/{source}/{explainer}/seed{seed}.csv`.
-        causal_files: named `…/{source}/{design}/seed{seed}.csv`.
     """
     import pandas as pd
 
@@ -86,13 +82,10 @@ def _accuracies(rows: pd.DataFrame, draws: Clustered) -> Iterator[tuple[str, str
     true_N, named_N = (rows[name].to_numpy(str) for name in ("concept_true", "concept_predicted"))
     named_N = np.where(rows["abstained"], "", named_N)
     right_N = true_N == named_N
-    is_true_C_N, is_named_C_N = (
-        np.array([names_N == concept for concept in concepts]) for names_N in (true_N, named_N)
-    )
+    is_true_C_N, is_named_C_N = (np.array([each_N == name for name in concepts]) for each_N in (true_N, named_N))
 
     def permuted(rows_n: np.ndarray, weights_B_n: np.ndarray) -> np.ndarray:
-        hits_C_C_n = is_true_C_N[:, None, rows_n] & is_named_C_N[None, :, rows_n]
-        number = range(len(concepts))
+        hits_C_C_n, number = is_true_C_N[:, None, rows_n] & is_named_C_N[None, :, rows_n], range(len(concepts))
         renamings = [hits_C_C_n[number, list(order)].any(axis=0) for order in permutations(number)]
         best_B = np.max([(weights_B_n * hit_n).sum(axis=1) for hit_n in renamings], axis=0)
         with np.errstate(divide="ignore", invalid="ignore"):  # a draw without any sample has no value
@@ -131,13 +124,10 @@ NOTES = {
         f"ones of their dataset and seed; {EMPTY} where there are fewer than {LEAST_CAUSAL} in all seeds."
     ),
     "icp_calls": "ICP calls: ICP runs per sample beyond the observed registration.",
-    "seconds_per_sample": (
-        "Seconds: all that one sample takes, the observed registration included; "
-        "the one column that differs from run to run."
-    ),
-    "test_samples": (
-        "n: test samples of a seed; fewer where each takes hundreds of ICP calls (uncertainty.*.samples, config)."
-    ),
+    "seconds_per_sample": "Seconds: all that one sample takes, the observed registration included; "
+    "the one column that differs from run to run.",
+    "test_samples": "n: test samples of a seed; fewer where each takes hundreds of ICP calls "
+    "(uncertainty.*.samples, config).",
 }
 
 

@@ -82,7 +82,13 @@ def draw_confusions_figure(metrics: pd.DataFrame, sources: Mapping[str, str], ex
         text(middle_in, 0.03, _wrapped(sources[source], source_in, 8), va="top", fontsize=None, linespacing=1.1)
         text(left_in + matrix_in / 2, 0.42, "of each true (%)")
         text(left_in + matrix_in + GAP_IN + bars_in / 2, 0.42, "of all (%)")
-    text(0.04, 0.03, _key(concepts, abstained), ha="left", va="top")
+    named = [f"{letter} {concept}" for letter, concept in zip(letters(concepts), concepts, strict=True)]
+    last = ["– abstained"] if abstained else []
+    key = "\n".join([", ".join(named), *last])
+    if len(named) > WIDEST_KEY:
+        key = f"{', '.join(named[:2])},\n{', '.join([*named[2:], *last])}"
+    key = f"{key}\nmatrix: true (rows), predicted\nbars: predicted (dash: true)"
+    text(0.04, 0.03, key, ha="left", va="top")
     return figure
 
 
@@ -107,16 +113,6 @@ def _wrapped(title: str, width_in: float, size_pt: float) -> str:
     """Break a title into lines that fit; a letter is about half as wide as it is high."""
     letter_in = 0.48 * size_pt / 72
     return "\n".join(textwrap.wrap(title, int(width_in / letter_in), break_on_hyphens=False))
-
-
-def _key(concepts: list[str], abstained: bool) -> str:
-    named = [f"{letter} {concept}" for letter, concept in zip(letters(concepts), concepts, strict=True)]
-    last = ["– abstained"] if abstained else []
-    if len(named) > WIDEST_KEY:
-        names = f"{', '.join(named[:2])},\n{', '.join([*named[2:], *last])}"
-    else:
-        names = "\n".join([", ".join(named), *last])
-    return f"{names}\nmatrix: true (rows), predicted\nbars: predicted (dash: true)"
 
 
 def letters(concepts: list[str]) -> list[str]:

@@ -192,13 +192,18 @@ AGAINST: Mapping[str, Rivals] = {
 }
 
 
-def compared_by_source(samples_of: Mapping[str, Mapping[str, Judged]], axis: str = "cause intervals") -> pd.DataFrame:
+def compared_by_source(
+    samples_of: Mapping[str, Mapping[str, Judged]],
+    axis: str = "cause intervals",
+    metrics: Iterable[str] = tuple(MEASURES),
+    against: Mapping[str, Rivals] = AGAINST,
+) -> pd.DataFrame:
     """Measures of every source and explainer with intervals over objects and seeds, and differences from rivals."""
     records: list[tuple] = []
     for source, by_explainer in samples_of.items():
         samples = next(iter(by_explainer.values()))
         draws = Clustered.drawn(samples.seed, samples.instance, axis, source)
-        records += compared_samples(source, by_explainer, draws, measure, MEASURES)
+        records += compared_samples(source, by_explainer, draws, measure, metrics, against=against)
     return intervals(records, "diagnoses")
 
 

@@ -13,7 +13,7 @@ from gpca.evaluation.measures import ALL, source_method_seed, tidy
 from gpca.experiments.experiment import Experiment, LeftOut
 from gpca.experiments.plan import Run
 from gpca.experiments.result import Paths, figure, numbers, table
-from gpca.experiments.step import Step
+from gpca.experiments.step import Step, encoder_of
 from gpca.io.arrays import REAL, WHOLE, load_arrays
 from gpca.io.csv_file import read_numbers
 from gpca.pairs.dataset import Registrations
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 
 def check(config: dict, _left_out: LeftOut) -> None:
-    encoder = EncoderSettings(**config["encoders"][config["embedding"]["encoder"]])
+    encoder = EncoderSettings(**encoder_of(config))
     if encoder.backbone != "dgcnn":
         return
     share, neighbors = max(config["gradients"]["deleted"]), encoder.options.get("k", DGCNNOptions.k)
@@ -45,9 +45,7 @@ EXPERIMENT = Experiment(
     sections={"gradients": GradientSettings},
     needs=("gradient_source",),
     names=lambda config, sources: {
-        "gradient_source": [
-            name for name in sources if config["encoders"][config["embedding"]["encoder"]]["backbone"] in DIFFERENTIABLE
-        ],
+        "gradient_source": list(sources) if encoder_of(config)["backbone"] in DIFFERENTIABLE else [],
         "gradient_encoder": config["embedding"]["encoder"],
     },
     check=check,
@@ -98,10 +96,8 @@ def collect(run: Run, deletions: Paths, tests: Paths) -> pd.DataFrame:
             values = dict(row)
             if order != RANDOM and (RANDOM, deleted) in means.index:
                 values["excess"] = row["drop"] - means.loc[(RANDOM, deleted), "drop"]
-            records += [
-                (SALIENCY, source, order, f"{name}_{100 * deleted:g}", ALL, seed, float(value))
-                for name, value in values.items()
-            ]
+            for name, value in values.items():
+                records.append((SALIENCY, source, order, f"{name}_{100 * deleted:g}", ALL, seed, float(value)))
         records += [
             (SALIENCY, source, order, "test_samples", ALL, seed, float(part["sample"].nunique()))
             for order, part in rows.groupby("order", sort=False)
@@ -118,7 +114,6 @@ def collect(run: Run, deletions: Paths, tests: Paths) -> pd.DataFrame:
 
 
 SECTION = "Beyond the paper: what explainers look at, and whether it carries over"
-NEEDS = ("gradient_source",)
 
 
 @figure(
@@ -128,7 +123,7 @@ NEEDS = ("gradient_source",)
     classifier and encoder, by rank among the points of the cloud. The model is gray.
 
     For each concept, the correctly named test sample with the median score is shown.""",
-    needs=NEEDS,
+    needs=("gradient_source",),
     registrations="registrations/{shown_source}/seed{first_seed}.npz",
     maps="saliency/{shown_source}/seed{first_seed}.npz",
     deletions="saliency/{shown_source}/seed{first_seed}.csv",
@@ -147,8 +142,6 @@ def saliency(run: Run, registrations: Path, maps: Path, deletions: Path) -> Figu
             shown[concept] = int(ordered["sample"].iloc[(len(ordered) - 1) // 2])
     test = {int(loaded.sample[row]): row for row in loaded.rows("test")}
     numbers_of_maps = {int(sample): i for i, sample in enumerate(arrays["sample"])}
-    if not shown or set(shown.values()) - (set(test) & set(numbers_of_maps)):
-        raise InputError(maps, f"its samples differ from those of {deletions}", "regenerate both")
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
@@ -172,7 +165,9 @@ def saliency(run: Run, registrations: Path, maps: Path, deletions: Path) -> Figu
         panel.set_aspect("equal", adjustable="datalim")
         score = rows.loc[rows["sample"] == str(sample), ["named", "before"]].iloc[0]
         panel.set_title(f"{concept}: named {score['named']}, {score['before']:.2f}", fontsize=SMALL_PT + 1)
-    bar = drawing.colorbar(ScalarMappable(Normalize(PALEST, 1), blues()), ax=axes, shrink=0.75, pad=0.01, ticks=TICKS)
+    bar = drawing.colorbar(
+        ScalarMappable(Normalize(PALEST, 1), blues()), ax=axes, shrink=0.75, pad=0.01, ticks=(0, 0.5, 1)
+    )
     bar.ax.set_ylim(0, 1)
     bar.set_label("rank of the point's saliency", fontsize=SMALL_PT)
     bar.ax.set_yticklabels(["least", "median", "most"], fontsize=SMALL_PT)
@@ -183,7 +178,6 @@ def saliency(run: Run, registrations: Path, maps: Path, deletions: Path) -> Figu
 
 HEIGHT_IN = 2.75
 PALEST = -0.25  # rank at which the colors reach white; no point has it
-TICKS = (0, 0.5, 1)
 
 
 @table(
@@ -191,7 +185,7 @@ TICKS = (0, 0.5, 1)
     "Deleting the most salient points",
     """How much the score of the concept that GP-CA names falls when points are deleted. A saliency map that shows what
     matters makes it fall more than deleting as many points at random.""",
-    needs=NEEDS,
+    needs=("gradient_source",),
     metrics="gradients.csv",
 )
 def saliency_deletion(run: Run, metrics):
@@ -235,7 +229,7 @@ ORDERS = {
     """The share of a class's test samples (columns) for which moving the embedding along a concept (rows) raises the
     log odds of that class, with a test against random directions. TCAV describes a whole class, not a sample; the
     concept activation vectors of the extended Table I use the same vectors sample by sample.""",
-    needs=NEEDS,
+    needs=("gradient_source",),
     metrics="gradients.csv",
 )
 def tcav(run: Run, metrics):

@@ -100,13 +100,7 @@ def collect(run: Run, score_files: Paths) -> pd.DataFrame:
     for path in score_files:
         scored = asked_for.Scored.load(path)
         for condition in asked_for.conditions(scored):
-            answers = asked_for.answers_of(scored, condition, settings)
-            if answers is not None:
-                rows += _rows_of_condition(
-                    condition.name, Path(path).stem, scored.subset(answers.row), answers, settings
-                )
-    if not rows:
-        raise InputError(NAME, "no files with scores were given", "name an explainer in guarantee.explainers")
+            rows += _rows_of_condition(Path(path).stem, scored, condition, settings)
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 
@@ -116,21 +110,17 @@ def read_guarantee(path: str | Path) -> pd.DataFrame:
 
 
 def _rows_of_condition(
-    name: str,
-    explainer: str,
-    asked: asked_for.Scored,
-    answers: asked_for.Answers,
-    settings: asked_for.GuaranteeSettings,
+    explainer: str, scored: asked_for.Scored, condition: asked_for.Condition, settings: asked_for.GuaranteeSettings
 ) -> Iterator[tuple]:
+    if (answers := asked_for.answers_of(scored, condition, settings)) is None:
+        return
+    name, asked = condition.name, scored.subset(answers.row)
     # All samples of a family and a seed are drawn together, so sums over them are enough.
     keys_A = np.char.add(np.char.add(asked.seed.astype(str), " "), asked.family)
     _, first_C, group_A = np.unique(keys_A, return_index=True, return_inverse=True)
-    random = generator("guarantee intervals", name)
-    drawn_B_C = pigeonhole_weights(random, asked.seed[first_C], asked.family[first_C])
-    sources = list(dict.fromkeys(asked.source.tolist()))
-    masks = {source: asked.source == source for source in sources}
-    if len(sources) > 1:
-        masks = {POOLED: np.ones(len(asked), bool)} | masks
+    drawn_B_C = pigeonhole_weights(generator("guarantee intervals", name), asked.seed[first_C], asked.family[first_C])
+    masks = {source: asked.source == source for source in dict.fromkeys(asked.source.tolist())}
+    masks = masks if len(masks) == 1 else {POOLED: np.ones(len(asked), bool)} | masks
     measured = list(asked_for.measures(asked, answers, settings))
     for source, inside_A in masks.items():
         by_state = name == FAMILIES and source == next(iter(masks))
@@ -299,8 +289,6 @@ def guarantee(run: Run, measured):
     }
     rows = _of_all_sources(where(measured, {"condition": FAMILIES, "concept": ALL}))
     titles = {name: title for name, title in _titles(run).items() if (rows["method"] == name).any()}
-    if not titles:
-        raise InputError(NAME, "has no results for these explainers", "run them first")
     page, grid = panels(2, 2, 2.1 + 0.68 * len(titles), COLUMN_WIDTH_IN, sharey=True)
     offsets = dict(zip(looks, np.linspace(-0.35, 0.35, len(looks)), strict=True))
     for panel, (metric, (label, lines)) in zip(grid.flat, shown.items(), strict=True):

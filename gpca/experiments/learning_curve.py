@@ -91,8 +91,6 @@ def read_curves(files: Paths) -> pd.DataFrame:
     for path in files:
         _, source, seed = source_method_seed(path)
         curves.append(read_numbers(path, CURVE_COLUMNS, CURVE_COLUMNS[1:]).assign(source=source, seed=seed))
-    if not curves:
-        raise InputError("learning curves", "no files were given", "name a source in learning_curve.sources")
     return pd.concat(curves, ignore_index=True)
 
 
@@ -132,8 +130,6 @@ def learning_curve(run: Run, curves):
     chosen = run.config[NAME]["sources"]
     present = set(curves["source"]) & set(chosen)
     shown = {name: title for name, title in run.source_titles.items() if name in present}
-    if not shown:
-        raise InputError("learning curves", "have no results for these sources", "run them first")
     page, axes = panels(len(rows), len(shown), 0.6 + 1.5 * len(rows), COLUMN_WIDTH_IN, sharex=True, sharey="row")
     ticks = sorted(curves.loc[curves["learner"] != CEILING, "samples"].unique())
     for column, (source, title_of_source) in enumerate(shown.items()):

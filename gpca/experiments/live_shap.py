@@ -40,7 +40,7 @@ class Section:
 
     Attributes:
         sources, seeds: how many of the run's are used, from the first.
-        samples: test samples of each source and seed, balanced.
+        samples: of each source and seed, balanced.
     """
 
     sources: Count = 1
@@ -49,7 +49,7 @@ class Section:
 
 
 def names(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str, Any]:
-    """Sources, none where the compared explainer is left out, and seeds."""
+    """No sources where the compared explainer is left out."""
     section = config["live_shap"]
     is_made = LOOKUP in config["explainers"] and "additive" in config["uncertainty"]
     chosen = list(sources)[: section["sources"]] if is_made else []

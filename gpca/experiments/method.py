@@ -139,10 +139,6 @@ def fig3_concepts(run: Run, objects_file: Path, registrations_file: Path) -> Fig
     objects, registrations = ObjectClouds.load(objects_file), Registrations.load(registrations_file)
     samples = choose_samples(registrations, registrations_file)
     name = str(registrations.object_name[samples["noise"]])
-    if name not in objects.names:
-        raise InputError(
-            objects_file, f"has no object '{name}'", f"regenerate it and {registrations_file} from the same config"
-        )
     sources = {concept: stages_of.source_before_icp(registrations, sample) for concept, sample in samples.items()}
     row = objects.names.index(name)
     points_shown = max(len(source) for source in sources.values())  # so that both clouds are equally dense

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 from math import inf
 from typing import TYPE_CHECKING, Any
 
-from gpca.causes.judged import measure, read_judged
+from gpca.causes.judged import read_judged
 from gpca.causes.settings import CauseSettings
 from gpca.errors import require_names
-from gpca.evaluation.intervals import REPEATS, Clustered
-from gpca.evaluation.measures import POOLED, intervals
+from gpca.evaluation.intervals import REPEATS
+from gpca.evaluation.measures import POOLED
 from gpca.experiments.cause_figures import draw_reenactment
 from gpca.experiments.cause_tables import AGAIN, SECTION, SHOWN, counts_and_calls
-from gpca.experiments.diagnosis import by_source, compared_samples, with_pooled
+from gpca.experiments.diagnosis import by_source, compared_by_source, with_pooled
 from gpca.experiments.experiment import Experiment, LeftOut
 from gpca.experiments.plan import Run
 from gpca.experiments.result import Paths, figure, numbers, table
@@ -77,13 +77,9 @@ ORACLES = Step(
 )
 def collect_oracles(run: Run, prediction_files: Paths, causes_files: Paths) -> pd.DataFrame:
     """`MEASURED` by source and by what is known, and differences from the estimate, with intervals."""
-    rows: list[tuple] = []
-    for source, samples_of in by_source(with_pooled(read_judged(prediction_files, causes_files))).items():
-        samples = next(iter(samples_of.values()))
-        draws = Clustered.drawn(samples.seed, samples.instance, "oracle intervals", source)
-        against = {"estimate": lambda name, names: [NOTHING]}
-        rows += compared_samples(source, samples_of, draws, measure, MEASURED, against=against)
-    return intervals(rows, "oracles")
+    samples_of = by_source(with_pooled(read_judged(prediction_files, causes_files)))
+    against = {"estimate": lambda name, names: [NOTHING]}
+    return compared_by_source(samples_of, "oracle intervals", MEASURED, against)
 
 
 def in_words(name: str) -> str:

@@ -143,17 +143,13 @@ def measured(rows: pd.DataFrame) -> Iterator[tuple[pd.DataFrame, Any, dict[str, 
                 yield subset, _by_concept, by_estimator
                 continue
             others = subset[subset["asked_of"] != learnt_from].assign(method=ANOTHER)
-            several = subset["asked_of"].nunique() > 1
-            yield pd.concat([subset, others]) if several else subset, _by_learned_method, by_method
+            both = pd.concat([subset, others]) if subset["asked_of"].nunique() > 1 else subset
+            yield both, lambda rows: {rows["learnt_from"].iloc[0]: np.ones(len(rows), bool)}, by_method
 
 
 def _by_concept(rows: pd.DataFrame) -> Parts:
     masks = {concept: (rows["concept_true"] == concept).to_numpy() for concept in rows["concept_true"].unique()}
     return {ALL: np.ones(len(rows), bool)} | masks
-
-
-def _by_learned_method(rows: pd.DataFrame) -> Parts:
-    return {name: (rows["learnt_from"] == name).to_numpy() for name in rows["learnt_from"].unique()}
 
 
 @numbers(
@@ -199,13 +195,11 @@ ANSWERED = {
 )
 def table14_estimator_explanations(run: Run, intervals):
     exchange = run.config["exchange"]
+    explainers = run.titles(explainer_entry, exchange["explainers"])
     sheet = Sheet(
         "table14_estimator_explanations",
         {"explainer": "Explainer", "estimator": "Uncertainty by"},
-        crossed(
-            ("table", run.titles(explainer_entry, exchange["explainers"])),
-            ("method", run.titles(estimator_entry, exchange["estimators"])),
-        ),
+        crossed(("table", explainers), ("method", run.titles(estimator_entry, exchange["estimators"]))),
         BY_CONCEPT | ANSWERED,
         intervals,
         blank=lambda row, key: key == "agreement" and row.where["method"] == MONTE_CARLO,  # with itself

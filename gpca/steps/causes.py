@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 from gpca.alignment.icp import ICPSettings
 from gpca.attribution.predictions import read_timings, write_predictions, write_timings
@@ -40,14 +43,7 @@ def describe(job: Job) -> None:
     from gpca.causes.descriptors import describe_all
 
     own, icp = job.settings_and_icp()
-    outputs = [job.descriptors, job.timings]
-    with record_provenance(outputs, [job.causes, job.causes_timings], job.settings, seed=job.seed):
-        causes = Causes.load(job.causes, (job.source, job.seed))
-        seconds_S, icp_seconds_S = read_timings(job.causes_timings, causes.registrations)
-        settings = DescriptorSettings(**own)
-        described, own_S, own_icp_S = describe_all(causes, job.source, job.seed, settings, ICPSettings(**icp))
-        described.save(job.descriptors)
-        write_timings(job.timings, causes.registrations, seconds_S + own_S, icp_seconds_S + own_icp_S)
+    _measure(job, job.descriptors, describe_all, DescriptorSettings(**own), ICPSettings(**icp))
 
 
 def reenact(job: Job) -> None:
@@ -59,12 +55,16 @@ def reenact(job: Job) -> None:
 
     settings = read_settings(ReenactmentSettings, job.section("reenactment"))
     truth = CauseSettings.from_dict(job.section("causes"), job.section("icp"))
-    outputs = [job.reenactments, job.timings]
-    with record_provenance(outputs, [job.causes, job.causes_timings], job.settings, seed=job.seed):
+    _measure(job, job.reenactments, reenact_all, settings, truth)
+
+
+def _measure(job: Job, out: Path, measure: Callable[..., tuple], *settings: Any) -> None:
+    """Write what a function measures of every pair, and the seconds that it adds to those of the registrations."""
+    with record_provenance([out, job.timings], [job.causes, job.causes_timings], job.settings, seed=job.seed):
         causes = Causes.load(job.causes, (job.source, job.seed))
         seconds_S, icp_seconds_S = read_timings(job.causes_timings, causes.registrations)
-        enacted, own_S, own_icp_S = reenact_all(causes, job.source, job.seed, settings, truth)
-        enacted.save(job.reenactments)
+        measured, own_S, own_icp_S = measure(causes, job.source, job.seed, *settings)
+        measured.save(out)
         write_timings(job.timings, causes.registrations, seconds_S + own_S, icp_seconds_S + own_icp_S)
 
 

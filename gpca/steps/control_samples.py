@@ -244,8 +244,8 @@ def train(job: Job) -> None:
         registrations = Registrations.load(path, (job.source, job.seed))
         if why := left_out(job.control, registrations, settings, encoder.backbone):
             print(f"control '{job.control}' of {job.source} is skipped: {why}", file=sys.stderr)
-            empty = {name: np.zeros((0, 1), np.float32) for name in ("h", "head_logits")}
-            arrays: dict[str, np.ndarray] = {**empty, "sample": np.zeros(0, int), "split": np.zeros(0, "U5")}
+            arrays = {name: np.zeros((0, 1), np.float32) for name in ("h", "head_logits")}
+            arrays |= {"sample": np.zeros(0, int), "split": np.zeros(0, "U5")}
             curve: list[dict] = []
         else:
             arrays, curve = encode(job.control, registrations, job.source, job.seed, settings, encoder, checkpoint)

@@ -145,7 +145,17 @@ class ControlRun:
         embeds = self._learned(PAPER, plain)
         plain = _attached(embeds, plain)
         tests = self._tests(PAPER, plain)
-        admitted = [control for control in self.settings.controls if self._admits(control, registrations, others)]
+        admitted = []
+        for control in self.settings.controls:
+            why = samples.left_out(control, registrations, self.settings, self.backbone)
+            if control == TRANSFER and not others:
+                why = "it needs at least two sources"
+            if control == HARD and self.hard is None:
+                why = "it needs samples of its own"
+            if why:
+                print(f"controls of {self.source}: '{control}' is skipped: {why}", file=sys.stderr)
+            else:
+                admitted.append(control)
         if TRANSFER in admitted:  # test samples of other sources with embeddings by the encoders of this one
             for name, other in others.items():
                 test = self._embedded(other.subset(other.rows("test")), name)
@@ -178,16 +188,6 @@ class ControlRun:
         explainer.fit(changed.subset(changed.rows("train")))
         attribution = explainer.explain(test.without_labels())
         return attribution, float(attribution.seconds_N.mean())
-
-    def _admits(self, control: str, registrations: Registrations, others: Mapping) -> bool:
-        why = samples.left_out(control, registrations, self.settings, self.backbone)
-        if control == TRANSFER and not others:
-            why = "it needs at least two sources"
-        if control == HARD and self.hard is None:
-            why = "it needs samples of its own"
-        if why:
-            print(f"controls of {self.source}: '{control}' is skipped: {why}", file=sys.stderr)
-        return not why
 
     def _changed(self, control: str, plain: Registrations, embeds: Mapping[str, Attach]) -> Registrations:
         """Registrations under a control, with all that explainers read attached."""

@@ -72,9 +72,8 @@ def diagnose_frames(job: Job) -> None:
     """
     import pandas as pd
 
-    # Of each source; re-enactments only where an explainer reads them.
     learned = {"causes": job.causes, DESCRIBED: job.descriptors, "encoders": job.encoders, EMBEDDED: job.embeddings}
-    learned |= {REENACTED: job.get("reenactments", [])}
+    learned |= {REENACTED: job.get("reenactments", [])}  # only where an explainer reads them
     enacted = job.get("frame_reenactments")
     read = [job.frame_causes, *([enacted] if enacted else [])]
     inputs = read + [path for paths in learned.values() for path in paths]

@@ -69,8 +69,6 @@ class ExchangeSettings:
 def run(job: Job) -> None:
     from gpca.encoders.training import embed, load_model
 
-    for name in job.section("explainers"):
-        require_exchangeable(name)
     settings = read_settings(ExchangeSettings, job.section("exchange"))
     encoder = EncoderSettings(**job.section("encoder"))
     methods, estimators = job.by_name("methods", settings.methods), job.by_name("estimators", settings.estimators)

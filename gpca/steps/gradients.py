@@ -19,8 +19,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 
 from gpca.classifier.settings import GPCSettings
-from gpca.encoders.registry import DIFFERENTIABLE, EncoderSettings
-from gpca.errors import InputError
+from gpca.encoders.registry import EncoderSettings
 from gpca.io.arrays import save_arrays
 from gpca.io.csv_file import write_csv
 from gpca.pairs.dataset import Registrations, read_embedding
@@ -66,9 +65,6 @@ def run(job: Job) -> None:
     from gpca.encoders.training import load_model
 
     settings, encoding = GradientSettings(**job.section("gradients")), EncoderSettings(**job.section("encoder"))
-    if encoding.backbone not in DIFFERENTIABLE:
-        fault = "has no gradient with respect to the points once it is trained"
-        raise InputError(f"backbone '{encoding.backbone}'", fault, f"use {' or '.join(DIFFERENTIABLE)}")
     files = ("registrations", "encoders", "embeddings", "deletions", "maps", "tcav")
     for seed, *paths in progress(list(job.per_seed(*files)), f"gradients of {job.source}"):
         inputs, outputs, axes = paths[:3], paths[3:], (job.source, seed)

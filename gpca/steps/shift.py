@@ -14,7 +14,6 @@ import numpy as np
 
 from gpca.attribution.predictions import prediction_frame
 from gpca.encoders.registry import EncoderSettings
-from gpca.errors import InputError
 from gpca.explainers.analytical_features import analytical_features
 from gpca.explainers.interface import ConceptExplainer
 from gpca.explainers.registry import explainer_entry
@@ -84,18 +83,11 @@ def shift(job: Job) -> None:
             registrations = Registrations.load(path, axes)
             registrations = replace(registrations, attached=read_embedding(embeddings, registrations))
             other = Registrations.load(other_path) if other_path else None
-            if other is not None and other.axes is not None and other.axes[0] == job.source:
-                fault = f"is of source '{job.source}' itself"
-                raise InputError(other_path, fault, "give registrations of another source")
             model = load_model(weights, encoder_settings, axes=axes)
             make_sets(objects, registrations, other, model, encoder_settings, *axes, settings).save(out, axes)
 
 
 def fit_learners(job: Job) -> None:
-    for learner in job.learners:
-        if explainer_entry(learner).reads != "embeddings":
-            raise InputError(f"learner '{learner}'", "does not read embeddings", "choose another")
-
     for i, (seed, path) in enumerate(job.per_seed("sets")):
         sets = ShiftedSets.load(path, (job.source, seed))
         outputs = job.out[i :: len(job.seeds)]

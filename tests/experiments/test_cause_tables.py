@@ -127,5 +127,3 @@ def test_the_figure_of_reliability_is_the_same_bytes_each_time(titles, same_byte
     titles["absent"] = "Absent"
     judged = {("ycb", "good", seed): random_judged(seed=seed) for seed in (100, 101)}
     same_bytes(lambda: nominal_reliability(run_with(sources=SOURCES), judged))
-    with pytest.raises(InputError, match="have no predictions of these sources and explainers"):
-        nominal_reliability(run_with(sources={"mugs": {"title": "Mugs", "stand_in": False}}), judged)

@@ -6,7 +6,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from gpca.errors import InputError
 from gpca.evaluation.measures import POOLED, read_clustered, write_metrics
 from gpca.experiments import control_tables
 from gpca.experiments.control_tables import REGISTRATION, read_costs, read_severities
@@ -167,12 +166,6 @@ def test_success_and_accuracy_stand_in_the_same_bins(files, tmp_path):
     assert noise["samples"].sum() == 40  # of four files
     assert (noise["value"] * noise["samples"]).sum() == pytest.approx(36)  # by the paper's protocol alone
     assert noise["value"].iloc[1] == 1
-
-
-def test_severities_of_other_samples_are_refused(files, tmp_path):
-    others = severity_files(tmp_path, files, sample=np.arange(30) + 1)
-    with pytest.raises(InputError, match="lack test samples"):
-        control_tables.collect(RUN, files, others)
 
 
 def test_a_perfect_pose_has_no_error(registrations, objects):

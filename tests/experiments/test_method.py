@@ -155,14 +155,6 @@ def test_draws_red_and_blue_in_three_panels_and_the_same_bytes_again(files, same
         assert all(panel.sum() > 100 for panel in panels)
 
 
-def test_objects_of_another_run_are_refused(files, tmp_path):
-    folder, _, _ = files
-    with np.load(folder / "objects.npz") as arrays:
-        save_arrays(tmp_path / "objects.npz", dict(arrays) | {"names": np.array(["cat", "duck"])})
-    with pytest.raises(InputError, match="has no object"):
-        fig3_concepts(BOXES, tmp_path / "objects.npz", folder / "registrations.npz")
-
-
 TREATMENTS = {"noise": "denoise", "pose": "reinitialize", "overlap": "new_view"}
 THRESHOLDS = {"uncertain": None, "queued_share": 0.05, "dominant": 0.4, "improvement": 0.3}
 

@@ -207,7 +207,6 @@ FAULTS = {
             {"--learners": ["learner_nearest", "gpca"]},
             "fewer than two concepts",
         ),
-        (untouched, {"--learners": ["gpca", "residuals_forest"]}, "'residuals_forest': does not read embeddings"),
     ],
     "model": [
         (removed("weights.pt"), {}, "weights.pt: no such weights"),
