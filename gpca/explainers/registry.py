@@ -5,12 +5,19 @@ A file lists its explainers of concepts as ``EXPLAINERS`` and those of causes as
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
 
-from gpca.explainers.interface import ExplainerEntry
+import numpy as np
+
+from gpca.errors import InputError
+from gpca.explainers.interface import ConceptExplainer, Describing, ExplainerEntry
+from gpca.pairs.dataset import Registrations
 from gpca.process.registry import Registry
 from gpca.settings import require_arguments
 
+Embed = Callable[[Registrations, str], tuple[np.ndarray, np.ndarray]]  # and the name of their source -> h and logits
 CONCEPTS, CAUSES = "concepts", "causes"  # explainers name what was perturbed, or what is wrong
 REGISTRIES: dict[str, Registry[ExplainerEntry]] = {
     CONCEPTS: Registry("explainer", "baselines", "EXPLAINERS", first=("gpca.explainers.gpca",), outside=ExplainerEntry),
@@ -36,3 +43,37 @@ def require_settings(name: str, settings: Mapping[str, object], kind: str = CONC
 def explainer_module(name: str, kind: str = CONCEPTS) -> str:
     """Return the module that lists the explainer."""
     return REGISTRIES[kind].module(name)
+
+
+@dataclass(frozen=True)
+class Rival:
+    """One explainer.
+
+    Attributes:
+        reads, observed_only: what it needs attached, as in :class:`gpca.explainers.interface.ExplainerEntry`.
+    """
+
+    make: Callable[[], ConceptExplainer]  # returns a new one at every call
+    reads: str
+    observed_only: bool = False
+
+
+def make_rivals(explainers: Mapping[str, Mapping], source: str, seed: int) -> dict[str, Rival]:
+    """Explainers of a section of the config, name -> settings."""
+    if not explainers:
+        raise InputError("setting explainers", "is empty", "name at least one")
+    rivals = {}
+    for name, settings in explainers.items():
+        require_settings(name, settings)
+        entry = explainer_entry(name)
+        rivals[name] = Rival(partial(entry.make, source, seed, **settings), entry.reads, entry.observed_only)
+    return rivals
+
+
+def described_for(rivals: Mapping[str, Rival], registrations: Registrations) -> Registrations:
+    """Registrations with the explainers' measurements attached, made once for all training sets."""
+    for rival in rivals.values():
+        explainer = rival.make()
+        if isinstance(explainer, Describing):
+            registrations = explainer.describe(registrations)
+    return registrations

@@ -6,7 +6,7 @@ trained on the others. The final classifier is trained on all.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from sys import intern
 
@@ -24,6 +24,7 @@ from gpca.errors import InputError
 from gpca.evaluation.conformal import highest_level
 from gpca.explainers.pair_classifier import Judgment, PairClassifier
 from gpca.guarantee.guarantee import Guarantee, calibrate, states_of
+from gpca.io.container import Container, array
 from gpca.model.diagnosis import Diagnosis, Guaranteed, Reenacted, state_probabilities
 from gpca.pairs.distances import ObservedPair
 from gpca.pairs.perturbation import CONCEPTS
@@ -174,36 +175,22 @@ class Diagnoser:
 
 
 @dataclass(frozen=True)
-class TrainingSet:
+class TrainingSet(Container):
     """N registrations with measured causes."""
 
-    features_N_F: np.ndarray  # :func:`gpca.reenactment.dataset.reenactment_features`
-    label_N: np.ndarray  # nominal, a dominant cause, or borderline
-    state_N: np.ndarray  # the label, but ``several`` for failures with several causes
-    causes_N_3: np.ndarray  # whether each concept is a cause
-    error_N: np.ndarray  # mean over the starts, diameters
-    family_N: np.ndarray  # family of the shape
+    features_N_F: np.ndarray = array("N F")  # :func:`gpca.reenactment.dataset.reenactment_features`
+    label_N: np.ndarray = array("N")  # nominal, a dominant cause, or borderline
+    state_N: np.ndarray = array("N")  # the label, but ``several`` for failures with several causes
+    causes_N_3: np.ndarray = array("N 3")  # whether each concept is a cause
+    error_N: np.ndarray = array("N")  # mean over the starts, diameters
+    family_N: np.ndarray = array("N")  # family of the shape
 
     @classmethod
     def of(cls, causes: Causes, reenactments: Reenactments) -> TrainingSet:
         """Return the training set of one source."""
-        return cls(
-            features_N_F=reenactment_features(reenactments),
-            label_N=labels_of(causes.truth),
-            state_N=states_of(causes.truth),
-            causes_N_3=causes.truth.causes,
-            error_N=causes.truth.error[:, ALL],
-            family_N=causes.registrations.cluster,
-        )
-
-    @classmethod
-    def joined(cls, parts: Sequence[TrainingSet]) -> TrainingSet:
-        """Concatenate the training sets of several sources."""
-        return cls(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in vars(parts[0])})
-
-    def subset(self, rows_N: np.ndarray) -> TrainingSet:
-        """Return the given rows."""
-        return TrainingSet(**{name: array[rows_N] for name, array in vars(self).items()})
+        truth = causes.truth
+        features, label_N, state_N = reenactment_features(reenactments), labels_of(truth), states_of(truth)
+        return cls(features, label_N, state_N, truth.causes, truth.error[:, ALL], causes.registrations.cluster)
 
     def classifier(self, gpc: GPCSettings, *axes: object) -> PairClassifier:
         """Train a classifier."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from html import escape
 from pathlib import Path
@@ -32,19 +32,12 @@ SCANS_WITHOUT = {"noise": "smoothed points", "pose": "right start", "overlap": "
 
 @dataclass(frozen=True)
 class PoseSpread:
-    """Uncertainty of the pose.
+    """Uncertainty of the pose."""
 
-    Attributes:
-        covariance_6_6: Σ of twists on the left of the pose, in radians and diameters.
-        diameter: the target's, in the unit of the points.
-        estimator: name of the estimator.
-        starts: number of starts of Monte-Carlo; None for other estimators.
-    """
-
-    covariance_6_6: np.ndarray
-    diameter: float
-    estimator: str
-    starts: int | None
+    covariance_6_6: np.ndarray  # Σ of twists on the left of the pose, in radians and diameters
+    diameter: float  # the target's, in the unit of the points
+    estimator: str  # name of the estimator
+    starts: int | None  # number of starts of Monte-Carlo; None for other estimators
 
     @property
     def rotation_deg(self) -> float:
@@ -58,11 +51,9 @@ class PoseSpread:
 
 
 class Page:
-    """An explanation that can be shown as a page."""
+    """An explanation that can be shown as the page that the method ``html`` of its class returns."""
 
-    def html(self, names: Mapping[str, str] | None = None) -> str:
-        """Return the page; defined by the subclasses."""
-        raise NotImplementedError
+    html: Callable[..., str]
 
     def save_html(self, path: str | Path, names: Mapping[str, str] | None = None) -> None:
         """Write :meth:`html` to a file."""
@@ -79,43 +70,31 @@ class Explanation(Page):
     """One registration of an object, explained by a trained model.
 
     Attributes:
-        T_target_source: (4, 4) the resulting pose, in the unit of the points.
         fitness, inlier_rmse: share of source points with a correspondence; their RMSE, in the unit of the points.
-        method: kind of the model's ICP, or name of a registration method.
-        diagnosis: state and causes, learned from measured causes; None if not requested.
         scores, variances: GP-CA as in the paper, which sees only the aligned source and always names a concept: mean
             and variance over the posterior draws (Eqs. 4, 5).
         bald, entropy: uncertainty of these in nats: Eq. 7, and the entropy of the scores.
-        concept: concept with the largest score (Eq. 6).
-        action: what to do next: a branch of the policy (:mod:`gpca.causes.policy`), or `CHECK`.
-        reason: reason for this action.
-        spread: uncertainty of the pose by an estimator, if requested and available.
-        unit: unit of all lengths.
-        seconds: duration of each stage, and ``total``.
-        notes: changes made to the clouds, such as points that were left out.
-        warnings: how the pair differs from the training data.
-        learned_from: training data of the diagnosis.
         scene: data of the 3-D view for :meth:`html`; None for explanations made in bulk.
     """
 
-    T_target_source: np.ndarray
+    T_target_source: np.ndarray  # (4, 4) the resulting pose, in the unit of the points
     fitness: float
     inlier_rmse: float
-    method: str
-    diagnosis: Diagnosis | None
+    method: str  # kind of the model's ICP, or name of a registration method
+    diagnosis: Diagnosis | None  # state and causes, learned from measured causes; None if not requested
     scores: dict[str, float]
     variances: dict[str, float]
     bald: float
     entropy: float
-    concept: str
-    action: str
-    reason: str
-    spread: PoseSpread | None
-    unit: str
-    seconds: dict[str, float]
-    notes: tuple[str, ...] = ()
-    warnings: tuple[str, ...] = ()
-    learned_from: str = ""
+    concept: str  # concept with the largest score (Eq. 6).
+    action: str  # what to do next: a branch of the policy (:mod:`gpca.causes.policy`), or `CHECK`
+    reason: str  # reason for this action
+    spread: PoseSpread | None  # uncertainty of the pose by an estimator, if requested and available
+    unit: str  # unit of all lengths
+    seconds: dict[str, float]  # duration of each stage, and ``total``
+    notes: tuple[str, ...] = ()  # changes made to the clouds, such as points that were left out
+    warnings: tuple[str, ...] = ()  # how the pair differs from the training data
+    learned_from: str = ""  # training data of the diagnosis
     scene: Scene | None = field(default=None, repr=False, compare=False)
 
     @property
@@ -187,41 +166,30 @@ class ScanExplanation(Page):
     """One registration of two partial scans of a scene, explained without training.
 
     Attributes:
-        T_target_source: (4, 4) the resulting pose, in the unit of the points.
         fitness, inlier_rmse: share of the source's voxels with a partner within two voxels; their RMSE.
-        method: name of the registration method.
-        voxel: edge length of the voxels.
-        state: ``nominal``, ``failed`` or ``not sure``.
-        failure: probability of a failure (:func:`gpca.model.scan_explainer.failure_of`), not calibrated.
-        limit: error above which a registration counts as failed: root mean square over the common surface.
         overlap: share of the source that lies on the target, and of the target that lies on the source.
-        reenacted: hypotheses of the true pose, and the effect of each cause.
         action, reason: what to do next, a branch of the policy, and why.
-        unit: unit of all lengths.
-        seconds: duration.
         notes, warnings: changes made to the clouds, and reasons to doubt the explanation.
-        learned_from: training data: none.
-        scene: data of the 3-D view.
     """
 
-    T_target_source: np.ndarray
+    T_target_source: np.ndarray  # (4, 4) the resulting pose, in the unit of the points
     fitness: float
     inlier_rmse: float
-    method: str
-    voxel: float
-    state: str
-    failure: float
-    limit: float
+    method: str  # name of the registration method
+    voxel: float  # edge length of the voxels
+    state: str  # ``nominal``, ``failed`` or ``not sure``
+    failure: float  # probability of a failure (:func:`gpca.model.scan_explainer.failure_of`), not calibrated
+    limit: float  # error above which a registration counts as failed: root mean square over the common surface
     overlap: tuple[float, float]
-    reenacted: Reenacted
+    reenacted: Reenacted  # hypotheses of the true pose, and the effect of each cause
     action: str
     reason: str
-    unit: str
-    seconds: float
+    unit: str  # unit of all lengths
+    seconds: float  # duration
     notes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
-    learned_from: str = LEARNED
-    scene: Scene | None = field(default=None, repr=False, compare=False)
+    learned_from: str = LEARNED  # training data: none
+    scene: Scene | None = field(default=None, repr=False, compare=False)  # data of the 3-D view
 
     @property
     def advice(self) -> str:

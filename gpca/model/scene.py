@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from base64 import b64decode, b64encode
+from base64 import b64encode
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -28,25 +28,19 @@ WITHOUT = {"noise": "clean points", "pose": "right start", "overlap": "whole sur
 
 @dataclass(frozen=True)
 class Possibility:
-    """A hypothesis of the true pose, with its re-enacted registrations in the target's frame and in its diameters.
-
-    Attributes:
-        clouds: (P, 3) the source after one registration from the unperturbed start, for each subset.
-    """
+    """A hypothesis of the true pose, with its re-enacted registrations in the target's frame and in its diameters."""
 
     probability: float  # among all hypotheses
     T: np.ndarray  # (4, 4) maps the source at its initial pose to the hypothesis
     errors: tuple[float, ...]  # v̂, the mean over the starts, for each subset of the causes that is left in
-    clouds: tuple[np.ndarray, ...]
+    clouds: tuple[np.ndarray, ...]  # (P, 3) for each subset, the source after ICP from the unperturbed start
 
 
 @dataclass(frozen=True)
 class Scene:
     """A registration in the target's canonical frame and in its diameters.
 
-    Attributes:
-        enact: repeats the re-enactment with the same random numbers; None if there was none. It runs only when the
-            scene is drawn.
+    Where there was a re-enactment, `enact` repeats it with the same random numbers, when the scene is drawn.
     """
 
     source: np.ndarray  # (N, 3) at its initial pose
@@ -69,10 +63,20 @@ class Scene:
             return ()
         enactments, truth = self.enact()
         weight_k = weights_of(enactment.hypothesis for enactment in enactments)
-        return tuple(
-            Possibility(float(weight), enactment.hypothesis.T, tuple(enactment.error_8), _clouds(enactment, truth))
-            for enactment, weight in zip(enactments, weight_k, strict=True)
-        )
+        possibilities = []
+        for enactment, weight in zip(enactments, weight_k, strict=True):
+            candidate, registrar = enactment.candidate, Registrar(enactment.candidate, truth, misses=True)
+            clouds = []
+            for causes in SUBSETS:
+                applied = tuple(cause for cause in causes if candidate.applied[cause])
+                try:
+                    T = registrar.run(applied, np.zeros((1, 6))).T_target_source_n[0]
+                except Unmeasurable:
+                    T = candidate.start(applied)
+                clouds.append(transform(T, candidate.observed(applied)))
+            T, errors = enactment.hypothesis.T, tuple(enactment.error_8)
+            possibilities.append(Possibility(float(weight), T, errors, tuple(clouds)))
+        return tuple(possibilities)
 
     def packed(self, unit: str) -> dict[str, object]:
         """JSON values for the page's script, see :func:`packed_pair`."""
@@ -84,30 +88,13 @@ class Scene:
         return pair | {"poses": poses}
 
 
-def _clouds(enactment: Enactment, truth: CauseSettings) -> tuple[np.ndarray, ...]:
-    candidate, registrar = enactment.candidate, Registrar(enactment.candidate, truth, misses=True)
-    clouds = []
-    for causes in SUBSETS:
-        applied = tuple(cause for cause in causes if candidate.applied[cause])
-        try:
-            T = registrar.run(applied, np.zeros((1, 6))).T_target_source_n[0]
-        except Unmeasurable:
-            T = candidate.start(applied)
-        clouds.append(transform(T, candidate.observed(applied)))
-    return tuple(clouds)
-
-
 def packed_pair(
     target: np.ndarray, source: np.ndarray, T_found: np.ndarray, reach: float, diameter: float, unit: str
 ) -> dict[str, object]:
     """Return the two clouds of a registration as JSON values, without hypotheses.
 
-    Lengths are in diameters of the target, except ``diameter`` itself, which is in `unit`.
-
-    Args:
-        target: (M, 3). source: (N, 3) at its initial pose.
-        T_found: (4, 4) maps the source from there to the result.
-        reach: distance from which on all points get the same color.
+    Lengths are in diameters of the target, except ``diameter`` itself, which is in `unit`. `T_found` maps the source
+    from its initial pose to the result; from the distance `reach` on, all points get the same color.
     """
     radii = [np.linalg.norm(points, axis=1) for points in (target, source, transform(T_found, source))]
     radius = max(float(np.quantile(radius, 0.98)) for radius in radii)  # a few far points are ignored
@@ -127,11 +114,6 @@ def packed(points: np.ndarray) -> dict[str, object]:
     kept = points[np.linspace(0, len(points) - 1, min(len(points), MOST_POINTS)).astype(int)]
     step = max(float(np.abs(kept).max()), 1e-9) / LARGEST_STEP
     return {"step": step, "data": b64encode(np.rint(kept / step).astype("<i2").tobytes()).decode("ascii")}
-
-
-def unpacked(cloud: dict) -> np.ndarray:
-    """Return the points (N, 3) of a :func:`packed` cloud, as the page's script does."""
-    return np.frombuffer(b64decode(cloud["data"]), "<i2").reshape(-1, 3) * cloud["step"]
 
 
 def flat(T: np.ndarray) -> list[float]:

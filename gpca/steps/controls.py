@@ -20,7 +20,7 @@ from gpca.encoders.registry import EncoderSettings
 from gpca.encoders.training import embed, load_model
 from gpca.explainers.gpca import GPCA_FORMS
 from gpca.explainers.interface import BARE, Describing, Encoding
-from gpca.explainers.rivals import Embed, Rival, described_for, make_rivals
+from gpca.explainers.registry import Embed, Rival, described_for, make_rivals
 from gpca.io.csv_file import write_csv
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations, read_embedding

@@ -14,8 +14,7 @@ from gpca.attribution.predictions import prediction_frame
 from gpca.attribution.scores import Attribution
 from gpca.encoders.registry import EncoderSettings
 from gpca.errors import InputError
-from gpca.explainers.registry import explainer_entry
-from gpca.explainers.rivals import Embed, Rival, described_for, make_rivals
+from gpca.explainers.registry import Embed, Rival, described_for, explainer_entry, make_rivals
 from gpca.io.csv_file import write_csv
 from gpca.io.files import SPLITS
 from gpca.objects.canonical import ObjectClouds

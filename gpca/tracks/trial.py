@@ -19,8 +19,7 @@ from gpca.encoders.registry import EncoderSettings
 from gpca.errors import InputError
 from gpca.experiments.scan_causes import diagnosis_settings
 from gpca.explainers.interface import BARE, REENACTED, ExplainerEntry
-from gpca.explainers.registry import explainer_entry, require_settings
-from gpca.explainers.rivals import make_rivals
+from gpca.explainers.registry import explainer_entry, make_rivals, require_settings
 from gpca.frames.source import REAL_WORLD
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.process.job import Job

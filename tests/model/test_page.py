@@ -2,6 +2,7 @@
 
 import json
 import re
+from base64 import b64decode
 from dataclasses import replace
 
 import numpy as np
@@ -9,11 +10,16 @@ import pytest
 
 from gpca.alignment.rigid import transform
 from gpca.causes.truth import ALL, BY_SIZE
-from gpca.model.scene import MOST_POINTS, packed, taken_out, unpacked
+from gpca.model.scene import MOST_POINTS, packed, taken_out
 
 from ..page.test_in_a_browser import chromium, in_a_browser, with_script
 
 LARGEST_BYTES = 2 * 10**6
+
+
+def unpacked(cloud):
+    """The points (N, 3) of a packed cloud, as the page's script reads them."""
+    return np.frombuffer(b64decode(cloud["data"]), "<i2").reshape(-1, 3) * cloud["step"]
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,6 @@ from gpca.causes.settings import CauseSettings, Limits
 from gpca.causes.truth import ALL, BY_SIZE
 from gpca.errors import InputError
 from gpca.experiments.registration_stages import source_before_icp
-from gpca.model.scene import unpacked
 from gpca.page.samples import (
     OF_EACH_CONCEPT,
     POINTS,
@@ -23,6 +22,8 @@ from gpca.page.samples import (
 from gpca.pairs.perturbation import CONCEPTS
 from tests.conftest import FEW_CAUSES
 from tests.figures import write_uncertainties
+
+from ..model.test_page import unpacked
 
 SOURCE = {"title": "Bricks", "stand_in": True}
 

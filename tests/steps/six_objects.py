@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gpca.attribution.scores import Attribution
-from gpca.explainers.rivals import Rival
+from gpca.explainers.registry import Rival
 from gpca.objects.surface import instance_of
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.steps.control_samples import ControlSettings

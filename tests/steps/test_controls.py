@@ -8,7 +8,7 @@ import pytest
 from baselines.pair import PairGPCA
 from baselines.residuals import residuals_logistic
 from gpca.encoders.registry import EncoderSettings
-from gpca.explainers.rivals import Rival
+from gpca.explainers.registry import Rival
 from gpca.steps.control_samples import TRAININGS, ControlSettings, encode, of_unseen_objects, shows_known_object
 from gpca.steps.controls import ASKED
 

@@ -13,7 +13,7 @@ from gpca.alignment.methods.interface import FailedRegistration, MethodEntry
 from gpca.alignment.rigid import exp, transform
 from gpca.attribution.scores import Attribution
 from gpca.errors import InputError
-from gpca.explainers.rivals import Rival
+from gpca.explainers.registry import Rival
 from gpca.pairs.judge import Judges
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import generator
