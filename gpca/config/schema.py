@@ -18,7 +18,7 @@ from gpca.encoders.reduction import PCA, UMAP, Autoencoder
 from gpca.encoders.registry import NamedEncoder
 from gpca.experiments.experiment import ByName
 from gpca.experiments.registry import experiments
-from gpca.objects.entry import Name, NamedSource, Place, SurfacePoints
+from gpca.objects.entry import Name, Place, SourceEntry, SurfacePoints
 from gpca.pairs.synthesis import RegistrationSettings
 from gpca.settings import Bounds, Different, Distinct, Keys, OpenShare, changes_of, part_of, required
 from gpca.uncertainty.settings import UncertaintySettings
@@ -79,7 +79,7 @@ class SharedSections:
     comparison: Annotated[dict, required(tolerances=Tolerances)]
     reference: Allowance
     figures: Annotated[dict, required(source=str)]  # of one registration
-    sources: Annotated[dict[Name, NamedSource], Field(min_length=1)]
+    sources: Annotated[dict[Name, SourceEntry], Field(min_length=1)]
 
 
 @cache

@@ -37,7 +37,7 @@ from gpca.experiments.specification_curve import Plain, stand_ins
 from gpca.experiments.step import Plan, Step
 from gpca.explainers.registry import explainer_module
 from gpca.io.csv_file import ANY, read_csv
-from gpca.objects.entry import Name, NamedSource, title_of
+from gpca.objects.entry import Name, SourceEntry, title_of
 from gpca.reporting.tables.builder import TableBuilder
 from gpca.reporting.tables.cells import plain_cell, rows_where
 from gpca.settings import Bounds, Count
@@ -64,7 +64,7 @@ class Section:
     """
 
     source: Name
-    objects: NamedSource
+    objects: SourceEntry
     stands_for: Name
     seeds: tuple[DevelopmentSeed, ...]
     samples: Annotated[int, Bounds(minimum=3, multipleOf=3)]

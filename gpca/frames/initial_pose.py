@@ -67,15 +67,15 @@ def read_bop_results(
                 message = f"{column} contains values that are not finite numbers: {fault}"
                 raise InputError(subject, message, REMEDY) from fault
             if len(entries[column]) != count:
-                fault = f"{column} has {len(entries[column])} entries, not {count}"
-                raise InputError(subject, fault, "separate them by spaces")
+                message = f"{column} has {len(entries[column])} entries, not {count}"
+                raise InputError(subject, message, "separate them by spaces")
             if not (abs(entries[column]) < 1e100).all():  # no norm of these overflows
                 raise InputError(subject, f"{column} contains a number that is out of bounds", REMEDY)
         pose = rigid_motion(entries["R"].reshape(3, 3), entries["t"] / 1000)
         require_rotation(pose, subject)
         if pose[2, 3] <= 0:
-            fault = f"t has z = {1e3 * pose[2, 3]:.6g} mm, not in front of the camera"
-            raise InputError(subject, fault, "leave out failed estimates")
+            message = f"t has z = {1e3 * pose[2, 3]:.6g} mm, not in front of the camera"
+            raise InputError(subject, message, "leave out failed estimates")
         if annotated := distances_m[scene, image]:
             ratios.append(float(np.linalg.norm(pose[:3, 3]) / np.median(annotated)))
             _require_unit(subject, ratios[-1], ONE_OFF)

@@ -175,16 +175,18 @@ def read_instances(
         raise InputError(", ".join(datasets), f"no object is left in any frame{reasons}", "check masks and depth")
     # Last, since errors are measured against poses that fit the measurements.
     poses = _poses_from_results(datasets, seen) if settings.form == "results" else _poses(seen, objects, settings)
-    for fault in left_out:
-        print(f"skipped: {fault}", file=sys.stderr)
-    columns = {name: np.array([of.row[name] for of in seen]) for name in seen[0].row if name not in PARTS}
+    for reason in left_out:
+        print(f"skipped: {reason}", file=sys.stderr)
+    columns: dict[str, Any] = {
+        name: np.array([of.row[name] for of in seen]) for name in seen[0].row if name not in PARTS
+    }
     columns |= {name: np.concatenate([of.row[name] for of in seen]) for name in PARTS}
     columns["offsets"] = np.cumsum([0, *(len(of.row["points_m"]) for of in seen)], dtype=np.int64)
     init_from, T_camera_object_init = zip(*poses, strict=True)
     return Instances(**columns, init_from=np.array(init_from), T_camera_object_init=np.array(T_camera_object_init))
 
 
-PARTS = ("points_m", "pixels")
+PARTS = {"points_m", "pixels"}
 
 
 class _Seen(NamedTuple):
@@ -208,7 +210,8 @@ def _poses(
     seen: list[_Seen], objects: ObjectClouds, settings: initial_pose.InitialPoseSettings
 ) -> list[tuple[str, np.ndarray]]:
     """Return the form of the initial poses, and each of them, without asking an estimator."""
-    poses, registration = [], dict[tuple[str, int], initial_pose.GlobalRegistration]()
+    poses: list[tuple[str, np.ndarray]] = []
+    registration: dict[tuple[str, int], initial_pose.GlobalRegistration] = {}
     for of in progress(seen, "initial poses"):
         axes, row = of.random_axes("initial pose"), of.row
         if settings.form == "true_pose":
@@ -216,8 +219,8 @@ def _poses(
         else:
             key = row["dataset"], of.annotation.object_id
             if key not in registration:
-                cloud = objects.clouds[row["object_index"]]
-                registration[key] = initial_pose.GlobalRegistration(*cloud, of.diameter_m, settings)
+                points_m, normals = objects.clouds[row["object_index"]]
+                registration[key] = initial_pose.GlobalRegistration(points_m, normals, of.diameter_m, settings)
             T_init = registration[key].register(row["points_m"], seed_of(*axes))
         poses.append((settings.form, T_init))
     return poses

@@ -94,7 +94,7 @@ def all_starts(
         T_init = instances.T_camera_object_true[i] @ inverse(T_model_object) @ T_error @ T_model_object
         found.append((i, TRANSPLANTED, "errors", T_init))
     by_features = np.flatnonzero(instances.init_from == GLOBAL)
-    found += [(i, NATIVE, GLOBAL, instances.T_camera_object_init[i]) for i in by_features]
+    found += [(int(i), NATIVE, GLOBAL, instances.T_camera_object_init[i]) for i in by_features]
     for rung, (turn_deg, shift) in enumerate(rungs):
         for i in range(len(instances)):
             T_error = misplacement(np.deg2rad(turn_deg), shift, generator(*_axes(instances, i), "rung", rung))

@@ -207,9 +207,7 @@ class ObjectClouds:
 
     names: tuple[str, ...]  # of the O objects
     diameters_m: np.ndarray  # (O,) float64
-    clouds: tuple[
-        tuple[np.ndarray, np.ndarray], ...
-    ]  # points (P, 3) in meters and unit normals (P, 3) of each, float32
+    clouds: tuple[tuple[np.ndarray, np.ndarray], ...]  # points (P, 3) in meters and unit normals (P, 3), float32
     families: tuple[str, ...] = ()  # of each object, from a file of splits; without one, each instance is a family
     folds: tuple[int, ...] = ()
 

@@ -23,30 +23,22 @@ Checksums = Sha256 | list[Sha256 | None] | None
 SurfacePoints = Annotated[int, Bounds(minimum=256, maximum=1048576)]  # sampled on each mesh
 
 
-@dataclass(frozen=True)
-class Source:
+@dataclass(frozen=True, kw_only=True)
+class SourceEntry:
     """A source of objects: one row in every table."""
 
-    title: Text = ""
-    kind: str = ""  # how the data is read
+    title: Text
+    kind: str  # how the data is read
     family: str = ""  # of procedural objects
     location: Place | None = None  # a folder, relative to `data_dir`
     files: Annotated[list[Text], Field(min_length=1)] = field(default_factory=list)  # patterns below it
     objects: Distinct[Annotated[int, Bounds(minimum=0)]] = ()  # their numbers; all if empty
     unit: Unit | None = None  # of lengths in the files
-    url: Url = ""  # of the download, where the location does not exist; or several
-    urls: Urls = field(default_factory=list)
+    url: Url = ""  # of the download, where the location does not exist
+    urls: Urls = field(default_factory=list)  # several of them
     sha256: Checksums = None
     views_per_instance: Count = 1  # at most, of single views
     stand_in: bool = False  # every title says that the objects are stand-ins
-
-
-@dataclass(frozen=True, kw_only=True)
-class NamedSource(Source):
-    """A source of the config, with a title and a kind."""
-
-    title: Text = field()
-    kind: str = field()
 
     def __post_init__(self) -> None:
         if self.kind == "mesh_folder" and not self.unit:

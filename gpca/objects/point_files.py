@@ -191,7 +191,8 @@ def _text(path: Path) -> np.ndarray:
         raise InputError(path, "has no points", COLUMNS_REMEDY)
     separator = next((sign for sign in SEPARATORS if sign in lines[0]), None)
     words = [word.strip().strip('"').lower() for word in lines[0].split(separator)]
-    are_numbers, columns = [_is_number(word) for word in words], (0, 1, 2)
+    are_numbers = [_is_number(word) for word in words]
+    columns: tuple[int, ...] = (0, 1, 2)
     if not any(are_numbers):
         if not set(AXES) <= set(words):
             raise InputError(path, f"has the columns {', '.join(words[:8])}, not x, y, z", COLUMNS_REMEDY)

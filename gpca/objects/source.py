@@ -81,8 +81,8 @@ def resolve(entry: dict, data_dir: str | None) -> dict:
         wanted = entry.get("location") or ", ".join(patterns or ["location"])
         raise InputError(subject, f"{wanted} does not exist", "correct location, or set data_dir to its parent folder")
     if checksums and len(checksums) != len(urls):
-        fault = f"has {len(urls)} url(s) but {len(checksums)} sha256 value(s)"
-        raise InputError(subject, fault, "give one for each, or null")
+        message = f"has {len(urls)} url(s) but {len(checksums)} sha256 value(s)"
+        raise InputError(subject, message, "give one for each, or null")
     return {**entry, "origin": "download"}
 
 

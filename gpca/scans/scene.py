@@ -205,7 +205,7 @@ class ScanPairs(Container):
             viewpoint_known=np.array([at is not None for _, _, at in scans]),
             target=row_K_2[:, 1],
             source_scan=row_K_2[:, 0],
-            **{name: np.array([getattr(pair, name) for pair in pairs]) for name in PER_PAIR},
+            **{name: np.array([getattr(pair, name) for pair in pairs]) for name in PER_PAIR},  # type: ignore[arg-type]
         )
 
     def check(self, path: str | Path) -> None:
