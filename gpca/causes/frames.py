@@ -15,9 +15,9 @@ never shows an object's back: the side that it hides by itself counts as no caus
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 
 from gpca.alignment.rigid import inverse, rotation_angle_rad, scale_translation
 from gpca.causes.candidate import Candidate, Unmeasurable
@@ -32,9 +32,6 @@ from gpca.objects.canonical import TRAINING, ObjectClouds
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.progress import progress
 from gpca.seeds import generator
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 OUTLINE_POINTS = 2048  # of an object, which tell where in the image it lies
 
@@ -76,8 +73,6 @@ def measure_frames(
         the registrations, all of them test samples with the number of their start; a row for each of where it was
         seen, what it started from and what was found.
     """
-    import pandas as pd
-
     subjects, limit = measure_clean_pairs(subjects_of(instances, starts.instance, objects), source, seed, settings)
     of_object = {subject.index: subject for subject in subjects}
 

@@ -269,4 +269,4 @@ def _clean_uncertainty(scans: DrawnScans, others: DrawnScans, axes: tuple, setti
         registrar = Registrar(candidate, settings, misses=True)
         measured = Counterfactuals(registrar, each.errors, xi_n_6 * settings.deviation_6(), settings)
         covariances.append(measured.covariance(NONE))
-    return float(divergence(*covariances, settings.floor))
+    return float(divergence(covariances[0], covariances[1], settings.floor))

@@ -83,10 +83,12 @@ def register_first(situation: Situation, points: int, icp: ICPSettings) -> Attem
     return outcome and replace(outcome, seconds=seconds + outcome.seconds)
 
 
-def register_misplaced(situation: Situation, clean: Attempt, points: int, icp: ICPSettings) -> Attempt | None:
+def register_misplaced(situation: Situation, clean: Attempt, points: int, icp: ICPSettings) -> Attempt:
     """Register the measurement made without a pose error, from the estimate that has the situation's error."""
     T_init = clean.holding.T_world_object_init @ situation.T_object_estimated
-    return register_held(situation, Holding(clean.holding.shots, T_init, T_init), points, icp)
+    attempt = register_held(situation, Holding(clean.holding.shots, T_init, T_init), points, icp)
+    assert attempt is not None  # the same points were registered before
+    return attempt
 
 
 def register_after(
@@ -185,7 +187,9 @@ def find_episodes(situations: Situations, settings: LoopSettings) -> list[Episod
     episodes: list[Episode] = []
     tries: dict[str, int] = {}
     for cause in CONCEPTS:
-        failures, good, tries[cause] = [], [], 0
+        failures: list[Case] = []
+        good: list[Case] = []
+        tries[cause] = 0
         for number in progress(range(settings.tries), f"failures by {cause}"):
             if len(failures) == settings.failures and len(good) >= settings.good:
                 break
@@ -213,21 +217,19 @@ def _try_situation(
     """
     points, icp, success = settings.cloud_points, settings.icp, settings.success
     disturbed, clean = situations.draw(cause, cause, number)
+    start: Attempt | None = None
     if cause != POSE:
         start = register_first(disturbed, points, icp)
-        if start is None:
-            return None, None, 1
-        if is_right(start, success):
-            return None, (disturbed, start), 1
+        if start is None or is_right(start, success):
+            return None, start and (disturbed, start), 1
     without = register_first(clean, points, icp)
     if without is None or not is_right(without, success):
         return None, None, 1
-    if cause != POSE:
+    if start is not None:
         return (disturbed, start), (clean, without), 1
     for tried in range(1, misplaced + 1):
         situation = situations.misplaced(clean, tried)
-        start = register_misplaced(situation, without, points, icp)
-        assert start is not None  # the same points were registered before
-        if not is_right(start, success):
-            return (situation, start), (clean, without), tried
-    return None, (situation, start), misplaced
+        attempt = register_misplaced(situation, without, points, icp)
+        if not is_right(attempt, success):
+            return (situation, attempt), (clean, without), tried
+    return None, (situation, attempt), misplaced

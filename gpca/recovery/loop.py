@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from time import perf_counter
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 
 from gpca.causes.settings import CauseSettings
 from gpca.errors import InputError
@@ -25,9 +25,6 @@ from gpca.recovery.rehearsal import known
 from gpca.recovery.settings import LoopSettings
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.seeds import generator
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 Taken = tuple[str, ...]
 NO_SCORES = np.full(len(CONCEPTS), np.nan)
@@ -96,8 +93,6 @@ class Loop:
 
     def run(self, policies: Sequence[str]) -> tuple[pd.DataFrame, pd.DataFrame]:
         """A row per episode, policy and step, and the seconds of each, in the same order."""
-        import pandas as pd
-
         entries = {name: policy_entry(name, tuple(self._actions)) for name in policies}
         decide = {name: entry.make(self._means) for name, entry in entries.items()}
         taken: dict[tuple[int, str], Taken] = {(e.number, name): () for e in self.episodes for name in policies}

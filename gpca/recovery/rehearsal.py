@@ -10,9 +10,10 @@ from collections.abc import Callable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import asdict, dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from gpca.causes.policy import DOUBTED, DRAWN, NOTHING, QUEUE_COLUMNS, RecoveryPolicy
 from gpca.pairs.dataset import Registrations
@@ -24,9 +25,6 @@ from gpca.recovery.episodes import Episode
 from gpca.recovery.policies import Means, Order, best_order, policy_entry
 from gpca.recovery.settings import LoopSettings
 from gpca.seeds import generator
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 BATCH = 4  # cases that are labeled before anything is learned from them
 DRAWS = 5  # random orders
@@ -193,9 +191,9 @@ def learners_of(
             continue  # policies of the same chances learn the same
         starts = [starts_of(episodes, means.actions, budget) for episodes in (queued, judged)]
         if entry.queues:
-            attached = map(explainers.attach[entry.explainer], starts)
+            own, others = map(explainers.attach[entry.explainer], starts)
             fitted, treatments = explainers.fitted[entry.explainer], means.policy.treatments
-            learners[name] = partial(ClassifierLearner, fitted, *attached, treatments)
+            learners[name] = partial(ClassifierLearner, fitted, own, others, treatments)
         elif means.utility is not None:
             answers = answers_of(explainers.explain[entry.explainer](starts[1].without_labels()))
             known_N_F = [known(e.observe(()), answer) for e, answer in zip(judged, answers, strict=True)]
@@ -214,8 +212,6 @@ def error_by_labels(
 
     `solved` says of each whether each action solves it; the axes name the random orders of the queued cases.
     """
-    import pandas as pd
-
     rows: list[tuple] = []
     queued = len(rehearsal.failures) if rehearsal else 0
     for name, make in learners.items():

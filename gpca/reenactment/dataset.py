@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 from scipy.special import expit
@@ -83,7 +84,7 @@ class Reenactments(Container):
         cls, rows: Sequence[Mapping[str, np.ndarray]], truth: CauseSettings, registrations: Registrations | None = None
     ) -> Reenactments:
         """Return those of the rows of pairs (:func:`row_of`), which may be of no registrations of a file."""
-        arrays = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+        arrays: dict[str, Any] = {name: np.array([row[name] for row in rows]) for name in rows[0]}
         said = verdict(arrays["error"], arrays["weight"], truth.limits)
         if registrations is None:
             return cls(sample=np.arange(len(rows)), split=np.full(len(rows), ""), **arrays, verdict=said)
