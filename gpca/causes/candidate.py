@@ -1,17 +1,15 @@
 """Candidates, a model and an observed cloud with any subset of the causes, and their counterfactual registrations.
 
-A cause that is not there is small, not zero: a start is never perfect, a sensor never without noise, a surface never
-whole. Without this, any trace of a cause would give away that it was applied.
-
-Lengths are in diameters. The observed cloud is kept in the model's frame, in which the true pose is the identity; a
-pose error is where the registration starts. ICP aligns the model to the observed cloud, so that missing surface hurts:
-every point of the model looks for a partner; or the other way (:attr:`gpca.causes.settings.CauseSettings.moved`).
+A cause that is not there is small, not zero, or any trace of it would give away that it was applied. Lengths are in
+diameters. The observed cloud is kept in the model's frame, in which the true pose is the identity; a pose error is
+where the registration starts. ICP aligns the model to the observed cloud, so that missing surface hurts, or the
+reverse.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from time import perf_counter
 
 import numpy as np
@@ -135,14 +133,14 @@ class Unmeasurable(Exception):
     """A candidate has no truth; the text says why."""
 
 
+@dataclass
 class Registrar:
     """Registers one candidate from any starts; `misses`: all runs may stay where they started, else that is refused."""
 
-    def __init__(self, candidate: Candidate, settings: CauseSettings, misses: bool = False) -> None:
-        self.candidate = candidate
-        self._settings = settings
-        self._misses = misses
-        self._targets: dict[tuple[int, ...], BatchedICP] = {}
+    candidate: Candidate
+    settings: CauseSettings
+    misses: bool = False
+    _targets: dict[tuple[int, ...], BatchedICP] = field(default_factory=dict)  # by the causes that change them
 
     def run(self, causes: tuple[int, ...], xi_n_6: np.ndarray) -> Runs:
         """Register with these causes from the starts exp(ξ) T_init; may raise Unmeasurable.
@@ -153,7 +151,7 @@ class Registrar:
         starts_n = exp(xi_n_6) @ self.candidate.start(causes)
         observed, model = self.candidate.observed(causes), self.candidate.reference(causes)
         started = perf_counter()
-        if self._settings.moved == OBSERVED:
+        if self.settings.moved == OBSERVED:
             changing = self.candidate.changing_reference(causes)
             poses_n, fitness_n, rmse_n = self._target(changing, model).register(observed, starts_n)
         else:
@@ -163,35 +161,26 @@ class Registrar:
         seconds = perf_counter() - started
         if not np.isfinite(poses_n).all():
             raise Unmeasurable("not finite")
-        if not (fitness_n.any() or self._misses):
+        if not (fitness_n.any() or self.misses):
             raise Unmeasurable("no correspondences")
-        rmse_n = np.where(fitness_n > 0, rmse_n, self._settings.icp.correspondence_distance)
+        rmse_n = np.where(fitness_n > 0, rmse_n, self.settings.icp.correspondence_distance)
         return Runs(poses_n, fitness_n, rmse_n, len(poses_n), seconds)
 
     def _target(self, causes: tuple[int, ...], points: np.ndarray) -> BatchedICP:
         if causes not in self._targets:
-            self._targets[causes] = BatchedICP(points, self._settings.icp)
+            self._targets[causes] = BatchedICP(points, self.settings.icp)
         return self._targets[causes]
 
 
+@dataclass
 class Counterfactuals:
-    """The errors and uncertainties of one candidate, measured when first asked for, which may raise Unmeasurable.
+    """The errors and uncertainties of one candidate, measured when first asked for, which may raise Unmeasurable."""
 
-    `errors` are those of poses (n, 4, 4) of the object's points, in diameters; starts are the same for every subset.
-    """
-
-    def __init__(
-        self,
-        registrar: Registrar,
-        errors: Callable[[np.ndarray], np.ndarray],
-        xi_n_6: np.ndarray,
-        settings: UncertaintySettings,
-    ) -> None:
-        self._registrar = registrar
-        self._errors = errors
-        self._xi_n_6 = xi_n_6
-        self._floor = settings.floor
-        self._measured: dict[tuple[int, ...], tuple[float, np.ndarray]] = {}
+    registrar: Registrar
+    errors: Callable[[np.ndarray], np.ndarray]  # of poses (n, 4, 4) of the object's points, in diameters
+    xi_n_6: np.ndarray  # the starts, the same for every subset
+    settings: UncertaintySettings
+    _measured: dict[tuple[int, ...], tuple[float, np.ndarray]] = field(default_factory=dict)
 
     def error(self, subset: int) -> float:
         """Return v, the mean error over the starts, in diameters."""
@@ -199,7 +188,7 @@ class Counterfactuals:
 
     def uncertainty(self, subset: int) -> float:
         """Return u against the clean pair, nats."""
-        return float(divergence(self.covariance(NONE), self.covariance(subset), self._floor))
+        return float(divergence(self.covariance(NONE), self.covariance(subset), self.settings.floor))
 
     def covariance(self, subset: int) -> np.ndarray:
         """Return Σ (6, 6) of the poses."""
@@ -207,11 +196,11 @@ class Counterfactuals:
 
     def _measure(self, subset: int) -> tuple[float, np.ndarray]:
         # What was not applied is not there to be removed: those subsets are the same registration.
-        causes = tuple(cause for cause in SUBSETS[subset] if self._registrar.candidate.applied[cause])
+        causes = tuple(cause for cause in SUBSETS[subset] if self.registrar.candidate.applied[cause])
         if causes not in self._measured:
-            runs = self._registrar.run(causes, self._xi_n_6)
+            runs = self.registrar.run(causes, self.xi_n_6)
             # An error is that of the model's pose in what was observed.
-            errors_n = capped(self._errors(inverses(runs.T_target_source_n)))
+            errors_n = capped(self.errors(inverses(runs.T_target_source_n)))
             if not np.isfinite(errors_n).all():
                 raise Unmeasurable("not finite")
             self._measured[causes] = float(errors_n.mean()), runs.covariance(np.eye(4))

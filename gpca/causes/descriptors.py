@@ -1,10 +1,8 @@
 """Descriptors of registered pairs in groups, the file that holds them, and what has to be seen for each.
 
-The group `remedied` has counterfactuals that anyone can make of their own registration: it is run again with remedies.
-The observed cloud is denoised, ICP starts from farther off and the best result counts, or the observed cloud is aligned
-to the model, in which it finds partners everywhere however much of it is missing. The result with all three remedies
-stands for the unknown truth: v̂ of a subset of the causes, those that are left alone, is how far the results with the
-other remedies lie from it.
+The group `remedied` has counterfactuals that anyone can make of their own registration: the observed cloud is denoised,
+ICP starts from farther off and the best result counts, or the observed cloud is aligned to the model, in which it finds
+partners everywhere. The result with all remedies stands for the unknown truth.
 """
 
 from __future__ import annotations

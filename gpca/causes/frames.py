@@ -1,15 +1,9 @@
 """Registrations of depth frames whose causes are measured: nothing about them was simulated.
 
-An instance was seen by a real (or the virtual) sensor, behind whatever stood in front of it, and its registration
-starts where an estimator took it to be, or off the truth. Mesh, pose and camera are known, so each of the three can be
-taken away:
-
-- without noise: where the rays of the same pixels meet the mesh at the true pose;
-- without missing surface: the whole side that the camera would see, with residuals like those measured where noise is;
-- without pose error: started from the true pose.
-
-The model that is registered is what the camera would see of it at the pose that ICP starts from, since a single view
-never shows an object's back: the side that it hides by itself counts as no cause.
+Mesh, pose and camera of an instance are known, so each of the three can be taken away: noise, by where the rays of the
+same pixels meet the mesh at the true pose; missing surface, by the whole side that the camera would see, with residuals
+like those measured where noise is; a pose error, by a start from the true pose. The model is what the camera would see
+at the pose that ICP starts from: the side that an object hides by itself counts as no cause.
 """
 
 from __future__ import annotations

@@ -203,7 +203,13 @@ def measure(samples: Judged, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
     called_failed_N = samples.nominal < samples.scores.max(axis=1)
     ranked = ranking(samples.alarm[labeled_N], failed_N[labeled_N], of_labeled)
     alarms_shown = ranking(samples.alarm[shown_N], samples.shown[shown_N] != NOMINAL, weights_B_N[:, shown_N])
-    is_nominal_n = samples.label[labeled_N] == NOMINAL
+    score_n, is_nominal_n = samples.nominal[labeled_N], samples.label[labeled_N] == NOMINAL
+    bin_n, calibration_B = np.minimum((score_n * BINS).astype(int), BINS - 1), np.zeros(len(weights_B_N))
+    for number in range(BINS):
+        inside_n = bin_n == number
+        calibration_B += np.abs((of_labeled[:, inside_n] * (score_n - is_nominal_n)[inside_n]).sum(axis=1))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        calibration_B /= of_labeled.sum(axis=1)
     measures = {
         "state_accuracy": _state_accuracy(samples.label, called_failed_N, weights_B_N),
         "state_accuracy_shown": _state_accuracy(samples.shown, called_failed_N, weights_B_N),
@@ -211,7 +217,7 @@ def measure(samples: Judged, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
         "auroc_failed": ranked["area"],
         "auprc_failed": ranked["precision"],
         "false_alarm_rate": ranked["false_alarms"],
-        "nominal_calibration": _calibration_error(samples.nominal[labeled_N], is_nominal_n, of_labeled),
+        "nominal_calibration": calibration_B,
     }
     if not samples.names_causes:
         return measures
@@ -286,16 +292,6 @@ def ranking(score_N: np.ndarray, true_N: np.ndarray, weights_B_N: np.ndarray) ->
         enough_B = (hits_B_G >= RECALL * positives_B[:, None] - 1e-9).argmax(axis=1)
         alarms_B = np.take_along_axis(alarms_B_G, enough_B[:, None], axis=1)[:, 0] / negatives_B
     return {"area": area_B, "precision": precision_B, "false_alarms": alarms_B}
-
-
-def _calibration_error(score_N: np.ndarray, true_N: np.ndarray, weights_B_N: np.ndarray) -> np.ndarray:
-    bin_N = np.minimum((score_N * BINS).astype(int), BINS - 1)
-    error_B = np.zeros(len(weights_B_N))
-    for number in range(BINS):
-        inside = bin_N == number
-        error_B += np.abs((weights_B_N[:, inside] * (score_N - true_N)[inside]).sum(axis=1))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return error_B / weights_B_N.sum(axis=1)
 
 
 def _cosines(a_N_3: np.ndarray, b_N_3: np.ndarray) -> np.ndarray:

@@ -1,11 +1,9 @@
 """Registrations of scans to scans whose causes are measured: real sensors, real overlap.
 
-Nothing is simulated but the noise that is added. Given the true pose, the pose error can be taken away, by a start from
-the truth, and so can what only one of the scans sees. Measured noise cannot be taken away, so as a cause it is an
-addition, in multiples of the sensor's. The source moves onto the target. Errors are root mean square distances over the
-surface that both scans truly have in common, scaled so that the limit of success is that of all other experiments.
-
-A *natural* registration has no added noise: it is what an estimate by a local method makes of two scans as they are.
+Given the true pose, the pose error can be taken away, and so can what only one of the scans sees. Measured noise
+cannot, so as a cause it is an addition, in multiples of the sensor's; a *natural* registration has none. The source
+moves onto the target. Errors are root mean square distances over the surface that both truly have in common, scaled so
+that the limit of success is that of all other experiments.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """What two aligned clouds alone tell of their registration: distances, local planes, and entropies of the joint cloud.
 
-The first four groups of thirteen distances are the plainest that tell a registration's faults apart: how far the
-observed cloud lies from the model, the model from the observed cloud, the observed cloud from the model's local planes,
-and how thick the observed cloud is.
+The first four groups of thirteen distances are the plainest: how far the observed cloud lies from the model, the model
+from it, it from the model's local planes, and how thick it is.
 """
 
 from __future__ import annotations

@@ -8,7 +8,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Protocol
+from time import perf_counter
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,6 +18,9 @@ from gpca.alignment.rigid import inverse, rigid_motion, rotation_angle_rad, scal
 from gpca.errors import require_known
 from gpca.frames.shots import Shot, agreement, fuse
 from gpca.settings import require_arguments
+
+if TYPE_CHECKING:
+    from gpca.frames.situations import Situation
 
 LOOSER = 2.0  # correspondence distance of the broader search, relative to ICP's
 JUDGED = 8  # number of results of the search that are compared with the shots
@@ -27,24 +31,38 @@ OBSERVED = (
     *("thickness", "on_model", "explained", "hidden", "log_points", "rotation_rad", "translation", "shots", "filtered"),
     *("rival_gain", "rival_distance", "rivals"),
 )
+FEWEST_POINTS = 64  # with fewer points of the object in all shots there is nothing to register
 ELSEWHERE = 0.1  # distance between different poses, in diameters
 PROBED = 16  # number of orientations tried to find rivals of a pose
 
 
-class Robot(Protocol):
-    """The camera and the known shape of the object."""
+class Robot:
+    """A robot in a situation: its camera, and the model of the object."""
 
-    points_m: np.ndarray
-    normals: np.ndarray
-    vertices_m: np.ndarray
-    faces: np.ndarray
-    diameter_m: float
+    def __init__(self, situation: Situation, axes: tuple = ()) -> None:
+        shelf, model = situation.shelf, situation.model
+        self.points_m = shelf.objects.points(model)
+        self.normals = shelf.objects.normals(model)
+        self.vertices_m = shelf.surfaces[model].vertices_m
+        self.faces = shelf.surfaces[model].triangles
+        self.diameter_m = situation.diameter_m
+        self.camera_seconds = 0.0
+        self._situation = situation
+        self._axes = axes
 
     def shoot(self, T_world_camera: np.ndarray, frames: int) -> Shot:
-        """Measure from a viewpoint."""
+        """Measure from a viewpoint; the noise is named by the actions before and by the viewpoint."""
+        started = perf_counter()
+        shot = self._situation.shoot(T_world_camera, frames, *self._axes, T_world_camera.round(6).tolist())
+        self.camera_seconds += perf_counter() - started
+        return shot
 
     def estimate(self, shot: Shot, filtered: bool) -> np.ndarray | None:
-        """Estimate the pose from one shot; None if it shows too little."""
+        """Estimate the pose from one shot; None where it shows too little."""
+        points_m = fuse((shot,), self.diameter_m, filtered)
+        if len(points_m) < FEWEST_POINTS:
+            return None
+        return self._situation.estimate(shot, points_m, *self._axes, shot.T_world_camera.round(6).tolist())
 
 
 @dataclass(frozen=True)

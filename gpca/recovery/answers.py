@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from time import perf_counter
 from typing import Any, NamedTuple
@@ -41,26 +41,24 @@ class Answer(NamedTuple):
     seconds: float
 
 
+@dataclass
 class Answers:
     """The answers so far, of episodes that stand at the place of their number, by explainers that the policies read."""
 
-    def __init__(
-        self, episodes: Sequence[Episode], explain: Mapping[str, Explain], actions: Sequence[str], budget: int
-    ) -> None:
-        self._episodes = episodes
-        self._explain = explain
-        self._actions = actions
-        self._budget = budget
-        self._answers: dict[CaseKey, Answer] = {}
+    episodes: Sequence[Episode]
+    explain: Mapping[str, Explain]
+    actions: Sequence[str]  # the names of all
+    budget: int
+    _answers: dict[CaseKey, Answer] = field(default_factory=dict)
 
     def ask(self, wanted: Iterable[CaseKey]) -> None:
         """Explain the registrations that no explainer of that name has seen yet, in a fixed order."""
         wanted = set(wanted) - set(self._answers)
-        for explainer, explain in self._explain.items():
+        for explainer, explain in self.explain.items():
             new = sorted(key for key in wanted if key.explainer == explainer)
             if not new:
                 continue
-            records = [record_of(self._episodes[key.episode], key.actions, self._actions, self._budget) for key in new]
+            records = [record_of(self.episodes[key.episode], key.actions, self.actions, self.budget) for key in new]
             attribution = explain(as_registrations(records)[0].without_labels())
             self._answers |= dict(zip(new, answers_of(attribution), strict=True))
 
@@ -82,7 +80,6 @@ def starts_of(episodes: Sequence[Episode], actions: Sequence[str], budget: int) 
 
 
 def answers_of(attribution: Attribution) -> list[Answer]:
-    """An attribution's rows as answers."""
     scores_N_C = as_shares(attribution.scores_N_C)
     bald_N, seconds_N = attribution.bald_N.tolist(), attribution.seconds_N.tolist()
     return list(map(Answer, scores_N_C, attribution.variances_N_C, bald_N, seconds_N))

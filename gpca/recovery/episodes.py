@@ -1,8 +1,7 @@
 """Episodes: registrations disturbed by a known cause, failed or fine, and everything that is tried about each.
 
-A failure is a registration whose pose is wrong (ADD, or ADD-S of symmetric objects, not below the limit of a success)
-and whose cause is known: without it, the same registration succeeds. An action gives the same result whichever policy
-takes it after the same actions, so every outcome is kept, and sequences share the outcomes of their first actions.
+The pose of a failure is wrong; without its cause, the same registration succeeds. An action gives the same result
+whichever policy takes it after the same actions, so every outcome is kept.
 """
 
 from __future__ import annotations
@@ -17,16 +16,15 @@ from gpca.alignment.icp import ICPSettings
 from gpca.alignment.pose_error import JUDGED_POINTS, pose_error
 from gpca.alignment.rigid import inverse, scale_translation, transform
 from gpca.errors import InputError
-from gpca.frames.shots import Shot, fuse
+from gpca.frames.shots import fuse
 from gpca.frames.situations import Situation, Situations
 from gpca.pairs.perturbation import CONCEPTS, Perturbed
 from gpca.pairs.synthesis import align_pair
 from gpca.process.progress import progress
-from gpca.recovery.actions import Action, Holding, observe
+from gpca.recovery.actions import FEWEST_POINTS, Action, Holding, Robot, observe
 from gpca.recovery.settings import LoopSettings
 from gpca.seeds import generator
 
-FEWEST_POINTS = 64  # with fewer points of the object in all shots there is nothing to register
 POSE = "pose"  # the cause that disturbs nothing but ICP's start
 MISPLACED = 40  # its starts that are tried in a situation until one fails; in every other one, only the first
 
@@ -41,38 +39,9 @@ class Attempt:
     seconds: float  # of ICP and of the action before it, without the camera
 
 
-class RobotIn:
-    """A robot in a situation: its camera, and the model of the object."""
-
-    def __init__(self, situation: Situation, axes: tuple = ()) -> None:
-        shelf, model = situation.shelf, situation.model
-        self.points_m = shelf.objects.points(model)
-        self.normals = shelf.objects.normals(model)
-        self.vertices_m = shelf.surfaces[model].vertices_m
-        self.faces = shelf.surfaces[model].triangles
-        self.diameter_m = situation.diameter_m
-        self.camera_seconds = 0.0
-        self._situation = situation
-        self._axes = axes
-
-    def shoot(self, T_world_camera: np.ndarray, frames: int) -> Shot:
-        """Measure from a viewpoint; the noise is named by the actions before and by the viewpoint."""
-        started = perf_counter()
-        shot = self._situation.shoot(T_world_camera, frames, *self._axes, T_world_camera.round(6).tolist())
-        self.camera_seconds += perf_counter() - started
-        return shot
-
-    def estimate(self, shot: Shot, filtered: bool) -> np.ndarray | None:
-        """Estimate the pose from one shot; None where it shows too little."""
-        points_m = fuse((shot,), self.diameter_m, filtered)
-        if len(points_m) < FEWEST_POINTS:
-            return None
-        return self._situation.estimate(shot, points_m, *self._axes, shot.T_world_camera.round(6).tolist())
-
-
 def register_first(situation: Situation, points: int, icp: ICPSettings) -> Attempt | None:
     """Estimate the pose from the first shot and register; None where it shows too little of the object."""
-    robot = RobotIn(situation)
+    robot = Robot(situation)
     shot = robot.shoot(situation.T_world_camera, 1)
     started = perf_counter()
     T_init = robot.estimate(shot, False)
@@ -95,7 +64,7 @@ def register_after(
     situation: Situation, before: Attempt, action: Action, actions: tuple[str, ...], points: int, icp: ICPSettings
 ) -> Attempt:
     """Take one action, named last of all that were taken, which name the random numbers, and register anew."""
-    robot = RobotIn(situation, actions)
+    robot = Robot(situation, actions)
     started = perf_counter()
     holding = action(before.holding, robot, generator(*situation.axes, "action", *actions))
     seconds = perf_counter() - started - robot.camera_seconds
@@ -156,7 +125,7 @@ class Episode:
         if actions not in self._observed:
             attempt = self.outcomes[actions]
             random = generator(*self.situation.axes, "observe", *actions)
-            self._observed[actions] = observe(attempt.holding, attempt.record, RobotIn(self.situation), random)
+            self._observed[actions] = observe(attempt.holding, attempt.record, Robot(self.situation), random)
         return self._observed[actions]
 
     def solved_by(self, actions: tuple[str, ...], known: Mapping[str, Action], settings: LoopSettings) -> bool:

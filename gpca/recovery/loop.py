@@ -6,6 +6,7 @@ Each policy also says what it would do about registrations that did not fail; no
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from time import perf_counter
 
 import numpy as np
@@ -15,10 +16,10 @@ from gpca.causes.settings import CauseSettings
 from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.progress import progress
-from gpca.recovery.actions import Action, Holding
+from gpca.recovery.actions import Action, Holding, Robot
 from gpca.recovery.answers import Answer, Answers, CaseKey, Explain
 from gpca.recovery.chances import alarm_threshold
-from gpca.recovery.episodes import Episode, RobotIn
+from gpca.recovery.episodes import Episode
 from gpca.recovery.policies import Case, Decide, Means, PolicyEntry, policy_entry
 from gpca.recovery.reenactment import Belief, KnownModel, Reenacted, believe, reenact
 from gpca.recovery.rehearsal import known
@@ -31,19 +32,20 @@ NO_SCORES = np.full(len(CONCEPTS), np.nan)
 UNEXPLAINED = Answer(NO_SCORES, NO_SCORES, np.nan, 0.0)
 
 
+@dataclass
 class Reenactor:
     """Re-enacts registrations of episodes on the tables of one run, from what their robots hold."""
 
-    def __init__(self, settings: ReenactmentSettings, counterfactuals: CauseSettings) -> None:
-        self._settings, self._counterfactuals = settings, counterfactuals
-        self._models: dict[int, KnownModel] = {}
-        self._beliefs: dict[tuple[Episode, Taken], Belief] = {}
-        self._reenacted: dict[tuple[Episode, Taken], Reenacted] = {}
+    settings: ReenactmentSettings
+    counterfactuals: CauseSettings
+    _models: dict[int, KnownModel] = field(default_factory=dict)
+    _beliefs: dict[tuple[Episode, Taken], Belief] = field(default_factory=dict)
+    _reenacted: dict[tuple[Episode, Taken], Reenacted] = field(default_factory=dict)
 
     def believe(self, episode: Episode, actions: Taken = ()) -> Belief:
         """The hypotheses after these actions, which were taken."""
         if (key := (episode, actions)) not in self._beliefs:
-            self._beliefs[key] = believe(*self._held(episode, actions), self._settings, *self._how(episode, actions))
+            self._beliefs[key] = believe(*self._held(episode, actions), self.settings, *self._how(episode, actions))
         return self._beliefs[key]
 
     def reenact(self, episode: Episode, actions: Taken = ()) -> Reenacted:
@@ -57,11 +59,11 @@ class Reenactor:
         model = episode.situation.model
         if model not in self._models:
             name = episode.situation.shelf.objects.names[model]
-            self._models[model] = KnownModel.of(RobotIn(episode.situation), generator("known model", name))
+            self._models[model] = KnownModel.of(Robot(episode.situation), generator("known model", name))
         return episode.outcomes[actions].holding, self._models[model]
 
     def _how(self, episode: Episode, actions: Taken) -> tuple[CauseSettings, tuple]:
-        return self._counterfactuals, (*episode.situation.axes, "re-enactment", *actions)
+        return self.counterfactuals, (*episode.situation.axes, "re-enactment", *actions)
 
 
 def calibrated_alarm(episodes: Iterable[Episode], reenactor: Reenactor, false_alarms: float) -> float:
@@ -74,51 +76,54 @@ def calibrated_alarm(episodes: Iterable[Episode], reenactor: Reenactor, false_al
     return alarm_threshold(np.array(failures), false_alarms)
 
 
+@dataclass
 class Loop:
     """All policies on all episodes, failed or not, step by step, so that explainers see what is new in one batch."""
 
-    def __init__(
-        self,
-        episodes: Sequence[Episode],
-        actions: Mapping[str, Action],
-        explain: Mapping[str, Explain],
-        means: Means,
-        settings: LoopSettings,
-        axes: tuple,
-        reenactor: Reenactor,
-    ) -> None:
-        self.episodes, self._actions, self._means, self._settings = episodes, actions, means, settings
-        self._axes, self._reenactor = axes, reenactor
-        self._answers = Answers(episodes, explain, tuple(actions), settings.budget)
+    episodes: Sequence[Episode]  # failed or not
+    actions: Mapping[str, Action]
+    explain: Mapping[str, Explain]  # for each explainer that the policies read, what attributes registrations
+    means: Means
+    settings: LoopSettings
+    axes: tuple
+    reenactor: Reenactor
 
     def run(self, policies: Sequence[str]) -> tuple[pd.DataFrame, pd.DataFrame]:
         """A row per episode, policy and step, and the seconds of each, in the same order."""
-        entries = {name: policy_entry(name, tuple(self._actions)) for name in policies}
-        decide = {name: entry.make(self._means) for name, entry in entries.items()}
+        entries = {name: policy_entry(name, tuple(self.actions)) for name in policies}
+        answers = Answers(self.episodes, self.explain, tuple(self.actions), self.settings.budget)
+        decide = {name: entry.make(self.means) for name, entry in entries.items()}
         taken: dict[tuple[int, str], Taken] = {(e.number, name): () for e in self.episodes for name in policies}
         rows, seconds = [], []
-        for step in range(1, self._settings.budget + 1):
-            self._answers.ask(CaseKey(entries[name].explainer, n, actions) for (n, name), actions in taken.items())
+        for step in range(1, self.settings.budget + 1):
+            answers.ask(CaseKey(entries[name].explainer, n, actions) for (n, name), actions in taken.items())
             following = {}
             for episode in self.episodes:
                 for name in policies:
                     if (key := (episode.number, name)) not in taken:
                         continue
-                    row, time = self._step(episode, name, entries[name], decide[name], taken[key])
+                    entry, before = entries[name], taken[key]
+                    history = answers.history(entry.explainer, episode.number, before) if entry.explainer else []
+                    row, time = self._step(episode, name, entry, decide[name], before, history)
                     rows.append(row | {"step": step})
                     seconds.append({c: row[c] for c in ("episode", "failed", "policy")} | {"step": step} | time)
-                    if row["failed"] and row["action"] in self._actions and not row["recovered"]:
-                        following[key] = (*taken[key], row["action"])
+                    if row["failed"] and row["action"] in self.actions and not row["recovered"]:
+                        following[key] = (*before, row["action"])
             taken = following
         order = sorted(range(len(rows)), key=lambda n: (rows[n]["episode"], policies.index(rows[n]["policy"]), n))
         return pd.DataFrame([rows[n] for n in order]), pd.DataFrame([seconds[n] for n in order])
 
     def _step(
-        self, episode: Episode, name: str, entry: PolicyEntry, decide: Decide, before: Taken
+        self,
+        episode: Episode,
+        name: str,
+        entry: PolicyEntry,
+        decide: Decide,
+        before: Taken,
+        history: Sequence[Answer],
     ) -> tuple[dict, dict]:
         """Let one policy decide and act; return its row and its seconds."""
-        history = self._answers.history(entry.explainer, episode.number, before) if entry.explainer else []
-        reenacted = self._reenactor.reenact(episode, before) if entry.reenacts else None
+        reenacted = self.reenactor.reenact(episode, before) if entry.reenacts else None
         started = perf_counter()
         decision = decide(
             Case(
@@ -128,16 +133,16 @@ class Loop:
                 observed_F=episode.observe(()) if entry.gated else None,
                 known_F=known(episode.observe(before), history[-1]) if entry.learns else None,
                 cause=episode.situation.cause if entry.oracle and episode.failed else "",
-                random=generator(*self._axes, "policy", episode.number),
+                random=generator(*self.axes, "policy", episode.number),
                 reenacted=reenacted,
             )
         )
         spent = perf_counter() - started + (reenacted.seconds if reenacted else 0.0)
         last = history[-1] if history else UNEXPLAINED
         old, new, action_seconds, recovered = episode.outcomes[before], None, 0.0, False
-        if episode.failed and decision.action in self._actions:
+        if episode.failed and decision.action in self.actions:
             after = (*before, decision.action)
-            new = episode.take(after, self._actions, self._settings)
+            new = episode.take(after, self.actions, self.settings)
             action_seconds, recovered = new.seconds, episode.is_right(after)
         situation = episode.situation
         row = {

@@ -1,7 +1,6 @@
 """Before a policy decides: every action is tried on failures of the training tables, and thresholds are settled.
 
-The rehearsed failures also serve as queued cases. A label is what solved the case: its cause for the classifier, the
-outcome of every action for the learned chances.
+The rehearsed failures also serve as queued cases, whose label is what solved them: cause, or outcome of each action.
 """
 
 from __future__ import annotations
@@ -141,22 +140,22 @@ class ClassifierLearner:
         return [self._treatments[CONCEPTS[column]] for column in attribution.scores_N_C.argmax(axis=1)]
 
 
+@dataclass
 class ChancesLearner:
     """Takes the action that is worth most by what was known at the start; it doubts where the best may not help."""
 
-    def __init__(
-        self, trials: Sequence[Sequence[Trial]], judged_N_F: Sequence[np.ndarray], costs: Mapping[str, float]
-    ) -> None:
-        self._trials, self._judged_N_F, self._costs = trials, judged_N_F, costs
-        self._learned: list[int] = []
+    trials: Sequence[Sequence[Trial]]  # of each queued case
+    judged_N_F: Sequence[np.ndarray]
+    costs: Mapping[str, float]
+    _learned: list[int] = field(default_factory=list)
 
     def _utility(self) -> ExpectedUtility:
-        return learn_utility([self._trials[row] for row in self._learned], self._costs, tuple(self._costs))
+        return learn_utility([self.trials[row] for row in self._learned], self.costs, tuple(self.costs))
 
     def doubts(self) -> np.ndarray:
         """The probability that the best action does not help."""
         chances = self._utility().chances
-        return np.array([1 - max(chances.of(a, trials[0].known_F) for a in self._costs) for trials in self._trials])
+        return np.array([1 - max(chances.of(a, trials[0].known_F) for a in self.costs) for trials in self.trials])
 
     def learn(self, rows: np.ndarray) -> None:
         """Learn which actions helped."""
@@ -165,7 +164,7 @@ class ChancesLearner:
     def choose(self) -> list[str]:
         """The actions of the largest gains."""
         utility = self._utility()
-        gains_N = [utility.gains(known_F, 0.0) for known_F in self._judged_N_F]
+        gains_N = [utility.gains(known_F, 0.0) for known_F in self.judged_N_F]
         return [max(gains, key=gains.__getitem__) for gains in gains_N]
 
 

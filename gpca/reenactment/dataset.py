@@ -57,16 +57,11 @@ World = Callable[[ObservedPair, int], list[Enactment]]
 class Reenactments(Container):
     """The re-enactments of S registrations under K hypotheses each, the most probable first.
 
-    Where a pair has fewer hypotheses, its first stands in the place of the others, with weight 0.
-
-    Attributes:
-        T_model_observed: takes what was observed from where the registration began to where a hypothesis has it in the
-            model, in diameters.
-        error, uncertainty: v̂ and û of every subset of the causes.
-        measured: the numbers of `MEASURED`: those of :class:`gpca.reenactment.hypotheses.Hypothesis`; the severities of
-            noise, outliers and crop under it; and how far (root mean square, diameters) the observed points then lie
-            from where the registration began, and from where it ended.
-        described: the groups `DESCRIBED` of descriptors (:mod:`gpca.causes.descriptors`), side by side.
+    Where a pair has fewer hypotheses, its first stands in the place of the others, with weight 0. Poses take what was
+    observed from where the registration began to where a hypothesis has it in the model, in diameters; errors and
+    uncertainties are v̂ and û. `MEASURED` are the numbers of :class:`gpca.reenactment.hypotheses.Hypothesis`; the
+    severities of noise, outliers and crop under it; and how far (root mean square, diameters) the observed points then
+    lie from where the registration began, and from where it ended.
     """
 
     sample: np.ndarray = array("S", WHOLE)
@@ -119,13 +114,7 @@ def reenact_all(
 def row_of(
     enactments: list[Enactment], pair: ObservedPair, settings: ReenactmentSettings, truth: CauseSettings
 ) -> dict[str, np.ndarray]:
-    """Return the arrays of one pair, see :class:`Reenactments`."""
-    described = np.concatenate([*describe_plainly(pair, truth.icp).values()])
-    return as_arrays(enactments, pair, settings.hypotheses) | {"described": described}
-
-
-def as_arrays(enactments: list[Enactment], pair: ObservedPair, most: int) -> dict[str, np.ndarray]:
-    """Return the arrays of one pair (K, …), see :class:`Reenactments`, for K = `most` hypotheses."""
+    """Return the arrays of one pair (K, …), see :class:`Reenactments`."""
     before, measured = transform(pair.T_init, pair.observed), []
     for enactment in enactments:
         found, severity = enactment.hypothesis, enactment.candidate.severity
@@ -133,6 +122,7 @@ def as_arrays(enactments: list[Enactment], pair: ObservedPair, most: int) -> dic
         to_result = displacements((found.T @ pair.T_init)[None], pair.observed)[0]
         numbers = (found.log_likelihood, found.width, found.covered)
         measured.append((*numbers, *(severity[name] for name in ("noise", "outliers", "crop")), to_start, to_result))
+    most = settings.hypotheses
     rows_K = np.where(np.arange(most) < len(enactments), np.arange(most), 0)
     return {
         "weight": np.pad(weights_of(enactment.hypothesis for enactment in enactments), (0, most - len(enactments))),
@@ -140,6 +130,7 @@ def as_arrays(enactments: list[Enactment], pair: ObservedPair, most: int) -> dic
         "error": np.array([enactment.error_8 for enactment in enactments])[rows_K],
         "uncertainty": np.array([enactment.uncertainty_8 for enactment in enactments])[rows_K],
         "measured": np.array(measured)[rows_K],
+        "described": np.concatenate([*describe_plainly(pair, truth.icp).values()]),
     }
 
 

@@ -1,8 +1,7 @@
 """Re-enactments in depth frames: what an observer with the camera knows, hypotheses, and their counterfactuals.
 
-As for whole objects (:mod:`gpca.reenactment.hypotheses`), but a camera sees one side of an object: the mixture is
-around the points that would be seen at a pose, and what hides the others is not a half-space but whatever stands in
-front. At a wrong pose another side would be seen, or much of it where nothing was measured.
+As for whole objects, but the mixture is around the points that would be seen at a pose, and whatever stands in front
+hides the others. At a wrong pose another side would be seen, or much of it where nothing was measured.
 """
 
 from __future__ import annotations

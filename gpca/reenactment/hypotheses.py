@@ -1,9 +1,8 @@
 """Hypotheses of the true pose, with the probability of each.
 
 ICP from starts spread evenly over rotations of every size, on few points, finds where the observed cloud may lie in the
-model; the mixture (:mod:`gpca.reenactment.mixture`) refines the best of these ends, at last on all points, and says how
-likely each is. Poses take what was observed, where it lay before the registration, to the model: the identity is the
-initial pose.
+model; the mixture (:mod:`gpca.reenactment.mixture`) refines the best ends, at last on all points. Poses take what was
+observed, where it lay before the registration, to the model: the identity is the initial pose.
 """
 
 from __future__ import annotations

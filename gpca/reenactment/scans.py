@@ -1,8 +1,7 @@
 """Re-enactments of registrations of scans: the counterfactuals of scans, at hypotheses of the true pose.
 
-As for whole objects, but neither scan holds all of the other. So missing overlap is not surface to be filled in: under
-a hypothesis, both scans are cropped to what they then have in common, as the truth crops them. A pose error is taken
-away by a start from the hypothesis, noise by moving the source's common points to the target's planes.
+As for whole objects, but neither scan holds all of the other, so both are cropped to what they have in common under a
+hypothesis. Noise is taken away by moving the source's common points to the target's planes.
 """
 
 from __future__ import annotations

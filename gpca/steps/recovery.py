@@ -30,10 +30,10 @@ from gpca.pairs.synthesis import as_registrations
 from gpca.process.job import Job
 from gpca.process.progress import progress
 from gpca.process.provenance import record_provenance
-from gpca.recovery.actions import Action, action_of, look_around
+from gpca.recovery.actions import FEWEST_POINTS, Action, Robot, action_of, look_around
 from gpca.recovery.answers import learn_explainers
 from gpca.recovery.chances import learn_utility
-from gpca.recovery.episodes import FEWEST_POINTS, Attempt, Episode, RobotIn, find_episodes, register_first
+from gpca.recovery.episodes import Attempt, Episode, find_episodes, register_first
 from gpca.recovery.loop import Loop, Reenactor, calibrated_alarm
 from gpca.recovery.policies import Means, PolicyEntry, policy_entry
 from gpca.recovery.rehearsal import (
@@ -223,7 +223,7 @@ def save_example(
     before, after = episode.outcomes[()], episode.take((ACTION,), actions, settings)
     situation = episode.situation
     random = generator(*situation.axes, "action", ACTION)  # the one that the action had
-    poses_n, seen_Q, shown_n_Q = look_around(before.holding, RobotIn(situation), random, **views)
+    poses_n, seen_Q, shown_n_Q = look_around(before.holding, Robot(situation), random, **views)
     arrays = {
         "object": np.array(situation.shelf.objects.names[situation.model]),
         "cause": np.array(situation.cause),

@@ -8,8 +8,8 @@ import pytest
 from gpca.alignment.rigid import inverse, rotation_angle_rad
 from gpca.errors import InputError
 from gpca.recovery import actions
-from gpca.recovery.actions import ACTIONS, OBSERVED, action_of, best_start, observe
-from gpca.recovery.episodes import RobotIn, register_after, register_held
+from gpca.recovery.actions import ACTIONS, OBSERVED, Robot, action_of, best_start, observe
+from gpca.recovery.episodes import register_after, register_held
 from tests.failures import LOOP
 
 from ..documents import block
@@ -19,7 +19,7 @@ ICP = LOOP.icp
 
 def test_a_broader_search_finds_what_explains_the_shots(start):
     situation, outcome = start
-    found = ACTIONS["reinitialize"](outcome.holding, RobotIn(situation), np.random.default_rng(0), starts=48)
+    found = ACTIONS["reinitialize"](outcome.holding, Robot(situation), np.random.default_rng(0), starts=48)
     assert register_held(situation, found, LOOP.cloud_points, ICP).error < outcome.error
     assert found.shots is outcome.holding.shots
 
@@ -58,7 +58,7 @@ def test_the_action_of_the_documentation_sees_the_object_from_closer(start):
 
 def test_the_pose_that_explains_the_shots_is_started_from(start):
     situation, outcome = start
-    robot, true = RobotIn(situation), situation.T_world_object
+    robot, true = Robot(situation), situation.T_world_object
     assert (best_start(outcome.holding, robot, [None, true]).T_world_object_init == true).all()
 
 
@@ -72,7 +72,7 @@ def test_unknown_actions_and_settings_are_refused(name, given, fault):
 
 
 def observed(situation, holding, record, seed=0):
-    numbers = observe(holding, record, RobotIn(situation), np.random.default_rng(seed))
+    numbers = observe(holding, record, Robot(situation), np.random.default_rng(seed))
     return dict(zip(OBSERVED, numbers, strict=True))
 
 

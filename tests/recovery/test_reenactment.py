@@ -12,8 +12,8 @@ from gpca.causes.truth import ALL, NONE
 from gpca.frames.shots import Shot
 from gpca.objects.camera import Camera, MeshScene
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.recovery.actions import ACTIONS
-from gpca.recovery.episodes import RobotIn, register_after
+from gpca.recovery.actions import ACTIONS, Robot
+from gpca.recovery.episodes import register_after
 from gpca.recovery.reenactment import Appearance, KnownModel, believe, reenact, seen_surface
 from gpca.reenactment.settings import ReenactmentSettings
 from tests.failures import LOOP
@@ -24,7 +24,7 @@ AXES = ("tiny", 1)
 
 @pytest.fixture(scope="module")
 def known(start):
-    return KnownModel.of(RobotIn(start[0]), np.random.default_rng(0))
+    return KnownModel.of(Robot(start[0]), np.random.default_rng(0))
 
 
 def belief_of(holding, known, axes=AXES):
@@ -68,7 +68,7 @@ def test_hypotheses_under_which_the_pose_is_right_say_nothing_of_a_failure(start
 def test_it_reads_what_the_robot_holds_and_the_model_alone(start):
     """A robot without a situation, so without a truth, comes to the same numbers."""
     situation, outcome = start
-    robot = RobotIn(situation)
+    robot = Robot(situation)
     shape = ("points_m", "normals", "vertices_m", "faces", "diameter_m")
     bare = SimpleNamespace(**{name: getattr(robot, name) for name in shape})
     numbers = []

@@ -7,7 +7,7 @@ from gpca.causes.candidate import Counterfactuals, Registrar
 from gpca.causes.dataset import LABELS
 from gpca.causes.truth import ALL, NONE
 from gpca.pairs.perturbation import NOISE, OVERLAP
-from gpca.reenactment.dataset import as_arrays, verdict
+from gpca.reenactment.dataset import row_of, verdict
 from gpca.reenactment.enactment import NoiseScale, fresh_points, observe, rebuild, reenact
 from gpca.reenactment.hypotheses import Hypothesis
 from gpca.reenactment.settings import ReenactmentSettings
@@ -105,7 +105,7 @@ SETTINGS = ReenactmentSettings()
 
 
 def verdict_of(enactments, pair):
-    arrays = as_arrays(enactments, pair, SETTINGS.hypotheses)
+    arrays = row_of(enactments, pair, SETTINGS, TRUTH)
     return verdict(arrays["error"][None], arrays["weight"][None], TRUTH.limits)[0]
 
 
