@@ -90,7 +90,7 @@ FAULTS = [
     ("sources.real_rgbd", folder(), "sources.real_rgbd: is reserved for the frames of real_world"),
     ("methods.icp", {}, "methods.icp: registration method 'icp': unknown; choose one of point_to_point, "),
     ("methods.gicp.voxel", 0.1, "methods.gicp: registration method 'gicp': setting voxel: unknown"),
-    ("methods.huber.kernel", "Huber", "methods.huber: registration method 'huber': setting kernel: 'Huber' should be"),
+    ("methods.huber.kernel", "Huber", "methods.huber: registration method 'huber': setting kernel: unknown"),
     ("methods.teaser.noise", -1, "methods.teaser: registration method 'teaser': setting noise: -1 should be greater "),
     ("methods", {}, "methods: {} should have at least 1 item"),
     ("exchange.methods", ["icp"], "exchange.methods: no registration method 'icp'; choose one of point_to_point, "),

@@ -101,7 +101,7 @@ def test_virtual_frames_stay_while_a_dataset_does():
     [
         ("methods.fgr", "method_pairs.global_start: registration method 'fgr' is left out; choose one of point_to_"),
         ("estimators.gauss", "estimators: no estimator 'gauss'; choose one of bonnabel, "),
-        ("methods.icp", "methods: no registration method 'icp'; choose one of fgr, "),
+        ("methods.icp", "methods: no registration method 'icp'; choose one of point_to_point, "),
         ("encoders.dgcnn", "embedding.encoder: encoder 'dgcnn' is left out; choose one of pointnet, "),
         ("sources.ycb", "learning_curve.sources: source 'ycb' is left out; choose one of coffee_cup, linemod"),
         ("sources.coffee_cup", "figures.source: source 'coffee_cup' is left out; choose one of linemod, ycb"),
