@@ -20,12 +20,9 @@ from gpca.settings import Bounds, Count
 
 
 class AnalyticalGPC(GPCA):
-    """GP-CA with analytical features in place of the embedding.
+    """GP-CA with analytical features in place of the embedding, the point-count ratio among them or not.
 
-    Args:
-        point_count: whether the point-count ratio is among the features.
-        shape_points: source points at which local shape is measured, at most.
-        neighbours: points, itself included, that determine a point's local shape.
+    Local shape is measured at `shape_points` source points at most, by `neighbours` points, itself included.
     """
 
     def __init__(

@@ -96,10 +96,9 @@ def motion_alarm(registrations: Registrations, name: str) -> np.ndarray:
 
 
 class CovarianceGate(Alarm):
-    """The alarm is ln |Σ + εI| of the covariance that an estimator gives at the result of ICP.
+    """The alarm is ln |Σ + εI| of the covariance that an untrained estimator gives at the result of ICP.
 
-    The estimator needs no training. A registration without an estimate, as nothing holds it, counts as one of
-    covariance I.
+    A registration without an estimate, as nothing holds it, counts as one of covariance I.
     """
 
     def __init__(self, estimator: str, source: str, seed: int, floor: Positive = 1e-12) -> None:

@@ -29,12 +29,8 @@ DropoutRate = Annotated[float, Bounds(minimum=0, exclusiveMaximum=1)]
 class Heads:
     """E heads d -> hidden -> C with ReLU, trained side by side from different starts and on different batches.
 
-    Args:
-        axes: name the random numbers.
-        heads: E.
-        rate: dropout before the last layer.
-        hidden: hidden units.
-        steps, learning_rate, weight_decay: of AdamW on the cross-entropy of random batches, with a cosine schedule.
+    AdamW minimizes the cross-entropy of random batches, with a cosine schedule and dropout before the last layer. The
+    axes name the random numbers.
     """
 
     def __init__(

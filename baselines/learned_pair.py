@@ -33,13 +33,9 @@ NUMBERS: Columns = {"motion": EVERY, "starts": EVERY}  # that an encoder for cau
 
 
 class LearnedPairGPCA(PairDescription, GPCA):
-    """GP-CA's classifier on the embedding of an encoder of pairs.
+    """GP-CA's classifier on the embedding of an encoder of pairs, which may read how far ICP moved the cloud.
 
-    Args:
-        motion: whether the encoder reads how far ICP moved the cloud.
-        points: of each cloud, each described by its relation to the other cloud.
-        draw_points, epochs, encoder_learning_rate: of the encoder's training; each epoch draws other points.
-        settings: those of the GPC.
+    Each of the `points` of a cloud is described by its relation to the other cloud; each epoch draws `draw_points`.
     """
 
     def __init__(

@@ -70,8 +70,8 @@ def logistic(source: str, seed: int, inverse_regularisation: Positive = 1.0) -> 
 def laplace_gpc(source: str, seed: int, lengthscale: Positive = 1.0) -> Learner:
     """Make scikit-learn's GP classifier: one against the rest, Laplace's approximation, RBF kernel.
 
-    The lengthscale is in units of √(2 d), the expected distance of two standardized embeddings. It is fixed, because
-    scikit-learn's optimizer takes minutes.
+    The lengthscale is in units of √(2 d), the expected distance of two standardized embeddings; scikit-learn would take
+    minutes to find it.
     """
     from sklearn.gaussian_process import GaussianProcessClassifier
     from sklearn.gaussian_process.kernels import RBF, ConstantKernel

@@ -26,14 +26,7 @@ WITHOUT = "without ICP's motion"  # in titles
 
 
 class PairDescription:
-    """Base of these explainers: each reads one group of descriptors of every pair.
-
-    Args:
-        source, seed: name the draws from the clouds.
-        group: one of :data:`gpca.pairs.description.WIDTHS`.
-        points: drawn from each cloud.
-        motion: whether the relations include how far ICP moved the cloud.
-    """
+    """Base of these explainers: each reads one group of :data:`gpca.pairs.description.WIDTHS` of every pair."""
 
     def __init__(self, source: str, seed: int, group: str, points: int, motion: bool = True) -> None:
         self._axes, self._group, self._motion, self._points = (source, seed), group, motion, points

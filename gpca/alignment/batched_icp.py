@@ -1,9 +1,8 @@
 """ICP of one source to one target from many initial poses, with everything that the runs share computed once.
 
 Point-to-point runs are a compiled loop with Open3D's steps and stopping rule, which ends at Open3D's poses
-(docs/protocol.md#two-loops-of-icp, tests/alignment/test_batched_icp.py). Open3D builds a tree of the target for
-every initial pose and searches it for every point in every iteration; `benchmarks/explainers.py` measures both.
-:class:`BatchedPlaneICP` takes all point-to-plane runs one step at a time; other methods call Open3D per initial pose.
+(docs/protocol.md#two-loops-of-icp). Open3D builds a tree of the target for every initial pose and searches it for
+every point in every iteration. :class:`BatchedPlaneICP` takes all point-to-plane runs one step at a time.
 """
 
 from __future__ import annotations

@@ -27,10 +27,7 @@ def estimate_normals(points_N_3: np.ndarray, neighbors: int = NEIGHBORS) -> np.n
 
 
 def fpfh_of_pair(pair: Any, radius: float, most_neighbors: int) -> tuple[list[Any], list[Any]]:
-    """Return Open3D's clouds of a pair's source and target, and the features of each, ``.data`` (33, N).
-
-    A feature is made of at most the nearest `most_neighbors` points in the radius.
-    """
+    """Return Open3D's clouds of a pair's source and target, and the features of each, ``.data`` (33, N)."""
     o3d = require_open3d()
     clouds = [open3d_cloud(getattr(pair, name), pair.normals(name)) for name in ("source", "target")]
     neighbors = o3d.geometry.KDTreeSearchParamHybrid(radius, most_neighbors)

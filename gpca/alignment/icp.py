@@ -39,9 +39,9 @@ class Registration:
 
 
 class ICP:
-    """Open3D's ICP of many sources to one target (P, 3), in any unit, which the correspondence distance shares.
+    """Open3D's ICP of many sources to one target (P, 3), in any unit; the correspondence distance is in it too.
 
-    Point-to-plane and generalized ICP need normals (P, 3); point-to-plane can take one of Open3D's robust kernels.
+    Other methods than point-to-point need normals (P, 3); point-to-plane can take one of Open3D's robust kernels.
     """
 
     def __init__(

@@ -56,10 +56,10 @@ def displacements(T_n: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 
 class PoseErrors:
-    """Errors of many estimates of one object's pose, where the truth is the identity.
+    """Errors of many estimates of one object's pose, where the truth is the identity; ADD-S if symmetric.
 
-    Errors are averaged over the first `judged` points, but nearest neighbors are sought among all of them, because
-    ADD-S cannot fall below their spacing. Errors have the unit of the points; `symmetric` selects ADD-S.
+    They are averaged over the first `judged` points, but nearest neighbors are sought among all of them, because ADD-S
+    cannot fall below their spacing.
     """
 
     def __init__(self, points_N_3: np.ndarray, judged: int, symmetric: bool) -> None:

@@ -1,7 +1,4 @@
-"""Rigid transforms as 4×4 matrices, such as ``T_target_source`` from source to target, their twists, and least squares.
-
-A twist ξ = (rotation, translation) is mapped to a rigid motion by exp of SE(3), and back by log.
-"""
+"""Rigid transforms as 4×4 matrices such as ``T_target_source``, their twists (rotation, translation), least squares."""
 
 from __future__ import annotations
 

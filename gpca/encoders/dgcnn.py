@@ -65,10 +65,9 @@ class DGCNN(nn.Module):
 
 
 class PairDGCNN(nn.Module):
-    """DGCNN on the points of both clouds of a registered pair, each with its membership (±1) as one more channel.
+    """DGCNN on the points of both clouds of a registered pair (:func:`gpca.pairs.distances.describe_points`).
 
-    The features of the points are those of :func:`gpca.pairs.distances.describe_points`. The `motion` numbers of
-    ICP's motion are appended to the embedding.
+    Each point has its membership (±1) as one more channel; the `motion` numbers of ICP's motion follow the embedding.
     """
 
     def __init__(
@@ -93,10 +92,7 @@ PAIR_ENCODERS = {"pair_dgcnn": PairDGCNN}
 
 
 class EdgeConv(nn.Module):
-    """Linear map on edges, batch norm over edges, LeakyReLU(0.2), maximum over the k neighbors.
-
-    ``weight`` (F_out, 2·F_in) acts on ``[x_j - x_i ; x_i]``, as in the per-edge form.
-    """
+    """Linear map W (F_out, 2·F_in) on edges, batch norm over edges, LeakyReLU(0.2), maximum over the k neighbors."""
 
     def __init__(self, in_features: int, out_features: int, k: int) -> None:
         super().__init__()

@@ -105,13 +105,10 @@ def _collect_with_ties(row, below, above, out):
 
 @njit(**OVER_CLOUDS)
 def gather_extreme_and_sums(ac, neighbors, gamma):
-    """Pass once over all edges y_ij = A_j + C_i.
+    """Pass once over all edges y_ij = A_j + C_i: extreme, extreme_at, edge_sums (B, N, F), mean and variance (F,).
 
-    Returns:
-        extreme (B, N, F): max_j y_ij where gamma >= 0, min_j y_ij elsewhere.
-        extreme_at (B, N, F): the point j at which it is reached.
-        edge_sums (B, N, F): Σ_j y_ij.
-        mean, variance (F,): float64, over all B·N·k edges (variance biased, as batch norm normalizes by it).
+    The extreme is max_j y_ij where gamma >= 0 and min_j y_ij elsewhere, reached at the point j; edge_sums are Σ_j y_ij.
+    Mean and biased variance are over all B·N·k edges, in float64.
     """
     batch, n, k = neighbors.shape
     features = ac.shape[2] // 2
@@ -202,16 +199,13 @@ def gather_max_affine(ac, neighbors, scale, shift, slope):
 def edge_max_backward(
     grad_out, ac, neighbors, extreme, extreme_at, edge_sums, mean, inverse_std, gamma, out, n_edges, slope
 ):
-    """Return the gradients of :func:`normalize_activate` after :func:`gather_extreme_and_sums`.
+    """Return grad_ac (B, N, 2F), grad_gamma (F,), grad_beta (F,) of :func:`normalize_activate`.
 
     With g the gradient at the extreme edges and ŷ the normalized edges, batch norm over E edges gives
 
         ∂L/∂y_e = γ/σ [ g_e - (Σ g + ŷ_e Σ g ŷ)/E ] ;
 
     summed over the edges that leave i it is ∂L/∂C_i, over those that arrive at j it is ∂L/∂A_j.
-
-    Returns:
-        grad_ac (B, N, 2F), grad_gamma (F,), grad_beta (F,).
     """
     batch, n, k = neighbors.shape
     features = gamma.shape[0]

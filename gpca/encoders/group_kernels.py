@@ -183,15 +183,12 @@ def normalize_max(y, scale, shift, ends, batch):
 
 @njit(**OVER_CLOUDS)
 def normalize_backward(grad_out, out, y, weight, mean, inverse_std, gamma, cloud_ends):
-    """Return the gradients of :func:`normalize` where its scale and shift come from :func:`moments`.
+    """Return grad_y (E, F), grad_gamma (F,), grad_beta (F,) of :func:`normalize` with statistics by :func:`moments`.
 
     With g_e the gradient that reaches edge e through all of its w_e slots and ŷ the normalized edges, batch norm over
     W = Σ w slots gives
 
         ∂L/∂γ = Σ g_e ŷ_e,  ∂L/∂β = Σ g_e,  ∂L/∂y_e = γ/σ [ g_e - w_e (∂L/∂β + ŷ_e ∂L/∂γ)/W ] .
-
-    Returns:
-        grad_y (E, F), grad_gamma (F,), grad_beta (F,).
     """
     features = y.shape[1]
     batch = len(cloud_ends) - 1

@@ -47,8 +47,7 @@ class Groups:
 class GroupMLP(nn.Module):
     """Layers of linear map, batch norm and ReLU on the slots of each group, then their maximum.
 
-    Points have `in_features` beside their coordinates relative to the group's center. Without `last_relu`, a residual
-    can be added before the last ReLU.
+    Without `last_relu`, a residual can be added before the last ReLU.
     """
 
     def __init__(self, in_features: int, widths: tuple[int, ...], last_relu: bool = True) -> None:
@@ -162,10 +161,7 @@ class _Normalize(torch.autograd.Function):
 
 
 def farthest_points(points_B_N_3: torch.Tensor, n_centers: int) -> torch.Tensor:
-    """Return the indices (B, M) of farthest-point sampling from point 0 (PointNet++, Sec. 3.2), M at most N.
-
-    Clouds are random draws, so point 0 is random.
-    """
+    """Return the indices (B, M) of farthest-point sampling from point 0, which is random (PointNet++, Sec. 3.2)."""
     points_B_N_3 = points_B_N_3.detach()
     batch, n, _ = points_B_N_3.shape
     if n <= n_centers:
@@ -180,8 +176,7 @@ def ball_query(
 ) -> tuple[torch.Tensor, torch.Tensor]:
     """Return neighbors (B, M, k) and counts (B, M), int32: the first k points within the radius of each center.
 
-    If there are fewer, the first one fills the remaining slots, and the count is the number of distinct points, at
-    least one. k is at most N.
+    Of fewer, the first one fills the remaining slots; the count is that of distinct points, at least one.
     """
     points_B_N_3, centers_B_M_3 = points_B_N_3.detach(), centers_B_M_3.detach()
     k = min(k, points_B_N_3.shape[1])

@@ -35,7 +35,6 @@ class PointLinear(nn.Linear):
     """A linear layer whose product is :func:`linear`."""
 
     def forward(self, x_I: torch.Tensor) -> torch.Tensor:
-        """Map inputs (…, I) to (…, O)."""
         y_O = linear(x_I, self.weight)
         return y_O if self.bias is None else y_O + self.bias
 

@@ -28,7 +28,6 @@ class PointNet(nn.Module):
         self.layers = GroupMLP(0, (width, width, width, 2 * width, self.embedding_size))
 
     def forward(self, points_B_N_3: torch.Tensor) -> torch.Tensor:
-        """Return embeddings (B, d)."""
         return self.layers(points_B_N_3, None, Groups.whole(points_B_N_3))[:, 0]
 
 
@@ -49,7 +48,6 @@ class PointNetTNet(nn.Module):
         self.penalty: torch.Tensor | None = None
 
     def forward(self, points_B_N_3: torch.Tensor) -> torch.Tensor:
-        """Return embeddings (B, d)."""
         x_B_N_F = self.first(stacked_product(points_B_N_3, self.turn_points(points_B_N_3)))
         A_B_F_F = self.turn_features(x_B_N_F)
         self.penalty = PENALTY * _from_orthogonal(A_B_F_F) if self.training else None
@@ -70,7 +68,6 @@ class TNet(nn.Module):
             self.matrix.bias.copy_(torch.eye(features).flatten())
 
     def forward(self, x_B_N_F: torch.Tensor) -> torch.Tensor:
-        """Return matrices (B, F, F)."""
         return self.matrix(self.whole(self.points(x_B_N_F))).view(-1, self.features, self.features)
 
 
@@ -82,7 +79,6 @@ class Pooled(nn.Module):
         self.layers = GroupMLP(inputs - 3, widths)
 
     def forward(self, x_B_N_F: torch.Tensor) -> torch.Tensor:
-        """Map features (B, N, F) to (B, F_out)."""
         # GroupMLP takes three numbers as coordinates, which it treats like the others when the group is the cloud.
         three_B_N_3, others_B_N_F = x_B_N_F[..., :3].contiguous(), x_B_N_F[..., 3:].contiguous()
         others = others_B_N_F if others_B_N_F.shape[-1] else None
@@ -98,7 +94,6 @@ class PointLayers(nn.Module):
         self.norms = nn.ModuleList(nn.BatchNorm1d(size) for size in sizes[1:])
 
     def forward(self, x_I: torch.Tensor) -> torch.Tensor:
-        """Map inputs (…, I) to (…, O)."""
         x_P_F = x_I.flatten(0, -2)
         for linear, norm in zip(self.linears, self.norms, strict=True):
             x_P_F = norm(linear(x_P_F)).relu()
@@ -142,7 +137,6 @@ class PointNet2(nn.Module):
         self.whole = GroupMLP(4 * w, (4 * w, 8 * w, self.embedding_size))
 
     def forward(self, points_B_N_3: torch.Tensor) -> torch.Tensor:
-        """Return embeddings (B, d)."""
         scale = UNIT_SPHERE if self.as_published else 1.0
         points_B_N_3 = scale * points_B_N_3
         x_B_N_F = None if self.as_published else points_B_N_3
@@ -157,10 +151,7 @@ class PointNet2(nn.Module):
 
 
 class SetAbstraction(nn.Module):
-    """A stage of PointNeXt-S: half of the points as centroids, two layers on each ball, maximum, residual.
-
-    Relative coordinates are divided by the radius. Variants B, L and XL have inverted residual blocks instead.
-    """
+    """A stage of PointNeXt-S: half of the points as centroids, two layers on each ball, maximum, residual."""
 
     def __init__(self, in_features: int, out_features: int, radius: float, neighbors: int) -> None:
         super().__init__()
@@ -169,7 +160,6 @@ class SetAbstraction(nn.Module):
         self.skip = PointLinear(in_features, out_features)
 
     def forward(self, points_B_N_3: torch.Tensor, x_B_N_F: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """Return the centroids (B, M, 3) and their features (B, M, F_out)."""
         chosen_B_M = farthest_points(points_B_N_3, max(1, points_B_N_3.shape[1] // 2))
         centers_B_M_3 = take(points_B_N_3, chosen_B_M)
         around = ball_query(points_B_N_3, centers_B_M_3, self.radius, self.neighbors)
@@ -196,7 +186,6 @@ class PointNeXt(nn.Module):
         self.whole = GroupMLP(d, (d, d))
 
     def forward(self, points_B_N_3: torch.Tensor) -> torch.Tensor:
-        """Return embeddings (B, d)."""
         x_B_N_F = self.stem(points_B_N_3)
         for stage in self.stages:
             points_B_N_3, x_B_N_F = stage(points_B_N_3, x_B_N_F)

@@ -36,10 +36,7 @@ class PCA:
 
 @dataclass(frozen=True)
 class UMAP:
-    """Uniform manifold approximation and projection (McInnes et al. 2018) by umap-learn.
-
-    A graph of some hundred samples fills only a few components; more add noise.
-    """
+    """Uniform manifold approximation and projection (McInnes et al. 2018) by umap-learn; more components add noise."""
 
     components: Count = 16
     neighbours: Annotated[int, Bounds(minimum=2)] = 15
@@ -129,10 +126,7 @@ def reduce(name: str, h_train_N_d: np.ndarray, h_S_d: np.ndarray, settings: dict
 
 
 def require_room(name: str, reduction: PCA | UMAP | Autoencoder, n: int, d: int | None) -> None:
-    """Raise an InputError if a reduction has too many components or neighbors for n training embeddings (n, d).
-
-    The config check does not always know d.
-    """
+    """Raise an InputError if components or neighbors are too many for n training embeddings of d numbers, if known."""
     if reduction.components > min(n, d or n):
         dimensions = f" of {d} numbers" if d else ""
         fault = f"{reduction.components} components are too many for {n} training embeddings{dimensions}"

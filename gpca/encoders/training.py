@@ -64,10 +64,7 @@ class Classifier(nn.Sequential):
 def make_model(
     settings: EncoderSettings, classes: tuple[str, ...] = CONCEPTS, encoder: Any | None = None
 ) -> Classifier:
-    """Return an encoder, by default a new one of the registry, with a new head over the classes.
-
-    The head is a linear layer, or DGCNN's usual kind without its first layer.
-    """
+    """Return an encoder, by default one of the registry, with a new head of one layer, or of two as DGCNN's last."""
     encoder = encoder or make_encoder(settings.backbone, settings.options)
     d, n_classes = encoder.embedding_size, len(classes)
     if settings.head == "linear":
@@ -106,9 +103,7 @@ def train_encoder(
         start: initial weights; random by default.
         group_S: (S,) rows of one group are held out together. By default, consecutive rows of one object.
 
-    Returns:
-        the model (``model.encoder``, ``model.head``), and for each epoch: epoch, learning_rate, loss, accuracy, and
-        with validation validation_loss and validation_accuracy.
+    Returns the model, and for each epoch: epoch, learning_rate, loss, accuracy, and those of the validation.
     """
     torch.manual_seed(seed_of(source, seed, "encoder", settings.backbone))
     model = make_model(settings, task.classes, task.make and task.make()).to(best_device())
@@ -266,11 +261,8 @@ def load_model(
 ) -> Classifier:
     """Load encoder and head, trained with these settings and classes, for inference.
 
-    Missing, damaged, pickled or another encoder's weights raise an InputError.
-
-    Args:
-        axes: required source and seed of the training samples, if any.
-        unlike: forbidden source and seed.
+    Source and seed of the training samples have to be `axes`, and must not be `unlike`. Missing, damaged, pickled or
+    another encoder's weights raise an InputError.
     """
     model = make_model(settings, classes)
     remedy = "regenerate them with Snakemake"
@@ -296,11 +288,10 @@ def embed(
     settings: EncoderSettings,
     draw: Draw = draw_points,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return embeddings h (S, d) of all rows, in their order, and the head's logits (S, C) at them; float32.
+    """Return embeddings h (S, d) of all rows and the head's logits (S, C) at them; float32.
 
     h is the mean over ``draws`` draws of N points, each named by sample and draw. One draw uses a quarter of a cloud
-    of 2048 points; averaging several halves the classifier's errors on unseen clouds. The logits of a linear head at h
-    are their mean over the draws too.
+    of 2048 points; averaging several halves the classifier's errors on unseen clouds.
     """
     model.to(best_device()).eval()
     batches = np.array_split(np.arange(len(registrations)), -(-len(registrations) // settings.batch_size))

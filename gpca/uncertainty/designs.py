@@ -39,11 +39,7 @@ Clouds = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 @dataclass(frozen=True)
 class Design:
-    """A list of K conditions.
-
-    `evaluate` takes the pair, the twists of the starts, the settings and the random numbers of a sample, and returns
-    the outcomes of all conditions.
-    """
+    """A list of K conditions; `evaluate` returns the outcomes of all for a pair with its starts and random numbers."""
 
     evaluate: Callable[[RegisteredRow, np.ndarray, UncertaintySettings, np.random.Generator], list[Spread]]
     conditions: tuple[str, ...]
@@ -155,8 +151,7 @@ DESIGNS = {
 def design_rows(registrations: Registrations, design: str, samples: int | None) -> np.ndarray:
     """Return the rows that a design evaluates: of its splits, the first `samples` test samples (all if None).
 
-    Samples come in threes of one object under the three concepts, and the threes go round the objects, so the first
-    ones are a stratified choice.
+    Samples come in threes, one object under the three concepts, round the objects: the first ones are stratified.
     """
     subject = f"uncertainty '{design}'"
     if samples is not None and samples % len(CONCEPTS):
@@ -204,9 +199,8 @@ def evaluate_design(
 
 
 class LiveUncertainty:
-    """u(noise, spread, overlap) of an observed pair in nats; nothing is kept from one call to the next.
+    """u(noise, spread, overlap) of an observed pair in nats, as in the table of design ``additive``; nothing is kept.
 
-    Its random numbers are those of the sample in design ``additive``, so it gives what the design's table holds.
     `icp_calls` counts the runs of ICP so far, those of the clean run included.
     """
 

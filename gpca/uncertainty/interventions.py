@@ -41,10 +41,7 @@ FEWEST_LEFT = 3  # that a cut leaves
 
 
 class KnobbedSource:
-    """A source cloud (N, 3), in diameters, under any setting of noise and overlap.
-
-    `random` draws the jitter and the direction of the cut.
-    """
+    """A source cloud (N, 3), in diameters, under any setting of noise and overlap, drawn once."""
 
     def __init__(self, source: np.ndarray, random: np.random.Generator) -> None:
         self._source = source
@@ -63,10 +60,7 @@ class KnobbedSource:
 class KnobRuns:
     """The function f of one pair; a setting that was evaluated is not evaluated again.
 
-    Args:
-        source, target: (N, 3) and (Q, 3), in diameters, each in its own frame.
-        T_target_source_init: initial pose. T_ref: pose from which the spread is measured.
-        xi_n_6: twists of the starts.
+    Clouds (N, 3) and (Q, 3) are in diameters, each in its own frame; the spread is measured from T_ref.
     """
 
     def __init__(
@@ -110,11 +104,8 @@ FEWEST_TRIMMED = 16  # where a trimmed target would have fewer, nothing is trimm
 class RemedyRuns:
     """Runs of one observed pair under every combination of remedies.
 
-    Args:
-        source, target: (N, 3) and (Q, 3), in diameters, each in its own frame; ICP sees fewer of their points than
-            denoising and the residual do.
-        T_target_source_init, T_target_source_icp: initial and found pose.
-        xi_n_6: twists of the starts.
+    Clouds (N, 3) and (Q, 3) are in diameters, each in its own frame; ICP sees fewer of their points than denoising and
+    the residual do.
     """
 
     def __init__(
@@ -165,10 +156,7 @@ class RemedyRuns:
 
 
 def denoise(points: np.ndarray) -> np.ndarray:
-    """Remove statistical outliers (Rusu et al. 2008) and move other points onto the least-squares planes of neighbors.
-
-    That is moving least squares of order one (Alexa et al. 2003).
-    """
+    """Remove statistical outliers (Rusu et al. 2008); move others to planes of neighbors (MLS, Alexa et al. 2003)."""
     neighbors = min(NEIGHBORS, len(points))
     distances, rows = cKDTree(points).query(points, neighbors)
     mean_N = distances.mean(axis=1)

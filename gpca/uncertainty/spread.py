@@ -80,12 +80,9 @@ def summarize_runs(
     settings: UncertaintySettings,
     started: float,
 ) -> Spread:
-    """Summarize the runs of one condition.
+    """Summarize the runs of one condition, whose work began at `started`, by the ``perf_counter``.
 
-    Args:
-        source_tree: of the source's points, in its own frame. target: (Q, 3) points whose residual counts.
-        T_ref: pose from which the spread is measured.
-        started: the ``perf_counter`` at which the condition's work began.
+    The tree is of the source's points, in its own frame; the residual is that of `target` (Q, 3).
     """
     best = runs.T_target_source_n[runs.cost_n(settings.icp.correspondence_distance).argmin()]
     return Spread(

@@ -126,8 +126,3 @@ def test_the_targets_points_are_the_given_ones_in_another_order():
         order = np.lexsort(points.T)
         assert np.array_equal(target.points[np.lexsort(target.points.T)], points[order])
         assert target.starts[0] == 0 and target.starts[-1] == len(points)
-
-
-def test_points_of_single_precision_are_searched_as_well():
-    points = ON_SPHERE.astype(np.float32)
-    check(make_target(points, 0.1), queries(points.astype(float), 0.1))

@@ -184,13 +184,6 @@ def test_beyond_half_a_turn_log_takes_the_shorter_way_to_the_same_motion(angle):
     assert np.allclose(exp(xi_n_6), T_n, atol=1e-6)
 
 
-def test_the_identity_and_pure_translations():
-    assert np.array_equal(exp(np.zeros((1, 6))), np.eye(4)[None])
-    assert np.array_equal(log(np.eye(4)[None]), np.zeros((1, 6)))
-    T = exp(np.array([[0, 0, 0, 1.0, -2.0, 3.0]]))[0]
-    assert np.array_equal(T[:3, 3], [1, -2, 3]) and np.array_equal(T[:3, :3], np.eye(3))
-
-
 def test_the_adjoint_takes_a_twist_to_another_frame():
     T = exp(np.array([[0.4, -1.0, 0.7, 0.3, 0.1, -0.2]]))[0]
     for xi_6 in twists(0.8, 5):

@@ -47,14 +47,6 @@ def test_the_vectors_and_the_order_of_the_scores_equal_an_independent_computatio
     assert log_scores - log_scores[:, :1] == pytest.approx(positions - positions[:, :1], abs=0.02)
 
 
-def test_it_names_the_concept_and_needs_no_label_and_no_other_sample(embedded):
-    explainer = fitted(embedded)
-    attribution = explainer.explain(embedded.without_labels())
-    assert np.mean(attribution.predicted_N == embedded.concept) > 0.9
-    rows = np.array([7, 50, 3])
-    assert explainer.explain(embedded.subset(rows)).scores_N_C == pytest.approx(attribution.scores_N_C[rows], abs=1e-12)
-
-
 @pytest.mark.parametrize("absent", CONCEPTS)
 def test_a_concept_absent_from_training_scores_0(embedded, absent):
     explainer = fitted(embedded.subset(np.flatnonzero(embedded.concept != absent)))

@@ -63,13 +63,6 @@ def test_the_third_feature_is_the_log_determinant_of_the_observed_condition_abov
     assert Residuals(None, 1e-5).features(attached)[:, 2] == pytest.approx(expected)
 
 
-def test_a_pair_whose_runs_all_end_at_one_pose_has_a_finite_feature(attached):
-    same = np.zeros_like(attached.attached["covariance"])
-    assert Residuals(None, FLOOR).features(replace(attached, attached={"covariance": same}))[:, 2] == pytest.approx(
-        6 * np.log(FLOOR)
-    )
-
-
 @pytest.mark.parametrize("name", RIVALS)
 def test_they_name_the_concept_and_need_no_label_and_no_other_sample(name, attached):
     assert explainer_entry(name).reads == "uncertainty/removal"

@@ -116,17 +116,6 @@ def test_learning_from_one_concept_alone_is_refused(name, attached):
 
 
 @pytest.mark.parametrize("name", (*SCALED, *LEARNED))
-def test_rows_in_another_order_give_the_results_in_that_order(name, attached):
-    explainer = fitted(name, attached)
-    whole = explainer.explain(attached)
-    rows = np.random.default_rng(2).permutation(len(attached))
-    shuffled = explainer.explain(attached.subset(rows))
-    assert shuffled.scores_N_C == pytest.approx(whole.scores_N_C[rows], abs=1e-12)
-    assert np.array_equal(shuffled.predicted_N, whole.predicted_N[rows])
-    assert np.array_equal(shuffled.icp_calls_N, whole.icp_calls_N[rows])
-
-
-@pytest.mark.parametrize("name", (*SCALED, *LEARNED))
 def test_only_the_corners_that_it_needs_are_charged(name, attached):
     attribution = fitted(name, attached).explain(attached)
     calls_N = attached.attached["icp_calls"][:, CHARGED[name]].sum(axis=1)

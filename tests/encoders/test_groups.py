@@ -62,16 +62,6 @@ def test_a_ball_holds_no_more_points_than_the_cloud():
     assert counts.tolist() == [[6] * 6]
 
 
-def test_a_whole_cloud_is_one_group_around_the_origin():
-    groups = Groups.whole(clouds(4, 9))
-    assert groups.is_whole
-    assert groups.neighbors_B_M_k.tolist() == [[list(range(9))]] * 4
-    assert groups.counts_B_M.tolist() == [[9]] * 4
-    assert not groups.centers_B_M_3.any()
-    points = clouds(4, 9)
-    assert not Groups(points, *ball_query(points, points, 0.1, 4)).is_whole
-
-
 def test_the_number_of_threads_changes_no_bit():
     program = """
 import hashlib, torch

@@ -215,23 +215,6 @@ def test_sampled_knobs_lie_within_the_ranges(kind, settings):
     assert np.array_equal(sample_knobs(kind), sampled)
 
 
-def test_the_latin_hypercube_has_one_setting_in_every_stratum_of_every_knob():
-    stratum = np.floor((sample_knobs("latin") - UNTOUCHED) / KNOB_RANGE * LATIN).astype(int)
-    for column in stratum.T:
-        assert sorted(column) == list(range(LATIN))
-    # and the knobs are not moved together
-    assert np.abs(np.corrcoef(sample_knobs("latin").T) - np.eye(3)).max() < 0.6
-
-
-def test_saltellis_settings_change_one_knob_of_the_first_to_that_of_the_last():
-    for block in sample_knobs("saltelli").reshape(SALTELLI, 5, 3):
-        first, *changed, last = block
-        for knob, setting in enumerate(changed):
-            expected = first.copy()
-            expected[knob] = last[knob]
-            assert np.array_equal(setting, expected)
-
-
 @pytest.mark.parametrize("design", DESIGNS)
 def test_a_source_and_target_of_the_same_points_are_survived(registrations, design):
     one = registrations.subset(np.array([40]))

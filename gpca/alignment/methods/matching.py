@@ -37,10 +37,7 @@ def align_by_ransac(
     correspondence_distance: float = CORRESPONDENCE_DISTANCE,
     feature_neighbors: int = MOST_NEIGHBORS,
 ) -> Outcome:
-    """Return the pose of three matches that agrees with most others (Fischler & Bolles 1981).
-
-    `feature_radius` and `inlier_distance`, of an agreeing match, are in diameters.
-    """
+    """Return the pose of three matches that agrees with most others (Fischler & Bolles 1981), all in diameters."""
     registration = require_open3d().pipelines.registration
     clouds, features = fpfh_of_pair(pair, feature_radius, feature_neighbors)
     require_open3d().utility.random.seed(pair.seed % 2**31)
@@ -69,10 +66,7 @@ def align_by_fgr(
     correspondence_distance: float = CORRESPONDENCE_DISTANCE,
     feature_neighbors: int = MOST_NEIGHBORS,
 ) -> Outcome:
-    """Minimize a robust cost over all matches in agreeing triples (Zhou et al. 2016).
-
-    `feature_radius` and `inlier_distance`, the final scale of the cost, are in diameters.
-    """
+    """Minimize a robust cost of the scale `inlier_distance` over all matches in agreeing triples (Zhou et al. 2016)."""
     registration = require_open3d().pipelines.registration
     clouds, features = fpfh_of_pair(pair, feature_radius, feature_neighbors)
     require_open3d().utility.random.seed(pair.seed % 2**31)

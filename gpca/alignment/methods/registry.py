@@ -57,8 +57,7 @@ def _require_package(name: str, remedy: str) -> None:
 def make_method(name: str, settings: Mapping[str, object] | None = None) -> Callable[[Pair], Outcome]:
     """Return a method as a function from pairs to outcomes; a failure becomes an outcome at the initial pose.
 
-    It runs in one thread, because Open3D sums and draws random numbers in the order in which its threads end. Raises
-    InputError for an unknown name, settings that the method does not take, and a missing package.
+    It runs in one thread, because Open3D sums and draws random numbers in the order in which its threads end.
     """
     from threadpoolctl import ThreadpoolController
 

@@ -135,8 +135,8 @@ def align_trimmed(
 ) -> Outcome:
     """Align the share `overlap` of the source that fits best; with 0, find that share ξ too (Chetverikov et al. 2002).
 
-    The minimized objective is ψ(ξ) = e / ξ^(1+λ), e the mean square of the trimmed distances. `correspondence_distance`
-    does not limit correspondences; it only measures the outcome.
+    The objective is ψ(ξ) = e / ξ^(1+λ), e the mean square of the trimmed distances. `correspondence_distance` only
+    measures the outcome.
     """
 
     @cache

@@ -151,10 +151,8 @@ def align(
 ) -> Outcome:
     """Return the pose on which the largest set of matches agrees.
 
-    Args:
-        feature_radius: of a feature, in diameters.
-        noise: bound of a right match's error, in diameters: about the spacing of the points.
-        most_matches: number of best matches used; TEASER's authors advise some hundreds.
+    `noise` bounds a right match's error, in diameters: about the spacing of the points. TEASER's authors advise some
+    hundreds of matches.
     """
     _, features = fpfh_of_pair(pair, feature_radius, feature_neighbors)
     source_N_33, target_P_33 = (each.data.T for each in features)

@@ -90,8 +90,7 @@ class RegisteredPair:
     def twists_from(self, xi_n_6: np.ndarray) -> np.ndarray:
         """Register from the starts exp(ξ) T_init and return the results' twists about the pose (m, 6).
 
-        Runs that found no correspondence are no results. Too few results, or a method that reads no initial pose, are a
-        failure.
+        Too few runs with a correspondence are a failure, and a method that reads no initial pose.
         """
         if method_entry(self.method).is_global:
             raise FailedEstimate(f"'{self.method}' reads no initial pose, so that its results do not spread")

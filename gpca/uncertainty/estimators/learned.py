@@ -31,13 +31,10 @@ def learn_cello(
 
     The covariance is the mean of the training pairs' covariances with weights exp(-|L (φ - φ')|²). L is diagonal,
     chosen so that the runs of each training pair are likely under the covariance that the others give it. It models how
-    results vary between the runs that it learns from: starts and data where both vary. An error that all runs of a pair
-    share is not modeled.
+    results vary between the runs that it learns from; an error that all runs of a pair share is not modeled.
 
     Axes of a pair have no common sign, over which the covariance between two of them averages out: what is learned are
-    the six variances along the principal axes of the target (:func:`intrinsic_frame`).
-
-    `components` are of a PCA of the descriptors, `steps` and `learning_rate` of Adam on the leave-one-out likelihood.
+    the six variances along the principal axes of the target (:func:`intrinsic_frame`). `components` are of a PCA.
     """
     import torch
 
@@ -73,10 +70,9 @@ def learn_cello(
 
 
 class Reduction:
-    """Descriptors, standardized and limited, onto their first principal components.
+    """Descriptors, standardized and limited, onto their first principal components, at most one fewer than pairs.
 
-    There are at most one fewer than training pairs: along any other axis these do not differ, and another pair would
-    lie infinitely far away.
+    Along any other axis these do not differ, and another pair would lie infinitely far away.
     """
 
     def __init__(self, descriptors_E_F: np.ndarray, components: int) -> None:
@@ -138,12 +134,9 @@ def learn_ensemble(
 ) -> Estimator:
     """Train networks on errors of training registrations against true poses (after De Maio & Lacroix, ICRA 2022).
 
-    Each network gives the mean and the variances of the error from a pair's descriptors. Their average spread is
-    aleatoric, their disagreement epistemic (Lakshminarayanan et al. 2017). The original is variational, on clouds. It
-    models the error, whatever causes it.
-
-    Six means and six variances along the target's principal axes, by the Gaussian likelihood of all runs of a pair. The
-    `members` differ by their initial weights.
+    Each gives means and variances of the error along the target's principal axes from a pair's descriptors, by the
+    Gaussian likelihood of all runs. Their average spread is aleatoric, their disagreement epistemic (Lakshminarayanan
+    et al. 2017). The original is variational, on clouds. It models the error, whatever causes it.
     """
     reduce, features_E_K = _reduced(examples, COMPONENTS)
     networks = _Ensemble(features_E_K.shape[1], hidden, members)

@@ -20,11 +20,10 @@ SMALLEST_VARIANCE = 1e-10  # squared diameters: a cloud on itself has residuals 
 
 
 class Posterior:
-    """ln p(ξ) = -½ |ξ - ξ₀|² / σ₀² - Σ |r|² / 2σ² over the source's matched points at exp(ξ) T̂.
+    """ln p(ξ) = -½ |ξ - ξ₀|² / σ₀² - Σ |r|² / 2σ² over the source's matched points at exp(ξ) T̂, for small twists.
 
     The prior is the starts' distribution about the initial pose ξ₀; σ² is the variance of a residual's coordinate at
-    the pose that was found. Valid for small twists: distances on the group are those of the twists. `covariance` (6, 6)
-    is that of the Gaussian that has its curvature at the pose, for steps of the right size.
+    the pose that was found. `covariance` (6, 6) is that of the Gaussian of its curvature at the pose.
     """
 
     def __init__(self, registered: RegisteredPair) -> None:
@@ -110,10 +109,10 @@ BETA_1, BETA_2, EPSILON = 0.9, 0.999, 1e-8  # Adam's defaults, as the authors ta
 def stein_icp(
     registered: RegisteredPair, particles: int = 100, steps: int = 150, batch: int = 150, learning_rate: float = 0.01
 ) -> np.ndarray:
-    """Return the covariance of the particles of Stein ICP (Maken, Ramos & Ott, RA-L 2022), in the authors' number.
+    """Return the covariance of the particles of Stein ICP (Maken, Ramos & Ott, RA-L 2022), from prior to posterior.
 
-    Stein variational gradient descent (Liu & Wang 2016) from the prior to the posterior: the particles attract each
-    other to where the posterior is high and repel each other by the kernel's slope.
+    By Stein variational gradient descent (Liu & Wang 2016), particles are drawn to where the posterior is high and
+    repel each other by the kernel's slope.
     """
     posterior = Posterior(registered)
     random = generator("stein_icp", registered.pair.seed)

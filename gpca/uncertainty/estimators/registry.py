@@ -33,14 +33,10 @@ def require_estimator_settings(name: str, settings: Mapping[str, object]) -> Non
 def make_estimator(
     name: str, settings: Mapping[str, object] | None = None, examples: Sequence[Example] = ()
 ) -> Callable[[RegisteredPair], Estimate]:
-    """Return an estimator as a function from registered pairs to estimates.
+    """Return an estimator as a function from registered pairs to estimates; one that learns needs examples.
 
     A failure inside it, at learning too, becomes an estimate that says why. So does a registration without any
-    correspondence, which no estimator is asked about. An unknown name, settings that it does not take, and one that
-    learns without examples raise an InputError.
-
-    Args:
-        examples: registrations of training objects by the same method, for one that learns.
+    correspondence. Unknown names and settings, and missing examples, raise an InputError.
     """
     settings = dict(settings or {})
     require_estimator_settings(name, settings)

@@ -24,11 +24,8 @@ def brossard(registered: RegisteredPair, noise: float = 0.0, bias: float = 0.0) 
 
     An unscented transform takes the starts' spread through the method by 2·6 sigma points and their middle. The
     sensor's white noise w and a bias b, the same for all points along their normals, move the minimum by
-    A⁻¹ Σ Jᵀ (w + b) with A = Σ JᵀJ; the bias remains when there are many points. It models starts and data.
-
-    Args:
-        noise: σ, standard deviation of the distances from planes, in diameters; with 0 it is estimated from them.
-        bias: b, in diameters; with 0 it is as large as the noise, as the authors take it.
+    A⁻¹ Σ Jᵀ (w + b) with A = Σ JᵀJ; the bias remains when there are many points. In diameters, σ is estimated from the
+    distances if 0, and b is then as large, as the authors take it.
     """
     distances_n, rows_n_6 = registered.matches().plane_rows()
     variance = noise**2 if noise else np.square(distances_n).sum() / max(len(distances_n) - 6, 1)
