@@ -7,16 +7,7 @@ from typing import TYPE_CHECKING
 
 from gpca.alignment.methods.registry import method_entry
 from gpca.evaluation.intervals import REPEATS
-from gpca.experiments.estimators import (
-    BOTH,
-    FAILED,
-    GATES,
-    SUCCEEDED,
-    TRUTH,
-    collect_estimate_seconds,
-    estimates,
-    read_intervals,
-)
+from gpca.experiments import estimators
 from gpca.experiments.plan import Run
 from gpca.experiments.result import table
 from gpca.reporting.tables.builder import TableBuilder, crossed
@@ -29,7 +20,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 SECTION = "Beyond the paper: how uncertain a pose is"
-INTERVALS = {"intervals": (read_intervals, "estimator_intervals.csv")}
+INTERVALS = {"intervals": (estimators.read_intervals, "estimator_intervals.csv")}
 REFERENCES = {"starts": "Other starts", "data": "Other data", "all": "Other starts and data"}
 # By which an estimator is judged, by what it models. No posterior can be drawn here; a right one is about as wide as
 # the results of other data.
@@ -44,8 +35,8 @@ BY_MODEL = {  # Each of these metrics has a column, by the reference of what an 
     "coverage": Column("Coverage (%)"),
 }
 BY_TRUTH = {
-    f"nees_{TRUTH}": Column("True pose: NEES / 6", 1, **RATIO),
-    f"coverage_{TRUTH}": Column("True pose: coverage (%)"),
+    f"nees_{estimators.TRUTH}": Column("True pose: NEES / 6", 1, **RATIO),
+    f"coverage_{estimators.TRUTH}": Column("True pose: coverage (%)"),
 }
 
 
@@ -83,14 +74,14 @@ def table12_uncertainty(run: Run, intervals):
     """How each estimator fits the reference of what it models, and the error: methods × states × estimators."""
     heads = {"method": "Registered by", "state": "State", "estimator": "Estimator", "models": "Models"}
     builder = TableBuilder("table12_uncertainty", heads)
-    methods, entries = _methods(run), estimates(run.config, run.sources)
-    for (method, state), labels in crossed(methods, {SUCCEEDED: "Succeeded", FAILED: "Failed"}):
+    methods, entries = _methods(run), estimators.estimates(run.config, run.sources)
+    for (method, state), labels in crossed(methods, {estimators.SUCCEEDED: "Succeeded", estimators.FAILED: "Failed"}):
         for name, entry in entries.items():
             models = entry["models"]
             values = _values(intervals, method, state, name)
             cells = {metric: _cell(values, f"{metric}_{REFERENCE_OF[models]}") for metric in BY_MODEL}
             cells |= {metric: _cell(values, metric) for metric in BY_TRUTH}
-            cells["samples"] = _count(values, f"coverage_{TRUTH}")
+            cells["samples"] = _count(values, f"coverage_{estimators.TRUTH}")
             builder.add_row([*labels, (name, entry["title"]), (models, models)], cells)
     builder.compare_down(("kl_rotation", "kl_translation"), same=2)
     refused = []
@@ -135,14 +126,14 @@ def table12_references(run: Run, intervals):
     for kind in KINDS:
         columns[f"kl_rotation_{kind}"] = Column(f"{REFERENCES[kind]}: KL, rotation", 1, interval=False, **KL)
         columns[f"coverage_{kind}"] = Column(f"{REFERENCES[kind]}: coverage (%)")
-    columns[f"coverage_{TRUTH}"] = Column("True pose: coverage (%)")
+    columns[f"coverage_{estimators.TRUTH}"] = Column("True pose: coverage (%)")
     references = {
         f"reference_{kind}": {"title": f"Reference: {title.lower()}", "models": "–"}
         for kind, title in REFERENCES.items()
     }
     for method, title in _methods(run).items():
-        for name, entry in (references | estimates(run.config, run.sources)).items():
-            values = _values(intervals, method, SUCCEEDED, name)
+        for name, entry in (references | estimators.estimates(run.config, run.sources)).items():
+            values = _values(intervals, method, estimators.SUCCEEDED, name)
             own = name.replace("reference_", "kl_rotation_")  # of a reference from itself
             cells = {metric: _cell(values, metric) for metric in columns if metric != own}
             labels = [(method, title), (name, entry["title"]), (entry["models"], entry["models"])]
@@ -167,18 +158,20 @@ def table12_references(run: Run, intervals):
     """Whether the spread that an estimator predicts tells registrations that failed from the others, and by how much
     better than the best gate, which needs no estimator.""",
     **INTERVALS,
-    seconds=(collect_estimate_seconds, "timings/{source}/estimator_{estimate}/seed{seed}.csv"),
+    seconds=(estimators.collect_estimate_seconds, "timings/{source}/estimator_{estimate}/seed{seed}.csv"),
 )
 def table12_failures(run: Run, intervals, seconds):
     """How well each estimator's spread finds failed registrations, beside gates that need no estimator."""
     builder = TableBuilder("table12_failures", {"method": "Registered by", "estimator": "Estimator"})
-    entries = estimates(run.config, run.sources)
-    titles = {name: entry["title"] for name, entry in entries.items()} | GATES
+    entries = estimators.estimates(run.config, run.sources)
+    titles = {name: entry["title"] for name, entry in entries.items()} | estimators.GATES
     for method, method_title in _methods(run).items():
         counted = rows_where(intervals, method=method, metric="no_estimate").groupby("state")["samples"].max()
-        counts = ", ".join(f"{int(counted.get(state, 0))} {state}" for state in (SUCCEEDED, FAILED))
+        counts = ", ".join(
+            f"{int(counted.get(state, 0))} {state}" for state in (estimators.SUCCEEDED, estimators.FAILED)
+        )
         for name, title in titles.items():
-            values = _values(intervals, method, BOTH, name)
+            values = _values(intervals, method, estimators.BOTH, name)
             cells = {metric: _cell(values, metric) for metric in ("auroc_failed", "spearman_error")}
             if "auroc_failed" in values.index:
                 row = values.loc["auroc_failed"]

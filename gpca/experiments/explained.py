@@ -14,9 +14,6 @@ def require_explained(config: Mapping[str, Any], key: str) -> Iterator[tuple[str
 
     Yields:
         the key of each in the config, and its name.
-
-    Raises:
-        InputError: an unknown explainer or setting.
     """
     section: Any = config
     for part in key.split("."):

@@ -88,11 +88,7 @@ def setting_name(kernel: str, learning_rate: float, iterations: int) -> str:
 
 
 def read_grids(files: Iterable[str | Path]) -> pd.DataFrame:
-    """Read files named `…/{source}/seed{seed}.csv` into one frame with the further columns `source` and `seed`.
-
-    Raises:
-        InputError: no files, a name of another form, a missing column, something that is not a finite number.
-    """
+    """Read files named `…/{source}/seed{seed}.csv` into one frame with the further columns `source` and `seed`."""
     import pandas as pd
 
     parts = []
@@ -121,11 +117,7 @@ def collect(run: Run, files: Iterable[str | Path]) -> pd.DataFrame:
 
 @numbers("kernel_intervals.csv", files="kernel_predictions/{kernel_source}/seed{seed}.csv")
 def collect_intervals(run: Run, files: Iterable[str | Path]) -> pd.DataFrame:
-    """All measures but the ELBO over all seeds, with intervals over families; a source's settings share the draws.
-
-    Raises:
-        InputError: no files, a name of another form, a file that cannot be read.
-    """
+    """All measures but the ELBO over all seeds, with intervals over families; a source's settings share the draws."""
     import pandas as pd
 
     from gpca.attribution.learner_predictions import estimates_of_scores

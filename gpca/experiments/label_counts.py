@@ -29,11 +29,7 @@ Clusters = Mapping[tuple[str, int], int]  # (source, seed) -> number of families
 def families(
     files: Iterable[str | Path], load: Callable[[Path, tuple[str, int]], Registrations] = Registrations.load
 ) -> Clusters:
-    """Number of families of the test samples in files named ``…/{source}/seed{seed}.npz``.
-
-    Raises:
-        InputError: a file that cannot be read, or of another source or seed.
-    """
+    """Number of families of the test samples in files named ``…/{source}/seed{seed}.npz``."""
     counts = {}
     for path in map(Path, files):
         axes = path.parent.name, seed_of_file(path)

@@ -25,22 +25,9 @@ from gpca.experiments.registration_stages import (
 )
 from gpca.experiments.result import figure
 from gpca.pairs.perturbation import CONCEPTS
+from gpca.reporting.figures import style
 from gpca.reporting.figures.cloud_views import draw_clouds, thinned
 from gpca.reporting.figures.diagram import Canvas
-from gpca.reporting.figures.style import (
-    BLACK,
-    BLUE,
-    CONCEPT_COLORS,
-    CONCEPT_MARKERS,
-    GRAY,
-    LIGHT_GRAY,
-    SMALL_PT,
-    SOURCE_COLOR,
-    TARGET_COLOR,
-    TEXT_WIDTH_IN,
-    blues,
-    write_title,
-)
 from gpca.seeds import generator
 
 if TYPE_CHECKING:
@@ -85,18 +72,18 @@ def fig4_pipeline(
     labeling = first_round(
         stages, new, ActiveLearningSettings.from_dict(dict(run.config["active_learning"])), source, seed
     )
-    canvas = Canvas(TEXT_WIDTH_IN, 3.5)
-    canvas.box(0.03, 1.9, 7.1, 1.4, color=LIGHT_GRAY)
-    canvas.box(0.03, 0.03, 7.1, 1.6, color=LIGHT_GRAY)
+    canvas = Canvas(style.TEXT_WIDTH_IN, 3.5)
+    canvas.box(0.03, 1.9, 7.1, 1.4, color=style.LIGHT_GRAY)
+    canvas.box(0.03, 0.03, 7.1, 1.6, color=style.LIGHT_GRAY)
     _draw_inference(canvas, stages, row, encoder_title(**run.config["embedding"]), labeling)
     _draw_active_learning(canvas, stages, labeling, new, curves)
     canvas.arrow((6.4, 1.97), (6.4, 1.63))
     canvas.text(6.36, 1.765, "uncertain cases", ha="right", va="center")
     canvas.arrow((0.9, 1.63), (0.9, 1.74), (4.62, 1.74), (4.62, 2.0))
     canvas.text(2.76, 1.775, "retrained classifier", va="bottom")
-    write_title(canvas.figure, title_of_sample(run, stages.predictions["object"][row]))
-    canvas.dot(6.15, 3.4, TARGET_COLOR, r"target $\mathcal{Q}$", gap_in=0.05)
-    canvas.dot(6.63, 3.4, SOURCE_COLOR, r"source $\mathcal{P}$", gap_in=0.05)
+    style.write_title(canvas.figure, title_of_sample(run, stages.predictions["object"][row]))
+    canvas.dot(6.15, 3.4, style.TARGET_COLOR, r"target $\mathcal{Q}$", gap_in=0.05)
+    canvas.dot(6.63, 3.4, style.SOURCE_COLOR, r"source $\mathcal{P}$", gap_in=0.05)
     return canvas.figure
 
 
@@ -124,9 +111,6 @@ def first_round(stages: Stages, held_out: str, settings: ActiveLearningSettings,
     """Fit the classifier that does not know a concept yet, and let the paper's strategy choose from the pool.
 
     Start, pool and classifier are those of the run's learning curves with this source and seed.
-
-    Raises:
-        InputError: see :func:`gpca.active_learning.rounds.make_task`.
     """
     from sklearn.decomposition import PCA
     from sklearn.preprocessing import StandardScaler
@@ -174,14 +158,14 @@ def _draw_inference(canvas: Canvas, stages: Stages, row: int, encoder: str, labe
     canvas.arrow((1.2, middle_in), (1.54, middle_in), words="ICP")
     canvas.arrow((2.66, middle_in), (2.8, middle_in))
     corners_in = [(2.8, 3.02), (3.3, 2.86), (3.3, 2.46), (2.8, 2.3)]
-    canvas.axes.fill(*zip(*corners_in, strict=True), facecolor=GRAY + "22", edgecolor=GRAY, linewidth=0.9)
+    canvas.axes.fill(*zip(*corners_in, strict=True), facecolor=style.GRAY + "22", edgecolor=style.GRAY, linewidth=0.9)
     canvas.text(3.05, middle_in, f"{encoder}\n$f_\\theta$", va="center")
     canvas.text(3.05, captions_in, "frozen", va="top")
     canvas.arrow((3.3, middle_in), (3.46, middle_in))
     draw_embedding(canvas.panel(3.48, 2.3, 0.36, 0.72), stages.h_S_d[row])
     canvas.text(3.66, captions_in, rf"$\mathbf{{h}} \in \mathbb{{R}}^{{{stages.h_S_d.shape[1]}}}$", va="top")
     canvas.arrow((3.86, middle_in), (4.02, middle_in))
-    canvas.box(4.02, 2.0, 1.2, 1.22, color=BLUE)
+    canvas.box(4.02, 2.0, 1.2, 1.22, color=style.BLUE)
     canvas.text(4.62, 3.19, "multi-class GP classifier", va="top")
     _draw_labeled(canvas.panel(4.07, 2.17, 1.1, 0.88), stages, row, labeling)
     canvas.text(4.62, 2.03, "★ this sample", va="bottom")
@@ -197,9 +181,14 @@ def _draw_labeled(axes, stages: Stages, row: int, labeling: Round) -> None:
     train = stages.registrations.rows("train")
     for concept in CONCEPTS:
         rows = train[stages.registrations.concept[train] == concept]
-        look = {"marker": CONCEPT_MARKERS[concept], "color": CONCEPT_COLORS[concept], "alpha": 0.6, "linewidths": 0}
+        look = {
+            "marker": style.CONCEPT_MARKERS[concept],
+            "color": style.CONCEPT_COLORS[concept],
+            "alpha": 0.6,
+            "linewidths": 0,
+        }
         axes.scatter(*labeling.map_S_2[rows].T, s=5, **look)
-    axes.scatter(*labeling.map_S_2[row], s=45, marker="*", color=BLACK, zorder=5)
+    axes.scatter(*labeling.map_S_2[row], s=45, marker="*", color=style.BLACK, zorder=5)
     axes.set_axis_off()
 
 
@@ -222,9 +211,9 @@ def _draw_active_learning(canvas: Canvas, stages: Stages, labeling: Round, new: 
     bald_N = labeling.bald_N
     points_N_2 = labeling.map_S_2[labeling.rows_N]
     order = np.argsort(bald_N, kind="stable")
-    panel.scatter(*labeling.map_S_2[labeling.labeled].T, s=5, marker="x", color=GRAY, linewidths=0.5)
-    panel.scatter(*points_N_2[order].T, s=9, c=bald_N[order], cmap=blues(), edgecolors=GRAY, linewidths=0.3)
-    panel.scatter(*points_N_2[labeling.candidates].T, s=26, facecolors="none", edgecolors=BLACK, linewidths=0.7)
+    panel.scatter(*labeling.map_S_2[labeling.labeled].T, s=5, marker="x", color=style.GRAY, linewidths=0.5)
+    panel.scatter(*points_N_2[order].T, s=9, c=bald_N[order], cmap=style.blues(), edgecolors=style.GRAY, linewidths=0.3)
+    panel.scatter(*points_N_2[labeling.candidates].T, s=26, facecolors="none", edgecolors=style.BLACK, linewidths=0.7)
     panel.set_axis_off()
     canvas.text(
         5.04,
@@ -236,8 +225,8 @@ def _draw_active_learning(canvas: Canvas, stages: Stages, labeling: Round, new: 
 
     canvas.text(3.66, heads_in, "Diversify: $k$-means", va="top")
     panel = canvas.panel(3.12, 0.36, 1.08, 1.02)
-    panel.scatter(*points_N_2[labeling.candidates].T, s=26, facecolors="white", edgecolors=BLACK, linewidths=0.7)
-    panel.scatter(*points_N_2[labeling.chosen].T, s=26, facecolors=BLUE, edgecolors=BLACK, linewidths=0.7)
+    panel.scatter(*points_N_2[labeling.candidates].T, s=26, facecolors="white", edgecolors=style.BLACK, linewidths=0.7)
+    panel.scatter(*points_N_2[labeling.chosen].T, s=26, facecolors=style.BLUE, edgecolors=style.BLACK, linewidths=0.7)
     panel.margins(0.12)
     panel.set_axis_off()
     canvas.text(3.66, captions_in, f"$B$ = {len(labeling.chosen)} kept,\none of each cluster", va="bottom")
@@ -262,8 +251,8 @@ def _draw_active_learning(canvas: Canvas, stages: Stages, labeling: Round, new: 
     low, high = panel.get_ylim()
     panel.set_ylim(bottom=low - 0.5 * (high - low))  # room for the legend
     panel.locator_params(axis="x", nbins=4, integer=True)
-    panel.set_ylabel("accuracy (%)", fontsize=SMALL_PT, labelpad=1)
-    panel.set_xlabel("labels", fontsize=SMALL_PT, labelpad=0)
+    panel.set_ylabel("accuracy (%)", fontsize=style.SMALL_PT, labelpad=1)
+    panel.set_xlabel("labels", fontsize=style.SMALL_PT, labelpad=0)
     panel.tick_params(pad=1.5, length=2)
     panel.legend(loc="lower right", borderaxespad=0, handlelength=1.2, borderpad=0.1, labelspacing=0.2)
 

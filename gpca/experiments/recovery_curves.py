@@ -16,21 +16,8 @@ from gpca.experiments.recovery import SECTION, tables_title, titles_of_policies
 from gpca.experiments.recovery_measures import at, pool_share, read_queues
 from gpca.experiments.result import figure
 from gpca.pairs.perturbation import CONCEPTS
+from gpca.reporting.figures import style
 from gpca.reporting.figures.panels import legend_below, panels
-from gpca.reporting.figures.style import (
-    BLACK,
-    BLUE,
-    CONCEPT_COLORS,
-    CONCEPT_MARKERS,
-    GRAY,
-    GREEN,
-    LIGHT_GRAY,
-    ORANGE,
-    PURPLE,
-    SKY_BLUE,
-    VERMILION,
-    write_title,
-)
 from gpca.reporting.words import plural
 
 if TYPE_CHECKING:
@@ -40,27 +27,30 @@ if TYPE_CHECKING:
 METRICS = {"metrics": "recovery.csv"}
 ROW_IN = 0.33  # with less, the markers of one policy overlap
 APART = 0.26  # of a row
-SHADES = (SKY_BLUE, BLUE, BLACK)  # grows darker with every action
-ORDERS = {DOUBTED: ("in doubt first, as a queue gives them", BLUE, "-"), DRAWN: ("drawn at random", GRAY, "--")}
+SHADES = (style.SKY_BLUE, style.BLUE, style.BLACK)  # grows darker with every action
+ORDERS = {
+    DOUBTED: ("in doubt first, as a queue gives them", style.BLUE, "-"),
+    DRAWN: ("drawn at random", style.GRAY, "--"),
+}
 Look = tuple[str, Any]  # color and line
 ALARMED: dict[str, Look] = {  # policies that are given that the pose is wrong
-    "gpca_acting": (BLUE, "-"),
-    "utility_acting": (GREEN, "-"),
-    "error_only_acting": (VERMILION, "-"),
-    "reenact": (PURPLE, "-"),
-    "random": (GRAY, ":"),
-    "oracle": (BLACK, (0, (4, 2))),
+    "gpca_acting": (style.BLUE, "-"),
+    "utility_acting": (style.GREEN, "-"),
+    "error_only_acting": (style.VERMILION, "-"),
+    "reenact": (style.PURPLE, "-"),
+    "random": (style.GRAY, ":"),
+    "oracle": (style.BLACK, (0, (4, 2))),
 }
 ALONE: dict[str, Look] = {  # policies that have to recognize failures themselves
-    "gpca": (BLUE, ":"),
-    "gpca_gated": (BLUE, "-"),
-    "utility": (GREEN, ":"),
-    "utility_gated": (GREEN, "-"),
-    "error_only": (VERMILION, "-"),
-    "error_only_reenact": (VERMILION, ":"),
-    "reenact_gated": (PURPLE, "-"),
+    "gpca": (style.BLUE, ":"),
+    "gpca_gated": (style.BLUE, "-"),
+    "utility": (style.GREEN, ":"),
+    "utility_gated": (style.GREEN, "-"),
+    "error_only": (style.VERMILION, "-"),
+    "error_only_reenact": (style.VERMILION, ":"),
+    "reenact_gated": (style.PURPLE, "-"),
 }
-ALWAYS: Look = (ORANGE, (0, (4, 2)))  # the best of the sequences
+ALWAYS: Look = (style.ORANGE, (0, (4, 2)))  # the best of the sequences
 FACTORS = np.geomspace(0.3, 3, 21)  # on the costs of all actions
 FAILED = (0.5, 0.1)  # shares of the registrations
 LOSSES = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)  # that the axis names
@@ -87,7 +77,7 @@ def recovery_rates(run: Run, metrics: pd.DataFrame) -> Figure:
     for n, cause in enumerate(CONCEPTS):
         _, failures = pool_share(metrics, shown[0], f"recovered_within_{budget}", cause) or (nan, 0)
         label = f"{cause} ($n$ = {failures})"
-        look = {"color": CONCEPT_COLORS[cause], "marker": CONCEPT_MARKERS[cause], "label": label}
+        look = {"color": style.CONCEPT_COLORS[cause], "marker": style.CONCEPT_MARKERS[cause], "label": label}
         _draw(axes[1], metrics, shown, f"recovered_within_{budget}", cause, APART * (n - 1), look)
     axes[0].set_yticks(range(len(shown)), [policies[name] for name in shown])
     axes[0].set_ylim(len(shown) - 0.4, -0.6)
@@ -101,7 +91,7 @@ def recovery_rates(run: Run, metrics: pd.DataFrame) -> Figure:
             loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, handletextpad=0.2, columnspacing=1.0, borderpad=0
         )
     _, episodes = pool_share(metrics, shown[0], "recovered_within_1") or (nan, 0)
-    write_title(drawing, f"{tables_title(run)}: {episodes} failures; right: within {budget} actions, by cause")
+    style.write_title(drawing, f"{tables_title(run)}: {episodes} failures; right: within {budget} actions, by cause")
     return drawing
 
 
@@ -137,7 +127,7 @@ def recovery_thresholds(run: Run, metrics: pd.DataFrame) -> Figure:
             points = [(100 * limit, 100 * share[0]) for limit, share in zip(curve, shares, strict=True) if share]
             look = {"color": color, "linestyle": line, "linewidth": 1.4, "marker": "o", "markersize": 3}
             panel.plot(*zip(*points, strict=True), label=policies[name], **look)
-        panel.axvline(100 * success["error"], color=LIGHT_GRAY, linestyle=":", zorder=0)
+        panel.axvline(100 * success["error"], color=style.LIGHT_GRAY, linestyle=":", zorder=0)
         panel.set_xscale("log")
         panel.set_xticks([100 * limit for limit in curve], [f"{100 * limit:g}" for limit in curve])
         panel.minorticks_off()
@@ -147,7 +137,7 @@ def recovery_thresholds(run: Run, metrics: pd.DataFrame) -> Figure:
     legend_below(drawing, handles, labels, 3)
     counts = [pool_share(metrics, next(iter(shown)), at("recovered_within_1", limit)) for limit in curve]
     of = ", ".join(f"{count[1]} at {100 * limit:g} %" for limit, count in zip(curve, counts, strict=True) if count)
-    write_title(drawing, f"{tables_title(run)}: failures: {of}")
+    style.write_title(drawing, f"{tables_title(run)}: failures: {of}")
     return drawing
 
 
@@ -181,7 +171,7 @@ def recovery_costs(run: Run, metrics: pd.DataFrame) -> Figure:
     drawn[0].set_ylabel("loss per registration")
     handles, labels = drawn[0].get_legend_handles_labels()
     legend_below(drawing, handles, labels, 3)
-    write_title(drawing, tables_title(run))
+    style.write_title(drawing, tables_title(run))
     return drawing
 
 
@@ -251,5 +241,5 @@ def queued_labels(run: Run, queues: pd.DataFrame) -> Figure:
         panel.xaxis.get_major_locator().set_params(integer=True)
     drawn[0].set_ylabel("not solved by the first action (%)")
     legend_below(drawing, *drawn[0].get_legend_handles_labels())
-    write_title(drawing, f"{tables_title(run)}: judged on {int(queues['failures'].max())} failures")
+    style.write_title(drawing, f"{tables_title(run)}: judged on {int(queues['failures'].max())} failures")
     return drawing

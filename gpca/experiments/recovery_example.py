@@ -16,21 +16,9 @@ from gpca.experiments.result import figure
 from gpca.io.arrays import load_arrays
 from gpca.objects.entry import dataset_of
 from gpca.pairs.perturbation import CONCEPTS
+from gpca.reporting.figures import style
 from gpca.reporting.figures.diagram import Canvas
 from gpca.reporting.figures.panels import legend_below, write_below
-from gpca.reporting.figures.style import (
-    BLACK,
-    CONCEPT_COLORS,
-    GRAY,
-    SMALL_PT,
-    TARGET_COLOR,
-    TEXT_WIDTH_IN,
-    VERMILION,
-    YELLOW,
-    blues,
-    use_style,
-    write_title,
-)
 from gpca.reporting.words import in_words, object_in_words, plural
 
 if TYPE_CHECKING:
@@ -44,9 +32,9 @@ WORDS = {
 }
 SILHOUETTES = ("mask", "true", "placed")
 Look = tuple[str, Any]  # color and line
-VISIBLE: Look = (YELLOW, "-")  # outlines of the object
-HIDDEN: Look = (YELLOW, "--")
-PLACED: Look = (TARGET_COLOR, "-")  # of the model where ICP put it
+VISIBLE: Look = (style.YELLOW, "-")  # outlines of the object
+HIDDEN: Look = (style.YELLOW, "--")
+PLACED: Look = (style.TARGET_COLOR, "-")  # of the model where ICP put it
 LINE_PT, RIM_PT = 1.0, 1.9
 SHAPES: dict[str, tuple[int | str, ...]] = {
     "object": (),
@@ -85,7 +73,7 @@ def fig1_recovery_example(run: Run, example_npz: str | Path) -> Figure:
     """
     entry = run.config["sources"][run.config["recovery"]["objects"]]
     example = load_arrays(example_npz, SHAPES)
-    drawing = use_style().figure(figsize=(TEXT_WIDTH_IN, 2.2), layout="constrained")
+    drawing = style.use_style().figure(figsize=(style.TEXT_WIDTH_IN, 2.2), layout="constrained")
     polar = {"c": {"projection": "polar"}}
     axes = drawing.subplot_mosaic("abcd", width_ratios=(2.2, 1.3, 1.6, 2.2), per_subplot_kw=polar)
     for letter, view in (("a", "first"), ("d", "next")):
@@ -111,7 +99,7 @@ def fig1_recovery_example(run: Run, example_npz: str | Path) -> Figure:
         write_below(axes[letter], caption)
     axes["b"].set_xlabel(captions[1], labelpad=1)
     name = object_in_words(example["object"], dataset_of(entry))
-    write_title(drawing, f"{tables_title(run)}: {name}")
+    style.write_title(drawing, f"{tables_title(run)}: {name}")
     _name_lines(drawing)
     return drawing
 
@@ -121,7 +109,7 @@ def _draw_view(panel, image: np.ndarray, mask: np.ndarray, true: np.ndarray, pla
     panel.imshow(image)
     for silhouette, color, line in ((true, *HIDDEN), (mask, *VISIBLE), (placed, *PLACED)):
         if silhouette.any():
-            panel.contour(silhouette, [0.5], colors=BLACK, linewidths=RIM_PT)  # seen on any color
+            panel.contour(silhouette, [0.5], colors=style.BLACK, linewidths=RIM_PT)  # seen on any color
             panel.contour(silhouette, [0.5], colors=color, linewidths=LINE_PT, linestyles=line)
     height, width = mask.shape
     v, u = np.nonzero(true | placed | mask)
@@ -139,16 +127,16 @@ def _draw_viewpoints(drawing, panel, example: Mapping[str, np.ndarray]) -> None:
     azimuth, zenith_deg = np.arctan2(towards[:, 1], towards[:, 0]), _zenith_deg(towards)
     seen_n = 100 * example["surface_n"]
     most = float(np.ceil(seen_n.max() / 10) * 10) or 100.0
-    look = {"cmap": blues(), "vmin": 0, "vmax": most, "edgecolors": BLACK}
+    look = {"cmap": style.blues(), "vmin": 0, "vmax": most, "edgecolors": style.BLACK}
     widths = np.where(np.arange(len(towards)) == int(example["chosen"]), 1.6, 0.3)
     dots = panel.scatter(azimuth, zenith_deg, c=seen_n, s=24, linewidths=widths, **look)
     first = example["viewpoint_first"]
-    panel.scatter(np.arctan2(first[1], first[0]), _zenith_deg(first), marker="x", s=22, color=VERMILION)
+    panel.scatter(np.arctan2(first[1], first[0]), _zenith_deg(first), marker="x", s=22, color=style.VERMILION)
     panel.set(rlim=(0, 90), xticks=[], yticks=[30, 60, 90])
     panel.set_yticklabels([])
     bar = drawing.colorbar(dots, ax=panel, shrink=0.7, pad=0.02, aspect=25, ticks=[0, most / 2, most])
-    bar.set_label("surface seen (%)", fontsize=SMALL_PT, labelpad=1)
-    bar.ax.tick_params(labelsize=SMALL_PT, length=1.5, pad=1)
+    bar.set_label("surface seen (%)", fontsize=style.SMALL_PT, labelpad=1)
+    bar.ax.tick_params(labelsize=style.SMALL_PT, length=1.5, pad=1)
     bar.outline.set_linewidth(0.4)
 
 
@@ -157,13 +145,15 @@ def _name_lines(drawing) -> None:
     from matplotlib.lines import Line2D
     from matplotlib.patheffects import withStroke
 
-    rim: dict[str, Any] = {"linewidth": LINE_PT, "path_effects": [withStroke(linewidth=RIM_PT, foreground=BLACK)]}
+    rim: dict[str, Any] = {"linewidth": LINE_PT, "path_effects": [withStroke(linewidth=RIM_PT, foreground=style.BLACK)]}
     outlines = (("where it is", VISIBLE), ("its hidden part", HIDDEN), ("where ICP put it", PLACED))
     handles = [Line2D([], [], label=words, color=look[0], linestyle=look[1], **rim) for words, look in outlines]
     mark: dict[str, Any] = {"linestyle": "", "markersize": 4}
     handles += [
-        Line2D([], [], label="first view", marker="x", color=VERMILION, **mark),
-        Line2D([], [], label="chosen", marker="o", color="white", markeredgecolor=BLACK, markeredgewidth=1.6, **mark),
+        Line2D([], [], label="first view", marker="x", color=style.VERMILION, **mark),
+        Line2D(
+            [], [], label="chosen", marker="o", color="white", markeredgecolor=style.BLACK, markeredgewidth=1.6, **mark
+        ),
     ]
     legend_below(drawing, handles)
 
@@ -187,15 +177,15 @@ def fig6_mitigation(run: Run, policy_json: str | Path) -> Figure:
     """
     policy = json.loads(Path(policy_json).read_text(encoding="utf-8"))
     limits, treatments = policy["thresholds"], policy["treatments"]
-    canvas = Canvas(TEXT_WIDTH_IN, 2.62)
-    write_title(canvas.figure, f"{tables_title(run)}: thresholds of this run")
+    canvas = Canvas(style.TEXT_WIDTH_IN, 2.62)
+    style.write_title(canvas.figure, f"{tables_title(run)}: thresholds of this run")
     words = "GP-CA\n" + r"scores $\hat{s}_c$, variances $v_c$," + "\nBALD"
     canvas.box(0.04, 0.86, 1.3, 0.66, words)
     dominant = rf"$\mathrm{{max}}_c\,\hat{{s}}_c$ < {limits['dominant']:.2f}"
     uncertain = f"BALD > {limits['uncertain']:.3f} nats\nor {dominant}"
-    branches = [(uncertain, "Abstain\nqueue for a person", GRAY)]
+    branches = [(uncertain, "Abstain\nqueue for a person", style.GRAY)]
     branches += [
-        (f"{concept} dominates", WORDS.get(action, in_words(action)), CONCEPT_COLORS[concept])
+        (f"{concept} dominates", WORDS.get(action, in_words(action)), style.CONCEPT_COLORS[concept])
         for concept, action in sorted(treatments.items(), key=lambda item: ("pose", "overlap", "noise").index(item[0]))
     ]
     middles_in = [1.99 - 0.53 * place for place in range(len(branches))]

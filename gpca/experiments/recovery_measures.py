@@ -220,9 +220,6 @@ def read_queues(files: Iterable[str | Path]) -> pd.DataFrame:
 
     Only numbers of labels that every seed has are kept. Of random orders it is the mean; the bounds are Wilson's, as if
     each failure were judged once.
-
-    Raises:
-        InputError: a missing column, or no rows.
     """
     import pandas as pd
 

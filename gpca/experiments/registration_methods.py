@@ -10,15 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gpca.alignment.methods.registry import (
-    installed,
-    left_out,
-    method_entry,
-    method_module,
-    methods,
-    require_global,
-    require_settings,
-)
+from gpca.alignment.methods import registry
 from gpca.alignment.pose_error import SuccessSettings, success_within
 from gpca.errors import InputError, require_names, with_key
 from gpca.evaluation.intervals import Clustered
@@ -63,15 +55,15 @@ DRAWN = {
 def check(config: dict, names_left_out: LeftOut) -> None:
     """Check that every method takes its settings, and that the global start is one that runs here."""
     for name, settings in config["methods"].items():
-        with_key(f"methods.{name}", require_settings, name, settings or {})
+        with_key(f"methods.{name}", registry.require_settings, name, settings or {})
     pairs, gone = config["method_pairs"], names_left_out("methods")
     for part in ("points_of", "neighbors_of"):
         named = list(pairs.get(part) or {})
         require_names(f"method_pairs.{part}", named, config["methods"], "registration method", gone)
     key, start = "method_pairs.global_start", pairs["global_start"]
     require_names(key, [start], config["methods"], "registration method", gone)
-    with_key(key, require_global, start)
-    if package := left_out([start]).get(start):
+    with_key(key, registry.require_global, start)
+    if package := registry.left_out([start]).get(start):
         fault = f"'{start}' needs the package {package}, which is not installed"
         raise InputError(f"config key {key}", fault, "install it or choose another global method")
 
@@ -79,13 +71,13 @@ def check(config: dict, names_left_out: LeftOut) -> None:
 EXPERIMENT = Experiment(
     name=NAME,
     sections={"method_pairs": PairSettings, "methods": ByName},
-    names=lambda config, sources: {"method": installed(config["methods"])},
+    names=lambda config, sources: {"method": registry.installed(config["methods"])},
     check=check,
-    optional_entries={"methods": Names("registration method", methods)},
+    optional_entries={"methods": Names("registration method", registry.methods)},
     lists={"method_pairs.points_of": "methods", "method_pairs.neighbors_of": "methods"},
     notices=lambda config: (
         f"registration method '{name}' is skipped: the package {package} is not installed"
-        for name, package in left_out(config["methods"]).items()
+        for name, package in registry.left_out(config["methods"]).items()
     ),
 )
 
@@ -98,7 +90,7 @@ def _registered(plan: Plan) -> list[str]:
 def _outside(plan: Plan) -> list[str]:
     """Methods from outside, but for the global start, which all jobs run."""
     start = plan.config["method_pairs"]["global_start"]
-    return [name for name in plan.names["method"] if is_outside(method_module(name)) and name != start]
+    return [name for name in plan.names["method"] if is_outside(registry.method_module(name)) and name != start]
 
 
 REGISTER = Step(
@@ -113,7 +105,7 @@ REGISTER = Step(
         "method_pairs": plan.config["method_pairs"],
         "methods": {name: plan.config["methods"][name] for name in _registered(plan)},
     },
-    modules=lambda plan: map(method_module, _registered(plan)),
+    modules=lambda plan: map(registry.method_module, _registered(plan)),
     apart=("method", _outside),
     target="methods",
     priority=2,
@@ -133,11 +125,7 @@ def read_trials(path: str | Path) -> pd.DataFrame:
 
 
 def trials(files: Iterable[str | Path], objects: Iterable[str | Path]) -> pd.DataFrame:
-    """Rows of all files; the method is named with its start, and the cluster is the object's family in its source.
-
-    Raises:
-        InputError: no files, a missing column, an object of none of the sources.
-    """
+    """Rows of all files; the method is named with its start, and the cluster is the object's family in its source."""
     families = {}
     for path in objects:
         clouds = ObjectClouds.load(path)
@@ -325,7 +313,7 @@ def rows_of(run: Run) -> Iterable[Row]:
 
 def method_rows(names: Iterable[str], global_start: str, initial: str = "Initial pose") -> Iterable[Row]:
     """Rows start by start: local methods have one at each start, global methods none."""
-    entries = {name: method_entry(name) for name in installed(names)}
+    entries = {name: registry.method_entry(name) for name in registry.installed(names)}
     starts = {INITIAL: initial, NO_START: "None"}
     if global_start in entries:
         starts[global_start] = entries[global_start].title
@@ -348,4 +336,6 @@ def notes(run: Run, sheet: Sheet, intervals: pd.DataFrame) -> list[str]:
 
 def missing_methods(names: Iterable[str]) -> list[str]:
     """Footnote on the methods whose package is not installed, if there are any."""
-    return missing_packages({method_entry(name).title: package for name, package in left_out(names).items()})
+    return missing_packages(
+        {registry.method_entry(name).title: package for name, package in registry.left_out(names).items()}
+    )

@@ -58,11 +58,7 @@ class Stages:
         uncertainty_csv: str | Path,
         limits: Mapping[str, float],
     ) -> Stages:
-        """Read the files of the stages; the limits are those of the config's section ``causes``.
-
-        Raises:
-            InputError: an unusable file, or files of different samples; predictions without variances or BALD.
-        """
+        """Read the files of the stages; the limits are those of the config's section ``causes``."""
         registrations = Registrations.load(registrations_npz)
         h_S_d = read_embedding(embeddings_npz, registrations)["embedding"]
         predictions = read_predictions(predictions_csv)
@@ -83,9 +79,6 @@ class Stages:
         the one with the median score is shown. If the concept has no candidate, the `others` are tried. If they have
         none either, conditions are dropped one by one: first that it failed, then that it is uncertain (the half that
         ICP fits worst stays), then that it is named right.
-
-        Raises:
-            InputError: no test sample of the concept; it names `path`.
         """
         for other in (concept, *others):
             if len(failures := self._uncertain_failures(other)):
@@ -182,11 +175,7 @@ def state_of_error(error: float, limits: Limits) -> str:
 
 
 def observed_uncertainties(path: str | Path, registrations: Registrations) -> tuple[np.ndarray, float]:
-    """u (S,) of the registrations in nats, NaN where the file has none, and the limit of the clean ones.
-
-    Raises:
-        InputError: see :func:`gpca.attribution.metrics.read_uncertainties`; also a file without any of the samples.
-    """
+    """u (S,) of the registrations in nats, NaN where the file has none, and the limit of the clean ones."""
     observed, limit = read_uncertainties(path)
     samples = list(zip(registrations.split.tolist(), registrations.sample.astype(str).tolist(), strict=True))
     u_S = observed.reindex(samples).to_numpy(float)

@@ -13,15 +13,8 @@ from gpca.causes.judged import CEILING, Judged, of_decisions, read_judged
 from gpca.causes.truth import ALL, BORDERLINE, FAILED, NOMINAL
 from gpca.evaluation.intervals import REPEATS, Clustered
 from gpca.evaluation.measures import POOLED, intervals
+from gpca.experiments import diagnosis
 from gpca.experiments.cause_tables import AGAIN, SECTION
-from gpca.experiments.diagnosis import (
-    CAUSES_FILES,
-    DIAGNOSES,
-    by_source,
-    cause_titles,
-    compared_samples,
-    with_pooled,
-)
 from gpca.experiments.plan import Run
 from gpca.experiments.result import numbers, table
 from gpca.reporting.sheet import Row, Sheet, Show, show, where
@@ -63,12 +56,12 @@ def strata_of(samples: Judged) -> dict[tuple[str, str], np.ndarray]:
     return states | {stratum: mask_N & failed_N for stratum, mask_N in parts.items()}
 
 
-@numbers("cause_strata.csv", prediction_files=DIAGNOSES, causes_files=CAUSES_FILES)
+@numbers("cause_strata.csv", prediction_files=diagnosis.DIAGNOSES, causes_files=diagnosis.CAUSES_FILES)
 def collect_strata(
     run: Run, prediction_files: Iterable[str | Path], causes_files: Iterable[str | Path]
 ) -> pd.DataFrame:
     """Decisions of every explainer in every stratum that has samples, over all sources and seeds, with intervals."""
-    samples_of = by_source(with_pooled(read_judged(prediction_files, causes_files)))
+    samples_of = diagnosis.by_source(diagnosis.with_pooled(read_judged(prediction_files, causes_files)))
     source = POOLED if POOLED in samples_of else next(iter(samples_of))
     samples = next(iter(samples_of[source].values()))
     draws = Clustered.drawn(samples.seed, samples.instance, "cause strata", source)
@@ -78,7 +71,7 @@ def collect_strata(
         if mask_N.any() and naming:
             inside = {explainer: each.subset(mask_N) for explainer, each in naming.items()}
             part = f"{kind}_{stratum}"
-            rows += compared_samples(source, inside, draws.subset(mask_N), of_decisions, DECISIONS, part)
+            rows += diagnosis.compared_samples(source, inside, draws.subset(mask_N), of_decisions, DECISIONS, part)
     return intervals(rows, "diagnoses")
 
 
@@ -113,7 +106,7 @@ SHOWN_STATES = {
 )
 def table9_strata(run: Run, strata):
     """How often a few explainers are right in every stratum, and what their answer leaves on the table."""
-    chosen = _chosen(strata, cause_titles(run.config))
+    chosen = _chosen(strata, diagnosis.cause_titles(run.config))
     columns: dict[str, Column] = {"samples": Column("n", decimals=0, interval=False, limits=(0.0, inf))}
     for name, title in chosen.items():
         columns[f"{name}_named_right"] = Show(
@@ -173,7 +166,7 @@ def table9_shown(run: Run, intervals):
     pooled = POOLED if POOLED in present else next(name for name in run.sources if name in present)
     rows = [
         Row([explainer], {"source": pooled, "method": explainer[0]}, rival=explainer[0] != CEILING)
-        for explainer in (cause_titles(run.config) | AGAIN).items()
+        for explainer in (diagnosis.cause_titles(run.config) | AGAIN).items()
     ]
     sheet = Sheet("table9_shown", {"explainer": "Explainer"}, rows, SHOWN_STATES, intervals)
     counts = where(intervals, {"source": pooled}).groupby("metric")["samples"].max()

@@ -17,20 +17,9 @@ from gpca.experiments.out_of_distribution import SECTION, learner_titles
 from gpca.experiments.plan import Run
 from gpca.experiments.result import figure
 from gpca.pairs.shifted_sets import DISTANCES, with_training_like
+from gpca.reporting.figures import style
 from gpca.reporting.figures.panels import legend_below, panels
 from gpca.reporting.figures.reliability import reliability_figure
-from gpca.reporting.figures.style import (
-    BLACK,
-    GRAY,
-    GREEN,
-    METHOD_LOOKS,
-    ORANGE,
-    OTHER_LOOK,
-    PURPLE,
-    SMALL_PT,
-    VERMILION,
-    write_title,
-)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -47,9 +36,9 @@ DISTANCE_BINS = 10  # of equally many samples
 BESIDE_OTHERS = "gpca"  # stands in the panels of the learners that the paper does not have
 PREDICTIONS = "learners/{source}/{learner}/seed{seed}.csv"
 OTHER_LOOKS: tuple[tuple[str, Any, float], ...] = (
-    *((color, "-", 1.1) for color in (BLACK, GREEN, PURPLE, GRAY)),
-    *((color, (0, (4, 2)), 1.1) for color in (BLACK, GREEN, PURPLE, GRAY)),
-    *((color, (0, (1, 1)), 1.1) for color in (BLACK, GREEN, VERMILION, ORANGE)),
+    *((color, "-", 1.1) for color in (style.BLACK, style.GREEN, style.PURPLE, style.GRAY)),
+    *((color, (0, (4, 2)), 1.1) for color in (style.BLACK, style.GREEN, style.PURPLE, style.GRAY)),
+    *((color, (0, (1, 1)), 1.1) for color in (style.BLACK, style.GREEN, style.VERMILION, style.ORANGE)),
 )
 
 
@@ -69,7 +58,7 @@ def coverage_risk(run: Run, learned: Mapping) -> Figure:
     The paper's learners are above, and below are the others beside GP-CA. A panel in which no classifier errs says so.
     """
     shown, columns = _shown(run, learned)
-    paper, others = _paper_first(shown), [name for name in shown if name not in METHOD_LOOKS]
+    paper, others = _paper_first(shown), [name for name in shown if name not in style.METHOD_LOOKS]
     beside = [name for name in paper if name == BESIDE_OTHERS]
     lines = [names for names in (paper, [*beside, *others] if others else []) if names]
     looks = _looks(shown)
@@ -146,7 +135,7 @@ def uncertainty_vs_distance(run: Run, learned: Mapping) -> Figure:
     the number n of samples, those of all seeds together.
     """
     learners, columns = _shown(run, learned)
-    names = _paper_first(learners) or list(learners)[: len(METHOD_LOOKS)]
+    names = _paper_first(learners) or list(learners)[: len(style.METHOD_LOOKS)]
     shown = {name: learners[name] for name in names}
     looks = _looks(learners)
     parts = {key: sets_of(rows) for key, rows in learned.items() if key[0] in columns and key[1] in shown}
@@ -165,8 +154,8 @@ def uncertainty_vs_distance(run: Run, learned: Mapping) -> Figure:
                     band = {"color": looks[learner]["color"], "alpha": 0.15, "linewidth": 0}
                     panel.fill_between(distance, np.maximum(mean - half, 0), mean + half, **band)
                     samples = sum(map(len, of_set))
-            panel.text(0.03, 0.96, f"$n$ = {samples}", transform=panel.transAxes, va="top", fontsize=SMALL_PT)
-        axes[row, 0].set_ylabel(f"{SETS[name]}\n1 - largest score", fontsize=SMALL_PT)
+            panel.text(0.03, 0.96, f"$n$ = {samples}", transform=panel.transAxes, va="top", fontsize=style.SMALL_PT)
+        axes[row, 0].set_ylabel(f"{SETS[name]}\n1 - largest score", fontsize=style.SMALL_PT)
     for panel, source in zip(axes[0], columns, strict=True):
         panel.set_title(columns[source])
     for panel in axes[-1]:
@@ -177,7 +166,7 @@ def uncertainty_vs_distance(run: Run, learned: Mapping) -> Figure:
         panel.xaxis.set_minor_locator(NullLocator())
     axes[0, 0].set_ylim(bottom=0)
     _write_legend(drawing, shown, looks)
-    write_title(drawing, "Means in bins of equally many of the n samples, and their 95 % intervals")
+    style.write_title(drawing, "Means in bins of equally many of the n samples, and their 95 % intervals")
     return drawing
 
 
@@ -198,20 +187,23 @@ def distance_curve(of_seeds: Sequence) -> tuple[np.ndarray, np.ndarray, np.ndarr
 def _looks(shown: Iterable[str]) -> dict[str, dict[str, Any]]:
     """Color, line and width of every learner; those without a look of their own take `OTHER_LOOKS` in turn."""
     others = iter(OTHER_LOOKS)
-    own = {name: METHOD_LOOKS[name] if name in METHOD_LOOKS else next(others, OTHER_LOOK) for name in shown}
+    own = {
+        name: style.METHOD_LOOKS[name] if name in style.METHOD_LOOKS else next(others, style.OTHER_LOOK)
+        for name in shown
+    }
     return {name: {"color": look[0], "linestyle": look[1], "linewidth": look[2]} for name, look in own.items()}
 
 
 def _paper_first(learners: Iterable[str]) -> list[str]:
     """Learners with a look of their own, in the order of the looks."""
-    return [name for name in METHOD_LOOKS if name in set(learners)]
+    return [name for name in style.METHOD_LOOKS if name in set(learners)]
 
 
 def _write_legend(drawing: Figure, shown: Mapping[str, str], looks: Mapping[str, dict[str, Any]]) -> None:
     """Name the line of every learner, the paper's first."""
     from matplotlib.lines import Line2D
 
-    ordered = [*_paper_first(shown), *(name for name in shown if name not in METHOD_LOOKS)]
+    ordered = [*_paper_first(shown), *(name for name in shown if name not in style.METHOD_LOOKS)]
     legend_below(drawing, [Line2D([], [], label=shown[name], **looks[name]) for name in ordered])
 
 

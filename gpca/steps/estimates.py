@@ -193,9 +193,6 @@ def try_estimators(
         situations: with test samples.
         other: of another source, for learners; None where there is none.
         estimators: name -> settings.
-
-    Raises:
-        InputError: an unknown estimator, method or setting, or other objects or settings than those of the causes.
     """
     import pandas as pd
 

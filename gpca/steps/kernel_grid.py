@@ -79,9 +79,6 @@ def evaluate_grid(
 
     Each row equals that of a separate fit of that many iterations to the training samples alone. `elbo` is per
     training sample in nats, `confidence` the mean of the largest score.
-
-    Raises:
-        InputError: no training or no test samples.
     """
     import pandas as pd
 

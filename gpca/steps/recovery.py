@@ -134,11 +134,7 @@ def _means(
 def lay_tables(
     surfaces: Iterable[Surface], settings: RecoverySettings, source: str, seed: int
 ) -> dict[str, Situations]:
-    """The situations of every part; source and seed name all that is random in them.
-
-    Raises:
-        InputError: an object is a cloud of points, which hides nothing.
-    """
+    """The situations of every part; source and seed name all that is random in them."""
     surfaces = [simplified(surface) for surface in surfaces]
     recovery = settings.section
     shelf = Shelf(surfaces, source, recovery["model_points"], InitialPoseSettings(**recovery["estimator"]))
@@ -154,9 +150,6 @@ def register_situations(
 
     Args:
         situations: those of ``train`` and ``test``, which share no table.
-
-    Raises:
-        InputError: the camera sees too little of the objects.
     """
     registered: dict[str, list[Episode]] = {"train": [], "test": []}
     for split, count in (("train", train), ("test", calibration)):

@@ -100,10 +100,6 @@ def try_methods(
     Args:
         registrations: with test samples; their targets are in the objects' canonical frames.
         methods: name -> settings, the global start among them.
-
-    Raises:
-        InputError: an unknown method or setting, a missing package, a global start that is none or not among them, no
-            test samples, or other objects than those that were registered.
     """
     import pandas as pd
 
