@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated
 
@@ -22,9 +21,6 @@ from gpca.settings import Count, Different, Distinct, fields_of
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from gpca.classifier.gpc import GPC
-    from gpca.classifier.gpytorch_classes import GpytorchGPC
 
 MEASURES = ("accuracy", "elbo", "confidence", "ece", "nll")
 SETTING = ("kernel", "learning_rate", "iterations")
@@ -82,13 +78,27 @@ def evaluate_grid(
     """
     import pandas as pd
 
+    from gpca.classifier.gpc import GPC
+    from gpca.classifier.gpytorch_classes import GpytorchGPC
+
     train, test = registrations.rows("train"), registrations.rows("test")
     if not len(train) or not len(test):
         raise InputError(f"registrations of {source}, seed {seed}", "lack a split", "give training and test samples")
     h_S_d, concept_S = registrations.embedding, registrations.concept
     target_N = np.array([CONCEPTS.index(concept) for concept in concept_S[test]])
     tested, predictions, rows = registrations.subset(test), [], []
-    for name, rate, counts, gpc in _fits(grid, source, seed):
+    fits: list[tuple[str, float, tuple[int, ...], GPC | GpytorchGPC]] = []
+    for kernel in grid.kernels:
+        for rate in grid.learning_rates:
+            settings = GPCSettings(kernel, rate, max(grid.iterations), grid.inducing, grid.draws)
+            fits.append((kernel, rate, grid.iterations, GPC(CONCEPTS, settings, source, seed)))
+    largest = max(rate for _, rate, _ in PRINTED)
+    for kernel, rate, iterations in PRINTED:
+        in_grid = rate in grid.learning_rates and iterations in grid.iterations
+        if kernel in grid.gpytorch and rate == largest and in_grid:
+            settings = GPCSettings(kernel, rate, iterations, grid.inducing, grid.draws)
+            fits.append((kernel + BY_GPYTORCH, rate, (iterations,), GpytorchGPC(CONCEPTS, settings, source, seed)))
+    for name, rate, counts, gpc in fits:
         for iterations in gpc.fit_up_to(counts, h_S_d[train], concept_S[train]):
             scores_N_C, variances_N_C, bald_N = gpc.attribute(h_S_d[test])
             attribution = Attribution.of_scores(
@@ -106,20 +116,3 @@ def evaluate_grid(
             rows.append((name, rate, iterations, *measured))
     predicted = pd.concat(predictions, ignore_index=True)
     return pd.DataFrame(rows, columns=list(GRID_COLUMNS)), predicted[[*SETTING, *predicted.columns.drop([*SETTING])]]
-
-
-def _fits(grid: KernelGrid, source: str, seed: int) -> Iterator[tuple[str, float, tuple[int, ...], GPC | GpytorchGPC]]:
-    """Name, learning rate, counts of iterations and classifier of every fit."""
-    from gpca.classifier.gpc import GPC
-    from gpca.classifier.gpytorch_classes import GpytorchGPC
-
-    for kernel in grid.kernels:
-        for rate in grid.learning_rates:
-            settings = GPCSettings(kernel, rate, max(grid.iterations), grid.inducing, grid.draws)
-            yield kernel, rate, grid.iterations, GPC(CONCEPTS, settings, source, seed)
-    largest = max(rate for _, rate, _ in PRINTED)
-    for kernel, rate, iterations in PRINTED:
-        in_grid = rate in grid.learning_rates and iterations in grid.iterations
-        if kernel in grid.gpytorch and rate == largest and in_grid:
-            settings = GPCSettings(kernel, rate, iterations, grid.inducing, grid.draws)
-            yield kernel + BY_GPYTORCH, rate, (iterations,), GpytorchGPC(CONCEPTS, settings, source, seed)

@@ -41,92 +41,65 @@ def run(job: Job) -> None:
     inputs += [job.cause_encoder, job.cause_embeddings]
     with record_provenance(job.out, inputs, job.settings, seed=job.seed):
         settings = ActiveLearningSettings.from_dict(job.section("active_learning"))
-        work = _Work(job, own)
         curves: dict[str, dict] = {strategy: {} for strategy in job.strategies}
-        for experiment in progress(work.experiments(), f"new concepts of {job.source}"):
-            for setting, strategy, curve in run_trial(experiment, job.strategies, settings, job.source, job.seed):
-                curves[strategy][setting, experiment.held_out] = curve
+        for trial in progress(_trials(job, own), f"new concepts of {job.source}"):
+            for setting, strategy, curve in run_trial(trial, job.strategies, settings, job.source, job.seed):
+                curves[strategy][setting, trial.held_out] = curve
         for strategy, path in zip(job.strategies, job.out, strict=True):
             write_curves(path, curves[strategy], POOL_COLUMNS)
 
 
-class _Work:
-    """The files of one source and seed; all are read before the first experiment, so that faults are found early."""
+def _trials(job: Job, own: NewConceptSettings) -> Iterator[NewConceptTrial]:
+    """Every new concept in every embedding; all files are read before the first, so that faults are found early."""
+    axes = (job.source, job.seed)
+    encoder, cause_encoder = (EncoderSettings(**job.section(name)) for name in ("encoder", "cause_encoder"))
+    registrations = Registrations.load(job.registrations, axes)
+    files = zip(job.encoders_of, job.encoders, strict=True)
+    models = {name: load_model(path, encoder, unlike=axes) for name, path in files}
+    cause_model = load_model(job.cause_encoder, cause_encoder, LABELS, axes)
+    causes = Causes.load(job.causes, axes)
+    h_S_d = read_embedding(job.cause_embeddings, causes.registrations)["embedding"]
+    seen = _seen(causes, h_S_d, Descriptors.load(job.descriptors, causes.registrations))
+    objects = ObjectClouds.load(job.objects, job.source)
 
-    def __init__(self, job: Job, own: NewConceptSettings) -> None:
-        self._job = job
-        self._own = own
-        self._axes = (job.source, job.seed)
-        self._encoder = EncoderSettings(**job.section("encoder"))
-        self._cause_encoder = EncoderSettings(**job.section("cause_encoder"))
-        self._registrations = Registrations.load(job.registrations, self._axes)
-        self._models = {
-            name: load_model(path, self._encoder, unlike=self._axes)
-            for name, path in zip(job.encoders_of, job.encoders, strict=True)
-        }
-        self._cause_model = load_model(job.cause_encoder, self._cause_encoder, LABELS, self._axes)
-        causes = Causes.load(job.causes, self._axes)
-        h_S_d = read_embedding(job.cause_embeddings, causes.registrations)["embedding"]
-        self._seen = _seen(causes, h_S_d, Descriptors.load(job.descriptors, causes.registrations))
-        self._objects = ObjectClouds.load(job.objects, job.source)
+    def normalized(samples: Embedded) -> Embedded:
+        features = NormalizedFeatures(*axes, "new_concepts").fit(samples.embedding[samples.split == "train"])
+        return replace(samples, embedding=features(samples.embedding))
 
-    def experiments(self) -> Iterator[NewConceptTrial]:
-        """Yield every new concept, in every embedding."""
-        registrations = self._registrations
-        for name, h_S_d in self._embeddings(registrations):
+    def leave_out(name: str, why: str) -> None:
+        print(f"new concepts of {job.source}: '{name}' is skipped: {why}", file=sys.stderr)
+
+    for name in own.embeddings:
+        if name == "pair":
+            measured_S_F = describe_registrations(registrations, *axes, points=own.points)["relations"]
+            samples = normalized(Embedded(measured_S_F, registrations.concept, registrations.split))
+        elif name in models:
+            h_S_d = embed(models[name], registrations, *axes, encoder)[0]
             samples = Embedded(h_S_d, registrations.concept, registrations.split)
-            errors = self._own.errors if name in self._own.erring else ()
-            for concept in self._job.section("active_learning").get("held_out", CONCEPTS):
-                yield NewConceptTrial(name, samples, concept, CONCEPTS, errors)
-        yield from self._of_causes()
+        else:
+            leave_out(name, f"it needs {FROM_OTHERS[name]}")
+            continue
+        for concept in job.section("active_learning").get("held_out", CONCEPTS):
+            yield NewConceptTrial(name, samples, concept, CONCEPTS, own.errors if name in own.erring else ())
 
-    def _embeddings(self, registrations: Registrations) -> Iterator[tuple[str, np.ndarray]]:
-        """Yield each embedding's name and the samples (S, d) in it."""
-        measured_S_F = describe_registrations(registrations, *self._axes, points=self._own.points)["relations"]
-        pair_S_F = _normalized(measured_S_F, registrations.split == "train", *self._axes)
-        for name in self._own.embeddings:
-            if name == "pair":
-                yield name, pair_S_F
-            elif name in self._models:
-                yield name, embed(self._models[name], registrations, *self._axes, self._encoder)[0]
-            else:
-                _leave_out(self._job.source, name, f"it needs {FROM_OTHERS[name]}")
-
-    def _of_causes(self) -> Iterator[NewConceptTrial]:
-        """Yield the experiments with causes as new concepts: by the causes' encoder, and by the pair's measurements."""
-        seen = self._seen
-        known = tuple(label for label in LABELS if label in seen["encoder"].concept)
-        if NOMINAL in self._own.causes:
-            yield NewConceptTrial("pretrained", seen["encoder"], NOMINAL, known)
-            yield NewConceptTrial("pair", self._normalized(seen["pair"]), NOMINAL, known)
-        if GEOMETRY in self._own.causes and (drawn := self._geometry()) is not None:
-            h_G_d = embed(self._cause_model, drawn.registrations, *self._axes, self._cause_encoder)[0]
-            icp = ICPSettings(**self._job.section("icp"))
-            descriptors = DescriptorSettings(**self._job.section("descriptors"))
-            new = _seen(drawn, h_G_d, describe_all(drawn, *self._axes, descriptors, icp)[0], GEOMETRY)
-            both = {name: seen[name].followed_by(new[name]) for name in new}
-            yield NewConceptTrial("unseen", both["encoder"], GEOMETRY, (*known, GEOMETRY))
-            yield NewConceptTrial("pair", self._normalized(both["pair"]), GEOMETRY, (*known, GEOMETRY))
-
-    def _geometry(self) -> Causes | None:
-        drawn = draw_geometry(
-            self._objects,
-            *self._axes,
-            CauseSettings.from_dict(self._job.section("causes"), self._job.section("icp")),
-            {"train": self._own.geometry_train, "test": self._own.geometry_test},
-            self._own.geometry_candidates,
-        )
+    # Causes as new concepts: by the causes' encoder, and by the pair's measurements.
+    known = tuple(label for label in LABELS if label in seen["encoder"].concept)
+    if NOMINAL in own.causes:
+        yield NewConceptTrial("pretrained", seen["encoder"], NOMINAL, known)
+        yield NewConceptTrial("pair", normalized(seen["pair"]), NOMINAL, known)
+    if GEOMETRY in own.causes:
+        drawn_by = CauseSettings.from_dict(job.section("causes"), job.section("icp"))
+        counts = {"train": own.geometry_train, "test": own.geometry_test}
+        drawn = draw_geometry(objects, *axes, drawn_by, counts, own.geometry_candidates)
         if drawn is None:
-            why = f"none of {self._own.geometry_candidates} candidates of a split fails without a cause"
-            _leave_out(self._job.source, GEOMETRY, why)
-        return drawn
-
-    def _normalized(self, samples: Embedded) -> Embedded:
-        return replace(samples, embedding=_normalized(samples.embedding, samples.split == "train", *self._axes))
-
-
-def _normalized(measured_S_F: np.ndarray, train_S: np.ndarray, *axes: object) -> np.ndarray:
-    return NormalizedFeatures(*axes, "new_concepts").fit(measured_S_F[train_S])(measured_S_F)
+            leave_out(GEOMETRY, f"none of {own.geometry_candidates} candidates of a split fails without a cause")
+            return
+        h_G_d = embed(cause_model, drawn.registrations, *axes, cause_encoder)[0]
+        descriptors, icp = DescriptorSettings(**job.section("descriptors")), ICPSettings(**job.section("icp"))
+        new = _seen(drawn, h_G_d, describe_all(drawn, *axes, descriptors, icp)[0], GEOMETRY)
+        both = {name: seen[name].followed_by(new[name]) for name in new}
+        yield NewConceptTrial("unseen", both["encoder"], GEOMETRY, (*known, GEOMETRY))
+        yield NewConceptTrial("pair", normalized(both["pair"]), GEOMETRY, (*known, GEOMETRY))
 
 
 def _seen(causes: Causes, h_S_d: np.ndarray, described: Descriptors, label: str | None = None) -> dict[str, Embedded]:
@@ -136,7 +109,3 @@ def _seen(causes: Causes, h_S_d: np.ndarray, described: Descriptors, label: str 
     by = {"encoder": h_S_d, "pair": np.hstack([described.groups[group] for group in GROUPS])}
     split_S = causes.registrations.split
     return {name: Embedded(array[rows], label_S[rows], split_S[rows]) for name, array in by.items()}
-
-
-def _leave_out(source: str, name: str, why: str) -> None:
-    print(f"new concepts of {source}: '{name}' is skipped: {why}", file=sys.stderr)

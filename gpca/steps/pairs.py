@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,14 +13,12 @@ from gpca.encoders.registry import EncoderSettings
 from gpca.errors import InputError
 from gpca.io.arrays import REAL, REGENERATE, TEXT, WHOLE, load_arrays, save_arrays
 from gpca.io.csv_file import write_csv
-from gpca.io.files import Axes
 from gpca.objects.canonical import ObjectClouds, write_objects
 from gpca.pairs.dataset import Registrations, read_embedding, read_instances_of
 from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
 
-if TYPE_CHECKING:
-    from gpca.explainers.interface import ExplainerEntry
+EARLIER = ("earlier_seconds", "earlier_icp_seconds")  # spent before an explainer starts
 
 
 def objects(job: Job) -> None:
@@ -150,16 +146,33 @@ def attribute(job: Job) -> None:
     """Fit an explainer to the training rows and explain every row, seed by seed -> predictions and timings."""
     from gpca.explainers.interface import Describing
     from gpca.explainers.registry import explainer_entry
+    from gpca.uncertainty.outcomes import Outcomes, read_seconds
+    from gpca.uncertainty.settings import CONDITIONS
 
     entry = explainer_entry(job.explainer)
-    none = [None] * len(job.seeds)
-    optional = [job.get(name, none) for name in ("embeddings", "uncertainty", "uncertainty_timings")]
-    files = zip(job.registrations, *optional, job.input_timings, strict=True)
-    for (seed, predictions, timings), inputs in zip(job.per_seed("predictions", "timings"), files, strict=True):
+    names = ("registrations", "embeddings", "uncertainty", "uncertainty_timings", "input_timings")
+    lists = [job.get(name, [None] * len(job.seeds)) for name in names]
+    files = [dict(zip(names, of_seed, strict=True)) for of_seed in zip(*lists, strict=True)]
+    for (seed, predictions, timings), read in zip(job.per_seed("predictions", "timings"), files, strict=True):
         explainer = entry.make(job.source, seed, **job.settings)
-        with record_provenance([predictions, timings], [path for path in inputs if path], job.settings, seed=seed):
+        inputs = [path for path in read.values() if path]
+        with record_provenance([predictions, timings], inputs, job.settings, seed=seed):
             axes = (job.get("files_of", job.source), job.get("files_seed", seed))
-            registrations = _with_what_it_reads(entry, axes, *inputs)
+            registrations = Registrations.load(read["registrations"], axes)
+            earlier = dict(zip(EARLIER, read_timings(read["input_timings"], registrations), strict=True))
+            if entry.design:
+                outcomes = Outcomes.load(read["uncertainty"], axes)
+                conditions = outcomes.uncertainty.shape[1]
+                if entry.design in CONDITIONS and conditions != len(CONDITIONS[entry.design]):
+                    fault = f"{conditions} conditions are not those of design '{entry.design}'"
+                    raise InputError(read["uncertainty"], fault, REGENERATE)
+                seconds = read_seconds(read["uncertainty_timings"], outcomes)
+                registrations = outcomes.attach_to(replace(registrations, attached=earlier), *seconds)
+            elif entry.reads == "embeddings":
+                earlier |= read_embedding(read["embeddings"], registrations, logits=True)
+                registrations = replace(registrations, attached=earlier)
+            else:
+                registrations = replace(registrations, attached=earlier)
             observed = registrations if entry.oracle else registrations.without_labels()
             started = perf_counter()
             if isinstance(explainer, Describing):  # once, for training and for explanation
@@ -173,34 +186,6 @@ def attribute(job: Job) -> None:
             write_timings(
                 timings,
                 registrations,
-                registrations.attached["earlier_seconds"] + describing_seconds + attribution.seconds_N,
-                registrations.attached["earlier_icp_seconds"] + attribution.icp_seconds_N,
+                registrations.attached[EARLIER[0]] + describing_seconds + attribution.seconds_N,
+                registrations.attached[EARLIER[1]] + attribution.icp_seconds_N,
             )
-
-
-def _with_what_it_reads(
-    entry: ExplainerEntry,
-    axes: Axes,
-    registrations: Path,
-    embeddings: Path,
-    uncertainty: Path,
-    uncertainty_timings: Path,
-    timings: Path,
-) -> Registrations:
-    """Return the registrations that the explainer gets, with what it reads and the seconds spent before attached."""
-    from gpca.uncertainty.outcomes import Outcomes, read_seconds
-    from gpca.uncertainty.settings import CONDITIONS
-
-    loaded = Registrations.load(registrations, axes)
-    seconds_S, icp_seconds_S = read_timings(timings, loaded)
-    attached = {"earlier_seconds": seconds_S, "earlier_icp_seconds": icp_seconds_S}
-    if entry.design:
-        outcomes = Outcomes.load(uncertainty, axes)
-        conditions = outcomes.uncertainty.shape[1]
-        if entry.design in CONDITIONS and conditions != len(CONDITIONS[entry.design]):
-            fault = f"{conditions} conditions are not those of design '{entry.design}'"
-            raise InputError(uncertainty, fault, REGENERATE)
-        return outcomes.attach_to(replace(loaded, attached=attached), *read_seconds(uncertainty_timings, outcomes))
-    if entry.reads == "embeddings":
-        attached |= read_embedding(embeddings, loaded, logits=True)
-    return replace(loaded, attached=attached)

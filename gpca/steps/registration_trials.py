@@ -55,14 +55,6 @@ class PairSettings:
     points_of: dict[str, Points] = field(default_factory=dict)
     neighbors_of: dict[str, Annotated[int, Bounds(minimum=3, maximum=1000)]] = field(default_factory=dict)
 
-    def points_for(self, method: str) -> int:
-        """Number of points of either cloud."""
-        return self.points_of.get(method, self.points)
-
-    def neighbors_for(self, method: str) -> int:
-        """Number of neighbors for its normals."""
-        return self.neighbors_of.get(method, NEIGHBORS)
-
 
 def run(job: Job) -> None:
     """Register by every method, seed by seed; the one that gives the others a start runs in any case."""
@@ -108,13 +100,16 @@ def try_methods(
     require_global(start)
     if start not in made:
         raise InputError("method_pairs.global_start", f"'{start}' is not among the methods", "add it or name another")
-    rows = _chosen(registrations, source, settings.samples)
+    rows = np.flatnonzero((registrations.split == "test") & (registrations.sample < settings.samples))
+    if not len(rows):  # threes of one object, which go round the objects
+        raise InputError(f"registrations of {source}", "have no test samples", "raise registrations.test")
     of_objects = Judges(objects, f"objects of {source}")
     judges = [of_objects.of(registrations, row) for row in rows]
     given = lru_cache(maxsize=4)(lambda *of: pair_to_register(registrations, of[0], source, seed, *of[1:]))
 
     def pair_of(row: int, name: str) -> Pair:
-        return given(row, settings.points_for(name), settings.neighbors_for(name))
+        points, neighbors = settings.points_of.get(name, settings.points), settings.neighbors_of.get(name, NEIGHBORS)
+        return given(row, points, neighbors)
 
     for name, method in made.items():
         method(pair_of(rows[0], name))
@@ -179,11 +174,3 @@ def timed(method: Method, pair: Pair) -> tuple[Outcome, float]:
     started = perf_counter()
     outcome = method(pair)
     return outcome, perf_counter() - started
-
-
-def _chosen(registrations: Registrations, source: str, samples: int) -> np.ndarray:
-    """Return the rows of the first test samples: threes of one object, which go round the objects."""
-    rows = np.flatnonzero((registrations.split == "test") & (registrations.sample < samples))
-    if not len(rows):
-        raise InputError(f"registrations of {source}", "have no test samples", "raise registrations.test")
-    return rows
