@@ -14,7 +14,7 @@ from gpca.process.plugins import entries_outside
 Entry = TypeVar("Entry")
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False)
 class Registry(Generic[Entry]):
     """All entries of a kind, such as registration methods; files that are new in the folder need no further listing."""
 
