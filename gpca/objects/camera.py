@@ -60,8 +60,6 @@ class MeshScene:
     def __init__(self, meshes: Sequence[tuple[np.ndarray, np.ndarray]]) -> None:
         o3d = require_open3d()
         self._tensor = o3d.core.Tensor
-        self._float = o3d.core.float32
-        self._uint = o3d.core.uint32
         self._scene = o3d.t.geometry.RaycastingScene(nthreads=1)
         corners_F_3_3 = np.concatenate([np.asarray(vertices_m, float)[faces] for vertices_m, faces in meshes])
         self._first_face = np.cumsum([0, *(len(faces) for _, faces in meshes)])

@@ -30,7 +30,7 @@ class ScanPair:
     source_N_3: np.ndarray
     target_M_3: np.ndarray
     T_target_source: np.ndarray
-    overlap: float  # share of the target's points that the source has, in (0, 1], published or by `overlap`
+    overlap: float  # share of the target's points that the source has, in (0, 1], published or measured
     scene: str
     kind: Kind = "room"
     size_m: float = ROOM_M  # diagonal of the box around all scans of the scene; unused for a room
@@ -86,20 +86,15 @@ def near(points_N_3: np.ndarray, others_M_3: np.ndarray, distance: float) -> np.
     return np.isfinite(nearest_N)
 
 
-def overlap(source_N_3: np.ndarray, target_M_3: np.ndarray, T_target_source: np.ndarray, scale: float = 1.0) -> float:
-    """Return the share of the target's surface in [0, 1] that the source has as well.
-
-    It is the share of the target's points within `OVERLAP_M` of the source at the true pose, after both were thinned to
-    voxels, so that the density near a sensor does not matter. The target's share is that published for 3DMatch and
-    3DLoMatch (Huang et al. 2021). `scale` is that of :attr:`ScanPair.scale`.
-    """
-    source_n_3, target_m_3 = (voxels(points, VOXEL_M * scale) for points in (source_N_3, target_M_3))
-    return overlap_of_voxels(source_n_3, target_m_3, T_target_source, scale)
-
-
 def overlap_of_voxels(
-    source_n_3: np.ndarray, target_m_3: np.ndarray, T_target_source: np.ndarray, scale: float = 1.0
+    source_n_3: np.ndarray, target_m_3: np.ndarray, T_target_source: np.ndarray, scale: float
 ) -> float:
+    """Return the share of the target's surface in [0, 1] that the source has as well, of clouds thinned to voxels.
+
+    It is the share of the target's points within `OVERLAP_M` of the source at the true pose; as the clouds are thinned,
+    the density near a sensor does not matter. The target's share is that published for 3DMatch and 3DLoMatch (Huang et
+    al. 2021). `scale` is that of :attr:`ScanPair.scale`.
+    """
     return float(near(target_m_3, transform(T_target_source, source_n_3), OVERLAP_M * scale).mean())
 
 
