@@ -72,7 +72,7 @@ def names(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str
 
 EXPERIMENT = Experiment(
     name="controls",
-    beside=("control_tables",),
+    beside=("control_tables", "severity_curves"),
     sections={"controls": Section},
     names=names,
     check=check,
@@ -260,9 +260,9 @@ def collect_intervals(run: Run, files: Paths) -> pd.DataFrame:
             for key, mask_N in masks.items():
                 same = (usual["control"] == (key[0] if plain else PAPER)) & usual["seed"].isin(rows["seed"][mask_N])
                 usual_values = _values(usual[same], usual_draws.subset(same.to_numpy()))
-                of_group = draws.subset(mask_N)
+                group_draws = draws.subset(mask_N)
                 group = measured.setdefault(key, {})
-                group[str(explainer)] = _values(rows[mask_N], of_group), of_group, plain or PAPER, usual_values
+                group[str(explainer)] = _values(rows[mask_N], group_draws), group_draws, plain or PAPER, usual_values
         for explainer in subset["explainer"].unique():
             for (control, trained_on), group in measured.items():
                 if explainer in group:

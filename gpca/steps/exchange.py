@@ -168,22 +168,24 @@ class Exchange:
         estimates_of_test = registrar.estimates(rows["test"], estimators)
         train, test = (described.subset(each) for each in rows.values())
         for estimator in estimators:
-            of_train, of_test = estimates_of_train[estimator], estimates_of_test[estimator]
+            train_estimates, test_estimates = estimates_of_train[estimator], estimates_of_test[estimator]
             for name, rival in rivals.items():
                 floor, conditions = self.uncertainty.floor, len(OBSERVED if rival.observed_only else ADDITIVE_KNOBS)
-                explainer, failure_S = rival.make(), of_test.failures(conditions)
+                explainer, failure_S = rival.make(), test_estimates.failures(conditions)
                 if rival.observed_only:
-                    usable = np.flatnonzero(of_train.failures(len(OBSERVED)) == "")
+                    usable = np.flatnonzero(train_estimates.failures(len(OBSERVED)) == "")
                     if set(train.concept[usable]) < set(CONCEPTS):
                         failure_S = np.where(failure_S == "", TOO_FEW, failure_S)
                     else:
-                        explainer.fit(of_train.attach_to(train, usable, len(OBSERVED), floor))
+                        explainer.fit(train_estimates.attach_to(train, usable, len(OBSERVED), floor))
                 # Abstained where there is no estimate.
                 scores_S_C, abstained_S = np.zeros((len(test), len(CONCEPTS))), np.ones(len(test), bool)
                 estimated = np.flatnonzero(failure_S == "")
                 if len(estimated):
-                    found = explainer.explain(of_test.attach_to(test.without_labels(), estimated, conditions, floor))
-                    scores_S_C[estimated], abstained_S[estimated] = found.scores_N_C, found.abstained_N
+                    attributed = explainer.explain(
+                        test_estimates.attach_to(test.without_labels(), estimated, conditions, floor)
+                    )
+                    scores_S_C[estimated], abstained_S[estimated] = attributed.scores_N_C, attributed.abstained_N
                 attribution = Attribution.of_scores(CONCEPTS, scores_S_C, seconds=0.0, abstained_N=abstained_S)
                 yield labeled(prediction_frame(test, attribution), (ESTIMATOR, estimator, estimator, name), failure_S)
 

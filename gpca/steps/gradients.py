@@ -201,8 +201,8 @@ def tcav(
     scaled_N_d = (h_N_d - mean_d) / deviation_d
     gradients = {}  # (n, d) of a class's log odds in the embeddings of its test samples
     for number, concept in enumerate(gpc.classes):
-        if (of_class_N := test.concept == concept).any():
-            h_n_d = torch.from_numpy(test.embedding[of_class_N].astype(float)).requires_grad_()
+        if (is_class_N := test.concept == concept).any():
+            h_n_d = torch.from_numpy(test.embedding[is_class_N].astype(float)).requires_grad_()
             odds_n = log_odds(gpc.mean_logits(h_n_d), number)
             gradients[concept] = torch.autograd.grad(odds_n.sum(), h_n_d)[0].numpy() * deviation_d
     examples = concept_examples(train, gpc.classes)

@@ -6,9 +6,10 @@ import pytest
 
 from gpca.errors import InputError
 from gpca.evaluation.measures import AGAINST, KEYS, NUMBERS
-from gpca.experiments.control_tables import BINNED as SEVERITIES
-from gpca.experiments.control_tables import REGISTRATION, SAMPLES, SUCCEEDS, severity_curves, transfer
+from gpca.experiments.control_tables import transfer
 from gpca.experiments.plan import Run
+from gpca.experiments.severity_curves import COLUMNS as SEVERITIES
+from gpca.experiments.severity_curves import REGISTRATION, SAMPLES, SUCCEEDS, severity_curves
 from gpca.explainers.registry import explainer_entry
 
 EXPLAINERS = {name: explainer_entry(name).title for name in ("gpca", "rule")}

@@ -7,10 +7,11 @@ import pandas as pd
 import pytest
 
 from gpca.evaluation.measures import POOLED, read_clustered, write_metrics
-from gpca.experiments import control_tables
-from gpca.experiments.control_tables import REGISTRATION, read_costs, read_severities
+from gpca.experiments import severity_curves
+from gpca.experiments.control_tables import read_costs
 from gpca.experiments.controls import collect, collect_intervals, read_controls
 from gpca.experiments.plan import Run
+from gpca.experiments.severity_curves import REGISTRATION, read_severities
 from gpca.io.csv_file import write_csv
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.steps.control_samples import LABELS, sample_table
@@ -156,7 +157,7 @@ def severity_files(folder, paths, **changed):
 
 
 def test_success_and_accuracy_stand_in_the_same_bins(files, tmp_path):
-    found = control_tables.collect(RUN, files, severity_files(tmp_path, files))
+    found = severity_curves.collect(RUN, files, severity_files(tmp_path, files))
     write_metrics(found, tmp_path / "severities.csv")
     rows = read_severities(tmp_path / "severities.csv").set_index(["concept", "method"])
     assert rows.loc[("pose", REGISTRATION)]["value"].tolist() == [0, 0]
