@@ -27,8 +27,8 @@ def causes(job: Job) -> None:
     """Draw candidates, measure their causes and keep a balanced set -> ``causes/{source}/seed{seed}.npz``."""
     from gpca.causes.drawing import draw_causes
 
-    own, icp = job.settings_and_icp()
-    settings = CauseSettings.from_dict(own, icp)
+    section, icp = job.settings_and_icp()
+    settings = CauseSettings.from_dict(section, icp)
     objects = ObjectClouds.load(job.objects, job.source)
     outputs = [job.causes, job.candidates, job.timings]
     with record_provenance(outputs, [job.objects], job.settings, seed=job.seed):
@@ -42,8 +42,8 @@ def describe(job: Job) -> None:
     """Describe every pair -> ``descriptors/{source}/seed{seed}.npz``."""
     from gpca.causes.descriptors import describe_all
 
-    own, icp = job.settings_and_icp()
-    _measure(job, job.descriptors, describe_all, DescriptorSettings(**own), ICPSettings(**icp))
+    section, icp = job.settings_and_icp()
+    _measure(job, job.descriptors, describe_all, DescriptorSettings(**section), ICPSettings(**icp))
 
 
 def reenact(job: Job) -> None:
@@ -74,13 +74,13 @@ def oracles(job: Job) -> None:
 
     settings = read_settings(ReenactmentSettings, job.section("reenactment"))
     truth = CauseSettings.from_dict(job.section("causes"), job.section("icp"))
-    own = {path.parts[-2]: path for path in job.predictions}
+    paths = {path.parts[-2]: path for path in job.predictions}
     with record_provenance(job.predictions, [job.objects, job.causes], job.settings, seed=job.seed):
         objects = ObjectClouds.load(job.objects, job.source)
         causes = Causes.load(job.causes, (job.source, job.seed))
         tested = causes.subset(causes.rows("test"))
         for name, attribution in ask_oracles(objects, tested, job.source, job.seed, settings, truth).items():
-            write_predictions(own[name], tested.registrations, attribution)
+            write_predictions(paths[name], tested.registrations, attribution)
 
 
 def train_on_causes(job: Job) -> None:
@@ -128,13 +128,13 @@ def model(job: Job) -> None:
     with record_provenance([job.out], inputs, job.settings, seed=job.seed):
         loaded = [(Causes.load(path), enacted) for path, enacted in zip(job.causes, job.reenactments, strict=True)]
         sets = [TrainingSet.of(each, Reenactments.load(enacted, each.registrations)) for each, enacted in loaded]
-        icp, own = job.section("registrations").get("icp", {}), job.section("model")
+        icp, section = job.section("registrations").get("icp", {}), job.section("model")
         diagnoser, bald_N = learn(
             TrainingSet.joined(sets),
-            GPCSettings(**own.get("classifier", {})),
-            CauseSettings.from_dict(job.section("causes") | own.get("causes", {}), icp),
+            GPCSettings(**section.get("classifier", {})),
+            CauseSettings.from_dict(job.section("causes") | section.get("causes", {}), icp),
             ReenactmentSettings(**job.section("reenactment")),
-            own.get("false_alarms", 0.05),
+            section.get("false_alarms", 0.05),
             *("model", job.seed),
         )
         settings, axes = EncoderSettings(**job.section("encoder")), (job.source, job.seed)
