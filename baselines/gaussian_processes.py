@@ -34,8 +34,6 @@ class CauseGPCA(GPCA):
 
 
 EXPLAINERS = {
-    "gpca_gpytorch": ExplainerEntry("GP-CA (gpytorch's classes)", GpytorchGPCA, ("source",), reads="embeddings"),
+    "gpca_gpytorch": ExplainerEntry("GP-CA (gpytorch's classes)", GpytorchGPCA, ("source",), reads="embeddings")
 }
-CAUSE_EXPLAINERS = {
-    "gpca": ExplainerEntry("GP-CA (aligned source)", CauseGPCA, ("source",), reads="embeddings"),
-}
+CAUSE_EXPLAINERS = {"gpca": ExplainerEntry("GP-CA (aligned source)", CauseGPCA, ("source",), reads="embeddings")}

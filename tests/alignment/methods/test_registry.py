@@ -4,6 +4,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from importlib import import_module
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -189,76 +190,52 @@ def test_an_optional_package_aligns_what_lies_close(objects, name, largest):
     assert error(pair, make_method(name)(pair), T_true) < largest
 
 
-REFUSED = 0.1
+class Refusing:
+    """KISS-Matcher where it refuses every voxel but the one by which its threads are limited."""
 
-
-def small_shift():
-    T = np.eye(4)
-    T[0, 3] = 0.01
-    return T
-
-
-class StandIn:
-    """What the two packages offer, as far as it is called, for where they are not installed."""
-
-    PointCloud = KISSMatcherConfig = staticmethod(lambda given: given)
-
-    def __init__(self, T, good):
-        self.T_target_source, self.rotation, self.translation = T, T[:3, :3], T[:3, 3:]
-        self.valid = good
-
-    def KdTree(self, cloud, num_threads):
-        return cloud
-
-    def estimate_covariances(self, cloud, tree=None, num_neighbors=20, num_threads=1):
-        assert num_threads == 1
-
-    def align(self, target, source, target_tree, init_T_target_source, max_correspondence_distance, **others):
-        assert target_tree is target and len(source) > 3 and max_correspondence_distance == 0.1
-        assert others.keys() == {"num_threads", "max_iterations", "rotation_epsilon", "translation_epsilon"}
-        if others["max_iterations"] == 1 and not self.valid:  # still on its way
-            return StandIn(small_shift() @ self.T_target_source, False)
-        return self
+    KISSMatcherConfig = staticmethod(lambda voxel: voxel)
 
     def KISSMatcher(self, voxel):
-        if voxel == REFUSED:
+        if voxel != 1.0:
             raise RuntimeError("Too small voxel size")
-        return self
-
-    def estimate(self, source, target):
-        assert source.dtype == target.dtype == np.float32
-        return self
-
-    def get_num_final_inliers(self):
-        return 5
-
-
-@pytest.mark.parametrize("good", [True, False])
-@pytest.mark.parametrize("name", OPTIONAL)
-def test_what_an_optional_package_finds_becomes_an_outcome(objects, monkeypatch, name, good):
-    pair, T_true = small_motion(objects)
-    monkeypatch.setitem(sys.modules, OPTIONAL[name], StandIn(T_true, good))
-    monkeypatch.setattr(registry, "find_spec", lambda name: True)
-    outcome = make_method(name)(pair)
-    assert outcome.converged == good
-    assert np.array_equal(outcome.T_target_source, T_true if good or name == "gicp_small" else np.eye(4))
+        return SimpleNamespace(estimate=lambda source, target: None)
 
 
 def test_what_kiss_matcher_refuses_is_a_failed_registration(objects, monkeypatch):
-    pair, T_true = small_motion(objects)
-    monkeypatch.setitem(sys.modules, "kiss_matcher", StandIn(T_true, True))
+    monkeypatch.setitem(sys.modules, "kiss_matcher", Refusing())
     monkeypatch.setattr(registry, "find_spec", lambda name: True)
-    outcome = make_method("kiss_matcher", {"voxel": REFUSED})(pair)
+    outcome = make_method("kiss_matcher", {"voxel": 0.1})(small_motion(objects)[0])
     assert outcome.failure == "KISS-Matcher: Too small voxel size"
 
 
 @pytest.mark.parametrize("voxel", [0.0, 0.001, 2.0])
 def test_kiss_matcher_is_not_asked_where_it_would_end_the_process(objects, monkeypatch, voxel):
-    pair, T_true = small_motion(objects)
-    monkeypatch.setitem(sys.modules, "kiss_matcher", StandIn(T_true, True))
+    monkeypatch.setitem(sys.modules, "kiss_matcher", Refusing())
     monkeypatch.setattr(registry, "find_spec", lambda name: True)
-    outcome = make_method("kiss_matcher", {"voxel": voxel})(pair)
+    outcome = make_method("kiss_matcher", {"voxel": voxel})(small_motion(objects)[0])
     assert outcome.failure == f"of the source, voxels of {voxel:g} diameters leave too few points"
+
+
+@pytest.mark.skipif(len(os.sched_getaffinity(0)) < 2, reason="one processor: no thread could be started")
+def test_kiss_matcher_starts_no_thread_since_its_threads_would_race():
+    pytest.importorskip("kiss_matcher")
+    code = """
+import os
+import numpy as np
+from gpca.alignment.methods.interface import Pair
+from gpca.alignment.methods.matching import align_by_kiss_matcher as align
+from gpca.process.processor import prepare
+
+prepare()
+points = np.random.default_rng(0).normal(size=(2000, 3))
+points *= np.array([0.5, 0.3, 0.2]) / np.linalg.norm(points, axis=1, keepdims=True)
+allowed, threads = os.sched_getaffinity(0), os.listdir("/proc/self/task")
+align(Pair(points[:1000], points[1000:]), 0.05)
+assert os.sched_getaffinity(0) == allowed
+print(len(os.listdir("/proc/self/task")) - len(threads))
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "0"
 
 
 def main():
