@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from itertools import product
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -49,7 +50,16 @@ def chance(comparison: pd.DataFrame, tolerances: Mapping[str, Tolerance]) -> dic
     kinds = rows["unit"].where(~rows["unit"].isin(TIMES), "time")
     columns: dict[str, list[tuple]] = {}  # per table: counts of agreement and centered ranks of each column
     for (table, column, _), group in rows.groupby(["table", "column", kinds], sort=False):
-        fits_K_K = _fits(group, tolerances)
+        printed = list(group.itertuples())
+        fits_K_K = np.zeros((len(group), len(group)), dtype=bool)  # the printed number i agrees with the run's value j
+        for (i, row), (j, run) in product(enumerate(printed), repeat=2):
+            upper = row.published if math.isnan(row.upper) else row.upper
+            low, high = (row.published, upper) if math.isnan(row.paper_low) else (row.paper_low, row.paper_high)
+            stated = Printed(row.published, upper, 0.5 * 10.0**-row.decimals, low, high)
+            bounds = (run.ci_low, run.ci_high, int(run.n), bool(run.at_least), run.cluster_low, run.cluster_high)
+            value = Reproduced(run.reproduced, *bounds).times(UNITS[row.unit].factor / UNITS[run.unit].factor)
+            verdict = verdicts.verdict_of(stated, value, tolerances[row.unit])
+            fits_K_K[i, j] = verdict in (verdicts.REPRODUCED, verdicts.CLOSE)
         random = generator("verdicts by chance", table, column)
         order_B_K = random.permuted(np.tile(np.arange(len(group)), (SHUFFLES, 1)), axis=1)
         hits_B = fits_K_K[np.arange(len(group)), order_B_K].sum(axis=1)
@@ -68,22 +78,6 @@ def chance(comparison: pd.DataFrame, tolerances: Mapping[str, Tolerance]) -> dic
         norm = math.sqrt((one_N @ one_N) * (other_N @ other_N))
         chances[name] = Agreement(agree, float(expected), p, float(one_N @ other_N / norm) if norm else math.nan)
     return chances
-
-
-def _fits(group: pd.DataFrame, tolerances: Mapping[str, Tolerance]) -> np.ndarray:
-    """Return (K, K): whether the printed number i agrees with the run's value j."""
-    rows = list(group.itertuples())
-    fits_K_K = np.zeros((len(rows), len(rows)), dtype=bool)
-    for i, row in enumerate(rows):
-        upper = row.published if math.isnan(row.upper) else row.upper
-        low, high = (row.published, upper) if math.isnan(row.paper_low) else (row.paper_low, row.paper_high)
-        printed = Printed(row.published, upper, 0.5 * 10.0**-row.decimals, low, high)
-        for j, run in enumerate(rows):
-            bounds = (run.ci_low, run.ci_high, int(run.n), bool(run.at_least), run.cluster_low, run.cluster_high)
-            value = Reproduced(run.reproduced, *bounds).times(UNITS[row.unit].factor / UNITS[run.unit].factor)
-            verdict = verdicts.verdict_of(printed, value, tolerances[row.unit])
-            fits_K_K[i, j] = verdict in (verdicts.REPRODUCED, verdicts.CLOSE)
-    return fits_K_K
 
 
 def is_close(number: Number, value: float, at_least: bool, tolerance: Tolerance) -> bool:

@@ -129,7 +129,6 @@ def judge(
 
     Args:
         results: file name -> its rows, as :func:`gpca.comparison.values.read_results` reads them.
-        objects: source -> ``{"title": str, "stand_in": bool}``.
         prediction_files: named ``…/predictions/{source}/{method}/seed{seed}.csv``, for claims about scores.
         clusters: counterpart -> its bootstrap draws, for claims about shares of samples.
         floors: unit -> the minimum that a run can have. A comparison is inconclusive where both values are at it in at

@@ -122,7 +122,23 @@ def search(
         shown: number of readings in `best`.
     """
     shape = tuple(len(grid[choice]) for choice in CHOICES)
-    closes = [_closes(number, printed, measured, grid, tolerances) for number in numbers]
+    closes = []  # whether each number's values are close to each printed one (P, …), with an axis for every choice
+    for number in numbers:
+        values = values_of(number, measured)
+        if not values:
+            raise InputError("joint reading", f"has no value of {' / '.join(number.key)}", "measure it again")
+        part = next(iter(values)).partition("/")[0]
+        axes = [len(grid[choice]) if choice in PARTS[part] else 1 for choice in CHOICES]
+        close = np.zeros((len(printed), *axes), dtype=bool)  # never to numbers that do not take its place
+        comparable = [i for i, other in enumerate(printed) if (other.table, other.unit) == (number.table, number.unit)]
+        for at in product(*map(range, axes)):
+            name = part_name(part, {choice: grid[choice][i] for choice, i in zip(CHOICES, at, strict=True)})
+            if name not in values:
+                fault = f"has no value of {' / '.join(number.key)} under {name}"
+                raise InputError("joint reading", fault, "measure it")
+            for other in comparable:
+                close[(other, *at)] = is_close(printed[other], *values[name], tolerances[number.unit])
+        closes.append(close)
     weight_K = weights(numbers)
     index_K = np.array([printed.index(number) for number in numbers])
     share_G = _shares(closes, index_K, weight_K, shape)
@@ -153,34 +169,6 @@ def values_of(number: Number, measured: pd.DataFrame) -> dict[str, tuple[float, 
     reached = rows[rows["metric"] == CENSORED_BY.get(metric)].groupby("table")["value"].min()
     factor = UNITS[number.unit].factor
     return {name: (factor * value, bool(reached.get(name, 1) < 1)) for name, value in means.items()}
-
-
-def _closes(
-    number: Number,
-    printed: Sequence[Number],
-    measured: pd.DataFrame,
-    grid: Mapping[str, Sequence[Any]],
-    tolerances: Mapping[str, Tolerance],
-) -> np.ndarray:
-    """Whether a number's values are close to each printed one (P, …), with an axis for every choice.
-
-    None is close to printed numbers that never take its place.
-    """
-    values = values_of(number, measured)
-    if not values:
-        raise InputError("joint reading", f"has no value of {' / '.join(number.key)}", "measure it again")
-    part = next(iter(values)).partition("/")[0]
-    shape = [len(grid[choice]) if choice in PARTS[part] else 1 for choice in CHOICES]
-    close = np.zeros((len(printed), *shape), dtype=bool)
-    comparable = [i for i, other in enumerate(printed) if (other.table, other.unit) == (number.table, number.unit)]
-    for at in product(*map(range, shape)):
-        name = part_name(part, {choice: grid[choice][i] for choice, i in zip(CHOICES, at, strict=True)})
-        if name not in values:
-            raise InputError("joint reading", f"has no value of {' / '.join(number.key)} under {name}", "measure it")
-        value, at_least = values[name]
-        for other in comparable:
-            close[(other, *at)] = is_close(printed[other], value, at_least, tolerances[number.unit])
-    return close
 
 
 def _shares(

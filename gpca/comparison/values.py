@@ -72,17 +72,30 @@ def value_of_run(
 ) -> Reproduced | None:
     """Return the run's value for a printed number, in its unit; None where the run has none.
 
-    Args:
-        results: file name -> its rows, as :func:`read_results` reads them.
-        clusters: counterpart -> its bootstrap draws (:func:`cluster_draws`).
+    `results` are as :func:`read_results` reads them, `clusters` of :func:`cluster_draws`.
     """
+    from scipy.stats import t as student_t
+
     counterpart = number.counterpart
     if counterpart is None or counterpart.file not in results:
         return None
-    summary = _runtime_summary if counterpart.file == RUNTIME else _tidy_summary
-    reproduced = summary(results[counterpart.file], counterpart)
-    if reproduced is None:
-        return None
+    if counterpart.file == RUNTIME:
+        if (timed := runtime_mean(results[RUNTIME], counterpart)) is None:
+            return None
+        mean, error, n = timed
+        half_width = float(student_t.ppf(0.975, n - 1) * error) if n > 1 else math.nan
+        reproduced = Reproduced(mean, mean - half_width, mean + half_width, n)
+    else:
+        by_seed, at_least = values_by_seed(results[counterpart.file], counterpart)
+        value_R, n = by_seed.to_numpy(), len(by_seed)
+        if not n or np.isnan(value_R).any() or (n < 2 and counterpart.statistic == "deviation"):
+            return None
+        if counterpart.statistic == "deviation":
+            deviation = float(value_R.std(ddof=1))
+            reproduced = Reproduced(deviation, *deviation_interval(deviation, n), n)
+        else:
+            mean, *bounds = mean_interval(value_R)
+            reproduced = Reproduced(mean, *([math.nan] * 2 if at_least else bounds), n, at_least)
     if draws := (clusters or {}).get(counterpart):
         cluster_low, cluster_high = draws.bounds()
         reproduced = replace(reproduced, cluster_low=cluster_low, cluster_high=cluster_high)
@@ -131,30 +144,6 @@ def deviation_interval(deviation: float, n: int) -> tuple[float, float]:
 
     low, high = (deviation * math.sqrt((n - 1) / chi2.ppf(level, n - 1)) for level in (0.975, 0.025))
     return low, high
-
-
-def _tidy_summary(rows: pd.DataFrame, counterpart: Counterpart) -> Reproduced | None:
-    by_seed, at_least = values_by_seed(rows, counterpart)
-    value_R, n = by_seed.to_numpy(), len(by_seed)
-    if not n or np.isnan(value_R).any():
-        return None
-    if counterpart.statistic == "mean":
-        mean, low, high = mean_interval(value_R)
-        return Reproduced(mean, math.nan, math.nan, n, True) if at_least else Reproduced(mean, low, high, n)
-    if n < 2:
-        return None
-    deviation = float(value_R.std(ddof=1))
-    return Reproduced(deviation, *deviation_interval(deviation, n), n)
-
-
-def _runtime_summary(rows: pd.DataFrame, counterpart: Counterpart) -> Reproduced | None:
-    from scipy.stats import t as student_t
-
-    if (measured := runtime_mean(rows, counterpart)) is None:
-        return None
-    mean, error, n = measured
-    half_width = float(student_t.ppf(0.975, n - 1) * error) if n > 1 else math.nan
-    return Reproduced(mean, mean - half_width, mean + half_width, n)
 
 
 def folder_behind(counterpart: Counterpart | None) -> Folder | None:

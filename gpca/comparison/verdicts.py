@@ -173,10 +173,20 @@ def compare(
             deviation = deviations.get((number.same_as or number.key)[:2])
         printed = printed_of(number, deviation)
         reproduced = values[number.key] = value_of_run(number, results, clusters)
-        verdict, reason = _judge(number, printed, reproduced, objects, tolerance, reasons)
+        sources, reason = counterpart.sources if counterpart else (), ""
+        if counterpart is None:
+            verdict, reason = NOT_COMPARABLE, number.note
+        elif any(objects[source]["stand_in"] for source in sources if source in objects):
+            verdict, reason = NOT_COMPARABLE, STAND_IN
+        elif reproduced is None:
+            verdict, reason = NOT_RUN, f"{counterpart.file} holds no such value"
+        elif (verdict := verdict_of(printed, reproduced, tolerance)) == INCONCLUSIVE:
+            no_interval = math.isnan(reproduced.interval()[0])
+            reason = LOWER_BOUND if reproduced.at_least else ONE_REPEAT if no_interval else TOO_WIDE
+        elif verdict != REPRODUCED:
+            reason = reason_of(number, reasons)
         first = values.get(number.same_as)
         repeats = first and reproduced and (first.value, first.n) == (reproduced.value, reproduced.n)
-        sources = counterpart.sources if counterpart else ()
         record = {
             **{name: getattr(number, name) for name in ("table", "row", "column", "unit", "decimals")},
             "statistic": counterpart.statistic if counterpart else "mean",
@@ -219,21 +229,6 @@ def judged_once(comparison: pd.DataFrame) -> pd.DataFrame:
 def counts(comparison: pd.DataFrame) -> dict[str, int]:
     """Return verdict -> number of rows."""
     return {verdict: int((comparison["verdict"] == verdict).sum()) for verdict in VERDICTS}
-
-
-def _judge(number, printed, reproduced, objects, tolerance, reasons) -> tuple[str, str]:
-    """Return the verdict and its reason."""
-    if number.counterpart is None:
-        return NOT_COMPARABLE, number.note
-    if any(objects[source]["stand_in"] for source in number.counterpart.sources if source in objects):
-        return NOT_COMPARABLE, STAND_IN
-    if reproduced is None:
-        return NOT_RUN, f"{number.counterpart.file} holds no such value"
-    verdict = verdict_of(printed, reproduced, tolerance)
-    if verdict == INCONCLUSIVE:
-        no_interval = math.isnan(reproduced.interval()[0])
-        return verdict, LOWER_BOUND if reproduced.at_least else ONE_REPEAT if no_interval else TOO_WIDE
-    return verdict, "" if verdict == REPRODUCED else reason_of(number, reasons)
 
 
 def _minus(one: float, other: float) -> float:

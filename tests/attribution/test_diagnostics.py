@@ -16,18 +16,18 @@ def confident(p, n_classes=3):
     return np.column_stack([p, *[(1 - p) / (n_classes - 1)] * (n_classes - 1)])
 
 
-def test_perfect_order_has_the_least_area():
+def test_areas_of_the_perfect_a_random_and_the_worst_order():
     perfect = -WRONG.astype(float)
     assert d.aurc(perfect, WRONG) == pytest.approx(E + (1 - E) * np.log(1 - E), abs=1e-3)
     assert d.excess_aurc(perfect, WRONG) == 0
     assert d.augrc(perfect, WRONG) == pytest.approx(E**2 / 2, abs=1e-3)
-
-
-def test_random_order_has_the_error_rate_as_its_area():
     constant = np.zeros(len(WRONG))
     assert d.aurc(constant, WRONG) == pytest.approx(E)
     assert d.augrc(constant, WRONG) == pytest.approx(E / 2, abs=1e-3)
     assert d.aurc(RANDOM.normal(size=len(WRONG)), WRONG) == pytest.approx(E, abs=0.02)
+    worst = WRONG.astype(float)
+    assert d.aurc(worst, WRONG) == pytest.approx(worst_aurc(E), abs=1e-3)
+    assert d.augrc(worst, WRONG) == pytest.approx(E - E**2 / 2, abs=1e-3)
 
 
 def worst_aurc(error_rate):
@@ -35,21 +35,12 @@ def worst_aurc(error_rate):
     return error_rate * (1 - np.log(error_rate))
 
 
-def test_worst_order_has_the_largest_area():
-    worst = WRONG.astype(float)
-    assert d.aurc(worst, WRONG) == pytest.approx(worst_aurc(E), abs=1e-3)
-    assert d.augrc(worst, WRONG) == pytest.approx(E - E**2 / 2, abs=1e-3)
-
-
-def test_ties_are_the_mean_over_their_orders():
+def test_ties_are_the_mean_over_their_orders_and_the_curve_ends_with_the_error_rate():
     wrong = np.array([True, False, False, True, False])
     confidence = np.array([2, 2, 2, 1, 1])
     tied = [sorted(range(5), key=lambda i: (-confidence[i], order.index(i))) for order in permutations(range(5))]
     areas = [np.mean(np.cumsum(wrong[order]) / np.arange(1, 6)) for order in map(np.array, tied)]
     assert d.aurc(confidence, wrong) == pytest.approx(np.mean(areas))
-
-
-def test_the_curve_ends_at_full_coverage_with_the_error_rate():
     coverage, risk = d.risk_coverage(RANDOM.normal(size=len(WRONG)), WRONG)
     assert (coverage[0], coverage[-1], risk[-1]) == (1 / len(WRONG), 1, pytest.approx(E))
 
@@ -72,11 +63,8 @@ def test_calibrated_predictions_have_no_error_and_overconfident_ones_their_exces
     )
 
 
-def test_a_confidence_of_one_is_in_the_last_bin_and_not_lost():
+def test_bins_hold_a_confidence_of_one_differ_by_their_kind_and_are_of_every_class():
     assert d.calibration_error(confident(np.ones(10)), np.arange(10) % 2) == pytest.approx(0.5)
-
-
-def test_equal_width_and_equal_mass_bins_differ_as_they_should():
     # Within one wide bin, errors of both signs cancel; bins of equal mass tell them apart.
     p = np.concatenate([np.full(160, 0.94), np.full(140, 0.99)])
     target = np.concatenate([np.zeros(160), np.arange(140) % 10 == 0]).astype(int)
@@ -84,9 +72,6 @@ def test_equal_width_and_equal_mass_bins_differ_as_they_should():
     assert d.calibration_error(confident(p), target) == pytest.approx(overall)
     apart = (160 * (1 - 0.94) + 140 * (0.99 - 0.9)) / 300
     assert d.calibration_error(confident(p), target, adaptive=True) == pytest.approx(apart)
-
-
-def test_classwise_error_looks_at_every_class():
     p = np.tile([0.5, 0.25, 0.25], (400, 1))
     target = np.arange(400) % 4 // 2
     assert d.calibration_error(p, target) == pytest.approx(0)

@@ -83,7 +83,7 @@ def test_what_the_suite_writes_is_collected(tmp_path):
     assert value(metrics, "icp_calls") == 3.5
 
 
-def test_a_swapped_predictor_is_right_once_relabeled():
+def test_permuted_accuracy_is_the_best_of_all_permutations_and_no_name_helps_a_constant():
     true = np.array([*["noise"] * 10, *["pose"] * 12, *["overlap"] * 8])
     turned = np.select([true == "noise", true == "pose"], ["pose", "overlap"], "noise")
     for predicted, plain, permuted in ((true, 1, 1), (turned, 0, 1)):
@@ -92,16 +92,10 @@ def test_a_swapped_predictor_is_right_once_relabeled():
         assert permuted_accuracy(confusion(true, predicted, sure, CONCEPTS)) == permuted
     abstained = true == "overlap"  # stays wrong under every name
     assert permuted_accuracy(confusion(true, turned, abstained, CONCEPTS)) == 22 / 30
-
-
-def test_no_name_helps_a_constant_predictor():
     true, constant = np.repeat(CONCEPTS, 7), np.repeat("pose", 21)
     sure = np.zeros(21, dtype=bool)
     assert accuracy(true, constant, sure) == pytest.approx(1 / 3)
     assert permuted_accuracy(confusion(true, constant, sure, CONCEPTS)) == pytest.approx(1 / 3)
-
-
-def test_permuted_accuracy_is_the_best_of_all_permutations():
     random = np.random.default_rng(0)
     for _ in range(20):
         counts = random.integers(0, 30, (4, 5))
@@ -206,10 +200,14 @@ def test_timings_are_means_over_the_test_samples(tmp_path):
             collect_timings([path])
 
 
-def test_predictions_of_training_rows_alone_are_refused(tmp_path):
+def test_files_of_training_rows_or_of_other_names_are_refused(tmp_path):
     path = write_predictions(tmp_path / "ycb" / "gpca" / "seed0.csv", split="train")
     with pytest.raises(InputError, match="no test rows"):
         collect([path])
+    with pytest.raises(InputError, match="is not named"):
+        collect([write_predictions(tmp_path / "ycb" / "gpca" / "zero.csv")])
+    with pytest.raises(InputError, match="no files"):
+        collect([])
 
 
 @pytest.mark.parametrize(
@@ -226,10 +224,3 @@ def test_faulty_metrics_are_refused(tmp_path, change, expected):
     change(metrics).to_csv(tmp_path / "metrics.csv", index=False)
     with pytest.raises(InputError, match=expected):
         read_metrics(tmp_path / "metrics.csv")
-
-
-def test_file_names_carry_source_explainer_and_seed(tmp_path):
-    with pytest.raises(InputError, match="is not named"):
-        collect([write_predictions(tmp_path / "ycb" / "gpca" / "zero.csv")])
-    with pytest.raises(InputError, match="no files"):
-        collect([])

@@ -39,32 +39,26 @@ def test_draws_that_agree_leave_no_epistemic_uncertainty(logits):
     assert np.abs(bald).max() < 1e-12
 
 
-def test_draws_that_disagree_confidently_have_bald_of_log_c():
+def test_draws_that_disagree_have_bald_of_log_c_whatever_is_added_to_all():
     scores, variances, bald = summarize_draws(1000.0 * np.eye(3)[np.arange(60) % 3][:, None])
     assert scores[0] == pytest.approx(1 / 3)
     assert variances[0] == pytest.approx(1 / 3 * 2 / 3)
     assert bald[0] == pytest.approx(np.log(3))
-
-
-def test_a_constant_added_to_all_logits_changes_nothing():
     logits = np.random.default_rng(0).normal(size=(10, 4, 3))
     for one, other in zip(summarize_draws(logits), summarize_draws(logits + 1e4), strict=True):
         assert np.allclose(one, other, atol=1e-9)
 
 
-def test_entropy_is_in_nats_and_takes_zeros():
+def test_entropy_is_in_nats_of_the_normalized_scores_and_takes_zeros():
     assert entropy(np.array([[1.0, 0, 0], [0.5, 0.5, 0], [1 / 3] * 3])) == pytest.approx([0, np.log(2), np.log(3)])
+    made = attribution(2, scores_N_C=np.array([[2.0, 2.0, 0.0], [5.0, 0.0, 0.0]]))
+    assert made.entropy_N == pytest.approx([np.log(2), 0])
 
 
 def test_the_largest_score_names_the_concept_and_ties_go_to_the_first():
     scores = np.array([[0.2, 0.3, 0.5], [0.4, 0.4, 0.2], [0.2, 0.4, 0.4], [1 / 3, 1 / 3, 1 / 3], [0.1, 0.8, 0.1]])
     made = attribution(5, scores_N_C=scores, abstained_N=np.array([False] * 4 + [True]))
     assert made.predicted_N.tolist() == ["overlap", "noise", "pose", "noise", ""]
-
-
-def test_entropy_is_that_of_the_normalized_scores():
-    made = attribution(2, scores_N_C=np.array([[2.0, 2.0, 0.0], [5.0, 0.0, 0.0]]))
-    assert made.entropy_N == pytest.approx([np.log(2), 0])
 
 
 def marginals(n, seed=0):
@@ -90,12 +84,9 @@ def test_the_block_size_changes_no_bit(block):
         assert np.array_equal(one, other)
 
 
-def test_no_points_have_an_empty_summary():
+def test_marginals_without_deviation_have_the_softmax_of_their_mean_and_none_an_empty_summary():
     shapes = [summary.shape for summary in summarize_marginals(*marginals(0))]
     assert shapes == [(0, 3), (0, 3), (0,)]
-
-
-def test_marginals_without_deviation_have_the_softmax_of_their_mean_and_no_bald():
     mean, deviation, normal = marginals(20)
     scores, variances, bald = summarize_marginals(mean, 0 * deviation, normal)
     assert scores == pytest.approx(np.exp(mean) / np.exp(mean).sum(axis=1, keepdims=True))

@@ -58,9 +58,6 @@ def test_the_file_keeps_the_rules_of_its_head():
         for place in (place for compared in claim.compared for place in compared.counterparts):
             assert place.file in {*FILES, PREDICTIONS}, claim
             assert all((place.table, *place.sources, *place.methods, *place.metrics, place.concept)), claim
-
-
-def test_calibration_is_asked_for_where_predictions_are_read_anyhow():
     printed = (number.counterpart for number in read_published())
     folders = set(folders_behind([*printed, *counterparts_of(read_claims())]))
     places = [place for place in counterparts_of(read_claims()) if place.file == PREDICTIONS]
@@ -159,13 +156,10 @@ def test_many_comparisons_do_not_refute_by_chance():
     assert set(among_ten["verdict"][1:]) == {"not run"}
 
 
-def test_a_number_stands_for_itself():
+def test_a_number_stands_for_itself_and_of_factors_the_logarithms_are_compared():
     chance = replace(CLAIM, compared=(Compared(ACCURACY, 33.3),))
     [row] = judged(chance, tidy([0.5, 0.51, 0.52])).itertuples()
     assert (row.value, row.other, row.verdict) == (pytest.approx(51 - 33.3), "33.3", "supported")
-
-
-def test_of_factors_the_logarithms_are_compared():
     claim = replace(CLAIM, test="less", margin=1.25, ratio=True)
     [row] = judged(claim, tidy([0.2, 0.21]), tidy([0.4, 0.42], method="other")).itertuples()
     assert (row.value, row.low, row.high, row.verdict) == (pytest.approx(0.5), 0.5, 0.5, "supported")

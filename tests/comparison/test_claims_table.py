@@ -40,18 +40,9 @@ def test_a_sentence_stands_once_above_its_comparisons():
     assert "| Ours overlap against b | greater, by 1 % | inconclusive (floor) |" in page
     assert "over 5 seeds" in page
     assert "nan" not in page
-
-
-def test_the_table_says_when_margins_were_set():
     words = "Margins were set for 2 on 2026-11-22, after the differences had been seen; 1 on 2026-11-24, before"
     assert words in table().markdown()
-
-
-def test_the_csv_has_the_bounds_of_factors_too():
     records = table().records()
     assert records[3][-6:] == (0.5, 0.4, 0.625, 5, 0, False)
-
-
-def test_nothing_that_was_run_makes_no_table():
     with pytest.raises(InputError, match="has nothing to show"):
         table(ROWS[-1:])

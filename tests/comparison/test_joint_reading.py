@@ -72,11 +72,14 @@ def test_by_chance_other_numbers_of_the_same_unit_come_into_a_place(rows):
     assert set(found.by_chance["column"]) == {1.0}  # it stands in another column
 
 
-def test_what_was_not_measured_is_refused(rows):
+def test_values_are_means_over_the_seeds_and_a_missing_one_is_refused(rows):
     with pytest.raises(InputError, match="has no value of I / YCB / GP-CA"):
         search([SHAP], [SHAP], rows[rows["method"] == "bald"], GRID, TOLERANCES, deals=1)
     with pytest.raises(InputError, match="under knobs/weaker/low"):
         search([SHAP], [SHAP], rows[rows["table"] != "knobs/weaker/low"], GRID, TOLERANCES, deals=1)
+    more = pd.concat([rows, rows.assign(seed=1, value=rows["value"] * 1.1)])
+    assert values_of(SHAP, more)["knobs/protocol/middle"] == (pytest.approx(52.5), False)
+    assert values_of(LABELS, rows)["labels/weaker/only/only/only/only/only/0.02"] == (20, True)
 
 
 def test_deals_stay_within_their_group_and_are_the_same_every_time():
@@ -91,7 +94,7 @@ def test_deals_stay_within_their_group_and_are_the_same_every_time():
         assert len(np.unique(dealt_D_K, axis=0)) > 10
 
 
-def test_each_table_weighs_the_same_and_each_value_counts_once():
+def test_each_table_weighs_the_same_each_value_counts_once_and_every_choice_matters():
     printed = numbers_asked(read_published())
     weight_K = weights(printed)
     assert weight_K.sum() == pytest.approx(1)
@@ -100,6 +103,7 @@ def test_each_table_weighs_the_same_and_each_value_counts_once():
     assert len(printed) == 54
     assert len(numbers_asked(read_published(), ["ycb"])) == 25
     assert not [number for number in printed if number.same_as]
+    assert {choice for of_part in PARTS.values() for choice in of_part} == set(CHOICES)
 
 
 PARTS_OF = ("I", "II", "III", "IV", "V")
@@ -127,16 +131,6 @@ def test_fixed_values_are_scored_beside_dealt_ones():
     assert records["all", "expected_column"] == 1
     assert records["all", "expected_unit"] == pytest.approx(0.5, abs=0.2)
     assert records["all", "p_unit"] == pytest.approx(0.5, abs=0.2)
-
-
-def test_values_are_means_over_the_seeds_and_bounds_where_any_is(rows):
-    more = pd.concat([rows, rows.assign(seed=1, value=rows["value"] * 1.1)])
-    assert values_of(SHAP, more)["knobs/protocol/middle"] == (pytest.approx(52.5), False)
-    assert values_of(LABELS, rows)["labels/weaker/only/only/only/only/only/0.02"] == (20, True)
-
-
-def test_every_part_depends_on_known_choices_and_every_choice_matters():
-    assert {choice for of_part in PARTS.values() for choice in of_part} == set(CHOICES)
 
 
 @pytest.mark.parametrize(

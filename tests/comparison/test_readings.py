@@ -82,7 +82,7 @@ def test_a_lower_bound_is_no_value_and_a_ratio_is_measured_by_its_logarithm():
     assert found.loc["few", "distance"] == pytest.approx(2)  # 14.5 × 3²
 
 
-def test_what_was_judged_is_read_back_or_refused(tmp_path):
+def test_what_was_judged_is_read_back_or_refused_even_if_infinitely_far(tmp_path):
     found, _ = judged(50.0, {"random": 0.5})
     path = tmp_path / "reading_verdicts.csv"
     found.to_csv(path, index=False)
@@ -90,9 +90,6 @@ def test_what_was_judged_is_read_back_or_refused(tmp_path):
     path.write_text(path.read_text().replace("50.0", "half"))
     with pytest.raises(InputError, match="column 'published' contains values that are not finite numbers"):
         read_judged(path)
-
-
-def test_a_risk_of_nothing_is_infinitely_far_by_its_ratio_and_read_back(tmp_path):
     risk = number(0.0078, decimals=4, unit="risk")
     comparison = compared([risk], {"metrics.csv": tidy([0.003, 0.003])})
     found = judge_readings([risk], comparison, readings({"perfect": 0.0, "random": 0.004}), TOLERANCES)

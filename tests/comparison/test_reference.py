@@ -113,15 +113,12 @@ def test_what_is_no_share_of_samples_may_differ_by_the_references_interval(folde
     assert outcomes(folders, half_widths=0)["kernels.csv"].verdict == "different"
 
 
-def test_labels_and_epochs_may_differ_by_a_ratio(folders):
+def test_labels_may_differ_by_a_ratio_and_yes_and_no_are_results(folders):
     for folder in folders:
         write(folder / "active_learning.csv", TIDY, [("a", "ycb", "random", "labels_to_target", "all", 0, 100)])
     change(folders[0] / "active_learning.csv", "all,0,100", "all,0,124")
     assert outcomes(folders)["active_learning.csv"].verdict == "rounding"
     assert outcomes(folders, ratio=0.2)["active_learning.csv"].verdict == "different"
-
-
-def test_yes_and_no_are_results_and_not_names(folders):
     heads = ("learner", "accurate", "mean", "ci_low", "ci_high", "n_seeds", "n_test")
     for folder in folders:
         write(folder / "tables/table5_answers.csv", heads, [("gpca", "yes", 1.0, "", "", 1, 9)])
@@ -173,13 +170,12 @@ def test_what_is_missing_comes_with_the_command_that_makes_it(folders, capsys):
     captured = capsys.readouterr()
     assert "metrics.csv        missing\n" in captured.out
     assert captured.err == f"1 missing; make them with: snakemake -j2 {folders[0]}/metrics.csv\n"
-
-
-def test_a_run_with_a_config_of_its_own_is_made_with_it(folders, capsys):
     here = folders[0].rename(folders[0].with_name("full"))
     (here / "tables/table1.csv").unlink()
     assert check([here], "--reference", str(folders[1])) == 1
-    assert capsys.readouterr().err.endswith(f"snakemake -j2 {here}/tables/table1.csv --configfile config/full.yaml\n")
+    assert capsys.readouterr().err.endswith(
+        f"snakemake -j2 {here}/metrics.csv {here}/tables/table1.csv --configfile config/full.yaml\n"
+    )
 
 
 def one_line(capsys):

@@ -17,14 +17,11 @@ from .conftest import write
 from .made_up import ACCURACY, LABELS, TIME, compared, number, runtime, tidy
 
 
-def test_the_mean_and_its_interval_come_in_the_printed_unit():
+def test_means_come_in_the_printed_unit_ratios_and_sources_are_taken_seed_by_seed():
     found = value_of_run(number(), {"metrics.csv": tidy([0.90, 0.92, 0.94])})
     assert (found.value, found.n) == (pytest.approx(92), 3)
     assert found.high - found.value == pytest.approx(4.30265 * 2 / np.sqrt(3), rel=1e-5)
     assert value_of_run(number(), {"metrics.csv": tidy([0.9, 0.99, 1.0])}).high == 100
-
-
-def test_shares_of_a_confusion_are_ratios_seed_by_seed():
     rows = pd.concat(
         [
             tidy([20, 30], metric="predicted_as_pose", concept="overlap"),
@@ -34,9 +31,6 @@ def test_shares_of_a_confusion_are_ratios_seed_by_seed():
     )
     counterpart = replace(ACCURACY, metrics=("predicted_as_pose", "test_samples"), concept="overlap")
     assert value_of_run(number(counterpart=counterpart), {"metrics.csv": rows}).value == pytest.approx(35)
-
-
-def test_several_sources_are_averaged_seed_by_seed():
     rows = pd.concat([tidy([0.9, 0.9]), tidy([0.7, 0.5], source="linemod")])
     found = value_of_run(number(counterpart=replace(ACCURACY, sources=("ycb", "linemod"))), {"metrics.csv": rows})
     assert found.value == pytest.approx(75)
@@ -94,12 +88,6 @@ def test_times_per_sample_name_the_processor_of_their_record(tmp_path):
     assert (row.verdict, row.hardware) == ("reproduced", "Some cores")
 
 
-def test_a_results_file_that_is_none_is_refused(tmp_path):
-    (tmp_path / "metrics.csv").write_text("table,source\n")
-    with pytest.raises(InputError, match=r"metrics\.csv"):
-        read_results([tmp_path / "metrics.csv"])
-
-
 CONCEPTS = ("noise", "pose", "overlap")
 TAKEN = replace(ACCURACY, metrics=("predicted_as_pose", "test_samples"), concept="overlap")
 
@@ -145,11 +133,13 @@ def test_objects_that_differ_make_the_interval_wide(tmp_path):
     assert found.interval() == (pytest.approx(100 * low), pytest.approx(100 * high))
 
 
-def test_confusions_are_shares_too(tmp_path):
+def test_confusions_are_shares_too_and_views_of_one_instance_are_one_object(tmp_path):
     files = predictions(tmp_path, dict.fromkeys("abc", 0.75))
     assert bounds_of(TAKEN, files) == pytest.approx(wilson_interval(3.75, 15))
     other = replace(TAKEN, concept="noise")  # of which there is no sample
     assert np.isnan(bounds_of(other, files)).all()
+    files = predictions(tmp_path, {"cup_1_1": 1.0, "cup_1_2": 0.0})
+    assert bounds_of(ACCURACY, files) == pytest.approx(wilson_interval(2.5, 5))
 
 
 def test_of_learners_the_set_that_is_named_counts(tmp_path):
@@ -161,23 +151,18 @@ def test_of_learners_the_set_that_is_named_counts(tmp_path):
     assert found[beyond].bounds() == pytest.approx(wilson_interval(0, 10))
 
 
-def test_views_of_one_instance_are_one_object(tmp_path):
-    files = predictions(tmp_path, {"cup_1_1": 1.0, "cup_1_2": 0.0})
-    assert bounds_of(ACCURACY, files) == pytest.approx(wilson_interval(2.5, 5))
-
-
-def test_what_is_no_share_of_samples_has_none(tmp_path):
+def test_what_is_no_share_of_samples_has_none_and_files_that_are_none_are_refused(tmp_path):
     deviation = replace(ACCURACY, statistic="deviation")
     assert [folder_behind(c) for c in (None, LABELS, deviation, replace(ACCURACY, metrics=("ece",)))] == [None] * 4
     assert folders_behind([ACCURACY, TAKEN, LABELS, None]) == [("predictions", "ycb", "gpca_paper")]
     assert cluster_draws([ACCURACY, LABELS, None], []) == {}
-
-
-def test_a_file_that_is_none_is_refused(tmp_path):
     [path] = predictions(tmp_path, {"a": 1.0}, seeds=1)
     path.write_text("sample,split\n0,test\n")
     with pytest.raises(InputError, match=r"seed100\.csv"):
         cluster_draws([ACCURACY], [path])
+    (tmp_path / "metrics.csv").write_text("table,source\n")
+    with pytest.raises(InputError, match=r"metrics\.csv"):
+        read_results([tmp_path / "metrics.csv"])
 
 
 def test_differences_are_of_the_same_draws(tmp_path):

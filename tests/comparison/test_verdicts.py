@@ -81,7 +81,7 @@ def test_a_printed_range_is_a_band(value, verdict):
     assert verdict_of(printed(86.0, upper=92.0), Reproduced(value, value, value, 5), POINTS) == verdict
 
 
-def test_the_papers_own_error_adds_to_that_of_the_run():
+def test_the_papers_own_error_adds_to_that_of_the_run_whose_wider_interval_counts():
     found = Reproduced(94.0, 92.8, 95.2, 5)  # 4 points above, less half a digit
     assert verdict_of(printed(90.0), found, POINTS) == "not reproduced"
     assert verdict_of(printed(90.0, low=88.0, high=92.0), found, POINTS) == "not reproduced"  # 1.2 and 2 make 2.3
@@ -89,9 +89,6 @@ def test_the_papers_own_error_adds_to_that_of_the_run():
     near = Reproduced(92.2, 91.0, 93.4, 5)
     assert verdict_of(printed(90.0), near, POINTS) == "close"
     assert verdict_of(printed(90.0, low=88.0, high=92.0), near, POINTS) == "reproduced"
-
-
-def test_the_wider_of_the_intervals_over_seeds_and_over_objects_counts():
     found = Reproduced(92.0, 91.5, 92.5, 5)
     assert verdict_of(printed(90.0), found, POINTS) == "close"
     assert verdict_of(printed(90.0), replace(found, cluster_low=89.9, cluster_high=92.1), POINTS) == "reproduced"
@@ -184,7 +181,7 @@ def test_a_value_is_judged_once_and_its_repeats_are_marked():
     assert compared([first, repeat], results)["repeat_of"].tolist() == ["", ""]  # the run has made it another value
 
 
-def test_stand_ins_are_shown_but_never_compared():
+def test_stand_ins_are_shown_but_never_compared_and_units_need_a_tolerance():
     stand_ins = OBJECTS | {"ycb": {"title": "YCB", "stand_in": True}}
     numbers = [number(), number(row="LINEMOD", counterpart=replace(ACCURACY, methods=("nothing",)))]
     rows = compared(numbers, {"metrics.csv": tidy([0.9, 0.9])}, stand_ins, [Reason("*", "*", "*", "A reason.")])
@@ -193,6 +190,8 @@ def test_stand_ins_are_shown_but_never_compared():
     assert rows["reproduced"][0] == pytest.approx(90)
     assert set(rows["objects"]) == {"YCB (procedural stand-in)"}
     assert "only real ones are compared" in summary(rows)
+    with pytest.raises(InputError, match=r"comparison\.tolerances: has no unit '%'; add its tolerance"):
+        compare([number()], {}, OBJECTS, {}, [])
 
 
 def test_a_printed_deviation_belongs_to_the_mean_of_the_same_counterpart_and_is_counted_apart():
@@ -204,11 +203,6 @@ def test_a_printed_deviation_belongs_to_the_mean_of_the_same_counterpart_and_is_
     assert math.isnan(rows["deviation"][1])
     assert len(judged_once(rows)) == 1
     assert "1 are standard deviations: 1 inconclusive." in summary(rows)
-
-
-def test_a_unit_without_tolerance_is_named():
-    with pytest.raises(InputError, match=r"comparison\.tolerances: has no unit '%'; add its tolerance"):
-        compare([number()], {}, OBJECTS, {}, [])
 
 
 # --- the page ---
@@ -240,15 +234,12 @@ def test_the_page_counts_first_and_gives_each_reason_once():
     assert "Intel i7-12700K and NVIDIA RTX 3090" in page
 
 
-def test_a_share_of_so_many_samples_has_wilsons_interval():
+def test_printed_shares_deviations_and_means_have_the_interval_of_their_samples():
     printed = printed_of(number(97.8, paper_n=180))
     centre, half_width = 96.753, 2.360  # of 176 in 180, by the formula of Wilson (1927)
     assert (printed.low, printed.high) == pytest.approx((centre - half_width, centre + half_width), abs=0.05)
     assert printed_of(number(100.0, paper_n=300)).high == 100
     assert printed_of(number(100.0, paper_n=300)).low == pytest.approx(100 * 300 / (300 + 1.959964**2))
-
-
-def test_a_deviation_and_a_mean_beside_one_have_those_of_their_repeats():
     deviation = number(2.0, counterpart=replace(ACCURACY, statistic="deviation"), paper_n=5)
     own = printed_of(deviation)
     assert chi2.cdf(4 * (2.0 / own.low) ** 2, 4) == pytest.approx(0.975)
@@ -256,9 +247,6 @@ def test_a_deviation_and_a_mean_beside_one_have_those_of_their_repeats():
     mean = printed_of(number(85.0), deviation)
     assert mean.high - 85 == pytest.approx(2.776445 * 2 / 5**0.5)
     assert 85 - mean.low == pytest.approx(mean.high - 85)
-
-
-def test_what_tells_no_sample_is_exact():
     printed = printed_of(number(350.0, 550.0, -1, "labels"))
     assert (printed.low, printed.high, printed.rounding) == (350, 550, 5)
 
@@ -274,21 +262,15 @@ def reference():
     return read_results(path for path in sorted(REFERENCE.glob("*.csv")) if path.name in files)
 
 
-def test_a_reason_is_filled_with_the_mean_over_the_seeds_in_the_unit_that_it_names():
+def test_a_reason_is_filled_with_what_was_run_in_the_unit_that_it_names():
     text = "Longer training gives {metrics.csv attribution @ gpca accuracy all %} %. The paper is silent."
     results = {"metrics.csv": pd.concat([tidy([0.9, 0.8], method="gpca"), tidy([0.1, 0.1])])}
     assert filled(text, number(50.0), results) == "Longer training gives 85.0 %. The paper is silent."
     own = "Here it is {metrics.csv attribution @ @ @ @ share}."
     assert filled(own, number(50.0), results) == "Here it is 0.1."
-
-
-def test_a_sentence_about_what_was_not_run_is_left_out():
     text = "It is {metrics.csv attribution @ gpca accuracy all %} %. The paper is silent."
     assert filled(text, number(50.0), {"metrics.csv": tidy([0.1])}) == "The paper is silent."
     assert filled(text, number(50.0), {}) == "The paper is silent."
-
-
-def test_a_lower_bound_says_so():
     rows = [
         tidy([value], metric=metric, concept="overlap") for metric, value in (("labels_to_target", 60), ("reached", 0))
     ]

@@ -20,49 +20,40 @@ def samples():
     return Clustered.drawn(SEED, CLUSTER, "tiny")
 
 
-def test_a_share_has_the_interval_of_the_bootstrap_that_the_comparison_uses(samples):
+def test_a_share_has_the_interval_of_the_bootstrap_and_rows_keep_their_draws(samples):
     weights = pigeonhole_weights(generator("tiny"), SEED, CLUSTER)
     assert (samples.weights[1:] == weights).all() and (samples.weights[0] == 1).all()
     with np.errstate(invalid="ignore"):
         drawn = (weights * RIGHT).sum(axis=1) / weights.sum(axis=1)
     assert samples.share(RIGHT) == interval(np.append((RIGHT * 1.0).mean(), drawn), weights)
-
-
-def test_two_families_that_are_alike_by_chance_do_not_make_it_narrow():
-    alike = Clustered.drawn(np.zeros(6), np.repeat(["cup", "can"], 3), "tiny")
-    right = np.array([1, 0, 0, 0, 1, 1])
-    assert quantile_bounds((alike.weights[1:] * right).sum(axis=1) / 6) == pytest.approx((1 / 3, 2 / 3))
-    assert alike.share(right) == (0.5, *wilson_interval(3, 6))
-
-
-def test_clusters_make_it_wider_than_as_many_samples_that_have_nothing_in_common(samples):
-    apart = Clustered.drawn(np.zeros(24), np.arange(24), "tiny")
-    width = {name: np.ptp(of.share(RIGHT)[1:]) for name, of in (("clusters", samples), ("apart", apart))}
-    assert width["clusters"] > 1.5 * width["apart"] > 0
-
-
-def test_a_share_on_which_all_draws_agree_has_wilsons_interval_of_its_clusters(samples):
-    assert samples.share(np.ones(24)) == (1, *wilson_interval(6, 6))
-    assert samples.subset(CLUSTER == "can").share(np.zeros(8)) == (0, *wilson_interval(0, 2))
-
-
-def test_a_difference_is_paired(samples):
-    other = np.where(CLUSTER == "can", 0.0, RIGHT)
-    value, low, high = samples.difference(RIGHT, other)
-    assert (value, low) == (pytest.approx(1 / 3), 0) and value < high <= 1
-    assert samples.difference(RIGHT, RIGHT) == (0, *[sign * wilson_interval(0, 6)[1] for sign in (-1, 1)])
-
-
-def test_rows_keep_their_draws(samples):
     of_cans = samples.subset(CLUSTER == "can")
     assert (of_cans.weights == samples.weights[:, CLUSTER == "can"]).all() and len(of_cans) == 8
 
 
-def test_a_mean_has_bounds_within_its_limits(samples):
+def test_a_share_is_as_wide_as_its_clusters_make_it_or_wilsons(samples):
+    alike = Clustered.drawn(np.zeros(6), np.repeat(["cup", "can"], 3), "tiny")
+    right = np.array([1, 0, 0, 0, 1, 1])
+    assert quantile_bounds((alike.weights[1:] * right).sum(axis=1) / 6) == pytest.approx((1 / 3, 2 / 3))
+    assert alike.share(right) == (0.5, *wilson_interval(3, 6))
+    apart = Clustered.drawn(np.zeros(24), np.arange(24), "tiny")
+    width = {name: np.ptp(of.share(RIGHT)[1:]) for name, of in (("clusters", samples), ("apart", apart))}
+    assert width["clusters"] > 1.5 * width["apart"] > 0
+    assert samples.share(np.ones(24)) == (1, *wilson_interval(6, 6))
+    assert samples.subset(CLUSTER == "can").share(np.zeros(8)) == (0, *wilson_interval(0, 2))
+
+
+def test_a_difference_is_paired_a_mean_has_limits_and_one_cluster_says_nothing(samples):
+    other = np.where(CLUSTER == "can", 0.0, RIGHT)
+    value, low, high = samples.difference(RIGHT, other)
+    assert (value, low) == (pytest.approx(1 / 3), 0) and value < high <= 1
+    assert samples.difference(RIGHT, RIGHT) == (0, *[sign * wilson_interval(0, 6)[1] for sign in (-1, 1)])
     value = np.where(CLUSTER == "cup", 3.0, -1.0)
     mean, low, high = samples.mean(value, (-0.5, np.inf))
     assert (mean, low) == (pytest.approx(1 / 3), -0.5) and high > mean
     assert samples.mean(value).low == -1
+    alone = Clustered.drawn(np.zeros(5), ["cup"] * 5, "tiny")
+    assert np.isnan(alone.mean(np.arange(5.0))[1:]).all()
+    assert alone.share(np.ones(5)) == (1, *wilson_interval(1, 1))  # a share has an interval nevertheless
 
 
 def test_a_measure_of_each_seed_is_averaged_by_their_samples_and_its_draws_lie_about_it(samples):
@@ -81,13 +72,7 @@ def test_a_measure_of_each_seed_is_averaged_by_their_samples_and_its_draws_lie_a
     assert told.value == pytest.approx((12 * 0.2 + 24 * 0.8) / 36)
 
 
-def test_one_cluster_in_one_seed_says_nothing_of_others():
-    alone = Clustered.drawn(np.zeros(5), ["cup"] * 5, "tiny")
-    assert np.isnan(alone.mean(np.arange(5.0))[1:]).all()
-    assert alone.share(np.ones(5)) == (1, *wilson_interval(1, 1))  # a share has an interval nevertheless
-
-
-def test_rows_are_written_and_read_back(samples, tmp_path):
+def test_rows_are_written_and_read_back_or_refused(samples, tmp_path):
     records = [samples.record(KEYS, samples.share(RIGHT))]
     lonely = Clustered.drawn([0, 0], ["cup", "cup"], "tiny")
     records.append(lonely.record(KEYS, lonely.mean([1.0, 2.0])))
@@ -97,9 +82,6 @@ def test_rows_are_written_and_read_back(samples, tmp_path):
     assert read.loc[0, ["seeds", "clusters", "samples"]].tolist() == [2, 3, 24]
     assert read.loc[0, ["value", "low", "high"]].tolist() == list(records[0][-3:])
     assert read.loc[1, "value"] == 1.5 and read.loc[1, ["low", "high"]].isna().all()
-
-
-def test_nothing_and_files_that_are_damaged_are_refused(samples, tmp_path):
     with pytest.raises(InputError, match="tiny: no files were given"):
         intervals([], "tiny")
     rows = intervals([samples.record(KEYS, samples.share(RIGHT))], "tiny")

@@ -92,21 +92,15 @@ def test_the_wilson_interval_is_that_of_the_literature():
         wilson_interval(0, 0)
 
 
-def test_mean_interval_against_a_worked_example():
+def test_mean_interval_is_students_and_covers_the_mean_as_often_as_it_says():
     # Three repeats 1, 2, 3: s = 1, t_2(0.975) = 4.302653, half-width 4.302653 / sqrt(3).
     mean, low, high = mean_interval([1, 2, 3])
     assert mean == 2
     assert high - mean == pytest.approx(2.484138, abs=1e-6)
     assert mean - low == pytest.approx(high - mean)
-
-
-def test_mean_interval_covers_the_true_mean_as_often_as_it_says():
     draws = np.random.default_rng(0).normal(size=(2000, 5))
     covered = [low <= 0 <= high for _, low, high in map(mean_interval, draws)]
     assert np.mean(covered) == pytest.approx(0.95, abs=0.02)
-
-
-def test_mean_interval_of_one_none_and_unfinished_repeats():
     mean, low, high = mean_interval([0.7])
     assert mean == 0.7
     assert np.isnan([low, high]).all()
@@ -124,13 +118,10 @@ WEIGHTS = np.vstack([np.ones(N), pigeonhole_weights(np.random.default_rng(9), np
 VALUES = {name: weighted_mean(right_N, WEIGHTS) for name, right_N in RIGHT.items()}
 
 
-def test_weighted_means_are_those_of_the_samples_and_then_of_every_draw():
+def test_the_best_untrained_one_is_beaten_by_a_paired_difference():
     assert VALUES["good"].shape == (1 + REPEATS,)
     assert VALUES["good"][0] == RIGHT["good"].mean()
     assert VALUES["good"][1:].std() > 0
-
-
-def test_the_best_untrained_one_is_beaten_by_a_paired_difference():
     assert UNTRAINED == tuple(untrained.EXPLAINERS) == tuple(untrained.CAUSE_EXPLAINERS)
     assert best_of(VALUES, UNTRAINED) == "rule" and best_of(VALUES, UNTRAINED, least_is_best=True) == "chance"
     other, value, low, high = difference(VALUES, "good", "rule")
@@ -138,9 +129,6 @@ def test_the_best_untrained_one_is_beaten_by_a_paired_difference():
     assert 0 < low < value < high
     shifted = {"a": VALUES["good"], "b": VALUES["good"] - 0.1}  # an interval of the differences, not of the two
     assert difference(shifted, "a", "b")[1:] == pytest.approx((0.1, 0.1, 0.1))
-
-
-def test_without_another_there_is_no_difference():
     alone = {"good": VALUES["good"], "rule": np.full(1 + REPEATS, np.nan)}
     assert best_of(alone, UNTRAINED) == ""
     assert difference(VALUES, "good", "") is NO_OTHER

@@ -45,11 +45,8 @@ def test_a_caption_is_whole_text(name):
     assert "``" not in html
 
 
-def test_no_name_is_registered_twice():
+def test_no_name_is_registered_twice_and_the_papers_tables_and_figures_are_marked():
     assert len(ENTRIES) == len(registered())
-
-
-def test_the_papers_seven_tables_and_six_figures_are_marked():
     paper = {name.split("_")[0] for name, entry in ENTRIES.items() if entry.paper}
     assert paper == {*(f"table{n}" for n in range(1, 8)), *(f"fig{n}" for n in range(1, 7))}
 
@@ -61,9 +58,6 @@ def test_files_are_listed_where_a_name_is_a_list_and_one_path_where_it_is_not():
     }
     assert result(given("metrics.csv")).files(NAMES) == {"metrics": "metrics.csv"}
     assert result(given("recovery/policy_seed{first_seed}.json")).files(NAMES)["metrics"].endswith("seed0.json")
-
-
-def test_the_files_of_a_result_are_those_of_its_kind():
     assert result().all_files == [f"tables/table9_mine.{suffix}" for suffix in ("md", "csv", "tex", "json")]
     assert result(kind="figures", name="fig").all_files == ["figures/fig.png", "figures/fig.pdf"]
     assert result().main_file == "tables/table9_mine.md"
@@ -124,17 +118,11 @@ def only(_run, learned):
     return learned
 
 
-def test_short_names_are_those_of_the_paper_and_the_first_of_a_number():
+def test_short_names_are_the_papers_a_misspelt_one_is_answered_and_sections_keep_their_order():
     names = ["table1_single", "table1_extended", "fig2_overview", "reliability", "fig_attribution_confusions"]
     short = targets(result(name=name) for name in names)
     assert {key: value.name for key, value in short.items()} == {"table1": "table1_single", "fig2": "fig2_overview"}
-
-
-def test_a_misspelt_target_is_answered_by_the_nearest_or_by_all():
     assert unknown_target("tabel2", ["table2", "page"]).endswith("did you mean table2?")
     assert unknown_target("xyz", ["table2", "page"]).endswith("choose one of page, table2")
-
-
-def test_results_stand_by_section_in_order():
     a, b, c = (result(name=name, section=section) for name, section in (("a", "II"), ("b", "I"), ("c", "II")))
     assert by_section([a, b, c]) == {"II": [a, c], "I": [b]}

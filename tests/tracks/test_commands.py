@@ -38,6 +38,7 @@ def test_a_method_in_a_file_stands_among_the_published_rows(method, published, r
 def test_an_explainer_of_the_suite_can_be_run_again(published, run, apart, capsys):
     assert main(["bench", "causes", "chance", "--samples", str(run)]) == 0
     assert f"{MARK}Chance (here)" in capsys.readouterr().out
+    assert plugins.named() == []
 
 
 @pytest.mark.parametrize(
@@ -98,7 +99,3 @@ def test_a_faulty_submission_makes_no_page(board, capsys):
     assert main(["leaderboard", "--submissions", str(board), "--check"]) == 2
     assert "sample 99 is no test sample" in capsys.readouterr().err
     assert not (board / "index.html").exists()
-
-
-def test_plugins_of_a_command_are_those_of_its_process_alone(apart):
-    assert plugins.named() == []

@@ -20,7 +20,7 @@ from ..config.configs import load
 from .conftest import SEED, SOURCE
 
 
-def test_the_truth_of_the_test_samples_is_kept(shipped, causes):
+def test_the_truth_and_what_methods_predict_are_kept_and_the_version_is_of_the_samples(shipped, causes):
     tested = causes.subset(causes.rows("test"))
     [(source, seed, rows)] = shipped.rows.parts()
     assert (source, seed, rows.tolist()) == (SOURCE, SEED, list(range(len(tested))))
@@ -28,14 +28,13 @@ def test_the_truth_of_the_test_samples_is_kept(shipped, causes):
     assert (labels_of(truth.truth) == labels_of(tested.truth)).all()
     np.testing.assert_array_equal(truth.truth_again.error, tested.truth_again.error)
     assert (shipped.rows.object == tested.registrations.object_name).all()
-
-
-def test_what_the_methods_said_is_kept_with_what_they_read(shipped):
     chance, rule = shipped.methods
     assert (chance.name, chance.reads, chance.icp_calls) == ("chance", "nothing", 0)
     assert rule.icp_calls > 0
     assert set(chance.labels_named(TRACKS["causes"].labels)) == {"pose"}
     assert rule.scores.shape == (len(shipped.rows), 4)
+    assert replace(shipped, methods=()).version == shipped.version
+    assert replace(shipped, hashes=dict.fromkeys(shipped.hashes, "0")).version != shipped.version
 
 
 def test_the_file_is_read_as_it_was_written_and_the_same_contents_are_the_same_bytes(shipped, tmp_path):
@@ -49,11 +48,6 @@ def test_the_file_is_read_as_it_was_written_and_the_same_contents_are_the_same_b
     assert (tmp_path / "first.npz").read_bytes() == (tmp_path / "second.npz").read_bytes()
 
 
-def test_other_samples_have_another_version_and_other_predictions_have_not(shipped):
-    assert replace(shipped, methods=()).version == shipped.version
-    assert replace(shipped, hashes=dict.fromkeys(shipped.hashes, "0")).version != shipped.version
-
-
 def test_a_file_that_is_missing_or_says_what_no_track_asks_is_refused(shipped, tmp_path):
     with pytest.raises(InputError, match="no such file, in which the published rows are; restore it, or make it"):
         Published.load(TRACKS["causes"], tmp_path / "causes.npz")
@@ -61,6 +55,8 @@ def test_a_file_that_is_missing_or_says_what_no_track_asks_is_refused(shipped, t
     replace(shipped, methods=(wrong,)).save(tmp_path / "causes.npz")
     with pytest.raises(InputError, match="names labels that the track does not have"):
         Published.load(TRACKS["causes"], tmp_path / "causes.npz")
+    with pytest.raises(InputError, match="track 'clouds': unknown; choose one of causes, hard, frames, scans"):
+        track_of("clouds")
 
 
 def test_a_package_without_its_repository_is_refused(monkeypatch, tmp_path):
@@ -75,11 +71,6 @@ def test_predictions_of_other_samples_are_refused(run, config, tmp_path):
     (tmp_path / "diagnoses").symlink_to(run / "diagnoses")
     with pytest.raises(InputError, match="predictions of other test samples than its own"):
         collect(TRACKS["causes"], tmp_path, config)
-
-
-def test_an_unknown_track_is_answered_with_the_known():
-    with pytest.raises(InputError, match="track 'clouds': unknown; choose one of causes, hard, frames, scans"):
-        track_of("clouds")
 
 
 def test_the_parts_of_the_tracks_are_those_of_the_default_config():

@@ -94,7 +94,7 @@ def test_a_step_that_fails_ends_in_its_own_line(default, tmp_path):
         module.make(["causes/ycb/seed0.npz"], tmp_path, default, processes=1)
 
 
-def test_samples_are_arrays_a_frame_and_a_torch_dataset(published, run, causes):
+def test_samples_are_arrays_a_frame_and_a_torch_dataset_of_the_split_that_is_asked_for(published, run, causes):
     data = gpca.load("causes", source=SOURCE, split="test", seed=SEED, samples=run)
     tested = causes.subset(causes.rows("test"))
     assert len(data) == len(tested) == 8 and published.version in repr(data)
@@ -107,9 +107,6 @@ def test_samples_are_arrays_a_frame_and_a_torch_dataset(published, run, causes):
     assert source_N_3.shape == target_N_3.shape == (64, 3)
     expected = data.labels.index(data.label[0]) if data.label[0] in data.labels else NO_LABEL
     assert int(number) == expected
-
-
-def test_both_splits_are_given_unless_one_is_asked_for(published, run, causes):
     assert len(gpca.load("causes", seed=SEED, samples=run)) == len(causes) == len(Causes.load(run / FILE))
 
 

@@ -134,6 +134,7 @@ def test_published_rows_have_the_numbers_of_table_18(shipped, folder, monkeypatc
         found = own.loc[(row["source"], name, row["metric"])]
         for column in ("value", "low", "high"):
             assert found[column] == pytest.approx(row[column], nan_ok=True), (row["metric"], column)
+    assert scan_causes.CAUSES in scoring.SHARES_OF_SAMPLES
 
 
 def test_a_method_in_a_file_stands_among_the_published_rows_of_every_data_set(method, published, folder, capsys):
@@ -241,7 +242,3 @@ def test_the_virtual_set_is_made_by_its_recipe_and_loaded_as_an_object(full, shi
     assert (data.frame()["severity_noise"] > 0).tolist() == (pd.read_csv(paths["samples"])["times"] > 0).tolist()
     with pytest.raises(InputError, match="split 'train': has no samples of the track scans; learn from the samples of"):
         gpca.load("scans", split="train", seed=SEED, samples=tmp_path)
-
-
-def test_measures_of_scans_are_those_that_an_interval_is_made_for():
-    assert scan_causes.CAUSES in scoring.SHARES_OF_SAMPLES

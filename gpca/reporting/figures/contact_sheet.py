@@ -49,6 +49,8 @@ def render_cloud(points: np.ndarray, normals: np.ndarray, view: tuple[float, flo
     Returns:
         The picture (pixels, pixels, 3) in [0, 1], which the solid fills, row 0 on top, white where nothing is.
     """
+    from scipy.spatial import cKDTree
+
     size = pixels * SUPERSAMPLING
     axes = view_from(*view)
     positions, facing = points @ axes.T, normals @ axes.T
@@ -56,21 +58,14 @@ def render_cloud(points: np.ndarray, normals: np.ndarray, view: tuple[float, flo
     scale = FILL * size / (float((high - low)[:2].max()) or 1.0)
     positions = (positions - (low + high) / 2) * scale
     positions[:, :2] += size / 2
-    radius = min(_disc_radius(positions), LARGEST_DISC * size)
+    radius, neighbors = 1.0, min(8, len(positions) - 1)
+    if neighbors:  # discs that cover DISC_COVER points, by the distance to the 8th neighbor
+        distance, _ = cKDTree(positions).query(positions, k=[neighbors + 1])
+        radius = max(1.0, float(np.median(distance)) * math.sqrt(DISC_COVER / neighbors))
+    radius = min(radius, LARGEST_DISC * size)
     depth, normal = splat(positions, facing, radius, size)
     image = _shade(depth, normal, relief=size / 40, radius=radius)
     return image.reshape(pixels, SUPERSAMPLING, pixels, SUPERSAMPLING, 3).mean(axis=(1, 3))[::-1]
-
-
-def _disc_radius(positions: np.ndarray) -> float:
-    """Return the radius of a disc that covers DISC_COVER points, from the distance to the 8th neighbor."""
-    from scipy.spatial import cKDTree
-
-    neighbors = min(8, len(positions) - 1)
-    if neighbors < 1:
-        return 1.0
-    distance, _ = cKDTree(positions).query(positions, k=[neighbors + 1])
-    return max(1.0, float(np.median(distance)) * math.sqrt(DISC_COVER / neighbors))
 
 
 def _shade(depth: np.ndarray, normal: np.ndarray, relief: float, radius: float) -> np.ndarray:

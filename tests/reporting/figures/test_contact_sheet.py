@@ -68,15 +68,12 @@ def test_ball_is_a_closed_disc_on_white_lit_from_above_left():
     assert image[22:30, 22:30].mean() > image[50:58, 50:58].mean() + 0.1
 
 
-def test_unit_of_length_and_sign_of_normals_do_not_matter():
+def test_unit_of_length_and_sign_of_normals_do_not_matter_and_flat_clouds_are_drawn():
     points, normals = _square(0.0, [0.0, 0.0, 1.0])
     image = render_cloud(points, normals, FROM_ABOVE, 40)
     np.testing.assert_allclose(render_cloud(1000 * points, normals, FROM_ABOVE, 40), image, atol=0.02)
     turned = render_cloud(points, -normals, FROM_ABOVE, 40)
     np.testing.assert_allclose(turned[12:28, 12:28], image[12:28, 12:28], atol=0.05)
-
-
-def test_single_point_and_flat_cloud_are_drawn():
     assert render_cloud(np.zeros((1, 3)), np.array([[0.0, 0.0, 1.0]]), FROM_ABOVE, 20).shape == (20, 20, 3)
     line = np.column_stack([np.linspace(0, 1, 50), np.zeros(50), np.zeros(50)])
     image = render_cloud(line, np.tile([0.0, 0.0, 1.0], (50, 1)), FROM_ABOVE, 40)

@@ -8,7 +8,7 @@ from gpca.reporting.figures.reliability import draw_reliability_panel
 from tests.judged import random_judged
 
 
-def test_the_error_in_the_title_is_the_one_of_the_tables(tmp_path):
+def test_the_error_is_that_of_the_tables_and_a_calibrated_score_lies_on_the_diagonal(tmp_path):
     judged = random_judged(n=300)
     clear = judged.label != "borderline"
     _, panel = plt.subplots()
@@ -16,9 +16,6 @@ def test_the_error_in_the_title_is_the_one_of_the_tables(tmp_path):
     expected = measure(judged, np.ones((1, len(judged))))["nominal_calibration"][0]
     assert gap == pytest.approx(expected)
     plt.close()
-
-
-def test_a_calibrated_score_lies_on_the_diagonal():
     random = np.random.default_rng(0)
     probability = random.uniform(size=40000)
     _, panel = plt.subplots()

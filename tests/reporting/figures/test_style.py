@@ -22,23 +22,17 @@ def figure():
     return figure
 
 
-def test_the_palette_is_the_one_of_the_matplotlibrc():
-    style.use_style()
-    cycle = [f"#{color.lstrip('#')}" for color in matplotlib.rcParams["axes.prop_cycle"].by_key()["color"]]
-    assert tuple(cycle) == style.PALETTE
-    assert matplotlib.rcParams["figure.figsize"][0] == style.COLUMN_WIDTH_IN
-    assert matplotlib.rcParams["xtick.labelsize"] == style.SMALL_PT
-
-
-def test_a_users_own_settings_change_nothing():
+def test_the_palette_is_that_of_the_file_and_a_users_own_settings_change_nothing():
     style.use_style()
     ours = dict(matplotlib.rcParams)
     matplotlib.rcParams.update({"font.size": 20, "axes.facecolor": "red", "lines.linestyle": "--"})
     style.use_style()
     assert dict(matplotlib.rcParams) == ours
-
-
-def test_the_file_serves_as_a_style_of_matplotlib():
+    style.use_style()
+    cycle = [f"#{color.lstrip('#')}" for color in matplotlib.rcParams["axes.prop_cycle"].by_key()["color"]]
+    assert tuple(cycle) == style.PALETTE
+    assert matplotlib.rcParams["figure.figsize"][0] == style.COLUMN_WIDTH_IN
+    assert matplotlib.rcParams["xtick.labelsize"] == style.SMALL_PT
     import matplotlib.pyplot as plt
 
     matplotlib.rcdefaults()
@@ -70,12 +64,9 @@ def test_a_drawing_has_few_colors_and_keeps_them(figure, tmp_path, photograph, m
         assert np.abs(shown - to_rgb(color)).max(2).min() < 0.05
 
 
-def test_an_edit_of_the_matplotlibrc_redraws_every_figure():
+def test_colors_are_named_in_the_style_alone_and_an_edit_of_the_file_redraws_every_figure():
     assert "gpca/reporting/figures/matplotlibrc" in code_files("gpca.experiments.kernel_grid")
     assert "gpca/reporting/figures/matplotlibrc" not in code_files("gpca.classifier.gpc")
-
-
-def test_colors_are_named_in_the_style_alone():
     folder = Path(style.__file__).parent
     strangers = {
         path.name: found

@@ -37,7 +37,7 @@ def built(builder, **options):
     return builder.build(**{"caption": "T", "column_head": "metric", "columns": columns, "footnotes": ["n"]} | options)
 
 
-def test_a_table_has_the_rows_and_cells_that_were_added_in_their_order(builder):
+def test_a_table_has_the_rows_that_were_added_in_their_order_if_they_have_a_cell(builder):
     table = built(builder)
     assert (table.name, table.caption, table.row_heads, table.column_head) == ("table9", "T", HEADS, "metric")
     assert [row[0][0] + " " + row[1][1] for row in table.rows] == [
@@ -47,9 +47,6 @@ def test_a_table_has_the_rows_and_cells_that_were_added_in_their_order(builder):
     assert (2, "b") not in table.cells
     assert table.footnotes == ("n",)
     assert "| YCB | Shap | 80.0 | – |" in table.markdown()
-
-
-def test_a_row_without_any_cell_is_left_out(builder):
     builder.add_row(labels("cups", "gpca"), cells(a=None, b=None))
     builder.add_row(labels("cups", "shap"), {})
     builder.add_row(labels("cups", "oracle"), cells(b=5))
@@ -94,14 +91,11 @@ def test_the_caption_speaks_of_the_stand_ins_among_the_rows(builder):
     assert builder.stand_in_clause(others) == ""
 
 
-def test_a_cell_of_repeats_has_their_mean_and_t_interval():
+def test_a_cell_of_repeats_has_their_mean_and_from_three_on_their_t_interval():
     cell = cell_of_repeats([97.0, 98.0, 99.0], 600)
     assert (cell.mean, cell.seeds, cell.test_samples, cell.at_least) == (98, 3, 600, False)
     assert cell.half_width == pytest.approx(4.302653 / math.sqrt(3), abs=1e-5)
     assert cell_of_repeats(pd.Series([1.0, 2.0]), 2, at_least=True).at_least
-
-
-def test_fewer_than_three_repeats_have_no_interval_and_none_makes_no_cell():
     assert math.isnan(cell_of_repeats([5.0], 200).half_width)
     assert math.isnan(cell_of_repeats([5.0, 6.0], 400).half_width)
     assert cell_of_repeats([5.0, 6.0], 400).mean == 5.5
@@ -109,7 +103,7 @@ def test_fewer_than_three_repeats_have_no_interval_and_none_makes_no_cell():
     assert math.isnan(plain_cell(0.25, 3, 600).half_width)
 
 
-def test_an_interval_has_its_bounds_where_it_is_not_that_over_the_seeds():
+def test_an_interval_has_its_bounds_and_is_not_printed_beside_a_heavy_tail():
     cell = Cell(76.9, 10.8, 1, 200, bounds=(64.9, 86.3))
     assert Column("A").text(cell) == "76.9 (64.9 to 86.3)"
     assert Column("A", interval=False).text(cell) == "76.9"
@@ -117,25 +111,19 @@ def test_an_interval_has_its_bounds_where_it_is_not_that_over_the_seeds():
     assert change.text(Cell(-21.7, 10.8, 1, 200, bounds=(-34.2, -12.5))) == "-21.7; -34.2 to -12.5"
     assert change.text(Cell(1.25, 0.5, 3, 600)) == "+1.2 ± 0.5"
     assert change.text(Cell(-0.01, 0.02, 1, 200, bounds=(-0.03, 0.01))) == "+0.0; 0.0 to 0.0"  # and no -0.0
-
-
-def test_an_interval_wider_than_a_mean_with_a_heavy_tail_is_not_printed():
     heavy = Column("KL", 2, limits=(0, math.inf), heavy_tail=True)
     assert heavy.text(Cell(7.56, 7.02, 5, 100)) == "7.56 ± 7.02"
     assert heavy.text(Cell(658.3, 1239.3, 5, 100)) == "658.30"
     assert Column("A").text(Cell(1.0, 2.0, 5, 100)) == "1.0 ± 2.0"
 
 
-def test_means_over_few_seeds_are_not_bold_but_those_with_an_interval_of_their_own():
+def test_means_over_few_seeds_and_what_all_share_are_not_bold():
     builder = TableBuilder("table9", HEADS)
     for name, bounds in (("gpca", None), ("shap", None), ("forest", (1.0, 9.0)), ("svm", (0.0, 5.0))):
         labels_of = labels("ycb" if bounds is None else "linemod", name)
         builder.add_row(labels_of, {"a": Cell(len(name), 1.0, 2, 400, bounds=bounds)})
     builder.compare_down(["a"], same=1)
     assert built(builder).best() == {(2, "a")}
-
-
-def test_what_all_of_a_group_share_is_not_bold():
     builder = TableBuilder("table9", HEADS)
     builder.add_row(labels("ycb", "gpca"), cells(a=4, b=4))
     builder.add_row(labels("ycb", "shap"), cells(a=4, b=5))
