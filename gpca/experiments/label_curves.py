@@ -72,11 +72,16 @@ def draw_curves(
                                  for i, part in enumerate((sources, rows, lines)))  # fmt: skip
     if not shown:
         raise InputError("active learning", "has no curve of these sources and strategies", "run it first")
-    down = [
-        (name, group)
-        for name in settings
-        for group in _groups([line for line in across if any(key[1:] == (name, line) for key in shown)], styles)
-    ]
+    down: list[tuple[str, list[str]]] = []
+    for name in settings:
+        present = [line for line in across if any(key[1:] == (name, line) for key in shown)]
+        if len(present) <= MOST_LINES:
+            down.append((name, present))
+            continue
+        always = [line for line in present if styles.get(line, _OTHER)[2] > 1][: MOST_LINES - 1]
+        others = [line for line in present if line not in always]
+        groups = -(-len(others) // (MOST_LINES - len(always)))
+        down += [(name, [*always, *map(str, part)]) for part in np.array_split(others, groups)]
     aim = f"target ({100 * target:g} %)"
     ordered = [*(lines[line] for line in across), aim]
     below = -(-len(ordered) // fitting_columns(ordered, TEXT_WIDTH_IN))
@@ -90,7 +95,12 @@ def draw_curves(
             panel.axhline(100 * target, color=GRAY, linewidth=0.6, linestyle=(0, (4, 3)), label=aim)
             for line in reversed(group):
                 if (source, name, line) in shown:
-                    _draw(panel, styles.get(line, _OTHER), lines[line], curves[source, name, line])
+                    curve, (color, dashes, width) = curves[source, name, line], styles.get(line, _OTHER)
+                    look = {"color": color, "linewidth": width, "label": lines[line]}
+                    panel.plot(curve["labels"], curve["mean"], dashes, **look)
+                    if width > 1:
+                        bounds = (curve[bound].clip(0, 100) for bound in ("low", "high"))
+                        panel.fill_between(curve["labels"], *bounds, color=color, alpha=0.15, linewidth=0)
             if len(panel.get_lines()) == 1:
                 panel.text(0.5, 0.5, "no curve", transform=panel.transAxes, ha="center", va="center", color=GRAY)
             panel.margins(x=0.01)
@@ -104,16 +114,6 @@ def draw_curves(
     seeds = {count for key in shown for count in curves[key]["seeds"]}
     write_title(figure, f"Means over {plural(span(seeds), 'seed')}")
     return figure
-
-
-def _groups(lines: list[str], styles: Mapping[str, tuple]) -> list[list[str]]:
-    """Lines of a setting as groups of at most `MOST_LINES`; lines with an interval are in each."""
-    if len(lines) <= MOST_LINES:
-        return [lines]
-    always = [line for line in lines if styles.get(line, _OTHER)[2] > 1][: MOST_LINES - 1]
-    others = [line for line in lines if line not in always]
-    parts = -(-len(others) // (MOST_LINES - len(always)))
-    return [[*always, *map(str, part)] for part in np.array_split(others, parts)]
 
 
 def mean_curves(
@@ -148,11 +148,3 @@ def mean_curves(
         ]
         means[key] = pd.DataFrame(rows, columns=["labels", "mean", "low", "high", "seeds"])
     return means
-
-
-def _draw(axes, style: tuple, title: str, curve: pd.DataFrame) -> None:
-    color, line, width = style
-    axes.plot(curve["labels"], curve["mean"], line, color=color, linewidth=width, label=title)
-    if width > 1:
-        bounds = curve["low"].clip(0, 100), curve["high"].clip(0, 100)
-        axes.fill_between(curve["labels"], *bounds, color=color, alpha=0.15, linewidth=0)

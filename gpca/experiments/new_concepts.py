@@ -165,7 +165,12 @@ def table15_new_concepts(
         selected = rows_where(metrics, source=source, table=TABLE + setting)
         rows = selected[selected["concept"].isin(CONCEPTS)]
         cells = {key: cell_of(rows, quantity, test, clusters) for key, quantity in (labels | accuracies).items()}
-        cells["within"] = _within(rows, test)
+        of_papers = rows_where(rows, method=PAPERS)
+        wide = of_papers.pivot_table(index=["seed", "concept"], columns="metric", values="value")
+        if {"labels_to_target", "reached"} <= set(wide):
+            done = (wide["labels_to_target"] <= WITHIN) & (wide["reached"] == 1)
+            shares = 100 * done.groupby(level="seed").mean()
+            cells["within"] = cell_of_repeats(shares, test * len(shares))
         cells |= {
             key: cell_of(selected, quantity, tests[str(quantity.concept)], cause_clusters)
             for key, quantity in with_causes.items()
@@ -173,9 +178,16 @@ def table15_new_concepts(
         builder.add_row(titles, cells, rival=setting != "pretrained")
     for (source, explainer), titles in crossed(run.source_titles, NO_LABELS):
         accuracy = clustered_cell(without_labels, source=source, method=explainer, metric="accuracy", concept=ALL)
-        cells = _without_labels(accuracy, labels, learning["target"])
+        cells = {"all_labels": accuracy}  # as of the whole pool, and 0 labels where it is enough
+        if accuracy and accuracy.mean >= 100 * learning["target"]:
+            cells |= dict.fromkeys(labels, plain_cell(0, accuracy.seeds, accuracy.test_samples))
         builder.add_row(titles, cells, rival=False)
     builder.compare_down([*labels, "within", *NEW_CAUSES], same=1)
+    fewer = {}  # datasets with fewer seeds of Geometry than of the rest
+    for (row, key), cell in builder.cells.items():
+        if key == GEOMETRY and cell.seeds < builder.most_seeds():
+            fewer[builder.labels[row][0][1]] = f"{builder.labels[row][0][1]}: {plural(cell.seeds, 'seed')}"
+    of_fewer = f" ({', '.join(fewer.values())})" if fewer else ""
     columns = {key: quantity.column for key, quantity in labels.items()} | {"within": within}
     columns |= {key: quantity.column for key, quantity in (accuracies | with_causes).items()}
     return builder.build(
@@ -195,7 +207,7 @@ def table15_new_concepts(
             "Nominal, Geometry: the new concept in registrations with measured causes, of objects that no method saw; "
             "accuracy over all causes after all queries by BALD, and with the whole pool labeled. No encoder saw "
             f"Geometry. Test samples of a seed: {tests[NOMINAL]}, with Geometry up to {tests[GEOMETRY]}, if any of its "
-            f"registrations fails by that{_fewer(builder)}.",
+            f"registrations fails by that{of_fewer}.",
         ),
     )
 
@@ -299,34 +311,6 @@ def tests_with_causes(run: Run) -> dict[str, int]:
     labeled = apportion(causes["test"], causes["shares"])
     judged = causes["test"] - labeled[BORDERLINE] - labeled[GEOMETRY]
     return {NOMINAL: judged, GEOMETRY: judged + run.config["new_concepts"]["geometry_test"]}
-
-
-def _fewer(builder: TableBuilder) -> str:
-    """Words on the datasets with fewer seeds of Geometry than of the rest, if there are any."""
-    most = builder.most_seeds()
-    fewer = {
-        builder.labels[row][0][1]: plural(cell.seeds, "seed")
-        for (row, key), cell in builder.cells.items()
-        if key == GEOMETRY and cell.seeds < most
-    }
-    return f" ({', '.join(f'{title}: {seeds}' for title, seeds in fewer.items())})" if fewer else ""
-
-
-def _within(metrics: pd.DataFrame, test: int) -> Cell | None:
-    wide = rows_where(metrics, method=PAPERS).pivot_table(index=["seed", "concept"], columns="metric", values="value")
-    if not {"labels_to_target", "reached"} <= set(wide):
-        return None
-    done = (wide["labels_to_target"] <= WITHIN) & (wide["reached"] == 1)
-    shares = 100 * done.groupby(level="seed").mean()
-    return cell_of_repeats(shares, test * len(shares))
-
-
-def _without_labels(accuracy: Cell | None, labels: Iterable[str], target: float) -> dict[str, Cell | None]:
-    """Cells of what needs no labels: its accuracy as that of the whole pool, and 0 labels where it is enough."""
-    enough = labels if accuracy and accuracy.mean >= 100 * target else ()
-    return {"all_labels": accuracy} | {
-        key: plain_cell(0, accuracy.seeds, accuracy.test_samples) for key in enough if accuracy
-    }
 
 
 def _protocol(learning: Mapping) -> str:

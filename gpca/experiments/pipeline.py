@@ -167,29 +167,20 @@ def _draw_inference(canvas: Canvas, stages: Stages, row: int, encoder: str, labe
     canvas.arrow((3.86, middle_in), (4.02, middle_in))
     canvas.box(4.02, 2.0, 1.2, 1.22, color=style.BLUE)
     canvas.text(4.62, 3.19, "multi-class GP classifier", va="top")
-    _draw_labeled(canvas.panel(4.07, 2.17, 1.1, 0.88), stages, row, labeling)
+    panel = canvas.panel(4.07, 2.17, 1.1, 0.88)
+    train = stages.registrations.rows("train")
+    for concept in CONCEPTS:
+        rows = train[stages.registrations.concept[train] == concept]
+        look = {"marker": style.CONCEPT_MARKERS[concept], "color": style.CONCEPT_COLORS[concept]}
+        panel.scatter(*labeling.map_S_2[rows].T, s=5, alpha=0.6, linewidths=0, **look)
+    panel.scatter(*labeling.map_S_2[row], s=45, marker="*", color=style.BLACK, zorder=5)
+    panel.set_axis_off()
     canvas.text(4.62, 2.03, "★ this sample", va="bottom")
     canvas.arrow((5.22, middle_in), (5.58, middle_in))
     draw_scores_with_numbers(canvas.panel(5.96, 2.42, 0.62, 0.62), sample)
     canvas.text(
         6.36, captions_in, rf"$\hat{{s}}_c \pm \sqrt{{v_c}}$;  $\hat{{c}}$ = {sample['concept_predicted']}", va="top"
     )
-
-
-def _draw_labeled(axes, stages: Stages, row: int, labeling: Round) -> None:
-    """Scatter the training samples by concept, and the sample that is shown."""
-    train = stages.registrations.rows("train")
-    for concept in CONCEPTS:
-        rows = train[stages.registrations.concept[train] == concept]
-        look = {
-            "marker": style.CONCEPT_MARKERS[concept],
-            "color": style.CONCEPT_COLORS[concept],
-            "alpha": 0.6,
-            "linewidths": 0,
-        }
-        axes.scatter(*labeling.map_S_2[rows].T, s=5, **look)
-    axes.scatter(*labeling.map_S_2[row], s=45, marker="*", color=style.BLACK, zorder=5)
-    axes.set_axis_off()
 
 
 def _draw_active_learning(canvas: Canvas, stages: Stages, labeling: Round, new: str, curves: Mapping) -> None:

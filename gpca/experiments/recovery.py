@@ -11,23 +11,25 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import Field
 
 from gpca.causes.policy import Thresholds
-from gpca.encoders.registry import EncoderChanges
+from gpca.encoders.registry import EncoderChanges, encoder_module
 from gpca.errors import InputError, require_names, with_key
 from gpca.experiments.experiment import Experiment, LeftOut, Names
 from gpca.experiments.plan import Run
 from gpca.experiments.recovery_measures import ERROR, SEQUENCE, pool_share
 from gpca.experiments.result import table
-from gpca.explainers.registry import explainer_entry, require_settings
+from gpca.experiments.step import Plan, Step, Wildcards
+from gpca.explainers.registry import explainer_entry, explainer_module, require_settings
 from gpca.frames.initial_pose import InitialPoseSettings
 from gpca.frames.situations import SituationSettings
 from gpca.io.csv_file import numbers as number_column
 from gpca.io.csv_file import read_csv
 from gpca.objects.camera import Camera
 from gpca.objects.entry import SurfacePoints
+from gpca.objects.source import data_files, data_folders, source_modules
 from gpca.pairs.perturbation import CONCEPTS, Hidden
 from gpca.pairs.synthesis import TestSamples, TrainSamples
 from gpca.recovery.actions import ACTIONS, action_of
-from gpca.recovery.policies import named_policies, policies, policy_entry
+from gpca.recovery.policies import named_policies, policies, policy_entry, policy_module
 from gpca.recovery.settings import LoopSettings
 from gpca.reporting.sheet import Row, Sheet, show
 from gpca.reporting.tables.builder import over_clusters
@@ -159,6 +161,58 @@ EXPERIMENT = Experiment(
     optional_entries={"recovery.actions": Names("action", lambda: ACTIONS)},
     switches={"recovery.policies": Names("policy", lambda: policies(tuple(ACTIONS)))},
     lists={"recovery.policies": policies_without},
+)
+
+
+def explained(plan: Plan) -> list[str]:
+    """Explainers that the policies of a run read."""
+    recovery = plan.config["recovery"]
+    entries = (policy_entry(name, tuple(recovery["actions"])) for name in recovery["policies"])
+    return sorted({entry.explainer for entry in entries if entry.explainer})
+
+
+def _settings(plan: Plan, _wildcards: Wildcards) -> dict[str, Any]:
+    config, recovery = plan.config, plan.config["recovery"]
+    return {
+        **{name: config[name] for name in ("recovery", "success", "registrations")},
+        "objects": config["sources"][recovery["objects"]],
+        "scenes": config["real_world"]["scenes"],
+        "encoder": config["encoders"][config["embedding"]["encoder"]] | recovery["encoder"],
+        "uncertainty": config["uncertainty"].get("removal", {}),
+        "reenactment": config["diagnosis"]["reenactment"],
+        "explainers": {name: config["explainers"].get(name) or {} for name in explained(plan)},
+    }
+
+
+def standing(plan: Plan) -> Mapping[str, Any]:
+    """Entry of the source whose objects stand on the tables."""
+    return plan.sources[plan.config["recovery"]["objects"]]
+
+
+RECOVER = Step(
+    name="recover",
+    run="gpca.steps.recovery",
+    data=lambda plan, _wildcards: data_files(standing(plan)),
+    outputs={
+        "rows": "recovery/seed{seed}.csv",
+        "queue": "recovery/queue_seed{seed}.csv",
+        "policy": "recovery/policy_seed{seed}.json",
+        "example": "recovery/example_seed{seed}.npz",
+        "timings": "timings/recovery/seed{seed}.csv",
+    },
+    settings=_settings,
+    params={
+        "folders": lambda plan, _wildcards: data_folders(
+            standing(plan), plan.config["data_dir"], plan.config["downloads"]
+        )
+    },
+    modules=lambda plan: [
+        encoder_module(plan.config["encoders"][plan.config["embedding"]["encoder"]]),
+        *map(explainer_module, explained(plan)),
+        *filter(None, map(policy_module, plan.config["recovery"]["policies"])),
+        *source_modules(standing(plan)),
+    ],
+    priority=6,
 )
 
 

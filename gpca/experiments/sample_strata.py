@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -106,18 +106,18 @@ SHOWN_STATES = {
 )
 def table9_strata(run: Run, strata):
     """How often a few explainers are right in every stratum, and what their answer leaves on the table."""
-    chosen = _chosen(strata, diagnosis.cause_titles(run.config))
+    explainers = diagnosis.cause_titles(run.config)
+    failed = where(strata, {"concept": "state_failed", "metric": "regret", "against": ""})
+    regret = failed.set_index("method")["value"]
+    trained = [name for name in explainers if name in regret.index and name not in (*SIMPLE, PAPER)]
+    names = [name for name in (*SIMPLE, PAPER) if name in explainers and name in regret.index]
+    names += sorted(trained, key=lambda name: regret[name])[:1]
+    chosen = {name: explainers[name] for name in names} | AGAIN
     columns: dict[str, Column] = {"samples": Column("n", decimals=0, interval=False, limits=(0.0, inf))}
     for name, title in chosen.items():
-        columns[f"{name}_named_right"] = Show(
-            f"{title}: right (%)", interval=name != CEILING, where={"method": name, "metric": "named_right"}
-        )
-        columns[f"{name}_regret"] = Show(
-            f"{title}: regret (%)",
-            interval=False,
-            limits=(0.0, inf),
-            where={"method": name, "metric": "regret"},
-        )
+        right, regretted = ({"method": name, "metric": metric} for metric in DECISIONS)
+        columns[f"{name}_named_right"] = Show(f"{title}: right (%)", interval=name != CEILING, where=right)
+        columns[f"{name}_regret"] = Show(f"{title}: regret (%)", interval=False, limits=(0.0, inf), where=regretted)
     rows = [
         Row([(kind, title), stratum], {"concept": f"{kind}_{stratum[0]}"})
         for kind, (title, strata_of_kind) in KINDS.items()
@@ -140,16 +140,6 @@ def table9_strata(run: Run, strata):
     )
     caption = "Parts of the registrations with measured causes" + run.stand_ins()
     return sheet.table(caption, "explainer", notes)
-
-
-def _chosen(strata: pd.DataFrame, explainers: Mapping[str, str]) -> dict[str, str]:
-    """Titles of those shown: untrained, the paper's, the trained one of least regret, the ceiling."""
-    failed = where(strata, {"concept": "state_failed", "metric": "regret", "against": ""})
-    regret = failed.set_index("method")["value"]
-    trained = [name for name in explainers if name in regret.index and name not in (*SIMPLE, PAPER)]
-    names = [name for name in (*SIMPLE, PAPER) if name in explainers and name in regret.index]
-    names += sorted(trained, key=lambda name: regret[name])[:1]
-    return {name: explainers[name] for name in names} | AGAIN
 
 
 @table(

@@ -143,33 +143,35 @@ def all_files(step: Step, plan: Plan) -> list[str]:
 
 
 def _rule(step: Step, plan: Plan, name: str) -> Rule:
-    outputs = {key: _files(step, plan, pattern) for key, pattern in step.outputs.items()}
-    in_outputs = [
-        found for pattern in step.outputs.values() for each in _listed(pattern) for found in BRACED.findall(each)
-    ]
-    wildcards = [
-        wildcard
-        for star, wildcard in dict.fromkeys(in_outputs)
-        if not star and not isinstance(plan.names.get(_source(step, wildcard)), str)
-    ]
-    lists = {
-        plural(listed): list(plan.names[_source(step, listed)]) for star, listed in dict.fromkeys(in_outputs) if star
-    }
-    constraints = {
-        wildcard: "|".join(map(str, plan.names[_source(step, wildcard)])) or "none"
-        for wildcard in wildcards
-        if wildcard != "seed" and _source(step, wildcard) in plan.names
-    }
+    patterns = [each for outputs in step.outputs.values() for each in _listed(outputs)]
+    in_outputs = dict.fromkeys(found for each in patterns for found in BRACED.findall(each))
+    values = {wildcard: plan.names.get(_source(step, wildcard)) for _, wildcard in in_outputs}
+    wildcards = [wildcard for star, wildcard in in_outputs if not star and not isinstance(values[wildcard], str)]
+    modules = (step.run, *step.modules(plan))
+
+    def later(function: Callable, *given: Any) -> Callable[[Wildcards], Any]:
+        return lambda wildcards: function(*given, wildcards)
+
     return Rule(
         name=name,
         run=step.run,
-        inputs={key: _input(step, plan, files) for key, files in step.inputs.items()},
-        data={"data": _data(step, plan)} if step.data else {},
-        code=_code(step, plan),
-        outputs=outputs,
-        settings=_settings(step, plan),
-        params=lists | {key: _param(plan, value) for key, value in step.params.items()},
-        constraints=constraints,
+        inputs={
+            key: later(_resolved, step, plan, files) if callable(files) else _files(step, plan, files)
+            for key, files in step.inputs.items()
+        },
+        data={"data": lambda wildcards: [*map(str, step.data(plan, wildcards))]} if step.data else {},
+        code=(lambda wildcards: code_files(*modules, *step.modules_of_job(plan, wildcards)))
+        if step.modules_of_job
+        else code_files(*modules),
+        outputs={key: _files(step, plan, pattern) for key, pattern in step.outputs.items()},
+        settings=later(_as_json, step, plan) if callable(step.settings) else _as_json(step, plan, None),
+        params={plural(listed): list(values[listed]) for star, listed in in_outputs if star}
+        | {key: later(value, plan) if callable(value) else value for key, value in step.params.items()},
+        constraints={
+            wildcard: "|".join(map(str, values[wildcard])) or "none"
+            for wildcard in wildcards
+            if wildcard != "seed" and values[wildcard] is not None
+        },
         place="/".join([name, *(f"{{{wildcard}}}" for wildcard in wildcards)]),
         priority=step.priority,
         threads=step.threads,
@@ -243,26 +245,10 @@ def _expanded(step: Step, plan: Plan, pattern: str) -> list[str]:
     return files
 
 
-def _input(step: Step, plan: Plan, files: Files) -> Any:
-    if callable(files):
-        return lambda wildcards: _resolved(step, plan, files, wildcards)
-    return _files(step, plan, files)
-
-
 def _resolved(step: Step, plan: Plan, files: Callable, wildcards: Wildcards) -> str | list[str]:
     given, by_name = files(plan, wildcards), dict(wildcards.items())
     paths = [path.format(**by_name) for pattern in _listed(given) for path in _expanded(step, plan, pattern)]
     return paths[0] if isinstance(given, str) and "{*" not in given else paths
-
-
-def _data(step: Step, plan: Plan) -> Callable[[Wildcards], list[str]]:
-    return lambda wildcards: [str(path) for path in step.data(plan, wildcards)]  # type: ignore[misc]
-
-
-def _settings(step: Step, plan: Plan) -> Any:
-    if callable(step.settings):
-        return lambda wildcards: _as_json(step, plan, wildcards)
-    return _as_json(step, plan, None)
 
 
 def _as_json(step: Step, plan: Plan, wildcards: Wildcards) -> str:
@@ -271,14 +257,3 @@ def _as_json(step: Step, plan: Plan, wildcards: Wildcards) -> str:
     else:
         settings = {key.rpartition(".")[2]: reduce(getitem, key.split("."), plan.config) for key in step.settings}
     return json.dumps(settings, sort_keys=True)
-
-
-def _code(step: Step, plan: Plan) -> Any:
-    of_job, modules = step.modules_of_job, (step.run, *step.modules(plan))
-    if of_job is None:
-        return code_files(*modules)
-    return lambda wildcards: code_files(*modules, *of_job(plan, wildcards))
-
-
-def _param(plan: Plan, value: Any) -> Any:
-    return (lambda wildcards: value(plan, wildcards)) if callable(value) else value
