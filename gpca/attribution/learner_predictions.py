@@ -26,9 +26,8 @@ SCORES = ("max_score", "entropy", "bald", "variance")  # not every learner has t
 def read_learner_predictions(prediction_files: Iterable[str | Path], set_files: Iterable[str | Path] = ()) -> dict:
     """(source, learner, seed) -> rows of predictions, with the uncertainties `SCORES`, higher where less sure.
 
-    Args:
-        prediction_files: named `…/{source}/{learner}/seed{seed}.csv`, as the step ``fit_learners`` writes them.
-        set_files: named `…/{source}/seed{seed}.npz`; their `DISTANCES` become columns of the rows.
+    Files are named `…/{source}/{learner}/seed{seed}.csv` and `…/{source}/seed{seed}.npz`; the `DISTANCES` of the latter
+    become columns of the rows.
     """
     import pandas as pd
 

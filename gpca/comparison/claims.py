@@ -127,12 +127,9 @@ def judge(
     by a Bonferroni interval (level divided by the number of comparisons). Values that the run lacks are "not run", and
     those of stand-ins "not comparable"; the other comparisons then decide.
 
-    Args:
-        results: file name -> its rows, as :func:`gpca.comparison.values.read_results` reads them.
-        prediction_files: named ``…/predictions/{source}/{method}/seed{seed}.csv``, for claims about scores.
-        clusters: counterpart -> its bootstrap draws, for claims about shares of samples.
-        floors: unit -> the minimum that a run can have. A comparison is inconclusive where both values are at it in at
-            least half of the seeds.
+    Prediction files, named ``…/predictions/{source}/{method}/seed{seed}.csv``, are for claims about scores, draws of
+    clusters for those about shares of samples. Floors are the minimum by unit; a comparison is inconclusive where both
+    values are at it in at least half of the seeds.
     """
     import pandas as pd
 

@@ -42,12 +42,7 @@ class DifferenceColumn(Column):
 
 
 def claims(verdicts: pd.DataFrame, sources: Mapping[str, Mapping], titles: Mapping[str, str]) -> Table:
-    """Return a row per comparison, below the sentence that it belongs to.
-
-    Args:
-        verdicts: as :func:`gpca.comparison.claims.read_verdicts` reads them.
-        titles: method -> what the tables call it.
-    """
+    """Return a row per comparison, below the sentence that it belongs to; titles are those of methods."""
 
     def titled(name: str) -> str:
         method, _, concept = name.partition(" ")

@@ -1,8 +1,8 @@
 """Joint readings: a value of every choice that touches several of the paper's tables, and which numbers they fit.
 
-A printed number depends only on the choices of its *part*, so a grid of joint readings needs far fewer values than it
-has readings. The values of a part form an array with an axis for every choice, of length 1 where they do not depend on
-it. The share of close numbers of every reading is a sum of these arrays, also for permuted printed numbers.
+A printed number depends only on the choices of its *part*. The values of a part form an array with an axis for every
+choice, of length 1 where they do not depend on it. The share of close numbers of every reading is a sum of these
+arrays, also for permuted printed numbers.
 """
 
 from __future__ import annotations
@@ -111,14 +111,11 @@ def search(
     deals: int,
     shown: int = 20,
 ) -> Found:
-    """Search every joint reading of a grid.
+    """Search every joint reading of a grid, which holds the values of every choice, the protocol's first.
 
     Args:
-        numbers: those whose values are measured.
-        printed: these and others, which take their places in permutations.
+        printed: the numbers and others, which take their places in as many permutations as `deals`.
         measured: tidy rows of one source that stands for theirs, with `table` as :func:`part_name` has it.
-        grid: the values of every choice, the protocol's first.
-        deals: number of permutations of the printed numbers.
         shown: number of readings in `best`.
     """
     shape = tuple(len(grid[choice]) for choice in CHOICES)
@@ -236,11 +233,7 @@ def judge(
 ) -> tuple[list[tuple], list[Record]]:
     """A row of `VERDICT_COLUMNS` for each number, and the scores of the joint reading and of the protocol.
 
-    Args:
-        joint: tidy rows of the joint reading.
-        comparison: text of the run's comparison: `reproduced`, `at_least`.
-        readings: as :func:`gpca.comparison.readings.read_judged` reads them.
-        deals: number of permutations of the printed numbers.
+    They are made from tidy rows of the joint reading, the text of the run's comparison, and the judged readings.
     """
     of_run = comparison.set_index(["table", "row", "column"])[["reproduced", "at_least"]]
     counts = readings.groupby(["table", "row", "column"])["close"].agg(["size", "sum"])

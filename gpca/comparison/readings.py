@@ -31,11 +31,8 @@ def judge_readings(
     """Return `READING_COLUMNS`, a row per printed number and reading that has a value in its place.
 
     The distance is in units of the close tolerance, in logarithms for a ratio; the chance is that of :func:`chance_of`.
-
-    Args:
-        comparison: the rows that :func:`gpca.comparison.verdicts.compare` returned for the numbers.
-        readings: tidy rows of ``readings.csv``; `table` holds the group and the values of its choices, joined by /,
-            and the other columns are those of the counterpart in its file.
+    In the tidy rows of ``readings.csv``, `table` holds the group and the values of its choices, joined by /, and the
+    other columns are those of the counterpart in its file.
     """
     import pandas as pd
 

@@ -113,10 +113,9 @@ def verdict_of(printed: Printed, reproduced: Reproduced, tolerance: Tolerance) -
     """Return one of `JUDGED`.
 
     The difference of the run's value from the printed number, half a digit wide to either side, has an interval that
-    combines both samplings (Newcombe's square-and-add). An interval that reaches farther from the difference than
-    `tolerance.close` only allows "not reproduced", if it lies beyond `tolerance.close` as a whole. Otherwise a number
-    is reproduced where the difference is within `tolerance.reproduced` or its interval holds 0, and close where the
-    difference is within `tolerance.close`.
+    combines both samplings (Newcombe's square-and-add). If it reaches farther than `tolerance.close` from the
+    difference, a number is not reproduced where the interval lies beyond that as a whole, else inconclusive. Otherwise
+    it is reproduced where the difference is within `tolerance.reproduced` or its interval holds 0.
     """
     scale = tolerance.scale
     near, far = scale(tolerance.reproduced), scale(tolerance.close)
@@ -151,12 +150,10 @@ def compare(
     """Return `COMPARISON_COLUMNS`, a row per printed number, in its unit.
 
     Args:
-        results: file name -> its rows, as :func:`gpca.comparison.values.read_results` reads them, with the files that
-            reasons cite.
+        results: as :func:`gpca.comparison.values.read_results` reads them, with the files that reasons cite.
         objects: source -> ``{"title": str, "stand_in": bool}``; "model" is what the explained model was trained on.
-        tolerances: by unit.
         hardware: the machine of the measured times, where their file does not say.
-        clusters: counterpart -> its bootstrap draws (:func:`gpca.comparison.values.cluster_draws`).
+        clusters: as :func:`gpca.comparison.values.cluster_draws` returns them.
     """
     import pandas as pd
 

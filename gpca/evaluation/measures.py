@@ -129,8 +129,6 @@ def compared(
     Args:
         keys: table and source.
         values: method -> the measure (1 + B,) of the samples and of every draw; methods without a value are left out.
-        draws: of the samples that the measure depends on.
-        limits: as of :class:`Measure`.
         against: kind of rival -> function that returns the rivals; the difference is from the best of them.
     """
     values = {method: value_B for method, value_B in values.items() if np.isfinite(value_B[0])}

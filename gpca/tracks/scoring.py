@@ -36,10 +36,9 @@ Group = tuple[str, np.ndarray, Clustered, np.ndarray]
 def score(published: Published, submitted: Mapping[str, Method]) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Score the published methods and submitted ones, whose names differ.
 
-    Returns:
-        `COLUMNS` for each group of samples, method and measure; and group, method and `AGAINST` for each pair of a
-        submitted method (``against``) and another: the other's headline minus the submitted one's. A method that lacks
-        scores for samples of a group has no row of it.
+    Returns `COLUMNS` for each group of samples, method and measure; and group, method and `AGAINST` for each pair of a
+    submitted method (``against``) and another: the other's headline minus the submitted one's. A method that lacks
+    scores for samples of a group has no row of it.
     """
     import pandas as pd
 

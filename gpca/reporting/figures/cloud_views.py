@@ -16,9 +16,7 @@ _PALEST = 0.65  # share of white in the color of the farthest point
 def draw_clouds(axes, target_Q_3: np.ndarray, source_P_3: np.ndarray, size: float = 1.6, corners=None) -> None:
     """Scatter both clouds together from back to front, in the frame of the view: right, up, towards the viewer.
 
-    Args:
-        size: area of a point in points².
-        corners: lowest and highest coordinates (2, 3), which panels of one scale share; by default of the two clouds.
+    The size of a point is its area in points². Panels of one scale share the lowest and highest coordinates (2, 3).
     """
     from matplotlib.colors import to_rgb
 

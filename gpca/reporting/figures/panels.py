@@ -59,8 +59,7 @@ def fitting_columns(labels: list[str], width_in: float) -> int:
 def draw_percentages(panel, percentages: np.ndarray, form: str, counts: np.ndarray | None = None, **style) -> None:
     """Draw a matrix in blues and write the number of every cell into it; a NaN has neither.
 
-    Args:
-        form: that of the numbers, as in ``{:.0f}``; a second pair of braces holds the count of the cell.
+    The form of the numbers is like ``{:.0f}``; a second pair of braces holds the count of the cell.
     """
     panel.imshow(np.ma.masked_invalid(percentages), cmap=blues(), vmin=0, vmax=100, aspect="auto")
     for cell, percentage in np.ndenumerate(percentages):

@@ -29,11 +29,7 @@ def reliability_figure(
 ) -> Figure:
     """Return a figure with a panel for each entry, and the calibration error of its samples in the panel's title.
 
-    Args:
-        samples: words above a panel -> probability of each of its samples, and whether it came true.
-        across, up: names of the axes.
-        label: of the curves, in the legend.
-        least: the smallest probability that there can be.
+    Samples are, by the words above their panel, probabilities from `least` on, and whether each came true.
     """
     lines = -(-len(samples) // MOST_PER_ROW)
     square_in = TEXT_WIDTH_IN / -(-len(samples) // lines) - 0.42

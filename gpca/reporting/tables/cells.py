@@ -34,11 +34,8 @@ def cell_of_repeats(
 ) -> Cell | None:
     """Return the mean over R seeds with the half-width of its t-interval; None for no seed, no interval for few.
 
-    Args:
-        values_R: in the column's unit.
-        test_samples: of all seeds together.
-        at_least: some repeat was stopped before it was done, which makes the mean a lower bound.
-        clusters: number of clusters that the samples are in, those of each seed counted; 0 where unknown.
+    Numbers of test samples and of clusters (0 where unknown) are those of all seeds together. With `at_least`, some
+    repeat was stopped before it was done, which makes the mean a lower bound.
     """
     if len(values_R) == 0:
         return None
