@@ -123,11 +123,7 @@ class ArgumentsOf:
 
 
 def read_settings(kind: type[T], settings: Mapping[str, Any], subject: str = "setting") -> T:
-    """Return an instance of a settings class from a section of a config.
-
-    Args:
-        subject: precedes the name of a key in messages.
-    """
+    """Return an instance of a settings class from a section of a config."""
     from pydantic import ValidationError
 
     def as_json(value: Any) -> Any:  # what no config can hold becomes its text

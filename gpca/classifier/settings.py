@@ -14,15 +14,11 @@ Draws = Annotated[int, Bounds(minimum=2)]
 
 @dataclass(frozen=True)
 class GPCSettings:
-    """Settings of the classifier and its fit; the defaults are the paper's.
-
-    Attributes:
-        learning_rate, iterations: of Adam, on the ELBO of the whole training set.
-    """
+    """Settings of the classifier and its fit; the defaults are the paper's."""
 
     kernel: Kernel = "rbf"  # ``rbf``, ``matern32`` or ``polynomial`` (of degree 2)
-    learning_rate: LearningRate = 0.01
-    iterations: Count = 100
+    learning_rate: LearningRate = 0.01  # of Adam
+    iterations: Count = 100  # of Adam, on the ELBO of the whole training set
     inducing: Count = 64  # number of shared inducing inputs N_Z
     draws: Draws = 1000  # M, posterior draws per explanation
 

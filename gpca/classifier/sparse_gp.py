@@ -107,11 +107,7 @@ def squared_distances(a_A_d: Tensor, b_B_d: Tensor) -> Tensor:
 
 
 class SparseGPs(nn.Module):
-    """C independent GPs with shared inducing inputs, separate covariances and whitened posteriors N(mean, R Rᵀ).
-
-    Args:
-        inducing_M_d: initial inducing inputs, which are learned too.
-    """
+    """C independent GPs with shared inducing inputs, separate covariances and whitened posteriors N(mean, R Rᵀ)."""
 
     def __init__(self, covariance: gpytorch.kernels.ScaleKernel, inducing_M_d: Tensor, random: torch.Generator) -> None:
         super().__init__()

@@ -125,11 +125,7 @@ def _provenance(path: Path) -> dict:
 def card(
     name: str, content: bytes, model: Model, record: Mapping, sources: Sequence[Source], scores: pd.DataFrame
 ) -> str:
-    """Return the card in Markdown; equal inputs give equal text.
-
-    Args:
-        scores: :func:`gpca.experiments.diagnosis.collect` of the run: values with intervals.
-    """
+    """Return the card in Markdown; equal inputs give equal text."""
     diagnoser, code = model.diagnoser, record["code"]
     try:
         limits = _limits(model, record["settings"])

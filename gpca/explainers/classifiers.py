@@ -15,11 +15,7 @@ LEAF = -1  # in place of a leaf's feature
 
 
 class ConceptClassifier:
-    """A classifier with fixed score columns, whichever labels occur in training.
-
-    Args:
-        classifier: an unfitted scikit-learn classifier or pipeline with ``predict_proba``.
-    """
+    """A classifier with fixed score columns, whichever labels occur in training."""
 
     def __init__(self, classifier, labels: tuple[str, ...] = CONCEPTS) -> None:
         self._classifier = classifier

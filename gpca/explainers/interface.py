@@ -187,11 +187,7 @@ def in_words(sees: Collection[str]) -> str:
 
 
 def icp_calls(sees: Collection[str], starts: int, descriptors: DescriptorSettings, reenactment: int = 0) -> int:
-    """Return the number of ICP runs that an explainer of causes needs beyond the explained one.
-
-    Args:
-        reenactment: maximum number of runs of a re-enactment.
-    """
+    """Return the number of ICP runs that an explainer of causes needs beyond the explained one."""
     further = starts - 1 if "runs" in sees else 0
     further += reenactment if "reenactment" in sees else 0
     if "remedies" in sees:

@@ -77,11 +77,7 @@ class Judgment:
 
 
 class PairClassifier:
-    """Independent binary Gaussian processes: one for failure, and one for each cause.
-
-    Args:
-        trees: whether boosted trees are averaged with them.
-    """
+    """Independent binary Gaussian processes: one for failure, and one for each cause."""
 
     def __init__(self, settings: GPCSettings, *axes: object, trees: bool = False) -> None:
         self._axes = axes

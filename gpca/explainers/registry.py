@@ -47,11 +47,7 @@ def explainer_module(name: str, kind: str = CONCEPTS) -> str:
 
 @dataclass(frozen=True)
 class Rival:
-    """One explainer.
-
-    Attributes:
-        reads, observed_only: what it needs attached, as in :class:`gpca.explainers.interface.ExplainerEntry`.
-    """
+    """One explainer."""
 
     make: Callable[[], ConceptExplainer]  # returns a new one at every call
     reads: str

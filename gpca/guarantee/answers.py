@@ -42,28 +42,19 @@ EVEN = 0.5  # failure score of an alarm for explainers that are not trained
 
 @dataclass(frozen=True)
 class GuaranteeSettings:
-    """What is guaranteed.
-
-    Attributes:
-        missed, false_alarms: largest probabilities that a failed registration is called good, and a good one failed.
-        nonconformity: score of how badly a state fits (:func:`gpca.evaluation.conformal.nonconformity`).
-    """
+    """What is guaranteed."""
 
     level: OpenShare = 0.9  # probability that a set holds the true state
-    missed: OpenShare = 0.05
-    false_alarms: OpenShare = 0.05
+    missed: OpenShare = 0.05  # largest probability that a failed registration is called good
+    false_alarms: OpenShare = 0.05  # largest probability that a good registration is called failed
     family_risk: OpenShare = 0.1  # both for calibration by family; there are too few families for a smaller one
     confidence: OpenShare = 0.9  # with which both hold for the thresholds themselves, in a row of its own
-    nonconformity: Literal["probability", "cumulative"] = "probability"
+    nonconformity: Literal["probability", "cumulative"] = "probability"  # score of how badly a state fits
 
 
 @dataclass(frozen=True)
 class Scored:
-    """N scored samples: a sample occurs once for each model that scored it. Borderline samples are left out.
-
-    Attributes:
-        source, seed, sample: (N,) the sample.
-    """
+    """N scored samples: a sample occurs once for each model that scored it. Borderline samples are left out."""
 
     model: np.ndarray  # (N,) name of the model. Scores of different models are never mixed.
     source: np.ndarray

@@ -23,16 +23,12 @@ REMEDY = "calibrate it again"
 
 @dataclass(frozen=True)
 class Guarantee:
-    """Calibrated sets of states and alarm.
-
-    Attributes:
-        samples, families: size of the calibration set; 0 families if samples were exchangeable one by one.
-    """
+    """Calibrated sets of states and alarm."""
 
     state_sets: StateSets
     failure_alarm: FailureAlarm
     samples: int
-    families: int
+    families: int  # number of families it was calibrated on; 0 if samples were exchangeable one by one
 
     def sets(self, scores_M_K: np.ndarray) -> np.ndarray:
         """Return which states (M, K) are in the set of each of M registrations, by their scores."""

@@ -116,17 +116,13 @@ def read_pose(path: Path) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Clouds:
-    """The two clouds of a registration, and its ICP.
-
-    Attributes:
-        source, target: (N, 3) and (P, 3) in that frame, the source at its initial pose.
-    """
+    """The two clouds of a registration, and its ICP."""
 
     seen: np.ndarray  # (N, 3) the given source, thinned
     T_target_source_init: np.ndarray  # initial pose of ICP, in the user's unit
     frame: CanonicalFrame  # canonical frame of the target
-    source: np.ndarray
-    target: np.ndarray
+    source: np.ndarray  # (N, 3) in that frame, at its initial pose
+    target: np.ndarray  # (P, 3) in that frame
     icp: BatchedICP  # ICP to that target
 
     @classmethod
@@ -141,11 +137,7 @@ class Clouds:
         settings: ICPSettings,
         notes: list[str],
     ) -> Clouds:
-        """Check a user's clouds and bring them into the target's frame; see :meth:`gpca.Explainer.explain`.
-
-        Args:
-            notes: receives a note on each cloud that was thinned.
-        """
+        """Check a user's clouds and bring them into the target's frame; see :meth:`gpca.Explainer.explain`."""
         from gpca.alignment.batched_icp import BatchedICP
 
         source, target = as_points(source_points, "source"), as_points(target_points, "target")
@@ -262,11 +254,7 @@ class Void(NamedTuple):
 
 
 def voids_of(source: np.ndarray, target: np.ndarray, fitness: float, familiar: Familiarity) -> list[Void]:
-    """Return the faults that leave an explanation without meaning, if any.
-
-    Args:
-        fitness: share of source points with a correspondence at the result.
-    """
+    """Return the faults that leave an explanation without meaning, if any."""
     voids = []
     if (matches := round(fitness * len(source))) < FEWEST_MATCHES:
         ended = f"only {matches} of the source's points" if matches else "no source point"

@@ -43,17 +43,13 @@ ADVICE = {  # per branch of the policy
 
 @dataclass(frozen=True)
 class Guaranteed:
-    """Guarantees for one registration (:mod:`gpca.guarantee`).
-
-    Attributes:
-        missed, false_alarms: largest probability that a failure is called good, and a good registration failed.
-    """
+    """Guarantees for one registration (:mod:`gpca.guarantee`)."""
 
     states: tuple[str, ...]  # possible states of the registration
     level: float  # probability that they contain the true one
     call: str  # good, not sure or failed
-    missed: float
-    false_alarms: float
+    missed: float  # largest probability that a failure is called good
+    false_alarms: float  # largest probability that a good registration is called failed
     families: int  # number of families of shapes used for calibration; 0 if samples were exchangeable one by one
 
     @classmethod

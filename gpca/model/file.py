@@ -54,11 +54,7 @@ MOST_NEIGHBORS = 10**4  # and other counts among a backbone's options
 
 @dataclass(frozen=True)
 class Model:
-    """A diagnoser of registrations and the paper's GP-CA.
-
-    Attributes:
-        title, stand_in: training objects of GP-CA, and whether the package generated them.
-    """
+    """A diagnoser of registrations and the paper's GP-CA."""
 
     diagnoser: Diagnoser  # reads the pair after ICP, trained on measured causes of all sources
     encoder: nn.Module  # maps clouds (B, N, 3) to embeddings (B, d); in evaluation mode
@@ -67,8 +63,8 @@ class Model:
     icp: ICPSettings  # settings of ICP
     cloud_points: int  # maximum number of points of source and target
     policy: RecoveryPolicy  # maps causes to actions
-    title: str
-    stand_in: bool
+    title: str  # training objects of GP-CA
+    stand_in: bool  # whether the package generated these
     familiar: Familiarity  # ranges of simple measures over GP-CA's training clouds
     learned_from: tuple[str, ...] = ()  # titles of the training objects of the diagnosis; empty if unknown
 

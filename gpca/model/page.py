@@ -120,12 +120,7 @@ def causes(explained: Mapping) -> str:
 
 
 def poses(reenacted: Reenacted, subject: str, unit: str, *, observation: bool = False) -> str:
-    """List the hypotheses of the true pose, each with a button that shows it.
-
-    Args:
-        subject: what fits, such as ``the object``.
-        observation: whether to state noise, outliers and missing surface under the most probable one.
-    """
+    """List the hypotheses of the true pose, each with a button that shows it."""
     items = "".join(
         f'<li><button type="button" data-view="pose:{k}">Pose {k + 1}</button> <span>{sentence(words)}</span>'
         f'<span class="share"><span class="bar"><i style="width:{100 * pose.probability:.1f}%"></i></span>'

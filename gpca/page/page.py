@@ -44,19 +44,14 @@ class Shown:
 
 @dataclass(frozen=True)
 class Run:
-    """A run with what its page needs besides its results.
-
-    Attributes:
-        samples: source -> files of the shown registrations (:func:`gpca.page.samples.page_samples`).
-        causes: source -> files of the shown failures with causes (:func:`gpca.page.samples.cause_samples`).
-    """
+    """A run with what its page needs besides its results."""
 
     name: str
     seeds: Sequence[int]  # of its repeats
     sources: Mapping[str, Mapping]  # name -> ``{"title": str, "stand_in": bool}``
     results: Sequence[Shown]  # tables and figures, in order
-    samples: Mapping[str, Mapping[str, str]]
-    causes: Mapping[str, Mapping[str, str]]
+    samples: Mapping[str, Mapping[str, str]]  # source -> files for :func:`page_samples`
+    causes: Mapping[str, Mapping[str, str]]  # source -> files for :func:`cause_samples`
     titles: Titles  # of the explainers
     reference: str | None  # ``comparison.csv`` of a run on real objects, shown where nothing of this run is judged
     config: Mapping  # the whole configuration

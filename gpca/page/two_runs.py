@@ -95,19 +95,14 @@ def read_number(text: str) -> PrintedNumber | None:
 
 @dataclass(frozen=True)
 class TwoTables:
-    """A table of both runs, cell by cell.
-
-    Attributes:
-        heads, labels: as in :class:`PrintedTable`; heads of the second alone come last.
-        rows: the names of each row, and its cells ``{one, other, difference, kind}``.
-    """
+    """A table of both runs, cell by cell."""
 
     name: str
     title: str
     caption: str
-    heads: Sequence[str]
+    heads: Sequence[str]  # as in :class:`PrintedTable`; those of the second alone come last
     labels: int
-    rows: Sequence[tuple[Sequence[str], Sequence[Mapping[str, str]]]]
+    rows: Sequence[tuple[Sequence[str], Sequence[Mapping[str, str]]]]  # names of each row, and its cells
     counts: Mapping[str, int]  # of the kinds
 
 

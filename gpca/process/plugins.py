@@ -57,12 +57,7 @@ def named() -> list[str]:
 
 
 def entries_outside(variable: str, kind: str, of: type, taken: Iterable[str]) -> dict[str, dict[str, Any]]:
-    """Return the entries that plugins list in a variable of `GROUPS`, by module.
-
-    Args:
-        kind: name of an entry in messages.
-        taken: names of the suite's entries.
-    """
+    """Return the entries that plugins list in a variable of `GROUPS`, by module."""
     group = next(group for group, variables in GROUPS.items() if variable in variables)
     modules = [load(name) for name in named()]
     for package, name in _announced(group):
