@@ -68,11 +68,11 @@ class GPC:
         if before is None:
             around_R_d = h_N_d if around_R_d is None else around_R_d
             self._scaler = self.scaling(around_R_d)
-            start = self.start(self._scaled(around_R_d))
+            start = self.start(self._scaler.tensor(around_R_d))
         else:
             self._scaler = before._scaler
             start = Start.after(before._prior, self._axes)
-        inputs_N_d = self._scaled(h_N_d)
+        inputs_N_d = self._scaler.tensor(h_N_d)
         targets_N = self._targets(labels_N)
         random = torch.Generator().manual_seed(start.seed)
         model = SparseGPs(start.covariance, start.inducing_M_d, random)
@@ -149,7 +149,7 @@ class GPC:
 
     def project(self, h_N_d: np.ndarray | Projection) -> Projection:
         """Project embeddings on the inducing inputs, once for several uses."""
-        return h_N_d if isinstance(h_N_d, Projection) else self._prior.project(self._scaled(h_N_d))
+        return h_N_d if isinstance(h_N_d, Projection) else self._prior.project(self._scaler.tensor(h_N_d))
 
     @property
     def learned_N_d(self) -> np.ndarray:
@@ -211,6 +211,3 @@ class GPC:
 
     def _targets(self, labels_N: np.ndarray) -> np.ndarray:
         return np.array([self.classes.index(label) for label in labels_N], dtype=np.int64)
-
-    def _scaled(self, h_N_d: np.ndarray) -> torch.Tensor:
-        return self._scaler.tensor(h_N_d)

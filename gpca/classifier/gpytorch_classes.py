@@ -129,18 +129,15 @@ class SameRoots(TorchFunctionMode):
     def __torch_function__(self, function, types, arguments=(), keywords=None):
         """Call the function, with replacements for roots and distances."""
         if function is torch.cdist:
-            return _Root.apply(_squared_distances(*arguments[:2]))
+            a_A_d, b_B_d = arguments[:2]
+            squares_A_B = a_A_d.square().sum(dim=-1)[..., :, None] + b_B_d.square().sum(dim=-1)[..., None, :]
+            # At least 1e-30, because the root has no derivative at 0.
+            return _Root.apply((squares_A_B - 2 * a_A_d @ b_B_d.mT).clamp_min(1e-30))
         if function in (torch.sqrt, Tensor.sqrt):
             return _Root.apply(arguments[0])
         if function is Tensor.sqrt_:
             return arguments[0].copy_(_Root.apply(arguments[0]))
         return function(*arguments, **(keywords or {}))
-
-
-def _squared_distances(a_A_d: Tensor, b_B_d: Tensor) -> Tensor:
-    """Return |a - b|², (…, A, B), at least 1e-30, because the root has no derivative at 0."""
-    squares_A_B = a_A_d.square().sum(dim=-1)[..., :, None] + b_B_d.square().sum(dim=-1)[..., None, :]
-    return (squares_A_B - 2 * a_A_d @ b_B_d.mT).clamp_min(1e-30)
 
 
 class _Root(torch.autograd.Function):

@@ -182,14 +182,13 @@ def _scores(record: Mapping, sources: Sequence[Source], scores: pd.DataFrame) ->
     rows, committees = [], 0
     for source, title in titles.items():
         for explainer, words in EXPLAINERS.items():
-            entries = {"source": source, "method": explainer, "against": ""}
-            metrics = where(scores, entries).set_index("metric")
+            metrics = where(scores, {"source": source, "method": explainer, "against": ""}).set_index("metric")
             if len(metrics):
                 committees += explainer == COMMITTEE
                 samples, seeds = metrics["samples"].reindex(list(MEASURES)).dropna(), metrics["seeds"].iloc[0]
                 counts = " to ".join(f"{count:.0f}" for count in sorted({samples.min(), samples.max()}))
-                counts = f"{counts} ({seeds:.0f})"
-                rows.append((title, words, *(_interval(metrics, metric) for metric in MEASURES), counts))
+                each = {name: f"{row.value:.3f} ({row.low:.3f} to {row.high:.3f})" for name, row in metrics.iterrows()}
+                rows.append((title, words, *(each.get(name, "–") for name in MEASURES), f"{counts} ({seeds:.0f})"))
     if not committees:
         raise InputError("cause_intervals.csv", f"has no scores of {COMMITTEE}", "switch it on in diagnosis.explainers")
     changes = record["settings"].get("model", {}).get("causes", {})
@@ -204,13 +203,6 @@ def _scores(record: Mapping, sources: Sequence[Source], scores: pd.DataFrame) ->
         f"{100 * RECALL:g}\u00a0% of the failed ones. The truth, measured again from other starts, is the most that "
         "can be expected. docs/causes.md defines every measure.",
     ]
-
-
-def _interval(metrics: pd.DataFrame, metric: str) -> str:
-    if metric not in metrics.index:
-        return "–"
-    value, low, high = metrics.loc[metric, ["value", "low", "high"]]
-    return f"{value:.3f} ({low:.3f} to {high:.3f})"
 
 
 def _limits(model: Model, settings: Mapping) -> list[str]:

@@ -119,8 +119,8 @@ class DrawingExplainer:
         """Draw for every registration and summarize (Eqs. 4 to 7)."""
         started = perf_counter()
         scores_N_C, variances_N_C, bald_N = self.summary(registrations)
-        seconds = (perf_counter() - started) / len(registrations)
         more = {"variances_N_C": variances_N_C, "bald_N": bald_N}
+        seconds = (perf_counter() - started) / len(registrations)
         return Attribution.of_scores(self.labels, scores_N_C, seconds=seconds, **more)
 
     def summary(self, registrations: Registrations) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -188,8 +188,7 @@ def in_words(sees: Collection[str]) -> str:
 
 def icp_calls(sees: Collection[str], starts: int, descriptors: DescriptorSettings, reenactment: int = 0) -> int:
     """Return the number of ICP runs that an explainer of causes needs beyond the explained one."""
-    further = starts - 1 if "runs" in sees else 0
-    further += reenactment if "reenactment" in sees else 0
+    further = (starts - 1) * ("runs" in sees) + reenactment * ("reenactment" in sees)
     if "remedies" in sees:
         return further + descriptors.remedy_calls
-    return further + (descriptors.quick_remedy_calls if "quick_remedies" in sees else 0)
+    return further + descriptors.quick_remedy_calls * ("quick_remedies" in sees)

@@ -84,9 +84,8 @@ class Scored:
         """Write the CSV described in results/README.md."""
         import pandas as pd
 
-        columns = {name: getattr(self, name) for name in TEXTS}
-        columns |= {"seed": self.seed, "taught": self.seen.astype(int), "severity": self.severity}
-        columns |= {"weight": self.weight} | dict(zip(SCORES, self.scores.T, strict=True))
+        columns = {name: getattr(self, name) for name in (*TEXTS, "seed")} | {"taught": self.seen.astype(int)}
+        columns |= {"severity": self.severity, "weight": self.weight} | dict(zip(SCORES, self.scores.T, strict=True))
         write_csv(path, pd.DataFrame(columns))
 
     @classmethod

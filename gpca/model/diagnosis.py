@@ -187,29 +187,18 @@ class Reenacted:
 
     def outside(self, frame: CanonicalFrame, T_target_source_init: np.ndarray) -> Reenacted:
         """Convert to the user's frame and unit of length, in which the initial pose is given."""
-        poses = tuple(
-            replace(
-                pose,
-                T_target_source=frame.pose_outside(pose.T_target_source) @ T_target_source_init,
-                **{name: getattr(pose, name) * frame.diameter for name in ("apart", "shift", "error")},
-            )
-            for pose in self.poses
-        )
-        return replace(
-            self,
-            error=self.error * frame.diameter,
-            effects={cause: effect * frame.diameter for cause, effect in self.effects.items()},
-            noise=self.noise * frame.diameter,
-            poses=poses,
-        )
+        poses, unit = [], frame.diameter
+        for pose in self.poses:
+            T = frame.pose_outside(pose.T_target_source) @ T_target_source_init
+            lengths = {name: getattr(pose, name) * unit for name in ("apart", "shift", "error")}
+            poses.append(replace(pose, T_target_source=T, **lengths))
+        effects = {cause: effect * unit for cause, effect in self.effects.items()}
+        return replace(self, error=self.error * unit, effects=effects, noise=self.noise * unit, poses=tuple(poses))
 
     def as_dict(self) -> dict[str, object]:
         """Values for JSON."""
-        poses = [
-            asdict(pose) | {"T_target_source": pose.T_target_source.tolist(), "axis": list(pose.axis)}
-            for pose in self.poses
-        ]
-        return asdict(self) | {"poses": poses}
+        lists = ({"T_target_source": pose.T_target_source.tolist(), "axis": list(pose.axis)} for pose in self.poses)
+        return asdict(self) | {"poses": [asdict(pose) | own for pose, own in zip(self.poses, lists, strict=True)]}
 
     def words(self, subject: str, unit: str) -> list[str]:
         """Describe each hypothesis relative to the result, such as ``the object also fits moved by 20 mm``."""

@@ -57,11 +57,6 @@ class Run:
     config: Mapping  # the whole configuration
     command: str  # that makes what is missing
 
-    @property
-    def sample_files(self) -> list[Path]:
-        """All files of samples."""
-        return [Path(path) for files in (*self.samples.values(), *self.causes.values()) for path in files.values()]
-
 
 def write_page(folder: str | Path, run: Run) -> None:
     """Write ``index.html`` of a finished run into its folder ``results/{run}``.
@@ -70,9 +65,10 @@ def write_page(folder: str | Path, run: Run) -> None:
     collected files, such as ``comparison.csv``.
     """
     folder = Path(folder)
+    sample_files = [Path(path) for files in (*run.samples.values(), *run.causes.values()) for path in files.values()]
     needed = [f"{each.kind}/{each.name}.{suffix}" for each in run.results for suffix in SUFFIXES[each.kind]]
     missing = [name for name in needed if not (folder / name).is_file()]
-    missing += [str(path) for path in run.sample_files if not path.is_file()]
+    missing += [str(path) for path in sample_files if not path.is_file()]
     if missing:
         raise InputError(folder, f"lacks {', '.join(missing)}", f"make them with '{run.command}'")
     shown = {result.name for result in run.results}
@@ -99,7 +95,7 @@ def write_page(folder: str | Path, run: Run) -> None:
         comparison=page_comparison(folder / "comparison.csv", run.reference),
         links=links,
         samples=samples,
-        provenance=read_provenance(recorded + run.sample_files),
+        provenance=read_provenance(recorded + sample_files),
     )
     with whole_file(folder / "index.html") as partial:
         partial.write_text(text, encoding="utf-8")

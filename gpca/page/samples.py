@@ -59,6 +59,8 @@ def page_samples(files: Mapping[str, str | Path], source: Mapping, limits: Limit
             fault = f"lacks test sample {number} of {files['registrations']}"
             raise InputError(files["predictions"], fault, "regenerate both")
         prediction, error = test.loc[number], registration_error(registrations, row)
+        named = {c: (prediction[f"score_{c}"], np.sqrt(prediction[f"variance_{c}"])) for c in concepts_of(predictions)}
+        scores = [{"concept": c, "mean": _number(m), "deviation": _number(d)} for c, (m, d) in named.items()]
         samples.append(
             {
                 "object": str(registrations.object_name[row]),
@@ -67,14 +69,7 @@ def page_samples(files: Mapping[str, str | Path], source: Mapping, limits: Limit
                 "severity": severity_words(registrations, row),
                 "fitness": _number(registrations.fitness[row]),
                 "predicted": str(prediction["concept_predicted"]),
-                "scores": [
-                    {
-                        "concept": concept,
-                        "mean": _number(prediction[f"score_{concept}"]),
-                        "deviation": _number(np.sqrt(prediction[f"variance_{concept}"])),
-                    }
-                    for concept in concepts_of(predictions)
-                ],
+                "scores": scores,
                 "error_percent": _number(100 * error),
                 "state": state_of_error(error, limits),
                 "scene": packed_registration(registrations, row, reach),

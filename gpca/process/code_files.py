@@ -121,21 +121,12 @@ def _is_followed(name: str, importing: str) -> bool:
 
 
 def _file_of(module: str) -> Path:
-    file = _file(module)
-    if file is None:
-        raise ModuleNotFoundError(f"no module {module} in {_root(module)}")
+    if (file := _file(module)) is None:
+        raise ModuleNotFoundError(f"there is no module {module}")
     return file
 
 
 def _file(module: str) -> Path | None:
-    path = _root(module).joinpath(*module.split("."))
-    for candidate in (path.with_suffix(".py"), path / "__init__.py"):
-        if candidate.is_file():
-            return candidate
-    return None
-
-
-def _root(module: str) -> Path:
-    """Return the folder that a module is imported from."""
     first = module.split(".")[0]
-    return ROOT if first in PACKAGES else ROOTS.get(first, ROOT)
+    path = (ROOT if first in PACKAGES else ROOTS.get(first, ROOT)).joinpath(*module.split("."))
+    return next((each for each in (path.with_suffix(".py"), path / "__init__.py") if each.is_file()), None)
