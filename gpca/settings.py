@@ -49,11 +49,11 @@ PositiveShare = Annotated[float, Bounds(exclusiveMinimum=0, maximum=1)]
 OpenShare = Annotated[float, Bounds(exclusiveMinimum=0, exclusiveMaximum=1)]
 
 
+@dataclass(frozen=True, eq=False)
 class Different:
     """Marks a list of at least `fewest` different values."""
 
-    def __init__(self, fewest: int = 1) -> None:
-        self._fewest = fewest
+    fewest: int = 1
 
     def __get_pydantic_core_schema__(self, kind: type, handler: GetCoreSchemaHandler) -> CoreSchema:
         """Add the check to the list's schema."""
@@ -62,8 +62,8 @@ class Different:
         return core_schema.no_info_after_validator_function(self._checked, handler(kind))
 
     def _checked(self, values: Collection) -> Collection:
-        if len(values) < self._fewest:
-            raise ValueError(f"is empty; name at least {self._fewest}")
+        if len(values) < self.fewest:
+            raise ValueError(f"is empty; name at least {self.fewest}")
         if any(value in tuple(values)[:n] for n, value in enumerate(values)):
             raise ValueError(f"{list(values)} holds a value twice; keep one of them")
         return values
@@ -72,23 +72,23 @@ class Different:
 Distinct = Annotated[tuple[T, ...], Different()]  # one or more
 
 
+@dataclass(frozen=True, eq=False)
 class Keys:
     """Marks a mapping with a type for each key; some are required, and others are refused if it is closed."""
 
-    def __init__(self, kinds: Mapping[str, Any], required: Iterable[str] = (), closed: bool = True) -> None:
-        self.kinds = kinds
-        self._required = tuple(required)
-        self._closed = closed
+    kinds: Mapping[str, Any]
+    required: Collection[str] = ()
+    closed: bool = True
 
     def __get_pydantic_core_schema__(self, _kind: type, handler: GetCoreSchemaHandler) -> CoreSchema:
         """Return the mapping's schema."""
         from pydantic_core import core_schema
 
         fields = {
-            name: core_schema.typed_dict_field(handler.generate_schema(kind), required=name in self._required)
+            name: core_schema.typed_dict_field(handler.generate_schema(kind), required=name in self.required)
             for name, kind in self.kinds.items()
         }
-        others: Literal["forbid", "allow"] = "forbid" if self._closed else "allow"
+        others: Literal["forbid", "allow"] = "forbid" if self.closed else "allow"
         strict = core_schema.CoreConfig(strict=True, allow_inf_nan=False)
         return core_schema.typed_dict_schema(fields, extra_behavior=others, config=strict)
 
