@@ -101,9 +101,9 @@ def observed_only(registrations: Registrations) -> Registrations:
 
 def labeled(causes: Causes) -> Registrations:
     """Return what an explainer learns: labels as the concepts, and ``causes`` (S, 3) attached, 1 where each is one."""
-    own = causes.registrations
-    attached = {**own.attached, "causes": causes.truth.causes.astype(float)}
-    return replace(own, concept=labels_of(causes.truth), attached=attached)
+    shown = causes.registrations
+    attached = {**shown.attached, "causes": causes.truth.causes.astype(float)}
+    return replace(shown, concept=labels_of(causes.truth), attached=attached)
 
 
 def with_label(causes: Causes) -> Registrations:

@@ -198,8 +198,8 @@ def describe_all(
         rows.append(described)
         seconds.append(perf_counter() - started)
         icp_seconds.append(remedies)
-    own, groups = causes.registrations, {name: np.array([described[name] for described in rows]) for name in GROUPS}
-    return Descriptors(own.sample, own.split, **groups, axes=own.axes), np.array(seconds), np.array(icp_seconds)
+    shown, groups = causes.registrations, {name: np.array([described[name] for described in rows]) for name in GROUPS}
+    return Descriptors(shown.sample, shown.split, **groups, axes=shown.axes), np.array(seconds), np.array(icp_seconds)
 
 
 def seen(arrays: Mapping[str, np.ndarray], sees: Collection[str], wanted: Columns = EVERYTHING) -> np.ndarray:

@@ -172,8 +172,8 @@ def draw_further(
     """
     shares = asdict(settings.shares) | {BORDERLINE: 0.0, GEOMETRY: 0.0}
     labeled = Shares(**{name: share / sum(shares.values()) for name, share in shares.items()})
-    own = replace(settings, train=wanted, shares=labeled)
-    drawing = _Drawing(objects, source, seed, settings, own, ("further", chunk))
+    further = replace(settings, train=wanted, shares=labeled)
+    drawing = _Drawing(objects, source, seed, settings, further, ("further", chunk))
     return as_causes(drawing.of_split("train"), (source, seed))[0]
 
 
@@ -186,12 +186,12 @@ class _Drawing:
         source: str,
         seed: int,
         settings: CauseSettings,
-        own: CauseSettings | None = None,
+        drawn_by: CauseSettings | None = None,
         part: tuple = (),
     ) -> None:
         subjects, uncertainty_limit = measure_clean_pairs(read_subjects(objects), source, seed, settings)
         self._subjects = split_by_object(subjects, source, seed, settings)
-        self._settings = own or settings
+        self._settings = drawn_by or settings
         self._measuring = Measuring(self._settings, uncertainty_limit)
         self._axes, self._part = (source, seed), part
         self.tally = Tally()

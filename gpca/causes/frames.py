@@ -68,14 +68,14 @@ def measure_frames(
         seen, what it started from and what was found.
     """
     subjects, limit = measure_clean_pairs(subjects_of(instances, starts.instance, objects), source, seed, settings)
-    of_object = {subject.index: subject for subject in subjects}
+    subject_of = {subject.index: subject for subject in subjects}
 
     def case(k: int) -> Case:
         i, began = int(starts.instance[k]), f"{starts.kind[k]}, {starts.init_from[k]}"
         axes = (source, seed, "frame causes", i, began)
 
         def candidate() -> tuple[Candidate, Subject]:
-            if (subject := of_object.get(int(instances.object_index[i]))) is None:
+            if (subject := subject_of.get(int(instances.object_index[i]))) is None:
                 raise Unmeasurable("its clean pairs are misaligned")
             T_init, random = starts.T_camera_object_init[k], generator(*axes)
             return frame_candidate(instances, i, T_init, subject, meshes[subject.index], points, random), subject
@@ -89,8 +89,8 @@ def measure_frames(
     started = starts.subset(registrations.sample)
     seen = {"instance": started.instance, "start": started.kind, "init_from": started.init_from}
     seen |= {name: getattr(instances, name)[started.instance] for name in ("dataset", "scene", "image")}
-    own = {"sample": registrations.sample, **seen, "object": registrations.object_name}
-    return causes, pd.DataFrame({**own, **severities, **found})
+    samples = {"sample": registrations.sample, **seen, "object": registrations.object_name}
+    return causes, pd.DataFrame({**samples, **severities, **found})
 
 
 def frame_candidate(

@@ -199,17 +199,17 @@ def measure(samples: Judged, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
     from scipy.stats import rankdata
 
     labeled_N, shown_N, failed_N = _labeled(samples), _shown(samples), _failed(samples)
-    of_labeled, of_failed = weights_B_N[:, labeled_N], weights_B_N[:, failed_N]
+    weights_B_n, weights_B_F = weights_B_N[:, labeled_N], weights_B_N[:, failed_N]
     called_failed_N = samples.nominal < samples.scores.max(axis=1)
-    ranked = ranking(samples.alarm[labeled_N], failed_N[labeled_N], of_labeled)
+    ranked = ranking(samples.alarm[labeled_N], failed_N[labeled_N], weights_B_n)
     alarms_shown = ranking(samples.alarm[shown_N], samples.shown[shown_N] != NOMINAL, weights_B_N[:, shown_N])
     score_n, is_nominal_n = samples.nominal[labeled_N], samples.label[labeled_N] == NOMINAL
     bin_n, calibration_B = np.minimum((score_n * BINS).astype(int), BINS - 1), np.zeros(len(weights_B_N))
     for number in range(BINS):
         inside_n = bin_n == number
-        calibration_B += np.abs((of_labeled[:, inside_n] * (score_n - is_nominal_n)[inside_n]).sum(axis=1))
+        calibration_B += np.abs((weights_B_n[:, inside_n] * (score_n - is_nominal_n)[inside_n]).sum(axis=1))
     with np.errstate(divide="ignore", invalid="ignore"):
-        calibration_B /= of_labeled.sum(axis=1)
+        calibration_B /= weights_B_n.sum(axis=1)
     measures = {
         "state_accuracy": _state_accuracy(samples.label, called_failed_N, weights_B_N),
         "state_accuracy_shown": _state_accuracy(samples.shown, called_failed_N, weights_B_N),
@@ -224,7 +224,7 @@ def measure(samples: Judged, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
     right_N, rows_N, first_N = samples.named == samples.label, np.arange(len(samples)), samples.scores.argmax(axis=1)
     recalls = [weighted_mean(right_N[of], weights_B_N[:, of]) for of in (samples.label == label for label in LABELS)]
     precisions = [
-        ranking(samples.scores[labeled_N, i], samples.causes[labeled_N, i], of_labeled)["precision"]
+        ranking(samples.scores[labeled_N, i], samples.causes[labeled_N, i], weights_B_n)["precision"]
         for i in range(len(CONCEPTS))
     ]
     scores_F_3, phi_F_3 = samples.scores[failed_N], samples.phi[failed_N]
@@ -232,13 +232,13 @@ def measure(samples: Judged, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
     spearman_F = _cosines(*(ranks_F_3 - ranks_F_3.mean(axis=1, keepdims=True) for ranks_F_3 in ranks))
     return measures | {
         **of_decisions(samples, weights_B_N),
-        "tied_accuracy": weighted_mean(samples.tied[rows_N, first_N][failed_N], of_failed),
+        "tied_accuracy": weighted_mean(samples.tied[rows_N, first_N][failed_N], weights_B_F),
         "balanced_accuracy": np.mean(recalls, axis=0),
-        "dominant_accuracy": weighted_mean((np.array(CONCEPTS)[first_N] == samples.label)[failed_N], of_failed),
+        "dominant_accuracy": weighted_mean((np.array(CONCEPTS)[first_N] == samples.label)[failed_N], weights_B_F),
         "average_precision": np.mean(precisions, axis=0),
-        "spearman_attribution": weighted_mean(spearman_F, of_failed),
-        "cosine_attribution": weighted_mean(_cosines(scores_F_3, np.maximum(phi_F_3, 0)), of_failed),
-        "deletion_gain": weighted_mean(gains(samples)[rows_N, first_N][failed_N], of_failed),
+        "spearman_attribution": weighted_mean(spearman_F, weights_B_F),
+        "cosine_attribution": weighted_mean(_cosines(scores_F_3, np.maximum(phi_F_3, 0)), weights_B_F),
+        "deletion_gain": weighted_mean(gains(samples)[rows_N, first_N][failed_N], weights_B_F),
     }
 
 

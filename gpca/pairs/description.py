@@ -40,15 +40,11 @@ def describe_registrations(registrations: Registrations, *axes: object, points: 
         distances, planes = measured.describe_distances(pair, matched)
         spacing, model_spacing, extent, model_extent = np.log(np.maximum(planes[3 * QUANTILES :][:4], SMALLEST))
         densities = [spacing - model_spacing, extent - model_extent]
-        of_points = measured.describe_points(pair, matched, points)
-        rows.append((distances, relations(pair, distances, planes), densities, of_points))
-    *groups, of_points = zip(*rows, strict=True) if rows else ((),) * 4
-    described = {
-        name: np.array(group, float).reshape(-1, width)
-        for (name, width), group in zip(WIDTHS.items(), groups, strict=True)
-    }
-    shape = (-1, 2, points, measured.CHANNELS)
-    return described | {POINTS: np.array(of_points, np.float32).reshape(shape)}
+        features = measured.describe_points(pair, matched, points)
+        rows.append((distances, relations(pair, distances, planes), densities, features))
+    columns = [[row[column] for row in rows] for column in range(len(WIDTHS) + 1)]
+    groups = {name: np.array(columns[n]).reshape(-1, width) for n, (name, width) in enumerate(WIDTHS.items())}
+    return groups | {POINTS: np.array(columns[-1], np.float32).reshape(-1, 2, points, measured.CHANNELS)}
 
 
 def relations(pair: ObservedPair, distances: np.ndarray, planes: np.ndarray) -> np.ndarray:

@@ -189,8 +189,10 @@ def _try_situation(
     start: Attempt | None = None
     if cause != POSE:
         start = register_first(disturbed, points, icp)
-        if start is None or is_right(start, success):
-            return None, start and (disturbed, start), 1
+        if start is None:
+            return None, None, 1
+        if is_right(start, success):
+            return None, (disturbed, start), 1
     without = register_first(clean, points, icp)
     if without is None or not is_right(without, success):
         return None, None, 1

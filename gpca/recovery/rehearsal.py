@@ -190,9 +190,9 @@ def learners_of(
             continue  # policies of the same chances learn the same
         starts = [starts_of(episodes, means.actions, budget) for episodes in (queued, judged)]
         if entry.queues:
-            own, others = map(explainers.attach[entry.explainer], starts)
+            queue, others = map(explainers.attach[entry.explainer], starts)
             fitted, treatments = explainers.fitted[entry.explainer], means.policy.treatments
-            learners[name] = partial(ClassifierLearner, fitted, own, others, treatments)
+            learners[name] = partial(ClassifierLearner, fitted, queue, others, treatments)
         elif means.utility is not None:
             answers = answers_of(explainers.explain[entry.explainer](starts[1].without_labels()))
             known_N_F = [known(e.observe(()), answer) for e, answer in zip(judged, answers, strict=True)]

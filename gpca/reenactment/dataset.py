@@ -80,11 +80,11 @@ class Reenactments(Container):
     ) -> Reenactments:
         """Return those of the rows of pairs (:func:`row_of`), which may be of no registrations of a file."""
         arrays: dict[str, Any] = {name: np.array([row[name] for row in rows]) for name in rows[0]}
-        said = verdict(arrays["error"], arrays["weight"], truth.limits)
-        if registrations is None:
-            return cls(sample=np.arange(len(rows)), split=np.full(len(rows), ""), **arrays, verdict=said)
-        own = registrations
-        return cls(sample=own.sample, split=own.split, **arrays, verdict=said, axes=own.axes)
+        verdict_S_4 = verdict(arrays["error"], arrays["weight"], truth.limits)
+        sample, split, axes = np.arange(len(rows)), np.full(len(rows), ""), None
+        if registrations is not None:
+            sample, split, axes = registrations.sample, registrations.split, registrations.axes
+        return cls(sample=sample, split=split, **arrays, verdict=verdict_S_4, axes=axes)
 
 
 def reenact_all(
@@ -117,10 +117,10 @@ def row_of(
     """Return the arrays of one pair (K, …), see :class:`Reenactments`."""
     before, measured = transform(pair.T_init, pair.observed), []
     for enactment in enactments:
-        found, severity = enactment.hypothesis, enactment.candidate.severity
-        to_start = displacements(found.T[None], before)[0]
-        to_result = displacements((found.T @ pair.T_init)[None], pair.observed)[0]
-        numbers = (found.log_likelihood, found.width, found.covered)
+        hypothesis, severity = enactment.hypothesis, enactment.candidate.severity
+        to_start = displacements(hypothesis.T[None], before)[0]
+        to_result = displacements((hypothesis.T @ pair.T_init)[None], pair.observed)[0]
+        numbers = (hypothesis.log_likelihood, hypothesis.width, hypothesis.covered)
         measured.append((*numbers, *(severity[name] for name in ("noise", "outliers", "crop")), to_start, to_result))
     most = settings.hypotheses
     rows_K = np.where(np.arange(most) < len(enactments), np.arange(most), 0)

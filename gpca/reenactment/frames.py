@@ -177,11 +177,11 @@ def reenact_frames(
 
     def world(pair: ObservedPair, row: int) -> list[Enactment]:
         i = int(starts.instance[row])
-        own, T_start = known[int(instances.object_index[i])], starts.T_camera_object_init[row]
-        view = FrameView(pair, own, instances.camera_3_3[i], instances.pixels_of(i), T_start)
+        seen, T_start = known[int(instances.object_index[i])], starts.T_camera_object_init[row]
+        view = FrameView(pair, seen, instances.camera_3_3[i], instances.pixels_of(i), T_start)
         random = generator(*pair.axes, "hypotheses")
         hypotheses = find_frame_hypotheses(view, settings, random)
-        xi_n_6, errors = start_twists(pair.axes, truth), own.subject.errors
+        xi_n_6, errors = start_twists(pair.axes, truth), seen.subject.errors
         enactments = []
         for hypothesis in hypotheses:
             candidate = view.candidate(hypothesis.T, random)
