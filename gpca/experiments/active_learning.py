@@ -161,12 +161,12 @@ def table3_active_learning(run: Run, metrics: pd.DataFrame, clusters: Clusters) 
     rows = metrics[metrics["concept"] == PAPERS_HELD_OUT]
     shares = learning["rare"]["shares"] if learning["rare"] else ()
     settings = {rare_setting(share): f"all concepts; {100 * share:g} % of the pool new" for share in shares} | SETTINGS
-    quantities = {
-        "labels_bald_kmeans": Quantity(
-            "labels_to_target", Column("Labels, BALD + k-means", **COUNT), strategy="bald_kmeans"
-        ),
-        "labels_bald": Quantity("labels_to_target", Column("Labels, BALD", **COUNT), strategy="bald"),
-        "labels_random": Quantity("labels_to_target", Column("Labels, random", **COUNT), strategy="random"),
+    chosen = {"bald_kmeans": "BALD + k-means", "bald": "BALD", "random": "random"}
+    labels_by = {
+        f"labels_{name}": Quantity("labels_to_target", Column(f"Labels, {words}", **COUNT), name)
+        for name, words in chosen.items()
+    }
+    quantities = labels_by | {
         "accuracy_bald_kmeans": Quantity("final_accuracy", Column("Acc. BALD (%)"), strategy="bald_kmeans"),
         "accuracy_random": Quantity("final_accuracy", Column("Acc. random (%)"), strategy="random"),
         "epochs_bald_kmeans": Quantity("epochs_at_target", Column("Epochs", **COUNT), strategy="bald_kmeans"),
@@ -175,7 +175,7 @@ def table3_active_learning(run: Run, metrics: pd.DataFrame, clusters: Clusters) 
     for (source, setting), labels in crossed(run.source_titles, settings):
         selected = rows_where(rows, source=source, table=TABLE + setting)
         builder.add_row(labels, _cells(run, selected, quantities, clusters))
-    builder.compare_across(["labels_bald_kmeans", "labels_bald", "labels_random"])
+    builder.compare_across(labels_by)
     other = "Other rows: " if shares else ""
     notes = [
         *_rare_note(learning),
@@ -218,10 +218,8 @@ def active_learning_overlap(run: Run, curve_files: Iterable[str | Path]) -> Figu
 
 def _draw(run: Run, files: Iterable[str | Path], rows: Mapping[str, str], held_out: Collection[str] | None = None):
     learning = run.config["active_learning"]
-    curves = {
-        (source, setting, strategy): curve
-        for (source, strategy, setting), curve in mean_curves(files, held_out).items()
-    }
+    by_strategy = mean_curves(files, held_out).items()
+    curves = {(source, setting, strategy): curve for (source, strategy, setting), curve in by_strategy}
     return draw_curves(curves, run.source_titles, rows, titles(learning["strategies"]), STYLES, learning["target"])
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from math import nan
 from typing import TYPE_CHECKING, Any
 
@@ -199,17 +199,12 @@ def _shown(
     if not shares:
         raise InputError("metrics", "have no recovery rates", "run the step recover first")
     shown = {name: look for name, look in looks.items() if name in shares}
-    return shown | dict.fromkeys(_best_sequence(metrics, shares, budget), ALWAYS)
-
-
-def _best_sequence(metrics: pd.DataFrame, shares: Iterable[str], budget: int) -> list[str]:
-    """The fixed sequence with the most recoveries within 1, 2, … actions, summed; none where there is none."""
-    fixed = [name for name in shares if name.startswith(("sequence_", "always_"))]
-    sums = {
+    sums = {  # of the recoveries within 1, 2, … actions
         name: sum((pool_share(metrics, name, f"recovered_within_{k}") or (0.0,))[0] for k in range(1, budget + 1))
-        for name in fixed
+        for name in shares
+        if name.startswith(("sequence_", "always_"))
     }
-    return [max(fixed, key=sums.__getitem__)] if fixed else []
+    return shown | ({max(sums, key=sums.__getitem__): ALWAYS} if sums else {})
 
 
 @figure(

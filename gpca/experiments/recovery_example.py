@@ -71,6 +71,9 @@ def fig1_recovery_example(run: Run, example_npz: str | Path) -> Figure:
     Both views show the outlines of the object, where it is and where ICP put it: between them lies the misfit. A pose
     is solved if its error is below the config's `success.error`.
     """
+    from matplotlib.lines import Line2D
+    from matplotlib.patheffects import withStroke
+
     entry = run.config["sources"][run.config["recovery"]["objects"]]
     example = load_arrays(example_npz, SHAPES)
     drawing = style.use_style().figure(figsize=(style.TEXT_WIDTH_IN, 2.2), layout="constrained")
@@ -100,7 +103,13 @@ def fig1_recovery_example(run: Run, example_npz: str | Path) -> Figure:
     axes["b"].set_xlabel(captions[1], labelpad=1)
     name = object_in_words(example["object"], dataset_of(entry))
     style.write_title(drawing, f"{tables_title(run)}: {name}")
-    _name_lines(drawing)
+    outlines = (("where it is", VISIBLE), ("its hidden part", HIDDEN), ("where ICP put it", PLACED))
+    rim = {"linewidth": LINE_PT, "path_effects": [withStroke(linewidth=RIM_PT, foreground=style.BLACK)]}
+    handles = [Line2D([], [], label=words, color=look[0], linestyle=look[1], **rim) for words, look in outlines]
+    ring = {"marker": "o", "color": "white", "markeredgecolor": style.BLACK, "markeredgewidth": 1.6}
+    for words, mark in (("first view", {"marker": "x", "color": style.VERMILION}), ("chosen", ring)):
+        handles.append(Line2D([], [], label=words, linestyle="", markersize=4, **mark))
+    legend_below(drawing, handles)
     return drawing
 
 
@@ -138,24 +147,6 @@ def _draw_viewpoints(drawing, panel, example: Mapping[str, np.ndarray]) -> None:
     bar.set_label("surface seen (%)", fontsize=style.SMALL_PT, labelpad=1)
     bar.ax.tick_params(labelsize=style.SMALL_PT, length=1.5, pad=1)
     bar.outline.set_linewidth(0.4)
-
-
-def _name_lines(drawing) -> None:
-    """Names of the outlines and of the viewpoints' marks, below all panels."""
-    from matplotlib.lines import Line2D
-    from matplotlib.patheffects import withStroke
-
-    rim: dict[str, Any] = {"linewidth": LINE_PT, "path_effects": [withStroke(linewidth=RIM_PT, foreground=style.BLACK)]}
-    outlines = (("where it is", VISIBLE), ("its hidden part", HIDDEN), ("where ICP put it", PLACED))
-    handles = [Line2D([], [], label=words, color=look[0], linestyle=look[1], **rim) for words, look in outlines]
-    mark: dict[str, Any] = {"linestyle": "", "markersize": 4}
-    handles += [
-        Line2D([], [], label="first view", marker="x", color=style.VERMILION, **mark),
-        Line2D(
-            [], [], label="chosen", marker="o", color="white", markeredgecolor=style.BLACK, markeredgewidth=1.6, **mark
-        ),
-    ]
-    legend_below(drawing, handles)
 
 
 def _zenith_deg(towards: np.ndarray) -> np.ndarray:

@@ -74,10 +74,7 @@ def policy_metrics(
 ) -> dict[str, float]:
     """Measures of one policy on the failures among the rows, and how often it acts on the others.
 
-    Args:
-        treatments: concept -> its action.
-        costs: action -> its cost, in right poses.
-        budget: actions per failure.
+    Treatments are actions by concept, costs by action, in right poses; the budget is of actions per failure.
     """
 
     def mean_cost(rows: pd.DataFrame, registrations: int) -> float:

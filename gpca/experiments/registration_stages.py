@@ -80,8 +80,11 @@ class Stages:
         none either, conditions are dropped one by one: first that it failed, then that it is uncertain (the half that
         ICP fits worst stays), then that it is named right.
         """
+        rows = self.predictions
         for other in (concept, *others):
-            if len(failures := self._uncertain_failures(other)):
+            named = (rows["split"] == "test") & (rows["concept_true"] == other) & (rows["concept_predicted"] == other)
+            uncertain = rows[named & (self.u_S > self.u_clean)]
+            if len(failures := uncertain[[self.state(row) == FAILED for row in uncertain.index]]):
                 return _median(failures, other)
         test = self.predictions[(self.predictions["split"] == "test") & (self.predictions["concept_true"] == concept)]
         if test.empty:
@@ -91,12 +94,6 @@ class Stages:
         uncertain = kept[self.u_S[kept.index] > self.u_clean]
         worst = kept.assign(fit=self.registrations.fitness[kept.index]).nsmallest((len(kept) + 1) // 2, "fit")
         return _median(uncertain if len(uncertain) else worst, concept)
-
-    def _uncertain_failures(self, concept: str) -> pd.DataFrame:
-        rows = self.predictions
-        uncertain = rows[(rows["split"] == "test") & (rows["concept_true"] == concept) & (self.u_S > self.u_clean)]
-        uncertain = uncertain[uncertain["concept_predicted"] == concept]
-        return uncertain[[self.state(row) == FAILED for row in uncertain.index]]
 
     def error(self, row: int) -> float:
         """Error of a row after ICP, in diameters."""

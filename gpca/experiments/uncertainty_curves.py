@@ -187,11 +187,8 @@ def distance_curve(of_seeds: Sequence) -> tuple[np.ndarray, np.ndarray, np.ndarr
 def _looks(shown: Iterable[str]) -> dict[str, dict[str, Any]]:
     """Color, line and width of every learner; those without a look of their own take `OTHER_LOOKS` in turn."""
     others = iter(OTHER_LOOKS)
-    own = {
-        name: style.METHOD_LOOKS[name] if name in style.METHOD_LOOKS else next(others, style.OTHER_LOOK)
-        for name in shown
-    }
-    return {name: {"color": look[0], "linestyle": look[1], "linewidth": look[2]} for name, look in own.items()}
+    own = {name: style.METHOD_LOOKS.get(name) or next(others, style.OTHER_LOOK) for name in shown}
+    return {name: dict(zip(("color", "linestyle", "linewidth"), look, strict=True)) for name, look in own.items()}
 
 
 def _paper_first(learners: Iterable[str]) -> list[str]:
@@ -209,10 +206,9 @@ def _write_legend(drawing: Figure, shown: Mapping[str, str], looks: Mapping[str,
 
 def _shown(run: Run, learned: Mapping) -> tuple[dict[str, str], dict[str, str]]:
     """Titles of the learners and of the sources that have predictions."""
-    learners = {
-        name: title for name, title in learner_titles(run.config).items() if any(key[1] == name for key in learned)
-    }
-    sources = {name: title for name, title in run.source_titles.items() if any(key[0] == name for key in learned)}
+    present = [{key[place] for key in learned} for place in (0, 1)]
+    sources = {name: title for name, title in run.source_titles.items() if name in present[0]}
+    learners = {name: title for name, title in learner_titles(run.config).items() if name in present[1]}
     if not learners or not sources:
         raise InputError("learners", "have no predictions of these sources and learners", "run them first")
     return learners, sources

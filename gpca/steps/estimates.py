@@ -188,11 +188,6 @@ def try_estimators(
 
     Rows have the seconds of an estimate, with those of the descriptors that it reads, without those of learning. Those
     that are trained otherwise have rows of the method with the most registrations alone.
-
-    Args:
-        situations: with test samples.
-        other: of another source, for learners; None where there is none.
-        estimators: name -> settings.
     """
     import pandas as pd
 

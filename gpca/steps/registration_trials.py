@@ -88,10 +88,6 @@ def try_methods(
     A method that fails has its reason in the row. Normals are estimated beforehand, as the same ones serve all methods
     of one number of points; what a method loads or compiles at its first call is loaded before the first pair. Fewer
     points of a cloud are among more of it.
-
-    Args:
-        registrations: with test samples; their targets are in the objects' canonical frames.
-        methods: name -> settings, the global start among them.
     """
     import pandas as pd
 

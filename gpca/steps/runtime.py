@@ -73,10 +73,7 @@ def measure(
     A repeat goes once through all components with the next test registration, so that whatever else the machine does
     meets all of them.
 
-    Args:
-        task: an experiment of active learning, not projected yet; BALD selects from its pool.
-        settings: those of active learning.
-        axes: the names of the draws (source, seed).
+    The axes name the draws; BALD selects from the pool of the task, which is not projected yet.
     """
     import pandas as pd
     import torch
@@ -123,12 +120,7 @@ def timed(work: Callable[[], Result]) -> tuple[Result, float]:
 def time_stages(
     explainers: Mapping[str, Explainer], model: Model, pair: CloudPair, random: np.random.Generator
 ) -> Times:
-    """Times of ICP, feature extraction, posterior sampling and the scores.
-
-    Args:
-        explainers: one per device, which extracts features there.
-        pair: the clouds before ICP.
-    """
+    """Times of ICP, feature extraction by the explainer of each device, posterior sampling and the scores."""
     source, target = pair
     start = np.eye(4)
     poses, elapsed = timed(lambda: BatchedICP(target, model.icp).register(source, start[None])[0])
@@ -159,15 +151,9 @@ def time_explanations(explainers: Mapping[str, Explainer], pairs: Mapping[str, C
 def time_labeling(
     task: LabelingTask[Projection], gpc: GPC, settings: ActiveLearningSettings, random: np.random.Generator
 ) -> Times:
-    """Times of BALD selection from the whole pool, and of the update of a copy of the classifier.
-
-    Args:
-        task: projected by `gpc`.
-    """
+    """Times of BALD selection from the pool projected by `gpc`, and of the update of a copy of the classifier."""
     left = np.arange(len(task.pool))
     chosen, elapsed = timed(lambda: select(STRATEGY, pool_of(task, gpc, left, []), settings.batch, random))
     yield ("bald", "CPU"), elapsed
-    more = task.pool.h[chosen]
-    labels = task.pool.concept_N[chosen]
-    known = copy(gpc)
+    more, labels, known = task.pool.h[chosen], task.pool.concept_N[chosen], copy(gpc)
     yield ("retraining", "CPU"), timed(lambda: known.update(more, labels, settings.iterations, settings.tolerance))[1]
