@@ -25,8 +25,8 @@ from gpca.causes.settings import FEWEST_POINTS
 from gpca.pairs.perturbation import within_half_space
 from gpca.seeds import generator
 from gpca.uncertainty.estimates import Kind
+from gpca.uncertainty.estimators.analytic import sample
 from gpca.uncertainty.estimators.interface import POINT_TO_PLANE, POINT_TO_POINT, RegisteredPair
-from gpca.uncertainty.estimators.starts import sample
 
 Clouds = Iterator[tuple[np.ndarray, np.ndarray]]  # (N, 3) of sources and (P, 3) of targets
 SETTINGS = ICPSettings("point_to_point", CORRESPONDENCE_DISTANCE, MAX_ITERATIONS)  # to points and to planes

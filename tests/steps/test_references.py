@@ -12,8 +12,8 @@ from gpca.alignment.rigid import exp, transform
 from gpca.causes.candidate import draw_candidate
 from gpca.causes.settings import CauseSettings
 from gpca.steps.references import Redraws, draw_twists
+from gpca.uncertainty.estimators.analytic import sample
 from gpca.uncertainty.estimators.interface import RegisteredPair
-from gpca.uncertainty.estimators.starts import sample
 
 SETTINGS = CauseSettings(points=(256, 512))
 POINTS = 10_000  # more than there are

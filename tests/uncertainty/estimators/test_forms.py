@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gpca.uncertainty.estimators import analytic, starts
+from gpca.uncertainty.estimators import analytic
 from gpca.uncertainty.estimators.interface import FailedEstimate, RegisteredPair
 
 from .cases import DEVIATION_6, plane, registered
@@ -37,7 +37,7 @@ def test_unscented_and_monte_carlo_agree_where_the_pose_follows_the_start():
     pair = registered("point_to_plane", plane)
     expected = np.diag(DEVIATION_6**2 * [0, 0, 1, 1, 1, 0])
     tolerance = 0.06 * np.sqrt(np.outer(DEVIATION_6, DEVIATION_6)).max() ** 2
-    unscented, sampled = starts.unscented(pair), starts.monte_carlo(pair, 800)
+    unscented, sampled = analytic.unscented(pair), analytic.monte_carlo(pair, 800)
     for found in (unscented, sampled):
         assert np.abs(found - expected).max() < 2 * tolerance
     assert np.diag(unscented)[2:5] == pytest.approx(np.diag(expected)[2:5], rel=0.12)
@@ -48,25 +48,25 @@ def test_unscented_is_exact_where_the_result_is_linear_in_the_start(monkeypatch)
     mixing = np.random.default_rng(0).normal(size=(6, 6))
     monkeypatch.setattr(RegisteredPair, "twists_from", lambda self, xi_n_6: xi_n_6 @ mixing.T)
     expected = mixing @ np.diag(DEVIATION_6**2) @ mixing.T
-    assert starts.unscented(registered()) == pytest.approx(expected)
-    sampled = starts.monte_carlo(registered(), 40_000)
+    assert analytic.unscented(registered()) == pytest.approx(expected)
+    sampled = analytic.monte_carlo(registered(), 40_000)
     assert np.abs(sampled - expected).max() < 0.03 * np.abs(expected).max()
 
 
 def test_the_sensor_adds_noise_and_a_bias():
     pair = registered("point_to_plane")
-    base = starts.unscented(pair)
+    base = analytic.unscented(pair)
     _, rows = pair.matches().plane_rows()
     inverse = np.linalg.inv(rows.T @ rows)
     shift = inverse @ rows.sum(axis=0)
     expected = 0.01 * inverse + 0.04 * np.outer(shift, shift)
-    assert starts.brossard(pair, noise=0.1, bias=0.2) - base == pytest.approx(expected, abs=1e-12)
-    assert starts.brossard(pair, noise=0.1) == pytest.approx(starts.brossard(pair, noise=0.1, bias=0.1))
+    assert analytic.brossard(pair, noise=0.1, bias=0.2) - base == pytest.approx(expected, abs=1e-12)
+    assert analytic.brossard(pair, noise=0.1) == pytest.approx(analytic.brossard(pair, noise=0.1, bias=0.1))
 
 
 def test_monte_carlo_is_of_the_pairs_own_draws():
     pair = registered(noise=0.02)
-    assert (starts.monte_carlo(pair, 20) == starts.monte_carlo(pair, 20)).all()
-    assert not (starts.sample(pair, 20, "a") == starts.sample(pair, 20, "b")).all()
+    assert (analytic.monte_carlo(pair, 20) == analytic.monte_carlo(pair, 20)).all()
+    assert not (analytic.sample(pair, 20, "a") == analytic.sample(pair, 20, "b")).all()
     with pytest.raises(FailedEstimate, match="fewer than 7 runs"):
-        starts.monte_carlo(pair, 6)
+        analytic.monte_carlo(pair, 6)
