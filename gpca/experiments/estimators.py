@@ -88,14 +88,6 @@ def _asked(plan: Plan) -> list[str]:
     return list(dict.fromkeys(found[name]["by"] for name in plan.names["estimate"] if name in found))
 
 
-def _settings(plan: Plan, _wildcards: Wildcards) -> dict[str, Any]:
-    return {
-        **{name: plan.config[name] for name in ("estimator_pairs", "causes", "success")},
-        "icp": plan.config["registrations"]["icp"],
-        "estimators": {name: plan.config["estimators"][name] for name in _asked(plan)},
-    }
-
-
 ESTIMATE = Step(
     name="estimate",
     run="gpca.steps.estimates",
@@ -112,7 +104,11 @@ ESTIMATE = Step(
         "timings": "timings/{source}/estimator_{*estimate}/seed{*seed}.csv",
         "samples": "reference_samples/{source}/seed{*seed}.npz",
     },
-    settings=_settings,
+    settings=lambda plan, _wildcards: {
+        **{name: plan.config[name] for name in ("estimator_pairs", "causes", "success")},
+        "icp": plan.config["registrations"]["icp"],
+        "estimators": {name: plan.config["estimators"][name] for name in _asked(plan)},
+    },
     params={
         "other": lambda plan, wildcards: "".join(_other(plan, wildcards)),
         "estimators": lambda plan, _wildcards: _asked(plan),

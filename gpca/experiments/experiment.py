@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
-from functools import reduce
-from operator import getitem
 from typing import Annotated, Any
 
 from pydantic import Field
@@ -47,16 +45,14 @@ class Tidy:
         file: its name.
         collector: ``module:function`` that returns its rows; empty where another rule of the experiment writes it.
         files: the collector's arguments -> patterns of files below the folder of a run, with names in braces.
-        arguments: its other arguments -> keys of the config.
         rule: name of the rule, if it is not that of the file.
         others: files that the collector returns besides, each a target of its own.
-        takes_run: the collector's first argument is the run, and it has no other ones besides its files.
+        takes_run: the collector's first argument is the run.
     """
 
     file: str
     collector: str = ""
     files: Mapping[str, str] = field(default_factory=dict)
-    arguments: Mapping[str, str] = field(default_factory=dict)
     rule: str = ""
     others: tuple[str, ...] = ()
     takes_run: bool = False
@@ -74,10 +70,6 @@ class Tidy:
     def inputs(self, names: Mapping[str, Any]) -> dict[str, list[str] | str]:
         """Return the files that the collector is given, by argument."""
         return {argument: expand((pattern,), names) for argument, pattern in self.files.items()}
-
-    def settings(self, config: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the collector's other arguments."""
-        return {argument: reduce(getitem, key.split("."), config) for argument, key in self.arguments.items()}
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -224,21 +224,15 @@ def kernel_learning_curves(run: Run, grid) -> Figure:
         axes[-1, column].set_xlabel("iterations")
     for row, label in enumerate(CURVES.values()):
         axes[row, 0].set_ylabel(label)
-    handles = [
-        Line2D([], [], color=COLORS[kernel], linewidth=WIDTHS[kernel], label=TITLES[kernel])
-        for kernel in COLORS
-        if (grid["kernel"] == kernel).any()
+    kernels = [kernel for kernel in COLORS if (grid["kernel"] == kernel).any()]
+    looks: list[dict[str, Any]] = [
+        *({"label": TITLES[name], "color": COLORS[name], "linewidth": WIDTHS[name]} for name in kernels),
+        *({"label": f"rate {rate:g}", "linestyle": LINES[i % len(LINES)]} for i, rate in enumerate(rates)),
+        {"label": "row of Table IV", "marker": "o", "markerfacecolor": "white", "linestyle": ""},
     ]
-    handles += [
-        Line2D([], [], color=GRAY, linestyle=LINES[i % len(LINES)], label=f"rate {rate:g}")
-        for i, rate in enumerate(rates)
-    ]
-    ours: dict[str, Any] = {"color": GRAY, "marker": "o", "markerfacecolor": "white", "linestyle": ""}
-    handles.append(Line2D([], [], label="row of Table IV", **ours))
     for symbol, rate in zip(PRINTED_MARKERS, rates, strict=False):
-        printed: dict[str, Any] = {"color": GRAY, "marker": symbol, "linestyle": "", "markersize": 3.5}
-        handles.append(Line2D([], [], label=f"paper, rate {rate:g}", **printed))
-    legend_below(drawing, handles, columns=3)
+        looks.append({"label": f"paper, rate {rate:g}", "marker": symbol, "linestyle": "", "markersize": 3.5})
+    legend_below(drawing, [Line2D([], [], **{"color": GRAY} | look) for look in looks], columns=3)
     return drawing
 
 

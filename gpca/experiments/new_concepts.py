@@ -78,19 +78,6 @@ def _other_encoders(plan: Plan, wildcards: Any) -> dict[str, str]:
     }
 
 
-def _settings(plan: Plan, wildcards: Any) -> dict[str, Any]:
-    config = plan.config
-    return {
-        "new_concepts": config["new_concepts"],
-        "active_learning": learning_settings(plan),
-        "encoder": config["encoders"][config["embedding"]["encoder"]],
-        "cause_encoder": config["diagnosis"]["encoder"],
-        "causes": config["causes"],
-        "descriptors": config["diagnosis"]["descriptors"],
-        "icp": config["registrations"]["icp"],
-    }
-
-
 LEARN = Step(
     name="learn_new_concepts",
     run="gpca.steps.new_concepts",
@@ -105,7 +92,15 @@ LEARN = Step(
     },
     outputs={"out": "new_concepts/{source}/{*strategy}/seed{seed}.csv"},
     where={"strategy": "new_concept_strategy"},
-    settings=_settings,
+    settings=lambda plan, _wildcards: {
+        "new_concepts": plan.config["new_concepts"],
+        "active_learning": learning_settings(plan),
+        "encoder": plan.config["encoders"][plan.config["embedding"]["encoder"]],
+        "cause_encoder": plan.config["diagnosis"]["encoder"],
+        "causes": plan.config["causes"],
+        "descriptors": plan.config["diagnosis"]["descriptors"],
+        "icp": plan.config["registrations"]["icp"],
+    },
     params={"encoders_of": lambda plan, wildcards: [*_other_encoders(plan, wildcards)]},
     modules=lambda plan: [
         encoder_module(plan.config["encoders"][plan.config["embedding"]["encoder"]]),

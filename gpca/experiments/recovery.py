@@ -17,7 +17,7 @@ from gpca.experiments.experiment import Experiment, LeftOut, Names
 from gpca.experiments.plan import Run
 from gpca.experiments.recovery_measures import ERROR, SEQUENCE, pool_share
 from gpca.experiments.result import table
-from gpca.experiments.step import Plan, Step, Wildcards
+from gpca.experiments.step import Plan, Step
 from gpca.explainers.registry import explainer_entry, explainer_module, require_settings
 from gpca.frames.initial_pose import InitialPoseSettings
 from gpca.frames.situations import SituationSettings
@@ -29,7 +29,7 @@ from gpca.objects.source import data_files, data_folders, source_modules
 from gpca.pairs.perturbation import CONCEPTS, Hidden
 from gpca.pairs.synthesis import TestSamples, TrainSamples
 from gpca.recovery.actions import ACTIONS, action_of
-from gpca.recovery.policies import named_policies, policies, policy_entry, policy_module
+from gpca.recovery.policies import PolicyEntry, named_policies, policies, policy_entry, policy_module
 from gpca.recovery.settings import LoopSettings
 from gpca.reporting.sheet import Row, Sheet, show
 from gpca.reporting.tables.builder import over_clusters
@@ -139,17 +139,19 @@ def policies_without(left_out: LeftOut) -> set[str]:
     }
 
 
+def _entries(config: Mapping[str, Any]) -> dict[str, PolicyEntry]:
+    actions = tuple(config["recovery"]["actions"])
+    return {name: policy_entry(name, actions) for name in config["recovery"]["policies"]}
+
+
 def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
     """Policies that learn, from rehearsals or from a person's labels."""
-    recovery = config["recovery"]
-    entries = {name: policy_entry(name, tuple(recovery["actions"])) for name in recovery["policies"]}
-    return {"learning_policy": [name for name, entry in entries.items() if entry.learns or entry.queues]}
+    return {"learning_policy": [name for name, each in _entries(config).items() if each.learns or each.queues]}
 
 
 def policy_titles(config: Mapping[str, Any]) -> dict[str, str]:
     """Titles of the policies."""
-    recovery = config["recovery"]
-    return {name: policy_entry(name, tuple(recovery["actions"])).title for name in recovery["policies"]}
+    return {name: entry.title for name, entry in _entries(config).items()}
 
 
 EXPERIMENT = Experiment(
@@ -166,22 +168,7 @@ EXPERIMENT = Experiment(
 
 def explained(plan: Plan) -> list[str]:
     """Explainers that the policies of a run read."""
-    recovery = plan.config["recovery"]
-    entries = (policy_entry(name, tuple(recovery["actions"])) for name in recovery["policies"])
-    return sorted({entry.explainer for entry in entries if entry.explainer})
-
-
-def _settings(plan: Plan, _wildcards: Wildcards) -> dict[str, Any]:
-    config, recovery = plan.config, plan.config["recovery"]
-    return {
-        **{name: config[name] for name in ("recovery", "success", "registrations")},
-        "objects": config["sources"][recovery["objects"]],
-        "scenes": config["real_world"]["scenes"],
-        "encoder": config["encoders"][config["embedding"]["encoder"]] | recovery["encoder"],
-        "uncertainty": config["uncertainty"].get("removal", {}),
-        "reenactment": config["diagnosis"]["reenactment"],
-        "explainers": {name: config["explainers"].get(name) or {} for name in explained(plan)},
-    }
+    return sorted({entry.explainer for entry in _entries(plan.config).values() if entry.explainer})
 
 
 def standing(plan: Plan) -> Mapping[str, Any]:
@@ -200,7 +187,15 @@ RECOVER = Step(
         "example": "recovery/example_seed{seed}.npz",
         "timings": "timings/recovery/seed{seed}.csv",
     },
-    settings=_settings,
+    settings=lambda plan, _wildcards: {
+        **{name: plan.config[name] for name in ("recovery", "success", "registrations")},
+        "objects": plan.config["sources"][plan.config["recovery"]["objects"]],
+        "scenes": plan.config["real_world"]["scenes"],
+        "encoder": plan.config["encoders"][plan.config["embedding"]["encoder"]] | plan.config["recovery"]["encoder"],
+        "uncertainty": plan.config["uncertainty"].get("removal", {}),
+        "reenactment": plan.config["diagnosis"]["reenactment"],
+        "explainers": {name: plan.config["explainers"].get(name) or {} for name in explained(plan)},
+    },
     params={
         "folders": lambda plan, _wildcards: data_folders(
             standing(plan), plan.config["data_dir"], plan.config["downloads"]
@@ -274,7 +269,7 @@ def table8_recovery(
         "cost": show("cost", "Cost", decimals=3, **apart),
         "seconds": show("seconds", "Seconds", decimals=2, **apart),
     }
-    rows = [Row([(name, title)], {"method": name}) for name, title in titles_of_policies(run).items()]
+    rows = [Row([(name, title)], {"method": name}) for name, title in policy_titles(run.config).items()]
     sheet = Sheet("table8_recovery", {"policy": "Policy"}, rows, columns, pd.concat([intervals, differences]))
     for i, row in enumerate(sheet.rows):
         policy, failures = row.where["method"], sheet.cells[i, first].test_samples
@@ -302,13 +297,6 @@ def table8_recovery(
         "per failure; the camera's and the robot's own times are not in them.",
     )
     return sheet.table(f"Failed registrations recovered (%): {tables_title(run)}", "metric", notes, bold=within)
-
-
-def titles_of_policies(run: Run) -> dict[str, str]:
-    """Title of each policy of the run."""
-    recovery = run.config["recovery"]
-    actions = tuple(recovery["actions"])
-    return run.titles(lambda name: policy_entry(name, actions), recovery["policies"])
 
 
 def tables_title(run: Run) -> str:

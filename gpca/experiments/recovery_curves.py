@@ -12,7 +12,7 @@ from gpca.causes.policy import DOUBTED, DRAWN
 from gpca.errors import InputError
 from gpca.evaluation.intervals import wilson_interval
 from gpca.experiments.plan import Run
-from gpca.experiments.recovery import SECTION, tables_title, titles_of_policies
+from gpca.experiments.recovery import SECTION, policy_titles, tables_title
 from gpca.experiments.recovery_measures import at, pool_share, read_queues
 from gpca.experiments.result import figure
 from gpca.pairs.perturbation import CONCEPTS
@@ -65,7 +65,7 @@ LOSSES = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)  # that the
 )
 def recovery_rates(run: Run, metrics: pd.DataFrame) -> Figure:
     """Left, rates within 1 to `budget` actions with their Wilson intervals; right, rates within all by cause."""
-    budget, policies = run.config["recovery"]["loop"]["budget"], titles_of_policies(run)
+    budget, policies = run.config["recovery"]["loop"]["budget"], policy_titles(run.config)
     shown = [name for name in policies if pool_share(metrics, name, "recovered_within_1") is not None]
     if not shown:
         raise InputError("metrics", "have no recovery rates", "run the step recover first")
@@ -118,7 +118,7 @@ def _draw(axes, metrics, shown, metric: str, concept: str, offset: float, look: 
 def recovery_thresholds(run: Run, metrics: pd.DataFrame) -> Figure:
     """The share recovered over the error below which a pose is right: a panel for each number of actions."""
     budget, success = run.config["recovery"]["loop"]["budget"], run.config["success"]
-    policies, curve = titles_of_policies(run), success["curve"]
+    policies, curve = policy_titles(run.config), success["curve"]
     shown = _shown(metrics, policies, ALARMED, budget)
     drawing, [drawn] = panels(1, budget, 2.6, sharex=True, sharey=True)
     for k, panel in enumerate(drawn, start=1):
@@ -154,7 +154,7 @@ def recovery_costs(run: Run, metrics: pd.DataFrame) -> Figure:
     """The loss over the factor on the costs of actions: a panel for each share of failures."""
     from matplotlib.ticker import FixedLocator
 
-    recovery, policies = run.config["recovery"], titles_of_policies(run)
+    recovery, policies = run.config["recovery"], policy_titles(run.config)
     budget, needless = recovery["loop"]["budget"], recovery["needless"]
     shown = _shown(metrics, policies, ALONE, budget)
     drawing, [drawn] = panels(1, len(FAILED), 2.8, sharex=True, sharey=True)
@@ -219,7 +219,7 @@ def _shown(
 )
 def queued_labels(run: Run, queues: pd.DataFrame) -> Figure:
     """The error over labels by order, with its interval: a panel for each policy that learns."""
-    policies = titles_of_policies(run)
+    policies = policy_titles(run.config)
     shown = [name for name in policies if (queues["policy"] == name).any()]
     highest = 100 * queues[queues["policy"].isin(shown)]["high"].max()
     drawing, [drawn] = panels(1, len(shown), 2.4, sharex=True, sharey=True)

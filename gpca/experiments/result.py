@@ -77,6 +77,17 @@ def _declared(
     after: str = "",
     **inputs: Given,
 ) -> Callable[[Function], Function]:
+    given = []
+    for argument, of in inputs.items():
+        if isinstance(of, str):
+            is_numbers = of.endswith(".csv") and "{" not in of
+            given.append(Input(argument, {"": (of,)}, READ_ROWS if is_numbers else ""))
+            continue
+        read, patterns = of
+        by_keyword = patterns if isinstance(patterns, Mapping) else {"": patterns}
+        files = {key: (each,) if isinstance(each, str) else tuple(each) for key, each in by_keyword.items()}
+        given.append(Input(argument, files, f"{read.__module__}:{read.__name__}"))
+
     def declare(function: Function) -> Function:
         function.result = Result(  # type: ignore[attr-defined]
             name=name or function.__name__,
@@ -85,7 +96,7 @@ def _declared(
             title=title,
             caption=cleandoc(caption),
             builder=f"{function.__module__}:{function.__name__}",
-            inputs=tuple(_input(argument, given) for argument, given in inputs.items()),
+            inputs=tuple(given),
             only=only or {},
             needs=needs,
             paper=paper,
@@ -94,13 +105,3 @@ def _declared(
         return function
 
     return declare
-
-
-def _input(argument: str, given: Given) -> Input:
-    if isinstance(given, str):
-        is_numbers = given.endswith(".csv") and "{" not in given
-        return Input(argument, {"": (given,)}, READ_ROWS if is_numbers else "")
-    read, patterns = given
-    by_keyword = patterns if isinstance(patterns, Mapping) else {"": patterns}
-    files = {key: (each,) if isinstance(each, str) else tuple(each) for key, each in by_keyword.items()}
-    return Input(argument, files, f"{read.__module__}:{read.__name__}")

@@ -4,20 +4,16 @@ import inspect
 
 import pytest
 
-from gpca.config.layers import without_false
 from gpca.experiments.experiment import Experiment, Tidy
 from gpca.experiments.registry import experiments
 from gpca.process.registry import load as load_function
-
-from ..config.configs import load
 
 COLLECTED = [tidy for each in experiments() for tidy in each.tidy if tidy.collector]
 
 
 @pytest.mark.parametrize("tidy", COLLECTED, ids=lambda tidy: tidy.file)
-def test_a_collector_takes_its_files_and_arguments_and_the_config_has_these(tidy):
-    arguments = {*tidy.files, *tidy.settings(without_false(load()))}
-    inspect.signature(load_function(tidy.collector)).bind(*[None] * tidy.takes_run, **dict.fromkeys(arguments))
+def test_a_collector_takes_its_files(tidy):
+    inspect.signature(load_function(tidy.collector)).bind(*[None] * tidy.takes_run, **dict.fromkeys(tidy.files))
 
 
 def test_no_two_experiments_write_one_file_or_read_one_section():
@@ -28,9 +24,8 @@ def test_no_two_experiments_write_one_file_or_read_one_section():
 
 
 def test_a_tidy_file_is_collected_from_the_files_of_all_names():
-    tidy = Tidy("mine.csv", "m:f", {"files": "mine/{source}/seed{seed}.csv"}, {"target": "a.b"})
+    tidy = Tidy("mine.csv", "m:f", {"files": "mine/{source}/seed{seed}.csv"})
     assert tidy.inputs({"source": ["x", "y"], "seed": [0]}) == {"files": ["mine/x/seed0.csv", "mine/y/seed0.csv"]}
-    assert tidy.settings({"a": {"b": 0.9}}) == {"target": 0.9}
     assert (tidy.target, Tidy("mine.csv", rule="mine_metrics").target) == ("mine", "mine_metrics")
 
 

@@ -9,7 +9,7 @@ import pytest
 from gpca.errors import InputError
 from gpca.evaluation.measures import AGAINST, KEYS, NUMBERS, tidy
 from gpca.evaluation.measures import COLUMNS as INTERVALS
-from gpca.experiments.recovery import table8_recovery, titles_of_policies
+from gpca.experiments.recovery import policy_titles, table8_recovery
 from gpca.experiments.recovery_curves import (
     losses,
     queued_labels,
@@ -127,7 +127,7 @@ def test_rates_are_drawn(metrics, same_bytes):
 
 def test_thresholds_and_costs_are_drawn_for_the_policies_that_there_are(metrics, same_bytes):
     run = run_of("gpca_acting", "error_only", "always_denoise")
-    titles = titles_of_policies(run)
+    titles = policy_titles(run.config)
     methods = {"gpca": "gpca_acting", "random": "error_only"}
     renamed = metrics.assign(method=metrics["method"].map(methods))
     fixed = renamed[renamed["method"] == "error_only"].assign(method="always_denoise")

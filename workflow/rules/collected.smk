@@ -20,7 +20,6 @@ for experiment in experiments():
             conda:
                 "../envs/gpca.yaml"
             params:
-                **tidy.settings(config),
                 collector=tidy.collector,
                 config=token_of(tidy.file) if tidy.takes_run else "",
             script:

@@ -7,10 +7,9 @@ from gpca.process.job import files_by_name, workflow_script
 from gpca.process.registry import load
 
 with workflow_script(snakemake) as added:
-    arguments = dict(snakemake.params.items())
-    collect, token = load(arguments.pop("collector")), arguments.pop("config", "")
+    collect, token = load(snakemake.params.collector), snakemake.params.config
     config = Recorded(snakemake.config)
-    made = collect(*([Run(config, names_of=names_of)] if token else []), **files_by_name(snakemake.input), **arguments)
+    made = collect(*([Run(config, names_of=names_of)] if token else []), **files_by_name(snakemake.input))
     if token:
         added[READ] = config.record(token)
     frames = made if isinstance(made, (tuple, list)) else [made]
