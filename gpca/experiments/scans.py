@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
 from math import inf
@@ -13,13 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 from pydantic import Field
 
-from gpca.alignment.methods.registry import (
-    installed,
-    method_entry,
-    method_module,
-    require_global,
-    require_settings,
-)
+from gpca.alignment.methods.registry import installed, method_entry, method_module, require_global, require_settings
 from gpca.errors import InputError, require_names, with_key
 from gpca.evaluation.intervals import Clustered
 from gpca.evaluation.measures import ALL, Measure, Parts, over_seeds, read_samples
@@ -31,9 +25,7 @@ from gpca.experiments.step import Plan, Step, Wildcards
 from gpca.io.csv_file import read_numbers
 from gpca.objects.entry import Name, title_of
 from gpca.reporting.sheet import Row, Sheet, show, where
-from gpca.reporting.tables.builder import TableBuilder, over_clusters
-from gpca.reporting.tables.cells import clustered_cell, plain_cell
-from gpca.reporting.tables.table import Column
+from gpca.reporting.tables.cells import plain_cell
 from gpca.reporting.words import plural
 from gpca.scans.pair import Rung, ScanSuccess
 from gpca.scans.scene import stratum_name, stratum_of
@@ -98,21 +90,11 @@ def check(config: dict, left_out: LeftOut) -> None:
             with_key(f"scans.datasets.{name}", place_of, entry, config["data_dir"])
 
 
-def entries_of(config: Mapping[str, Any]) -> dict[str, ScanEntry]:
-    """Data sets by name."""
-    return {name: entry_of(settings) for name, settings in plain(config["scans"]["datasets"]).items()}
-
-
 def present(config: Mapping[str, Any]) -> dict[str, ScanEntry]:
     """Data sets without those that are optional and do not exist, by name."""
-    entries, data_dir = entries_of(config), config["data_dir"]
+    entries = {name: entry_of(settings) for name, settings in plain(config["scans"]["datasets"]).items()}
+    data_dir = config["data_dir"]
     return {name: entry for name, entry in entries.items() if entry.kind == "virtual" or place_of(entry, data_dir)}
-
-
-def missing(config: Mapping[str, Any]) -> dict[str, str]:
-    """Address of each optional data set that does not exist, by title."""
-    there = present(config)
-    return {entry.title: entry.address for name, entry in entries_of(config).items() if name not in there}
 
 
 def titles_of_scans(config: Mapping[str, Any]) -> dict[str, str]:
@@ -155,11 +137,6 @@ def place_of_set(plan: Plan, wildcards: Wildcards) -> str:
     return str(place_of(present(plan.config)[wildcards.source], plan.config["data_dir"]) or "")
 
 
-def _methods(plan: Plan) -> dict[str, Mapping]:
-    own, shared = plan.config["scans"]["methods"], plan.config["methods"]
-    return {name: own.get(name) or shared[name] for name in plan.names["scan_method"]}
-
-
 DRAW = Step(
     name="draw_scans",
     run="gpca.steps.scans:draw_scans",
@@ -185,7 +162,10 @@ REGISTER = Step(
     },
     settings=lambda plan, _wildcards: {
         "scans": fields_of(plan.config["scans"], TrialSettings),
-        "methods": _methods(plan),
+        "methods": {
+            name: plan.config["scans"]["methods"].get(name) or plan.config["methods"][name]
+            for name in plan.names["scan_method"]
+        },
     },
     modules=lambda plan: map(method_module, plan.names["scan_method"]),
     where=EACH_SET | {"method": "scan_method"},
@@ -199,17 +179,17 @@ TRIAL_COLUMNS = ("size_m", "overlap", "rmse_m", "rotation_error_rad", "translati
 TEXTS = ("sample", "pair", "cluster", "kind", "rung", "start", "failure", "inlier_rmse")
 
 
-def read_trials(path: str | Path) -> pd.DataFrame:
-    """Read a file of the step ``register_scans``: numbers as numbers, the rest as text.
+@numbers("scans.csv", files="scan_trials/{scan_set}/{scan_method}/seed{scan_seed}.csv")
+def collect(run: Run, files: Iterable[str | Path]) -> pd.DataFrame:
+    """Recalls and failures of every data set, method and start, with intervals over scenes.
 
-    Raises:
-        InputError: missing or unreadable file, a column that is missing or unknown, a value that is no number.
+    ``concept`` is ``all``, a stratum, a rung of the ladder, or one of the benchmark's lists. A registration is correct
+    by the RMSE over the true overlap (:mod:`gpca.scans.pair`), whatever the method says of it, as in 3DMatch's
+    benchmark; a method that ends without any correspondence has no pose, so it is not correct.
     """
-    return read_numbers(path, (*TRIAL_COLUMNS, *TEXTS), TRIAL_COLUMNS)
+    import pandas as pd
 
-
-def parts_of(strata: Sequence[float]) -> Callable[[pd.DataFrame], Parts]:
-    """Function that returns masks of all trials and of those of each stratum, list and rung."""
+    strata, success = list(run.config["scans"]["strata"]), ScanSuccess(**run.config["scans"]["success"])
 
     def parts(trials: pd.DataFrame) -> Parts:
         overlap_N = trials["overlap"].to_numpy()
@@ -220,16 +200,6 @@ def parts_of(strata: Sequence[float]) -> Callable[[pd.DataFrame], Parts]:
             masks[name] = (overlap_N >= low) & ((overlap_N < high) | ((high == 1) & (overlap_N == 1)))
         return masks | {name: (trials["rung"] == name).to_numpy() for name in trials["rung"].unique()}
 
-    return parts
-
-
-def measures(success: ScanSuccess) -> dict[str, Measure]:
-    """Recalls and failures.
-
-    A registration is correct by the RMSE over the true overlap (:mod:`gpca.scans.pair`), whatever the method says of
-    it, as in 3DMatch's benchmark; a method that ends without any correspondence has no pose, so it is not correct.
-    """
-
     def correct(trials: pd.DataFrame) -> np.ndarray:
         limit_N = np.where(trials["kind"] == "room", success.room_m, success.object_share * trials["size_m"])
         return (trials["fitness"] > 0) & (trials["rmse_m"] < limit_N)
@@ -238,20 +208,9 @@ def measures(success: ScanSuccess) -> dict[str, Measure]:
         is_close = np.rad2deg(trials["rotation_error_rad"]) < CLOSE_DEG
         return (trials["fitness"] > 0) & is_close & (trials["translation_error_m"] < CLOSE_M)
 
-    return {RECALL: Measure(correct), FAILED: Measure(lambda trials: trials["failure"] != ""), CLOSE: Measure(close)}
-
-
-@numbers("scans.csv", files="scan_trials/{scan_set}/{scan_method}/seed{scan_seed}.csv")
-def collect(run: Run, files: Iterable[str | Path]) -> pd.DataFrame:
-    """Recalls and failures of every data set, method and start, with intervals over scenes.
-
-    ``concept`` is ``all``, a stratum, a rung of the ladder, or one of the benchmark's lists.
-    """
-    import pandas as pd
-
-    section = run.config["scans"]
-    parts, measured = parts_of(list(section["strata"])), measures(ScanSuccess(**section["success"]))
-    rows = read_samples(files, read_trials)
+    measures = {RECALL: correct, FAILED: lambda trials: trials["failure"] != "", CLOSE: close}
+    measured = {name: Measure(of) for name, of in measures.items()}
+    rows = read_samples(files, lambda path: read_numbers(path, (*TRIAL_COLUMNS, *TEXTS), TRIAL_COLUMNS))
     rows["method"] = [row_name(*each) for each in zip(rows["method"], rows["start"], strict=True)]
     frames = []
     for (source, _), trials in rows.assign(table="scans").groupby(["source", "method"], sort=False):
@@ -280,7 +239,9 @@ def _notes(run: Run, sheet: Sheet, intervals: pd.DataFrame, parts: Iterable[str]
         samples = recalls.groupby("concept")["samples"].max()
         scenes = plural(int(where(recalls, {"concept": ALL})["clusters"].max()), "scene")
         counts.append(f"{title}: {', '.join(str(int(samples.get(part, 0))) for part in parts)}, of {scenes}")
-    absent = [f"{title} ({address})" if address else title for title, address in missing(run.config).items()]
+    there = present(run.config)
+    left_out = [entry_of(each) for name, each in plain(run.config["scans"]["datasets"]).items() if name not in there]
+    absent = [f"{entry.title} ({entry.address})" if entry.address else entry.title for entry in left_out]
     return [
         f"{sheet.over(clusters=SCENES)}. Correct: the RMSE over the points that the target has "
         f"as well is below {success['room_m']:g} m in rooms and {100 * success['object_share']:g} % of the size of "
@@ -304,18 +265,11 @@ def table17_scans(run: Run, intervals, seconds):
     """Recalls in all and by stratum of overlap, and seconds: data sets × starts × methods."""
     strata = {stratum_name(*ends): ends for ends in pairwise(run.config["scans"]["strata"])}
     columns = {key: show(RECALL, f"{low:g} to {high:g} (%)", key) for key, (low, high) in strata.items()}
+    seconds_look = {"decimals": 2, "interval": False, "limits": (0, inf), "least_is_best": True}
     columns |= {
         ALL: show(RECALL, "All (%)"),
         FAILED: show(FAILED, "Failed (%)", interval=False, least_is_best=True),
-        "seconds": show(
-            *("seconds", "s"),
-            factor=1,
-            frame="seconds",
-            decimals=2,
-            interval=False,
-            limits=(0, inf),
-            least_is_best=True,
-        ),
+        "seconds": show("seconds", "s", factor=1, frame="seconds", **seconds_look),
     }
     heads = {"data": "Scans", "start": "Start", "method": "Method"}
     sheet = Sheet("table17_scans", heads, _rows(run), columns, intervals, {"seconds": seconds})
@@ -360,32 +314,36 @@ def table17_ladder(run: Run, intervals):
 )
 def table17_published(run: Run, intervals):
     """Recalls of global methods by list: this run's on each benchmark, and published ones of other features."""
-    table = TableBuilder("table17_published", {"by": "By", "method": "Method", "features": "Features"})
     entries = {name: method_entry(name) for name in installed(run.config["methods"])}
     titles = titles_of_scans(run.config)
-    for dataset in (name for name, entry in present(run.config).items() if entry.benchmark):
-        for name, entry in entries.items():
-            if entry.is_global:
-                rows = where(intervals, {"source": dataset, "method": name, "metric": CLOSE})
-                labels = [("run", f"This run, {titles[dataset]}"), (name, entry.title), ("FPFH", "FPFH")]
-                table.add_row(labels, {key: clustered_cell(rows, concept=key) for key in LISTS})
-    seeds = table.most_seeds()
+    rows = [
+        Row(
+            [("run", f"This run, {titles[dataset]}"), (name, entry.title), ("FPFH", "FPFH")],
+            {"source": dataset, "method": name},
+        )
+        for dataset in (name for name, entry in present(run.config).items() if entry.benchmark)
+        for name, entry in entries.items()
+        if entry.is_global
+    ]
+    columns = {
+        name: show(CLOSE, f"{name}, overlap {low:g} to {high:g} (%)", name) for name, (low, high) in LISTS.items()
+    }
+    heads = {"by": "By", "method": "Method", "features": "Features"}
+    sheet = Sheet("table17_published", heads, rows, columns, intervals)
+    over = sheet.over(clusters=SCENES)
     with Path(__file__).with_name("published_scans.csv").open(encoding="utf-8", newline="") as file:
         published = list(csv.DictReader(file))
     for title in dict.fromkeys(row["title"] for row in published):
         recalls = [row for row in published if row["title"] == title]
-        first = recalls[0]
-        labels = [("published", "Published"), (first["method"], title), (first["features"], first["features"])]
-        table.add_row(labels, {row["list"]: plain_cell(float(row["recall"]), 1, 0) for row in recalls}, rival=False)
+        method, features = recalls[0]["method"], recalls[0]["features"]
+        labels = [("published", "Published"), (method, title), (features, features)]
+        sheet.add_row(labels, {row["list"]: plain_cell(float(row["recall"]), 1, 0) for row in recalls}, rival=False)
     sources = "; ".join(dict.fromkeys(row["source"] for row in published))
-    return table.build(
-        caption="Recall of 3DMatch and 3DLoMatch beside published recalls",
-        column_head="list",
-        columns={name: Column(f"{name}, overlap {low:g} to {high:g} (%)") for name, (low, high) in LISTS.items()},
-        footnotes=(
-            f"{over_clusters(seeds, clusters=SCENES)}. Correct: rotation off by less than {CLOSE_DEG:g}° "
-            f"and translation by less than {100 * CLOSE_M:g} cm, as where the others were published: {sources}. Those "
-            "match learned features (FCGF) on all pairs of the benchmark's eight scenes; this run has a sample of the "
-            "pairs, as many of each stratum, of the scenes that it was given.",
-        ),
+    note = (
+        f"{over}. Correct: rotation off by less than {CLOSE_DEG:g}° "
+        f"and translation by less than {100 * CLOSE_M:g} cm, as where the others were published: {sources}. Those "
+        "match learned features (FCGF) on all pairs of the benchmark's eight scenes; this run has a sample of the "
+        "pairs, as many of each stratum, of the scenes that it was given."
     )
+    caption = "Recall of 3DMatch and 3DLoMatch beside published recalls"
+    return sheet.table(caption, "list", [note], keep_empty=True)

@@ -13,9 +13,7 @@ from gpca.experiments.scans import (
     ChoiceSettings,
     check,
     collect,
-    missing,
     names,
-    read_trials,
     table17_ladder,
     table17_published,
     table17_scans,
@@ -55,7 +53,6 @@ def config():
 def test_data_sets_that_exist_are_registered(config, tmp_path):
     assert names(config, {})["scan_set"] == ["virtual_scans"]
     assert names(config, {})["scan_benchmark"] == []
-    assert "3DMatch and 3DLoMatch" in missing(config)
     write_npz(tmp_path / "scans/3dmatch/floor.npz")
     there = config | {"data_dir": str(tmp_path)}
     assert names(there, {})["scan_set"] == ["virtual_scans", "threedmatch"]
@@ -163,7 +160,7 @@ def test_faults_of_trials_are_one_line(files):
         collect(run_of(), [])
     write_csv(files[0], trials().drop(columns="rung"))
     with pytest.raises(InputError, match="column 'rung' is missing"):
-        read_trials(files[0])
+        collect(run_of(), files)
 
 
 def seconds(tmp_path):
