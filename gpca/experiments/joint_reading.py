@@ -2,44 +2,31 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from gpca.comparison.joint_reading import (
-    DEVELOPMENT,
-    EVALUATED,
-    EVALUATION,
-    JUDGED,
-    PROTOCOL,
-    SEVERITIES,
-    VERDICT_COLUMNS,
-    Grid,
-    judge,
-    numbers_asked,
-    read_choices,
-    read_verdicts,
-)
+from gpca.comparison import joint_reading as joint
+from gpca.comparison.joint_reading import DEVELOPMENT, EVALUATED, EVALUATION, JUDGED, PROTOCOL, SEVERITIES
 from gpca.comparison.published import read_published
 from gpca.comparison.readings import read_judged
 from gpca.comparison.verdicts import Tolerance
 from gpca.errors import InputError
 from gpca.evaluation.measures import read_all_metrics, read_metrics, tidy
+from gpca.experiments import reading_words
 from gpca.experiments.active_learning import learning_settings
 from gpca.experiments.experiment import Experiment, LeftOut
 from gpca.experiments.plan import Run
 from gpca.experiments.reading_steps import retrained_on
-from gpca.experiments.reading_words import words_of
 from gpca.experiments.result import numbers, table
-from gpca.experiments.specification_curve import Plain, stand_ins
+from gpca.experiments.specification_curve import plain_cells, plain_column, stand_ins
 from gpca.experiments.step import Plan, Step
 from gpca.explainers.registry import explainer_module
 from gpca.io.csv_file import ANY, read_csv
 from gpca.objects.entry import Name, SourceEntry, title_of
 from gpca.reporting.tables.builder import TableBuilder
-from gpca.reporting.tables.cells import plain_cell, rows_where
+from gpca.reporting.tables.cells import rows_where
 from gpca.settings import Bounds, Count
 
 if TYPE_CHECKING:
@@ -71,7 +58,7 @@ class Section:
     batch: Count
     labels: Count
     deals: Count
-    choices: Grid
+    choices: joint.Grid
 
 
 def check(config: dict, _left_out: LeftOut) -> None:
@@ -105,10 +92,6 @@ EXPERIMENT = Experiment(
 )
 
 
-def _is_run(plan: Plan) -> bool:
-    return bool(plan.names["development_seed"])
-
-
 def _sections(plan: Plan) -> dict[str, Any]:
     """What joint readings leave as it is."""
     config, section = plan.config, plan.config["joint_reading"]
@@ -122,11 +105,12 @@ def _sections(plan: Plan) -> dict[str, Any]:
     }
 
 
-def _modules(_plan: Plan) -> list[str]:
-    return [explainer_module("learner_forest")]
+def _step(**declared: Any) -> Step:
+    """Step of a run that has a joint reading."""
+    return Step(when=lambda plan: bool(plan.names["development_seed"]), priority=9, **declared)
 
 
-MEASURE = Step(
+MEASURE = _step(
     name="measure_joint",
     run="gpca.steps.joint_readings:measure",
     inputs={
@@ -141,54 +125,38 @@ MEASURE = Step(
         **_sections(plan),
     },
     params={"source": lambda plan, wildcards: plan.names["development_source"]},
-    modules=_modules,
-    when=_is_run,
-    priority=9,
+    modules=lambda plan: [explainer_module("learner_forest")],
 )
-CHOOSE = Step(
+CHOOSE = _step(
     name="choose_joint",
     run="gpca.steps.joint_readings:choose",
     inputs={"measured": "joint_measures/{*joint_severities}/seed{*development_seed}.csv"},
     outputs={name: f"joint_choice/{name}.csv" for name in ("choice", "best", "scores")},
     settings=("joint_reading.choices", "joint_reading.stands_for", "joint_reading.deals", "comparison.tolerances"),
-    when=_is_run,
-    priority=9,
 )
-
-
-def _sets(plan: Plan, _wildcards: object) -> list[str]:
-    return [f"shifted/{{source}}/seed{seed}.npz" for seed in plan.config["seeds"][: plan.config["readings"]["seeds"]]]
-
-
-def _other_sets(plan: Plan, _wildcards: object) -> list[str]:
-    return [
-        f"retrained/{severities}/{{source}}/seed{seed}.npz"
-        for severities in plan.names["joint_severities"]
-        if severities != PROTOCOL
-        for seed in plan.config["seeds"][: plan.config["readings"]["encoders"]]
-    ]
-
-
-APPLY = Step(
+APPLY = _step(
     name="apply_joint",
     run="gpca.steps.joint_readings:apply",
     inputs={
         "choice": "joint_choice/choice.csv",
         "objects": "objects/{source}.npz",
-        "sets": _sets,
-        "other_sets": _other_sets,
+        "sets": lambda plan, wildcards: [
+            f"shifted/{{source}}/seed{seed}.npz" for seed in plan.run.seeds(plan.config["readings"]["seeds"])
+        ],
+        "other_sets": lambda plan, wildcards: [
+            f"retrained/{severities}/{{source}}/seed{seed}.npz"
+            for severities in plan.names["joint_severities"]
+            if severities != PROTOCOL
+            for seed in plan.run.seeds(plan.config["readings"]["encoders"])
+        ],
     },
     outputs={"out": "joint_readings/{source}.csv"},
     settings=lambda plan, wildcards: {
         "registrations": plan.config["registrations"],
-        "severities": {
-            name: {"severities": severities} for name, severities in plan.config["readings"]["severities"].items()
-        },
+        "severities": {name: {"severities": each} for name, each in plan.config["readings"]["severities"].items()},
         **_sections(plan),
     },
-    modules=_modules,
-    when=_is_run,
-    priority=9,
+    modules=lambda plan: [explainer_module("learner_forest")],
 )
 
 
@@ -208,14 +176,14 @@ def judge_joint(
     import pandas as pd
 
     tolerances = {unit: Tolerance(**given) for unit, given in run.config["comparison"]["tolerances"].items()}
-    joint = read_all_metrics(values)
-    asked = numbers_asked(read_published(), joint["source"].unique())
+    of_joint = read_all_metrics(values)
+    asked = joint.numbers_asked(read_published(), of_joint["source"].unique())
     of_run = read_csv(comparison, ("table", "row", "column", "reproduced", "at_least"), others=ANY)
     deals = run.config["joint_reading"]["deals"]
-    rows, records = judge(asked, joint, of_run, read_judged(readings), tolerances, deals)
+    rows, records = joint.judge(asked, of_joint, of_run, read_judged(readings), tolerances, deals)
     scores = [(table, EVALUATION, method, metric, "all", 0, float(value)) for table, method, metric, value in records]
     return (
-        pd.DataFrame(rows, columns=list(VERDICT_COLUMNS)),
+        pd.DataFrame(rows, columns=list(joint.VERDICT_COLUMNS)),
         pd.concat([read_metrics(development), tidy(scores, "joint reading")]),
     )
 
@@ -234,9 +202,9 @@ KNOBS = {"low": "knobs at the lower ends", "middle": "knobs at the middles", "hi
     """The choices that the paper leaves open and that touch several tables, searched together: the reading with the
     largest share of printed means that come close, found on other objects and seeds and then run once. It says
     what one consistent protocol reproduces. Nobody knows whether it is what the paper did.""",
-    verdicts=(read_verdicts, "joint_verdicts.csv"),
+    verdicts=(joint.read_verdicts, "joint_verdicts.csv"),
     scores="joint_scores.csv",
-    choice=(read_choices, "joint_choice/choice.csv"),
+    choice=(joint.read_choices, "joint_choice/choice.csv"),
     needs=("development_seed",),
 )
 def table16_joint_reading(run: Run, verdicts: pd.DataFrame, scores: pd.DataFrame, choice: pd.DataFrame):
@@ -251,53 +219,44 @@ def table16_joint_reading(run: Run, verdicts: pd.DataFrame, scores: pd.DataFrame
             *(("yes" if is_close else "no",) * 2 for is_close in (row.close, row.joint_close)),
             (f"{row.readings_close:.0f}/{row.readings:.0f}", count),
         )
-        values = {name: float(getattr(row, name)) for name in COLUMNS}
-        cells = {
-            name: None if math.isnan(value) else plain_cell(value, int(row.n), 0) for name, value in values.items()
-        }
-        table.add_row(labels, cells)
+        table.add_row(labels, plain_cells({name: getattr(row, name) for name in COLUMNS}, row.n))
     never = ~(verdicts["close"] | verdicts["joint_close"] | (verdicts["readings_close"] > 0))
     entry = run.config["joint_reading"]["objects"]
     development = title_of({"title": entry["title"], "stand_in": entry.get("stand_in", entry["kind"] == "procedural")})
-    here = _measures(scores, DEVELOPMENT, EVALUATED)
+    chosen = dict(zip(choice["choice"], choice["value"], strict=True))
+    severities, knobs = chosen.pop(SEVERITIES), KNOBS[chosen.pop("knobs")]
+    severities = "the protocol's perturbations" if severities == PROTOCOL else f"{severities} perturbations"
+    words = ", ".join([severities, *(reading_words.value(*each) for each in chosen.items()), knobs])
+
+    def measured(samples: str, method: str) -> dict[str, float]:
+        rows = rows_where(scores, source=samples, method=method, table="all")
+        return dict(zip(rows["metric"], rows["value"], strict=True))
+
+    def sentence(samples: str, method: str, subject: str) -> str:
+        """The close numbers, their share, and the share by chance."""
+        score = measured(samples, method)
+        largest = "the largest share would be" if samples == DEVELOPMENT else "it would be"
+        return (
+            f"{subject}: {score['close']:.0f} of {score['numbers']:.0f} numbers are close, {100 * score['share']:.0f} "
+            f"% with each table weighted once; {largest} {100 * score['expected_unit']:.0f} % if printed numbers "
+            f"changed places within the unit of a table (p = {score['p_unit']:.2f}), "
+            f"{100 * score['expected_column']:.0f} % within its columns (p = {score['p_column']:.2f})."
+        )
+
+    there = measured(DEVELOPMENT, EVALUATED)
     return table.build(
         "The paper's Tables I to V under one reading of all that they leave open" + stand_ins(run),
         "value",
-        {name: Plain(title, interval=False, limits=(-math.inf, math.inf)) for name, title in COLUMNS.items()},
+        {name: plain_column(title) for name, title in COLUMNS.items()},
         (
-            f"The joint reading: {_in_words(choice)}. It was found on {development}; the paper states none.",
-            _sentence(scores, DEVELOPMENT, EVALUATED, "There, of what is printed of the source that they stand for"),
-            f"Of {here['readings']:.0f} readings, {here['equals']:.0f} have that share there, and the first of them is "
-            f"taken; the protocol's own has {100 * here['share_of_protocol']:.0f} %.",
-            _sentence(scores, EVALUATION, EVALUATED, "Here"),
-            _sentence(scores, EVALUATION, JUDGED, "The protocol that is judged"),
+            f"The joint reading: {words}. It was found on {development}; the paper states none.",
+            sentence(DEVELOPMENT, EVALUATED, "There, of what is printed of the source that they stand for"),
+            f"Of {there['readings']:.0f} readings, {there['equals']:.0f} have that share there, and the first of them "
+            f"is taken; the protocol's own has {100 * there['share_of_protocol']:.0f} %.",
+            sentence(EVALUATION, EVALUATED, "Here"),
+            sentence(EVALUATION, JUDGED, "The protocol that is judged"),
             f"No reading of ours, alone or joint, comes close to {int(never.sum())} of the {len(verdicts)} numbers.",
             "Close: the mean is within the second tolerance (docs/comparison.md), whatever its interval. Of a range, "
             "Paper is the lower end. Values are in the row's unit.",
         ),
-    )
-
-
-def _in_words(choice: pd.DataFrame) -> str:
-    chosen = dict(zip(choice["choice"], choice["value"], strict=True))
-    name = chosen[SEVERITIES]
-    severities = "the protocol's perturbations" if name == PROTOCOL else f"{name} perturbations"
-    words = [words_of(name, value) for name, value in chosen.items() if name not in (SEVERITIES, "knobs")]
-    return ", ".join([severities, *words, KNOBS[chosen["knobs"]]])
-
-
-def _measures(scores: pd.DataFrame, samples: str, method: str) -> dict[str, float]:
-    rows = rows_where(scores, source=samples, method=method, table="all")
-    return dict(zip(rows["metric"], rows["value"], strict=True))
-
-
-def _sentence(scores: pd.DataFrame, samples: str, method: str, subject: str) -> str:
-    """Sentence with the close numbers, their share, and the share by chance."""
-    score = _measures(scores, samples, method)
-    largest = "the largest share would be" if samples == DEVELOPMENT else "it would be"
-    return (
-        f"{subject}: {score['close']:.0f} of {score['numbers']:.0f} numbers are close, {100 * score['share']:.0f} % "
-        f"with each table weighted once; {largest} {100 * score['expected_unit']:.0f} % if printed numbers changed "
-        f"places within the unit of a table (p = {score['p_unit']:.2f}), {100 * score['expected_column']:.0f} % within "
-        f"its columns (p = {score['p_column']:.2f})."
     )

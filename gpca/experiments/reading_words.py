@@ -1,23 +1,9 @@
-"""Readings in words: the values of each group's choices."""
+"""Readings in words: the values of each group's choices, as :class:`gpca.comparison.readings.Words` wants them."""
 
 from __future__ import annotations
 
 from gpca.steps.readings.groups import GROUPS
 
-_INPUTS = {
-    "pool": "inputs scaled by the pool too",
-    "labeled": "inputs scaled by the labeled samples alone",
-    "standardised": "standardized inputs",
-    "unit_norm": "inputs of unit norm",
-    "raw": "raw inputs",
-}
-_SETS = {
-    "in_distribution": "samples as in training",
-    "severity": "severer perturbations",
-    "source": "another dataset",
-    "objects": "unseen objects",
-    "seen_objects": "seen objects",
-}
 WORDS = {  # field of a group's choices -> what its values are called
     "quantity": {
         "divergence": "KL divergence",
@@ -40,7 +26,13 @@ WORDS = {  # field of a group's choices -> what its values are called
     },
     "range": {"weaker": "weaker perturbations", "stronger": "stronger perturbations"},
     "classifier": {"paper": "the paper's setting", "converged": "trained longer"},
-    "inputs": _INPUTS,
+    "inputs": {
+        "pool": "inputs scaled by the pool too",
+        "labeled": "inputs scaled by the labeled samples alone",
+        "standardised": "standardized inputs",
+        "unit_norm": "inputs of unit norm",
+        "raw": "raw inputs",
+    },
     "inducing": {"kmeans": "inducing inputs by k-means", "random": "random inducing inputs"},
     "lengthscale": {"median": "lengthscale from the median distance", "default": "default lengthscale"},
     "batch": {"full": "all samples at once", "minibatch": "minibatches"},
@@ -49,7 +41,13 @@ WORDS = {  # field of a group's choices -> what its values are called
     "machine": {"svc": "SVC", "linear_svc": "LinearSVC"},
     "probability": {"platt": "Platt scaling", "softmax": "softmax of the decision values"},
     "head": {"linear": "linear head", "two_layer": "head of two layers"},
-    "set": _SETS,
+    "set": {
+        "in_distribution": "samples as in training",
+        "severity": "severer perturbations",
+        "source": "another dataset",
+        "objects": "unseen objects",
+        "seen_objects": "seen objects",
+    },
     "distance": {
         "knn_analytical": "distance to neighbors in classic features",
         "mahalanobis_analytical": "Mahalanobis distance in classic features",
@@ -94,33 +92,23 @@ NUMBERS = {  # field -> the words around a number
 }
 
 
-def reading_in_words(group: str, reading: str) -> str:
+def reading(group: str, name: str) -> str:
     """A reading as words: ``RBF, 100 iterations`` for ``rbf/100`` of the group ``kernel``.
 
     Unknown values stay as they are.
     """
-    values = reading.split("/")
-    names = list(GROUPS[group].choices) if group in GROUPS else []
-    if len(names) != len(values):
-        return ", ".join(values)
-    return ", ".join(words_of(name, value) for name, value in zip(names, values, strict=True))
+    values, choices = name.split("/"), list(GROUPS[group].choices) if group in GROUPS else []
+    return ", ".join(map(value, choices, values) if len(choices) == len(values) else values)
 
 
-def words_of(name: str, value: str) -> str:
+def value(choice: str, name: str) -> str:
     """A value of a choice as words."""
-    words = WORDS.get(name, {})
-    if value not in words and name in NUMBERS:
-        return NUMBERS[name].format(value)
-    return " and ".join(words.get(part, part) for part in value.split("+"))
+    words = WORDS.get(choice, {})
+    if name not in words and choice in NUMBERS:
+        return NUMBERS[choice].format(name)
+    return " and ".join(words.get(part, part) for part in name.split("+"))
 
 
-def group_in_words(name: str) -> str:
+def group(name: str) -> str:
     """What a group leaves open: ``How the GPC starts``; an unknown name stays as it is."""
     return GROUPS[name].title if name in GROUPS else name
-
-
-class ReadingWords:
-    """Names of groups and readings for readers (:class:`gpca.comparison.readings.Words`)."""
-
-    group = staticmethod(group_in_words)
-    reading = staticmethod(reading_in_words)

@@ -13,10 +13,10 @@ import numpy as np
 from gpca.comparison.readings import read_judged, summarize, unresolved
 from gpca.errors import InputError
 from gpca.evaluation.measures import ALL
+from gpca.experiments import reading_words
 from gpca.experiments.experiment import Experiment, Names, Tidy
 from gpca.experiments.frames import encoder_title, frames_of, title_of_frames
 from gpca.experiments.plan import Run
-from gpca.experiments.reading_words import group_in_words, reading_in_words
 from gpca.experiments.result import figure, table
 from gpca.frames.source import REAL_WORLD, conditions_of
 from gpca.objects.entry import stand_in_clause
@@ -26,17 +26,8 @@ from gpca.reporting.tables.cells import cell_of_repeats, plain_cell, rows_where
 from gpca.reporting.tables.table import Cell, Column
 from gpca.reporting.words import plural
 from gpca.settings import Bounds, Keys
-from gpca.steps.readings.groups import (
-    ALIGNED,
-    FRAME_ENCODER,
-    FRAME_INPUT,
-    FRAME_REPEATS,
-    FRAME_START,
-    GROUPS,
-    SEVERITIES_RETRAINED,
-    OtherSeverities,
-    ReadingSizes,
-)
+from gpca.steps.readings import groups
+from gpca.steps.readings.groups import FRAME_INPUT, FRAME_REPEATS, GROUPS, OtherSeverities, ReadingSizes
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -45,6 +36,7 @@ if TYPE_CHECKING:
     from gpca.reporting.tables.table import Table
 
 RANGES = get_args(OtherSeverities)
+SAMPLES = "test_samples"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,35 +64,35 @@ def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
     estimated = [name for name, entry in conditions_of(config).items() if entry.get("form") == "results"]
     readable = {
         FRAME_INPUT: readings["frame_seeds"] and "none" in frames["reductions"],
-        FRAME_ENCODER: frames["published"],
-        FRAME_START: estimated and frames["condition_backbones"],
-        SEVERITIES_RETRAINED: readings["encoders"],
+        groups.FRAME_ENCODER: frames["published"],
+        groups.FRAME_START: estimated and frames["condition_backbones"],
+        groups.SEVERITIES_RETRAINED: readings["encoders"],
     }
-    groups = [name for name in readings["groups"] if readable.get(name, True)]
+
+    def values_of(group: str) -> Mapping[str, list]:
+        return readings["groups"].get(group) or {}
+
+    run = [name for name in readings["groups"] if readable.get(name, True)]
     return {
-        "reading_group": groups,
+        "reading_group": run,
         "whole_group": [name for name in readings["groups"] if name != FRAME_REPEATS],
-        "frame_input": [name for name in groups if name == FRAME_INPUT],
+        "frame_input": [name for name in run if name == FRAME_INPUT],
         "estimated": f"{REAL_WORLD}_{estimated[0]}" if estimated else "",
-        "repeats": list((readings["groups"].get(FRAME_REPEATS) or {}).get("repeats", [])),
+        "repeats": list(values_of(FRAME_REPEATS).get("repeats", [])),
         "repeated_backbone": list(frames["backbones"]),
         "clouded_backbone": frames["backbones"][0],  # whose encoder sees other clouds
-        "cloud": [name for name in (readings["groups"].get(FRAME_INPUT) or {}).get("input", []) if name != ALIGNED],
+        "cloud": [
+            name for name in (readings["groups"].get(FRAME_INPUT) or {}).get("input", []) if name != groups.ALIGNED
+        ],
     }
 
 
+READ_ALL = "gpca.evaluation.measures:read_all_metrics"
 EXPERIMENT = Experiment(
     name="specification_curve",
     beside=("reading_steps",),
     sections={"readings": Section},
-    tidy=(
-        Tidy(
-            "readings.csv",
-            "gpca.evaluation.measures:read_all_metrics",
-            {"paths": "readings/{reading_group}.csv"},
-            rule="reading_values",
-        ),
-    ),
+    tidy=(Tidy("readings.csv", READ_ALL, {"paths": "readings/{reading_group}.csv"}, rule="reading_values"),),
     names=names,
     optional_entries={"readings.groups": Names("group of readings", lambda: GROUPS)},
 )
@@ -113,6 +105,16 @@ class Plain(Column):
     def text(self, cell: Cell) -> str:
         """E.g. ``0.592``."""
         return f"{cell.mean:.3g}"
+
+
+def plain_column(title: str) -> Plain:
+    """Column of numbers without intervals."""
+    return Plain(title, interval=False, limits=(-math.inf, math.inf))
+
+
+def plain_cells(values: Mapping[str, float], seeds: float) -> dict[str, Cell | None]:
+    """Cells of numbers that are means over these seeds, none where there is no number."""
+    return {name: None if math.isnan(x) else plain_cell(float(x), int(seeds), 0) for name, x in values.items()}
 
 
 def stand_ins(run: Run) -> str:
@@ -139,26 +141,32 @@ CONFUSED = {"pose": "overlap", "overlap": "pose"}
 )
 def table6_inputs(run: Run, metrics: pd.DataFrame) -> Table:
     """Accuracy on depth frames by the cloud that the encoder sees."""
+
+    def share(rows: pd.DataFrame, metric: str, concept: str = ALL, is_count: bool = False) -> Cell | None:
+        """Mean of a metric over the seeds, in percent of the test samples where it is a count."""
+        rows = rows_where(rows, concept=concept).sort_values("seed")
+        value_R, samples_R = (rows_where(rows, metric=name)["value"].to_numpy(float) for name in (metric, SAMPLES))
+        return cell_of_repeats(100 * (np.divide(value_R, samples_R) if is_count else value_R), int(samples_R.sum()))
+
     methods = {method: encoder_title(*method.split("-")) for method in metrics["method"].unique()}
     table = TableBuilder("table6_inputs", {"backbone": "Backbone", "input": "The encoder sees"})
     for (method, cloud), labels in crossed(methods, INPUTS):
         rows = {name: rows_where(metrics, table=f"{FRAME_INPUT}/{cloud}/{name}", method=method) for name in OBJECTS}
-        cells = {name: _share(subset, "accuracy") for name, subset in rows.items()}
-        cells |= {concept: _share(rows["all"], "accuracy", concept) for concept in CONCEPTS}
+        cells = {name: share(subset, "accuracy") for name, subset in rows.items()}
+        cells |= {concept: share(rows["all"], "accuracy", concept) for concept in CONCEPTS}
         for one, other in CONFUSED.items():
-            cells[f"{one}_as_{other}"] = _share(rows["all"], f"predicted_as_{other}", one, is_count=True)
+            cells[f"{one}_as_{other}"] = share(rows["all"], f"predicted_as_{other}", one, is_count=True)
         table.add_row(labels, cells)
     table.compare_down(OBJECTS, same=1)
+    titles = {concept: f"{concept.capitalize()} (%)" for concept in CONCEPTS}
+    titles |= {f"{one}_as_{other}": f"{one.capitalize()} taken for {other} (%)" for one, other in CONFUSED.items()}
     columns = {name: Column(head) for name, head in OBJECTS.items()}
-    columns |= {concept: Column(f"{concept.capitalize()} (%)", interval=False) for concept in CONCEPTS}
-    for one, other in CONFUSED.items():
-        columns[f"{one}_as_{other}"] = Column(f"{one.capitalize()} taken for {other} (%)", interval=False)
     counts = [f"{name} {table.cells[0, name].test_samples}" for name in OBJECTS if (0, name) in table.cells]
     seeds = table.most_seeds()
     return table.build(
         caption=f"Accuracy (%) on {title_of_frames(run.config)} by the cloud that the encoder sees",
         column_head="samples",
-        columns=columns,
+        columns=columns | {name: Column(title, interval=False) for name, title in titles.items()},
         footnotes=(
             f"Mean over {plural(seeds, 'seed')}, the first of the run; {interval_over(seeds)}. Test samples: "
             f"{', '.join(counts)}. The share of seen objects differs from seed to seed, so that All need not lie "
@@ -167,13 +175,6 @@ def table6_inputs(run: Run, metrics: pd.DataFrame) -> Table:
             "VI's, on the same samples.",
         ),
     )
-
-
-def _share(rows: pd.DataFrame, metric: str, concept: str = ALL, is_count: bool = False) -> Cell | None:
-    """Mean of a metric over the seeds, in percent of the test samples where it is a count."""
-    rows = rows_where(rows, concept=concept).sort_values("seed")
-    value_R, samples_R = (rows_where(rows, metric=name)["value"].to_numpy(float) for name in (metric, "test_samples"))
-    return cell_of_repeats(100 * (np.divide(value_R, samples_R) if is_count else value_R), int(samples_R.sum()))
 
 
 SECTION = "What the paper leaves unstated"
@@ -201,33 +202,30 @@ CHANCE = "chance"
 )
 def table13_readings(run: Run, judged: pd.DataFrame) -> Table:
     """A row per missed number and group of readings that touches it; of stand-ins, per number that is touched."""
-    table = TableBuilder("table13_readings", HEADS)
-    summaries = summarize(judged)
-    for key, by_group in summaries.items():
+    table, every = TableBuilder("table13_readings", HEADS), []
+    for key, by_group in summarize(judged).items():
         rows = rows_where(judged, **dict(zip(NUMBER, key, strict=True)))
         first = rows.iloc[0]
         for group, of in by_group.items():
-            seeds = int(rows.loc[rows["group"] == group, "n"].max())
             labels = (
                 (" / ".join(key), ", ".join(key)),
-                (first["unit"], first["unit"]),
-                (group, group_in_words(group)),
-                (of.where, of.where),
-                (of.nearest, reading_in_words(group, of.nearest)),
+                (first["unit"],) * 2,
+                (group, reading_words.group(group)),
+                (of.where,) * 2,
+                (of.nearest, reading_words.reading(group, of.nearest)),
                 (f"{of.close}/{of.readings}", f"{of.close} of {of.readings}"),
-                (of.joint, f"{reading_in_words(group, of.joint)} ({of.fitted} of {of.touched})"),
+                (of.joint, f"{reading_words.reading(group, of.joint)} ({of.fitted} of {of.touched})"),
             )
-            values = {"published": first["published"], "reproduced": first["reproduced"]}
-            values |= {"least": of.least, "most": of.most, "value": of.value, CHANCE: 100 * of.chance}
-            cells = {name: None if math.isnan(x) else plain_cell(float(x), seeds, 0) for name, x in values.items()}
-            table.add_row(labels, cells)
-    every = [of for by_group in summaries.values() for of in by_group.values()]
+            values = {"published": first["published"], "reproduced": first["reproduced"], CHANCE: 100 * of.chance}
+            values |= {"least": of.least, "most": of.most, "value": of.value}
+            table.add_row(labels, plain_cells(values, rows.loc[rows["group"] == group, "n"].max()))
+            every.append(of)
     inside = [of for of in every if of.inside]
     return table.build(
         "The numbers that are not reproduced, under other readings of what the paper leaves unstated" + stand_ins(run),
         "value",
         {
-            **{name: Plain(title, interval=False, limits=(-math.inf, math.inf)) for name, title in COLUMNS.items()},
+            **{name: plain_column(title) for name, title in COLUMNS.items()},
             CHANCE: Column("Chance (%)", decimals=0, interval=False),
         },
         (
@@ -268,21 +266,17 @@ def draw_readings(run: Run, judged: pd.DataFrame) -> Figure:
     from gpca.reporting.figures.style import BLUE, GRAY, LIGHT_GRAY, SMALL_PT, write_title
 
     missed = unresolved(judged)
-    by_group = {
-        name: list(missed[missed["group"] == name].groupby(NUMBER, sort=False))
-        for name in GROUPS
-        if (missed["group"] == name).any()
-    }
+    by_group = {name: list(missed[missed["group"] == name].groupby(NUMBER, sort=False)) for name in GROUPS}
+    by_group = {name: lines for name, lines in by_group.items() if lines}
     if not by_group:
         raise InputError("reading_verdicts.csv", "has no readings of these groups", "run the readings first")
     figure, [[panel]] = panels(1, 1, HEAD_IN + ROW_IN * sum(len(lines) + 1 for lines in by_group.values()))
     panel.axvspan(-1, 1, color=LIGHT_GRAY, alpha=0.6, linewidth=0)
     panel.axvline(0, color=GRAY, linewidth=0.6)
-    names: list[str] = []
-    headings = []
+    names, headings = list[str](), list[int]()
     for group, lines in by_group.items():
         headings.append(len(names))
-        names.append(group_in_words(group))
+        names.append(reading_words.group(group))
         for (of_table, row, column), rows in lines:
             y = len(names)
             distance_R = np.sort(rows["distance"].to_numpy(float).clip(-FARTHEST, FARTHEST))

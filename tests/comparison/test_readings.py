@@ -6,11 +6,11 @@ import pytest
 from gpca.comparison.readings import chance_of, judge_readings, read_judged, summarize, with_readings
 from gpca.errors import InputError
 from gpca.evaluation.measures import TIDY_COLUMNS
-from gpca.experiments.reading_words import ReadingWords
+from gpca.experiments import reading_words
 
 from .made_up import ACCURACY, LABELS, TOLERANCES, compared, number, tidy
 
-WORDS = ReadingWords()
+WORDS = reading_words
 KEY, OTHER = ("I", "YCB", "GP-CA"), ("I", "Cups", "GP-CA")
 OF_CUPS = ACCURACY.__class__(**{**ACCURACY.__dict__, "sources": ("cups",)})
 

@@ -11,7 +11,7 @@ from gpca.comparison.published import NONE_YET, read_published, read_reasons
 from gpca.comparison.readings import READINGS, judge_readings, with_readings
 from gpca.comparison.values import read_results
 from gpca.comparison.verdicts import JUDGED, NOT_COMPARABLE, Tolerance, compare
-from gpca.experiments.reading_words import ReadingWords
+from gpca.experiments import reading_words
 from gpca.process.code_files import ROOT
 
 SETTINGS = yaml.safe_load((ROOT / "config/config.yaml").read_text())["comparison"]["tolerances"]
@@ -28,7 +28,7 @@ def reference():
     results = read_results(path for path in sorted(folder.glob("*.csv")) if path.name in named | {READINGS})
     comparison = compare(numbers, results, objects, TOLERANCES, read_reasons())
     judged = judge_readings(numbers, comparison, results[READINGS], TOLERANCES)
-    return with_readings(comparison, judged, ReadingWords())
+    return with_readings(comparison, judged, reading_words)
 
 
 @pytest.fixture(scope="module")

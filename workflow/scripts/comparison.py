@@ -6,7 +6,7 @@ from gpca.comparison.published import read_published, read_reasons
 from gpca.comparison.readings import READINGS, judge_readings, with_readings
 from gpca.comparison.values import cluster_draws, measured_on, read_results
 from gpca.comparison.verdicts import Tolerance, compare
-from gpca.experiments.reading_words import ReadingWords
+from gpca.experiments import reading_words
 from gpca.io.csv_file import write_csv
 from gpca.io.files import whole_file
 from gpca.process.job import workflow_script
@@ -28,7 +28,7 @@ with workflow_script(snakemake):
         clusters,
     )
     judged = judge_readings(numbers, comparison, results[READINGS], tolerances)
-    comparison = with_readings(comparison, judged, ReadingWords())
+    comparison = with_readings(comparison, judged, reading_words)
     claims = judge(sentences, results, params.objects, given.predictions, clusters, params.floors)
     out = snakemake.output
     for frame, path in ((comparison, out.csv), (claims, out.claims), (judged, out.readings)):

@@ -9,7 +9,8 @@ from gpca.config.check import check
 from gpca.config.layers import with_defaults
 from gpca.errors import InputError
 from gpca.evaluation.measures import read_metrics
-from gpca.experiments.reading_words import NUMBERS, WORDS, ReadingWords, reading_in_words
+from gpca.experiments import reading_words
+from gpca.experiments.reading_words import NUMBERS, WORDS
 from gpca.process.code_files import ROOT
 from gpca.steps.readings.groups import GROUPS, name_of, readings_of
 from tests.steps.by_words import main
@@ -123,11 +124,11 @@ def test_a_grid_that_cannot_be_run_stops_when_the_config_is_loaded(change, messa
     ],
 )
 def test_a_reading_is_words(group, reading, words):
-    assert reading_in_words(group, reading) == words
+    assert reading_words.reading(group, reading) == words
 
 
 def test_sets_that_are_joined_are_both_named():
-    shown = reading_in_words("diagnostics", "in_distribution+source/knn_embedding/max_score/aurc")
+    shown = reading_words.reading("diagnostics", "in_distribution+source/knn_embedding/max_score/aurc")
     assert shown.startswith("samples as in training and another dataset, distance to neighbors in the embedding, 1 -")
 
 
@@ -136,7 +137,7 @@ def test_every_reading_of_the_suite_has_words_of_its_own(group):
     names = list(GROUPS[group].choices)
     assert names == list(GRID[group])  # the order in which a reading names its values
     readings = readings_of(GRID[group])
-    shown = {reading_in_words(group, name_of(group, reading).partition("/")[2]) for reading in readings}
+    shown = {reading_words.reading(group, name_of(group, reading).partition("/")[2]) for reading in readings}
     assert len(shown) == len(readings)
     for reading in readings:
         for name, value in reading.items():
@@ -144,7 +145,7 @@ def test_every_reading_of_the_suite_has_words_of_its_own(group):
 
 
 def test_reasons_say_groups_and_readings_in_words():
-    words = ReadingWords()
+    words = reading_words
     assert words.group("gpc_start") == "How the GPC starts"
     assert "/" not in words.reading("diagnostics", "in_distribution/knn_analytical/max_score/auroc_error")
     assert words.group("mine") == "mine"
