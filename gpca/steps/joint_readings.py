@@ -14,26 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from gpca.active_learning.rounds import LabelingTask, make_task, rounds
+from gpca.active_learning.rounds import make_task, rounds
 from gpca.active_learning.settings import LOOK_EVERY, ActiveLearningSettings
-from gpca.alignment.icp import ICPSettings
 from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
-from gpca.comparison.joint_reading import (
-    CHOICES,
-    DEVELOPMENT,
-    EVALUATED,
-    PROTOCOL,
-    SEVERITIES,
-    START,
-    Joint,
-    numbers_asked,
-    part_name,
-    read_choices,
-    scores,
-    search,
-    text_of,
-)
+from gpca.comparison import joint_reading as reading
+from gpca.comparison.joint_reading import CHOICES, DEVELOPMENT, EVALUATED, PROTOCOL, SEVERITIES, Joint, part_name
 from gpca.comparison.published import read_published
 from gpca.comparison.verdicts import Tolerance
 from gpca.errors import InputError
@@ -48,7 +34,7 @@ from gpca.process.job import Job
 from gpca.process.progress import progress
 from gpca.process.provenance import record_provenance
 from gpca.seeds import seed_of_file
-from gpca.steps.readings.files import accuracies, diagnostics_of_scores, like_the_training, train_and_test
+from gpca.steps.readings.files import RunFiles, accuracies, diagnostics_of_scores, like_the_training, train_and_test
 from gpca.steps.readings.gpc_start import FITTED, StartedGPC, of_unit_norm, relevant
 from gpca.steps.readings.knobs import accuracies_of_magnitudes, runs_of
 from gpca.steps.readings.labels import NEW
@@ -82,15 +68,7 @@ class Samples:
 
     @classmethod
     def load(cls, objects: ObjectClouds, sets: Path, axes: tuple[str, int], registrations: dict, pairs: int):
-        """Read the sets, and make some of their pairs anew.
-
-        Args:
-            objects: of the source.
-            sets: file of the step ``shift`` or ``retrain``.
-            axes: source and seed.
-            registrations: the config's section of that name, with the severities of the sets.
-            pairs: number of test samples for Monte-Carlo ICP, a multiple of 3.
-        """
+        """Read the sets, and make some of their pairs anew, by settings that have the severities of the sets."""
         settings = RegistrationSettings.from_dict(registrations)
         few = replace(settings, train=0, test=min(pairs, settings.test))
         return cls(ShiftedSets.load(sets, axes), make_registrations(objects, *axes, few)[0], axes)
@@ -100,7 +78,7 @@ class Samples:
         return train_and_test(like_the_training(self.sets))
 
     def test_sets(self) -> Iterator[tuple[str, Registrations, np.ndarray]]:
-        """Yield name, test samples and their rows of the sets whose samples are embedded by the encoder itself."""
+        """Name, test samples and their rows of the sets whose samples are embedded by the encoder itself."""
         for name in ("in_distribution", "severity"):
             rows = self.sets.rows(name, "test")
             yield name, self.sets.registrations(rows), rows
@@ -124,14 +102,9 @@ class MeasureSettings:
     @classmethod
     def of_job(cls, job: Job) -> MeasureSettings:
         """Read the sections of the config that a rule gives; ``labels`` changes those of ``active_learning``."""
-        active = job.section("active_learning")
-        additive = {name: value for name, value in job.section("uncertainty").items() if name != "samples"}
-        return cls(
-            job.section("gpca_paper"),
-            ActiveLearningSettings.from_dict(active | job.section("labels")),
-            active["target"],
-            UncertaintySettings(**additive, icp=ICPSettings(**job.section("icp"))),
-        )
+        active, uncertainty = job.section("active_learning"), RunFiles(settings=job.settings).uncertainty()
+        labels = ActiveLearningSettings.from_dict(active | job.section("labels"))
+        return cls(job.section("gpca_paper"), labels, active["target"], uncertainty)
 
 
 def measure(job: Job) -> None:
@@ -151,16 +124,16 @@ def choose(job: Job) -> None:
 
     tolerances = {unit: Tolerance(**tolerance) for unit, tolerance in job.section("tolerances").items()}
     published = read_published()
-    numbers, printed = numbers_asked(published, [job.settings["stands_for"]]), numbers_asked(published)
+    numbers, printed = reading.numbers_asked(published, [job.settings["stands_for"]]), reading.numbers_asked(published)
     files = job.files("measured")
     with record_provenance([job.choice, job.best, job.scores], files, job.settings):
         measured = read_all_metrics(files)
-        found = search(numbers, printed, measured, job.section("choices"), tolerances, job.settings["deals"])
-        chosen = [(choice, text_of(found.joint[choice])) for choice in CHOICES]
+        found = reading.search(numbers, printed, measured, job.section("choices"), tolerances, job.settings["deals"])
+        chosen = [(choice, reading.text_of(found.joint[choice])) for choice in CHOICES]
         write_csv(job.choice, pd.DataFrame(chosen, columns=["choice", "value"]))
-        best = [{"share": share, **{c: text_of(joint[c]) for c in CHOICES}} for joint, share in found.best]
+        best = [{"share": share, **{c: reading.text_of(joint[c]) for c in CHOICES}} for joint, share in found.best]
         write_csv(job.best, pd.DataFrame(best), form=None)
-        records = scores(numbers, found.close, found.share, found.by_chance)
+        records = reading.scores(numbers, found.close, found.share, found.by_chance)
         counts = {"readings": found.readings, "equals": found.equals, "share_of_protocol": found.protocol}
         records += [("all", EVALUATED, name, value) for name, value in counts.items()]
         rows = [(table, DEVELOPMENT, method, metric, "all", 0, float(v)) for table, method, metric, v in records]
@@ -169,7 +142,7 @@ def choose(job: Job) -> None:
 
 def apply(job: Job) -> None:
     """Values that the joint reading gives on a source's test samples of its severities, seed by seed."""
-    joint = dict(read_choices(job.choice).itertuples(index=False, name=None))
+    joint = dict(reading.read_choices(job.choice).itertuples(index=False, name=None))
     joint["new_share"] = finite_number(job.choice, "new_share", joint["new_share"])
     severities = joint[SEVERITIES]
     files = job.files("sets")
@@ -194,11 +167,16 @@ def apply(job: Job) -> None:
 def values(samples: Samples, severities: str, choices: Choices, settings: MeasureSettings) -> Iterator[Value]:
     """Yield the values under every combination of these choices that matters to a part, with these severities."""
     choices = dict(choices) | {SEVERITIES: [severities]}
-    yield from _knob_values(samples, choices, settings)
+    uncertainty, title = settings.uncertainty, f"knobs of {samples.axes[0]}, seed {samples.axes[1]}"
+    pairs = runs_of(samples.pairs, *samples.axes, uncertainty, uncertainty.starts, title)
+    turned_R_3 = np.array([KNOBS[name] for name in choices["knobs"]])
+    for method, value_R in accuracies_of_magnitudes(pairs, turned_R_3, uncertainty.floor).items():
+        for joint, value in zip(_combinations(choices, (SEVERITIES, "knobs")), value_R, strict=True):
+            yield part_name("knobs", joint), method, "accuracy", ALL, float(value)
     yield from _learner_values(samples, choices)
     train, test = samples.train_and_test()
     fits: dict[tuple, GPC] = {}  # starts share those whose relevant choices agree
-    starts = list(_combinations(choices, (SEVERITIES, *START)))
+    starts = list(_combinations(choices, (SEVERITIES, *reading.START)))
     for start in progress(starts, f"joint readings of {' '.join(map(str, samples.axes))}, {severities}"):
         fitted = {}
         for schedule in PRINTED:
@@ -212,32 +190,15 @@ def values(samples: Samples, severities: str, choices: Choices, settings: Measur
             method = f"{kernel}-{rate:g}-{iterations}"
             yield part_name("schedules", start), method, "accuracy", ALL, right["accuracy", ALL]
         for kernel in choices["kernel"]:
-            joint = start | {"kernel": kernel}
-            yield from _classifier_values(samples, joint, choices, fitted[SCHEDULES[kernel]])
+            joint, gpc = start | {"kernel": kernel}, fitted[SCHEDULES[kernel]]
+            # Accuracies of GP-CA in Tables I and II and of the GPC in V, and the diagnostics of the latter.
+            right = accuracies(test.concept, gpc.attribute(test.embedding)[0])
+            for (metric, concept), value in right.items():
+                yield part_name("classifier", joint), "gpca_paper", metric, concept, value
+            yield part_name("classifier", joint), "gpca_matern", "accuracy", ALL, right["accuracy", ALL]
+            scored = {name: (gpc.attribute(part.embedding)[0], part, rows) for name, part, rows in samples.test_sets()}
+            yield from _diagnostics("diagnostics", "gpca_matern", scored, samples.sets, joint, choices)
             yield from _label_values(samples, joint, choices, settings)
-
-
-def _knob_values(samples: Samples, choices: Choices, settings: MeasureSettings) -> Iterator[Value]:
-    """Yield the accuracies of SHAP and SA by how far the knobs are turned."""
-    uncertainty, title = settings.uncertainty, f"knobs of {samples.axes[0]}, seed {samples.axes[1]}"
-    pairs = runs_of(samples.pairs, *samples.axes, uncertainty, uncertainty.starts, title)
-    turned_R_3 = np.array([KNOBS[name] for name in choices["knobs"]])
-    for method, value_R in accuracies_of_magnitudes(pairs, turned_R_3, uncertainty.floor).items():
-        for joint, value in zip(_combinations(choices, (SEVERITIES, "knobs")), value_R, strict=True):
-            yield part_name("knobs", joint), method, "accuracy", ALL, float(value)
-
-
-def _classifier_values(samples: Samples, joint: Joint, choices: Choices, gpc: GPC) -> Iterator[Value]:
-    """Yield the accuracies of GP-CA in Tables I and II and of the GPC in V, and the diagnostics of the latter."""
-    _, test = samples.train_and_test()
-    right = accuracies(test.concept, gpc.attribute(test.embedding)[0])
-    for (metric, concept), value in right.items():
-        yield part_name("classifier", joint), "gpca_paper", metric, concept, value
-    yield part_name("classifier", joint), "gpca_matern", "accuracy", ALL, right["accuracy", ALL]
-    scored = {name: (gpc.attribute(part.embedding)[0], part, rows) for name, part, rows in samples.test_sets()}
-    for asked in _combinations(choices, ("set", "distance")):
-        for metric, value in _diagnostics(scored, samples.sets, asked).items():
-            yield part_name("diagnostics", joint | asked), "gpca_matern", metric, ALL, value
 
 
 def _learner_values(samples: Samples, choices: Choices) -> Iterator[Value]:
@@ -265,22 +226,24 @@ def _learner_values(samples: Samples, choices: Choices) -> Iterator[Value]:
             scores_S_C, part, _ = scored["in_distribution"]
             right = accuracies(part.concept, scores_S_C)["accuracy", ALL]
             yield part_name("learners", joint), method, "accuracy", ALL, right
-            for asked in _combinations(choices, ("set", "distance")):
-                for metric, value in _diagnostics(scored, samples.sets, asked).items():
-                    yield part_name("learner_diagnostics", joint | asked), method, metric, ALL, value
+            yield from _diagnostics("learner_diagnostics", method, scored, samples.sets, joint, choices)
 
 
 def _diagnostics(
-    scored: Mapping[str, tuple[np.ndarray, Registrations, np.ndarray]], sets: ShiftedSets, asked: Joint
-) -> dict[str, float]:
-    """ρ, AUC and ECE on the set and by the distance of a reading."""
-    parts = [scored[name] for name in asked["set"].split("+")]
-    rows = np.concatenate([rows for _, _, rows in parts])
-    return diagnostics_of_scores(
-        np.concatenate([part.concept for _, part, _ in parts]),
-        np.concatenate([scores_S_C for scores_S_C, _, _ in parts]),
-        sets.distance[rows, DISTANCES.index(asked["distance"])],
-    )
+    part: str,
+    method: str,
+    scored: Mapping[str, tuple[np.ndarray, Registrations, np.ndarray]],
+    sets: ShiftedSets,
+    joint: Joint,
+    choices: Choices,
+) -> Iterator[Value]:
+    """Yield ρ, AUC and ECE by set and distance, given scores, samples and rows of each set."""
+    for asked in _combinations(choices, ("set", "distance")):
+        scores, samples, rows = zip(*(scored[name] for name in asked["set"].split("+")), strict=True)
+        concept_S = np.concatenate([each.concept for each in samples])
+        distance_S = sets.distance[np.concatenate(rows), DISTANCES.index(asked["distance"])]
+        for metric, value in diagnostics_of_scores(concept_S, np.concatenate(scores), distance_S).items():
+            yield part_name(part, joint | asked), method, metric, ALL, value
 
 
 def _label_values(samples: Samples, joint: Joint, choices: Choices, settings: MeasureSettings) -> Iterator[Value]:
@@ -313,30 +276,18 @@ def _label_values(samples: Samples, joint: Joint, choices: Choices, settings: Me
                 "reached": float(any(hits)),
                 "final_accuracy": float(steps[-1]["accuracy"]),
             }
-            if strategy == "bald_kmeans":
-                metrics["epochs_at_target"] = _passes(
-                    task, at_target, with_kernel, joint, settings.target, samples.axes
-                )
+            if strategy == "bald_kmeans":  # passes over these labels, or all, to a new classifier's target accuracy
+                anew = StartedGPC(with_kernel, joint, *samples.axes, "epochs", NEW)
+                labeled_L_d = np.concatenate([task.initial.h, task.pool.h[at_target]])
+                concept_L = np.concatenate([task.initial.concept_N, task.pool.concept_N[at_target]])
+                most = with_kernel.iterations
+                for passes in anew.fit_up_to([*range(LOOK_EVERY, most, LOOK_EVERY), most], labeled_L_d, concept_L):
+                    metrics["epochs_at_target"] = float(passes)
+                    scores_S_C = anew.attribute(task.test.h)[0]
+                    if accuracies(task.test.concept_N, scores_S_C)["accuracy", ALL] >= settings.target:
+                        break
             for metric, value in metrics.items():
                 yield part_name("labels", joint | {"new_share": new_share}), strategy, metric, NEW, value
-
-
-def _passes(
-    task: LabelingTask[np.ndarray],
-    rows: list[int],
-    settings: GPCSettings,
-    start: Joint,
-    target: float,
-    axes: tuple[str, int],
-) -> float:
-    """Passes over these labels, a multiple of `LOOK_EVERY` or all, to a new classifier's target accuracy."""
-    gpc, most = StartedGPC(settings, start, *axes, "epochs", NEW), settings.iterations
-    labeled_L_d = np.concatenate([task.initial.h, task.pool.h[rows]])
-    concept_L = np.concatenate([task.initial.concept_N, task.pool.concept_N[rows]])
-    for done in gpc.fit_up_to([*range(LOOK_EVERY, most, LOOK_EVERY), most], labeled_L_d, concept_L):
-        if accuracies(task.test.concept_N, gpc.attribute(task.test.h)[0])["accuracy", ALL] >= target:
-            return float(done)
-    return float(most)
 
 
 def gpc_settings(settings: MeasureSettings, schedule: tuple[str, float, int]) -> GPCSettings:

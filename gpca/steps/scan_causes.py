@@ -8,7 +8,7 @@ what learns from scans.
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -58,7 +58,9 @@ def measure(job: Job) -> None:
         chosen = drawn_pairs(job, section | {"pairs": own.pairs})
         kept = np.sort(generator(*axes, "scan causes", "pairs").permutation(len(chosen))[: own.most_pairs])
         pairs = ScanPairs.of([chosen[k] for k in kept])
-        truth = truth_settings(job.section("causes"), own)
+        # Counterfactuals are registered as those of objects, but the source onto the target.
+        icp = {name: getattr(own.icp, name) for name in ("correspondence_distance", "max_iterations")}
+        truth = CauseSettings.from_dict(job.section("causes") | {"moved": OBSERVED}, icp)
         trials = read_settings(TrialSettings, fields_of(section, TrialSettings))
         methods = global_methods(trials, job.section("methods"), *axes) if own.global_start else {}
         starts = starts_of(pairs, *axes, own, trials.ladder, methods)
@@ -68,22 +70,18 @@ def measure(job: Job) -> None:
         write_csv(job.samples, samples)
         descriptors = DescriptorSettings(**job.section("descriptors"))
         describe_all(causes, *axes, descriptors, truth.icp)[0].save(job.descriptors)
-        factor_S = samples["error_factor"].to_numpy()
-        measured = [starts[number] for number in samples["sample"]]
-        T_found_S = [found_from(pairs[start.pair], start) for start in measured]
+        T_found_S = []  # motions (k, 4, 4) from the start of each registration to the results of global methods
+        for start in (starts[number] for number in samples["sample"]):
+            motions = [motion_between(pairs[start.pair], start.T_target_source, found) for found in start.found]
+            T_found_S.append(np.array(motions).reshape(-1, 4, 4))
         reenactment = read_settings(ReenactmentSettings, job.section("reenactment"))
-        reenact_scans(causes, factor_S, reenactment, truth, T_found_S).save(job.reenactments)
+        reenact_scans(causes, samples["error_factor"].to_numpy(), reenactment, truth, T_found_S).save(job.reenactments)
 
 
 def global_methods(
     settings: TrialSettings, methods: Mapping[str, Mapping | None], *axes: object
 ) -> dict[str, GlobalMethod]:
-    """The global method at whose pose local ones start, as Table XVII runs it.
-
-    Args:
-        methods: its settings, by name.
-        axes: name its draws.
-    """
+    """The global method at whose pose local ones start, as Table XVII runs it, given settings by name."""
     name = settings.global_start
     align = make_method(name, methods.get(name))
 
@@ -92,18 +90,6 @@ def global_methods(
         return scale_translation(outcome.T_target_source, pair.scale) if outcome.converged else None
 
     return {name: register}
-
-
-def found_from(pair: ScanPair, start: ScanStart) -> np.ndarray:
-    """Motions (k, 4, 4) from the start of a registration to the results of global methods."""
-    motions = [motion_between(pair, start.T_target_source, found) for found in start.found]
-    return np.array(motions).reshape(-1, 4, 4)
-
-
-def truth_settings(causes: dict, samples: ScanSamples) -> CauseSettings:
-    """How counterfactuals of scans are registered: as those of objects, but the source onto the target."""
-    icp = {"correspondence_distance": samples.icp.correspondence_distance, "max_iterations": samples.icp.max_iterations}
-    return CauseSettings.from_dict(causes | {"moved": OBSERVED}, icp)
 
 
 def starts_of(
@@ -117,10 +103,6 @@ def starts_of(
     """Starts of each pair: drawn rungs, the poses of global methods, and a rung with noise added.
 
     A rung without an error is not drawn, because it would show that there is no pose error.
-
-    Args:
-        ladder: of starts.
-        methods: the global ones, by name.
     """
     rungs = [rung for rung in ladder if rung.rotation_deg or rung.translation_m]
     starts: list[ScanStart] = []
@@ -171,21 +153,24 @@ def folds_of(cluster_S: np.ndarray, most: int) -> np.ndarray:
 
 
 class ScansToExplain(World):
-    """Registrations of scans to be explained; see :class:`gpca.steps.diagnosis.World`.
+    """Registrations of scans to be explained, given the files of all sources of objects, by what explainers read.
 
-    Args:
-        training: files of all sources of objects, by what explainers read.
+    See :class:`gpca.steps.diagnosis.World`.
     """
 
     def __init__(self, job: Job, training: dict[str, list[Path]]) -> None:
-        files = zip(job.scan_causes, job.scan_descriptors, job.scan_reenactments, strict=True)
-        parts = [_measured(*paths) for paths in files]
-        self._names, self._own = [path.parent.name for path in job.scan_causes], [own for own, _ in parts]
-        joined = Registrations.joined([with_labels for _, with_labels in parts])
-        self._all_read = joined
-        labels_alone = replace(joined, attached={"causes": joined.attached["causes"]})
+        self._names, self._own, parts = [path.parent.name for path in job.scan_causes], [], []
+        for paths in zip(job.scan_causes, job.scan_descriptors, job.scan_reenactments, strict=True):
+            causes = Causes.load(paths[0])
+            enacted, with_labels = Reenactments.load(paths[2], causes.registrations), labeled(causes)
+            read = dict(Descriptors.load(paths[1], causes.registrations).groups)
+            read |= {"verdict": enacted.verdict, "reenactment": reenactment_features(enacted)}
+            self._own.append(causes.registrations)
+            parts.append(replace(with_labels, attached={**with_labels.attached, **read}))
+        self._all_read = Registrations.joined(parts)
+        labels_alone = replace(self._all_read, attached={"causes": self._all_read.attached["causes"]})
         super().__init__(job, training, labels_alone, job.section("causes")["starts"])
-        self._fold_S = folds_of(joined.cluster, read_settings(ScanSamples, job.section("samples")).folds)
+        self._fold_S = folds_of(labels_alone.cluster, read_settings(ScanSamples, job.section("samples")).folds)
 
     def predictions(self, attribution: Attribution) -> pd.DataFrame:
         """Rows of a prediction file, the data set of each in column ``scans``."""
@@ -212,8 +197,13 @@ class ScansToExplain(World):
         entry = explainer_entry(name, CAUSES)
         attributions: list[Attribution] = []
         for training_set, asked in self._sets(entry, learned == OBJECTS):
+            parts = [(np.arange(len(asked)), training_set)]
+            if training_set is asked:  # one fold is asked about, and the labeled rows of the others are learned from
+                labeled_S = asked.concept != BORDERLINE
+                of_folds = (self._fold_S == fold for fold in np.unique(self._fold_S))
+                parts = [(np.flatnonzero(of_S), asked.subset(np.flatnonzero(labeled_S & ~of_S))) for of_S in of_folds]
             answers = []
-            for rows, training in self._parts(training_set, asked):
+            for rows, training in parts:
                 if len(np.unique(training.concept)) < FEWEST_LABELS:
                     return None
                 explainer = entry.make(*self._axes, **settings)
@@ -227,25 +217,3 @@ class ScansToExplain(World):
 
     def _read(self, reads: str) -> Registrations:
         return self._all_read
-
-    def _parts(self, learned: Registrations, asked: Registrations) -> Iterator[tuple[np.ndarray, Registrations]]:
-        """Rows that are asked about, and the training set for them: objects, or the rows of other folds."""
-        if learned is not asked:
-            yield np.arange(len(asked)), learned
-            return
-        labeled_S = asked.concept != BORDERLINE
-        for fold in np.unique(self._fold_S):
-            training = np.flatnonzero(labeled_S & (self._fold_S != fold))
-            yield np.flatnonzero(self._fold_S == fold), asked.subset(training)
-
-
-def _measured(
-    causes_file: Path, descriptors_file: Path, reenactments_file: Path
-) -> tuple[Registrations, Registrations]:
-    """Registrations of a data set, without and with labels and all that explainers read but embeddings."""
-    causes = Causes.load(causes_file)
-    enacted = Reenactments.load(reenactments_file, causes.registrations)
-    read = dict(Descriptors.load(descriptors_file, causes.registrations).groups)
-    read |= {"verdict": enacted.verdict, "reenactment": reenactment_features(enacted)}
-    with_labels = labeled(causes)
-    return causes.registrations, replace(with_labels, attached={**with_labels.attached, **read})

@@ -20,11 +20,12 @@ from gpca.pairs.perturbation import CONCEPTS
 from gpca.pairs.shifted_sets import ShiftedSets
 from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
+from gpca.seeds import seed_of_file
 from gpca.steps.readings.groups import GROUPS, Reading, ReadingSizes, name_of, readings_of
 from gpca.uncertainty.settings import UncertaintySettings
 
 Values = dict[tuple[str, str], float]  # (metric, concept) -> value, named as in published.csv
-Row = tuple[Reading, str, str, str, str, int, float]  # reading, source, method, metric, concept, seed, value
+Row = tuple[Reading, str, str, int, Values]  # reading, source, method, seed, values
 Files = Mapping[tuple, Path]
 
 
@@ -37,6 +38,7 @@ class RunFiles:
         predictions, embeddings: (source, method, seed) -> file.
         retrained: (severities, source, seed) -> file of the step ``retrain``.
         settings: sections of the config by name, for what a reading leaves as it is.
+        sizes: of what the readings see.
     """
 
     registrations: Files = field(default_factory=dict)
@@ -45,6 +47,7 @@ class RunFiles:
     embeddings: Files = field(default_factory=dict)
     retrained: Files = field(default_factory=dict)
     settings: Mapping[str, dict] = field(default_factory=dict)
+    sizes: ReadingSizes = field(default_factory=ReadingSizes)
 
     def section(self, name: str) -> dict:
         """A section of the settings; an absent one is empty."""
@@ -55,17 +58,21 @@ class RunFiles:
         runs = {name: value for name, value in self.section("uncertainty").items() if name != "samples"}
         return UncertaintySettings(**runs, icp=ICPSettings(**self.section("icp")))
 
-    def in_distribution(self) -> Iterator[tuple[str, int, ShiftedSets, Registrations]]:
-        """Yield source, seed, sets, and the samples like those of the training, with their embeddings."""
+    def loaded(self) -> Iterator[tuple[str, int, Registrations]]:
+        """Source, seed and registrations of each file of these."""
+        for (source, seed), path in self.registrations.items():
+            yield source, seed, Registrations.load(path, (source, seed))
+
+    def in_distribution(self) -> Iterator[tuple[str, int, Registrations, np.ndarray]]:
+        """Source, seed, samples like those of the training with their embeddings, and distances (S,) of the test's."""
         for (source, seed), path in self.sets.items():
             sets = ShiftedSets.load(path, (source, seed))
-            yield source, seed, sets, like_the_training(sets)
+            yield source, seed, like_the_training(sets), sets.distance[sets.rows("in_distribution", "test"), 0]
 
     def embedded(self, source: str, method: str, seed: int) -> Registrations:
         """Registrations with the embeddings of a ``{backbone}-{reduction}``."""
         registrations = Registrations.load(self.registrations[source, seed], (source, seed))
-        embedding = read_embedding(self.embeddings[source, method, seed], registrations)
-        return replace(registrations, attached=embedding)
+        return replace(registrations, attached=read_embedding(self.embeddings[source, method, seed], registrations))
 
     def predicted(self, source: str, method: str, seed: int) -> np.ndarray:
         """Concepts (S,) that a method names for the test samples."""
@@ -73,18 +80,11 @@ class RunFiles:
         return rows.loc[rows["split"] == "test", "concept_predicted"].to_numpy()
 
 
-def _embedding_key(path: Path) -> tuple[str, str, int]:
-    backbone, reduction, seed = source_method_seed(path)
-    if len(path.parts) < 4:
-        raise InputError(path, "is not named …/{source}/{backbone}/{reduction}/seed{number}.npz", "rename it")
-    return path.parts[-4], f"{backbone}-{reduction}", seed
-
-
 KEYS: dict[str, Callable[[Path], tuple]] = {  # kind of file -> its key in RunFiles
     "registrations": lambda path: source_method_seed(path)[1:],
     "sets": lambda path: source_method_seed(path)[1:],
     "predictions": source_method_seed,
-    "embeddings": _embedding_key,
+    "embeddings": lambda path: (path.parts[-4], "-".join(path.parts[-3:-1]), seed_of_file(path)),
     "retrained": source_method_seed,
 }
 
@@ -98,10 +98,12 @@ def run(job: Job) -> None:
     inputs = [path for paths in files.values() for path in paths.values()]
     with record_provenance([job.out], inputs, job.settings):
         readings = readings_of({name: choices[name] for name in group.choices})
-        rows = group.function()(
-            RunFiles(**files, settings=job.settings), readings, ReadingSizes(**job.section("sizes"))
-        )
-        records = [(name_of(job.group, reading), *value) for reading, *value in rows]
+        run_files = RunFiles(**files, settings=job.settings, sizes=ReadingSizes(**job.section("sizes")))
+        records = [
+            (name_of(job.group, reading), source, method, metric, concept, seed, value)
+            for reading, source, method, seed, values in group.function()(run_files, readings)
+            for (metric, concept), value in values.items()
+        ]
         if not records:
             remedy = f"raise registrations.train, or real_world.train, or set readings.groups.{job.group} to false"
             raise InputError(f"readings of {job.group}", "need more training samples than the run has", remedy)
@@ -122,12 +124,6 @@ def like_the_training(sets: ShiftedSets) -> Registrations:
 def train_and_test(registrations: Registrations) -> list[Registrations]:
     """The samples of either split."""
     return [registrations.subset(registrations.rows(split)) for split in ("train", "test")]
-
-
-def rows_of(values: Values, reading: Reading, source: str, method: str, seed: int) -> Iterator[Row]:
-    """Yield a row for each value."""
-    for (metric, concept), value in values.items():
-        yield reading, source, method, metric, concept, seed, value
 
 
 def accuracies(true_S: np.ndarray, scores_S_C: np.ndarray) -> Values:

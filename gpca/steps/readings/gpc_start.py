@@ -19,8 +19,8 @@ from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.progress import progress
 from gpca.seeds import seed_of
-from gpca.steps.readings.files import Row, RunFiles, accuracies, rows_of, table5, train_and_test
-from gpca.steps.readings.groups import Reading, ReadingSizes
+from gpca.steps.readings.files import Row, RunFiles, accuracies, table5, train_and_test
+from gpca.steps.readings.groups import Reading
 
 BATCH = 64  # samples of a minibatch
 DEFAULT_LENGTHSCALE = math.log(2)  # gpytorch's
@@ -39,13 +39,7 @@ class UnitNorm(Standardization):
 
 
 class StartedGPC(GPC):
-    """The classifier from another start.
-
-    Args:
-        settings: as those of :class:`gpca.classifier.gpc.GPC`.
-        reading: ``inputs``, ``inducing``, ``lengthscale`` and ``batch`` of the start; other choices are ignored.
-        axes: names of the seed.
-    """
+    """The classifier from another start: ``inputs``, ``inducing``, ``lengthscale`` and ``batch`` of a reading."""
 
     def __init__(self, settings: GPCSettings, reading: Reading, *axes: object) -> None:
         super().__init__(CONCEPTS, settings, *axes)
@@ -87,11 +81,10 @@ def of_unit_norm(h_N_d: np.ndarray) -> np.ndarray:
     return h_N_d / np.where(length_N_1 > 0, length_N_1, 1)
 
 
-def starts(run_files: RunFiles, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iterator[Row]:
-    """Yield accuracies under each reading, and Table V's numbers of those of `SHOWN_AS`."""
-    for source, seed, sets, registrations in run_files.in_distribution():
+def starts(run_files: RunFiles, readings: Sequence[Reading]) -> Iterator[Row]:
+    """Accuracies under each reading, and Table V's numbers of those of `SHOWN_AS`."""
+    for source, seed, registrations, distance_S in run_files.in_distribution():
         train, test = train_and_test(registrations)
-        distance_S = sets.distance[sets.rows("in_distribution", "test"), 0]
         fitted: dict[tuple, np.ndarray] = {}
         for reading in progress(readings, f"starts of the GPC on {source}, seed {seed}"):
             for schedule in FITTED:
@@ -103,10 +96,9 @@ def starts(run_files: RunFiles, readings: Sequence[Reading], _sizes: ReadingSize
                     gpc = StartedGPC(settings, reading, source, seed).fit(train.embedding, train.concept)
                     fitted[key] = gpc.attribute(test.embedding)[0]
                 values, method = accuracies(test.concept, fitted[key]), f"{kernel}-{rate:g}-{iterations}"
-                yield from rows_of(values, reading, source, method, seed)
+                yield reading, source, method, seed, values
                 if schedule in SHOWN_AS:
-                    values = table5(test.concept, fitted[key], distance_S)
-                    yield from rows_of(values, reading, source, SHOWN_AS[schedule], seed)
+                    yield reading, source, SHOWN_AS[schedule], seed, table5(test.concept, fitted[key], distance_S)
 
 
 def relevant(reading: Reading, kernel: str) -> Reading:

@@ -15,7 +15,7 @@ from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.progress import progress
 from gpca.seeds import generator
 from gpca.steps.readings.files import Row, RunFiles
-from gpca.steps.readings.groups import Reading, ReadingSizes
+from gpca.steps.readings.groups import Reading
 from gpca.uncertainty.designs import KNOB_RANGE, STEP, RegisteredRow, design_rows
 from gpca.uncertainty.interventions import MIDDLE, UNTOUCHED, KnobRuns, Knobs
 from gpca.uncertainty.settings import CORNERS, UncertaintySettings
@@ -26,10 +26,10 @@ Pair = tuple[str, dict[str, tuple[tuple, KnobRuns]]]  # concept, and name -> clo
 STEPS = {"small": STEP * KNOB_RANGE, "middle": np.subtract(MIDDLE, UNTOUCHED)}
 
 
-def sensitivity(run_files: RunFiles, readings: Sequence[Reading], sizes: ReadingSizes) -> Iterator[Row]:
-    """Yield the accuracies of local sensitivity analysis under each reading."""
+def sensitivity(run_files: RunFiles, readings: Sequence[Reading]) -> Iterator[Row]:
+    """Accuracies of local sensitivity analysis under each reading."""
     settings = run_files.uncertainty()
-    for source, seed, pairs in _pairs(run_files, sizes, settings, settings.starts, "sensitivity"):
+    for source, seed, pairs in _pairs(run_files, settings.starts, "sensitivity"):
         steps = [(concept, _steps(runs["observed"], settings)) for concept, runs in pairs]
         concept_S, measured = zip(*steps, strict=True)
         for reading in readings:
@@ -39,51 +39,47 @@ def sensitivity(run_files: RunFiles, readings: Sequence[Reading], sizes: Reading
             change_S_3 = values_S_K[:, first : first + 3] - values_S_K[:, :1]
             derivative_S_3 = change_S_3 / (step_3 / KNOB_RANGE if reading["unit"] == "range" else step_3)
             value = _accuracy(np.array(concept_S), derivative_S_3, reading["sign"])
-            yield reading, source, "sa_local_additive", "accuracy", ALL, seed, value
+            yield reading, source, "sa_local_additive", seed, {("accuracy", ALL): value}
 
 
-def shap(run_files: RunFiles, readings: Sequence[Reading], sizes: ReadingSizes) -> Iterator[Row]:
-    """Yield the accuracies of SHAP under each reading."""
-    settings = run_files.uncertainty()
+def shap(run_files: RunFiles, readings: Sequence[Reading]) -> Iterator[Row]:
+    """Accuracies of SHAP under each reading."""
     starts = sorted({reading["starts"] for reading in readings})
-    for source, seed, pairs in _pairs(run_files, sizes, settings, starts[-1], "shap"):
-        concept_S, spreads = [], []
-        for concept, runs in pairs:
-            concept_S.append(concept)
-            spreads.append({name: _corners(pair, starts) for name, pair in runs.items()})
+    for source, seed, pairs in _pairs(run_files, starts[-1], "shap"):
+        cornered = [(each, {name: _corners(pair, starts) for name, pair in runs.items()}) for each, runs in pairs]
+        concept_S, spreads = zip(*cornered, strict=True)
         for reading in readings:
             spread_S_8 = np.array([by_name[reading["background"]][reading["starts"]] for by_name in spreads])
             worth_S_8 = _worth(spread_S_8, reading["quantity"], reading["floor"])
             value = _accuracy(np.array(concept_S), shapley_values(worth_S_8), reading["sign"])
-            yield reading, source, "shap_additive", "accuracy", ALL, seed, value
+            yield reading, source, "shap_additive", seed, {("accuracy", ALL): value}
 
 
-def magnitudes(run_files: RunFiles, readings: Sequence[Reading], sizes: ReadingSizes) -> Iterator[Row]:
-    """Yield the accuracies of SHAP and of local sensitivity analysis by how far each knob is turned.
+def magnitudes(run_files: RunFiles, readings: Sequence[Reading]) -> Iterator[Row]:
+    """Accuracies of SHAP and of local sensitivity analysis by how far each knob is turned.
 
     SHAP turns it that far or not at all; sensitivity analysis divides by that step, in units of the knob's range.
     """
     settings = run_files.uncertainty()
     turned_R_3 = np.array([[reading[name] for name in Knobs._fields] for reading in readings])
-    for source, seed, pairs in _pairs(run_files, sizes, settings, settings.starts, "knobs"):
+    for source, seed, pairs in _pairs(run_files, settings.starts, "knobs"):
         for method, value_R in accuracies_of_magnitudes(pairs, turned_R_3, settings.floor).items():
             for reading, value in zip(readings, value_R, strict=True):
-                yield reading, source, method, "accuracy", ALL, seed, float(value)
+                yield reading, source, method, seed, {("accuracy", ALL): float(value)}
 
 
 def accuracies_of_magnitudes(pairs: Iterable[Pair], turned_R_3: np.ndarray, floor: float) -> dict[str, np.ndarray]:
-    """Accuracies (R,) of SHAP and of local sensitivity analysis, by how far the knobs are turned.
+    """Accuracies (R,) of SHAP and of local sensitivity analysis, by the settings to which the knobs are turned.
 
-    Args:
-        pairs: as :func:`runs_of` yields them.
-        turned_R_3: settings of the knobs.
-        floor: variance below which a spread is no uncertainty.
+    A spread is no uncertainty whose variance is below the floor.
     """
     concept_S, worths = [], []
     for concept, runs in pairs:
         concept_S.append(concept)
-        spread_R_8 = np.array([_turned(runs["observed"], turned_3) for turned_3 in turned_R_3])
-        worths.append(_worth(spread_R_8, "divergence", floor))
+        (_, _, _, T_ref), knob_runs = runs["observed"]
+        turned = (Knobs(*np.where(on, turned_3, UNTOUCHED)) for turned_3 in turned_R_3 for on in CORNERS)
+        spread = np.array([knob_runs.runs(corner)[0].covariance(T_ref) for corner in turned])
+        worths.append(_worth(spread.reshape(len(turned_R_3), len(CORNERS), 6, 6), "divergence", floor))
     true_S = np.array(concept_S)
     values: dict[str, list[float]] = {"shap_additive": [], "sa_local_additive": []}
     for number, turned_3 in enumerate(turned_R_3):
@@ -95,30 +91,18 @@ def accuracies_of_magnitudes(pairs: Iterable[Pair], turned_R_3: np.ndarray, floo
     return {method: np.array(value_R) for method, value_R in values.items()}
 
 
-def _turned(pair: tuple, turned_3: np.ndarray) -> np.ndarray:
-    """Covariances (8, 6, 6) of the corners between the untouched knobs and these."""
-    (_, _, _, T_ref), knob_runs = pair
-    corners = (Knobs(*np.where(switches, turned_3, UNTOUCHED)) for switches in CORNERS)
-    return np.array([knob_runs.runs(corner)[0].covariance(T_ref) for corner in corners])
-
-
-def _pairs(
-    run_files: RunFiles, sizes: ReadingSizes, settings: UncertaintySettings, starts: int, title: str
-) -> Iterator[tuple[str, int, Iterator[Pair]]]:
-    """Yield source, seed and the pairs of its samples.
-
-    The axes of random numbers are those of :func:`gpca.uncertainty.designs.evaluate_design`.
-    """
-    for (source, seed), path in run_files.registrations.items():
-        registrations = Registrations.load(path, (source, seed))
-        chosen = registrations.subset(design_rows(registrations, "additive", sizes.samples))
-        yield source, seed, runs_of(chosen, source, seed, settings, starts, f"{title} of {source}, seed {seed}")
+def _pairs(run_files: RunFiles, starts: int, title: str) -> Iterator[tuple[str, int, Iterator[Pair]]]:
+    """Source, seed and the pairs of its samples, by the random numbers of the protocol."""
+    for source, seed, registrations in run_files.loaded():
+        chosen = registrations.subset(design_rows(registrations, "additive", run_files.sizes.samples))
+        title_of = f"{title} of {source}, seed {seed}"
+        yield source, seed, runs_of(chosen, source, seed, run_files.uncertainty(), starts, title_of)
 
 
 def runs_of(
     registrations: Registrations, source: str, seed: int, settings: UncertaintySettings, starts: int, title: str
 ) -> Iterator[Pair]:
-    """Yield the concept of each registration, and its Monte-Carlo ICP by pair: the observed one, and a clean one."""
+    """Concept of each registration, and its Monte-Carlo ICP by pair: the observed one, and a clean one."""
     observed = registrations.without_labels()
     for row in progress(range(len(registrations)), title):
         axes = (source, seed, "uncertainty", observed.split[row], observed.sample[row])

@@ -10,18 +10,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from gpca.active_learning.retraining import Retraining, Step, learn
+from gpca.active_learning.retraining import Retraining, learn
 from gpca.active_learning.rounds import LabelingTask, initial_gpc, make_task, rounds
 from gpca.active_learning.settings import JUDGED_SHARE, ActiveLearningSettings, RareSettings, rare_setting
 from gpca.classifier.gpc import GPC
-from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.progress import progress
 from gpca.settings import read_settings
-from gpca.steps.readings.files import Row, RunFiles
-from gpca.steps.readings.groups import Reading, ReadingSizes
+from gpca.steps.readings.files import Row, RunFiles, Values
+from gpca.steps.readings.groups import Reading
 
 NEW = "overlap"  # the paper's new concept
 RANDOM_BATCH = 10  # random choice is the same in rounds of any size, and needs many labels
@@ -30,16 +29,16 @@ EVERY, MOST = 5, 200  # epochs between looks at the accuracy, and the most of th
 STRATEGIES = ("bald_kmeans", "random")
 
 
-def pool(run_files: RunFiles, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iterator[Row]:
-    """Yield labels and epochs to the target under each reading, by BALD with k-means and by random choice.
+def pool(run_files: RunFiles, readings: Sequence[Reading]) -> Iterator[Row]:
+    """Labels and epochs to the target under each reading, by BALD with k-means and by random choice.
 
     Further labels move the posterior alone, as the classifier of the protocol would take hours, and epochs are the
     passes of all rounds.
     """
     base, target = base_settings(run_files)
-    for source, seed, _, registrations in run_files.in_distribution():
+    for source, seed, registrations, _ in run_files.in_distribution():
         started: dict[tuple, tuple[LabelingTask, GPC] | None] = {}
-        labeled: dict[tuple, dict[str, float]] = {}
+        labeled: dict[tuple, Values] = {}
         for reading in progress(readings, f"pools of {source}, seed {seed}"):
             start = (reading["new_share"], reading["initial"])
             settings = replace(base, initial=reading["initial"])
@@ -59,14 +58,13 @@ def pool(run_files: RunFiles, readings: Sequence[Reading], _sizes: ReadingSizes)
             for strategy, (batch, labels) in budgets.items():
                 if (key := (*start, strategy, batch)) not in labeled:
                     budget = replace(settings, batch=batch, labels=labels)
-                    steps, _ = until(target, *begun, strategy, budget, source, seed)
+                    steps = until(target, *begun, strategy, budget, source, seed)
                     labeled[key] = {
-                        "labels_to_target": steps[-1]["labels"],
-                        "epochs_at_target": sum(step["epochs"] for step in steps),
-                        "reached": float(steps[-1]["accuracy"] >= target),
+                        ("labels_to_target", NEW): float(steps[-1]["labels"]),
+                        ("epochs_at_target", NEW): float(sum(step["epochs"] for step in steps)),
+                        ("reached", NEW): float(steps[-1]["accuracy"] >= target),
                     }
-                for metric, value in labeled[key].items():
-                    yield reading, source, strategy, metric, NEW, seed, float(value)
+                yield reading, source, strategy, seed, labeled[key]
 
 
 def until(
@@ -76,83 +74,65 @@ def until(
     strategy: str,
     settings: ActiveLearningSettings,
     *axes: object,
-) -> tuple[list[dict[str, float]], list[int]]:
-    """Rounds to the first of that accuracy, or all of them, and the rows of the pool that they labeled."""
+) -> list[dict[str, float]]:
+    """Rounds to the first of that accuracy, or all of them."""
     done = []
-    for step_and_rows in rounds(task.project(gpc), gpc, strategy, settings, *axes, "reading"):
-        done.append(step_and_rows)
-        if step_and_rows[0]["accuracy"] >= accuracy:
+    for step, _ in rounds(task.project(gpc), gpc, strategy, settings, *axes, "reading"):
+        done.append(step)
+        if step["accuracy"] >= accuracy:
             break
-    return [step for step, _ in done], done[-1][1]
+    return done
 
 
-def epochs(run_files: RunFiles, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iterator[Row]:
-    """Yield the passes of Adam that a classifier takes to the target, on labels of the protocol's run."""
+def epochs(run_files: RunFiles, readings: Sequence[Reading]) -> Iterator[Row]:
+    """Passes of Adam that a new classifier takes to the target, and whether it gets there, on the protocol's labels."""
     rare, target = rare_settings(run_files)
-    for source, seed, _, registrations in run_files.in_distribution():
+    for source, seed, registrations, _ in run_files.in_distribution():
         task, axes = judged_task(run_files, registrations, source, seed)
         learned = learn(Retraining(task, rare.gpc, *axes), "bald_kmeans", rare, [target], *axes)
         queried = {"at_target": learned.labels_to(target), "all": learned.queried}
         for reading in progress(readings, f"epochs on {source}, seed {seed}"):
+            rows = queried[reading["labels"]]
+            labeled_L_d = np.concatenate([task.initial.h, task.pool.h[rows]])
+            concept_L = np.concatenate([task.initial.concept_N, task.pool.concept_N[rows]])
             settings = replace(rare.gpc, learning_rate=reading["learning_rate"])
-            values = passes(task, queried[reading["labels"]], settings, target, source, seed)
-            for metric, value in values.items():
-                yield reading, source, "bald_kmeans", metric, NEW, seed, value
+            gpc, passes, reached = GPC(CONCEPTS, settings, source, seed, "epochs"), float(MOST), 0.0
+            for done in gpc.fit_up_to(range(EVERY, MOST + 1, EVERY), labeled_L_d, concept_L):
+                named_N = np.array(CONCEPTS)[gpc.attribute(task.test.h)[0].argmax(axis=1)]
+                if np.mean(named_N == task.test.concept_N) >= target:
+                    passes, reached = float(done), 1.0
+                    break
+            yield reading, source, "bald_kmeans", seed, {("epochs_at_target", NEW): passes, ("reached", NEW): reached}
 
 
-def passes(
-    task: LabelingTask[np.ndarray], queried: list[int], settings: GPCSettings, target: float, *axes: object
-) -> dict[str, float]:
-    """Epochs after which a new classifier on the labels reaches the target, and whether it does."""
-    labeled_L_d = np.concatenate([task.initial.h, task.pool.h[queried]])
-    concept_L = np.concatenate([task.initial.concept_N, task.pool.concept_N[queried]])
-    gpc = GPC(CONCEPTS, settings, *axes, "epochs")
-    for done in gpc.fit_up_to(range(EVERY, MOST + 1, EVERY), labeled_L_d, concept_L):
-        named_N = np.array(CONCEPTS)[gpc.attribute(task.test.h)[0].argmax(axis=1)]
-        if np.mean(named_N == task.test.concept_N) >= target:
-            return {"epochs_at_target": float(done), "reached": 1.0}
-    return {"epochs_at_target": float(MOST), "reached": 0.0}
+def classifiers(run_files: RunFiles, readings: Sequence[Reading]) -> Iterator[Row]:
+    """Labels and epochs to the target by the classifier, also by that of the protocol.
 
-
-def classifiers(run_files: RunFiles, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iterator[Row]:
-    """Yield labels and epochs to the target by the classifier, also by that of the protocol."""
+    From ``posterior``, further labels move the first classifier's posterior alone.
+    """
     rare, target = rare_settings(run_files)
-    for source, seed, _, registrations in run_files.in_distribution():
+    for source, seed, registrations, _ in run_files.in_distribution():
         task, axes = judged_task(run_files, registrations, source, seed)
         for reading in progress(readings, f"classifiers of {source}, seed {seed}"):
-            gpc = replace(rare.gpc, learning_rate=reading["learning_rate"], iterations=reading["iterations"])
+            settings = replace(rare.gpc, learning_rate=reading["learning_rate"], iterations=reading["iterations"])
             start, sees_pool = reading["start"], reading["inputs"] == "pool"
             for strategy in STRATEGIES:
                 if start == "posterior":
-                    settings = replace(rare, gpc=gpc)
-                    steps = _by_the_posterior(run_files, task, strategy, settings, sees_pool, target, *axes)
+                    around = np.concatenate([task.initial.h, task.pool.h]) if sees_pool else None
+                    gpc = GPC(CONCEPTS, settings, *axes, "posterior")
+                    gpc.fit(task.initial.h, task.initial.concept_N, around).level()
+                    batch = RANDOM_BATCH if strategy == "random" else rare.batch
+                    budget = replace(base_settings(run_files)[0], batch=batch, labels=rare.labels)
+                    steps = until(target, task, gpc, strategy, budget, *axes)
                 else:
-                    retraining = Retraining(task, gpc, *axes, warm=start == "warm", sees_pool=sees_pool)
+                    retraining = Retraining(task, settings, *axes, warm=start == "warm", sees_pool=sees_pool)
                     steps = learn(retraining, strategy, rare, [target], *axes).steps
                 at = next((step for step in steps if step["accuracy"] >= target), steps[-1])
                 values = {"labels_to_target": at["labels"], "reached": at["accuracy"] >= target}
                 if start != "posterior":  # whose passes are no epochs of Adam
                     values["epochs_at_target"] = at["epochs"]
-                for metric, value in values.items():
-                    yield reading, source, strategy, metric, NEW, seed, float(value)
-
-
-def _by_the_posterior(
-    run_files: RunFiles,
-    task: LabelingTask[np.ndarray],
-    strategy: str,
-    rare: RareSettings,
-    sees_pool: bool,
-    target: float,
-    *axes: object,
-) -> list[Step]:
-    """Rounds to the target in which further labels move the first classifier's posterior alone."""
-    around = np.concatenate([task.initial.h, task.pool.h]) if sees_pool else None
-    gpc = GPC(CONCEPTS, rare.gpc, *axes, "posterior").fit(task.initial.h, task.initial.concept_N, around)
-    gpc.level()
-    base, _ = base_settings(run_files)
-    batch = RANDOM_BATCH if strategy == "random" else rare.batch
-    return until(target, task, gpc, strategy, replace(base, batch=batch, labels=rare.labels), *axes)[0]
+                of_new = {(metric, NEW): float(value) for metric, value in values.items()}
+                yield reading, source, strategy, seed, of_new
 
 
 def judged_task(

@@ -22,9 +22,9 @@ from gpca.explainers.classifiers import PAPERS_RANDOM_STATE
 from gpca.explainers.registry import explainer_entry
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.steps.readings.files import Row, RunFiles, Values, accuracies, rows_of, table5, train_and_test
+from gpca.steps.readings.files import Row, RunFiles, Values, accuracies, table5, train_and_test
 from gpca.steps.readings.gpc_start import gpc_scores
-from gpca.steps.readings.groups import Reading, ReadingSizes
+from gpca.steps.readings.groups import Reading
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -40,28 +40,26 @@ FEATURES = {
 }
 
 
-def kernel(run_files: RunFiles, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iterator[Row]:
-    """Yield the GPC's numbers of Table V, by its kernel and schedule."""
-    for source, seed, sets, registrations in run_files.in_distribution():
+def kernel(run_files: RunFiles, readings: Sequence[Reading]) -> Iterator[Row]:
+    """The GPC's numbers of Table V, by its kernel and schedule."""
+    for source, seed, registrations, distance_S in run_files.in_distribution():
         train, test = train_and_test(registrations)
-        distance_S = sets.distance[sets.rows("in_distribution", "test"), 0]
         for name in dict.fromkeys(reading["kernel"] for reading in readings):
             by_iterations = {reading["iterations"]: reading for reading in readings if reading["kernel"] == name}
-            settings = GPCSettings(**{**run_files.section(GPC_OF_TABLE_V), "kernel": name})
+            settings = GPCSettings(**run_files.section(GPC_OF_TABLE_V) | {"kernel": name})
             gpc = GPC(CONCEPTS, settings, source, seed)
             for iterations in gpc.fit_up_to(by_iterations, train.embedding, train.concept):
                 values = table5(test.concept, gpc.attribute(test.embedding)[0], distance_S)
-                yield from rows_of(values, by_iterations[iterations], source, GPC_OF_TABLE_V, seed)
+                yield by_iterations[iterations], source, GPC_OF_TABLE_V, seed, values
 
 
-def linear_svm(run_files: RunFiles, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iterator[Row]:
-    """Yield the linear SVM's numbers of Table V, by its kind."""
-    for source, seed, sets, registrations in run_files.in_distribution():
+def linear_svm(run_files: RunFiles, readings: Sequence[Reading]) -> Iterator[Row]:
+    """The linear SVM's numbers of Table V, by its kind."""
+    for source, seed, registrations, distance_S in run_files.in_distribution():
         train, test = train_and_test(registrations)
-        distance_S = sets.distance[sets.rows("in_distribution", "test"), 0]
         for reading in readings:
             scores_S_C = svm_scores(train, test.embedding, **reading)
-            yield from rows_of(table5(test.concept, scores_S_C, distance_S), reading, source, SVM, seed)
+            yield reading, source, SVM, seed, table5(test.concept, scores_S_C, distance_S)
 
 
 def svm_scores(train: Registrations, h_S_d: np.ndarray, machine: str, inputs: str, probability: str) -> np.ndarray:
@@ -83,19 +81,19 @@ def svm_scores(train: Registrations, h_S_d: np.ndarray, machine: str, inputs: st
     with warnings.catch_warnings():  # scikit-learn's defaults stop before a LinearSVC on raw inputs has converged
         warnings.simplefilter("ignore")
         fitted.fit(np.asarray(train.embedding, float), train.concept)
-    columns = [list(fitted.classes_).index(concept) for concept in CONCEPTS]
+    columns, h_S_d = [list(fitted.classes_).index(concept) for concept in CONCEPTS], np.asarray(h_S_d, float)
     if probability == "platt":
-        return fitted.predict_proba(np.asarray(h_S_d, float))[:, columns]
-    return softmax(fitted.decision_function(np.asarray(h_S_d, float))[:, columns], axis=1)
+        return fitted.predict_proba(h_S_d)[:, columns]
+    return softmax(fitted.decision_function(h_S_d)[:, columns], axis=1)
 
 
-def encoder_head(run_files: RunFiles, readings: Sequence[Reading], sizes: ReadingSizes) -> Iterator[Row]:
-    """Yield the accuracies of Table V's learners on embeddings by encoders that were trained with other heads."""
-    for number, (source, seed, _, registrations) in enumerate(run_files.in_distribution()):
+def encoder_head(run_files: RunFiles, readings: Sequence[Reading]) -> Iterator[Row]:
+    """Accuracies of Table V's learners on embeddings by encoders that were trained with other heads."""
+    for number, (source, seed, registrations, _) in enumerate(run_files.in_distribution()):
         by_head = {"linear": registrations}
-        if number < sizes.encoders:
+        if number < run_files.sizes.encoders:
             clouds = Registrations.load(run_files.registrations[source, seed], (source, seed))
-            settings = EncoderSettings(**{**run_files.section("encoder"), "head": "two_layer"})
+            settings = EncoderSettings(**run_files.section("encoder") | {"head": "two_layer"})
             model, _ = train_encoder(clouds, source, seed, settings)
             h_S_d, _ = embed(model, clouds, source, seed, settings)
             by_head["two_layer"] = replace(clouds, attached={"embedding": h_S_d})
@@ -109,31 +107,30 @@ def encoder_head(run_files: RunFiles, readings: Sequence[Reading], sizes: Readin
             trees.fit(train)
             scores[FOREST] = trees.explain(test).scores_N_C
             for reading in (reading for reading in readings if reading["head"] == head):
-                svm_S_C = svm_scores(train, test.embedding, "svc", reading["inputs"], "platt")
-                for method, scores_S_C in {**scores, SVM: svm_S_C}.items():
-                    yield from rows_of(accuracies(test.concept, scores_S_C), reading, source, method, seed)
+                scores[SVM] = svm_scores(train, test.embedding, "svc", reading["inputs"], "platt")
+                for method, scores_S_C in scores.items():
+                    yield reading, source, method, seed, accuracies(test.concept, scores_S_C)
 
 
-def classic_features(run_files: RunFiles, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iterator[Row]:
-    """Yield the accuracies of the paper's GPC on each choice of features."""
-    for (source, seed), path in run_files.registrations.items():
-        registrations = Registrations.load(path, (source, seed))
+def classic_features(run_files: RunFiles, readings: Sequence[Reading]) -> Iterator[Row]:
+    """Accuracies of the paper's GPC on each choice of features."""
+    for source, seed, registrations in run_files.loaded():
         features_S_F = analytical_features(registrations, source, seed, "analytical")
         for reading in readings:
             chosen = replace(registrations, attached={"embedding": features_S_F[:, FEATURES[reading["features"]]]})
             train, test = train_and_test(chosen)
             scores_S_C = gpc_scores(run_files.section("gpca_paper"), train, test.embedding, source, seed)
-            yield from rows_of(accuracies(test.concept, scores_S_C), reading, source, "analytical_gpc", seed)
+            yield reading, source, "analytical_gpc", seed, accuracies(test.concept, scores_S_C)
 
 
-def diagnostics(run_files: RunFiles, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iterator[Row]:
-    """Yield ρ, AUC and ECE of each learner under each reading."""
+def diagnostics(run_files: RunFiles, readings: Sequence[Reading]) -> Iterator[Row]:
+    """ρ, AUC and ECE of each learner under each reading."""
     learned = read_learner_predictions(run_files.predictions.values(), run_files.sets.values())
     for (source, learner, seed), rows in learned.items():
         by_set = sets_of(rows)
         for reading in readings:
             if (in_set := by_set.get(reading["set"])) is not None:
-                yield from rows_of(diagnostics_under(in_set, reading), reading, source, learner, seed)
+                yield reading, source, learner, seed, diagnostics_under(in_set, reading)
 
 
 def diagnostics_under(rows: pd.DataFrame, reading: Reading) -> Values:

@@ -15,26 +15,17 @@ from gpca.pairs.shifted_sets import ShiftedSets
 from gpca.pairs.synthesis import RegistrationSettings, make_registrations
 from gpca.process.job import Job
 from gpca.process.provenance import record_provenance
-from gpca.steps.readings.files import (
-    Row,
-    RunFiles,
-    accuracies,
-    accuracies_of_named,
-    like_the_training,
-    rows_of,
-    train_and_test,
-)
+from gpca.steps.readings.files import Row, RunFiles, accuracies, accuracies_of_named, like_the_training, train_and_test
 from gpca.steps.readings.gpc_start import gpc_scores
-from gpca.steps.readings.groups import Reading, ReadingSizes
+from gpca.steps.readings.groups import Reading
 
 THIRDS = ("weakest", "middle", "strongest")
 CLASSIFIERS = {"paper": "gpca_paper", "converged": "gpca"}
 
 
-def thirds(run_files: RunFiles, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iterator[Row]:
-    """Yield the accuracies on all test samples, or on a third of each concept's."""
-    for (source, seed), path in run_files.registrations.items():
-        registrations = Registrations.load(path, (source, seed))
+def thirds(run_files: RunFiles, readings: Sequence[Reading]) -> Iterator[Row]:
+    """Accuracies on all test samples, or on a third of each concept's."""
+    for source, seed, registrations in run_files.loaded():
         test = registrations.subset(registrations.rows("test"))
         third_of = dict(zip(test.sample.astype(str), third_S(test), strict=True))
         for reading in readings:
@@ -46,7 +37,7 @@ def thirds(run_files: RunFiles, readings: Sequence[Reading], _sizes: ReadingSize
             if reading["part"] != "all":
                 rows = rows[rows["sample"].map(third_of) == reading["part"]]
             values = accuracies_of_named(rows["concept_true"].to_numpy(), rows["concept_predicted"].to_numpy())
-            yield from rows_of(values, reading, source, "gpca_paper", seed)
+            yield reading, source, "gpca_paper", seed, values
 
 
 def third_S(registrations: Registrations) -> np.ndarray:
@@ -64,14 +55,14 @@ def third_S(registrations: Registrations) -> np.ndarray:
     return names_S
 
 
-def retrained(run_files: RunFiles, readings: Sequence[Reading], _sizes: ReadingSizes) -> Iterator[Row]:
-    """Yield the accuracies of encoder and classifier that learned from other severities, on test samples of these."""
+def retrained(run_files: RunFiles, readings: Sequence[Reading]) -> Iterator[Row]:
+    """Accuracies of encoder and classifier that learned from other severities, on test samples of these."""
     for (severities, source, seed), path in run_files.retrained.items():
         train, test = train_and_test(like_the_training(ShiftedSets.load(path, (source, seed))))
         for reading in (reading for reading in readings if reading["range"] == severities):
             section = run_files.section(CLASSIFIERS[reading["classifier"]])
             scores_S_C = gpc_scores(section, train, test.embedding, source, seed)
-            yield from rows_of(accuracies(test.concept, scores_S_C), reading, source, "gpca_paper", seed)
+            yield reading, source, "gpca_paper", seed, accuracies(test.concept, scores_S_C)
 
 
 def retrain(job: Job) -> None:

@@ -74,10 +74,15 @@ def run_files(embedded, tmp_path_factory):
         embeddings={("tiny", "dgcnn-none", 0): paths["embeddings"]},
         retrained={("weaker", "tiny", 0): paths["retrained"]},
         settings=SECTIONS,
+        sizes=ReadingSizes(samples=6),
     )
 
 
-def rows_of(run, run_files, choices, sizes=None):
+def rows_of(run, run_files, choices):
     """What a group yields: reading, method, metric and concept -> value."""
-    rows = run(run_files, readings_of(choices), sizes or ReadingSizes(samples=6))
-    return {(tuple(reading.values()), method, metric, concept): v for reading, _, method, metric, concept, _, v in rows}
+    rows = run(run_files, readings_of(choices))
+    return {
+        (tuple(reading.values()), method, *named): value
+        for reading, _, method, _, values in rows
+        for named, value in values.items()
+    }

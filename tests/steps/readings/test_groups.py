@@ -81,7 +81,7 @@ def test_another_head_trains_another_encoder_and_only_where_it_is_wanted(run_fil
     methods = {(reading[0], method) for reading, method, _, _ in found}
     learned = ("gpca_paper", "gpca_matern", "learner_forest", "learner_linear_svm")
     assert methods == {(h, m) for h in choices["head"] for m in learned}
-    none = rows_of(learners.encoder_head, run_files, choices, ReadingSizes(encoders=0))
+    none = rows_of(learners.encoder_head, replace(run_files, sizes=ReadingSizes(encoders=0)), choices)
     assert {reading[0] for reading, *_ in none} == {"linear"}
 
 
@@ -165,13 +165,11 @@ def test_repeats_on_frames_vary_in_what_they_say(run_files, embedded, tmp_path):
     predictions = {("tiny", "dgcnn-none", seed): run_files.predictions["tiny", "gpca_paper", 0] for seed in range(3)}
     shown = replace(run_files, registrations=five, predictions=predictions)
     readings = [{"repeats": repeats, "objects": "all"} for repeats in ("everything", "classifiers", "samples")]
-    rows = list(frames.repeats(shown, readings, ReadingSizes()))
+    rows = list(frames.repeats(shown, readings))
     # A job for each kind of repeat gives the same.
-    assert [row for reading in readings for row in frames.repeats(shown, [reading], ReadingSizes())] == rows
-    of_all = [row for row in rows if row[3:5] == ("accuracy", "all")]
-    assert [row[5] for row in of_all] == [0, 1, 2] * 3
-    assert {row[6] for row in of_all[:3]} == {15 / 18}
-    assert frames.shown_samples(shown.embedded("tiny", "dgcnn-none", 0))[1]["unseen"].sum() == 0
+    assert [row for reading in readings for row in frames.repeats(shown, [reading])] == rows
+    assert [row[3] for row in rows] == [0, 1, 2] * 3
+    assert {row[4]["accuracy", "all"] for row in rows[:3]} == {15 / 18}
 
 
 def test_features_are_chosen_by_name(run_files):
@@ -202,7 +200,7 @@ def test_the_cold_classifier_of_the_labels_is_the_protocols(run_files):
     choices = {"learning_rate": [0.1], "iterations": [20], "start": ["cold", "warm"], "inputs": ["labeled", "pool"]}
     found = rows_of(labels.classifiers, run_files, choices)
     rare, target = labels.rare_settings(run_files)
-    [(source, seed, _, registrations)] = run_files.in_distribution()
+    [(source, seed, registrations, _)] = run_files.in_distribution()
     task, axes = labels.judged_task(run_files, registrations, source, seed)
     learned = learn(Retraining(task, rare.gpc, *axes), "bald_kmeans", rare, [target], *axes)
     of_cold = found[(0.1, 20, "cold", "labeled"), "bald_kmeans", "labels_to_target", "overlap"]

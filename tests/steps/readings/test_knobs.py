@@ -62,7 +62,7 @@ def test_every_quantity_is_measured_in_every_condition(run_files):
     quantities = ["divergence", "divergence_reversed", "log_determinant", "trace", "residual", "inlier_rmse",
                   "inlier_rmse_of_one"]  # fmt: skip
     settings = run_files.uncertainty()
-    [(_, _, pairs)] = knobs._pairs(run_files, knobs.ReadingSizes(samples=3), settings, 13, "test")
+    [(_, _, pairs)] = knobs._pairs(run_files, 13, "test")
     measured = knobs._steps(next(pairs)[1]["observed"], settings)
     assert set(measured) == set(quantities)
     for values_K in measured.values():
