@@ -14,7 +14,7 @@ import yaml
 
 from gpca.__main__ import COMMANDS, load_command
 from gpca.experiments.registry import registered, steps
-from gpca.objects.entry import Source
+from gpca.objects.entry import SourceEntry
 from gpca.steps.control_samples import CONTROLS
 
 from .documents import PAGES, ROOT, anchor_of, commands, our_files, relative
@@ -186,7 +186,7 @@ def test_every_name_of_the_config_is_described(page):
 
 
 def test_every_key_of_a_source_is_described():
-    keys = [field.name for field in fields(Source)]
+    keys = [field.name for field in fields(SourceEntry)]
     text = (ROOT / "config/sources.yaml").read_text()
     [described] = re.findall(r"^# Keys: (.+?\))\.$", text, re.MULTILINE | re.DOTALL)
     names = re.findall(r"(?:^|; |or )(\w+)", re.sub(r"\(.*?\)", "", described.replace("\n# ", " "), flags=re.DOTALL))

@@ -38,10 +38,9 @@ def read(config: dict, command_line: Mapping, as_module: bool = False) -> tuple[
 
 
 def check(config: dict) -> dict[str, dict]:
-    """Check a configuration against its settings classes, plugins, names and data; it is not changed.
+    """Check a configuration, except entries left out with ``false``; it is not changed.
 
-    Entries that are left out with ``false`` are not checked. Returns the resolved entry of every source, by name. The
-    line of an InputError names the key.
+    Returns the resolved entry of every source, by name. The line of an InputError names the key.
     """
     require_plain(config, "config key")
     with_key("plugins", use, config.get("plugins") or [])

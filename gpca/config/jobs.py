@@ -1,7 +1,7 @@
 """The environment that jobs inherit from the process that plans them, and the leftovers of killed runs.
 
-Snakemake locks its working directory by files that outlive it: after ``kill -9`` or a power cut every start ends with a
-LockException until ``--unlock``. So each Snakemake also holds a kernel lock, which ends with the process.
+Snakemake's lock outlives a killed process, and every later start ends with a LockException until ``--unlock``. So
+each Snakemake also holds a kernel lock, which ends with the process.
 """
 
 from __future__ import annotations

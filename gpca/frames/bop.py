@@ -52,15 +52,17 @@ def read_images(path: Path) -> dict[int, Any]:
 def read_camera(entry: Any, subject: str) -> tuple[np.ndarray, float]:
     """Return K (3, 3) in pixels and the millimeters per unit of depth; InputError for impossible values."""
     camera_3_3 = _numbers(entry, "cam_K", 9, subject).reshape(3, 3)
-    of_camera = f"{subject}: cam_K"
+    matrix_subject = f"{subject}: cam_K"
     if abs(camera_3_3[[1, 2, 2], [0, 0, 1]]).max() > 1e-6 or abs(camera_3_3[2, 2] - 1) > 1e-6:
-        raise InputError(of_camera, "is not a camera matrix", "give fx s cx, 0 fy cy, 0 0 1, row by row")
+        raise InputError(matrix_subject, "is not a camera matrix", "give fx s cx, 0 fy cy, 0 0 1, row by row")
     focal_px = np.diag(camera_3_3)[:2]
     if not ((focal_px >= FOCAL_PX[0]) & (focal_px <= FOCAL_PX[1])).all():
         lengths = " and ".join(f"{length:.6g}" for length in focal_px)
-        raise InputError(of_camera, f"has the focal lengths {lengths} px", "they must be positive; check fx and fy")
+        raise InputError(
+            matrix_subject, f"has the focal lengths {lengths} px", "they must be positive; check fx and fy"
+        )
     if abs(camera_3_3[:2]).max() > FOCAL_PX[1]:
-        raise InputError(of_camera, "has a skew or principal point outside any image", "give them in pixels")
+        raise InputError(matrix_subject, "has a skew or principal point outside any image", "give them in pixels")
     (scale,) = _numbers(entry, "depth_scale", 1, subject)
     if not DEPTH_SCALES[0] <= scale <= DEPTH_SCALES[1]:
         raise InputError(subject, f"depth_scale is {scale:.6g}", "give the millimeters per unit of the depth images")
@@ -234,10 +236,7 @@ def from_entry(entry: dict, folder: Path) -> Iterator[Surface]:
 
 
 def cut_out_views(folder: Path, objects: Sequence[int] | None = None, views: int = VIEWS) -> Iterator[Surface]:
-    """Yield the views of each object, spread evenly over its frames; those with too few points are named on stderr.
-
-    `views` is the largest number of one object. InputError for faulty files, or an object that no frame shows.
-    """
+    """Yield up to `views` of each object, spread over its frames; those with too few points are named on stderr."""
     shown: dict[int, list] = {}
     for frame in read_frames([folder]):
         for place, annotation in enumerate(frame.annotations):

@@ -137,8 +137,9 @@ def read_instances(
         symmetric = {}
         for number, i in index.items():
             listed = models[number].listed_symmetries
-            found = find_symmetries(objects.points(i), objects.diameters_m[i]) if listed is None else listed
-            symmetric[number] = bool(found)
+            symmetric[number] = bool(
+                find_symmetries(objects.points(i), objects.diameters_m[i]) if listed is None else listed
+            )
         observations = []
         for frame in progress(frames, f"frames of {dataset.name}"):
             depth_m = frame.depth_m()
@@ -241,9 +242,9 @@ def _poses_from_results(
         alone = [each.object_id for each in of.frame.annotations].count(number) == 1
         random = generator(*of.random_axes("estimator"))
         shown = of.row | {"diameter_m": of.diameter_m}
-        found = initial_pose.estimates_of(estimators[name], (*of.frame.place, number), alone, shown)
-        estimates.append(found[int(random.integers(len(found)))] if found else None)
-        if found:
+        candidates = initial_pose.estimates_of(estimators[name], (*of.frame.place, number), alone, shown)
+        estimates.append(candidates[int(random.integers(len(candidates)))] if candidates else None)
+        if candidates:
             errors.add((name, number), inverse(of.annotation.T_camera_model) @ estimates[-1][1])  # type: ignore[index]
     poses = []
     for key, of, estimate in zip(objects, seen, estimates, strict=True):

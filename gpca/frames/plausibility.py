@@ -61,8 +61,8 @@ class Observation:
 
     def distance(self, undo: Undo = (None, 1.0)) -> float:
         """Return the median distance from the points to the model in diameters, after undoing a fault."""
-        of_pose, factor = undo
-        T_camera_model = of_pose(self.T_camera_model) if of_pose else self.T_camera_model
+        undo_pose, factor = undo
+        T_camera_model = undo_pose(self.T_camera_model) if undo_pose else self.T_camera_model
         T_object_camera = inverse(T_camera_model @ self.T_model_object)
         points_m = spread(self.points_m, JUDGED_POINTS) * factor
         return median_distance(self.tree, transform(T_object_camera, points_m)) / self.diameter_m

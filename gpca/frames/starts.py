@@ -72,7 +72,7 @@ def all_starts(
         for frame in dataset.frames()
         for annotation in frame.annotations
     )
-    found: list[tuple[int, str, str, np.ndarray]] = []
+    starts: list[tuple[int, str, str, np.ndarray]] = []
     for i, (name, number) in enumerate(object_I):
         place = (int(instances.scene[i]), int(instances.image[i]), number)
         seen = {
@@ -84,25 +84,25 @@ def all_starts(
         T_model_object = models[name][number].T_model_object
         kind = CARRIED if datasets[name].place(place[0]).estimates == canonical.CARRIED else NATIVE
         for estimator, T_camera_model in estimates_of(estimators[name], place, annotated[name, *place] == 1, seen):
-            found.append((i, kind, estimator, T_camera_model @ T_model_object))
+            starts.append((i, kind, estimator, T_camera_model @ T_model_object))
             T_camera_model_true = instances.T_camera_object_true[i] @ inverse(T_model_object)
             errors.add((name, number), inverse(T_camera_model_true) @ T_camera_model)
-    without = sorted(set(range(len(instances))) - {start[0] for start in found}) if errors.by_object else []
+    without = sorted(set(range(len(instances))) - {start[0] for start in starts}) if errors.by_object else []
     for i in without:
         T_model_object = models[object_I[i][0]][object_I[i][1]].T_model_object
         T_error = errors.draw(object_I[i], generator(*_axes(instances, i), "error"))
         T_init = instances.T_camera_object_true[i] @ inverse(T_model_object) @ T_error @ T_model_object
-        found.append((i, TRANSPLANTED, "errors", T_init))
+        starts.append((i, TRANSPLANTED, "errors", T_init))
     by_features = np.flatnonzero(instances.init_from == GLOBAL)
-    found += [(int(i), NATIVE, GLOBAL, instances.T_camera_object_init[i]) for i in by_features]
+    starts += [(int(i), NATIVE, GLOBAL, instances.T_camera_object_init[i]) for i in by_features]
     for rung, (turn_deg, shift) in enumerate(rungs):
         for i in range(len(instances)):
             T_error = misplacement(np.deg2rad(turn_deg), shift, generator(*_axes(instances, i), "rung", rung))
             diameter_m = float(objects.diameters_m[instances.object_index[i]])
             T_init = instances.T_camera_object_true[i] @ scale_translation(T_error, diameter_m)
-            found.append((i, LADDER, f"{turn_deg:g} deg, {shift:g} d", T_init))
-    found.sort(key=lambda start: (KINDS.index(start[1]), start[0]))
-    instance_K, kind_K, from_K, T_K = zip(*found, strict=True) if found else ((), (), (), ())
+            starts.append((i, LADDER, f"{turn_deg:g} deg, {shift:g} d", T_init))
+    starts.sort(key=lambda start: (KINDS.index(start[1]), start[0]))
+    instance_K, kind_K, from_K, T_K = zip(*starts, strict=True) if starts else ((), (), (), ())
     return Starts(
         np.array(instance_K, int), np.array(kind_K, str), np.array(from_K, str), np.array(T_K, float).reshape(-1, 4, 4)
     )

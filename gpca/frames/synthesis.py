@@ -71,17 +71,17 @@ def make_frame_registrations(
         record |= {"sample": n, "split": split, "concept": concept}
         record |= {"cluster": str(cluster_I[i]), "fold": int(instances.fold[i])}
         records.append(record)
-        told: dict[str, Any] = {"sample": n, "split": split, "concept": concept, "instance": i}
-        told |= {name: getattr(instances, name)[i] for name in ("dataset", "scene", "image")}
-        told |= {"object": record["object_name"], "in_training": record["object_index"] in trained}
-        told |= {"symmetric": bool(instances.symmetric[i]), "init_from": instances.init_from[i]}
+        pose_row: dict[str, Any] = {"sample": n, "split": split, "concept": concept, "instance": i}
+        pose_row |= {name: getattr(instances, name)[i] for name in ("dataset", "scene", "image")}
+        pose_row |= {"object": record["object_name"], "in_training": record["object_index"] in trained}
+        pose_row |= {"symmetric": bool(instances.symmetric[i]), "init_from": instances.init_from[i]}
         model_m = objects.points(record["object_index"])[:JUDGED_POINTS]
         T_source_target = inverse(record["T_target_source_true"])
         for name in ("init", "icp"):
             T_error = record[f"T_target_source_{name}"] @ T_source_target
-            error_m = pose_error(model_m, T_error, np.eye(4), told["symmetric"])
-            told[f"{name}_error"] = error_m / record["diameter_m"]
-        poses.append(told | {"lost_to": lost_to})
+            error_m = pose_error(model_m, T_error, np.eye(4), pose_row["symmetric"])
+            pose_row[f"{name}_error"] = error_m / record["diameter_m"]
+        poses.append(pose_row | {"lost_to": lost_to})
     return *as_registrations(records, (source, seed)), pd.DataFrame(poses)
 
 

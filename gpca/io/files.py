@@ -1,8 +1,7 @@
 """Files: readable within limits, written whole or not at all, named, and images.
 
-A small file may claim to be large, or unpack to a large one, so sizes are checked before anything is read. The step
-that makes a file writes source and seed into it, and those that read it check them, since files of another source or
-seed often have the same shapes.
+A small file may claim to be large, or unpack to a large one, so sizes are checked before anything is read. Files of
+another source or seed often have the same shapes, so the step that makes a file writes them, and readers check them.
 """
 
 from __future__ import annotations

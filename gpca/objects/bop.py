@@ -32,8 +32,7 @@ def from_entry(entry: dict, folder: Path) -> Iterator[Surface]:
 def surfaces(folder: str | Path, unit: str = "mm", objects: Sequence[int] | None = None) -> Iterator[Surface]:
     """Yield the models `objects` (ids; all when None), sorted and named ``obj_000001``.
 
-    The folder holds obj_*.ply itself, or models/ with them. InputError for a missing folder, model or models_info.json,
-    or a model whose diameter is not the listed one.
+    The folder holds obj_*.ply itself, or models/ with them. InputError also where a diameter is not the listed one.
     """
     models = models_folder(Path(folder))
     scale = meters_per(unit)

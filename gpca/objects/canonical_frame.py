@@ -28,11 +28,8 @@ class CanonicalFrame:
     ) -> CanonicalFrame:
         """Measure the points (N, 3) of a target.
 
-        Args:
-            subject, say: the target and the place of its unit, for messages.
-
-        Raises:
-            InputError: too few points, NaN, points on one line, or a diameter that the unit does not give.
+        `subject` and `say` are the target and the place of its unit, for messages. InputError for too few points, NaN,
+        points on one line, or a diameter that the unit does not give.
         """
         require_cloud_points(points, subject)
         points = thin(points, MEASURED_POINTS, "frame")

@@ -56,8 +56,7 @@ REMEDY = "give an (N, 3) array or a point cloud of Open3D"
 def as_points(cloud: Any, role: str) -> np.ndarray:
     """Return the points (N, 3) float64 of an array, a list, a tensor on any device, or a cloud of Open3D, old or new.
 
-    Open3D is not imported: its clouds are recognized by ``points`` or ``point.positions``. InputError, with `role` as
-    the subject, for anything else.
+    Open3D is not imported: its clouds are recognized by ``points`` or ``point.positions``. `role` names the cloud.
     """
     values = cloud
     if not isinstance(cloud, np.ndarray):

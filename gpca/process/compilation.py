@@ -1,8 +1,7 @@
 """Numba with a cache of compiled loops per state of their code.
 
-Numba itself checks a function's own file only, not the modules that it imports. The caches lie beside this module, else
-in the user's cache, else among the temporary files. They name a loop by its package, not by its path as numba does, so
-that a copied or moved checkout keeps its compiled loops.
+Numba itself checks a function's own file only, not the modules that it imports. The caches name a loop by its
+package, not by its path as numba does, so that a copied or moved checkout keeps its compiled loops.
 """
 
 from __future__ import annotations

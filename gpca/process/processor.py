@@ -1,12 +1,10 @@
 """The processor: its facts, and the instructions that libraries may use.
 
 OpenBLAS, MKL, NumPy, torch, oneDNN and numba choose their code by the processor, each choice rounds differently, and
-ICP turns a last digit into another pose. So all are limited to x86-64-v3 (AVX2 and FMA), which every x86-64 machine of
-the last ten years has, and MKL to the only code that it runs on any vendor's processor.
-
-Pins choose the code, but ``rsqrtps`` and ``rcpps`` are estimates from a table of each vendor, which MKL uses in some
-functions at every level. So `gpca.portable` replaces those and fuses Adam, and ``tests/vendor_guard.py`` fails where a
-step calls them. Pins have no effect on Open3D, small_gicp and other libraries compiled for one level, or on plugins.
+ICP turns a last digit into another pose. So all are limited to x86-64-v3 (AVX2 and FMA), and MKL to the only code
+that it runs on any vendor's processor. Estimates such as ``rsqrtps``, which MKL uses at every level, differ by
+vendor; `gpca.portable` replaces those functions, and ``tests/vendor_guard.py`` fails where a step calls them. Pins
+have no effect on Open3D, small_gicp and other libraries compiled for one level, or on plugins.
 """
 
 from __future__ import annotations

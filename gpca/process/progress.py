@@ -1,8 +1,7 @@
 """Progress of long work on stderr, and Ctrl-C that is not lost.
 
-Python raises KeyboardInterrupt wherever it happens to be. Inside a callback of compiled code (as llvmlite has them for
-numba's compiler), a ``__del__`` or a weakref callback, it prints "Exception ignored in" and goes on; numba raises a
-SystemError instead. So the signal is also remembered, and raised again by :func:`progress`.
+Inside a callback of compiled code, a ``__del__`` or a weakref callback, Python prints a KeyboardInterrupt and goes
+on, and numba raises a SystemError instead. So the signal is also remembered, and raised again by :func:`progress`.
 """
 
 from __future__ import annotations

@@ -116,10 +116,10 @@ def stratum_of(overlap: float, edges: Sequence[float]) -> str | None:
 
 
 def choose_pairs(scenes: Iterable[Scene], edges: Sequence[float], most: int, *axes: object) -> list[ScanPair]:
-    """Return up to `most` pairs of each scene and stratum, stratum by stratum, scene by scene.
+    """Return up to `most` pairs of each scene and stratum of overlap, stratum by stratum, scene by scene.
 
-    Scenes are read one after another, and only the chosen clouds are kept. `edges` are those of the strata of overlap,
-    ascending. The axes name the random numbers; a scene's draw does not depend on the other scenes.
+    Scenes are read one after another, and only the chosen clouds are kept. The axes name the random numbers; a scene's
+    draw does not depend on the other scenes.
     """
     chosen: dict[str, list[ScanPair]] = {stratum_name(*ends): [] for ends in pairwise(edges)}
     for scene in scenes:
