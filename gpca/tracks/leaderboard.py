@@ -22,7 +22,7 @@ from gpca.reporting.tables.cells import interval_cell, plain_cell, rows_where
 from gpca.reporting.tables.table import Cell, Column, Table
 from gpca.tracks.published import FOLDER as PUBLISHED
 from gpca.tracks.published import NO_CALLS, Method, Published
-from gpca.tracks.scoring import counts, score
+from gpca.tracks.scoring import AGAINST, counts, score
 from gpca.tracks.submission import NO_LINK, Submission, read_submission, track_in_head
 from gpca.tracks.track import CAUSES_TRACK, FRAMES_TRACK, HARD_TRACK, SCANS_TRACK, TRACKS
 
@@ -79,9 +79,8 @@ def table_of(
             }
             samples, seeds = int(rows["samples"].max()), int(rows["seeds"].max())
             for pair in rows_where(against, group=group, method=name).to_dict("records"):
-                bounds = (factor * pair["difference_low"], factor * pair["difference_high"])
-                value = factor * pair["difference"]
-                cells[f"minus {pair['against']}"] = Cell(value, bounds[1] - value, seeds, samples, bounds=bounds)
+                value, *bounds = (factor * pair[each] for each in AGAINST[1:])
+                cells[f"minus {pair['against']}"] = Cell(value, bounds[1] - value, seeds, samples, bounds=tuple(bounds))
             method = methods.get(name)
             if method is not None and method.icp_calls != NO_CALLS:
                 cells["icp_calls"] = plain_cell(method.icp_calls, seeds, samples)
@@ -121,13 +120,12 @@ def _footnotes(published: Published, submitted: Mapping[str, Method]) -> tuple[s
     if track.groups:
         states = " or ".join(track.required_states)
         notes.append(f"Nothing is concluded from fewer than {FEWEST_FAILURES} {states} ones.")
+    names = list(dict.fromkeys(source_N.tolist()))
     if track.everywhere:
-        names = list(dict.fromkeys(source_N.tolist()))
         notes.append(f"The published rows are of {', '.join(names)}, and have learned from the scenes of all of these.")
-        for method in submitted.values():
-            asked = dict.fromkeys(source_N[np.isfinite(method.scores).all(axis=1)].tolist())
-            if len(asked) < len(names):
-                notes.append(f"{method.title} is of {', '.join(asked)} alone.")
+    for method in submitted.values() if track.everywhere else ():
+        asked = dict.fromkeys(source_N[np.isfinite(method.scores).all(axis=1)].tolist())
+        notes += [f"{method.title} is of {', '.join(asked)} alone."] if len(asked) < len(names) else []
     return (*notes, track.measures)
 
 
@@ -203,21 +201,18 @@ def board_of(published: Published, submissions: Sequence[Submission]) -> Board:
     scores, _ = score(published, submitted)
     table = table_of(published, submitted, scores, scores.iloc[:0])
     printed = table.printed()
+    labels, rows = printed["label_columns"], []
     columns = [name for name, column in table.columns.items() if not column.beside]
-    labels = printed["label_columns"]
-    rows = []
     for row, (keys, cells) in enumerate(zip(table.rows, printed["rows"], strict=True)):
-        name = next(key for key, _ in keys[-2:-1])
+        name = keys[-2][0]
         head = head_of.get(name, OURS)
-        link = head.get("link", NO_LINK)
-        words = [{"text": text, "value": text, "bold": bold} for text, bold in cells[:labels]]
-        words[-2] |= {"link": link} if link != NO_LINK else {}
-        numbers = [
-            {"text": text, "bold": bold, "value": table.cells[row, column].mean if (row, column) in table.cells else ""}
-            for column, (text, bold) in zip(columns, cells[labels:], strict=True)
-        ]
-        from_head = [{"text": head.get(key, "–"), "bold": False, "value": head.get(key, "")} for key in HEAD_COLUMNS]
-        rows.append((name in head_of, [*words, *numbers, *from_head]))
+        shown: list[dict[str, Any]] = [{"text": text, "value": text, "bold": bold} for text, bold in cells]
+        for column, cell in zip(columns, shown[labels:], strict=True):
+            cell["value"] = table.cells[row, column].mean if (row, column) in table.cells else ""
+        if (link := head.get("link", NO_LINK)) != NO_LINK:
+            shown[labels - 2]["link"] = link
+        shown += [{"text": head.get(key, "–"), "bold": False, "value": head.get(key, "")} for key in HEAD_COLUMNS]
+        rows.append((name in head_of, shown))
     title = f"{published.track.name}: {published.track.title}"
     notes = [f"Samples {published.version}.", *table.footnotes]
     return Board(title, [*printed["heads"], *(key.capitalize() for key in HEAD_COLUMNS)], labels, rows, notes)

@@ -173,58 +173,41 @@ def recipe_of(file: str, config: Mapping[str, Any]) -> Recipe:
     """Return how the rules of the workflow make a file of a run, such as ``causes/ycb/seed0.npz``."""
     kind, *rest = PurePosixPath(file).with_suffix("").parts
     data = {name: config[name] for name in ("data_dir", "downloads")}
-    points = {"surface_points": config["objects"]["surface_points"]}
-    if kind in ("objects", "instances") and rest != [REAL_WORLD]:
-        [source] = rest
-        given = {"source": source, "settings": config["sources"][source], **data, **points}
-        return Recipe("gpca.steps.pairs:objects", given, _splits("objects", config), {"out": f"objects/{source}.npz"})
+    icp = {"icp": config["registrations"]["icp"]}
     if kind in ("objects", "instances"):
-        section = config["real_world"]
+        points = {"surface_points": config["objects"]["surface_points"]}
+        source, section = rest[0], config["real_world"]
+        if source != REAL_WORLD:
+            given = {"source": source, "settings": config["sources"][source], **data, **points}
+            outputs = {"out": f"objects/{source}.npz"}
+            return Recipe("gpca.steps.pairs:objects", given, _splits("objects", config), outputs)
         settings = {"datasets": section["datasets"], "initial_pose": section["initial_pose"]}
-        given = {"source": REAL_WORLD, "settings": settings | {"role": config["splits"]["role"]}, **data, **points}
-        outputs = {name: f"{name}/{REAL_WORLD}.npz" for name in ("instances", "objects")}
+        given = {"source": source, "settings": settings | {"role": config["splits"]["role"]}, **data, **points}
+        outputs = {name: f"{name}/{source}.npz" for name in ("instances", "objects")}
         return Recipe("gpca.steps.frames:instances", given, _splits("scenes", config), outputs)
-    seed = int(rest[-1].removeprefix("seed"))
     if kind == "timings":  # an output of the same step
         return recipe_of(f"{rest[1]}/{rest[0]}/{rest[2]}.npz", config)
+    seed = int(rest[-1].removeprefix("seed"))
     if kind in ("frame_causes", "frame_starts") or (kind == "reenactments" and rest[0] == REAL_WORLD):
-        return _frames_recipe(kind, seed, config, data)
+        section = config["real_world"]
+        settings = {
+            "datasets": section["datasets"],
+            "role": config["splits"]["role"],
+            "causes": config["causes"],
+            **icp,
+        }
+        inputs = _splits("scenes", config) | {name: f"{name}/{REAL_WORLD}.npz" for name in ("instances", "objects")}
+        outputs = {"frame_causes": f"frame_causes/seed{seed}.npz", "starts": f"frame_starts/seed{seed}.npz"}
+        step, more = "frame_causes", {"frames": section["causes"]}
+        if kind == "reenactments":
+            step, more = "reenact_frames", {"reenactment": config["diagnosis"]["reenactment"] | section["reenactment"]}
+            inputs, outputs = inputs | outputs, {"reenactments": f"reenactments/{REAL_WORLD}/seed{seed}.npz"}
+        else:
+            outputs |= {"samples": f"frame_causes/seed{seed}.csv"}
+        given = {"source": REAL_WORLD, "seed": seed, **data, "settings": settings | more}
+        return Recipe(f"gpca.steps.frames:{step}", given, inputs, outputs)
     source = rest[-2]
-    name_and_seed = {"source": source, "seed": seed}
-    if kind in ("scan_causes", "scan_descriptors", "scan_reenactments"):
-        from gpca.experiments.scan_causes import measurement_settings
-        from gpca.scans.source import entry_of, place_of
-
-        place = place_of(entry_of(config["scans"]["datasets"][source]), config["data_dir"])
-        given = name_and_seed | {"settings": measurement_settings(config, source), "place": str(place or "")}
-        arguments = {"scan_causes": "scan_causes", "descriptors": "scan_descriptors"}
-        arguments |= {"reenactments": "scan_reenactments"}
-        outputs = {argument: f"{folder}/{source}/seed{seed}.npz" for argument, folder in arguments.items()}
-        outputs |= {"samples": f"scan_causes/{source}/seed{seed}.csv"}
-        return Recipe("gpca.steps.scan_causes:measure", given, {}, outputs)
-    return _objects_recipe(file, kind, name_and_seed, config)
-
-
-def _frames_recipe(kind: str, seed: int, config: Mapping[str, Any], data: Mapping[str, Any]) -> Recipe:
-    section = config["real_world"]
-    settings = {"datasets": section["datasets"], "role": config["splits"]["role"], "causes": config["causes"]}
-    settings |= {"icp": config["registrations"]["icp"]}
-    inputs = _splits("scenes", config) | {name: f"{name}/{REAL_WORLD}.npz" for name in ("instances", "objects")}
-    measured = {"frame_causes": f"frame_causes/seed{seed}.npz", "starts": f"frame_starts/seed{seed}.npz"}
-    given = {"source": REAL_WORLD, "seed": seed, **data}
-    if kind != "reenactments":
-        outputs = measured | {"samples": f"frame_causes/seed{seed}.csv"}
-        settings |= {"frames": section["causes"]}
-        return Recipe("gpca.steps.frames:frame_causes", given | {"settings": settings}, inputs, outputs)
-    settings |= {"reenactment": config["diagnosis"]["reenactment"] | section["reenactment"]}
-    outputs = {"reenactments": f"reenactments/{REAL_WORLD}/seed{seed}.npz"}
-    return Recipe("gpca.steps.frames:reenact_frames", given | {"settings": settings}, inputs | measured, outputs)
-
-
-def _objects_recipe(file: str, kind: str, name_and_seed: dict[str, Any], config: Mapping[str, Any]) -> Recipe:
-    source, seed = name_and_seed.values()
-    icp = {"icp": config["registrations"]["icp"]}
-    diagnosis, causes = config["diagnosis"], config["causes"]
+    given = {"source": source, "seed": seed}
 
     def path(folder: str, suffix: str = "npz") -> str:
         return f"{folder}/{source}/seed{seed}.{suffix}"
@@ -232,31 +215,40 @@ def _objects_recipe(file: str, kind: str, name_and_seed: dict[str, Any], config:
     def timings(step: str) -> str:
         return f"timings/{source}/{step}/seed{seed}.csv"
 
-    inputs = {"causes": path("causes"), "causes_timings": timings("causes")}
+    if kind in ("scan_causes", "scan_descriptors", "scan_reenactments"):
+        from gpca.experiments.scan_causes import measurement_settings
+        from gpca.scans.source import entry_of, place_of
+
+        place = place_of(entry_of(config["scans"]["datasets"][source]), config["data_dir"])
+        given |= {"settings": measurement_settings(config, source), "place": str(place or "")}
+        outputs = {"scan_causes": path("scan_causes"), "descriptors": path("scan_descriptors")}
+        outputs |= {"reenactments": path("scan_reenactments"), "samples": path("scan_causes", "csv")}
+        return Recipe("gpca.steps.scan_causes:measure", given, {}, outputs)
+    diagnosis, causes = config["diagnosis"], config["causes"]
+    step, inputs = "gpca.steps.causes:causes", {"causes": path("causes"), "causes_timings": timings("causes")}
+    outputs = {kind: path(kind), "timings": timings(kind)}
     if kind in ("causes", HARD):
-        step, inputs = "causes", {"objects": f"objects/{source}.npz"}
+        inputs = {"objects": f"objects/{source}.npz"}
         settings = causes | (config["controls"]["hard"] if kind == HARD else {}) | icp
         outputs = {"causes": path(kind), "candidates": path(kind, "csv"), "timings": timings(kind)}
     elif kind == "descriptors":
-        step, settings = "describe", diagnosis["descriptors"] | icp
-        outputs = {"descriptors": path(kind), "timings": timings(kind)}
+        step, settings = "gpca.steps.causes:describe", diagnosis["descriptors"] | icp
     elif kind == "reenactments":
-        step, settings = "reenact", {"reenactment": diagnosis["reenactment"], "causes": causes} | icp
-        outputs = {"reenactments": path(kind), "timings": timings(kind)}
+        step = "gpca.steps.causes:reenact"
+        settings = {"reenactment": diagnosis["reenactment"], "causes": causes} | icp
     elif kind in ("cause_embeddings", "cause_encoders"):
-        step, settings = "train_on_causes", diagnosis["encoder"]
+        step, settings = "gpca.steps.causes:train_on_causes", diagnosis["encoder"]
         outputs = {"weights": path("cause_encoders", "pt"), "curve": path("cause_encoders", "csv")}
         outputs |= {"embeddings": path("cause_embeddings"), "timings": timings("cause_embeddings")}
     elif kind == "control_embeddings":
         controls = {name: value for name, value in config["controls"].items() if name not in ("explainers", "hard")}
         settings = {"controls": controls, "encoder": config["encoders"][config["embedding"]["encoder"]]}
-        folder = f"{kind}/{HARD}"
-        given = name_and_seed | {"control": HARD, "settings": settings}
-        outputs = {"embeddings": path(folder), "curve": path(folder, "csv")}
-        return Recipe("gpca.steps.control_samples:train", given, {"registrations": path(HARD)}, outputs)
+        given |= {"control": HARD}
+        step, inputs = "gpca.steps.control_samples:train", {"registrations": path(HARD)}
+        outputs = {"embeddings": path(f"{kind}/{HARD}"), "curve": path(f"{kind}/{HARD}", "csv")}
     else:
         raise InputError(file, "is not a file of samples", "name one of a track")
-    return Recipe(f"gpca.steps.causes:{step}", name_and_seed | {"settings": settings}, inputs, outputs)
+    return Recipe(step, given | {"settings": settings}, inputs, outputs)
 
 
 def _splits(kind: str, config: Mapping[str, Any]) -> dict[str, str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -52,12 +53,9 @@ def collect(track: Track, run: Path, config: Mapping[str, Any]) -> Published:
                 raise InputError(run, "has predictions of other test samples than its own", "finish the run")
         methods.append(_method(key, track, config, [by_part[part] for part in parts]))
     optional = [pattern.format(source=source, seed=seed) for pattern in track.read for source, seed in parts]
-    optional += [
-        f"{folder}/{source}/seed{seed}.npz"
-        for folder in track.training_folders
-        for source in config["sources"]
-        for seed in dict.fromkeys(seed for _, seed in parts)
-    ]
+    seeds = dict.fromkeys(seed for _, seed in parts)
+    folders = product(track.training_folders, config["sources"], seeds)
+    optional += [f"{folder}/{source}/seed{seed}.npz" for folder, source, seed in folders]
     files = [track.file(*part) for part in parts] + [file for file in optional if (run / file).is_file()]
     limits = {name: getattr(tested[parts[0]].truth, name) for name in LIMITS}
     code = _provenance(run / track.file(*parts[0])).get("code")
@@ -70,18 +68,14 @@ def _rows(track: Track, run: Path, tested: Mapping[Part, Causes]) -> Rows:
     columns: dict[str, list] = {}
     for (source, seed), causes in tested.items():
         n, registrations = len(causes), causes.registrations
-        arrays: dict[str, Any] = {
+        arrays: dict[str, Any] = {name: getattr(registrations, name) for name in ("sample", "cluster", "concept")}
+        for again, truth in {"": causes.truth, "_again": causes.truth_again}.items():
+            arrays |= {f"error{again}": truth.error, f"uncertainty{again}": truth.uncertainty}
+        arrays |= {
             "source": np.full(n, source),
             "seed": np.full(n, seed),
-            "sample": registrations.sample,
             "object": registrations.object_name,
-            "cluster": registrations.cluster,
-            "concept": registrations.concept,
             "symmetric": causes.symmetric,
-            "error": causes.truth.error,
-            "uncertainty": causes.truth.uncertainty,
-            "error_again": causes.truth_again.error,
-            "uncertainty_again": causes.truth_again.uncertainty,
             "error_shown": causes.error_shown,
             "uncertainty_limit": np.full(n, causes.truth.uncertainty_limit),
             "start": np.full(n, "none"),

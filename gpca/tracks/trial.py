@@ -81,7 +81,7 @@ def try_method(
         explain = {CAUSES_TRACK: _causes, FRAMES_TRACK: _frames}.get(track.name, _hard)
         answers = [explain(trial, source, seed) for source, seed, _ in parts]
     numbers = {label: number for number, label in enumerate(track.labels)}
-    scores_N_C, named_N = np.full((len(rows), len(track.labels)), np.nan), np.full(len(rows), NOTHING_NAMED)
+    scores_N_C, named_N = np.full((len(rows), len(numbers)), np.nan), np.full(len(rows), NOTHING_NAMED)
     for (_, _, part_rows), answer in zip(parts, answers, strict=True):
         if answer.scores.shape != (len(part_rows), len(track.labels)) or not np.isfinite(answer.scores).all():
             fault = f"gives scores of shape {answer.scores.shape}, or such as are no finite numbers"
