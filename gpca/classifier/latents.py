@@ -105,13 +105,15 @@ def refine(
         the sites, their posterior, and the number of iterations.
     """
     wanted_N_C = np.eye(sites.linear_N_C.shape[1])[targets_N]
-    latents = sites.posterior(projection)
+    latents, normal_Q_1_C = sites.posterior(projection), _normal_points(wanted_N_C.shape[1])[:, None]
     before_N_C = None
     for iteration in range(1, iterations + 1):
         mean_N_C, deviation_N_C = latents.marginals(projection)
-        p_N_C, curvature_N_C = _expected_softmax(mean_N_C, deviation_N_C)
+        p_Q_N_C = softmax(mean_N_C + deviation_N_C * normal_Q_1_C, axis=2)
+        p_N_C = p_Q_N_C.mean(axis=0)
         if before_N_C is not None and np.abs(p_N_C - before_N_C).max() < tolerance:
             return sites, latents, iteration - 1
+        curvature_N_C = p_N_C - np.square(p_Q_N_C).mean(axis=0)
         linear_N_C = wanted_N_C - p_N_C + curvature_N_C * mean_N_C
         sites = Sites(
             (1 - step) * sites.linear_N_C + step * linear_N_C, (1 - step) * sites.precision_N_C + step * curvature_N_C
@@ -132,13 +134,6 @@ def expected_log_likelihood(mean_N_C: np.ndarray, deviation_N_C: np.ndarray, tar
     log_p_Q_N_C = logits_Q_N_C - largest_Q_N_1
     log_p_Q_N_C = log_p_Q_N_C - np.log(np.exp(log_p_Q_N_C).sum(axis=2, keepdims=True))
     return float(log_p_Q_N_C[:, np.arange(len(targets_N)), targets_N].mean(axis=0).sum())
-
-
-def _expected_softmax(mean_N_C: np.ndarray, deviation_N_C: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return E_q[p] and E_q[p (1 - p)], each (N, C)."""
-    p_Q_N_C = softmax(mean_N_C + deviation_N_C * _normal_points(mean_N_C.shape[1])[:, None], axis=2)
-    p_N_C = p_Q_N_C.mean(axis=0)
-    return p_N_C, p_N_C - np.square(p_Q_N_C).mean(axis=0)
 
 
 @cache

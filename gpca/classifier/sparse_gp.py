@@ -27,6 +27,7 @@ from gpca.seeds import generator, seed_of
 # gpytorch's in single precision: added to variances of the prior; smallest variance of a latent.
 JITTER, LEAST_VARIANCE = 1e-4, 1e-6
 LIKELIHOOD_DRAWS = 10
+MOST_MEDIAN = 1000  # random inputs among which the median distance is taken
 MEAN_DEVIATION = 1e-3  # standard deviation of the variational mean at the start
 
 
@@ -279,7 +280,9 @@ class Start:
         """Return the start around standardized inputs; `axes` name the seeds."""
         from sklearn.cluster import KMeans
 
-        covariance = make_covariance(settings.kernel, n_classes, _median_distance(inputs_N_d, axes))
+        order = generator(*axes, "median").permutation(len(inputs_N_d))[:MOST_MEDIAN]
+        median = float(torch.pdist(inputs_N_d[order]).median()) if len(order) > 1 else 0.0
+        covariance = make_covariance(settings.kernel, n_classes, median if median > 0 else 1.0)
         clusters = min(settings.inducing, len(torch.unique(inputs_N_d, dim=0)))
         kmeans = KMeans(clusters, n_init=1, random_state=seed_of(*axes, "inducing") % 2**32).fit(inputs_N_d.numpy())
         centers_M_d = torch.from_numpy(kmeans.cluster_centers_.astype(np.float32))
@@ -289,10 +292,3 @@ class Start:
     def after(cls, prior: Prior, axes: tuple) -> Start:
         """Return the start at the result of an earlier fit."""
         return cls(deepcopy(prior.covariance).requires_grad_(True), prior.inducing_M_d, seed_of(*axes, "gpc"))
-
-
-def _median_distance(inputs_N_d: Tensor, axes: tuple, most: int = 1000) -> float:
-    """Median distance between at most `most` randomly chosen points (the median heuristic)."""
-    order = generator(*axes, "median").permutation(len(inputs_N_d))[:most]
-    median = float(torch.pdist(inputs_N_d[order]).median()) if len(order) > 1 else 0.0
-    return median if median > 0 else 1.0

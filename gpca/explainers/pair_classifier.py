@@ -50,9 +50,15 @@ class NormalizedFeatures:
         return self
 
     def __call__(self, features_N_F: np.ndarray) -> np.ndarray:
-        """Return the normalized descriptors (N, F)."""
-        columns = zip(features_N_F.T, self._quantiles_Q_F.T, strict=True)
-        return ndtri(np.column_stack([_ranks(*column) for column in columns])).clip(-FARTHEST, FARTHEST)
+        """Return the normalized descriptors (N, F), as scikit-learn to the last digit; ties get their mean rank."""
+        ranks_Q, ranks = np.linspace(0, 1, len(self._quantiles_Q_F)), []
+        for values_N, quantiles_Q in zip(features_N_F.T, self._quantiles_Q_F.T, strict=True):
+            from_above_N = -np.interp(-values_N, -quantiles_Q[::-1], -ranks_Q[::-1])
+            ranks_N = 0.5 * (np.interp(values_N, quantiles_Q, ranks_Q) + from_above_N)
+            ranks_N[values_N + AT_THE_END > quantiles_Q[-1]] = 1
+            ranks_N[values_N - AT_THE_END < quantiles_Q[0]] = 0
+            ranks.append(ranks_N)
+        return ndtri(np.column_stack(ranks)).clip(-FARTHEST, FARTHEST)
 
     def state(self) -> torch.Tensor:
         """Return the quantiles (Q, F) for :meth:`from_state`."""
@@ -150,16 +156,6 @@ class PairClassifier:
         made._causes = [GPC.from_state(part) for part in state["causes"]]
         made._trees = [BoostedQuestion.from_state(part) for part in state.get("trees", ())]
         return made
-
-
-def _ranks(values_N: np.ndarray, quantiles_Q: np.ndarray) -> np.ndarray:
-    """Return ranks in [0, 1], as scikit-learn's QuantileTransformer to the last digit; ties get their mean rank."""
-    ranks_Q = np.linspace(0, 1, len(quantiles_Q))
-    from_above_N = -np.interp(-values_N, -quantiles_Q[::-1], -ranks_Q[::-1])
-    ranks_N = 0.5 * (np.interp(values_N, quantiles_Q, ranks_Q) + from_above_N)
-    ranks_N[values_N + AT_THE_END > quantiles_Q[-1]] = 1
-    ranks_N[values_N - AT_THE_END < quantiles_Q[0]] = 0
-    return ranks_N
 
 
 def _to_nearest(inputs_N_F: np.ndarray, learned_M_F: np.ndarray, skipped: int) -> np.ndarray:

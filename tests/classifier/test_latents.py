@@ -87,7 +87,7 @@ def assert_equal_posterior(one, other, tolerance):
 def test_the_marginals_are_those_of_gpytorchs_model(trained, n):
     gpc, model = trained
     with torch.no_grad():
-        expected = model(gpc._scaled(H_TEST[:n]))
+        expected = model(gpc._scaler.tensor(H_TEST[:n]))
     mean, deviation = gpc.posterior(H_TEST[:n])
     assert mean.shape == (n, 3)
     assert np.abs(mean - expected.mean.numpy()).max() < 1e-4
