@@ -64,17 +64,11 @@ def run(job: Job) -> None:
 def try_methods(
     pairs: ScanPairs, name: str, seed: int, methods: Mapping[str, Mapping], settings: TrialSettings
 ) -> dict[str, pd.DataFrame]:
-    """Rows of pairs and starts with the seconds of each trial, by method.
+    """Rows of pairs and starts of the data set `name` with the seconds of each trial, by method.
 
-    Normals are estimated beforehand. Each method is called once before the first pair, so that no trial includes what a
-    method loads or compiles.
-
-    Args:
-        name: of the data set.
-        methods: name -> settings, the global start among them.
-
-    Raises:
-        InputError: an unknown method or setting, a missing package, or a global start that is none or not among them.
+    The global start is among the methods, which are given with their settings. Normals are estimated beforehand. Each
+    method is called once before the first pair, so that no trial includes what a method loads or compiles. Raises
+    InputError for an unknown method or setting, a missing package, or a global start that is none or not among them.
     """
     import pandas as pd
 
@@ -90,15 +84,8 @@ def try_methods(
         if k == 0:
             for method in made.values():
                 method(given)
-        keys = {
-            "sample": k,
-            "pair": pair.name,
-            "cluster": pair.cluster,
-            "kind": pair.kind,
-            "size_m": pair.size_m,
-            "overlap": pair.overlap,
-            "rung": rung.name,
-        }
+        keys = {"sample": k, "pair": pair.name, "cluster": pair.cluster, "kind": pair.kind, "size_m": pair.size_m}
+        keys |= {"overlap": pair.overlap, "rung": rung.name}
         coarse = timed(made[start], given)
         for method_name, align in made.items():
             for started_at, outcome, seconds in attempts(method_name, align, given, start, coarse):
@@ -131,9 +118,7 @@ def pair_to_register(pair: ScanPair, rung: Rung, settings: TrialSettings, *axes:
 def scan_normals(points_N_3: np.ndarray, radius: float, viewpoint_3: np.ndarray | None) -> np.ndarray:
     """Unit normals (N, 3) that point to the sensor, or away from the middle where its position is unknown.
 
-    Args:
-        radius: of the neighbors, in the unit of the points.
-        viewpoint_3: position of the sensor in the frame of the points.
+    The radius is that of the neighbors, in the unit of the points; the viewpoint is in their frame.
     """
     cloud = open3d_cloud(points_N_3)
     cloud.estimate_normals(require_open3d().geometry.KDTreeSearchParamHybrid(radius, NORMAL_NEIGHBORS))

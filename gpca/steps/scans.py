@@ -23,13 +23,9 @@ def draw_scans(job: Job) -> None:
 
 
 def drawn_pairs(job: Job, choice: Mapping[str, Any]) -> list[ScanPair]:
-    """Return pairs of the data set that a job names by its entry, place and role.
+    """Pairs of the data set that a job names by its entry, place and role.
 
-    Args:
-        choice: edges of the strata, pairs of each scene and stratum, and points of a scan, at most.
-
-    Raises:
-        InputError: what readers refuse, or no two scans that overlap.
+    The choice has the edges of the strata, and pairs of each scene and stratum and points of a scan, at most.
     """
     from gpca.scans.scene import choose_pairs
     from gpca.scans.source import entry_of, scenes_of
