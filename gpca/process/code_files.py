@@ -82,8 +82,8 @@ def _statements_for(tree: ast.Module, function: str) -> list[ast.AST]:
     """Return a function of a module, and the module's statements that bind the names that it uses, and so on."""
     binding: dict[str, ast.stmt] = {}
     for node in tree.body:
-        is_named = isinstance(node, (ast.FunctionDef, ast.ClassDef))
-        binding |= dict.fromkeys({node.name} if is_named else _used_and_bound(node)[1], node)
+        names = {node.name} if isinstance(node, (ast.FunctionDef, ast.ClassDef)) else _used_and_bound(node)[1]
+        binding |= dict.fromkeys(names, node)
     if function not in binding:
         raise AttributeError(f"the module has no function {function}")
     statements: dict[ast.AST, None] = {}
