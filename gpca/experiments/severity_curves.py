@@ -43,7 +43,8 @@ def collect(run: Run, files: Paths, samples: Paths) -> pd.DataFrame:
 
     bins, severities = run.config["controls"]["bins"], dict(run.config["registrations"]["severities"])
     ranges = RegistrationSettings.from_dict({"severities": severities}).severities
-    edges = {name: np.linspace(*getattr(ranges, name), bins + 1) for name in SEVERITIES}
+    limits = {name: getattr(ranges, name) for name in SEVERITIES}
+    edges = {name: np.linspace(low, high, bins + 1) for name, (low, high) in limits.items()}
     predictions = read_controls(files)
     predictions = predictions[predictions["control"] == PAPER]
     frames = []

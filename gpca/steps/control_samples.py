@@ -244,7 +244,7 @@ def train(job: Job) -> None:
         registrations = Registrations.load(path, (job.source, job.seed))
         if why := left_out(job.control, registrations, settings, encoder.backbone):
             print(f"control '{job.control}' of {job.source} is skipped: {why}", file=sys.stderr)
-            arrays = {name: np.zeros((0, 1), np.float32) for name in ("h", "head_logits")}
+            arrays: dict[str, np.ndarray] = {name: np.zeros((0, 1), np.float32) for name in ("h", "head_logits")}
             arrays |= {"sample": np.zeros(0, int), "split": np.zeros(0, "U5")}
             curve: list[dict] = []
         else:
