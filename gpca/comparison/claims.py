@@ -258,7 +258,8 @@ def difference_of(
     at_floor = False
     if floor is not None and len(compared.counterparts) == 2:
         at_floor = bool(((values[0] <= floor) & (values[1] <= floor)).mean() >= 0.5)
-    return ClaimDifference(float(difference_R.mean()), bounds, len(difference_R), *censored, at_floor)
+    at_least, at_most = censored
+    return ClaimDifference(float(difference_R.mean()), bounds, len(difference_R), at_least, at_most, at_floor)
 
 
 def _cluster_bounds(

@@ -248,7 +248,14 @@ def judge(
         reproduced, at_least = of_run.loc[number.key]
         run_value = (float(reproduced or "nan"), at_least == "True")  # empty where the run has no such value
         upper = number.upper if number.upper > number.value else math.nan
-        row = (*number.key, number.unit, number.value, upper, *run_value, is_close(number, *run_value, tolerance))
+        row: tuple = (
+            *number.key,
+            number.unit,
+            number.value,
+            upper,
+            *run_value,
+            is_close(number, *run_value, tolerance),
+        )
         row += (round(value[0], 6), value[1], is_close(number, *value, tolerance), measured["seed"].nunique())
         close = counts.loc[number.key].tolist() if number.key in counts.index else [0, 0]
         rows.append((*row, *close))

@@ -94,8 +94,9 @@ def value_of_run(
             deviation = float(value_R.std(ddof=1))
             reproduced = Reproduced(deviation, *deviation_interval(deviation, n), n)
         else:
-            mean, *bounds = mean_interval(value_R)
-            reproduced = Reproduced(mean, *([math.nan] * 2 if at_least else bounds), n, at_least)
+            mean, low, high = mean_interval(value_R)
+            low, high = (math.nan, math.nan) if at_least else (low, high)
+            reproduced = Reproduced(mean, low, high, n, at_least)
     if draws := (clusters or {}).get(counterpart):
         cluster_low, cluster_high = draws.bounds()
         reproduced = replace(reproduced, cluster_low=cluster_low, cluster_high=cluster_high)
