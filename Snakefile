@@ -6,7 +6,7 @@ from gpca.config.check import read
 from gpca.config.jobs import clear_leftovers, export_to_jobs
 from gpca.config.layers import DEFAULTS, require_sound
 from gpca.errors import one_line
-from gpca.experiments.registry import experiments
+from gpca.declarations.registry import experiments
 from gpca.process.time_left import tell_time_left
 
 given, module = workflow.config_settings, workflow.modifier

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gpca.attribution.scores import summarize_marginals
+from gpca.classifier.scores import summarize_marginals
 from gpca.explainers.classifiers import known_concepts
 from gpca.explainers.interface import DrawingExplainer, ExplainerEntry, attached
 from gpca.pairs.dataset import Registrations

@@ -10,10 +10,10 @@ from functools import partial
 
 import numpy as np
 
-from gpca.attribution.scores import Attribution
 from gpca.causes.dataset import LABELS
 from gpca.causes.settings import MOTION
 from gpca.causes.truth import NOMINAL
+from gpca.classifier.scores import Attribution
 from gpca.explainers.interface import ExplainerEntry, ScoringExplainer, attached
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS

@@ -14,7 +14,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from gpca.attribution.diagnostics import negative_log_likelihood
-from gpca.attribution.scores import summarize_draws
+from gpca.classifier.scores import summarize_draws
 from gpca.explainers.classifiers import known_concepts
 from gpca.explainers.interface import DrawingExplainer, ExplainerEntry, attached
 from gpca.pairs.dataset import Registrations

@@ -12,7 +12,7 @@ from typing import Annotated
 
 import numpy as np
 
-from gpca.attribution.scores import Attribution
+from gpca.classifier.scores import Attribution
 from gpca.explainers.classifiers import standardized_regression
 from gpca.explainers.interface import ClassifierExplainer, ExplainerEntry, attached, measured
 from gpca.pairs.dataset import Registrations

@@ -13,9 +13,9 @@ from typing import Literal, get_args
 import numpy as np
 
 from baselines.gates import NominalThreshold
-from gpca.attribution.scores import Attribution
 from gpca.causes.dataset import LABELS
 from gpca.causes.truth import ALL, NOMINAL, SUBSETS
+from gpca.classifier.scores import Attribution
 from gpca.explainers.classifiers import standardized_regression
 from gpca.explainers.interface import ClassifierExplainer, ScoringExplainer, attached
 from gpca.pairs.dataset import Registrations

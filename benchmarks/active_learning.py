@@ -85,7 +85,7 @@ def compare_bald(gpc, pool, options: argparse.Namespace) -> tuple[list[float], l
     """Return the seconds of the plain loop and of ours, in pairs, and the largest difference of their BALD."""
     import numpy as np
 
-    from gpca.attribution.scores import summarize_marginals
+    from gpca.classifier.scores import summarize_marginals
 
     mean_N_C, deviation_N_C = gpc.posterior(pool)
     normal_M_C = np.random.default_rng(1).normal(size=(options.draws, mean_N_C.shape[1]))

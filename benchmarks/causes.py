@@ -114,8 +114,8 @@ def plain_error(candidate, subject, xi_n_6, settings) -> float:
 
     from gpca.alignment.icp import ICP
     from gpca.alignment.pose_error import pose_error
-    from gpca.alignment.rigid import exp
     from gpca.causes.measuring import JUDGED_POINTS
+    from gpca.rigid import exp
 
     causes = tuple(np.flatnonzero(candidate.applied).tolist())
     errors = []

@@ -52,12 +52,12 @@ def on_frames(explainer, options: argparse.Namespace) -> dict[str, float]:
     import pandas as pd
     from sklearn.metrics import roc_auc_score
 
-    from gpca.alignment.rigid import inverse, transform
     from gpca.causes.descriptors import describe_motion
     from gpca.causes.settings import MOTION
     from gpca.objects.canonical_frame import CanonicalFrame
     from gpca.pairs.dataset import Registrations
     from gpca.process.progress import progress
+    from gpca.rigid import inverse, transform
 
     file = f"{options.name}/seed{options.seed}"
     registrations = Registrations.load(options.frames / f"registrations/{file}.npz")
@@ -119,8 +119,8 @@ def resampled(instance_K, random):
 def clean_pairs(explainer, options: argparse.Namespace) -> dict[str, float]:
     import numpy as np
 
-    from gpca.alignment.rigid import exp, transform
     from gpca.objects.canonical import ObjectClouds
+    from gpca.rigid import exp, transform
     from gpca.seeds import generator
 
     objects = ObjectClouds.load(options.objects)

@@ -78,7 +78,7 @@ def compare_icp(registrations, settings) -> tuple[float, float]:
 
     from gpca.alignment.batched_icp import BatchedICP
     from gpca.alignment.icp import ICP
-    from gpca.alignment.rigid import exp
+    from gpca.rigid import exp
     from gpca.uncertainty.designs import RegisteredRow
 
     starts_n = exp(np.random.default_rng(SEED).normal(size=(settings.starts, 6)) * settings.deviation_6())

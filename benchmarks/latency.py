@@ -188,8 +188,8 @@ class PlainComposition:
         import torch
 
         from gpca.alignment.icp import ICP
-        from gpca.alignment.rigid import transform
         from gpca.objects.canonical_frame import CanonicalFrame
+        from gpca.rigid import transform
 
         frame = CanonicalFrame.of(target)
         source, target = frame.coordinates(source), frame.coordinates(target)

@@ -43,8 +43,8 @@ from benchmarks import markdown  # noqa: E402 (the script runs from a plain chec
 from benchmarks.pipeline import SIDECAR, number  # noqa: E402
 from benchmarks.schedule import Job, critical_path, wall_time  # noqa: E402
 from benchmarks.targets import name_of_run, parser_of_run, plan, read_plan  # noqa: E402
+from gpca.declarations.registry import experiments  # noqa: E402
 from gpca.errors import InputError  # noqa: E402
-from gpca.experiments.registry import experiments  # noqa: E402
 from gpca.io.files import whole_file  # noqa: E402
 from gpca.process.time_left import TIMES, read_times  # noqa: E402
 

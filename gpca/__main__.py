@@ -10,8 +10,8 @@ from pathlib import Path
 
 from gpca import __version__
 from gpca.errors import InputError
-from gpca.process.arguments import THREADS, OneLineParser
-from gpca.process.job import as_process, keep_freed_memory
+from gpca.jobs.arguments import THREADS, OneLineParser
+from gpca.jobs.job import as_process, keep_freed_memory
 from gpca.process.processor import prepare
 
 COMMANDS = {  # those for a registration of one's own first, then those for a run

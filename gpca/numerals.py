@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import re
 
+LARGEST_NUMBER = 1e15  # squares of larger numbers leave the range of float32
 _WHOLE = re.compile("-?[0-9]{1,19}")
 _DECIMAL = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,4})?")
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gpca.attribution.predictions import write_predictions
-from gpca.attribution.scores import Attribution
+from gpca.classifier.scores import Attribution
 from gpca.pairs.perturbation import CONCEPTS
 
 LIMITS = {"nominal": 0.02, "failed": 0.03}  # of the errors that states are told apart by

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 
 from gpca.attribution.predictions import write_predictions
-from gpca.attribution.scores import Attribution
 from gpca.causes.dataset import LABELS, labels_of
 from gpca.causes.judged import Judged
 from gpca.causes.truth import BORDERLINE, FAILED, NOMINAL
+from gpca.classifier.scores import Attribution
 
 
 def random_judged(n=60, seed=0, skill=1.0):

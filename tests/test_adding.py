@@ -101,8 +101,8 @@ def test_an_acquisition_strategy(config, registrations, monkeypatch, tmp_path):
     from gpca.active_learning.rounds import initial_gpc, make_task, run_rounds
     from gpca.active_learning.settings import ActiveLearningSettings
     from gpca.classifier.settings import GPCSettings
+    from gpca.declarations.plan import Run
     from gpca.experiments.active_learning import table3_extended
-    from gpca.experiments.plan import Run
 
     monkeypatch.setitem(acquisition.STRATEGIES, "bald_dense", None)  # taken out again at the end
     exec(block("gpca/active_learning/acquisition.py"), dict(vars(acquisition)))
@@ -133,7 +133,7 @@ def test_a_registration_method(config, added_modules, objects):
     from gpca.alignment.methods.interface import Pair
     from gpca.alignment.methods.registry import method_module, methods
     from gpca.alignment.pose_error import adds_error
-    from gpca.alignment.rigid import exp, inverse, transform
+    from gpca.rigid import exp, inverse, transform
 
     added_modules("gpca/alignment/methods/principal_axes.py")
     assert methods()["principal_axes"].title == "Principal axes"

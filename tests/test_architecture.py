@@ -6,7 +6,7 @@ from graphlib import TopologicalSorter
 
 import pytest
 
-from gpca.experiments.registry import steps as declared_steps
+from gpca.declarations.registry import steps as declared_steps
 
 from .documents import ROOT
 

@@ -13,7 +13,7 @@ import pytest
 import yaml
 
 from gpca.__main__ import COMMANDS, load_command
-from gpca.experiments.registry import registered, steps
+from gpca.declarations.registry import registered, steps
 from gpca.objects.entry import SourceEntry
 from gpca.steps.control_samples import CONTROLS
 

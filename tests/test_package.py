@@ -140,7 +140,7 @@ from pathlib import Path
 from gpca.process.code_files import code_files
 from gpca.comparison.published import PUBLISHED, read_published
 from gpca.comparison.published import REASONS
-from gpca.process.provenance import record_provenance
+from gpca.jobs.provenance import record_provenance
 from gpca.reporting.figures.style import MATPLOTLIBRC
 from gpca.page.page import TEMPLATES
 assert len(read_published())

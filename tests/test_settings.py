@@ -145,7 +145,7 @@ def test_the_settings_of_several_classes_are_taken_out_of_a_section():
 
 
 def test_a_mapping_that_is_no_dictionary_is_read_as_one():
-    from gpca.experiments.plan import Recorded
+    from gpca.declarations.plan import Recorded
 
     given = Recorded({"limits": {"low": 0.5}})
     assert read_settings(dict, given) == {"limits": {"low": 0.5}}

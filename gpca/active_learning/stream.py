@@ -15,9 +15,9 @@ import numpy as np
 from gpca.active_learning.rounds import LabelingTask, accuracies
 from gpca.active_learning.settings import ActiveLearningSettings, StreamSettings
 from gpca.active_learning.stream_models import BayesianLayer, MondrianForest
-from gpca.attribution.scores import entropy
 from gpca.classifier.gpc import GPC
 from gpca.classifier.latents import Projection
+from gpca.classifier.scores import entropy
 from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.seeds import generator

@@ -8,7 +8,7 @@ from itertools import combinations_with_replacement
 import numpy as np
 from scipy.special import softmax
 
-from gpca.attribution.scores import summarize_draws
+from gpca.classifier.scores import summarize_draws
 
 DISCOUNT = 10.0  # per dimension: rate at which a box forgets its parents, as in the authors' code
 NEWTON_STEPS = 20

@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from gpca.alignment.icp import CONVERGED, ICP, ICPSettings, require_cloud
-from gpca.alignment.rigid import rigid_motion
+from gpca.rigid import rigid_motion
 
 MOST_LISTS = 1 << 16  # beyond that, queries in new voxels search the cells
 SINGULAR = 1e-10  # eigenvalue, relative to the largest, below which a step leaves its direction alone
@@ -176,7 +176,7 @@ def _descend(
     for _ in range(iterations):
         if not len(active):
             break
-        # Gauss-Newton steps of least norm, as :func:`gpca.alignment.rigid.plane_step`.
+        # Gauss-Newton steps of least norm, as :func:`gpca.rigid.plane_step`.
         values_m_6, axes_m_6_6 = np.linalg.eigh(hessian_n[active])
         held_m_6 = values_m_6 > SINGULAR * values_m_6[:, -1:]
         along_m_6 = np.einsum("nji,nj->ni", axes_m_6_6, gradient_n[active])

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gpca.alignment.rigid import transform
 from gpca.errors import InputError
+from gpca.rigid import transform
 from gpca.settings import Distinct, PositiveShare
 
 JUDGED_POINTS = 1000  # the first points of an object, over which errors are usually averaged

@@ -18,7 +18,7 @@ from gpca.io.csv_file import numbers, read_csv, read_numbers, write_csv
 if TYPE_CHECKING:
     import pandas as pd
 
-    from gpca.attribution.scores import Attribution
+    from gpca.classifier.scores import Attribution
     from gpca.pairs.dataset import Registrations
 
 PREDICTION_COLUMNS = (

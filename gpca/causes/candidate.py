@@ -15,13 +15,13 @@ from time import perf_counter
 import numpy as np
 
 from gpca.alignment.batched_icp import BatchedICP
-from gpca.alignment.rigid import exp, inverses, random_direction, transform
 from gpca.causes.dataset import Causes
 from gpca.causes.settings import FEWEST_POINTS, OBSERVED, CauseSettings
 from gpca.causes.truth import NONE, SUBSETS, capped
 from gpca.errors import InputError
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.perturbation import CONCEPTS, NOISE, OVERLAP, POSE, displacement, within_half_space
+from gpca.rigid import exp, inverses, random_direction, transform
 from gpca.seeds import generator
 from gpca.uncertainty.settings import UncertaintySettings
 from gpca.uncertainty.spread import Runs, divergence

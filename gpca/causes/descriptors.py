@@ -17,7 +17,6 @@ from scipy.spatial import cKDTree
 from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.icp import ICPSettings, clipped_cost
 from gpca.alignment.pose_error import displacements
-from gpca.alignment.rigid import exp, inverse, inverses, log, scale_translation
 from gpca.causes.dataset import Causes
 from gpca.causes.settings import DENSITIES, GROUPS, MOTION, QUANTILES, REMEDIED, DescriptorSettings
 from gpca.causes.truth import SUBSETS, capped, shapley_values
@@ -26,6 +25,7 @@ from gpca.io.container import Container, array
 from gpca.pairs.distances import ENTROPY, ObservedPair, describe_distances, describe_entropy
 from gpca.pairs.perturbation import NOISE, OVERLAP, POSE
 from gpca.process.progress import progress
+from gpca.rigid import exp, inverse, inverses, log, scale_translation
 from gpca.seeds import generator
 from gpca.uncertainty.interventions import denoise
 

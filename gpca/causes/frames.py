@@ -13,7 +13,6 @@ from collections.abc import Mapping
 import numpy as np
 import pandas as pd
 
-from gpca.alignment.rigid import inverse, rotation_angle_rad, scale_translation
 from gpca.causes.candidate import Candidate, Unmeasurable
 from gpca.causes.dataset import Causes
 from gpca.causes.measuring import Case, Measuring, Subject, found_in, measure_cases, measure_clean_pairs
@@ -25,6 +24,7 @@ from gpca.objects.camera import MeshScene
 from gpca.objects.canonical import TRAINING, ObjectClouds
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.progress import progress
+from gpca.rigid import inverse, rotation_angle_rad, scale_translation
 from gpca.seeds import generator
 
 OUTLINE_POINTS = 2048  # of an object, which tell where in the image it lies

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from gpca.alignment.pose_error import PoseErrors
-from gpca.alignment.rigid import inverse, scale_translation, transform
 from gpca.causes.candidate import Candidate, Counterfactuals, Registrar, Unmeasurable, draw_candidate, redrawn
 from gpca.causes.dataset import Causes
 from gpca.causes.settings import CauseSettings
@@ -22,6 +21,7 @@ from gpca.objects.canonical import ObjectClouds, drawn, unseen
 from gpca.pairs.perturbation import CONCEPTS, SEVERITIES
 from gpca.pairs.synthesis import as_registrations
 from gpca.process.progress import progress
+from gpca.rigid import inverse, scale_translation, transform
 from gpca.seeds import generator
 from gpca.uncertainty.spread import divergence
 

@@ -19,7 +19,6 @@ from scipy.spatial import cKDTree
 
 from gpca.alignment.features import estimate_normals
 from gpca.alignment.pose_error import displacements
-from gpca.alignment.rigid import inverse, inverses, rigid_motion, rotate, rotation_angle_rad, transform
 from gpca.causes.candidate import Candidate, Counterfactuals, Registrar, Unmeasurable
 from gpca.causes.dataset import Causes
 from gpca.causes.measuring import Case, Measuring, Subject, found_in, measure_cases
@@ -29,6 +28,7 @@ from gpca.objects.canonical import DRAWN
 from gpca.pairs.distances import dots
 from gpca.pairs.perturbation import CONCEPTS, NOISE, OVERLAP, POSE
 from gpca.process.progress import progress
+from gpca.rigid import inverse, inverses, rigid_motion, rotate, rotation_angle_rad, transform
 from gpca.scans.pair import ROOM_M, ScanPair, ScanSuccess
 from gpca.scans.scene import ScanPairs
 from gpca.seeds import generator

@@ -13,8 +13,8 @@ from dataclasses import asdict
 import numpy as np
 import torch
 
-from gpca.attribution.scores import score_marginals, summarize_marginals
 from gpca.classifier.latents import Latents, Projection, Sites, elbo, refine
+from gpca.classifier.scores import score_marginals, summarize_marginals
 from gpca.classifier.settings import GPCSettings
 from gpca.classifier.sparse_gp import Prior, SparseGPs, Standardization, Start, make_covariance
 from gpca.errors import InputError

@@ -14,8 +14,8 @@ import torch
 from torch import Tensor
 from torch.overrides import TorchFunctionMode
 
-from gpca.attribution.scores import summarize_marginals
 from gpca.classifier.latents import expected_log_likelihood
+from gpca.classifier.scores import summarize_marginals
 from gpca.classifier.settings import GPCSettings
 from gpca.classifier.sparse_gp import Standardization, Start
 from gpca.errors import InputError

@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING
 
 from gpca.errors import InputError
 from gpca.io.files import require_outputs
+from gpca.jobs.arguments import length
 from gpca.model.clouds import read_points, read_pose, read_scan, require_format
 from gpca.model.location import model_path, require_model
 from gpca.objects.mesh_folder import METERS_PER_UNIT
-from gpca.process.arguments import length
 
 if TYPE_CHECKING:
     from gpca.model.explainer import Explainer

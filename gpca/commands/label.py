@@ -16,14 +16,14 @@ import torch
 
 from gpca.active_learning.labeling import SKIPPED, LabelFile, Question, Queue, Session, is_queue, require_name
 from gpca.attribution.predictions import write_predictions
-from gpca.attribution.scores import Attribution
+from gpca.classifier.scores import Attribution
 from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
 from gpca.io.files import require_file, require_outputs
+from gpca.jobs.arguments import COUNT
+from gpca.jobs.provenance import record_provenance
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.process.arguments import COUNT
-from gpca.process.provenance import record_provenance
 from gpca.reporting.figures.cloud_views import draw_query
 from gpca.settings import read_settings
 

@@ -91,7 +91,7 @@ def add_compare_arguments(parser: ArgumentParser) -> None:
 
 def run_compare(options: Namespace) -> int:
     """Write a page with the tables and figures of two runs, and print how many numbers of each table differ."""
-    from gpca.experiments.registry import registered
+    from gpca.declarations.registry import registered
     from gpca.io.files import require_outputs
     from gpca.page.two_runs import ALONE, APART, DIFFERENT, compare_tables, write_comparison
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from gpca.errors import InputError, require_known
 from gpca.io.files import require_outputs
-from gpca.process.arguments import COUNT
+from gpca.jobs.arguments import COUNT
 from gpca.tracks import leaderboard
 from gpca.tracks.published import FOLDER, Published
 from gpca.tracks.submission import read_submission

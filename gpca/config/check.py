@@ -9,10 +9,10 @@ from typing import Any
 from gpca.causes.settings import CauseSettings
 from gpca.config.layers import check_left_out, in_order, names_left_out, with_defaults, with_types, without_false
 from gpca.config.schema import whole_config
+from gpca.declarations.experiment import LeftOut
+from gpca.declarations.registry import experiments
 from gpca.encoders.registry import require_backbone, require_draws
 from gpca.errors import InputError, require_names, with_key
-from gpca.experiments.experiment import LeftOut
-from gpca.experiments.registry import experiments
 from gpca.explainers.registry import explainer_entry, require_settings
 from gpca.frames.source import REAL_WORLD
 from gpca.io.structured_text import require_plain

@@ -17,9 +17,9 @@ from contextlib import suppress
 from pathlib import Path
 from typing import IO
 
+from gpca.jobs.provenance import CONFIG_VARIABLE, sha256_of_settings
 from gpca.process.code_files import ROOT
 from gpca.process.processor import pin_instructions
-from gpca.process.provenance import CONFIG_VARIABLE, sha256_of_settings
 
 # Sections that change no result: where data lies, and how results are judged.
 WITHOUT_RESULT = ("data_dir", "downloads", "comparison", "reference")

@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import Any
 
 from gpca.config.schema import DESIGNS, Reductions
+from gpca.declarations.experiment import EXPLAINERS, Names
+from gpca.declarations.registry import experiments
 from gpca.errors import InputError, require_names
-from gpca.experiments.experiment import EXPLAINERS, Names
-from gpca.experiments.registry import experiments
 from gpca.explainers.registry import explainers
 from gpca.io.structured_text import read_mapping, read_scalar
 from gpca.process.code_files import ROOT

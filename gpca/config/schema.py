@@ -14,10 +14,10 @@ from gpca.classifier.settings import GPCSettings
 from gpca.comparison.published import UNITS
 from gpca.comparison.reference import Allowance
 from gpca.comparison.verdicts import Tolerance
+from gpca.declarations.experiment import ByName
+from gpca.declarations.registry import experiments
 from gpca.encoders.reduction import PCA, UMAP, Autoencoder
 from gpca.encoders.registry import NamedEncoder
-from gpca.experiments.experiment import ByName
-from gpca.experiments.registry import experiments
 from gpca.objects.entry import Name, Place, SourceEntry, SurfacePoints
 from gpca.pairs.synthesis import RegistrationSettings
 from gpca.settings import Bounds, Different, Distinct, Keys, OpenShare, changes_of, part_of, required

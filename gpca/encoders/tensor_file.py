@@ -12,7 +12,8 @@ from typing import Any
 
 import torch
 
-from gpca.io.files import LARGEST_NUMBER, whole_file
+from gpca.io.files import whole_file
+from gpca.numerals import LARGEST_NUMBER
 
 
 def read_tensors(path: str | Path) -> Any:

@@ -16,14 +16,14 @@ from gpca.active_learning.settings import (
     StreamSettings,
     rare_setting,
 )
+from gpca.declarations.experiment import Experiment, LeftOut, Names
+from gpca.declarations.plan import Run
+from gpca.declarations.result import figure, numbers, table
+from gpca.declarations.step import Plan, Step
 from gpca.encoders.registry import EncoderChanges, encoder_module, require_draws
 from gpca.errors import require_names
-from gpca.experiments.experiment import Experiment, LeftOut, Names
 from gpca.experiments.label_counts import COUNT, Clusters, Quantity, cell_of, families
 from gpca.experiments.label_curves import STYLES, draw_curves, mean_curves
-from gpca.experiments.plan import Run
-from gpca.experiments.result import figure, numbers, table
-from gpca.experiments.step import Plan, Step
 from gpca.pairs.perturbation import Concept
 from gpca.reporting.tables.builder import TableBuilder, cautious_over, crossed
 from gpca.reporting.tables.cells import rows_where

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.alignment.rigid import transform
 from gpca.attribution.predictions import read_predictions
 from gpca.causes.candidate import replay
 from gpca.causes.dataset import LABELS, Causes
@@ -24,6 +23,7 @@ from gpca.reporting.figures.cloud_views import draw_clouds, legend_of_clouds, wi
 from gpca.reporting.figures.panels import color_on_blue, write_below
 from gpca.reporting.figures.style import SMALL_PT, TEXT_WIDTH_IN, blues, use_style, write_title
 from gpca.reporting.words import object_in_words
+from gpca.rigid import transform
 from gpca.seeds import seed_of_file
 
 if TYPE_CHECKING:

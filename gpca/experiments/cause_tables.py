@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 from gpca.causes.judged import BINS, CEILING, joined, read_judged
 from gpca.causes.settings import CauseSettings
 from gpca.causes.truth import BORDERLINE, NOMINAL
+from gpca.declarations.plan import Run
+from gpca.declarations.result import figure, table
 from gpca.evaluation.intervals import REPEATS
 from gpca.evaluation.measures import POOLED
 from gpca.experiments.cause_figures import draw_causes_example
 from gpca.experiments.confusions import draw_confusions_figure
 from gpca.experiments.diagnosis import CAUSES_FILES, DIAGNOSES, cause_costs, cause_titles
-from gpca.experiments.plan import Run
-from gpca.experiments.result import figure, table
 from gpca.explainers.interface import WORDS
 from gpca.objects.entry import dataset_of
 from gpca.pairs.perturbation import CONCEPTS

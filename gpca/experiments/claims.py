@@ -7,13 +7,13 @@ from typing import Any
 
 from gpca.comparison import claims_table
 from gpca.comparison.claims import read_verdicts
+from gpca.declarations.experiment import Experiment
+from gpca.declarations.plan import Run
+from gpca.declarations.result import table
 from gpca.experiments.active_learning import titles
-from gpca.experiments.experiment import Experiment
 from gpca.experiments.frames import frames_of
 from gpca.experiments.out_of_distribution import learner_titles
-from gpca.experiments.plan import Run
 from gpca.experiments.recovery import policy_titles
-from gpca.experiments.result import table
 from gpca.explainers.registry import explainer_entry
 from gpca.frames.source import ONE_ENCODER, REAL_WORLD
 

@@ -11,13 +11,13 @@ import numpy as np
 
 from gpca.attribution.metrics import read_causal
 from gpca.attribution.predictions import concepts_of, read_predictions
+from gpca.declarations.experiment import Experiment, Tidy
+from gpca.declarations.plan import Run
+from gpca.declarations.result import Paths, figure, table
 from gpca.errors import InputError
 from gpca.evaluation.intervals import Clustered, Estimate
 from gpca.evaluation.measures import ALL, intervals, read_all_metrics, source_method_seed
 from gpca.experiments.confusions import draw_confusions_figure
-from gpca.experiments.experiment import Experiment, Tidy
-from gpca.experiments.plan import Run
-from gpca.experiments.result import Paths, figure, table
 from gpca.explainers.gpca import GPCA_FORMS
 from gpca.explainers.registry import explainer_entry
 from gpca.reporting.sheet import Sheet, crossed, show

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from math import inf
 from typing import TYPE_CHECKING, Any
 
+from gpca.declarations.plan import Run
+from gpca.declarations.result import Paths, figure, table
 from gpca.errors import InputError
 from gpca.evaluation.intervals import REPEATS
 from gpca.evaluation.measures import ALL, POOLED, source_method_seed, tidy
 from gpca.experiments.cause_tables import rule_near_chance
 from gpca.experiments.controls import AUROC, CALLS, NO_TRAINING, RIVAL, SECTION, USUAL
 from gpca.experiments.explained import titles
-from gpca.experiments.plan import Run
-from gpca.experiments.result import Paths, figure, table
 from gpca.explainers.gpca import GPCA_FORMS
 from gpca.explainers.registry import explainer_entry
 from gpca.io.csv_file import read_numbers

@@ -10,14 +10,14 @@ import numpy as np
 
 from gpca.attribution.predictions import read_predictions
 from gpca.causes.settings import NOT_OF_CAUSES, CauseSettings
+from gpca.declarations.experiment import EXPLAINERS, ByName, Experiment, LeftOut
+from gpca.declarations.plan import Run
+from gpca.declarations.result import Paths, numbers
+from gpca.declarations.step import Plan, Step, Wildcards
 from gpca.errors import InputError, with_key
 from gpca.evaluation.intervals import UNTRAINED, Clustered, best_of, interval, weighted_mean
 from gpca.evaluation.measures import ALL, POOLED, TEST_SAMPLES, intervals, source_method_seed, tidy
-from gpca.experiments.experiment import EXPLAINERS, ByName, Experiment, LeftOut
 from gpca.experiments.explained import explainer_settings, require_explained
-from gpca.experiments.plan import Run
-from gpca.experiments.result import Paths, numbers
-from gpca.experiments.step import Plan, Step, Wildcards
 from gpca.explainers.gpca import GPCA_FORMS
 from gpca.explainers.interface import BARE
 from gpca.explainers.registry import explainer_entry, explainer_module

@@ -14,14 +14,14 @@ from gpca.causes.dataset import LABELS
 from gpca.causes.judged import CEILING, MEASURES, Judged, counted, joined, measure, read_judged
 from gpca.causes.settings import DescriptorSettings
 from gpca.causes.truth import BORDERLINE
+from gpca.declarations.experiment import ByName, Experiment, LeftOut, Names
+from gpca.declarations.plan import Run
+from gpca.declarations.result import Paths, numbers
+from gpca.declarations.step import Step, Wildcards
 from gpca.encoders.registry import NamedEncoder, require_backbone, require_draws
 from gpca.errors import InputError, with_key
 from gpca.evaluation.intervals import ANYTHING, UNTRAINED, Clustered
 from gpca.evaluation.measures import ALL, POOLED, Measure, Rivals, compared, intervals, tidy
-from gpca.experiments.experiment import ByName, Experiment, LeftOut, Names
-from gpca.experiments.plan import Run
-from gpca.experiments.result import Paths, numbers
-from gpca.experiments.step import Step, Wildcards
 from gpca.explainers.interface import BARE, REENACTED, icp_calls
 from gpca.explainers.registry import CAUSES, explainer_entry, explainer_module, explainers, require_settings
 from gpca.reenactment.settings import ReenactmentSettings

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpca.alignment.methods.registry import method_entry
+from gpca.declarations.plan import Run
+from gpca.declarations.result import figure
 from gpca.errors import InputError
 from gpca.experiments.estimator_tables import SECTION
-from gpca.experiments.plan import Run
-from gpca.experiments.result import figure
 from gpca.reporting.figures import style
 from gpca.reporting.figures.panels import label_outer
 from gpca.reporting.figures.style import BLACK, GRAY, SMALL_PT

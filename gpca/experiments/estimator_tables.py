@@ -6,10 +6,10 @@ from math import inf
 from typing import TYPE_CHECKING
 
 from gpca.alignment.methods.registry import method_entry
+from gpca.declarations.plan import Run
+from gpca.declarations.result import table
 from gpca.evaluation.intervals import REPEATS
 from gpca.experiments import estimators
-from gpca.experiments.plan import Run
-from gpca.experiments.result import table
 from gpca.reporting.tables.builder import TableBuilder, crossed
 from gpca.reporting.tables.cells import interval_cell, plain_cell, rows_where
 from gpca.reporting.tables.table import Cell, Column
@@ -67,7 +67,7 @@ def _count(values: pd.DataFrame, metric: str) -> Cell | None:
     """What each estimator says about the same registrations, judged by what it models. A reference is a set of further
     registrations of the same situation: from other starts, of other data (the surfaces sampled again, with other
     noise and other outliers), or both. The paper uses Monte-Carlo over the starts alone. Registrations that failed
-    stand apart. Learners are also taught with another dataset and with mild severities.""",
+    stand apart. Learners are also trained on another dataset and with mild severities.""",
     **INTERVALS,
 )
 def table12_uncertainty(run: Run, intervals):

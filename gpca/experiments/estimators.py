@@ -10,13 +10,13 @@ import numpy as np
 
 from gpca.alignment.methods.registry import method_module, methods, require_local
 from gpca.causes.judged import ranking
+from gpca.declarations.experiment import ByName, Experiment, LeftOut, Names
+from gpca.declarations.plan import Run
+from gpca.declarations.result import numbers
+from gpca.declarations.step import Plan, Step, Wildcards
 from gpca.errors import InputError, with_key
 from gpca.evaluation.intervals import interval, pigeonhole_weights
 from gpca.evaluation.measures import source_method_seed, tidy
-from gpca.experiments.experiment import ByName, Experiment, LeftOut, Names
-from gpca.experiments.plan import Run
-from gpca.experiments.result import numbers
-from gpca.experiments.step import Plan, Step, Wildcards
 from gpca.io import csv_file
 from gpca.process.plugins import is_outside
 from gpca.seeds import generator

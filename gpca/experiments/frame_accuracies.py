@@ -11,13 +11,13 @@ import numpy as np
 from gpca.attribution.diagnostics import brier_score, calibration_error, negative_log_likelihood
 from gpca.attribution.metrics import attribution_metrics
 from gpca.attribution.predictions import concepts_of, read_predictions
+from gpca.declarations.plan import Run
+from gpca.declarations.result import numbers
 from gpca.errors import InputError
 from gpca.evaluation.intervals import Clustered
 from gpca.evaluation.measures import ALL, intervals, source_method_seed, tidy
 from gpca.experiments.frame_labels import collect_labels
 from gpca.experiments.frames import TOGETHER, reduced_backbones
-from gpca.experiments.plan import Run
-from gpca.experiments.result import numbers
 from gpca.pairs.dataset import read_samples_of_frames
 
 if TYPE_CHECKING:

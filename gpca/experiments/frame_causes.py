@@ -14,17 +14,17 @@ from gpca.attribution.predictions import read_predictions
 from gpca.causes.dataset import LABELS, Causes, labels_of
 from gpca.causes.judged import CEILING, MEASURES, Judged, ceiling_of, joined, judged_by, measure
 from gpca.causes.truth import BORDERLINE, FAILED, GEOMETRY, NOMINAL, Truth
+from gpca.declarations.experiment import Experiment
+from gpca.declarations.plan import Run
+from gpca.declarations.result import numbers, table
+from gpca.declarations.step import Plan, Step
 from gpca.encoders.registry import encoder_module
 from gpca.errors import InputError
 from gpca.evaluation.intervals import REPEATS, Clustered, pigeonhole_weights
 from gpca.evaluation.measures import ALL, intervals
 from gpca.experiments import cause_tables as tables
 from gpca.experiments.diagnosis import TABLE, cause_costs, cause_titles, compared_samples
-from gpca.experiments.experiment import Experiment
 from gpca.experiments.frames import title_of_frames
-from gpca.experiments.plan import Run
-from gpca.experiments.result import numbers, table
-from gpca.experiments.step import Plan, Step
 from gpca.explainers.interface import REENACTED
 from gpca.explainers.registry import CAUSES, explainer_entry, explainer_module
 from gpca.frames.source import REAL_WORLD

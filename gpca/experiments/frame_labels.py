@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 from gpca.active_learning.curves import TABLE, collect_curves
 from gpca.active_learning.settings import ALL_LABELS, PAIR, FrameLabelSettings
+from gpca.declarations.experiment import Experiment, LeftOut
+from gpca.declarations.plan import Run
+from gpca.declarations.result import table
+from gpca.declarations.step import Step
 from gpca.errors import InputError, require_names
-from gpca.experiments.experiment import Experiment, LeftOut
 from gpca.experiments.frames import encoder_title, title_of_frames
-from gpca.experiments.plan import Run
-from gpca.experiments.result import table
-from gpca.experiments.step import Step
 from gpca.frames.source import REAL_WORLD
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.tables.builder import TableBuilder, mean_over

@@ -8,17 +8,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gpca.alignment.rigid import inverse, transform
 from gpca.attribution.diagnostics import BINS
 from gpca.attribution.predictions import concepts_of, read_predictions
+from gpca.declarations.plan import Run
+from gpca.declarations.result import figure
 from gpca.errors import InputError
 from gpca.evaluation.measures import source_method_seed
 from gpca.experiments.confusions import counts_and_shares, pooled_confusions
 from gpca.experiments.frame_views import draw_scores
 from gpca.experiments.frames import encoder_title, read_together, title_of_frames, unreduced_methods
-from gpca.experiments.plan import Run
 from gpca.experiments.registration_stages import source_before_icp
-from gpca.experiments.result import figure
 from gpca.frames.instances import Instances
 from gpca.frames.synthesis import HALF_SPACE, OCCLUDER
 from gpca.io.container import require_same_samples
@@ -40,6 +39,7 @@ from gpca.reporting.figures.style import (
     write_title,
 )
 from gpca.reporting.words import BOP_TITLES, object_of_frames
+from gpca.rigid import inverse, transform
 
 if TYPE_CHECKING:
     import pandas as pd

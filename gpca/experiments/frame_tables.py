@@ -5,6 +5,8 @@ from __future__ import annotations
 from math import inf
 from typing import Any
 
+from gpca.declarations.plan import Run
+from gpca.declarations.result import table
 from gpca.encoders.registry import make_encoder, parameter_count
 from gpca.evaluation.intervals import UNTRAINED
 from gpca.evaluation.measures import ALL
@@ -12,8 +14,6 @@ from gpca.experiments import frames
 from gpca.experiments.explained import titles
 from gpca.experiments.frame_accuracies import DATASET, SEEN, UNSEEN
 from gpca.experiments.frames import CLASSIC, REDUCTIONS, TOGETHER, title_of_frames
-from gpca.experiments.plan import Run
-from gpca.experiments.result import table
 from gpca.explainers.registry import explainer_entry
 from gpca.frames.source import ONE_ENCODER, REAL_WORLD, conditions_of
 from gpca.pairs.perturbation import CONCEPTS

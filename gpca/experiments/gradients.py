@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gpca.declarations.experiment import Experiment, LeftOut
+from gpca.declarations.plan import Run
+from gpca.declarations.result import Paths, figure, numbers, table
+from gpca.declarations.step import Step, encoder_of
 from gpca.encoders.registry import DIFFERENTIABLE, DGCNNOptions, EncoderSettings
 from gpca.errors import InputError
 from gpca.evaluation.measures import ALL, source_method_seed, tidy
-from gpca.experiments.experiment import Experiment, LeftOut
-from gpca.experiments.plan import Run
-from gpca.experiments.result import Paths, figure, numbers, table
-from gpca.experiments.step import Step, encoder_of
 from gpca.io.arrays import REAL, WHOLE, load_arrays
 from gpca.io.csv_file import read_numbers
 from gpca.pairs.dataset import Registrations

@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gpca.declarations.experiment import Experiment, LeftOut
+from gpca.declarations.plan import Run
+from gpca.declarations.result import Paths, figure, numbers, table
+from gpca.declarations.step import Step
 from gpca.errors import InputError, require_names
 from gpca.evaluation.intervals import interval, pigeonhole_weights
 from gpca.evaluation.measures import ALL, POOLED
-from gpca.experiments.experiment import Experiment, LeftOut
 from gpca.experiments.frame_causes import FEWEST_FAILURES
-from gpca.experiments.plan import Run
-from gpca.experiments.result import Paths, figure, numbers, table
-from gpca.experiments.step import Step
 from gpca.explainers.interface import EMBEDDINGS, REENACTED
 from gpca.explainers.registry import CAUSES, explainer_entry, explainer_module
 from gpca.frames.source import REAL_WORLD

@@ -12,16 +12,16 @@ from gpca.comparison.joint_reading import DEVELOPMENT, EVALUATED, EVALUATION, JU
 from gpca.comparison.published import read_published
 from gpca.comparison.readings import read_judged
 from gpca.comparison.verdicts import Tolerance
+from gpca.declarations.experiment import Experiment, LeftOut
+from gpca.declarations.plan import Run
+from gpca.declarations.result import numbers, table
+from gpca.declarations.step import Plan, Step
 from gpca.errors import InputError
 from gpca.evaluation.measures import read_all_metrics, read_metrics, tidy
 from gpca.experiments import reading_words
 from gpca.experiments.active_learning import learning_settings
-from gpca.experiments.experiment import Experiment, LeftOut
-from gpca.experiments.plan import Run
 from gpca.experiments.reading_steps import retrained_on
-from gpca.experiments.result import numbers, table
 from gpca.experiments.specification_curve import plain_cells, plain_column, stand_ins
-from gpca.experiments.step import Plan, Step
 from gpca.explainers.registry import explainer_module
 from gpca.io.csv_file import ANY, read_csv
 from gpca.objects.entry import Name, SourceEntry, title_of

@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gpca.attribution.predictions import read_predictions
+from gpca.declarations.experiment import Experiment, LeftOut
+from gpca.declarations.plan import Run
+from gpca.declarations.result import figure, numbers, table
+from gpca.declarations.step import Step
 from gpca.errors import InputError, require_names
 from gpca.evaluation.intervals import Clustered
 from gpca.evaluation.measures import ALL, intervals, source_method_seed, tidy
-from gpca.experiments.experiment import Experiment, LeftOut
-from gpca.experiments.plan import Run
-from gpca.experiments.result import figure, numbers, table
-from gpca.experiments.step import Step
 from gpca.io.csv_file import numbers as number_column
 from gpca.io.csv_file import read_csv
 from gpca.reporting.figures.style import BLACK, BLUE, COLUMN_WIDTH_IN, GRAY, ORANGE

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from gpca.causes.judged import CEILING
+from gpca.declarations.experiment import Experiment, LeftOut
+from gpca.declarations.plan import Run
+from gpca.declarations.result import Paths, figure, numbers
+from gpca.declarations.step import Step
 from gpca.errors import InputError, require_names
 from gpca.evaluation.measures import source_method_seed, tidy
-from gpca.experiments.experiment import Experiment, LeftOut
-from gpca.experiments.plan import Run
-from gpca.experiments.result import Paths, figure, numbers
-from gpca.experiments.step import Step
 from gpca.io.csv_file import read_numbers
 from gpca.settings import Distinct, read_settings
 from gpca.steps.learning_curve import CURVE_COLUMNS, MEASURED, CurveSettings, labeled_samples

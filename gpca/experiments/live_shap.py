@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from math import inf
 from typing import TYPE_CHECKING, Annotated, Any
 
+from gpca.declarations.experiment import Experiment
+from gpca.declarations.plan import Run
+from gpca.declarations.result import Paths, numbers, table
+from gpca.declarations.step import Step
 from gpca.evaluation.measures import read_all_metrics
-from gpca.experiments.experiment import Experiment
-from gpca.experiments.plan import Run
-from gpca.experiments.result import Paths, numbers, table
-from gpca.experiments.step import Step
 from gpca.explainers.registry import explainer_module
 from gpca.reporting.tables.builder import TableBuilder, crossed
 from gpca.reporting.tables.cells import cell_of_repeats, rows_where

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gpca.causes.policy import NOTHING, QUEUE, Decision, RecoveryPolicy
+from gpca.declarations.experiment import Experiment
+from gpca.declarations.plan import Run
+from gpca.declarations.result import figure
 from gpca.errors import InputError
 from gpca.experiments import registration_stages as stages_of
-from gpca.experiments.experiment import Experiment
 from gpca.experiments.frames import encoder_title
-from gpca.experiments.plan import Run
 from gpca.experiments.recovery_example import short_action
 from gpca.experiments.registration_stages import FILES, Stages, title_of_sample
-from gpca.experiments.result import figure
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS, SEVERITIES_OF

@@ -10,16 +10,16 @@ from gpca.active_learning.curves import TABLE, collect_curves
 from gpca.active_learning.settings import ALL_LABELS, NEW_CONCEPT_STRATEGIES, NewConceptSettings
 from gpca.causes.drawing import apportion
 from gpca.causes.truth import BORDERLINE, GEOMETRY, NOMINAL
+from gpca.declarations.experiment import Experiment
+from gpca.declarations.plan import Run
+from gpca.declarations.result import figure, numbers, table
+from gpca.declarations.step import Plan, Step
 from gpca.encoders.registry import encoder_module
 from gpca.evaluation.measures import ALL, read_all_metrics
 from gpca.experiments.active_learning import learning_settings
 from gpca.experiments.concept_attribution import PREDICTIONS, collect_intervals
-from gpca.experiments.experiment import Experiment
 from gpca.experiments.label_counts import COUNT, Clusters, Quantity, cell_of, families, families_with_causes
 from gpca.experiments.label_curves import draw_curves, mean_curves
-from gpca.experiments.plan import Run
-from gpca.experiments.result import figure, numbers, table
-from gpca.experiments.step import Plan, Step
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.figures.style import BLUE, GRAY, GREEN, SKY_BLUE, VERMILION
 from gpca.reporting.tables.builder import TableBuilder, cautious_over, crossed

@@ -11,15 +11,15 @@ import numpy as np
 
 from gpca.attribution import diagnostics, weighted
 from gpca.attribution import learner_predictions as predicted
+from gpca.declarations.experiment import ByName, Experiment, LeftOut, Names
+from gpca.declarations.plan import Run
+from gpca.declarations.result import Paths, numbers, table
+from gpca.declarations.step import Step
 from gpca.encoders.registry import EncoderChanges, require_draws
 from gpca.errors import InputError
 from gpca.evaluation.intervals import Clustered
 from gpca.evaluation.measures import ALL, intervals, tidy
-from gpca.experiments.experiment import ByName, Experiment, LeftOut, Names
 from gpca.experiments.explained import explainer_settings, require_explained
-from gpca.experiments.plan import Run
-from gpca.experiments.result import Paths, numbers, table
-from gpca.experiments.step import Step
 from gpca.explainers.registry import explainer_entry, explainer_module, explainers
 from gpca.pairs.perturbation import Severities
 from gpca.pairs.shifted_sets import DISTANCES, TRAINED_ON, with_training_like

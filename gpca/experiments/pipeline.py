@@ -11,11 +11,12 @@ import numpy as np
 
 from gpca.active_learning.acquisition import EXPANSION, select, top
 from gpca.active_learning.settings import ActiveLearningSettings
+from gpca.declarations.plan import Run
+from gpca.declarations.result import figure
 from gpca.errors import InputError
 from gpca.evaluation.measures import source_method_seed
 from gpca.experiments.frames import encoder_title
 from gpca.experiments.label_curves import STYLES, mean_curves
-from gpca.experiments.plan import Run
 from gpca.experiments.registration_stages import (
     FILES,
     Stages,
@@ -23,7 +24,6 @@ from gpca.experiments.registration_stages import (
     draw_scores_with_numbers,
     title_of_sample,
 )
-from gpca.experiments.result import figure
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.figures import style
 from gpca.reporting.figures.cloud_views import draw_clouds, thinned

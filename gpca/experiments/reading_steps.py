@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from gpca.declarations.step import Files, Plan, Step
 from gpca.encoders.registry import encoder_module
 from gpca.experiments.active_learning import learning_settings
 from gpca.experiments.explained import explainer_settings
-from gpca.experiments.step import Files, Plan, Step
 from gpca.explainers.registry import explainer_module
 from gpca.frames.source import REAL_WORLD, VIRTUAL
 from gpca.steps.readings.groups import (

@@ -9,10 +9,10 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from gpca.causes.settings import FrameCauseSettings
+from gpca.declarations.experiment import EXPLAINERS, Experiment, LeftOut, Names
 from gpca.encoders.reduction import make_reduction, require_room
 from gpca.encoders.registry import OPTIONS, EncoderSettings
 from gpca.errors import InputError, require_names, with_key
-from gpca.experiments.experiment import EXPLAINERS, Experiment, LeftOut, Names
 from gpca.experiments.frames import (
     CLASSIC,
     pretraining_of,

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import Field
 
 from gpca.causes.policy import Thresholds
+from gpca.declarations.experiment import Experiment, LeftOut, Names
+from gpca.declarations.plan import Run
+from gpca.declarations.result import table
+from gpca.declarations.step import Plan, Step
 from gpca.encoders.registry import EncoderChanges, encoder_module
 from gpca.errors import InputError, require_names, with_key
-from gpca.experiments.experiment import Experiment, LeftOut, Names
-from gpca.experiments.plan import Run
 from gpca.experiments.recovery_measures import ERROR, SEQUENCE, pool_share
-from gpca.experiments.result import table
-from gpca.experiments.step import Plan, Step
 from gpca.explainers.registry import explainer_entry, explainer_module, require_settings
 from gpca.frames.initial_pose import InitialPoseSettings
 from gpca.frames.situations import SituationSettings

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gpca.causes.policy import DOUBTED, DRAWN
+from gpca.declarations.plan import Run
+from gpca.declarations.result import figure
 from gpca.errors import InputError
 from gpca.evaluation.intervals import wilson_interval
-from gpca.experiments.plan import Run
 from gpca.experiments.recovery import SECTION, policy_titles, tables_title
 from gpca.experiments.recovery_measures import at, pool_share, read_queues
-from gpca.experiments.result import figure
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.figures import style
 from gpca.reporting.figures.panels import legend_below, panels

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gpca.declarations.plan import Run
+from gpca.declarations.result import figure
 from gpca.experiments.frame_views import draw_score_bars
-from gpca.experiments.plan import Run
 from gpca.experiments.recovery import SECTION, tables_title
-from gpca.experiments.result import figure
 from gpca.io.arrays import load_arrays
 from gpca.objects.entry import dataset_of
 from gpca.pairs.perturbation import CONCEPTS

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpca.causes.policy import NOTHING, QUEUE, QUEUE_COLUMNS
+from gpca.declarations.plan import Run
+from gpca.declarations.result import numbers
 from gpca.evaluation.intervals import Clustered, wilson_interval
 from gpca.evaluation.measures import ALL, Measure, Parts, intervals, over_seeds, tidy
-from gpca.experiments.plan import Run
-from gpca.experiments.result import numbers
 from gpca.io.csv_file import numbers as number_column
 from gpca.io.csv_file import read_csv, read_numbers
 from gpca.pairs.perturbation import CONCEPTS

@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING, Any
 
 from gpca.causes.judged import read_judged
 from gpca.causes.settings import CauseSettings
+from gpca.declarations.experiment import Experiment, LeftOut
+from gpca.declarations.plan import Run
+from gpca.declarations.result import Paths, figure, numbers, table
+from gpca.declarations.step import Step
 from gpca.errors import require_names
 from gpca.evaluation.intervals import REPEATS
 from gpca.evaluation.measures import POOLED
 from gpca.experiments.cause_figures import draw_reenactment
 from gpca.experiments.cause_tables import AGAIN, SECTION, SHOWN, counts_and_calls
 from gpca.experiments.diagnosis import by_source, compared_by_source, with_pooled
-from gpca.experiments.experiment import Experiment, LeftOut
-from gpca.experiments.plan import Run
-from gpca.experiments.result import Paths, figure, numbers, table
-from gpca.experiments.step import Step
 from gpca.objects.entry import dataset_of
 from gpca.pairs.perturbation import NOISE, OVERLAP, POSE
 from gpca.reenactment.settings import EVERYTHING, KNOWN, NOTHING, ReenactmentSettings

@@ -12,6 +12,10 @@ import numpy as np
 
 from gpca.alignment.methods import registry
 from gpca.alignment.pose_error import SuccessSettings, success_within
+from gpca.declarations.experiment import ByName, Experiment, LeftOut, Names
+from gpca.declarations.plan import Run
+from gpca.declarations.result import numbers, table
+from gpca.declarations.step import Plan, Step
 from gpca.errors import InputError, require_names, with_key
 from gpca.evaluation.intervals import Clustered
 from gpca.evaluation.measures import (
@@ -25,10 +29,6 @@ from gpca.evaluation.measures import (
     read_samples,
     source_method_seed,
 )
-from gpca.experiments.experiment import ByName, Experiment, LeftOut, Names
-from gpca.experiments.plan import Run
-from gpca.experiments.result import numbers, table
-from gpca.experiments.step import Plan, Step
 from gpca.io.csv_file import numbers as number_column
 from gpca.io.csv_file import read_csv
 from gpca.objects.canonical import ObjectClouds

@@ -10,14 +10,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpca.alignment.pose_error import adds_error
-from gpca.alignment.rigid import inverse, scale_translation, transform
 from gpca.attribution.metrics import read_uncertainties
 from gpca.attribution.predictions import concepts_of, read_predictions
 from gpca.causes.settings import Limits
 from gpca.causes.truth import BORDERLINE, FAILED, NOMINAL
+from gpca.declarations.plan import Run
 from gpca.errors import InputError
 from gpca.experiments.frame_views import draw_scores
-from gpca.experiments.plan import Run
 from gpca.io.container import require_same_samples
 from gpca.io.csv_file import numbers
 from gpca.pairs.dataset import Registrations, read_embedding
@@ -25,6 +24,7 @@ from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.figures.cloud_views import widest_views
 from gpca.reporting.figures.style import GRAY, SMALL_PT, blues
 from gpca.reporting.words import object_in_words
+from gpca.rigid import inverse, scale_translation, transform
 
 if TYPE_CHECKING:
     import pandas as pd

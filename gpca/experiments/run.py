@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from gpca.experiments.registry import experiments
+from gpca.declarations.registry import experiments
 from gpca.explainers.gpca import GPCA_FORMS
 from gpca.explainers.registry import explainer_entry
 

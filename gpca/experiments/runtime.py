@@ -8,12 +8,12 @@ from math import inf, nan
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from gpca.comparison.published import HARDWARE, Number, printed_seconds, read_published
+from gpca.declarations.experiment import Experiment, Tidy
+from gpca.declarations.plan import Run
+from gpca.declarations.result import figure, table
 from gpca.errors import InputError
 from gpca.evaluation.runtime_file import COMPONENTS, OF_ONE_EXPLANATION, read_runtime
-from gpca.experiments.experiment import Experiment, Tidy
 from gpca.experiments.frames import frames_of
-from gpca.experiments.plan import Run
-from gpca.experiments.result import figure, table
 from gpca.objects.entry import title_of
 from gpca.reporting.figures.panels import legend_below, panels
 from gpca.reporting.figures.style import BLUE, GRAY, GREEN, ORANGE, SMALL_PT, write_title

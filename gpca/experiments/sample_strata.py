@@ -11,12 +11,12 @@ import numpy as np
 
 from gpca.causes.judged import CEILING, Judged, of_decisions, read_judged
 from gpca.causes.truth import ALL, BORDERLINE, FAILED, NOMINAL
+from gpca.declarations.plan import Run
+from gpca.declarations.result import numbers, table
 from gpca.evaluation.intervals import REPEATS, Clustered
 from gpca.evaluation.measures import POOLED, intervals
 from gpca.experiments import diagnosis
 from gpca.experiments.cause_tables import AGAIN, SECTION
-from gpca.experiments.plan import Run
-from gpca.experiments.result import numbers, table
 from gpca.reporting.sheet import Row, Sheet, Show, show, where
 from gpca.reporting.tables.cells import plain_cell
 from gpca.reporting.tables.table import Column

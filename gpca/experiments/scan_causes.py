@@ -31,16 +31,16 @@ from gpca.causes.judged import (
 from gpca.causes.scans import KINDS
 from gpca.causes.settings import SCANS, ScanSamples
 from gpca.causes.truth import BORDERLINE, GEOMETRY
+from gpca.declarations.experiment import Experiment, LeftOut, Names
+from gpca.declarations.plan import Run
+from gpca.declarations.result import numbers
+from gpca.declarations.step import Step
 from gpca.encoders.registry import encoder_module
 from gpca.errors import InputError, with_key
 from gpca.evaluation.intervals import NO_OTHER, best_of, difference, interval, pigeonhole_weights
 from gpca.evaluation.measures import ALL, POOLED
-from gpca.experiments.experiment import Experiment, LeftOut, Names
 from gpca.experiments.frame_causes import count_ends, ends_of
-from gpca.experiments.plan import Run
-from gpca.experiments.result import numbers
 from gpca.experiments.scans import EACH_SET, ChoiceSettings, files_of_set, place_of_set
-from gpca.experiments.step import Step
 from gpca.explainers.registry import CAUSES as CAUSE_EXPLAINERS
 from gpca.explainers.registry import explainer_module, explainers, require_settings
 from gpca.io.container import require_same_samples

@@ -11,14 +11,14 @@ from gpca.causes.judged import CEILING
 from gpca.causes.scans import GLOBAL, LADDER
 from gpca.causes.settings import OBJECTS, SCANS, DescriptorSettings
 from gpca.causes.truth import BORDERLINE, GEOMETRY, NOMINAL
+from gpca.declarations.plan import Run, plain
+from gpca.declarations.result import figure, table
 from gpca.errors import InputError
 from gpca.evaluation.intervals import REPEATS
 from gpca.evaluation.measures import POOLED
 from gpca.experiments import cause_tables as tables
 from gpca.experiments import scan_causes as scans
 from gpca.experiments.frame_causes import ENDS, FEWEST_FAILURES, MISSED_NOTE, counts_in, sheet_of_counts
-from gpca.experiments.plan import Run, plain
-from gpca.experiments.result import figure, table
 from gpca.experiments.scan_causes import ADDED, CAUSES, EVERY, NATURAL, TRUTH
 from gpca.experiments.scans import titles_of_scans
 from gpca.explainers.interface import icp_calls

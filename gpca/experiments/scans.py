@@ -14,14 +14,14 @@ import numpy as np
 from pydantic import Field
 
 from gpca.alignment.methods.registry import installed, method_entry, method_module, require_global, require_settings
+from gpca.declarations.experiment import Experiment, LeftOut, Names
+from gpca.declarations.plan import Run, plain
+from gpca.declarations.result import numbers, table
+from gpca.declarations.step import Plan, Step, Wildcards
 from gpca.errors import InputError, require_names, with_key
 from gpca.evaluation.intervals import Clustered
 from gpca.evaluation.measures import ALL, Measure, Parts, over_seeds, read_samples
-from gpca.experiments.experiment import Experiment, LeftOut, Names
-from gpca.experiments.plan import Run, plain
 from gpca.experiments.registration_methods import method_rows, missing_methods, read_seconds, row_name
-from gpca.experiments.result import numbers, table
-from gpca.experiments.step import Plan, Step, Wildcards
 from gpca.io.csv_file import read_numbers
 from gpca.objects.entry import Name, title_of
 from gpca.reporting.sheet import Row, Sheet, show, where

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gpca.declarations.plan import Run
+from gpca.declarations.result import Paths, figure, numbers
 from gpca.errors import InputError
 from gpca.evaluation.measures import source_method_seed
 from gpca.experiments.controls import SECTION, read_controls
 from gpca.experiments.explained import titles
-from gpca.experiments.plan import Run
-from gpca.experiments.result import Paths, figure, numbers
 from gpca.io.csv_file import read_numbers
 from gpca.reporting.figures.style import GRAY, SMALL_PT, write_title
 from gpca.steps.control_samples import PAPER, SAMPLE_COLUMNS, SEVERITIES

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 import numpy as np
 
 from gpca.comparison.readings import read_judged, summarize, unresolved
+from gpca.declarations.experiment import Experiment, Names, Tidy
+from gpca.declarations.plan import Run
+from gpca.declarations.result import figure, table
 from gpca.errors import InputError
 from gpca.evaluation.measures import ALL
 from gpca.experiments import reading_words
-from gpca.experiments.experiment import Experiment, Names, Tidy
 from gpca.experiments.frames import encoder_title, frames_of, title_of_frames
-from gpca.experiments.plan import Run
-from gpca.experiments.result import figure, table
 from gpca.frames.source import REAL_WORLD, conditions_of
 from gpca.objects.entry import stand_in_clause
 from gpca.pairs.perturbation import CONCEPTS, Severities

@@ -10,15 +10,15 @@ import numpy as np
 
 from gpca.alignment.methods.registry import installed, method_entry, method_module
 from gpca.attribution.predictions import read_predictions
+from gpca.declarations.experiment import EXPLAINERS, ByName, Experiment, LeftOut
+from gpca.declarations.plan import Run
+from gpca.declarations.result import Paths, numbers, table
+from gpca.declarations.step import Plan, Step, Wildcards
 from gpca.errors import require_names, with_key
 from gpca.evaluation.intervals import Clustered
 from gpca.evaluation.measures import ALL, POOLED, Measure, Parts, over_seeds, per_seed, read_samples
-from gpca.experiments.experiment import EXPLAINERS, ByName, Experiment, LeftOut
 from gpca.experiments.explained import explainer_settings, require_explained
-from gpca.experiments.plan import Run
 from gpca.experiments.registration_methods import missing_methods
-from gpca.experiments.result import Paths, numbers, table
-from gpca.experiments.step import Plan, Step, Wildcards
 from gpca.explainers.registry import explainer_entry, explainer_module
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.sheet import Sheet, Show, crossed, show, where

@@ -12,10 +12,10 @@ import numpy as np
 
 from gpca.attribution.diagnostics import BINS, risk_coverage
 from gpca.attribution.learner_predictions import read_learner_predictions, sets_of, wrong
+from gpca.declarations.plan import Run
+from gpca.declarations.result import figure
 from gpca.errors import InputError
 from gpca.experiments.out_of_distribution import SECTION, learner_titles
-from gpca.experiments.plan import Run
-from gpca.experiments.result import figure
 from gpca.pairs.shifted_sets import DISTANCES, with_training_like
 from gpca.reporting.figures import style
 from gpca.reporting.figures.panels import legend_below, panels

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Literal, Protocol, get_args, runtime_checkable
 
 import numpy as np
 
-from gpca.attribution.scores import Attribution
+from gpca.classifier.scores import Attribution
 from gpca.errors import InputError
 from gpca.explainers.classifiers import ConceptClassifier
 from gpca.pairs.dataset import Registrations

@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 
-from gpca.alignment.rigid import require_rotation, rigid_motion
 from gpca.errors import InputError
 from gpca.io.files import read_image
 from gpca.io.structured_text import finite_numbers, read_json
@@ -23,6 +22,7 @@ from gpca.numerals import whole
 from gpca.objects.camera import back_project
 from gpca.objects.mesh_folder import meters_per
 from gpca.objects.surface import Surface, evenly
+from gpca.rigid import require_rotation, rigid_motion
 
 REMEDY = "the folder may be half unpacked: unpack the dataset again"
 # Far beyond those of all depth cameras; wrong values within these limits show in the measured points.

@@ -15,12 +15,12 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from gpca.alignment.rigid import inverse, random_direction, require_rotation, rigid_motion, rotate, transform
 from gpca.errors import InputError
 from gpca.io.csv_file import ANY, numbers, read_csv
 from gpca.numerals import decimal, whole
 from gpca.pairs.perturbation import HalfTurn, Shift
 from gpca.process.environment import open3d_cloud, require_open3d
+from gpca.rigid import inverse, random_direction, require_rotation, rigid_motion, rotate, transform
 from gpca.settings import Count, PositiveShare
 
 RESULT_COLUMNS = ("scene_id", "im_id", "obj_id", "score", "R", "t")

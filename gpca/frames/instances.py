@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from gpca.alignment.rigid import inverse, transform
 from gpca.errors import InputError
 from gpca.frames import initial_pose, plausibility
 from gpca.frames.bop import Annotation, Frame, TooFewPoints, measured_points, without_background
@@ -21,6 +20,7 @@ from gpca.io.container import FLAG, FLOAT, Container, array
 from gpca.objects.bop import find_symmetries
 from gpca.objects.canonical import DRAWN, ObjectClouds, unseen
 from gpca.process.progress import progress
+from gpca.rigid import inverse, transform
 from gpca.seeds import generator, seed_of
 
 NO_COLOR = "none"

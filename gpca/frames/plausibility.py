@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from gpca.alignment.rigid import inverse, rigid_motion, scale_translation, transform
 from gpca.errors import InputError
+from gpca.rigid import inverse, rigid_motion, scale_translation, transform
 
 # Median distance of measured points from the model, in diameters. Of 223 annotated objects of five datasets the worst
 # is at 0.034; turned at random, the worst is at 0.298. Objects that are farther away do not fit their poses.

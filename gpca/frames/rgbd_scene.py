@@ -11,7 +11,6 @@ from typing import Annotated, Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from gpca.alignment.rigid import inverse, rigid_motion, transform
 from gpca.errors import InputError
 from gpca.io.files import whole_folder
 from gpca.objects.bop import find_symmetries
@@ -19,6 +18,7 @@ from gpca.objects.camera import TABLE_M, Camera, DepthNoise, MeshScene, directio
 from gpca.objects.canonical import canonical_cloud, diameter
 from gpca.objects.surface import Surface
 from gpca.process.progress import progress
+from gpca.rigid import inverse, rigid_motion, transform
 from gpca.seeds import generator
 from gpca.settings import Bounds, Count, Distinct
 

@@ -9,9 +9,9 @@ from itertools import product
 import numpy as np
 from scipy.spatial import cKDTree
 
-from gpca.alignment.rigid import inverse, rotate, transform
 from gpca.objects.camera import Camera, MeshScene, back_project, direction, look_at, table
 from gpca.process.environment import open3d_cloud
+from gpca.rigid import inverse, rotate, transform
 
 
 @dataclass(frozen=True)

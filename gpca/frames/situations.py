@@ -9,7 +9,6 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from gpca.alignment.rigid import inverse, scale_translation, transform
 from gpca.errors import InputError
 from gpca.frames.initial_pose import GlobalRegistration, InitialPoseSettings
 from gpca.frames.rgbd_scene import Placed, SceneSettings, center, lay_table, rest, stable_poses
@@ -19,6 +18,7 @@ from gpca.objects.camera import TABLE_M, Camera, DepthNoise, MeshScene, directio
 from gpca.objects.canonical import ObjectClouds, canonical_cloud
 from gpca.objects.surface import Surface
 from gpca.pairs.perturbation import Hidden, Severities, misplace
+from gpca.rigid import inverse, scale_translation, transform
 from gpca.seeds import generator, seed_of
 from gpca.settings import NotNegative
 

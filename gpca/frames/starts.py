@@ -16,7 +16,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gpca.alignment.rigid import inverse, scale_translation
 from gpca.frames.dataset import CenteredModel, Dataset
 from gpca.frames.initial_pose import EstimatorErrors, estimates_of
 from gpca.frames.instances import Instances
@@ -25,6 +24,7 @@ from gpca.io.container import Container, array
 from gpca.objects import canonical
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.perturbation import misplacement
+from gpca.rigid import inverse, scale_translation
 from gpca.seeds import generator
 
 NATIVE, CARRIED, TRANSPLANTED, LADDER = KINDS = ("native", "carried", "transplanted", "ladder")

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gpca.alignment.pose_error import JUDGED_POINTS, pose_error
-from gpca.alignment.rigid import inverse, scale_translation, transform
 from gpca.frames.instances import Instances
 from gpca.io.files import SPLITS
 from gpca.objects.canonical import ObjectClouds
@@ -20,6 +19,7 @@ from gpca.pairs.perturbation import CONCEPTS, PERTURBATIONS, Perturbed
 from gpca.pairs.synthesis import RegistrationSettings, align_pair, as_registrations
 from gpca.process.environment import require_open3d
 from gpca.process.progress import progress
+from gpca.rigid import inverse, scale_translation, transform
 from gpca.seeds import generator
 from gpca.settings import OpenShare, Share
 

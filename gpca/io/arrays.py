@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from gpca.errors import InputError
-from gpca.io.files import LARGEST_NUMBER, SPLITS, Axes, is_name, require_axes, require_file, require_memory, whole_file
+from gpca.io.files import SPLITS, Axes, is_name, require_axes, require_file, require_memory, whole_file
+from gpca.numerals import LARGEST_NUMBER
 
 REGENERATE = "regenerate it with Snakemake"
 TEXT, WHOLE, REAL = "U", "iu", "iuf"  # what an array holds, in the letters of NumPy

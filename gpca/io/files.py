@@ -27,7 +27,6 @@ LARGEST_FILE_BYTES = 10**9  # twice Stanford's Lucy of 28 million triangles; par
 # masks to a twentieth.
 LARGEST_RATIO = 20
 SMALL_BYTES = 2**28
-LARGEST_NUMBER = 1e15  # squares of larger numbers leave the range of float32
 MOST_PIXELS = 2**26  # of an image, ten times a depth camera's
 IMAGE_FORMATS = ("PNG", "JPEG", "TIFF")  # Pillow knows others by their content, and runs programs for some
 SPLITS = ("train", "test")

@@ -15,7 +15,6 @@ import torch
 
 from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.icp import ICPSettings
-from gpca.alignment.rigid import exp, inverse, transform
 from gpca.causes.dataset import LABELS, Causes, labels_of
 from gpca.causes.settings import CauseSettings, Moved
 from gpca.causes.truth import ALL, BORDERLINE, LARGEST_ERROR, NOMINAL
@@ -32,6 +31,7 @@ from gpca.reenactment.dataset import Reenactments, reenactment_features, row_of
 from gpca.reenactment.enactment import Enactment, reenact
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface
+from gpca.rigid import exp, inverse, transform
 from gpca.seeds import generator
 from gpca.uncertainty.settings import UncertaintySettings
 

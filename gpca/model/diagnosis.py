@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.alignment.rigid import inverse, log
 from gpca.causes.policy import NOTHING, QUEUE
 from gpca.causes.truth import ALL, FAILED, NOMINAL, shapley_values
 from gpca.evaluation.conformal import ALARM, GOOD
@@ -19,6 +18,7 @@ from gpca.pairs.perturbation import CONCEPTS
 from gpca.reenactment.enactment import Enactment
 from gpca.reenactment.hypotheses import SAME
 from gpca.reenactment.surface import ModelSurface
+from gpca.rigid import inverse, log
 
 if TYPE_CHECKING:
     from gpca.explainers.pair_classifier import Judgment

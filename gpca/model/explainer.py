@@ -18,11 +18,10 @@ import torch
 from gpca.alignment.icp import Method, clipped_cost
 from gpca.alignment.methods.interface import Outcome, Pair
 from gpca.alignment.methods.registry import make_method
-from gpca.alignment.rigid import inverse, transform
-from gpca.attribution.scores import entropy
 from gpca.causes.policy import NOTHING, Decision, RecoveryPolicy
 from gpca.causes.settings import Limits
 from gpca.causes.truth import NOMINAL
+from gpca.classifier.scores import entropy
 from gpca.encoders.training import best_device
 from gpca.errors import InputError
 from gpca.model.clouds import OR_SCANS, Clouds, voids_of
@@ -34,6 +33,7 @@ from gpca.model.location import model_path
 from gpca.model.scene import Scene
 from gpca.objects.canonical_frame import CanonicalFrame, thin
 from gpca.objects.surface import as_points
+from gpca.rigid import inverse, transform
 from gpca.seeds import generator, seed_of
 from gpca.uncertainty.estimators.interface import Estimate, RegisteredPair
 from gpca.uncertainty.estimators.registry import make_estimator

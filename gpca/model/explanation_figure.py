@@ -7,12 +7,12 @@ from textwrap import fill, wrap
 
 import numpy as np
 
-from gpca.alignment.rigid import transform
 from gpca.causes.truth import BY_SIZE
 from gpca.model.explanation import Explanation
 from gpca.model.scene import Scene, distances, taken_out
 from gpca.reporting.figures import style
 from gpca.reporting.figures.cloud_views import thinned, widest_views
+from gpca.rigid import transform
 
 HEIGHT_IN = 5.0
 POINTS = 1500  # of each cloud; more hide one another

@@ -19,7 +19,6 @@ import numpy as np
 from scipy.special import expit
 
 from gpca.alignment.pose_error import displacements
-from gpca.alignment.rigid import inverse, require_rigid, transform
 from gpca.causes.policy import NOTHING, TREATMENTS
 from gpca.causes.settings import OBSERVED, CauseSettings
 from gpca.causes.truth import FAILED, NOMINAL
@@ -38,6 +37,7 @@ from gpca.reenactment.hypotheses import INDEPENDENT, weights_of
 from gpca.reenactment.scans import reenact_scan
 from gpca.reenactment.settings import STEEPNESS, ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface
+from gpca.rigid import inverse, require_rigid, transform
 
 OUTSIDE = 0.01  # share of the target's points on either side that its extent ignores
 FEWEST_VOXELS = 64

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 
-from gpca.alignment.rigid import transform
 from gpca.causes.candidate import Registrar, Unmeasurable
 from gpca.causes.settings import CauseSettings
 from gpca.causes.truth import BY_SIZE, SUBSETS
@@ -18,6 +17,7 @@ from gpca.objects.canonical_frame import CanonicalFrame
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reenactment.enactment import Enactment
 from gpca.reenactment.hypotheses import weights_of
+from gpca.rigid import transform
 
 ASSETS = Path(__file__).with_name("assets")  # style and script of the view
 MOST_POINTS = 3000  # per cloud; more points hide one another

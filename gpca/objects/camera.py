@@ -9,12 +9,12 @@ from typing import Annotated
 
 import numpy as np
 
-from gpca.alignment.rigid import rigid_motion, rotate
 from gpca.errors import InputError
 from gpca.objects import mesh_folder
 from gpca.objects.canonical import bounding_center
 from gpca.objects.surface import Surface
 from gpca.process.environment import require_open3d
+from gpca.rigid import rigid_motion, rotate
 from gpca.seeds import generator
 from gpca.settings import Bounds, Positive
 

@@ -14,11 +14,11 @@ from gpca.alignment.icp import ICPSettings
 from gpca.causes.settings import CauseSettings
 from gpca.errors import InputError
 from gpca.io.files import whole_file
+from gpca.jobs.provenance import sha256_of_settings
 from gpca.model.scene import ASSETS
 from gpca.page.comparison import page_comparison
 from gpca.page.findings import Titles, findings_of
 from gpca.page.samples import CAUSES_RULE, POINTS, RULE, cause_samples, page_samples
-from gpca.process.provenance import sha256_of_settings
 from gpca.reporting.registry import SUFFIXES, by_section
 
 TEMPLATES = Path(__file__).parent / "templates"

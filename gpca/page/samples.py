@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 
-from gpca.alignment.rigid import inverse, transform
 from gpca.attribution.predictions import concepts_of, read_predictions
 from gpca.causes.candidate import replay
 from gpca.causes.dataset import Causes
@@ -20,6 +19,7 @@ from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.figures.cloud_views import thinned
+from gpca.rigid import inverse, transform
 from gpca.seeds import seed_of_file
 
 OF_EACH_CONCEPT = 2  # samples in every source

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from gpca.alignment.rigid import inverse, scale_translation, transform
 from gpca.errors import InputError
 from gpca.io.arrays import REAL, TEXT, WHOLE, load_arrays
 from gpca.io.container import Container, array, require_same_samples
@@ -17,6 +16,7 @@ from gpca.io.csv_file import numbers, read_csv
 from gpca.io.files import SPLITS
 from gpca.objects.canonical import LARGEST_DIAMETER_M, SMALLEST_DIAMETER_M
 from gpca.pairs.perturbation import CONCEPTS
+from gpca.rigid import inverse, scale_translation, transform
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -7,11 +7,11 @@ from functools import partial
 import numpy as np
 
 from gpca.alignment.pose_error import displacements
-from gpca.alignment.rigid import inverse, log
 from gpca.pairs import distances as measured
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.distances import LEVELS, MatchedPair, ObservedPair
 from gpca.process.progress import progress
+from gpca.rigid import inverse, log
 from gpca.seeds import generator
 
 QUANTILES = len(LEVELS)

@@ -13,8 +13,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from gpca.alignment.icp import ICPSettings, clipped_cost
-from gpca.alignment.rigid import inverse
 from gpca.pairs.dataset import Registrations
+from gpca.rigid import inverse
 
 LEVELS = np.array([0.01, *np.arange(1, 12) / 12, 0.99])  # of quantiles; the very ends belong to single points
 NEIGHBORS = 12  # that span a local plane

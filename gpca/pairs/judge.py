@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from gpca.alignment.pose_error import JUDGED_POINTS, PoseErrors
-from gpca.alignment.rigid import inverse
 from gpca.errors import InputError
 from gpca.objects.bop import angle_up_to_symmetry, find_symmetries
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations
+from gpca.rigid import inverse
 
 
 class Judge:

@@ -13,8 +13,8 @@ from typing import Annotated, Literal, get_args
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from gpca.alignment.rigid import inverse, random_direction, rigid_motion, transform
 from gpca.errors import InputError
+from gpca.rigid import inverse, random_direction, rigid_motion, transform
 from gpca.settings import Bounds, Share
 
 Concept = Literal["noise", "pose", "overlap"]

@@ -10,7 +10,6 @@ import numpy as np
 
 from gpca.alignment.features import estimate_normals
 from gpca.alignment.icp import ICP, ICPSettings
-from gpca.alignment.rigid import inverse, scale_translation, transform
 from gpca.errors import InputError
 from gpca.io.files import SPLITS, Axes
 from gpca.objects.canonical import ObjectClouds
@@ -18,6 +17,7 @@ from gpca.pairs.dataset import REGISTRATION_COLUMNS, Registrations, ragged
 from gpca.pairs.perturbation import CONCEPTS, PERTURBATIONS, SEVERITIES, Perturbed, Severities
 from gpca.process.environment import require_open3d
 from gpca.process.progress import progress
+from gpca.rigid import inverse, scale_translation, transform
 from gpca.seeds import generator
 from gpca.settings import Bounds
 

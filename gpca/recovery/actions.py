@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpca.alignment.icp import clipped_cost
-from gpca.alignment.rigid import inverse, rigid_motion, rotation_angle_rad, scale_translation
 from gpca.errors import require_known
 from gpca.frames.shots import Shot, agreement, fuse
+from gpca.rigid import inverse, rigid_motion, rotation_angle_rad, scale_translation
 from gpca.settings import require_arguments
 
 if TYPE_CHECKING:

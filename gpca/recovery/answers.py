@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gpca.attribution.scores import Attribution
+from gpca.classifier.scores import Attribution
 from gpca.encoders.registry import EncoderSettings
 from gpca.encoders.training import embed, train_encoder
 from gpca.explainers.registry import explainer_entry

@@ -14,7 +14,6 @@ import numpy as np
 
 from gpca.alignment.icp import ICPSettings
 from gpca.alignment.pose_error import JUDGED_POINTS, pose_error
-from gpca.alignment.rigid import inverse, scale_translation, transform
 from gpca.errors import InputError
 from gpca.frames.shots import fuse
 from gpca.frames.situations import Situation, Situations
@@ -23,6 +22,7 @@ from gpca.pairs.synthesis import align_pair
 from gpca.process.progress import progress
 from gpca.recovery.actions import FEWEST_POINTS, Action, Holding, Robot, observe
 from gpca.recovery.settings import LoopSettings
+from gpca.rigid import inverse, scale_translation, transform
 from gpca.seeds import generator
 
 POSE = "pose"  # the cause that disturbs nothing but ICP's start

@@ -14,7 +14,6 @@ from time import perf_counter
 import numpy as np
 from scipy.special import expit
 
-from gpca.alignment.rigid import inverse, rotate, scale_translation, transform
 from gpca.causes.candidate import Counterfactuals, Registrar, Unmeasurable
 from gpca.causes.settings import CauseSettings
 from gpca.causes.truth import LARGEST_ERROR, SUBSETS, capped, shapley_values
@@ -25,6 +24,7 @@ from gpca.reenactment.enactment import NoiseScale, observe, rebuild, start_twist
 from gpca.reenactment.hypotheses import Hypothesis, find_hypotheses, weights_of
 from gpca.reenactment.settings import SMALLEST_ERROR, STEEPNESS, ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface
+from gpca.rigid import inverse, rotate, scale_translation, transform
 from gpca.seeds import generator
 
 OBSERVED_POINTS, MODEL_POINTS = 384, 768  # largest numbers of re-enacted points

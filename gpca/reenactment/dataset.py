@@ -11,7 +11,6 @@ import numpy as np
 from scipy.special import expit
 
 from gpca.alignment.pose_error import displacements
-from gpca.alignment.rigid import transform
 from gpca.causes.dataset import LABELS, Causes
 from gpca.causes.descriptors import WIDTHS, describe_plainly, observed_pair
 from gpca.causes.settings import CauseSettings, Limits
@@ -25,6 +24,7 @@ from gpca.process.progress import progress
 from gpca.reenactment.enactment import Enactment, reenact
 from gpca.reenactment.hypotheses import weights_of
 from gpca.reenactment.settings import SMALLEST_ERROR, STEEPNESS, ReenactmentSettings
+from gpca.rigid import transform
 
 
 def verdict(error_S_K_8: np.ndarray, weight_S_K: np.ndarray, limits: Limits) -> np.ndarray:

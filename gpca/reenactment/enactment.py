@@ -14,7 +14,6 @@ from time import perf_counter
 
 import numpy as np
 
-from gpca.alignment.rigid import inverse, transform
 from gpca.causes.candidate import Candidate, Counterfactuals, Registrar, Unmeasurable
 from gpca.causes.settings import CauseSettings
 from gpca.causes.truth import LARGEST_ERROR, SUBSETS, shapley_values
@@ -22,6 +21,7 @@ from gpca.pairs.distances import ObservedPair
 from gpca.reenactment.hypotheses import Hypothesis, find_hypotheses
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface, covered_points, trimmed_square
+from gpca.rigid import inverse, transform
 from gpca.seeds import generator
 
 NOISES = np.array([0.0, 0.01, 0.02, 0.03, 0.045, 0.06, 0.08, 0.11])  # diameters, that are simulated

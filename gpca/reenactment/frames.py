@@ -13,7 +13,6 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import cKDTree
 
-from gpca.alignment.rigid import inverse, scale_translation, transform
 from gpca.causes.candidate import Candidate
 from gpca.causes.dataset import Causes
 from gpca.causes.frames import candidate_of_view, outline, subjects_of
@@ -33,6 +32,7 @@ from gpca.reenactment.hypotheses import Hypothesis
 from gpca.reenactment.mixture import LARGEST_WIDTH, Anchor, Mixture
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface
+from gpca.rigid import inverse, scale_translation, transform
 from gpca.seeds import generator
 
 SURFACE_POINTS = 512  # of the whole object, in which the search looks for what was observed

@@ -17,10 +17,10 @@ from scipy.spatial.transform import Rotation
 
 from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.icp import ICPSettings, clipped_cost
-from gpca.alignment.rigid import inverses, rigid_motion, rotate, rotation_angle_rad, transform
 from gpca.reenactment.mixture import Anchor, Fits, Mixture
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface, share_within
+from gpca.rigid import inverses, rigid_motion, rotate, rotation_angle_rad, transform
 
 # How many rotations, up to which angle (degrees), and whether about the cloud's own center or that of its frame. Where
 # surface is missing, the center of what was observed is not the object's; where the start is off, the frame's is not.

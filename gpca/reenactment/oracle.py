@@ -7,12 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from gpca.alignment.rigid import inverse, transform
-from gpca.attribution.scores import Attribution
 from gpca.causes.candidate import Candidate, drawn_again
 from gpca.causes.dataset import LABELS, Causes
 from gpca.causes.descriptors import observed_pair
 from gpca.causes.settings import CauseSettings
+from gpca.classifier.scores import Attribution
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.distances import ObservedPair
 from gpca.pairs.perturbation import NOISE, OVERLAP, POSE
@@ -22,6 +21,7 @@ from gpca.reenactment.enactment import Enactment, NoiseScale, enact, reenact, re
 from gpca.reenactment.hypotheses import hypothesis_at, weights_of
 from gpca.reenactment.settings import KNOWN, ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface
+from gpca.rigid import inverse, transform
 from gpca.seeds import generator
 
 

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gpca.alignment.rigid import inverse, transform
 from gpca.causes.dataset import Causes
 from gpca.causes.scans import OverlapErrors, ScanCandidate
 from gpca.causes.settings import FEWEST_POINTS, CauseSettings
@@ -20,6 +19,7 @@ from gpca.reenactment.enactment import QUIET, Enactment, NoiseScale, register, s
 from gpca.reenactment.hypotheses import Hypothesis, find_hypotheses
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface
+from gpca.rigid import inverse, transform
 from gpca.scans.pair import near
 from gpca.seeds import generator
 

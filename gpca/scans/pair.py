@@ -10,8 +10,8 @@ from typing import Annotated, Literal
 import numpy as np
 from scipy.spatial import cKDTree
 
-from gpca.alignment.rigid import random_direction, require_rigid, rigid_motion, rotate, transform
 from gpca.errors import InputError
+from gpca.rigid import random_direction, require_rigid, rigid_motion, rotate, transform
 from gpca.seeds import generator
 from gpca.settings import Bounds, NotNegative, Positive, PositiveShare
 

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-from gpca.alignment.rigid import inverse, transform
 from gpca.errors import InputError
 from gpca.io.arrays import TEXT, WHOLE
 from gpca.io.container import FLAG, Container, array
+from gpca.rigid import inverse, transform
 from gpca.scans.pair import ROOM_M, VOXEL_M, Kind, ScanPair, overlap_of_voxels, voxels
 from gpca.seeds import generator
 

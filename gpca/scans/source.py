@@ -16,7 +16,6 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from gpca.alignment.rigid import require_rigid, scale_translation
 from gpca.errors import InputError
 from gpca.io.arrays import REAL, load_arrays
 from gpca.io.csv_file import ANY, numbers, read_csv
@@ -26,6 +25,7 @@ from gpca.objects.canonical import require_points
 from gpca.objects.entry import Place, Text, Unit
 from gpca.objects.mesh_folder import meters_per, read_surface
 from gpca.objects.source import places_of
+from gpca.rigid import require_rigid, scale_translation
 from gpca.scans.pair import Kind
 from gpca.scans.scene import Known, Scan, Scene
 from gpca.seeds import generator

@@ -15,11 +15,11 @@ from gpca.active_learning.stream import run_stream
 from gpca.encoders.registry import EncoderSettings
 from gpca.errors import require_known
 from gpca.io.arrays import save_arrays
+from gpca.jobs.job import Job
+from gpca.jobs.provenance import record_provenance
 from gpca.pairs.dataset import Registrations, load_embeddings, read_embedding
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.process.job import Job
 from gpca.process.progress import progress
-from gpca.process.provenance import record_provenance
 from gpca.settings import read_settings
 
 NEW = "overlap"  # the paper's new concept, also learned where it is rare

@@ -14,11 +14,11 @@ from gpca.causes.settings import CauseSettings, DescriptorSettings
 from gpca.encoders.registry import EncoderSettings
 from gpca.io.arrays import save_arrays
 from gpca.io.csv_file import write_csv
+from gpca.jobs.job import Job
+from gpca.jobs.provenance import record_provenance
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.process.job import Job
-from gpca.process.provenance import record_provenance
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.settings import read_settings
 

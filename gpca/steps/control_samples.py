@@ -14,17 +14,17 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 import numpy as np
 
 from gpca.alignment.icp import ICPSettings
-from gpca.alignment.rigid import inverse
 from gpca.encoders.registry import OF_ANY_SIZE, EncoderSettings
 from gpca.errors import InputError
 from gpca.io.arrays import save_arrays
 from gpca.io.csv_file import write_csv
+from gpca.jobs.job import Job
+from gpca.jobs.provenance import record_provenance
 from gpca.objects.canonical import ObjectClouds, unseen
 from gpca.objects.surface import instance_of
 from gpca.pairs.dataset import Registrations, ragged
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.process.job import Job
-from gpca.process.provenance import record_provenance
+from gpca.rigid import inverse
 from gpca.seeds import generator
 from gpca.settings import Bounds, Count, Different, Distinct, read_settings
 

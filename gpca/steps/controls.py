@@ -15,18 +15,18 @@ import pandas as pd
 
 from gpca.alignment.icp import ICPSettings
 from gpca.attribution.predictions import prediction_frame
-from gpca.attribution.scores import Attribution
+from gpca.classifier.scores import Attribution
 from gpca.encoders.registry import EncoderSettings
 from gpca.encoders.training import embed, load_model
 from gpca.explainers.gpca import GPCA_FORMS
 from gpca.explainers.interface import BARE, Describing, Encoding
 from gpca.explainers.registry import Embed, Rival, described_for, make_rivals
 from gpca.io.csv_file import write_csv
+from gpca.jobs.job import Job
+from gpca.jobs.provenance import record_provenance
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.process.job import Job
-from gpca.process.provenance import record_provenance
 from gpca.settings import read_settings
 from gpca.steps import control_samples as samples
 from gpca.steps.control_samples import HARD, LABELS, PAPER, RELABELED, RETRAINED, SEEN, TRANSFER, UNSEEN

@@ -12,19 +12,19 @@ import numpy as np
 
 from gpca.alignment.icp import ICPSettings
 from gpca.attribution.predictions import prediction_frame, read_timings, write_predictions, write_timings
-from gpca.attribution.scores import Attribution
 from gpca.causes.dataset import LABELS, Causes, labeled, observed_only
 from gpca.causes.descriptors import Descriptors, describe_all
 from gpca.causes.settings import DescriptorSettings
 from gpca.causes.truth import BORDERLINE
+from gpca.classifier.scores import Attribution
 from gpca.encoders.registry import EncoderSettings
 from gpca.errors import InputError
 from gpca.explainers.interface import BARE, REENACTED, ConceptExplainer, ExplainerEntry, icp_calls
 from gpca.explainers.registry import CAUSES, explainer_entry
 from gpca.io.csv_file import write_csv
+from gpca.jobs.job import Job
+from gpca.jobs.provenance import record_provenance
 from gpca.pairs.dataset import Registrations, read_embedding
-from gpca.process.job import Job
-from gpca.process.provenance import record_provenance
 from gpca.reenactment.dataset import Reenactments, reenactment_features
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.seeds import seed_of_file

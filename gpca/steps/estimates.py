@@ -19,18 +19,18 @@ import numpy as np
 
 from gpca.alignment.methods.interface import Pair
 from gpca.alignment.methods.registry import make_method
-from gpca.alignment.rigid import inverse, point_jacobians, transform
 from gpca.causes.candidate import drawn_again
 from gpca.causes.dataset import Causes
 from gpca.causes.descriptors import observed_pair
 from gpca.causes.settings import CauseSettings
 from gpca.errors import InputError
 from gpca.io.csv_file import write_csv
+from gpca.jobs.job import Job
+from gpca.jobs.provenance import record_provenance
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.judge import Judges
-from gpca.process.job import Job
 from gpca.process.progress import progress
-from gpca.process.provenance import record_provenance
+from gpca.rigid import inverse, point_jacobians, transform
 from gpca.seeds import generator, seed_of
 from gpca.steps.references import Redraws, Reference, draw_twists
 from gpca.uncertainty import estimates
@@ -199,18 +199,21 @@ def try_estimators(
         raise InputError(f"causes of {situations.source}", "have no test samples", "raise causes.test")
     for method, wanted in settings.methods.items():
         own = Registering(situations, method, settings)
-        lessons = {"": (own, situations.causes.rows("train"))}
+        training_sets = {"": (own, situations.causes.rows("train"))}
         if method == most_tested(settings):
-            lessons[f"_{estimates.MILD}"] = own, mild(situations, situations.causes.rows("train"))
+            training_sets[f"_{estimates.MILD}"] = own, mild(situations, situations.causes.rows("train"))
             if other is not None:
-                lessons[f"_{estimates.OTHER_SOURCE}"] = Registering(other, method, settings), other.causes.rows("train")
+                training_sets[f"_{estimates.OTHER_SOURCE}"] = (
+                    Registering(other, method, settings),
+                    other.causes.rows("train"),
+                )
         examples = {
             shift: [by.example(row) for row in spaced(of, settings.train)] if learners else []
-            for shift, (by, of) in lessons.items()
+            for shift, (by, of) in training_sets.items()
         }
         trained = {name: make_estimator(name, entry, examples[""]) for name, entry in estimators.items()}
         for name in learners:
-            for shift in list(lessons)[1:]:
+            for shift in list(training_sets)[1:]:
                 trained[f"{name}{shift}"] = make_estimator(name, estimators[name], examples[shift])
         for row in progress(
             spaced(tested, wanted), f"estimators on {situations.source}, seed {situations.seed}, {method}"

@@ -9,21 +9,21 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 
 from gpca.alignment.methods.registry import make_method
-from gpca.alignment.rigid import scale_translation, transform
 from gpca.attribution.predictions import prediction_frame
-from gpca.attribution.scores import Attribution
+from gpca.classifier.scores import Attribution
 from gpca.encoders.registry import EncoderSettings
 from gpca.errors import InputError
 from gpca.explainers.registry import Embed, Rival, described_for, explainer_entry, make_rivals
 from gpca.io.csv_file import write_csv
 from gpca.io.files import SPLITS
+from gpca.jobs.job import Job
+from gpca.jobs.provenance import record_provenance
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations, ragged
 from gpca.pairs.judge import Judges
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.process.job import Job
 from gpca.process.progress import progress
-from gpca.process.provenance import record_provenance
+from gpca.rigid import scale_translation, transform
 from gpca.settings import Bounds, Count, Distinct, read_settings
 from gpca.steps.registration_trials import pair_to_register
 from gpca.uncertainty.designs import ADDITIVE_KNOBS

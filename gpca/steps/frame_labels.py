@@ -18,11 +18,11 @@ from gpca.active_learning.settings import (
     RetrainingSettings,
 )
 from gpca.explainers.pair_classifier import NormalizedFeatures
+from gpca.jobs.job import Job
+from gpca.jobs.provenance import record_provenance
 from gpca.pairs.dataset import Registrations, load_embeddings
 from gpca.pairs.description import describe_registrations
-from gpca.process.job import Job
 from gpca.process.progress import progress
-from gpca.process.provenance import record_provenance
 from gpca.settings import fields_of, read_settings
 
 

@@ -11,9 +11,9 @@ from gpca.causes.dataset import Causes
 from gpca.causes.settings import CauseSettings, FrameCauseSettings
 from gpca.errors import InputError
 from gpca.io.csv_file import write_csv
+from gpca.jobs.job import Job
+from gpca.jobs.provenance import record_provenance
 from gpca.objects.canonical import EVALUATION, ObjectClouds, sample_objects
-from gpca.process.job import Job
-from gpca.process.provenance import record_provenance
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.settings import read_settings
 

@@ -22,11 +22,11 @@ from gpca.classifier.settings import GPCSettings
 from gpca.encoders.registry import EncoderSettings
 from gpca.io.arrays import save_arrays
 from gpca.io.csv_file import write_csv
+from gpca.jobs.job import Job
+from gpca.jobs.provenance import record_provenance
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.process.job import Job
 from gpca.process.progress import progress
-from gpca.process.provenance import record_provenance
 from gpca.seeds import generator
 from gpca.settings import Bounds, Distinct, OpenShare
 

@@ -29,10 +29,10 @@ from gpca.io.arrays import REGENERATE
 from gpca.io.container import REGENERATE_BOTH, require_same_samples
 from gpca.io.csv_file import ANY, read_csv
 from gpca.io.files import Axes
+from gpca.jobs.job import Job
+from gpca.jobs.provenance import record_provenance
 from gpca.objects.canonical import BY_ICP
 from gpca.pairs.dataset import Registrations
-from gpca.process.job import Job
-from gpca.process.provenance import record_provenance
 from gpca.reenactment.dataset import Reenactments, reenactment_features
 from gpca.seeds import generator, seed_of_file
 

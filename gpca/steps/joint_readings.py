@@ -26,13 +26,13 @@ from gpca.errors import InputError
 from gpca.evaluation.measures import ALL, read_all_metrics, tidy, write_metrics
 from gpca.explainers.registry import explainer_entry
 from gpca.io.csv_file import finite_number, write_csv
+from gpca.jobs.job import Job
+from gpca.jobs.provenance import record_provenance
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.shifted_sets import DISTANCES, ShiftedSets
 from gpca.pairs.synthesis import RegistrationSettings, make_registrations
-from gpca.process.job import Job
 from gpca.process.progress import progress
-from gpca.process.provenance import record_provenance
 from gpca.seeds import seed_of_file
 from gpca.steps.readings.files import RunFiles, accuracies, diagnostics_of_scores, like_the_training, train_and_test
 from gpca.steps.readings.gpc_start import FITTED, StartedGPC, of_unit_norm, relevant

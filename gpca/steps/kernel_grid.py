@@ -9,14 +9,14 @@ import numpy as np
 
 from gpca.attribution.diagnostics import calibration_error, negative_log_likelihood
 from gpca.attribution.predictions import prediction_frame
-from gpca.attribution.scores import Attribution
+from gpca.classifier.scores import Attribution
 from gpca.classifier.settings import Draws, GPCSettings, Kernel, LearningRate
 from gpca.errors import InputError
 from gpca.io.csv_file import write_csv
+from gpca.jobs.job import Job
+from gpca.jobs.provenance import record_provenance
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.process.job import Job
-from gpca.process.provenance import record_provenance
 from gpca.settings import Count, Different, Distinct, fields_of
 
 if TYPE_CHECKING:

@@ -10,23 +10,23 @@ import numpy as np
 
 from gpca.alignment.icp import ICPSettings
 from gpca.attribution.predictions import prediction_frame
-from gpca.attribution.scores import Attribution
 from gpca.causes.dataset import LABELS, Causes, labels_of
 from gpca.causes.descriptors import WIDTHS, Descriptors, describe_motion, describe_starts, observed_pair
 from gpca.causes.drawing import apportion, draw_further
 from gpca.causes.judged import CEILING, Judged, ceiling_of, judged_by, measure
 from gpca.causes.settings import CauseSettings
 from gpca.causes.truth import BORDERLINE, GEOMETRY
+from gpca.classifier.scores import Attribution
 from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
 from gpca.io.arrays import TEXT
 from gpca.io.container import Container, array
 from gpca.io.csv_file import write_csv
+from gpca.jobs.job import Job
+from gpca.jobs.provenance import record_provenance
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.distances import describe_distances
-from gpca.process.job import Job
 from gpca.process.progress import progress
-from gpca.process.provenance import record_provenance
 from gpca.seeds import generator, seed_of
 from gpca.settings import Bounds, Count, Distinct, read_settings
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from gpca.alignment.icp import ICPSettings
-from gpca.attribution.scores import Attribution
+from gpca.classifier.scores import Attribution
 from gpca.evaluation.measures import ALL, tidy, write_metrics
 from gpca.explainers.registry import explainer_entry
+from gpca.jobs.job import Job
+from gpca.jobs.provenance import record_provenance
 from gpca.pairs.dataset import Registrations
-from gpca.process.job import Job
 from gpca.process.progress import progress
-from gpca.process.provenance import record_provenance
 from gpca.uncertainty.designs import LiveUncertainty, design_rows
 from gpca.uncertainty.interventions import MIDDLE, UNTOUCHED, Knobs
 from gpca.uncertainty.outcomes import Outcomes

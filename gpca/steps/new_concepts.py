@@ -24,13 +24,13 @@ from gpca.causes.truth import BORDERLINE, GEOMETRY, NOMINAL
 from gpca.encoders.registry import EncoderSettings
 from gpca.encoders.training import embed, load_model
 from gpca.explainers.pair_classifier import NormalizedFeatures
+from gpca.jobs.job import Job
+from gpca.jobs.provenance import record_provenance
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.pairs.description import describe_registrations
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.process.job import Job
 from gpca.process.progress import progress
-from gpca.process.provenance import record_provenance
 from gpca.settings import read_settings
 
 

@@ -13,10 +13,10 @@ from gpca.encoders.registry import EncoderSettings
 from gpca.errors import InputError
 from gpca.io.arrays import REAL, REGENERATE, TEXT, WHOLE, load_arrays, save_arrays
 from gpca.io.csv_file import write_csv
+from gpca.jobs.job import Job
+from gpca.jobs.provenance import record_provenance
 from gpca.objects.canonical import ObjectClouds, write_objects
 from gpca.pairs.dataset import Registrations, read_embedding, read_instances_of
-from gpca.process.job import Job
-from gpca.process.provenance import record_provenance
 
 EARLIER = ("earlier_seconds", "earlier_icp_seconds")  # spent before an explainer starts
 

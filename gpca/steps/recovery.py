@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gpca.alignment.rigid import inverse
 from gpca.errors import InputError
 from gpca.frames.dataset import simplified
 from gpca.frames.initial_pose import InitialPoseSettings
@@ -21,15 +20,15 @@ from gpca.frames.situations import REDRAWS, Shelf, Situation, Situations
 from gpca.io.arrays import save_arrays
 from gpca.io.csv_file import write_csv
 from gpca.io.files import Axes, whole_file
+from gpca.jobs.job import Job
+from gpca.jobs.provenance import record_provenance
 from gpca.objects.camera import MeshScene, shade
 from gpca.objects.source import data_files, resolve, surfaces
 from gpca.objects.surface import Surface
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.pairs.synthesis import as_registrations
-from gpca.process.job import Job
 from gpca.process.progress import progress
-from gpca.process.provenance import record_provenance
 from gpca.recovery.actions import FEWEST_POINTS, Action, Robot, action_of, look_around
 from gpca.recovery.answers import learn_explainers
 from gpca.recovery.chances import learn_utility
@@ -47,6 +46,7 @@ from gpca.recovery.rehearsal import (
     summary,
 )
 from gpca.recovery.settings import LoopSettings, RecoverySettings
+from gpca.rigid import inverse
 from gpca.seeds import generator
 
 if TYPE_CHECKING:

@@ -19,10 +19,10 @@ import numpy as np
 from gpca.alignment.icp import ICPSettings
 from gpca.alignment.methods.interface import CORRESPONDENCE_DISTANCE, MAX_ITERATIONS, Pair
 from gpca.alignment.methods.registry import make_method
-from gpca.alignment.rigid import exp, transform
 from gpca.causes.candidate import Candidate
 from gpca.causes.settings import FEWEST_POINTS
 from gpca.pairs.perturbation import within_half_space
+from gpca.rigid import exp, transform
 from gpca.seeds import generator
 from gpca.uncertainty.estimates import Kind
 from gpca.uncertainty.estimators.analytic import sample

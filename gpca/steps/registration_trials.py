@@ -18,13 +18,13 @@ from gpca.alignment.methods.interface import Outcome, Pair
 from gpca.alignment.methods.registry import make_method, method_entry, require_global
 from gpca.errors import InputError
 from gpca.io.csv_file import write_csv
+from gpca.jobs.job import Job
+from gpca.jobs.provenance import record_provenance
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.judge import Judges
 from gpca.pairs.perturbation import SEVERITIES
-from gpca.process.job import Job
 from gpca.process.progress import progress
-from gpca.process.provenance import record_provenance
 from gpca.seeds import generator, seed_of
 from gpca.settings import Bounds
 

@@ -17,21 +17,21 @@ from gpca.active_learning.rounds import LabelingTask, initial_gpc, make_task, po
 from gpca.active_learning.settings import ActiveLearningSettings
 from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.icp import ICP
-from gpca.alignment.rigid import transform
-from gpca.attribution.scores import summarize_draws
 from gpca.classifier.gpc import GPC
 from gpca.classifier.latents import Projection
+from gpca.classifier.scores import summarize_draws
 from gpca.evaluation.runtime_file import COMPONENTS, RUNTIME_COLUMNS
 from gpca.io.csv_file import write_csv
+from gpca.jobs.job import Job
+from gpca.jobs.provenance import record_provenance
 from gpca.model.explainer import Explainer
 from gpca.model.file import Model
 from gpca.objects.canonical import FEWEST_CLOUD_POINTS
 from gpca.objects.canonical_frame import CanonicalFrame
 from gpca.pairs.dataset import Registrations, read_embedding
-from gpca.process.job import Job
 from gpca.process.processor import cpu_name
 from gpca.process.progress import progress
-from gpca.process.provenance import record_provenance
+from gpca.rigid import transform
 from gpca.seeds import generator
 
 if TYPE_CHECKING:

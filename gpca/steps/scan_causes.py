@@ -16,24 +16,24 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpca.alignment.methods.registry import make_method
-from gpca.alignment.rigid import scale_translation
 from gpca.attribution.predictions import prediction_frame
-from gpca.attribution.scores import Attribution
 from gpca.causes.dataset import LABELS, Causes, labeled, observed_only
 from gpca.causes.descriptors import Descriptors, describe_all
 from gpca.causes.scans import GLOBAL, LADDER, ScanStart, measure_scans, motion_between
 from gpca.causes.settings import OBJECTS, OBSERVED, CauseSettings, DescriptorSettings, ScanSamples
 from gpca.causes.truth import BORDERLINE
+from gpca.classifier.scores import Attribution
 from gpca.errors import InputError
 from gpca.explainers.interface import REENACTED
 from gpca.explainers.registry import CAUSES, explainer_entry
 from gpca.io.csv_file import write_csv
+from gpca.jobs.job import Job
+from gpca.jobs.provenance import record_provenance
 from gpca.pairs.dataset import Registrations
-from gpca.process.job import Job
-from gpca.process.provenance import record_provenance
 from gpca.reenactment.dataset import Reenactments, reenactment_features
 from gpca.reenactment.scans import reenact_scans
 from gpca.reenactment.settings import ReenactmentSettings
+from gpca.rigid import scale_translation
 from gpca.scans.pair import Rung, ScanPair, ScanSuccess, disturbed
 from gpca.scans.scene import ScanPairs
 from gpca.seeds import generator

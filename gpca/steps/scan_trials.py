@@ -13,13 +13,13 @@ import numpy as np
 
 from gpca.alignment.methods.interface import Pair
 from gpca.alignment.methods.registry import make_method, require_global
-from gpca.alignment.rigid import inverse, rotation_angle_rad, scale_translation
 from gpca.errors import InputError
 from gpca.io.csv_file import write_csv
+from gpca.jobs.job import Job
+from gpca.jobs.provenance import record_provenance
 from gpca.process.environment import open3d_cloud, require_open3d
-from gpca.process.job import Job
 from gpca.process.progress import progress
-from gpca.process.provenance import record_provenance
+from gpca.rigid import inverse, rotation_angle_rad, scale_translation
 from gpca.scans.pair import Rung, ScanPair, disturbed, overlap_rmse, rungs_of, voxels
 from gpca.scans.scene import ScanPairs
 from gpca.seeds import generator, seed_of

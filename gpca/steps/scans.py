@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gpca.errors import InputError
-from gpca.process.job import Job
-from gpca.process.provenance import record_provenance
+from gpca.jobs.job import Job
+from gpca.jobs.provenance import record_provenance
 
 if TYPE_CHECKING:
     from gpca.scans.pair import ScanPair

@@ -18,13 +18,13 @@ from gpca.explainers.analytical_features import analytical_features
 from gpca.explainers.interface import ConceptExplainer
 from gpca.explainers.registry import explainer_entry
 from gpca.io.csv_file import write_csv
+from gpca.jobs.job import Job
+from gpca.jobs.provenance import record_provenance
 from gpca.objects.canonical import ObjectClouds, drawn, unseen
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.pairs.shifted_sets import SPACES, TRAINED_ON, ShiftedSets
 from gpca.pairs.synthesis import RegistrationSettings, make_registrations
-from gpca.process.job import Job
 from gpca.process.progress import progress
-from gpca.process.provenance import record_provenance
 from gpca.settings import Bounds, Count, OpenShare
 
 if TYPE_CHECKING:

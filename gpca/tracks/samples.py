@@ -31,7 +31,7 @@ from gpca.tracks.track import DEFAULT, Track
 LEARNED = ("cause_embeddings", "cause_encoders", "control_embeddings")  # their last digits depend on the processor
 # The process is limited before this module loads NumPy.
 _IN_PROCESS = (
-    "from gpca.process.job import keep_freed_memory; from gpca.process.processor import prepare; "
+    "from gpca.jobs.job import keep_freed_memory; from gpca.process.processor import prepare; "
     "prepare(1); keep_freed_memory(); from gpca.tracks.samples import run_recipe; run_recipe()"
 )
 
@@ -159,7 +159,7 @@ def _run(recipe: Recipe, folder: Path) -> None:
 
 def run_recipe() -> None:
     """Run the step that standard input describes, and exit as a job of the workflow does."""
-    from gpca.process.job import Job, as_process, call
+    from gpca.jobs.job import Job, as_process, call
 
     described = json.loads(sys.stdin.read())
     files = {name: Path(path) for name, path in described["files"].items()}

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpca.attribution.scores import Attribution
 from gpca.causes.dataset import LABELS
 from gpca.causes.judged import CEILING, SHARES, Judged, ceiling_of, counted, joined, judged_of, measure, ranking
 from gpca.causes.truth import BORDERLINE, NOMINAL
+from gpca.classifier.scores import Attribution
 from gpca.evaluation.intervals import Clustered, interval, weighted_mean
 from gpca.evaluation.measures import POOLED
 from gpca.experiments.scan_causes import CAUSES as SCAN_MEASURE

@@ -12,17 +12,17 @@ import numpy as np
 
 from gpca.alignment.icp import ICPSettings
 from gpca.attribution.predictions import read_predictions
-from gpca.attribution.scores import Attribution
 from gpca.causes.dataset import Causes, labeled
 from gpca.causes.settings import OBJECTS, DescriptorSettings
+from gpca.classifier.scores import Attribution
 from gpca.encoders.registry import EncoderSettings
 from gpca.errors import InputError
 from gpca.experiments.scan_causes import diagnosis_settings
 from gpca.explainers.interface import BARE, REENACTED, ExplainerEntry
 from gpca.explainers.registry import explainer_entry, make_rivals, require_settings
 from gpca.frames.source import REAL_WORLD
+from gpca.jobs.job import Job
 from gpca.pairs.dataset import Registrations, read_embedding
-from gpca.process.job import Job
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.settings import read_settings
 from gpca.steps.control_samples import HARD, ControlSettings

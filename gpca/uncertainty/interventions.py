@@ -17,9 +17,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from gpca.alignment.batched_icp import BatchedICP
-from gpca.alignment.rigid import random_direction, transform
 from gpca.errors import InputError
 from gpca.pairs.perturbation import within_half_space
+from gpca.rigid import random_direction, transform
 from gpca.uncertainty.settings import Remedies, UncertaintySettings
 from gpca.uncertainty.spread import Runs, Spread, run_from_starts, summarize_runs
 

@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 
 from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.icp import clipped_cost
-from gpca.alignment.rigid import exp, inverse, log, transform
+from gpca.rigid import exp, inverse, log, transform
 from gpca.uncertainty.settings import UncertaintySettings
 
 SMALLEST_RESIDUAL = 1e-6  # diameters; a cloud on itself counts as this far off, or the logarithm would be infinite

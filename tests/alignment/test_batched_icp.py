@@ -5,9 +5,9 @@ from scipy.spatial import cKDTree
 from gpca.alignment import batched_icp
 from gpca.alignment.batched_icp import BatchedICP, BatchedPlaneICP
 from gpca.alignment.icp import ICP, METHODS, ICPSettings
-from gpca.alignment.rigid import exp
 from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS, PERTURBATIONS, Severities
+from gpca.rigid import exp
 
 DEVIATION = np.array([0.1, 0.1, 0.1, 0.03, 0.03, 0.03])
 TO_PLANES = ICPSettings("point_to_plane")

@@ -2,7 +2,7 @@ import numpy as np
 
 from gpca.alignment.features import MOST_NEIGHBORS, RADIUS, estimate_normals, fpfh_of_pair, mutual_matches
 from gpca.alignment.methods.interface import Pair
-from gpca.alignment.rigid import exp, rotate, transform
+from gpca.rigid import exp, rotate, transform
 
 from .methods.pairs import clouds
 

@@ -5,11 +5,11 @@ from scipy.spatial.transform import Rotation
 
 from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.icp import ICP, ICPSettings
-from gpca.alignment.rigid import exp, inverse, transform
 from gpca.errors import InputError
 from gpca.objects.canonical import ObjectClouds, write_objects
 from gpca.objects.source import resolve, surfaces
 from gpca.pairs.perturbation import CONCEPTS, PERTURBATIONS, Severities
+from gpca.rigid import exp, inverse, transform
 from gpca.seeds import generator
 from tests.documents import ROOT
 

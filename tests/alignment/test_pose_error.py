@@ -3,7 +3,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from gpca.alignment.pose_error import PoseErrors, adds_error, displacements, pose_error
-from gpca.alignment.rigid import transform
+from gpca.rigid import transform
 
 
 def pose(angle_deg=0.0, axis="z", shift=(0.0, 0.0, 0.0)):

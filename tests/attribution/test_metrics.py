@@ -70,7 +70,7 @@ def test_collect_is_tidy_and_looks_at_test_rows_only(tmp_path):
 def test_what_the_suite_writes_is_collected(tmp_path):
     # The writer's own frame, so that the two ends of the prediction file cannot drift apart.
     from gpca.attribution.predictions import write_predictions
-    from gpca.attribution.scores import Attribution
+    from gpca.classifier.scores import Attribution
 
     scores = np.array([[0.7, 0.2, 0.1], [0.1, 0.8, 0.1]])
     abstained = np.array([False, True])

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from gpca.attribution.predictions import read_predictions, read_timings, write_predictions, write_timings
-from gpca.attribution.scores import Attribution
+from gpca.classifier.scores import Attribution
 from gpca.errors import InputError
 from gpca.io.csv_file import ANY, read_csv
 from gpca.pairs.perturbation import CONCEPTS

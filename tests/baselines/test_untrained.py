@@ -5,11 +5,11 @@ import pytest
 
 from baselines.gates import GATES, NominalThreshold, motion_alarm
 from baselines.untrained import CAUSE_EXPLAINERS, EXPLAINERS
-from gpca.alignment.rigid import rigid_motion
 from gpca.causes.dataset import LABELS
 from gpca.causes.settings import MOTION
 from gpca.pairs.dataset import ragged
 from gpca.pairs.perturbation import CONCEPTS
+from gpca.rigid import rigid_motion
 
 
 def explained(registrations, name, of=EXPLAINERS, train=None, **settings):

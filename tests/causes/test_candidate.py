@@ -7,13 +7,13 @@ from scipy.spatial import KDTree
 from baselines.untrained import Rule
 from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.pose_error import PoseErrors, pose_error
-from gpca.alignment.rigid import exp, inverse, rotation_angle_rad
 from gpca.causes.candidate import Counterfactuals, Registrar, Unmeasurable, draw_applied, draw_candidate, redrawn
 from gpca.causes.dataset import labels_of
 from gpca.causes.drawing import draw_causes
 from gpca.causes.settings import CauseSettings, CauseSeverities, Small
 from gpca.config.layers import with_defaults
 from gpca.pairs.perturbation import CONCEPTS
+from gpca.rigid import exp, inverse, rotation_angle_rad
 from gpca.uncertainty.spread import divergence
 
 SETTINGS = CauseSettings(severities=CauseSeverities(outliers=(0.1, 0.2)))

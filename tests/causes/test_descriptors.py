@@ -6,7 +6,6 @@ from scipy.spatial.transform import Rotation
 
 import gpca.causes.descriptors as module
 from gpca.alignment.batched_icp import BatchedICP
-from gpca.alignment.rigid import inverse, scale_translation, transform
 from gpca.causes.descriptors import (
     COLUMNS,
     EVERYTHING,
@@ -27,6 +26,7 @@ from gpca.causes.descriptors import (
 from gpca.causes.settings import GROUPS, MOTION, QUANTILES, REMEDIED, DescriptorSettings
 from gpca.causes.truth import ALL
 from gpca.errors import InputError
+from gpca.rigid import inverse, scale_translation, transform
 from tests.pairs.conftest import FEW, ICP
 
 

@@ -4,13 +4,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gpca.alignment.rigid import inverse, rotation_angle_rad, transform
 from gpca.causes import drawing
 from gpca.causes.candidate import Registrar, Unmeasurable
 from gpca.causes.drawing import Quotas, Tally, apportion, draw_causes, draw_geometry, group_of
 from gpca.causes.settings import CauseSettings, CauseSeverities, Limits, Shares
 from gpca.causes.truth import Truth
 from gpca.errors import InputError
+from gpca.rigid import inverse, rotation_angle_rad, transform
 from gpca.uncertainty.settings import FEWEST_STARTS
 
 from ..conftest import FEW_CAUSES as FEW

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from gpca.alignment.rigid import rigid_motion, transform
 from gpca.causes.candidate import Registrar
 from gpca.causes.scans import (
     GLOBAL,
@@ -22,6 +21,7 @@ from gpca.causes.scans import (
 from gpca.causes.settings import OBSERVED, CauseSettings
 from gpca.causes.truth import ALL, FAILED, GEOMETRY, NONE
 from gpca.errors import InputError
+from gpca.rigid import rigid_motion, transform
 from gpca.scans.pair import ScanSuccess, overlap_rmse
 from tests.scans.corner import corner_pair, start_off
 

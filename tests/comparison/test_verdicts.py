@@ -29,8 +29,8 @@ from gpca.comparison.verdicts import (
     printed_of,
     verdict_of,
 )
+from gpca.declarations.registry import experiments
 from gpca.errors import InputError
-from gpca.experiments.registry import experiments
 from gpca.process.code_files import ROOT
 
 from .made_up import ACCURACY, OBJECTS, TIME, TOLERANCES, compared, number, runtime, tidy

@@ -1,7 +1,7 @@
 """Runs that tests of experiments make tables of."""
 
 from gpca.config.layers import with_defaults
-from gpca.experiments.plan import Run
+from gpca.declarations.plan import Run
 
 YCB = {"title": "YCB", "kind": "bop"}
 SOURCES = {"ycb": YCB, "cups": {"title": "Cups", "kind": "procedural"}}  # the second one is a stand-in

@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 
 from gpca.active_learning.curves import POOL_COLUMNS, write_curves
+from gpca.declarations.plan import Run
 from gpca.errors import InputError
 from gpca.evaluation.intervals import wilson_interval
 from gpca.evaluation.measures import TIDY_COLUMNS
@@ -20,7 +21,6 @@ from gpca.experiments.active_learning import (
 )
 from gpca.experiments.label_counts import families, families_with_causes
 from gpca.experiments.label_curves import MOST_LINES, STYLES, mean_curves
-from gpca.experiments.plan import Run
 from gpca.reporting.figures.cloud_views import draw_query
 from tests.figures import words_of
 

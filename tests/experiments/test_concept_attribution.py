@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 
 from gpca.attribution.metrics import collect
+from gpca.declarations.plan import Run
 from gpca.errors import InputError
 from gpca.evaluation.intervals import wilson_interval
 from gpca.evaluation.measures import COLUMNS, TIDY_COLUMNS, read_clustered
@@ -17,7 +18,6 @@ from gpca.experiments.concept_attribution import (
     table1_single_baselines,
     table2_per_concept,
 )
-from gpca.experiments.plan import Run
 from gpca.io.csv_file import write_csv
 from gpca.reporting.tables.table import Cell, Column, Table
 

@@ -4,10 +4,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from gpca.declarations.plan import Run
 from gpca.errors import InputError
 from gpca.evaluation.measures import AGAINST, KEYS, NUMBERS
 from gpca.experiments.control_tables import transfer
-from gpca.experiments.plan import Run
 from gpca.experiments.severity_curves import COLUMNS as SEVERITIES
 from gpca.experiments.severity_curves import REGISTRATION, SAMPLES, SUCCEEDS, severity_curves
 from gpca.explainers.registry import explainer_entry

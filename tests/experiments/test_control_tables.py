@@ -6,9 +6,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from gpca.declarations.plan import Run
 from gpca.evaluation.measures import AGAINST, KEYS, NUMBERS, POOLED, TIDY_COLUMNS
 from gpca.experiments.control_tables import table10_controls, table10_costs, table10_encoders, table10_transfer
-from gpca.experiments.plan import Run
 
 TITLES = {"good": "Good", "head": "Head", "gpca": "GP-CA", "gpca_pair": "GP-CA on the pair"}
 SEES = {"good": "pair", "head": "aligned source"}

@@ -6,11 +6,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from gpca.declarations.plan import Run
 from gpca.evaluation.measures import POOLED, read_clustered, write_metrics
 from gpca.experiments import severity_curves
 from gpca.experiments.control_tables import read_costs
 from gpca.experiments.controls import collect, collect_intervals, read_controls
-from gpca.experiments.plan import Run
 from gpca.experiments.severity_curves import REGISTRATION, read_severities
 from gpca.io.csv_file import write_csv
 from gpca.pairs.perturbation import CONCEPTS

@@ -5,10 +5,10 @@ import pytest
 
 from gpca.active_learning.curves import POOL_COLUMNS, write_curves
 from gpca.active_learning.settings import FrameLabelSettings, RetrainingSettings
+from gpca.declarations.plan import Run
 from gpca.errors import InputError
 from gpca.evaluation.measures import TIDY_COLUMNS
 from gpca.experiments.frame_labels import collect_labels, table6_labels
-from gpca.experiments.plan import Run
 from gpca.steps.frame_labels import rounds_of
 
 # Accuracies after 0, 4, 8 labels.

@@ -6,7 +6,8 @@ import pytest
 
 from gpca.attribution.metrics import collect
 from gpca.attribution.predictions import write_predictions
-from gpca.attribution.scores import Attribution
+from gpca.classifier.scores import Attribution
+from gpca.declarations.plan import Run
 from gpca.errors import InputError
 from gpca.evaluation.measures import write_metrics
 from gpca.experiments.frame_pictures import (
@@ -21,7 +22,6 @@ from gpca.experiments.frame_pictures import (
 )
 from gpca.experiments.frame_views import draw_scores
 from gpca.experiments.frames import read_together
-from gpca.experiments.plan import Run
 from gpca.explainers.registry import explainer_entry
 from gpca.frames.synthesis import OCCLUDER, FrameSettings, make_frame_registrations
 from gpca.io.csv_file import write_csv

@@ -1,10 +1,10 @@
 import pandas as pd
 import pytest
 
+from gpca.declarations.plan import Run
 from gpca.errors import InputError
 from gpca.evaluation.measures import ALL, COLUMNS, TIDY_COLUMNS
 from gpca.experiments import frame_tables
-from gpca.experiments.plan import Run
 
 PARAMETERS = {"dgcnn": 600_000, "pointnet": 150_000, "dgcnn_1024": 750_000, "mine": 1000}
 CONFIG = {

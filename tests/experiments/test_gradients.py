@@ -4,8 +4,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from gpca.declarations.plan import Run
 from gpca.experiments.gradients import collect, saliency, saliency_deletion, tcav
-from gpca.experiments.plan import Run
 from gpca.io.arrays import save_arrays
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.steps.gradients import DELETION_COLUMNS

@@ -5,10 +5,10 @@ import pytest
 
 from gpca.config.check import check
 from gpca.config.layers import without_false
+from gpca.declarations.plan import Run
 from gpca.errors import InputError
 from gpca.evaluation.measures import ALL, POOLED
 from gpca.experiments.guarantee import COLUMNS, collect, guarantee, read_guarantee, table19_guarantee, table19_shift
-from gpca.experiments.plan import Run
 from gpca.explainers.registry import CAUSES, explainer_entry
 from gpca.guarantee.answers import (
     BY_FAMILY,

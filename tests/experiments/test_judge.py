@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from gpca.alignment.rigid import exp
 from gpca.pairs.judge import Judge
+from gpca.rigid import exp
 
 
 def motion(*twist):

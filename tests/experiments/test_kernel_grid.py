@@ -3,6 +3,7 @@
 import pandas as pd
 import pytest
 
+from gpca.declarations.plan import Run
 from gpca.errors import InputError
 from gpca.evaluation.measures import COLUMNS
 from gpca.experiments.kernel_grid import (
@@ -14,7 +15,6 @@ from gpca.experiments.kernel_grid import (
     table4_grid,
     table4_kernels,
 )
-from gpca.experiments.plan import Run
 from gpca.steps.kernel_grid import GRID_COLUMNS, PRINTED
 
 

@@ -5,9 +5,9 @@ import pandas as pd
 import pytest
 
 from gpca.causes.judged import CEILING
+from gpca.declarations.plan import Run
 from gpca.evaluation.measures import TIDY_COLUMNS
 from gpca.experiments.learning_curve import CURVE_COLUMNS, MEASURED, collect, learning_curve, read_curves
-from gpca.experiments.plan import Run
 from gpca.io.csv_file import write_csv
 
 

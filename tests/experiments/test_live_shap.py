@@ -1,8 +1,8 @@
 import pandas as pd
 
+from gpca.declarations.plan import Run
 from gpca.evaluation.measures import TIDY_COLUMNS
 from gpca.experiments.live_shap import live_shap, names
-from gpca.experiments.plan import Run
 
 SOURCES = {"tiny": {"title": "Tiny", "stand_in": True}}
 

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 import trimesh
 
-from gpca.alignment.rigid import scale_translation, transform
 from gpca.causes.policy import NOTHING, QUEUE, RecoveryPolicy, Thresholds
+from gpca.declarations.plan import Run
 from gpca.errors import InputError
 from gpca.experiments.method import choose_samples, choose_view, decide, fig2_overview, fig3_concepts
-from gpca.experiments.plan import Run
 from gpca.experiments.registration_stages import Stages, severity_text, source_before_icp
 from gpca.io.arrays import save_arrays
 from gpca.objects.canonical import DRAWN
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS, PERTURBATIONS, SEVERITIES, SEVERITIES_OF, Severities
+from gpca.rigid import scale_translation, transform
 from tests.figures import assert_words_are_large_enough_and_inside, words_of
 
 from .runs import SOLIDS

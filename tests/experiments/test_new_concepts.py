@@ -3,6 +3,7 @@
 import pandas as pd
 import pytest
 
+from gpca.declarations.plan import Run
 from gpca.errors import InputError
 from gpca.evaluation.intervals import wilson_interval
 from gpca.evaluation.measures import COLUMNS as INTERVALS
@@ -13,7 +14,6 @@ from gpca.experiments.new_concepts import (
     table15_new_concepts,
     table15_oracle,
 )
-from gpca.experiments.plan import Run
 from tests.figures import words_of
 
 SOURCES = {"ycb": {"title": "YCB", "stand_in": True}}

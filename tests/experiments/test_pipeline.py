@@ -9,9 +9,9 @@ from gpca.active_learning.acquisition import EXPANSION
 from gpca.active_learning.curves import POOL_COLUMNS, write_curves
 from gpca.active_learning.rounds import initial_gpc, make_task, rounds
 from gpca.active_learning.settings import ActiveLearningSettings
+from gpca.declarations.plan import Run
 from gpca.errors import InputError
 from gpca.experiments.pipeline import fig4_pipeline, first_round
-from gpca.experiments.plan import Run
 from gpca.experiments.registration_stages import Stages, severity_text
 from tests.figures import assert_words_are_large_enough_and_inside, words_of
 

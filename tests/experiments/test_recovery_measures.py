@@ -4,10 +4,10 @@ import pandas as pd
 import pytest
 
 from gpca.causes.policy import NOTHING, QUEUE, TREATMENTS
+from gpca.declarations.plan import Run
 from gpca.errors import InputError
 from gpca.evaluation.intervals import wilson_interval
 from gpca.evaluation.measures import read_clustered
-from gpca.experiments.plan import Run
 from gpca.experiments.recovery import mean_seconds
 from gpca.experiments.recovery_measures import (
     collect,

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from gpca.attribution.predictions import write_predictions
-from gpca.attribution.scores import Attribution
 from gpca.causes.dataset import LABELS, labels_of
 from gpca.causes.judged import CEILING
 from gpca.causes.settings import CauseSettings
 from gpca.causes.truth import FAILED
+from gpca.classifier.scores import Attribution
 from gpca.errors import InputError
 from gpca.evaluation.measures import POOLED
 from gpca.experiments.cause_figures import draw_reenactment, usual_failure

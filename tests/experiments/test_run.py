@@ -7,9 +7,9 @@ import pytest
 
 from gpca.config.check import check
 from gpca.config.layers import without_false
+from gpca.declarations.plan import Run
+from gpca.declarations.registry import results_of
 from gpca.experiments.claims import compared_sources
-from gpca.experiments.plan import Run
-from gpca.experiments.registry import results_of
 from gpca.experiments.run import explainer_of, files_behind, names_of
 from gpca.objects.entry import title_of
 from gpca.process.registry import load as load_function

@@ -4,9 +4,9 @@ import pandas as pd
 import pytest
 
 from gpca.comparison.published import printed_seconds, read_published
+from gpca.declarations.plan import Run
 from gpca.errors import InputError
 from gpca.evaluation.runtime_file import COMPONENTS, OF_ONE_EXPLANATION, RUNTIME_COLUMNS
-from gpca.experiments.plan import Run
 from gpca.experiments.runtime import ALL_STAGES, draw_runtime, stages_of, table7_runtime
 
 

@@ -7,10 +7,10 @@ import pandas as pd
 import pytest
 
 from gpca.attribution.predictions import prediction_frame
-from gpca.attribution.scores import Attribution
 from gpca.causes.dataset import LABELS, labels_of
 from gpca.causes.judged import CEILING
 from gpca.causes.truth import BORDERLINE, NOMINAL
+from gpca.classifier.scores import Attribution
 from gpca.errors import InputError
 from gpca.evaluation.measures import POOLED
 from gpca.experiments import scan_causes

@@ -4,9 +4,9 @@ import pandas as pd
 import pytest
 
 from gpca.comparison.readings import READING_COLUMNS
+from gpca.declarations.plan import Run
 from gpca.errors import InputError
 from gpca.evaluation.measures import ALL, TIDY_COLUMNS
-from gpca.experiments.plan import Run
 from gpca.experiments.specification_curve import draw_readings, table6_inputs, table13_readings
 
 from ..config.configs import load

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from gpca.alignment.pose_error import pose_error
-from gpca.alignment.rigid import inverse, rotation_angle_rad
 from gpca.errors import InputError
 from gpca.frames.initial_pose import (
     EstimatorErrors,
@@ -18,6 +17,7 @@ from gpca.frames.initial_pose import (
     read_bop_results,
     read_pose_errors,
 )
+from gpca.rigid import inverse, rotation_angle_rad
 
 from ..hostile import refusal
 from ..steps.by_words import main

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 import trimesh
 
-from gpca.alignment.rigid import transform
 from gpca.errors import InputError
 from gpca.frames.instances import points_on_model
 from gpca.frames.rgbd_scene import SceneSettings, lay_table, stable_poses, write_scenes
 from gpca.io.files import read_image
 from gpca.objects.camera import DepthNoise
 from gpca.objects.surface import Surface
+from gpca.rigid import transform
 
 from ..hostile import refusal
 from .tiny import PERFECT, scene_settings, surfaces

@@ -1,7 +1,6 @@
 import numpy as np
 import pytest
 
-from gpca.alignment.rigid import transform
 from gpca.frames.shots import (
     VOXEL_M,
     Shot,
@@ -16,6 +15,7 @@ from gpca.frames.shots import (
     without_outliers,
 )
 from gpca.objects.camera import Camera, MeshScene, look_at
+from gpca.rigid import transform
 
 from .tiny import CAMERA
 

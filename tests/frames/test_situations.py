@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
 
-from gpca.alignment.rigid import inverse, rotation_angle_rad
 from gpca.errors import InputError
 from gpca.frames.initial_pose import InitialPoseSettings
 from gpca.frames.situations import LEAST_VISIBLE, Shelf, Situations, SituationSettings
 from gpca.objects.camera import Camera, DepthNoise
 from gpca.pairs.perturbation import CONCEPTS
+from gpca.rigid import inverse, rotation_angle_rad
 
 from .tiny import scene_settings, surfaces
 

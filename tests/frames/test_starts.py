@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gpca.alignment.rigid import inverse, rotation_angle_rad
 from gpca.errors import InputError
 from gpca.frames.dataset import Dataset, read_models
 from gpca.frames.starts import CARRIED, GLOBAL, LADDER, NATIVE, TRANSPLANTED, Starts, all_starts
 from gpca.objects.canonical import CARRIED as IS_CARRIED
 from gpca.objects.canonical import Place
+from gpca.rigid import inverse, rotation_angle_rad
 
 HEAD = "scene_id,im_id,obj_id,score,R,t,time"
 OFF_MM = (30.0, 0.0, 0.0)

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from gpca.alignment.rigid import inverse, transform
 from gpca.frames.instances import Instances
 from gpca.frames.synthesis import HALF_SPACE, OCCLUDER, TOLERANCE, FrameSettings, make_frame_registrations, occlude
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.pairs.synthesis import RegistrationSettings
+from gpca.rigid import inverse, transform
 
 SETTINGS = FrameSettings(registration=RegistrationSettings(train=24, test=12, cloud_points=256))
 

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from gpca.alignment.rigid import inverse, transform
 from gpca.config.check import check
 from gpca.config.layers import without_false
 from gpca.errors import InputError
@@ -17,6 +16,7 @@ from gpca.objects.canonical import ObjectClouds, write_objects
 from gpca.objects.source import data_files, resolve, source_modules
 from gpca.objects.source import surfaces as surfaces_of
 from gpca.objects.surface import Surface, evenly, instance_of
+from gpca.rigid import inverse, transform
 
 from ..config.configs import load
 from .tiny import surfaces as meshes

@@ -4,7 +4,7 @@ import pytest
 import trimesh
 
 from gpca import Explainer
-from gpca.alignment.rigid import inverse, transform
+from gpca.rigid import inverse, transform
 
 BALL = trimesh.creation.icosphere(3, radius=50)
 

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from gpca import Explainer
-from gpca.alignment.rigid import exp
 from gpca.errors import InputError
 from gpca.model.clouds import MEASURES, Familiarity, hidden_share, measure, read_points, read_pose, voids_of
 from gpca.model.diagnosis import ADVICE, CHECK, UNKNOWN
 from gpca.objects.canonical import canonical_cloud
 from gpca.objects.procedural import FAMILIES, surfaces
+from gpca.rigid import exp
 
 trimesh = pytest.importorskip("trimesh")
 POINTS = np.random.default_rng(0).uniform(size=(200, 3)) * [0.1, 0.2, 0.3]

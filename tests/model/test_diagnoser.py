@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from gpca.alignment.rigid import exp
 from gpca.causes.settings import CauseSettings
 from gpca.causes.truth import ALL
 from gpca.classifier.settings import GPCSettings
@@ -25,6 +24,7 @@ from gpca.model.diagnosis import Diagnosis, Reenacted, state_probabilities
 from gpca.model.file import FEATURE_COUNT
 from gpca.reenactment.dataset import FEATURES, Reenactments, reenactment_features
 from gpca.reenactment.settings import ReenactmentSettings
+from gpca.rigid import exp
 
 SMALL_MOTION = exp(np.array([[0.05, -0.02, 0.03, 0.01, 0.02, -0.01]]))[0]
 

@@ -6,13 +6,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from gpca.alignment.rigid import exp, transform
 from gpca.causes.truth import ALL, shapley_values
 from gpca.model.diagnosis import Reenacted, axis_in_words
 from gpca.objects.canonical_frame import CanonicalFrame
 from gpca.reenactment.enactment import Enactment
 from gpca.reenactment.hypotheses import Hypothesis
 from gpca.reenactment.surface import ModelSurface
+from gpca.rigid import exp, transform
 
 ERRORS = np.arange(8) / 100
 T_RESULT = exp(np.array([[0.2, -0.1, 0.3, 0.05, 0.02, -0.04]]))[0]

@@ -11,9 +11,9 @@ from gpca import CanonicalFrame, Explainer
 from gpca.alignment.icp import ICP, ICPSettings
 from gpca.alignment.methods.interface import Pair
 from gpca.alignment.methods.registry import make_method
-from gpca.alignment.rigid import exp, inverse, transform
 from gpca.errors import InputError
 from gpca.process.code_files import ROOT
+from gpca.rigid import exp, inverse, transform
 from gpca.uncertainty.settings import UncertaintySettings
 
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from gpca import Explainer
-from gpca.alignment.rigid import exp, inverse, transform
 from gpca.causes.policy import NOTHING, QUEUE, RecoveryPolicy, Thresholds
 from gpca.explainers.pair_classifier import PairClassifier
 from gpca.model.diagnosis import ADVICE
+from gpca.rigid import exp, inverse, transform
 from gpca.uncertainty.settings import UncertaintySettings
 
 

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gpca.alignment.rigid import transform
 from gpca.causes.truth import ALL, BY_SIZE
 from gpca.model.scene import MOST_POINTS, packed, taken_out
+from gpca.rigid import transform
 
 from ..page.test_in_a_browser import chromium, in_a_browser, with_script
 

@@ -10,12 +10,12 @@ import trimesh
 
 from gpca import explain_scans
 from gpca.__main__ import main
-from gpca.alignment.rigid import exp, inverse, transform
 from gpca.errors import InputError
 from gpca.model.clouds import read_scan
 from gpca.model.explanation import NOT_SURE
 from gpca.model.scan_registration import in_voxels, voxel_size
 from gpca.process.environment import open3d_cloud
+from gpca.rigid import exp, inverse, transform
 
 
 def room(seed, low, high, size=12.0):

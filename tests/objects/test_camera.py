@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from gpca.alignment.rigid import inverse, transform
 from gpca.objects.camera import NOTHING, Camera, DepthNoise, MeshScene, View, back_project, look_at, shade
+from gpca.rigid import inverse, transform
 
 CAMERA = Camera(width=80, height=60, focal_px=70)
 WALL = (np.array([[-9, -9, 0], [9, -9, 0], [9, 9, 0], [-9, 9, 0]], float), np.array([[0, 1, 2], [0, 2, 3]]))

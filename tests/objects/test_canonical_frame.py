@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from gpca.alignment.rigid import exp, transform
 from gpca.errors import InputError
 from gpca.objects import canonical_frame
 from gpca.objects.canonical_frame import CanonicalFrame, thin
+from gpca.rigid import exp, transform
 
 BOX = np.random.default_rng(0).uniform((0, 0, 0), (0.3, 0.4, 1.2), size=(500, 3))
 BOX[:2] = (0, 0, 0), (0.3, 0.4, 1.2)

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from gpca.jobs.provenance import record_provenance
 from gpca.page.page import write_page
 from gpca.process.processor import describe
-from gpca.process.provenance import record_provenance
 from gpca.reporting.figures.style import save_figure, use_style
 from gpca.reporting.registry import SUFFIXES
 from gpca.reporting.tables.table import Cell, Column, Table

@@ -7,8 +7,8 @@ from urllib.parse import urlparse
 import pytest
 
 from gpca.errors import InputError
+from gpca.jobs.provenance import record_provenance
 from gpca.page.crate import NAME, write_crate
-from gpca.process.provenance import record_provenance
 
 
 def faults(crate, folder):

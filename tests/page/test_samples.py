@@ -5,7 +5,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from gpca.alignment.rigid import inverse, transform
 from gpca.causes.settings import CauseSettings, Limits
 from gpca.causes.truth import ALL, BY_SIZE
 from gpca.errors import InputError
@@ -20,6 +19,7 @@ from gpca.page.samples import (
     severity_words,
 )
 from gpca.pairs.perturbation import CONCEPTS
+from gpca.rigid import inverse, transform
 from tests.conftest import FEW_CAUSES
 from tests.figures import write_uncertainties
 

@@ -5,12 +5,12 @@ import pytest
 from scipy.spatial import cKDTree
 
 from gpca.alignment.icp import ICP, ICPSettings
-from gpca.alignment.rigid import inverse, rotation_angle_rad, transform
 from gpca.errors import InputError
 from gpca.pairs import synthesis
 from gpca.pairs.dataset import REGISTRATION_COLUMNS, Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.pairs.synthesis import RegistrationSettings, make_registrations, read_as
+from gpca.rigid import inverse, rotation_angle_rad, transform
 
 
 def in_object_frame(registrations, row):

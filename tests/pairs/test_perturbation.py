@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from gpca.alignment.rigid import rotation_angle_rad, transform
 from gpca.pairs.perturbation import CONCEPTS, PERTURBATIONS, Severities, add_noise, crop, misplace
+from gpca.rigid import rotation_angle_rad, transform
 
 POINTS = np.random.default_rng(0).uniform(-0.5, 0.5, size=(2000, 3))
 LIMITS = {

@@ -85,10 +85,10 @@ def test_paths_are_sorted_and_there(monkeypatch):
 STEPS = {  # module -> files that it depends on, and some that it does not
     "gpca.steps.pairs:objects": (
         {"gpca/seeds.py", "gpca/objects/source.py"},
-        {"gpca/alignment/rigid.py", "gpca/classifier/gpc.py", "gpca/explainers/interface.py"},
+        {"gpca/rigid.py", "gpca/classifier/gpc.py", "gpca/explainers/interface.py"},
     ),
     "gpca.steps.pairs:registrations": (
-        {"gpca/alignment/rigid.py", "gpca/pairs/perturbation.py"},
+        {"gpca/rigid.py", "gpca/pairs/perturbation.py"},
         {"gpca/classifier/gpc.py", "gpca/explainers/interface.py"},
     ),
     "gpca.steps.pairs:train": (
@@ -97,7 +97,7 @@ STEPS = {  # module -> files that it depends on, and some that it does not
     ),
     "gpca.steps.pairs:embed": (
         {"gpca/encoders/training.py", "gpca/attribution/predictions.py"},
-        {"gpca/classifier/gpc.py", "gpca/attribution/scores.py"},
+        {"gpca/classifier/gpc.py", "gpca/classifier/scores.py"},
     ),
     "gpca.steps.pairs:reduce": (
         {"gpca/encoders/reduction.py", "gpca/seeds.py"},
@@ -132,7 +132,7 @@ STEPS = {  # module -> files that it depends on, and some that it does not
         {"gpca/explainers/interface.py"},
     ),
     "gpca.steps.pairs:attribute": (
-        {"gpca/explainers/interface.py", "gpca/attribution/scores.py"},
+        {"gpca/explainers/interface.py", "gpca/classifier/scores.py"},
         {"gpca/classifier/gpc.py", "gpca/uncertainty/designs.py", "gpca/encoders/training.py"},
     ),
 }

@@ -7,7 +7,7 @@ import weakref
 import pytest
 
 from gpca.errors import InputError
-from gpca.process.job import as_process
+from gpca.jobs.job import as_process
 from gpca.process.progress import certain_interrupts, progress
 
 

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gpca.alignment.rigid import inverse, rotation_angle_rad
 from gpca.errors import InputError
 from gpca.recovery import actions
 from gpca.recovery.actions import ACTIONS, OBSERVED, Robot, action_of, best_start, observe
 from gpca.recovery.episodes import register_after, register_held
+from gpca.rigid import inverse, rotation_angle_rad
 from tests.failures import LOOP
 
 from ..documents import block

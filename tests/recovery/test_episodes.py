@@ -3,7 +3,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gpca.alignment.rigid import inverse
 from gpca.errors import InputError
 from gpca.recovery.actions import ACTIONS
 from gpca.recovery.episodes import (
@@ -16,6 +15,7 @@ from gpca.recovery.episodes import (
     register_misplaced,
 )
 from gpca.recovery.settings import LoopSettings
+from gpca.rigid import inverse
 from tests.failures import LOOP
 
 ICP = LOOP.icp

@@ -6,9 +6,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from gpca.attribution.scores import Attribution
 from gpca.causes.policy import NOTHING, QUEUE, RecoveryPolicy, Thresholds
 from gpca.causes.settings import OBSERVED, CauseSettings
+from gpca.classifier.scores import Attribution
 from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.recovery.actions import ACTIONS, action_of

@@ -6,7 +6,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from gpca.alignment.rigid import inverse, rigid_motion, scale_translation
 from gpca.causes.settings import OBSERVED, CauseSettings
 from gpca.causes.truth import ALL, NONE
 from gpca.frames.shots import Shot
@@ -16,6 +15,7 @@ from gpca.recovery.actions import ACTIONS, Robot
 from gpca.recovery.episodes import register_after
 from gpca.recovery.reenactment import Appearance, KnownModel, believe, reenact, seen_surface
 from gpca.reenactment.settings import ReenactmentSettings
+from gpca.rigid import inverse, rigid_motion, scale_translation
 from tests.failures import LOOP
 
 SETTINGS, COUNTERFACTUALS = ReenactmentSettings(), CauseSettings(moved=OBSERVED)

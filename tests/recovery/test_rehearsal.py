@@ -4,8 +4,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from gpca.attribution.scores import Attribution
 from gpca.causes.policy import DOUBTED, DRAWN
+from gpca.classifier.scores import Attribution
 from gpca.errors import InputError
 from gpca.experiments.recovery_measures import read_queues
 from gpca.io.csv_file import write_csv

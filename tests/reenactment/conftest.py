@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gpca.alignment.rigid import inverse, transform
 from gpca.causes.candidate import Registrar, draw_candidate
 from gpca.causes.settings import CauseSettings, CauseSeverities
 from gpca.pairs.distances import ObservedPair
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reenactment.surface import ModelSurface
+from gpca.rigid import inverse, transform
 
 STRONG = CauseSeverities(
     noise=(0.06, 0.06), outliers=(0.03, 0.03), rotation_deg=(100, 100), translation=(0.2, 0.2), crop=(0.6, 0.6)

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gpca.alignment.rigid import inverse, rotation_angle_rad, scale_translation
 from gpca.causes.dataset import LABELS
 from gpca.causes.descriptors import observed_pair
 from gpca.causes.frames import measure_frames, subjects_of
@@ -16,6 +15,7 @@ from gpca.frames.dataset import meshes_of
 from gpca.reenactment.dataset import Reenactments
 from gpca.reenactment.frames import FrameView, KnownObject, reenact_frames
 from gpca.reenactment.settings import ReenactmentSettings
+from gpca.rigid import inverse, rotation_angle_rad, scale_translation
 from tests.frames.bracket import hidden, misplaced, models_in, most_seen, noisy, own_starts
 from tests.reenactment.conftest import without_truth
 

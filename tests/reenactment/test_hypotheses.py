@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from gpca.alignment.rigid import exp, inverse, rotation_angle_rad, transform
 from gpca.reenactment.hypotheses import (
     distinct_rows,
     find_hypotheses,
@@ -16,6 +15,7 @@ from gpca.reenactment.hypotheses import (
 )
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface
+from gpca.rigid import exp, inverse, rotation_angle_rad, transform
 from tests.reenactment.conftest import candidate_of, pair_of
 
 

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from gpca.alignment.rigid import exp, inverse, transform
 from gpca.reenactment.mixture import FIRST_OUTLIERS, REACH, Anchor, Mixture
+from gpca.rigid import exp, inverse, transform
 
 RANDOM = np.random.default_rng(100)
 

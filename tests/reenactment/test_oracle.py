@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gpca.alignment.rigid import inverse
 from gpca.causes.dataset import LABELS
 from gpca.causes.settings import CauseSettings
 from gpca.causes.truth import ALL, SUBSETS
@@ -17,6 +16,7 @@ from gpca.reenactment.hypotheses import Hypothesis
 from gpca.reenactment.oracle import ask_oracles, informed
 from gpca.reenactment.settings import EVERYTHING, KNOWN, NOTHING, ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface
+from gpca.rigid import inverse
 from tests.conftest import FEW_CAUSES
 from tests.reenactment.conftest import candidate_of, surface_of
 

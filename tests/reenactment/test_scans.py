@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from gpca.alignment.rigid import rotation_angle_rad, scale_translation
 from gpca.causes.dataset import LABELS
 from gpca.causes.scans import LADDER, ScanStart, measure_scans
 from gpca.causes.settings import OBSERVED, CauseSettings
@@ -14,6 +13,7 @@ from gpca.reenactment.hypotheses import Hypothesis
 from gpca.reenactment.scans import cropped, reenact_scans
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface
+from gpca.rigid import rotation_angle_rad, scale_translation
 from gpca.scans.pair import ScanSuccess
 from tests.reenactment.conftest import without_truth
 from tests.scans.corner import corner_pair, start_off

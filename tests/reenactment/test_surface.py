@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from gpca.alignment.pose_error import PoseErrors
-from gpca.alignment.rigid import exp
 from gpca.reenactment.surface import CORNER, ModelSurface, covered_points, directions
+from gpca.rigid import exp
 
 
 def test_planes_lie_in_the_surface(drill, model):

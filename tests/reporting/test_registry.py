@@ -3,8 +3,8 @@ import json
 
 import pytest
 
-from gpca.experiments import registry
-from gpca.experiments.registry import registered, results_of
+from gpca.declarations import registry
+from gpca.declarations.registry import registered, results_of
 from gpca.page.page import rendered_caption
 from gpca.process.registry import load
 from gpca.reporting.registry import Input, Result, build, by_section, targets, unknown_target

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from gpca.alignment.rigid import inverse, rigid_motion, rotate, transform
+from gpca.rigid import inverse, rigid_motion, rotate, transform
 from gpca.scans.pair import ScanPair
 
 SIDE_M = 2.4

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gpca.alignment.rigid import inverse, rigid_motion, rotation_angle_rad, transform
 from gpca.errors import InputError
+from gpca.rigid import inverse, rigid_motion, rotation_angle_rad, transform
 from gpca.scans.pair import OVERLAP_M, Rung, ScanSuccess, disturbed, overlap_rmse, rungs_of, voxels
 from gpca.scans.scene import Known, Scene, choose_pairs, stratum_of
 

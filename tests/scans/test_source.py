@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from gpca.alignment.rigid import scale_translation
 from gpca.errors import InputError
+from gpca.rigid import scale_translation
 from gpca.scans.pair import near
 from gpca.scans.scene import ScanPairs
 from gpca.scans.source import (
@@ -83,7 +83,7 @@ def test_virtual_scans_of_one_scene_show_one_surface():
 
 
 def transformed(scans):
-    from gpca.alignment.rigid import transform
+    from gpca.rigid import transform
 
     return transform(scans.T_target_source, scans.source_N_3)
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from gpca.alignment.rigid import inverse, rigid_motion, transform
+from gpca.rigid import inverse, rigid_motion, transform
 from gpca.scans.scene import Scan, Scene
 
 STEP_M = 0.02

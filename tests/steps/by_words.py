@@ -10,8 +10,8 @@ from pathlib import Path
 
 from gpca.__main__ import COMMANDS
 from gpca.__main__ import main as command
+from gpca.jobs.job import Job, as_process, call
 from gpca.process.code_files import ROOT
-from gpca.process.job import Job, as_process, call
 from gpca.process.processor import THREAD_VARIABLES
 
 SHARED = {  # module of gpca.steps -> the steps that it has, functions of their names

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gpca.attribution.scores import Attribution
+from gpca.classifier.scores import Attribution
 from gpca.explainers.registry import Rival
 from gpca.objects.surface import instance_of
 from gpca.pairs.perturbation import CONCEPTS

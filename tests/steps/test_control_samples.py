@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from gpca.alignment.icp import ICPSettings
-from gpca.alignment.rigid import inverse, transform
 from gpca.errors import InputError
 from gpca.objects.surface import instance_of
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.pairs.synthesis import registered_backwards
+from gpca.rigid import inverse, transform
 from gpca.steps.control_samples import (
     RELABELED,
     ControlSettings,

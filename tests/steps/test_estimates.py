@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gpca.alignment.rigid import exp, inverse, transform
 from gpca.causes.drawing import draw_causes
 from gpca.causes.settings import CauseSettings
 from gpca.errors import InputError
 from gpca.pairs.judge import Judges
+from gpca.rigid import exp, inverse, transform
 from gpca.steps.estimates import (
     Situations,
     compared,

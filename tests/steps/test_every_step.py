@@ -5,7 +5,7 @@ import re
 import pytest
 
 from gpca.__main__ import COMMANDS
-from gpca.experiments.registry import steps as declared
+from gpca.declarations.registry import steps as declared
 from gpca.process.code_files import ROOT
 from tests.steps.by_words import main, module_of, run_apart
 

@@ -10,12 +10,12 @@ from baselines.sensitivity import sa_local_additive
 from baselines.shap_kl import shap_over_knobs
 from gpca.alignment.methods import registry
 from gpca.alignment.methods.interface import FailedRegistration, MethodEntry
-from gpca.alignment.rigid import exp, transform
-from gpca.attribution.scores import Attribution
+from gpca.classifier.scores import Attribution
 from gpca.errors import InputError
 from gpca.explainers.registry import Rival
 from gpca.pairs.judge import Judges
 from gpca.pairs.perturbation import CONCEPTS
+from gpca.rigid import exp, transform
 from gpca.seeds import generator
 from gpca.steps.exchange import TOO_FEW, Exchange, ExchangeSettings, registered_by, require_exchangeable
 from gpca.uncertainty.designs import ADDITIVE_KNOBS, evaluate_design

@@ -7,17 +7,17 @@ import pandas as pd
 import pytest
 
 from gpca.attribution.predictions import prediction_frame, write_predictions
-from gpca.attribution.scores import Attribution
 from gpca.causes.dataset import LABELS
 from gpca.causes.descriptors import WIDTHS, Descriptors
 from gpca.causes.drawing import draw_causes
 from gpca.causes.settings import GROUPS, CauseSettings
 from gpca.causes.truth import BORDERLINE
+from gpca.classifier.scores import Attribution
 from gpca.errors import InputError
 from gpca.guarantee.answers import Scored
 from gpca.guarantee.guarantee import states_of
 from gpca.io.csv_file import write_csv
-from gpca.process.job import Job
+from gpca.jobs.job import Job
 from gpca.reenactment.dataset import Reenactments
 from gpca.steps import guarantee as step
 from gpca.steps.guarantee import parts_of, read_pool

@@ -9,9 +9,9 @@ import yaml
 from gpca.comparison.joint_reading import CHOICES, numbers_asked, read_choices, read_verdicts
 from gpca.comparison.published import read_published
 from gpca.comparison.readings import READING_COLUMNS
+from gpca.declarations.plan import Run
 from gpca.evaluation.measures import TIDY_COLUMNS, read_metrics, write_metrics
 from gpca.experiments.joint_reading import judge_joint, table16_joint_reading
-from gpca.experiments.plan import Run
 from gpca.objects.canonical import write_objects
 from gpca.objects.procedural import surfaces
 from gpca.process.code_files import ROOT

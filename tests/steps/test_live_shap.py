@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from baselines.shap_kl import shapley_values
-from gpca.attribution.scores import Attribution
+from gpca.classifier.scores import Attribution
 from gpca.evaluation.measures import read_metrics
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.steps.live_shap import compared, live_values

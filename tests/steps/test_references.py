@@ -8,9 +8,9 @@ import pytest
 
 from gpca.alignment.methods.interface import Pair
 from gpca.alignment.methods.registry import make_method
-from gpca.alignment.rigid import exp, transform
 from gpca.causes.candidate import draw_candidate
 from gpca.causes.settings import CauseSettings
+from gpca.rigid import exp, transform
 from gpca.steps.references import Redraws, draw_twists
 from gpca.uncertainty.estimators.analytic import sample
 from gpca.uncertainty.estimators.interface import RegisteredPair

@@ -12,7 +12,7 @@ from gpca.causes.descriptors import Descriptors
 from gpca.causes.scans import GLOBAL, LADDER
 from gpca.causes.settings import ScanSamples
 from gpca.causes.truth import BORDERLINE, NOMINAL
-from gpca.process.job import Job
+from gpca.jobs.job import Job
 from gpca.reenactment.dataset import Reenactments
 from gpca.scans.pair import Rung
 from gpca.scans.scene import ScanPairs

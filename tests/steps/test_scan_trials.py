@@ -7,8 +7,8 @@ import pytest
 
 from gpca.alignment.methods import registry
 from gpca.alignment.methods.interface import FailedRegistration, MethodEntry, Outcome
-from gpca.alignment.rigid import rotation_angle_rad
 from gpca.errors import InputError
+from gpca.rigid import rotation_angle_rad
 from gpca.scans.pair import Rung, rungs_of
 from gpca.scans.scene import ScanPairs
 from gpca.steps.scan_trials import TrialSettings, errors_of, pair_to_register, scan_normals, try_methods

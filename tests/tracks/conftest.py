@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from gpca.attribution.predictions import write_predictions
-from gpca.attribution.scores import Attribution
 from gpca.causes.dataset import LABELS, labels_of
+from gpca.classifier.scores import Attribution
 from gpca.tracks import published as module
 from gpca.tracks.published import Published
 from gpca.tracks.shipping import collect

@@ -12,15 +12,15 @@ import pytest
 import gpca
 from gpca.__main__ import main
 from gpca.attribution.predictions import prediction_frame
-from gpca.attribution.scores import Attribution
 from gpca.causes.dataset import LABELS
+from gpca.classifier.scores import Attribution
 from gpca.config.check import check, with_success
 from gpca.config.layers import without_false
+from gpca.declarations.plan import Run
 from gpca.errors import InputError
 from gpca.experiments import scan_causes
-from gpca.experiments.plan import Run
 from gpca.io.csv_file import write_csv
-from gpca.process.job import Job
+from gpca.jobs.job import Job
 from gpca.steps.scan_causes import measure
 from gpca.tracks import published as module
 from gpca.tracks import scoring

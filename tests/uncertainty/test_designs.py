@@ -3,9 +3,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gpca.alignment.rigid import transform
 from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS
+from gpca.rigid import transform
 from gpca.uncertainty.designs import (
     ADDITIVE_KNOBS,
     DESIGNS,

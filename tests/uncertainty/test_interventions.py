@@ -4,9 +4,9 @@ from scipy.optimize import linprog
 from scipy.spatial import cKDTree
 
 from gpca.alignment.batched_icp import BatchedICP
-from gpca.alignment.rigid import exp
 from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS, PERTURBATIONS, Severities
+from gpca.rigid import exp
 from gpca.uncertainty import interventions
 from gpca.uncertainty.interventions import (
     FEWEST_TRIMMED,

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from gpca.alignment.batched_icp import BatchedICP
-from gpca.alignment.rigid import exp, inverse, transform
+from gpca.rigid import exp, inverse, transform
 from gpca.uncertainty.spread import (
     SMALLEST_RESIDUAL,
     Runs,

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks.kills import unfinished
-from gpca.experiments.registry import experiments, registered
+from gpca.declarations.registry import experiments, registered
 
 from .conftest import is_interrupted
 

@@ -125,7 +125,7 @@ def test_an_experiment_of_the_docs_is_one_short_file_and_a_line_of_the_config(fi
 EXPLAINER = """
 import numpy as np
 
-from gpca.attribution.scores import Attribution
+from gpca.classifier.scores import Attribution
 from gpca.explainers.interface import ExplainerEntry
 from gpca.pairs.perturbation import CONCEPTS
 

@@ -6,7 +6,7 @@ import pytest
 
 from gpca.config.check import check
 from gpca.config.layers import without_false
-from gpca.experiments.registry import results_of
+from gpca.declarations.registry import results_of
 from gpca.experiments.run import names_of
 from gpca.process.registry import load
 

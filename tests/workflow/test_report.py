@@ -5,7 +5,7 @@ import re
 
 import pytest
 
-from gpca.experiments.registry import registered
+from gpca.declarations.registry import registered
 from gpca.page.crate import NAME
 
 from ..page.test_crate import faults

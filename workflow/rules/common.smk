@@ -11,9 +11,9 @@ from gpca.process.code_files import code_files
 from gpca.encoders.registry import encoders
 from gpca.objects.source import find_file
 from gpca.experiments.frames import pretraining_of
-from gpca.experiments.plan import Run, config_token
+from gpca.declarations.plan import Run, config_token
 from gpca.experiments.run import names_of
-from gpca.experiments.step import Plan
+from gpca.declarations.step import Plan
 from gpca.frames.source import VIRTUAL
 
 # An own kind of source is a file in sources/ that writes <results>/objects/<name>.npz and adds itself to SOURCES.
@@ -89,7 +89,7 @@ def encoder_code(step):
 
 
 def collector_code(function):
-    return code_files(function.split(":")[0], "gpca.process.job")
+    return code_files(function.split(":")[0], "gpca.jobs.job")
 
 
 def below_results(files):
@@ -104,6 +104,6 @@ def below_results(files):
 
 
 def token_of(file):
-    """Return the token of the config for a file whose function is given the run (gpca/experiments/plan.py)."""
+    """Return the token of the config for a file whose function is given the run (gpca/declarations/plan.py)."""
     sidecar = f"results/{config['run']}/{file}.provenance.json"
     return lambda wildcards: config_token(config, sidecar)

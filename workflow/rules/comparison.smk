@@ -6,7 +6,7 @@ from gpca.comparison.claims import counterparts_of, read_claims
 from gpca.comparison.published import read_published
 from gpca.comparison.values import folders_behind
 from gpca.experiments.diagnosis import cause_titles
-from gpca.experiments.registry import experiments
+from gpca.declarations.registry import experiments
 from gpca.frames.source import ONE_ENCODER
 
 COLLECTED = [
@@ -69,7 +69,7 @@ rule comparison:
             "gpca.comparison.readings",
             "gpca.experiments.reading_words",
             "gpca.comparison.markdown",
-            "gpca.process.job",
+            "gpca.jobs.job",
         ),
     output:
         csv="<results>/comparison.csv",
@@ -112,7 +112,7 @@ rule page:
         causes=collect(
             f"<results>/causes/{{source}}/seed{SEEDS[0]}.npz", source=MEASURED
         ),
-        code=code_files("gpca.page.page", "gpca.page.crate", "gpca.process.job"),
+        code=code_files("gpca.page.page", "gpca.page.crate", "gpca.jobs.job"),
     output:
         page="<results>/index.html",
         crate="<results>/ro-crate-metadata.json",

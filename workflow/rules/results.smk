@@ -1,5 +1,5 @@
 # Every table and figure that an experiment declares: a rule of its name for each.
-from gpca.experiments.registry import results_of
+from gpca.declarations.registry import results_of
 from gpca.reporting.registry import SUFFIXES
 
 RESULTS = results_of(NAMES)
@@ -28,7 +28,7 @@ for result in RESULTS:
             result.name
         input:
             **below_results(result.files(NAMES)),
-            code=code_files(*result.modules, "gpca.process.job"),
+            code=code_files(*result.modules, "gpca.jobs.job"),
         output:
             **outputs(result),
         log:

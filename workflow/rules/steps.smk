@@ -1,6 +1,6 @@
 # The steps that experiments declare: a rule for each, of one shape, and a target for all its files.
-from gpca.experiments.registry import steps
-from gpca.experiments.step import all_files, rules_of
+from gpca.declarations.registry import steps
+from gpca.declarations.step import all_files, rules_of
 
 if workflow.is_main_process:
     for experiment in experiments():

@@ -1,9 +1,9 @@
 """Files of all sources, methods and seeds -> CSV files of numbers, by the collector that the rule names."""
 
+from gpca.declarations.plan import READ, Recorded, Run
 from gpca.evaluation.measures import write_metrics
-from gpca.experiments.plan import READ, Recorded, Run
 from gpca.experiments.run import names_of
-from gpca.process.job import files_by_name, workflow_script
+from gpca.jobs.job import files_by_name, workflow_script
 from gpca.process.registry import load
 
 with workflow_script(snakemake) as added:

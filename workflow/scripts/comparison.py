@@ -9,7 +9,7 @@ from gpca.comparison.verdicts import Tolerance, compare
 from gpca.experiments import reading_words
 from gpca.io.csv_file import write_csv
 from gpca.io.files import whole_file
-from gpca.process.job import workflow_script
+from gpca.jobs.job import workflow_script
 
 with workflow_script(snakemake):
     given, params = snakemake.input, snakemake.params

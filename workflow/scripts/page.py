@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
+from gpca.jobs.job import workflow_script
 from gpca.page.crate import write_crate
 from gpca.page.findings import Titles
 from gpca.page.page import Run, Shown, write_page
-from gpca.process.job import workflow_script
 
 with workflow_script(snakemake):
     given, files = snakemake.params, snakemake.input

@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from gpca.experiments.plan import READ, Recorded, Run
+from gpca.declarations.plan import READ, Recorded, Run
 from gpca.experiments.run import names_of
-from gpca.process.job import files_by_name, workflow_script
+from gpca.jobs.job import files_by_name, workflow_script
 from gpca.reporting.figures.style import save_figure
 from gpca.reporting.registry import build
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gpca.alignment.methods.interface import MethodEntry, Outcome, Pair
-from gpca.alignment.rigid import rotate
+from gpca.rigid import rotate
 
 
 def align_centers(pair: Pair, correspondence_distance: float = 0.10) -> Outcome:

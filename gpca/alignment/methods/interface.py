@@ -11,8 +11,8 @@ from scipy.spatial import cKDTree
 
 from gpca.alignment.features import NEIGHBORS, estimate_normals
 from gpca.alignment.icp import require_cloud
-from gpca.alignment.rigid import require_rigid, transform
 from gpca.errors import InputError
+from gpca.rigid import require_rigid, transform
 
 CORRESPONDENCE_DISTANCE = 0.10  # diameters, as in the protocol's ICP
 MAX_ITERATIONS = 50

@@ -25,8 +25,8 @@ from gpca.alignment.methods.interface import (
     Outcome,
     Pair,
 )
-from gpca.alignment.rigid import transform
 from gpca.process.environment import require_open3d
+from gpca.rigid import transform
 
 Kernel = Literal["HuberLoss", "CauchyLoss", "GMLoss", "TukeyLoss"]
 # k, in diameters. At 0.02, the middle of the protocol's noise, a poor start makes most points outliers: on a

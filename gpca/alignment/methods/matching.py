@@ -19,8 +19,8 @@ from gpca.alignment.methods.interface import (
     Outcome,
     Pair,
 )
-from gpca.alignment.rigid import rigid_motion
 from gpca.process.environment import require_open3d
+from gpca.rigid import rigid_motion
 
 EDGE_SIMILARITY = 0.9  # minimum ratio of the edges of the two triangles of RANSAC
 CONFIDENCE = 0.999  # at which it stops

@@ -25,7 +25,7 @@ from gpca.alignment.methods.interface import (
     Pair,
 )
 from gpca.alignment.methods.local import failure_of_a_step
-from gpca.alignment.rigid import best_motion, plane_step, rotate, transform
+from gpca.rigid import best_motion, plane_step, rotate, transform
 from gpca.seeds import generator
 from gpca.settings import Share
 

@@ -21,7 +21,7 @@ from gpca.alignment.methods.interface import (
     Outcome,
     Pair,
 )
-from gpca.alignment.rigid import best_rotation, rigid_motion, rotate
+from gpca.rigid import best_rotation, rigid_motion, rotate
 
 GROWTH = 1.4  # of the convexity parameter μ per iteration, as in the paper
 MOST_ITERATIONS = 100

@@ -15,11 +15,11 @@ from gpca.attribution.metrics import accuracy, concept_accuracy
 from gpca.attribution.predictions import read_predictions
 from gpca.errors import InputError
 from gpca.evaluation.measures import ALL, TIDY_COLUMNS, read_all_metrics, source_method_seed, write_metrics
+from gpca.jobs.job import Job
+from gpca.jobs.provenance import record_provenance
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.pairs.shifted_sets import ShiftedSets
-from gpca.process.job import Job
-from gpca.process.provenance import record_provenance
 from gpca.seeds import seed_of_file
 from gpca.steps.readings.groups import GROUPS, Reading, ReadingSizes, name_of, readings_of
 from gpca.uncertainty.settings import UncertaintySettings

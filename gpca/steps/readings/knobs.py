@@ -7,12 +7,12 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 import numpy as np
 from scipy.spatial import cKDTree
 
-from gpca.alignment.rigid import inverse, transform
 from gpca.causes.truth import shapley_values
 from gpca.evaluation.measures import ALL
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.progress import progress
+from gpca.rigid import inverse, transform
 from gpca.seeds import generator
 from gpca.steps.readings.files import Row, RunFiles
 from gpca.steps.readings.groups import Reading

@@ -9,12 +9,12 @@ import numpy as np
 from scipy.stats import rankdata
 
 from gpca.attribution.predictions import read_predictions
+from gpca.jobs.job import Job
+from gpca.jobs.provenance import record_provenance
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.shifted_sets import ShiftedSets
 from gpca.pairs.synthesis import RegistrationSettings, make_registrations
-from gpca.process.job import Job
-from gpca.process.provenance import record_provenance
 from gpca.steps.readings.files import Row, RunFiles, accuracies, accuracies_of_named, like_the_training, train_and_test
 from gpca.steps.readings.gpc_start import gpc_scores
 from gpca.steps.readings.groups import Reading

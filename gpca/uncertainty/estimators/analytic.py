@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gpca.alignment.rigid import point_jacobians
+from gpca.rigid import point_jacobians
 from gpca.seeds import generator
 from gpca.uncertainty.estimators.interface import (
     POINT_TO_PLANE,

@@ -8,10 +8,10 @@ from typing import Literal
 import numpy as np
 
 from gpca.alignment.methods.interface import Outcome, Pair
-from gpca.alignment.rigid import inverse, log, rigid_motion, transform
 from gpca.objects.bop import symmetric_turn
 from gpca.pairs.distances import ObservedPair, describe_distances, describe_entropy
 from gpca.pairs.judge import Judge
+from gpca.rigid import inverse, log, rigid_motion, transform
 from gpca.uncertainty.estimators.interface import Example, FailedEstimate, RegisteredPair, intrinsic_frame
 
 Moved = Literal["model", "observed"]  # which cloud the source is

@@ -16,7 +16,7 @@ import numpy as np
 from gpca.alignment.icp import ICPSettings
 from gpca.alignment.methods.interface import CORRESPONDENCE_DISTANCE, FEWEST, MAX_ITERATIONS, Outcome, Pair
 from gpca.alignment.methods.registry import make_method, method_entry
-from gpca.alignment.rigid import exp, inverse, log, point_jacobians, rigid_motion, transform
+from gpca.rigid import exp, inverse, log, point_jacobians, rigid_motion, transform
 
 SINGULAR = 1e-9  # ratio of eigenvalues below which a direction counts as open
 FEWEST_RUNS = 7  # that give a 6×6 covariance its rank

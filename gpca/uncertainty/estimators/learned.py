@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gpca.alignment.rigid import adjoint, exp, log
+from gpca.rigid import adjoint, exp, log
 from gpca.seeds import generator
 from gpca.uncertainty.estimators.interface import (
     Estimator,

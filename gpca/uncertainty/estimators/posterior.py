@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 
 from gpca.alignment.methods.interface import CORRESPONDENCE_DISTANCE
-from gpca.alignment.rigid import exp, inverse, log
+from gpca.rigid import exp, inverse, log
 from gpca.seeds import generator
 from gpca.uncertainty.estimators.interface import EstimatorEntry, RegisteredPair
 

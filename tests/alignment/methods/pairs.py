@@ -4,8 +4,8 @@ import numpy as np
 
 from gpca.alignment.methods.interface import Pair
 from gpca.alignment.pose_error import adds_error
-from gpca.alignment.rigid import exp, inverse, transform
 from gpca.pairs.perturbation import PERTURBATIONS, Severities
+from gpca.rigid import exp, inverse, transform
 
 
 def clouds(objects, index, seed=0, points=250):

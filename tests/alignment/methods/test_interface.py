@@ -3,8 +3,8 @@ import pytest
 from scipy.spatial import cKDTree
 
 from gpca.alignment.methods.interface import FailedRegistration, Outcome, Pair
-from gpca.alignment.rigid import transform
 from gpca.errors import InputError
+from gpca.rigid import transform
 
 from .pairs import clouds, perturbed
 

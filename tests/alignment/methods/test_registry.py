@@ -20,8 +20,8 @@ from gpca.alignment.methods.registry import (
     require_settings,
 )
 from gpca.alignment.pose_error import pose_error
-from gpca.alignment.rigid import require_rigid
 from gpca.errors import InputError
+from gpca.rigid import require_rigid
 from tests.documents import ROOT
 
 from .pairs import clouds, error, perturbed, small_motion

@@ -9,8 +9,8 @@ from gpca.alignment.methods import stages
 from gpca.alignment.methods.interface import FailedRegistration, Pair
 from gpca.alignment.methods.registry import make_method
 from gpca.alignment.methods.stages import VARIANTS, Stages, nearest, run_stages
-from gpca.alignment.rigid import exp, inverse, transform
 from gpca.pairs.perturbation import CONCEPTS
+from gpca.rigid import exp, inverse, transform
 
 from .pairs import clouds, perturbed, small_motion
 

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from gpca.alignment.methods.teaser import gnc_rotation, largest_clique, solve, vote
-from gpca.alignment.rigid import inverse, rotate, rotation_angle_rad, transform
+from gpca.rigid import inverse, rotate, rotation_angle_rad, transform
 
 NOISE = 0.01
 

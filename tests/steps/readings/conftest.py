@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gpca.attribution.predictions import write_predictions
-from gpca.attribution.scores import Attribution
+from gpca.classifier.scores import Attribution
 from gpca.io.arrays import save_arrays
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.pairs.shifted_sets import DISTANCES, ShiftedSets

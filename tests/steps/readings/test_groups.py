@@ -8,8 +8,8 @@ import pytest
 from gpca.active_learning.retraining import Retraining, learn
 from gpca.attribution.learner_predictions import read_learner_predictions
 from gpca.attribution.predictions import write_predictions
-from gpca.attribution.scores import Attribution
 from gpca.classifier.gpc import GPC
+from gpca.classifier.scores import Attribution
 from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
 from gpca.explainers.registry import explainer_entry

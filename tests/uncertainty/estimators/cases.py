@@ -3,7 +3,7 @@
 import numpy as np
 
 from gpca.alignment.methods.interface import Outcome, Pair
-from gpca.alignment.rigid import exp
+from gpca.rigid import exp
 from gpca.uncertainty.estimators.interface import RegisteredPair
 
 DEVIATION_6 = np.repeat([np.deg2rad(10), 0.05], 3) / np.sqrt(3)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gpca.alignment.rigid import best_motion, exp, log, transform
+from gpca.rigid import best_motion, exp, log, transform
 from gpca.uncertainty.estimators.analytic import censi, hessian, mixed_derivatives
 from gpca.uncertainty.estimators.interface import FailedEstimate, Matches
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gpca.alignment.rigid import adjoint, exp, log
+from gpca.rigid import adjoint, exp, log
 from gpca.uncertainty.estimators import learned
 from gpca.uncertainty.estimators.interface import Example, FailedEstimate, intrinsic_frame
 

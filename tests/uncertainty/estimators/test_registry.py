@@ -123,7 +123,7 @@ def test_the_inverse_of_a_hessian_or_why_there_is_none():
 
 
 def test_the_intrinsic_frame_turns_with_the_cloud():
-    from gpca.alignment.rigid import exp, transform
+    from gpca.rigid import exp, transform
 
     cloud = ellipsoid(0)[0] ** 3 + 0.3 * ellipsoid(0)[0]
     T = exp(np.array([[0.4, -0.8, 0.5, 0.1, 0.2, 0.3]]))[0]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gpca.alignment.rigid import exp, transform
+from gpca.rigid import exp, transform
 from gpca.uncertainty.estimators import posterior
 from gpca.uncertainty.estimators.posterior import Posterior
 

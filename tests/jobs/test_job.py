@@ -8,8 +8,8 @@ import pytest
 
 from gpca.__main__ import COMMANDS
 from gpca.errors import InputError
+from gpca.jobs.job import Job, as_process
 from gpca.process.code_files import ROOT
-from gpca.process.job import Job, as_process
 
 JOB = Job(
     source="ycb",
@@ -21,7 +21,7 @@ JOB = Job(
 SNAKEMAKE = """
 import sys
 from types import SimpleNamespace
-from gpca.process.job import run_step
+from gpca.jobs.job import run_step
 run_step(SimpleNamespace(
     threads=2, log=["log.txt"], wildcards={"seed": "7", "source": "tiny"},
     params={"step": "own_step", "settings": '{"b": 1, "a": 2}', "folders": {"data_dir": "data"}, "threads": 1},
@@ -103,7 +103,7 @@ import sys
 from snakemake.iocontainers import InputFiles, Log, OutputFiles, Params
 from types import SimpleNamespace
 from gpca.errors import InputError
-from gpca.process.job import workflow_script
+from gpca.jobs.job import workflow_script
 snakemake = SimpleNamespace(
     input=InputFiles(fromdict={"predictions": ["predictions.csv"], "code": ["module.py"]}),
     output=OutputFiles(toclone=["table.md"]),

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gpca.errors import InputError
-from gpca.io.files import LARGEST_NUMBER
+from gpca.numerals import LARGEST_NUMBER
 
 
 def transform(T_b_a: np.ndarray, points_a: np.ndarray) -> np.ndarray:

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from gpca.__main__ import COMMANDS, load_command
-from gpca.process.arguments import whole_number
+from gpca.jobs.arguments import whole_number
 from gpca.process.environment import require_open3d, system_library_hint
 from tests.hostile import refusal
 

@@ -93,7 +93,7 @@ def workflow_script(snakemake: Any) -> Iterator[dict]:
 
     A fault of the input ends as one line in the log and status 2. The block can add to the provenance by the mapping.
     """
-    from gpca.process.provenance import record_provenance
+    from gpca.jobs.provenance import record_provenance
 
     _print_to(snakemake.log)
     lists = (paths if isinstance(paths, list) else [paths] for paths in files_by_name(snakemake.input).values())

@@ -4,8 +4,8 @@ import inspect
 
 import pytest
 
-from gpca.experiments.experiment import Experiment, Tidy
-from gpca.experiments.registry import experiments
+from gpca.declarations.experiment import Experiment, Tidy
+from gpca.declarations.registry import experiments
 from gpca.process.registry import load as load_function
 
 COLLECTED = [tidy for each in experiments() for tidy in each.tidy if tidy.collector]

@@ -12,8 +12,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from gpca.jobs.provenance import sha256_of_settings
 from gpca.objects.entry import dataset_of, stand_in_clause, title_of
-from gpca.process.provenance import sha256_of_settings
 
 KEYS = "*"  # at the end of a path: the keys of a mapping, whatever their values
 READ = "config_read"  # in the provenance of a result

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from gpca.experiments.plan import Run
-from gpca.experiments.step import Plan, Step, all_files, rules_of
+from gpca.declarations.plan import Run
+from gpca.declarations.step import Plan, Step, all_files, rules_of
 
 NAMES = {
     "source": ["ycb", "cups"],

@@ -1,4 +1,4 @@
-"""All experiments, their steps, tables and figures: a new file of this folder is found at the next call."""
+"""All experiments, their steps, tables and figures: a new file of ``gpca/experiments/`` is found at the next call."""
 
 from __future__ import annotations
 
@@ -9,10 +9,12 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from gpca.experiments.experiment import Experiment
-from gpca.experiments.step import Step
+from gpca.declarations.experiment import Experiment
+from gpca.declarations.step import Step
 from gpca.reporting.registry import Names, Result
 
+PACKAGE = "gpca.experiments"
+FOLDER = Path(__file__).parents[1] / "experiments"
 BEYOND = "Beyond the paper"
 SECTIONS = (  # of the page, the paper's first
     "III Gaussian process concept attribution",
@@ -38,8 +40,8 @@ SECTIONS = (  # of the page, the paper's first
 def experiments() -> tuple[Experiment, ...]:
     """All experiments, by their names."""
     declared = []
-    for path in sorted(Path(__file__).parent.glob("*.py")):
-        experiment = getattr(import_module(f"{__package__}.{path.stem}"), "EXPERIMENT", None)
+    for path in sorted(FOLDER.glob("*.py")):
+        experiment = getattr(import_module(f"{PACKAGE}.{path.stem}"), "EXPERIMENT", None)
         if experiment is not None:
             tidy = tuple(function.tidy for function in _declared(experiment, "tidy"))
             declared.append(replace(experiment, tidy=(*experiment.tidy, *tidy)))
@@ -58,7 +60,7 @@ def steps() -> list[Step]:
 
 
 def _modules(experiment: Experiment) -> list[ModuleType]:
-    return [import_module(f"{__package__}.{name}") for name in (experiment.name, *experiment.beside)]
+    return [import_module(f"{PACKAGE}.{name}") for name in (experiment.name, *experiment.beside)]
 
 
 def _declared(experiment: Experiment, kind: str) -> list[Any]:

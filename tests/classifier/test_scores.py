@@ -3,7 +3,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from gpca.attribution.scores import Attribution, entropy, summarize_draws, summarize_marginals
+from gpca.classifier.scores import Attribution, entropy, summarize_draws, summarize_marginals
 from gpca.pairs.perturbation import CONCEPTS
 
 

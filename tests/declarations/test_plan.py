@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from gpca.experiments.plan import READ, Recorded, Run, config_token
+from gpca.declarations.plan import READ, Recorded, Run, config_token
 
 CONFIG = {
     "seeds": [0, 1, 2],

@@ -1,7 +1,7 @@
 """Tables, figures and files of numbers as an experiment declares them: functions of a run and of some of its files.
 
 ``@table`` and ``@figure`` give a result's place on the page and the words beside it, ``@numbers`` which files
-its function writes. The function gets a :class:`gpca.experiments.plan.Run` first, and then its inputs by name:
+its function writes. The function gets a :class:`gpca.declarations.plan.Run` first, and then its inputs by name:
 
 - ``intervals="causes_intervals.csv"``: a file of numbers, read by :func:`gpca.evaluation.measures.read_rows`;
 - ``seconds=(read_seconds, "timings/{source}/seed{seed}.csv")``: what the function makes of these files; several
@@ -19,7 +19,7 @@ from inspect import cleandoc
 from pathlib import Path
 from typing import Any, TypeVar
 
-from gpca.experiments.experiment import Tidy
+from gpca.declarations.experiment import Tidy
 from gpca.reporting.registry import Input, Result
 
 READ_ROWS = "gpca.evaluation.measures:read_rows"

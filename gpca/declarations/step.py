@@ -17,8 +17,8 @@ from operator import getitem
 from pathlib import Path
 from typing import Any
 
+from gpca.declarations.plan import Run
 from gpca.encoders.registry import encoders
-from gpca.experiments.plan import Run
 from gpca.process.code_files import code_files
 
 BRACED = re.compile(r"{(\*?)(\w+)}")

@@ -4,7 +4,8 @@ from scipy.linalg import expm
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from gpca.alignment.rigid import (
+from gpca.errors import InputError
+from gpca.rigid import (
     adjoint,
     best_motion,
     best_rotation,
@@ -21,7 +22,6 @@ from gpca.alignment.rigid import (
     scale_translation,
     transform,
 )
-from gpca.errors import InputError
 
 RANDOM = np.random.default_rng(0)
 SOURCE = RANDOM.normal(size=(30, 3))

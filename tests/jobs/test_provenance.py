@@ -8,9 +8,9 @@ from types import SimpleNamespace
 import pytest
 
 from gpca import __version__
-from gpca.process import provenance
+from gpca.jobs import provenance
+from gpca.jobs.provenance import record_provenance, sha256_of_settings
 from gpca.process.processor import describe
-from gpca.process.provenance import record_provenance, sha256_of_settings
 
 
 @pytest.fixture

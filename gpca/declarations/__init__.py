@@ -1,0 +1,1 @@
+"""What the file of an experiment declares: settings, steps, numbers, tables and figures."""

@@ -1,0 +1,1 @@
+"""What a job is given, its arguments, and the provenance of what it writes."""
