@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -51,7 +51,7 @@ class LearnedPairGPCA(PairDescription, GPCA):
     ) -> None:
         PairDescription.__init__(self, source, seed, "relations", points, motion)
         GPCA.__init__(self, source, seed, **settings)
-        self._training = {"epochs": epochs, "learning_rate": encoder_learning_rate}
+        self._training: dict[str, Any] = {"epochs": epochs, "learning_rate": encoder_learning_rate}
         self._draw_points = min(draw_points, points)
         self._embedding = f"{self._prefix}embedding_by_{ENCODER}" + ("" if motion else "_without_motion")
         self._embed: Callable[[Registrations], Registrations] | None = None
@@ -69,7 +69,7 @@ class LearnedPairGPCA(PairDescription, GPCA):
             return replace(described, attached={**described.attached, motion: self.motion(described)})
 
         labeled = seen(registrations)
-        options = {"motion": labeled.attached[motion].shape[1]}
+        options: dict[str, Any] = {"motion": labeled.attached[motion].shape[1]}
         settings = EncoderSettings(ENCODER, self._draw_points, draws=2, options=options, **self._training)
         draw = partial(draw_pairs, self._prefix + "points", motion)
         task = TrainingTask(self.labels, make=lambda: PAIR_ENCODERS[ENCODER](**options), draw=draw)

@@ -81,10 +81,11 @@ def run_explain(options: Namespace) -> int:
     from gpca.process.compilation import say_when_compiling
 
     say_when_compiling()
+    from gpca.model.explanation import LEARNED, Explanation
+
     explain: Callable[..., Explanation | ScanExplanation]
-    names, extra = {"target": str(options.target)}, {}
+    learned, names, extra = LEARNED, {"target": str(options.target)}, {}
     if path is None:
-        from gpca.model.explanation import LEARNED as learned
         from gpca.model.scan_explainer import explain_scans
 
         explain = partial(explain_scans, voxel=options.voxel, method=options.method)
@@ -103,15 +104,16 @@ def run_explain(options: Namespace) -> int:
         uncertainty = UncertaintySettings() if options.uncertainty or options.estimator else None
         estimator = options.estimator or MONTE_CARLO
         asked = {"frame": frame, "uncertainty": uncertainty, "estimator": estimator, "method": options.method}
-        explain = partial(explainer.explain, **asked, fast=options.fast)
+        by_model: Callable[..., Explanation] = explainer.explain
+        explain = partial(by_model, **asked, fast=options.fast)
     status = 0
     for name, source in zip(map(str, options.source), sources, strict=True):
         try:
-            explanation = explain(source, target, T_init, options.unit)
+            explanation = explain(source, target, T_target_source_init=T_init, unit=options.unit)
         except InputError as fault:
             raise InputError(name, str(fault)) from fault
         _write(options, explanation, {"source": name, **names}, extra)
-        if path is not None:
+        if isinstance(explanation, Explanation):
             status = UNKNOWN_STATUS if explanation.unknown else status
             _queue(options.queue, explainer, explanation, f"{name} to {options.target}")
     print(learned, file=sys.stderr)

@@ -206,8 +206,9 @@ def _scores(record: Mapping, sources: Sequence[Source], scores: pd.DataFrame) ->
 
 
 def _limits(model: Model, settings: Mapping) -> list[str]:
-    causes, sets = settings["causes"] | settings["model"].get("causes", {}), model.diagnoser.guarantee.state_sets
-    guarantee, alarm = model.diagnoser.guarantee, model.diagnoser.guarantee.failure_alarm
+    causes, guarantee = settings["causes"] | settings["model"].get("causes", {}), model.diagnoser.guarantee
+    assert guarantee is not None  # a model file holds one
+    sets, alarm = guarantee.state_sets, guarantee.failure_alarm
     severities = ", ".join(f"{name} {low:g} to {high:g}" for name, (low, high) in causes["severities"].items())
     familiar = ", ".join(f"{name} {low:.2f} to {high:.2f}" for name, (low, high) in model.familiar.ranges.items())
     fewest, most = causes["points"]

@@ -165,10 +165,10 @@ def _rule(step: Step, plan: Plan, name: str) -> Rule:
         else code_files(*modules),
         outputs={key: _files(step, plan, pattern) for key, pattern in step.outputs.items()},
         settings=later(_as_json, step, plan) if callable(step.settings) else _as_json(step, plan, None),
-        params={plural(listed): list(values[listed]) for star, listed in in_outputs if star}
+        params={plural(listed): list(values[listed] or ()) for star, listed in in_outputs if star}
         | {key: later(value, plan) if callable(value) else value for key, value in step.params.items()},
         constraints={
-            wildcard: "|".join(map(str, values[wildcard])) or "none"
+            wildcard: "|".join(map(str, values[wildcard] or ())) or "none"
             for wildcard in wildcards
             if wildcard != "seed" and values[wildcard] is not None
         },

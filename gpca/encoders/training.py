@@ -155,7 +155,7 @@ class _Training:
         # Fused, because the plain form takes torch.sqrt, whose last bit depends on the processor's vendor.
         self._optimizer = torch.optim.AdamW(model.parameters(), rate, weight_decay=settings.weight_decay, fused=True)
         self._schedule = torch.optim.lr_scheduler.OneCycleLR(self._optimizer, rate, steps, pct_start=RISING)
-        self.state = {"model": model, "optimizer": self._optimizer, "schedule": self._schedule}
+        self.state: dict[str, Any] = {"model": model, "optimizer": self._optimizer, "schedule": self._schedule}
         self.title = f"{settings.backbone} on {axes[0]}, seed {axes[1]}"
 
     def run_epoch(self, epoch: int) -> dict[str, float]:

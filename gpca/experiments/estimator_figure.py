@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -49,7 +49,7 @@ PARTS = {
     "rotation": (slice(0, 3), "degrees", np.rad2deg(1.0)),
     "translation": (slice(3, 6), "% of the diameter", 100.0),
 }
-SIGNS = (
+SIGNS: tuple[tuple[str, str, dict[str, Any]], ...] = (
     ("results of other starts and data", ".", {"color": style.LIGHT_GRAY}),
     ("true pose", "*", {}),
     ("succeeded", "o", {"markerfacecolor": "none", "markersize": 3}),

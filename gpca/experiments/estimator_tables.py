@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import inf
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from gpca.alignment.methods.registry import method_entry
 from gpca.declarations.plan import Run
@@ -25,8 +25,8 @@ REFERENCES = {"starts": "Other starts", "data": "Other data", "all": "Other star
 # By which an estimator is judged, by what it models. No posterior can be drawn here; a right one is about as wide as
 # the results of other data.
 REFERENCE_OF = {"starts": "starts", "data": "data", "posterior": "data", "starts and data": "all", "error": "all"}
-KL = {"limits": (0, inf), "least_is_best": True}
-RATIO = {"interval": False, "limits": (0, inf)}
+KL: dict[str, Any] = {"limits": (0, inf), "least_is_best": True}
+RATIO: dict[str, Any] = {"interval": False, "limits": (0, inf)}
 BY_MODEL = {  # Each of these metrics has a column, by the reference of what an estimator models.
     "kl_rotation": Column("KL, rotation (nats)", 1, heavy_tail=True, **KL),
     "kl_translation": Column("KL, translation (nats)", 1, heavy_tail=True, **KL),

@@ -200,8 +200,10 @@ def ends_of(truth: Truth) -> np.ndarray:
 
 def count_ends(samples: pd.DataFrame, things: Iterable[str], whole: str) -> Counter[str]:
     """Numbers of samples by their `end`, of different things among them, and of all, by the name `whole`."""
-    counts = Counter(samples["end"].tolist()) | Counter({f"{name}s": samples[name].nunique() for name in things})
-    return counts | Counter({whole: len(samples), "missed": int((samples["missed"] == "True").sum())})
+    counts: Counter[str] = Counter(samples["end"].tolist())
+    counts.update({f"{name}s": samples[name].nunique() for name in things})
+    counts.update({whole: len(samples), "missed": int((samples["missed"] == "True").sum())})
+    return counts
 
 
 def counts_in(rows: pd.DataFrame) -> dict[str, int]:

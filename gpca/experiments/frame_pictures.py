@@ -293,7 +293,8 @@ def draw_real_world_failures(
         right = np.cross([0.0, 0.0, 1.0] if abs(towards[2]) < 0.95 else [0.0, 1.0, 0.0], towards)
         right /= np.linalg.norm(right)
         view = np.array([right, np.cross(towards, right), towards])
-        draw_clouds(above, *(cloud[:: max(1, len(cloud) // 1500)] @ view.T for cloud in (model, source)), size=1.2)
+        target, seen = (cloud[:: max(1, len(cloud) // 1500)] @ view.T for cloud in (model, source))
+        draw_clouds(above, target, seen, size=1.2)
         draw_scores(below, mistake)
         taken = f"{mistake['concept_true']} taken for {mistake['concept_predicted']}"
         words = f"{object_of_frames(registrations.object_name[row])}\n{taken}\n"
@@ -338,8 +339,11 @@ def draw_frame_reliability(run: Run, prediction_files: Iterable[str | Path]) -> 
         scores_N_C = rows[[f"score_{concept}" for concept in concepts_of(rows)]].to_numpy(float)
         hit_N = (rows["concept_predicted"] == rows["concept_true"]).to_numpy()
         parts.setdefault(source_method_seed(path)[1], []).append((scores_N_C.max(axis=1), hit_N))
-    samples = {
-        title: tuple(np.concatenate(columns) for columns in zip(*parts[method], strict=True))
+    samples: dict[str, tuple[np.ndarray, np.ndarray]] = {
+        title: (
+            np.concatenate([score for score, _ in parts[method]]),
+            np.concatenate([hit for _, hit in parts[method]]),
+        )
         for method, title in methods.items()
         if method in parts
     }

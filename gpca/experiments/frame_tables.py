@@ -78,7 +78,7 @@ def table6_backbones(run: Run, intervals, metrics):
         counts = subset.iloc[0][["seeds", "samples"]].astype(int)
         cells = {}
         for key, source, samples in (("classifiers", ONE_ENCODER, 0), ("deviation", REAL_WORLD, counts["samples"])):
-            accuracies = where(metrics, row.where | {"source": source, "metric": "accuracy", "concept": ALL})
+            accuracies = where(metrics, {**row.where} | {"source": source, "metric": "accuracy", "concept": ALL})
             if len(accuracies) > 1:
                 deviation = float((accuracies["value"].to_numpy() * 100).std(ddof=1))
                 cells[key] = plain_cell(deviation, len(accuracies), samples)
@@ -151,7 +151,7 @@ def table6_seen_unseen(run: Run, intervals, metrics):
         columns[name] = show("accuracy", title, where={"table": name}, interval=False)
 
     def more(row: Row, _subset):
-        of_all = where(metrics, row.where | {"table": TOGETHER, "concept": ALL})
+        of_all = where(metrics, {**row.where} | {"table": TOGETHER, "concept": ALL})
         values = {metric: where(of_all, {"metric": metric})["value"] for metric in (*NOT_SHARES, "test_samples")}
         samples = int(values["test_samples"].sum())
         return {metric: cell_of_repeats(values[metric].to_numpy(), samples) for metric in NOT_SHARES}

@@ -171,9 +171,9 @@ def explained(plan: Plan) -> list[str]:
     return sorted({entry.explainer for entry in _entries(plan.config).values() if entry.explainer})
 
 
-def standing(plan: Plan) -> Mapping[str, Any]:
+def standing(plan: Plan) -> dict[str, Any]:
     """Entry of the source whose objects stand on the tables."""
-    return plan.sources[plan.config["recovery"]["objects"]]
+    return dict(plan.sources[plan.config["recovery"]["objects"]])
 
 
 RECOVER = Step(

@@ -104,9 +104,9 @@ def fig1_recovery_example(run: Run, example_npz: str | Path) -> Figure:
     name = object_in_words(example["object"], dataset_of(entry))
     style.write_title(drawing, f"{tables_title(run)}: {name}")
     outlines = (("where it is", VISIBLE), ("its hidden part", HIDDEN), ("where ICP put it", PLACED))
-    rim = {"linewidth": LINE_PT, "path_effects": [withStroke(linewidth=RIM_PT, foreground=style.BLACK)]}
+    rim: dict[str, Any] = {"linewidth": LINE_PT, "path_effects": [withStroke(linewidth=RIM_PT, foreground=style.BLACK)]}
     handles = [Line2D([], [], label=words, color=look[0], linestyle=look[1], **rim) for words, look in outlines]
-    ring = {"marker": "o", "color": "white", "markeredgecolor": style.BLACK, "markeredgewidth": 1.6}
+    ring: dict[str, Any] = {"marker": "o", "color": "white", "markeredgecolor": style.BLACK, "markeredgewidth": 1.6}
     for words, mark in (("first view", {"marker": "x", "color": style.VERMILION}), ("chosen", ring)):
         handles.append(Line2D([], [], label=words, linestyle="", markersize=4, **mark))
     legend_below(drawing, handles)

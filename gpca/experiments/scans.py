@@ -265,7 +265,7 @@ def table17_scans(run: Run, intervals, seconds):
     """Recalls in all and by stratum of overlap, and seconds: data sets × starts × methods."""
     strata = {stratum_name(*ends): ends for ends in pairwise(run.config["scans"]["strata"])}
     columns = {key: show(RECALL, f"{low:g} to {high:g} (%)", key) for key, (low, high) in strata.items()}
-    seconds_look = {"decimals": 2, "interval": False, "limits": (0, inf), "least_is_best": True}
+    seconds_look: dict[str, Any] = {"decimals": 2, "interval": False, "limits": (0, inf), "least_is_best": True}
     columns |= {
         ALL: show(RECALL, "All (%)"),
         FAILED: show(FAILED, "Failed (%)", interval=False, least_is_best=True),

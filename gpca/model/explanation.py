@@ -123,11 +123,11 @@ class Explanation(Page):
         scene, explained = self.scene, self.as_dict()
         if scene is not None and self.unknown:
             scene = replace(scene, enact=None)  # hypotheses mean nothing where scores mean nothing
-        possible = scene is not None and self.diagnosis is not None and not self.unknown
+        diagnosis = None if self.unknown or scene is None else self.diagnosis
         body = [
             page.action(explained, self.advice),
             *([] if self.unknown else [page.promise(explained), page.causes(explained)]),
-            page.poses(self.diagnosis.reenacted, "the object", self.unit, observation=True) if possible else "",
+            page.poses(diagnosis.reenacted, "the object", self.unit, observation=True) if diagnosis else "",
             page.counterfactuals(scene, self.unit) if scene else "",
             "" if self.unknown else page.as_in_the_paper(explained),
             page.details(explained, {"training": self.learned_from} | dict(names or {})),
@@ -228,7 +228,7 @@ class ScanExplanation(Page):
             page.action(explained, self.advice),
             page.section("Overlap", f"<p>{escape(self._overlap())}.</p>"),
             page.poses(self.reenacted, "the source", self.unit),
-            page.counterfactuals(scene, self.unit, SCANS_WITHOUT),
+            page.counterfactuals(scene, self.unit, SCANS_WITHOUT) if scene else "",
             page.details(explained, inputs),
         ]
         head = f'<h1 class="{tone}">{title}</h1><p>{escape(doubt)}</p>{page.warnings(self.warnings)}'

@@ -9,6 +9,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
+from typing import Any
 
 from gpca.alignment.icp import ICPSettings
 from gpca.causes.settings import CauseSettings
@@ -110,7 +111,12 @@ def render(template: str = "index.html.jinja", **content) -> str:
         words = section.removeprefix("Beyond the paper: ")
         return words[:1].upper() + words[1:]
 
-    options = {"autoescape": True, "undefined": StrictUndefined, "trim_blocks": True, "lstrip_blocks": True}
+    options: dict[str, Any] = {
+        "autoescape": True,
+        "undefined": StrictUndefined,
+        "trim_blocks": True,
+        "lstrip_blocks": True,
+    }
     environment = Environment(loader=FileSystemLoader([TEMPLATES, ASSETS]), **options)
     environment.filters["anchor"] = lambda title: re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-")
     environment.filters["short"] = short

@@ -96,8 +96,8 @@ def try_methods(
     require_global(start)
     if start not in made:
         raise InputError("method_pairs.global_start", f"'{start}' is not among the methods", "add it or name another")
-    rows = np.flatnonzero((registrations.split == "test") & (registrations.sample < settings.samples))
-    if not len(rows):  # threes of one object, which go round the objects
+    rows = np.flatnonzero((registrations.split == "test") & (registrations.sample < settings.samples)).tolist()
+    if not rows:  # threes of one object, which go round the objects
         raise InputError(f"registrations of {source}", "have no test samples", "raise registrations.test")
     of_objects = Judges(objects, f"objects of {source}")
     judges = [of_objects.of(registrations, row) for row in rows]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -52,9 +53,10 @@ class Pair:
     def with_normals(self, neighbors: int = NEIGHBORS) -> Pair:
         """Return the pair with normals of both clouds, estimated if missing."""
         missing = [name for name in ("source", "target") if getattr(self, f"{name}_normals") is None]
-        return replace(
-            self, **{f"{name}_normals": estimate_normals(getattr(self, name), neighbors) for name in missing}
-        )
+        normals: dict[str, Any] = {
+            f"{name}_normals": estimate_normals(getattr(self, name), neighbors) for name in missing
+        }
+        return replace(self, **normals)
 
     def normals(self, name: str) -> np.ndarray:
         """Return the normals of the "source" or the "target"; without them, the registration fails."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache, partial
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -163,7 +163,7 @@ def align_variant(
     max_iterations: int = MAX_ITERATIONS,
 ) -> Outcome:
     """Run point-to-plane ICP with one stage changed; rows are drawn once per pair."""
-    changed = {stage: change(pair) if stage == "rows" else change}
+    changed: dict[str, Any] = {stage: change(pair) if stage == "rows" else change}
     stages = Stages(metric="point_to_plane", distance=correspondence_distance, **changed)
     T, _, failure = run_stages(pair, stages, max_iterations)
     return Outcome.at(pair, T, correspondence_distance, failure)
