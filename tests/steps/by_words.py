@@ -90,7 +90,17 @@ LISTS = {  # which names of a step are lists, and not of one seed, file or name
 NUMBERS = {"seed", "seeds", "files_seed", "surface_points", "threads"}
 TEXTS = {
     *("source", "explainer", "control", "design", "reduction", "group", "title", "name", "files_of", "encoder_of"),
-    *("registrations_of", "retrained", "others", "strategies", "concepts", "estimators", "backbones", "learners"),
+    *(
+        "registrations_of",
+        "retrained",
+        "others",
+        "strategies",
+        "concepts",
+        "estimators",
+        "estimates",
+        "backbones",
+        "learners",
+    ),
     *("remedies", "reenactment", "other", "methods", "encoders_of", "data_dir", "chunk", "severities"),
     "place",
 }

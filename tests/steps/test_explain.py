@@ -27,7 +27,7 @@ FAULTS = [
     ),
     (written("pose.txt", "1 0 0"), {"--init": "pose.txt"}, r"pose.txt: contains 3 numbers; give 4×4"),
     (untouched, {"--init": "pose.txt"}, r"pose.txt: no such file"),
-    (untouched, {"--method": "icp"}, r"explain: registration method 'icp': unknown; choose one of fgr, "),
+    (untouched, {"--method": "icp"}, r"explain: registration method 'icp': unknown; choose one of point_to_point, "),
     (untouched, {"--estimator": "gauss"}, r"explain: estimator 'gauss': unknown; choose one of .*brossard"),
     (untouched, {"--estimator": "cello"}, r"explain: estimator 'cello': learns from registrations"),
     (untouched, {"--estimator": ""}, r"--estimator: '' is empty or does not fit on one line"),
