@@ -50,7 +50,7 @@ def test_a_reader_of_one_file_is_given_one_and_a_reader_of_many_a_list(config, s
                 parameters = inspect.signature(load_function(given.read)).parameters
                 for keyword in given.files:
                     taken = parameters[keyword] if keyword else next(iter(parameters.values()))
-                    many = any(word in str(taken.annotation) for word in ("Iterable", "Sequence", "list"))
+                    many = any(word in str(taken.annotation) for word in ("Iterable", "Paths", "Sequence", "list"))
                     is_list = isinstance(files[input_name(given.argument, keyword)], list)
                     assert is_list == many, f"{result.name}: {given.argument}"
 

@@ -82,8 +82,9 @@ rule model:
     conda:
         "../envs/gpca.yaml"
     params:
-        **TITLED["model"],
         step="gpca.steps.causes:model",
+        title=TITLED["model"]["title"],
+        stand_in=TITLED["model"]["stand_in"],
         source=MODEL_SOURCE,
         seed=SEEDS[0],
         learned_from=[
