@@ -96,8 +96,6 @@ def test_every_file_of_arrays_and_weights_says_of_what_it_is(made):
 
 
 def test_the_own_source_is_not_another_one(folder, capsys):
-    changes = {"--other-registrations": "registrations.npz"}
-    refused(folder, capsys, "shift", lambda _: None, changes, "registrations.npz: is of source 'tiny' itself; give")
     changes = {"--encoders": "weights.pt"}
     refused(folder, capsys, "new_concepts", lambda _: None, changes, "weights.pt: was trained on the same samples")
 

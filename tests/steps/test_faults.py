@@ -152,7 +152,6 @@ FAULTS = {
     "exchange": [
         (removed("weights.pt"), {}, "weights.pt: no such weights"),
         (arrays_changed("objects.npz", names=reversed_order), {}, ANOTHER_NAME),
-        (untouched, settings("exchange", explainers={"shap_removal": {}}), "'shap_removal': reads design 'removal'"),
     ],
     "reduce": [
         (removed("embeddings.npz"), {}, "embeddings.npz: no such file"),

@@ -15,12 +15,12 @@ class Deleted:
     def __del__(self):
         os.kill(os.getpid(), signal.SIGINT)
 
-def keep(checkpoint, identity, state, curve):
-    kept(checkpoint, identity, state, curve)
-    if len(curve) == 3:
+def write(path, content):
+    written(path, content)
+    if len(content.get("curve", ())) == 3:
         {stop}
 
-kept, training.keep = training.keep, keep
+written, training.write_tensors = training.write_tensors, write
 signal.signal(signal.SIGINT, signal.default_int_handler)
 sys.exit(main(sys.argv[1:]))
 """
