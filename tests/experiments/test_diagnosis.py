@@ -8,7 +8,7 @@ from gpca.causes.judged import CEILING, Judged, ceiling_of, read_judged
 from gpca.causes.truth import BORDERLINE, FAILED, NOMINAL
 from gpca.errors import InputError
 from gpca.evaluation.measures import POOLED, read_clustered, write_metrics
-from gpca.experiments import diagnosis, sample_strata
+from gpca.experiments import diagnosis
 from gpca.experiments.sample_strata import collect_strata, strata_of, table9_shown, table9_strata
 from tests.experiments.runs import run_with
 from tests.judged import random_judged, write_run
@@ -144,7 +144,7 @@ def test_each_kind_of_stratum_divides_the_failed_and_the_states_all_that_is_judg
 
 @pytest.fixture
 def run(causes, tmp_path, monkeypatch):
-    monkeypatch.setattr(sample_strata, "cause_titles", lambda config: TITLES)
+    monkeypatch.setattr(diagnosis, "cause_titles", lambda config: TITLES)
     return write_run(tmp_path, causes)
 
 
