@@ -7,7 +7,7 @@ from itertools import product
 
 from gpca.errors import InputError
 from gpca.evaluation.intervals import REPEATS
-from gpca.objects.entry import stand_in_clause, title_of
+from gpca.objects.entry import stand_in_clause
 from gpca.reporting.tables.cells import share_within_limits
 from gpca.reporting.tables.table import LEAST_SEEDS, Cell, Column, Table
 from gpca.reporting.words import plural, span
@@ -58,11 +58,6 @@ class TableBuilder:
             fault = "has nothing to show: its files hold no numbers of what the config names"
             raise InputError(f"table '{self.name}'", fault, "run that first")
 
-    def first_cell(self, column: str) -> Cell:
-        """Return the cell of the first row in a column."""
-        self.require_rows()
-        return self.cells[0, column]
-
     def stand_in_clause(self, sources: Mapping[str, Mapping], partly: bool = True) -> str:
         """Return the caption's clause on stand-ins among the sources that name the rows."""
         self.require_rows()
@@ -101,11 +96,6 @@ def crossed(*titles: Mapping[str, str]) -> Iterator[tuple[tuple[str, ...], list[
     """Yield the keys and the labels of every row of a table that crosses names, given the title of each."""
     for labels in product(*(named.items() for named in titles)):
         yield tuple(key for key, _ in labels), list(labels)
-
-
-def titles_of(sources: Mapping[str, Mapping]) -> dict[str, str]:
-    """Return the title of each source, which says so where it is a stand-in."""
-    return {name: title_of(entry) for name, entry in sources.items()}
 
 
 # Starts of footnotes, without a full stop. Numbers of samples are of each seed.
