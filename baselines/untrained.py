@@ -44,7 +44,7 @@ class MostFrequent(ScoringExplainer):
         return np.tile(self._shares_C, (len(registrations), 1))
 
 
-class Rule(ScoringExplainer):
+class ThresholdRule(ScoringExplainer):
     """ICP turned the observed cloud by more than `turned_deg`: pose; it has too few points: overlap; else noise.
 
     A cloud without missing parts has at least the share `complete` of the model's points.
@@ -75,7 +75,7 @@ class CauseMostFrequent(MostFrequent):
     labels = LABELS
 
 
-class CauseRule(Rule):
+class CauseRule(ThresholdRule):
     """The rule, with "nominal" by the one of three gates (:mod:`baselines.gates`) that is best in training."""
 
     labels = LABELS
@@ -95,7 +95,7 @@ class CauseRule(Rule):
 EXPLAINERS = {
     "chance": ExplainerEntry("Chance", Chance, ()),
     "most_frequent": ExplainerEntry("Most frequent label", MostFrequent, ()),
-    "rule": ExplainerEntry("Rule of three lines", Rule, ("pair", "motion")),
+    "rule": ExplainerEntry("Rule of three lines", ThresholdRule, ("pair", "motion")),
 }
 CAUSE_EXPLAINERS = {
     "chance": ExplainerEntry("Chance", CauseChance, ()),

@@ -35,7 +35,7 @@ from gpca.objects.canonical_frame import CanonicalFrame, thin
 from gpca.objects.surface import as_points
 from gpca.rigid import inverse, transform
 from gpca.seeds import generator, seed_of
-from gpca.uncertainty.estimators.interface import Estimate, RegisteredPair
+from gpca.uncertainty.estimators.interface import CovarianceEstimate, RegisteredPair
 from gpca.uncertainty.estimators.registry import make_estimator
 from gpca.uncertainty.settings import MONTE_CARLO, UncertaintySettings
 from gpca.uncertainty.spread import run_from_starts
@@ -250,7 +250,7 @@ class Explainer:
         outcome: Outcome,
         method: str | None,
         estimator: str,
-        estimate: Callable[[RegisteredPair], Estimate],
+        estimate: Callable[[RegisteredPair], CovarianceEstimate],
         settings: UncertaintySettings,
         notes: list[str],
     ) -> PoseSpread | None:

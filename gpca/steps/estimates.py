@@ -36,7 +36,7 @@ from gpca.steps.references import Redraws, Reference, draw_twists
 from gpca.uncertainty import estimates
 from gpca.uncertainty.estimates import KINDS, EstimatorPairSettings, ReferenceSamples
 from gpca.uncertainty.estimators.examples import Moved, describe, example, true_twist
-from gpca.uncertainty.estimators.interface import Estimate, Example, FailedEstimate, RegisteredPair
+from gpca.uncertainty.estimators.interface import CovarianceEstimate, Example, FailedEstimate, RegisteredPair
 from gpca.uncertainty.estimators.registry import estimator_entry, make_estimator
 from gpca.uncertainty.settings import start_deviation
 from gpca.uncertainty.spread import divergence
@@ -222,7 +222,7 @@ def try_estimators(
             cases.append(case)
             for kind, reference in case.references.items():
                 lost = "too few of the reference's runs found a correspondence"
-                answer = Estimate(reference.covariance_6_6, "" if len(reference.twists) else lost)
+                answer = CovarianceEstimate(reference.covariance_6_6, "" if len(reference.twists) else lost)
                 judgment = judged(case, answer, settings.floor) | {"seconds": reference.seconds}
                 records.setdefault(f"reference_{kind}", []).append(judgment)
             for name, estimate in trained.items():
@@ -268,7 +268,7 @@ def reference_samples(cases: Sequence[EstimatedRow]) -> ReferenceSamples:
     )
 
 
-def judged(case: EstimatedRow, answer: Estimate, floor: float) -> dict[str, object]:
+def judged(case: EstimatedRow, answer: CovarianceEstimate, floor: float) -> dict[str, object]:
     """Row of an estimate; numbers that it lacks are NaN."""
     numbers = dict.fromkeys(estimates.JUDGED, np.nan)
     if (sigma_6_6 := answer.covariance_6_6) is not None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial import KDTree
 
-from baselines.untrained import Rule
+from baselines.untrained import ThresholdRule
 from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.pose_error import PoseErrors, pose_error
 from gpca.causes.candidate import Counterfactuals, Registrar, Unmeasurable, draw_applied, draw_candidate, redrawn
@@ -138,7 +138,7 @@ CAUSES = CONFIG["causes"] | {"limits": LIMITS, "shares": CONFIG["controls"]["har
 def test_a_rule_of_three_lines_is_near_chance(four, settings):
     causes, _, _ = draw_causes(four, "four", 100, CauseSettings.from_dict(settings | FEWER))
     label_S = labels_of(causes.truth)
-    named_S = np.array(CONCEPTS)[Rule("four", 100).scores(causes.registrations).argmax(axis=1)]
+    named_S = np.array(CONCEPTS)[ThresholdRule("four", 100).scores(causes.registrations).argmax(axis=1)]
     recall = [(named_S[label_S == concept] == concept).mean() for concept in CONCEPTS]
     assert set(label_S) == set(CONCEPTS)
     assert np.mean(recall) <= 1 / 3 + 0.1

@@ -13,9 +13,9 @@ from gpca.seeds import generator
 from gpca.uncertainty.estimators.interface import (
     POINT_TO_PLANE,
     POINT_TO_POINT,
+    Correspondences,
     EstimatorEntry,
     FailedEstimate,
-    Matches,
     RegisteredPair,
     inverse_hessian,
 )
@@ -94,7 +94,7 @@ def censi(registered: RegisteredPair, noise: float = 0.0) -> np.ndarray:
     return variance * inverse_6_6 @ middle_6_6 @ inverse_6_6
 
 
-def hessian(matches: Matches) -> np.ndarray:
+def hessian(matches: Correspondences) -> np.ndarray:
     """Return H (6, 6) of A = Σ |exp(ξ) y - q|² at ξ = 0, the curvature of the motion included."""
     y, r = matches.source, matches.residuals
     hessian_6_6 = 2 * np.einsum("nik,nil->kl", matches.jacobians, matches.jacobians)
@@ -106,7 +106,7 @@ def hessian(matches: Matches) -> np.ndarray:
     return hessian_6_6
 
 
-def mixed_derivatives(matches: Matches) -> tuple[np.ndarray, np.ndarray]:
+def mixed_derivatives(matches: Correspondences) -> tuple[np.ndarray, np.ndarray]:
     """Return ∂²A/∂y∂ξ and ∂²A/∂q∂ξ (n, 6, 3), by the moved source points and by the target's.
 
     The gradient is 2 Σ (y × r, r) with r = y - q; moving y by a changes y × r by q × a, moving q by b by -y × b.

@@ -31,7 +31,7 @@ class FailedEstimate(Exception):
 
 
 @dataclass(frozen=True)
-class Matches:
+class Correspondences:
     """Source points (n, 3) at the pose, their nearest target points, and the normals of these (n, 3) or None."""
 
     source: np.ndarray
@@ -77,7 +77,7 @@ class RegisteredPair:
         """The pose (4×4)."""
         return self.outcome.T_target_source
 
-    def matches(self) -> Matches:
+    def matches(self) -> Correspondences:
         """Return the correspondences at the pose; fewer than three are a failure."""
         moved_N_3 = transform(self.T_target_source, self.pair.source)
         distance_N, rows_N = self.pair.target_tree.query(moved_N_3)
@@ -85,7 +85,9 @@ class RegisteredPair:
         if near_N.sum() < FEWEST:
             raise FailedEstimate(f"fewer than {FEWEST} correspondences at the pose")
         rows_n, normals = rows_N[near_N], self.pair.target_normals
-        return Matches(moved_N_3[near_N], self.pair.target[rows_n], None if normals is None else normals[rows_n])
+        return Correspondences(
+            moved_N_3[near_N], self.pair.target[rows_n], None if normals is None else normals[rows_n]
+        )
 
     def twists_from(self, xi_n_6: np.ndarray) -> np.ndarray:
         """Register from the starts exp(ξ) T_init and return the results' twists about the pose (m, 6).
@@ -133,7 +135,7 @@ class RegisteredPair:
 
 
 @dataclass(frozen=True)
-class Estimate:
+class CovarianceEstimate:
     """The result of an estimator: Σ (6, 6) in radians and diameters, or the reason why there is none."""
 
     covariance_6_6: np.ndarray | None

@@ -12,7 +12,7 @@ from gpca.errors import InputError
 from gpca.process.registry import Registry
 from gpca.settings import require_arguments
 from gpca.uncertainty.estimators.interface import (
-    Estimate,
+    CovarianceEstimate,
     Estimator,
     EstimatorEntry,
     Example,
@@ -32,7 +32,7 @@ def require_estimator_settings(name: str, settings: Mapping[str, object]) -> Non
 
 def make_estimator(
     name: str, settings: Mapping[str, object] | None = None, examples: Sequence[Example] = ()
-) -> Callable[[RegisteredPair], Estimate]:
+) -> Callable[[RegisteredPair], CovarianceEstimate]:
     """Return an estimator as a function from registered pairs to estimates; one that learns needs examples.
 
     A failure inside it, at learning too, becomes an estimate that says why. So does a registration without any
@@ -53,17 +53,17 @@ def make_estimator(
         except FailedEstimate as failure:
             learning_failure = str(failure)
 
-    def estimate_or_failure(registered: RegisteredPair) -> Estimate:
+    def estimate_or_failure(registered: RegisteredPair) -> CovarianceEstimate:
         if learning_failure:
-            return Estimate(None, learning_failure)
+            return CovarianceEstimate(None, learning_failure)
         if registered.outcome.fitness == 0:
-            return Estimate(None, registered.outcome.failure or "no source point is near the target")
+            return CovarianceEstimate(None, registered.outcome.failure or "no source point is near the target")
         try:
             covariance_6_6 = estimate(registered)
             if not np.isfinite(covariance_6_6).all():
                 raise FailedEstimate("the covariance is not finite")
         except FailedEstimate as failure:
-            return Estimate(None, str(failure))
-        return Estimate((covariance_6_6 + covariance_6_6.T) / 2)
+            return CovarianceEstimate(None, str(failure))
+        return CovarianceEstimate((covariance_6_6 + covariance_6_6.T) / 2)
 
     return estimate_or_failure

@@ -22,7 +22,7 @@ from gpca.seeds import generator, seed_of
 from gpca.uncertainty.designs import ADDITIVE_KNOBS, RegisteredRow
 from gpca.uncertainty.estimators.analytic import sample
 from gpca.uncertainty.estimators.examples import Moved, describe, example
-from gpca.uncertainty.estimators.interface import POINT_TO_POINT, Estimate, Example, RegisteredPair
+from gpca.uncertainty.estimators.interface import POINT_TO_POINT, CovarianceEstimate, Example, RegisteredPair
 from gpca.uncertainty.interventions import UNTOUCHED, KnobbedSource, Knobs
 from gpca.uncertainty.settings import UncertaintySettings
 from gpca.uncertainty.spread import divergence
@@ -90,7 +90,7 @@ class KnobbedRegistrar:
     def estimates(
         self,
         rows: np.ndarray,
-        estimators: Mapping[str, Callable[[RegisteredPair], Estimate]],
+        estimators: Mapping[str, Callable[[RegisteredPair], CovarianceEstimate]],
         settings_of_knobs: Sequence[Knobs] = ADDITIVE_KNOBS,
     ) -> dict[str, Estimates]:
         """Return the covariances of the rows under each setting, by estimator."""

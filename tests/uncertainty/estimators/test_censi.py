@@ -5,7 +5,7 @@ import pytest
 
 from gpca.rigid import best_motion, exp, log, transform
 from gpca.uncertainty.estimators.analytic import censi, hessian, mixed_derivatives
-from gpca.uncertainty.estimators.interface import FailedEstimate, Matches
+from gpca.uncertainty.estimators.interface import Correspondences, FailedEstimate
 
 from .cases import plane, registered
 
@@ -18,7 +18,7 @@ def matches():
     random = np.random.default_rng(0)
     target = random.normal(size=(12, 3)) * [0.5, 0.3, 0.2]
     source = target + 0.05 * random.normal(size=target.shape)
-    return Matches(transform(best_motion(source, target, np.ones(12)), source), target, None)
+    return Correspondences(transform(best_motion(source, target, np.ones(12)), source), target, None)
 
 
 def cost(xi_6, source, target):
