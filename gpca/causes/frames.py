@@ -15,7 +15,7 @@ import pandas as pd
 
 from gpca.causes.candidate import Candidate, Unmeasurable
 from gpca.causes.dataset import Causes
-from gpca.causes.measuring import Case, Measuring, Subject, found_in, measure_cases, measure_clean_pairs
+from gpca.causes.measuring import Measuring, RecordedPair, Subject, found_in, measure_cases, measure_clean_pairs
 from gpca.causes.settings import FEWEST_POINTS, CauseSettings, FrameCauseSettings
 from gpca.frames.instances import Instances
 from gpca.frames.shots import CleanView, clean_view, rendered_side
@@ -70,7 +70,7 @@ def measure_frames(
     subjects, limit = measure_clean_pairs(subjects_of(instances, starts.instance, objects), source, seed, settings)
     subject_of = {subject.index: subject for subject in subjects}
 
-    def case(k: int) -> Case:
+    def case(k: int) -> RecordedPair:
         i, began = int(starts.instance[k]), f"{starts.kind[k]}, {starts.init_from[k]}"
         axes = (source, seed, "frame causes", i, began)
 
@@ -80,7 +80,7 @@ def measure_frames(
             T_init, random = starts.T_camera_object_init[k], generator(*axes)
             return frame_candidate(instances, i, T_init, subject, meshes[subject.index], points, random), subject
 
-        return Case(k, i, f"instance {i} ({began})", axes, candidate)
+        return RecordedPair(k, i, f"instance {i} ({began})", axes, candidate)
 
     nothing = ("no instance in the frames can be measured", "check the meshes and poses")
     cases = map(case, progress(range(len(starts)), f"causes of {source}, seed {seed}"))

@@ -183,7 +183,7 @@ class Measuring:
 
 
 @dataclass(frozen=True)
-class Case:
+class RecordedPair:
     """A registration to be measured that was not drawn: one in a depth frame, or one of two scans."""
 
     sample: int  # number of its row
@@ -193,7 +193,7 @@ class Case:
     make: Callable[[], tuple[Candidate, Subject]]  # what stands for its object; may raise `Unmeasurable`
 
 
-def measure_cases(cases: Iterable[Case], measuring: Measuring, axes: Axes, nothing: tuple[str, str]) -> Causes:
+def measure_cases(cases: Iterable[RecordedPair], measuring: Measuring, axes: Axes, nothing: tuple[str, str]) -> Causes:
     """Measure registrations as test samples, from two sets of starts each.
 
     This is the one way to measure what happened in a world that gives cases: depth frames (:mod:`gpca.causes.frames`)

@@ -21,7 +21,7 @@ from gpca.alignment.features import estimate_normals
 from gpca.alignment.pose_error import displacements
 from gpca.causes.candidate import Candidate, Counterfactuals, Registrar, Unmeasurable
 from gpca.causes.dataset import Causes
-from gpca.causes.measuring import Case, Measuring, Subject, found_in, measure_cases
+from gpca.causes.measuring import Measuring, RecordedPair, Subject, found_in, measure_cases
 from gpca.causes.settings import FEWEST_POINTS, CauseSettings
 from gpca.causes.truth import NONE
 from gpca.objects.canonical import DRAWN
@@ -225,7 +225,7 @@ def measure_scans(
             print(f"causes of {source}: pair {pair.name} is skipped: {fault}", file=sys.stderr)
     measuring = Measuring(settings, float(np.quantile(limits, settings.limits.clean)) if limits else 0.0)
 
-    def case(number: int) -> Case:
+    def case(number: int) -> RecordedPair:
         start = starts[number]
         scans = drawn[start.pair]
         pair = scans.pair
@@ -238,7 +238,7 @@ def measure_scans(
             subject = Subject(start.pair, pair.name, unit_m, scans.target, False, errors, pair.cluster, DRAWN)
             return scans.candidate(start.T_target_source, start.times, random), subject
 
-        return Case(number, number, f"pair {pair.name} ({start.kind}, {start.init_from})", axes, candidate)
+        return RecordedPair(number, number, f"pair {pair.name} ({start.kind}, {start.init_from})", axes, candidate)
 
     numbers = progress(range(len(starts)), f"causes of {source}, seed {seed}")
     cases = (case(number) for number in numbers if starts[number].pair in drawn)

@@ -117,7 +117,7 @@ class Condition(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Answers:
+class SetsAndCalls:
     """Sets and calls for A tested rows."""
 
     row: np.ndarray  # (A,) numbers of the rows
@@ -154,7 +154,7 @@ def conditions(scored: Scored) -> list[Condition]:
     return listed
 
 
-def answers_of(scored: Scored, condition: Condition, settings: GuaranteeSettings) -> Answers | None:
+def answers_of(scored: Scored, condition: Condition, settings: GuaranteeSettings) -> SetsAndCalls | None:
     """Sets and calls for all tested rows, or None where there are none.
 
     Every family is tested with thresholds that were calibrated on scores of the same model for other families, none of
@@ -192,7 +192,7 @@ def answers_of(scored: Scored, condition: Condition, settings: GuaranteeSettings
             counts.append(len(np.unique(families)))
     if not rows:
         return None
-    return Answers(
+    return SetsAndCalls(
         np.concatenate(rows),
         {name: np.concatenate([part[name] for part in sets]) for name in sets[0]},
         {name: np.concatenate([part[name] for part in calls]) for name in calls[0]},
@@ -215,7 +215,7 @@ def plain_threshold(failure_M: np.ndarray, missed: float) -> float:
     return float(np.sort(failure_M)[min(floor(missed * len(failure_M) + 1e-9), len(failure_M) - 1)])
 
 
-def measures(asked: Scored, answers: Answers, settings: GuaranteeSettings) -> Iterator[Measured]:
+def measures(asked: Scored, answers: SetsAndCalls, settings: GuaranteeSettings) -> Iterator[Measured]:
     """Yield every measure of every variant.
 
     - coverage: share of the sets that hold the true state, over all samples and over those of each state;

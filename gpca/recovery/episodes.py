@@ -96,7 +96,7 @@ def register_held(
     return Attempt(ended, record, error / d, perf_counter() - started)
 
 
-Case = tuple[Situation, Attempt]
+Started = tuple[Situation, Attempt]
 
 
 class Episode:
@@ -156,8 +156,8 @@ def find_episodes(situations: Situations, settings: LoopSettings) -> list[Episod
     episodes: list[Episode] = []
     tries: dict[str, int] = {}
     for cause in CONCEPTS:
-        failures: list[Case] = []
-        good: list[Case] = []
+        failures: list[Started] = []
+        good: list[Started] = []
         tries[cause] = 0
         for number in progress(range(settings.tries), f"failures by {cause}"):
             if len(failures) == settings.failures and len(good) >= settings.good:
@@ -178,7 +178,7 @@ def find_episodes(situations: Situations, settings: LoopSettings) -> list[Episod
 
 def _try_situation(
     situations: Situations, cause: str, number: int, settings: LoopSettings, misplaced: int
-) -> tuple[Case | None, Case | None, int]:
+) -> tuple[Started | None, Started | None, int]:
     """Register a disturbed situation, and the clean one where that failed; of bad poses, until one fails.
 
     A pose error changes nothing but ICP's start, so several are tried on one measurement and estimate. Returns the

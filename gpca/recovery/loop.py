@@ -21,7 +21,7 @@ from gpca.recovery.answers import Answer, Answers, CaseKey, Explain
 from gpca.recovery.chances import alarm_threshold
 from gpca.recovery.episodes import Episode
 from gpca.recovery.policies import Case, Decide, Means, PolicyEntry, policy_entry
-from gpca.recovery.reenactment import Belief, KnownModel, Reenacted, believe, reenact
+from gpca.recovery.reenactment import Belief, CauseEffects, KnownModel, believe, reenact
 from gpca.recovery.rehearsal import known
 from gpca.recovery.settings import LoopSettings
 from gpca.reenactment.settings import ReenactmentSettings
@@ -40,7 +40,7 @@ class Reenactor:
     counterfactuals: CauseSettings
     _models: dict[int, KnownModel] = field(default_factory=dict)
     _beliefs: dict[tuple[Episode, Taken], Belief] = field(default_factory=dict)
-    _reenacted: dict[tuple[Episode, Taken], Reenacted] = field(default_factory=dict)
+    _reenacted: dict[tuple[Episode, Taken], CauseEffects] = field(default_factory=dict)
 
     def believe(self, episode: Episode, actions: Taken = ()) -> Belief:
         """The hypotheses after these actions, which were taken."""
@@ -48,7 +48,7 @@ class Reenactor:
             self._beliefs[key] = believe(*self._held(episode, actions), self.settings, *self._how(episode, actions))
         return self._beliefs[key]
 
-    def reenact(self, episode: Episode, actions: Taken = ()) -> Reenacted:
+    def reenact(self, episode: Episode, actions: Taken = ()) -> CauseEffects:
         """The counterfactuals of the registration after these actions, which were taken."""
         if (key := (episode, actions)) not in self._reenacted:
             belief = self.believe(episode, actions)

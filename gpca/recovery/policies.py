@@ -20,7 +20,7 @@ from gpca.process.plugins import joined_outside, module_outside
 from gpca.recovery.chances import ExpectedUtility, FailureGate
 
 if TYPE_CHECKING:
-    from gpca.recovery.reenactment import Reenacted
+    from gpca.recovery.reenactment import CauseEffects
 
 Order = tuple[str, ...]  # a sequence of actions
 SEQUENCE = "sequence"  # prefix of the names of fixed sequences, such as sequence_reinitialize_new_view
@@ -39,7 +39,7 @@ class Case:
     known_F: np.ndarray | None  # all features (:func:`gpca.recovery.rehearsal.known`), for trained policies
     cause: str  # of the failure, for the oracle only; otherwise empty
     random: np.random.Generator  # of the case, restarted for every decision
-    reenacted: Reenacted | None = None  # the current registration, for policies that read it
+    reenacted: CauseEffects | None = None  # the current registration, for policies that read it
 
 
 Decide = Callable[[Case], Decision]

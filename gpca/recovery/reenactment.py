@@ -100,7 +100,7 @@ class Belief:
 
 
 @dataclass(frozen=True)
-class Reenacted:
+class CauseEffects:
     """Counterfactuals of a registration under each hypothesis."""
 
     belief: Belief
@@ -139,7 +139,7 @@ def believe(
     return Belief(hypotheses, observed, weights_of(hypotheses), error_K, failure_K, perf_counter() - started)
 
 
-def reenact(belief: Belief, holding: Holding, shape: KnownModel, truth: CauseSettings, axes: tuple) -> Reenacted:
+def reenact(belief: Belief, holding: Holding, shape: KnownModel, truth: CauseSettings, axes: tuple) -> CauseEffects:
     """Register with every subset of the causes, under each hypothesis in turn.
 
     Without noise or missing surface, the measurement is rebuilt (:func:`gpca.reenactment.enactment.rebuild`); without a
@@ -158,7 +158,7 @@ def reenact(belief: Belief, holding: Holding, shape: KnownModel, truth: CauseSet
         for subset in range(len(SUBSETS)):
             with suppress(Unmeasurable):
                 error_8[subset] = measured.error(subset)
-    return Reenacted(belief, error_K_8, belief.seconds + perf_counter() - started)
+    return CauseEffects(belief, error_K_8, belief.seconds + perf_counter() - started)
 
 
 def seen_surface(holding: Holding, shape: KnownModel, hypothesis: Hypothesis, noise: float) -> np.ndarray:
