@@ -149,7 +149,7 @@ def read_instances(
                 try:
                     points_m, pixels = measured_points(frame, annotation, depth_m)
                     place = annotation.subject, T_camera_model, T_model_object, trees[number], diameter_m
-                    observed = plausibility.Observation(*place, points_m)
+                    observed = plausibility.MeasuredObject(*place, points_m)
                     plausibility.require_plausible(observed)
                     points_m, pixels = without_background(points_m, pixels, annotation, diameter_m)
                 except TooFewPoints as fault:

@@ -49,7 +49,7 @@ for factor in (0.5, 0.67, 0.8, 0.85, 0.9, 0.95, 1.05, 1.1, 1.15, 1.25, 1.5, 2):
 
 
 @dataclass(frozen=True)
-class Observation:
+class MeasuredObject:
     """One annotated object and its measured points (P, 3) in the camera's frame; `tree` is of the canonical cloud."""
 
     subject: str  # the annotation's place in its file
@@ -83,7 +83,7 @@ def spread(points_m: np.ndarray, most: int) -> np.ndarray:
     return points_m[:: max(1, len(points_m) // most)]
 
 
-def require_plausible(observed: Observation) -> None:
+def require_plausible(observed: MeasuredObject) -> None:
     """Raise an InputError with the likeliest reason where an object was measured away from its pose."""
     distance = observed.distance()
     if distance <= FARTHEST:
@@ -99,7 +99,7 @@ def require_plausible(observed: Observation) -> None:
     )
 
 
-def require_shared_form(dataset: str, observations: Sequence[Observation]) -> None:
+def require_shared_form(dataset: str, observations: Sequence[MeasuredObject]) -> None:
     """Raise an InputError where all poses of a dataset are off, or where one mistake explains them far better.
 
     The median over some of the observations counts, so that single bad masks do not matter.

@@ -38,7 +38,7 @@ class Known:
 
 
 @dataclass(frozen=True)
-class Scene:
+class ScannedScene:
     """A scene that was scanned from several places."""
 
     name: str
@@ -115,7 +115,7 @@ def stratum_of(overlap: float, edges: Sequence[float]) -> str | None:
     return None
 
 
-def choose_pairs(scenes: Iterable[Scene], edges: Sequence[float], most: int, *axes: object) -> list[ScanPair]:
+def choose_pairs(scenes: Iterable[ScannedScene], edges: Sequence[float], most: int, *axes: object) -> list[ScanPair]:
     """Return up to `most` pairs of each scene and stratum of overlap, stratum by stratum, scene by scene.
 
     Scenes are read one after another, and only the chosen clouds are kept. The axes name the random numbers; a scene's

@@ -27,7 +27,7 @@ from gpca.objects.mesh_folder import meters_per, read_surface
 from gpca.objects.source import places_of
 from gpca.rigid import require_rigid, scale_translation
 from gpca.scans.pair import Kind
-from gpca.scans.scene import Known, Scan, Scene
+from gpca.scans.scene import Known, Scan, ScannedScene
 from gpca.seeds import generator
 from gpca.settings import Bounds, read_settings
 
@@ -84,7 +84,7 @@ NAME_ARRAYS = ("name", "index")
 CLOUD = "cloud_"
 
 
-def npz_scenes(entry: ScanEntry, place: Path) -> Iterator[Scene]:
+def npz_scenes(entry: ScanEntry, place: Path) -> Iterator[ScannedScene]:
     """Yield the scene of each npz file of a folder, by name, or of the one file; InputError for a faulty one."""
     files = sorted(place.glob("*.npz")) if place.is_dir() else [place]
     if not files:
@@ -118,7 +118,7 @@ def npz_scenes(entry: ScanEntry, place: Path) -> Iterator[Scene]:
             require_points(points_N_3, f"{path}, {CLOUD}{name}")
             require_rigid(T_scene_scan, f"{path}, {poses} of {name}")
             scans[name] = entry.scan(points_N_3 * entry.scale, T_scene_scan)
-        yield Scene(path.stem, entry.scenes or NPZ_POSES[poses], scans, listed.get(path.stem, ()))
+        yield ScannedScene(path.stem, entry.scenes or NPZ_POSES[poses], scans, listed.get(path.stem, ()))
 
 
 def _read_pairs(path: Path) -> dict[str, tuple[Known, ...]]:
@@ -139,7 +139,7 @@ POSES_FILE = "poses.txt"
 POSES_REMEDY = "write a name and the 16 numbers of a pose in each line"
 
 
-def ply_scenes(entry: ScanEntry, place: Path) -> Iterator[Scene]:
+def ply_scenes(entry: ScanEntry, place: Path) -> Iterator[ScannedScene]:
     """Yield the scene of the folder, or of each folder in it, by name; InputError for a faulty one."""
     if not entry.scenes:
         raise InputError(entry.title, "does not say what its scenes are", "set scenes: room, or object")
@@ -151,7 +151,7 @@ def ply_scenes(entry: ScanEntry, place: Path) -> Iterator[Scene]:
             name: entry.scan(read_surface(path.with_name(f"{name}.ply"), entry.scale).vertices_m, T_scene_scan)
             for name, T_scene_scan in read_poses(path).items()
         }
-        yield Scene(path.absolute().parent.name, entry.scenes, scans)
+        yield ScannedScene(path.absolute().parent.name, entry.scenes, scans)
 
 
 def read_poses(path: Path) -> dict[str, np.ndarray]:
@@ -185,7 +185,7 @@ LINES_OF_PAIR = 5  # of a pair in gt.log
 BENCHMARK_REMEDY = "fetch the benchmark again"
 
 
-def benchmark_scenes(entry: ScanEntry, place: Path) -> Iterator[Scene]:
+def benchmark_scenes(entry: ScanEntry, place: Path) -> Iterator[ScannedScene]:
     """Yield the scene of each folder with fragments, by name; InputError for a faulty one."""
     folder = place / "fragments" if (place / "fragments").is_dir() else place
     found = sorted({path.parent for path in folder.glob("*/cloud_bin_*.ply")})
@@ -205,7 +205,7 @@ def benchmark_scenes(entry: ScanEntry, place: Path) -> Iterator[Scene]:
         named = sorted({name for pair in printed for name in (pair.target, pair.source)}, key=int)
         files = {name: scene_folder / f"cloud_bin_{name}.ply" for name in named}
         scans = {name: entry.scan(read_surface(path, entry.scale).vertices_m) for name, path in files.items()}
-        yield Scene(scene_folder.name, entry.scenes or "room", scans, printed)
+        yield ScannedScene(scene_folder.name, entry.scenes or "room", scans, printed)
 
 
 def read_log(path: Path) -> dict[tuple[str, str], np.ndarray]:
@@ -280,14 +280,14 @@ def data_files(entry: ScanEntry, data_dir: str | None) -> list[Path]:
     return sorted(files)
 
 
-READERS: dict[str, Callable[[ScanEntry, Path], Iterator[Scene]]] = {
+READERS: dict[str, Callable[[ScanEntry, Path], Iterator[ScannedScene]]] = {
     "npz": npz_scenes,
     "ply_folder": ply_scenes,
     "threedmatch": benchmark_scenes,
 }
 
 
-def scenes_of(entry: ScanEntry, place: Path | None, role: str, most_points: int) -> Iterator[Scene]:
+def scenes_of(entry: ScanEntry, place: Path | None, role: str, most_points: int) -> Iterator[ScannedScene]:
     """Yield the scenes of a data set that the `role` of the run sees, one by one.
 
     Larger scans are thinned to `most_points`, drawn at random. InputError for no scenes of the role, or faulty files.
@@ -295,7 +295,7 @@ def scenes_of(entry: ScanEntry, place: Path | None, role: str, most_points: int)
     if entry.kind == "virtual":
         from gpca.scans import virtual  # loads trimesh, which nothing needs that plans a run
 
-        found: Iterator[Scene] = virtual.scenes(entry.rooms, entry.objects, entry.views, role == DEVELOPMENT)
+        found: Iterator[ScannedScene] = virtual.scenes(entry.rooms, entry.objects, entry.views, role == DEVELOPMENT)
     elif place is None:
         raise InputError(entry.title, "its data is not there", "set data_dir")
     else:

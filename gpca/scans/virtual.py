@@ -14,7 +14,7 @@ import numpy as np
 from gpca.objects.camera import Camera, DepthNoise, MeshScene, look_at
 from gpca.objects.procedural import box, cylinder, ellipsoid, mesh_of
 from gpca.scans.pair import Kind
-from gpca.scans.scene import Scan, Scene
+from gpca.scans.scene import Scan, ScannedScene
 from gpca.seeds import generator
 
 FIRST_OF_DEVELOPMENT = 100
@@ -28,7 +28,7 @@ WALL_M = 0.1
 Mesh = tuple[np.ndarray, np.ndarray]
 
 
-def scenes(rooms: int, objects: int, views: int, development: bool) -> Iterator[Scene]:
+def scenes(rooms: int, objects: int, views: int, development: bool) -> Iterator[ScannedScene]:
     """Yield this many rooms, then this many objects, each with the same number of scans."""
     first = FIRST_OF_DEVELOPMENT if development else 0
     for number in range(first, first + rooms):
@@ -37,7 +37,7 @@ def scenes(rooms: int, objects: int, views: int, development: bool) -> Iterator[
         yield compound(f"object_{number}", views)
 
 
-def room(name: str, views: int) -> Scene:
+def room(name: str, views: int) -> ScannedScene:
     """Return a room of this name and its scans."""
     random = generator("virtual scans", name)
     extent_3 = random.uniform((3.5, 3.5, 2.4), (6.0, 5.0, 3.0))
@@ -51,7 +51,7 @@ def room(name: str, views: int) -> Scene:
     return _scanned(name, "room", meshes, places, ROOM_CAMERA, ROOM_NOISE)
 
 
-def compound(name: str, views: int) -> Scene:
+def compound(name: str, views: int) -> ScannedScene:
     """Return an object of this name, a few solids in one another, and its scans."""
     random = generator("virtual scans", name)
     size_m = random.uniform(0.12, 0.22)
@@ -78,14 +78,14 @@ def compound(name: str, views: int) -> Scene:
 
 def _scanned(
     name: str, kind: Kind, meshes: MeshScene, places: list[np.ndarray], camera: Camera, noise: DepthNoise
-) -> Scene:
+) -> ScannedScene:
     """Return what a camera measures from each ``T_scene_camera``."""
     scans = {}
     for i, T_scene_camera in enumerate(places):
         depth_m = noise.measure(meshes.look(camera, T_scene_camera), generator("virtual scans", name, i))
         points_N_3 = (camera.rays() * depth_m[..., None])[depth_m > 0]
         scans[str(i)] = Scan(points_N_3, T_scene_camera, np.zeros(3))
-    return Scene(name, kind, scans)
+    return ScannedScene(name, kind, scans)
 
 
 def _furnished(extent_3: np.ndarray, random: np.random.Generator) -> list[Mesh]:

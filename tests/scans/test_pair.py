@@ -8,7 +8,7 @@ import pytest
 from gpca.errors import InputError
 from gpca.rigid import inverse, rigid_motion, rotation_angle_rad, transform
 from gpca.scans.pair import OVERLAP_M, Rung, ScanSuccess, disturbed, overlap_rmse, rungs_of, voxels
-from gpca.scans.scene import Known, Scene, choose_pairs, stratum_of
+from gpca.scans.scene import Known, ScannedScene, choose_pairs, stratum_of
 
 from .tiny import floor, pair, scene
 
@@ -80,15 +80,15 @@ def test_overlap_is_the_share_of_the_target_that_the_source_has():
 
 def test_what_a_data_set_prints_comes_first():
     printed = (Known("2", "0", 0.42), Known("0", "1", None, scene().scans["1"].T_scene_scan))
-    of = Scene("floor", "room", scene().scans, printed)
+    of = ScannedScene("floor", "room", scene().scans, printed)
     first, second = of.known()
     assert (first.overlap, first.target) == (0.42, "2")
     np.testing.assert_array_equal(second.T_target_source, of.scans["1"].T_scene_scan)
     assert of.pair(first).overlap == 0.42
     with pytest.raises(InputError, match="scene floor: lists a pair with scan '7'"):
-        Scene("floor", "room", scene().scans, (Known("0", "7"),))
+        ScannedScene("floor", "room", scene().scans, (Known("0", "7"),))
     with pytest.raises(InputError, match="scene floor: has 1 scans; give at least two"):
-        Scene("floor", "room", {"0": scene().scans["0"]})
+        ScannedScene("floor", "room", {"0": scene().scans["0"]})
 
 
 def test_a_voxel_has_the_mean_of_its_points():

@@ -3,7 +3,7 @@
 import numpy as np
 
 from gpca.rigid import inverse, rigid_motion, transform
-from gpca.scans.scene import Scan, Scene
+from gpca.scans.scene import Scan, ScannedScene
 
 STEP_M = 0.02
 SENSORS = [  # T_scene_scan of each scan
@@ -25,7 +25,7 @@ def scene(kind="room", name="floor", windows=((0.0, 1.0), (0.5, 1.5), (0.8, 1.8)
         str(i): Scan(transform(inverse(T), floor(*window)), T)
         for i, (window, T) in enumerate(zip(windows, SENSORS, strict=False))
     }
-    return Scene(name, kind, scans)
+    return ScannedScene(name, kind, scans)
 
 
 def pair(kind="room", target="0", source="1"):
