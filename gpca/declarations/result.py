@@ -17,10 +17,17 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from inspect import cleandoc
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from gpca.declarations.experiment import Tidy
 from gpca.reporting.registry import Input, Result
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure as Figure
+    from pandas import DataFrame as Frame
+    from pandas import Series as Series
+else:  # planning imports neither
+    Figure = Frame = Series = Any
 
 READ_ROWS = "gpca.evaluation.measures:read_rows"
 Given = str | tuple[Callable, str | Sequence[str] | Mapping[str, str]]

@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 from itertools import product
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from gpca.declarations.experiment import Experiment, LeftOut
 from gpca.declarations.plan import Run
-from gpca.declarations.result import Paths, figure, numbers, table
+from gpca.declarations.result import Frame, Paths, figure, numbers, table
 from gpca.declarations.step import Step
 from gpca.errors import InputError, require_names
 from gpca.evaluation.intervals import interval, pigeonhole_weights
@@ -29,9 +29,6 @@ from gpca.io.csv_file import read_numbers
 from gpca.reporting.sheet import Row, Sheet, Show, crossed, show, where
 from gpca.seeds import generator
 from gpca.settings import Distinct, read_settings
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 NAME = "guarantee"
 TRAINED_AGAIN = ("descriptors", REENACTED)  # inputs of explainers that are trained again, on one part of the families
@@ -90,7 +87,7 @@ SCORE = Step(
 
 
 @numbers("guarantee.csv", rule="guarantee_metrics", score_files="guarantee/{guaranteed}.csv")
-def collect(run: Run, score_files: Paths) -> pd.DataFrame:
+def collect(run: Run, score_files: Paths) -> Frame:
     """Values with 95 % intervals of a bootstrap over families and seeds, from files named ``…/{explainer}.csv``."""
     import pandas as pd
 
@@ -104,7 +101,7 @@ def collect(run: Run, score_files: Paths) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 
-def read_guarantee(path: str | Path) -> pd.DataFrame:
+def read_guarantee(path: str | Path) -> Frame:
     """Read the rows of :func:`collect`; a value that has no nominal limit has no `promised`."""
     return read_numbers(path, COLUMNS, NUMBERS, optional=("promised", "low", "high"))
 
@@ -321,7 +318,7 @@ def guarantee(run: Run, measured):
     return page
 
 
-def _with_counts(measured: pd.DataFrame) -> pd.DataFrame:
+def _with_counts(measured: Frame) -> Frame:
     """The rows, and further ones for numbers of samples and of families, and for the state with the least coverage."""
     import pandas as pd
 
@@ -333,7 +330,7 @@ def _with_counts(measured: pd.DataFrame) -> pd.DataFrame:
     return pd.concat([measured, worst, *counts])
 
 
-def _of_all_sources(rows: pd.DataFrame) -> pd.DataFrame:
+def _of_all_sources(rows: Frame) -> Frame:
     """Rows of all sources together, or of the only one."""
     return where(rows, {"source": POOLED if (rows["source"] == POOLED).any() else rows["source"].iloc[:1].sum()})
 

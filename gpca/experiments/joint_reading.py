@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from gpca.comparison import joint_reading as joint
 from gpca.comparison.joint_reading import DEVELOPMENT, EVALUATED, EVALUATION, JUDGED, PROTOCOL, SEVERITIES
@@ -14,7 +14,7 @@ from gpca.comparison.readings import read_judged
 from gpca.comparison.verdicts import Tolerance
 from gpca.declarations.experiment import Experiment, LeftOut
 from gpca.declarations.plan import Run
-from gpca.declarations.result import numbers, table
+from gpca.declarations.result import Frame, Paths, numbers, table
 from gpca.declarations.step import Plan, Step
 from gpca.errors import InputError
 from gpca.evaluation.measures import read_all_metrics, read_metrics, tidy
@@ -28,9 +28,6 @@ from gpca.objects.entry import Name, SourceEntry, title_of
 from gpca.reporting.tables.builder import TableBuilder
 from gpca.reporting.tables.cells import rows_where
 from gpca.settings import Bounds, Count
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 DevelopmentSeed = Annotated[int, Bounds(minimum=100)]  # no other run has them
 
@@ -169,9 +166,7 @@ APPLY = _step(
     readings="reading_verdicts.csv",
     development="joint_choice/scores.csv",
 )
-def judge_joint(
-    run: Run, values: Iterable[str | Path], comparison: Path, readings: Path, development: Path
-) -> tuple[pd.DataFrame, pd.DataFrame]:
+def judge_joint(run: Run, values: Paths, comparison: Path, readings: Path, development: Path) -> tuple[Frame, Frame]:
     """Values of the joint reading, of the run and of all readings beside the printed ones; scores of all samples."""
     import pandas as pd
 
@@ -207,7 +202,7 @@ KNOBS = {"low": "knobs at the lower ends", "middle": "knobs at the middles", "hi
     choice=(joint.read_choices, "joint_choice/choice.csv"),
     needs=("development_seed",),
 )
-def table16_joint_reading(run: Run, verdicts: pd.DataFrame, scores: pd.DataFrame, choice: pd.DataFrame):
+def table16_joint_reading(run: Run, verdicts: Frame, scores: Frame, choice: Frame):
     """A row per printed mean of Tables I to V, each value of ours once."""
     table = TableBuilder("table16_joint_reading", HEADS)
     for row in verdicts.itertuples():

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from gpca.attribution.predictions import read_predictions
 from gpca.declarations.experiment import Experiment, LeftOut
 from gpca.declarations.plan import Run
-from gpca.declarations.result import figure, numbers, table
+from gpca.declarations.result import Figure, Frame, Paths, figure, numbers, table
 from gpca.declarations.step import Step
 from gpca.errors import InputError, require_names
 from gpca.evaluation.intervals import Clustered
@@ -24,10 +23,6 @@ from gpca.reporting.tables.builder import interval_over
 from gpca.reporting.tables.cells import cell_of_repeats
 from gpca.settings import Distinct
 from gpca.steps.kernel_grid import BY_GPYTORCH, GRID_COLUMNS, MEASURES, PRINTED, SETTING, KernelGrid
-
-if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.figure import Figure
 
 TABLE = "kernels"  # in the column `table`
 GRID_FILES = "kernels/{kernel_source}/seed{seed}.csv"
@@ -87,7 +82,7 @@ def setting_name(kernel: str, learning_rate: float, iterations: int) -> str:
     return f"{kernel}-{learning_rate:g}-{iterations}"
 
 
-def read_grids(files: Iterable[str | Path]) -> pd.DataFrame:
+def read_grids(files: Paths) -> Frame:
     """Read files named `…/{source}/seed{seed}.csv` into one frame with the further columns `source` and `seed`."""
     import pandas as pd
 
@@ -104,7 +99,7 @@ def read_grids(files: Iterable[str | Path]) -> pd.DataFrame:
 
 
 @numbers("kernels.csv", files=GRID_FILES)
-def collect(run: Run, files: Iterable[str | Path]) -> pd.DataFrame:
+def collect(run: Run, files: Paths) -> Frame:
     """`MEASURES` of every setting, by seed."""
     records = [
         (TABLE, row.source, setting_name(row.kernel, row.learning_rate, row.iterations), measure, ALL, row.seed, value)
@@ -116,13 +111,13 @@ def collect(run: Run, files: Iterable[str | Path]) -> pd.DataFrame:
 
 
 @numbers("kernel_intervals.csv", files="kernel_predictions/{kernel_source}/seed{seed}.csv")
-def collect_intervals(run: Run, files: Iterable[str | Path]) -> pd.DataFrame:
+def collect_intervals(run: Run, files: Paths) -> Frame:
     """All measures but the ELBO over all seeds, with intervals over families; a source's settings share the draws."""
     import pandas as pd
 
     from gpca.attribution.learner_predictions import estimates_of_scores
 
-    by_source: dict[str, list[pd.DataFrame]] = {}
+    by_source: dict[str, list[Frame]] = {}
     for path in files:
         _, source, seed = source_method_seed(path)
         rows = read_predictions(path, SETTING)
@@ -309,7 +304,7 @@ def over(sheet: Sheet) -> str:
     return sheet.over(cell.test_samples // cell.seeds)
 
 
-def stand_ins(run: Run, intervals: pd.DataFrame) -> str:
+def stand_ins(run: Run, intervals: Frame) -> str:
     """Clause of a caption on stand-ins among the sources with results."""
     return run.stand_ins([name for name in titles(run) if (intervals["source"] == name).any()], partly=False)
 

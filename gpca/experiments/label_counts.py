@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from gpca.active_learning.curves import CENSORED_BY
 from gpca.causes.dataset import Causes
+from gpca.declarations.result import Frame, Paths
 from gpca.pairs.dataset import Registrations
 from gpca.reporting.tables.cells import cautious_cell, cell_of_repeats, rows_where
 from gpca.reporting.tables.table import Cell, Column
 from gpca.seeds import seed_of_file
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 COUNT: dict[str, Any] = {"decimals": 0, "limits": (0, inf), "least_is_best": True}
 SHARES = ("reached", "area_under_curve", "area_gain")  # these and every accuracy lie in [0, 1] and are printed in %
@@ -26,9 +24,7 @@ OVER_TEST_SAMPLES = ("final_accuracy", "final_accuracy_new", "area_under_curve")
 Clusters = Mapping[tuple[str, int], int]  # (source, seed) -> number of families of the test samples
 
 
-def families(
-    files: Iterable[str | Path], load: Callable[[Path, tuple[str, int]], Registrations] = Registrations.load
-) -> Clusters:
+def families(files: Paths, load: Callable[[Path, tuple[str, int]], Registrations] = Registrations.load) -> Clusters:
     """Number of families of the test samples in files named ``…/{source}/seed{seed}.npz``."""
     counts = {}
     for path in map(Path, files):
@@ -38,7 +34,7 @@ def families(
     return counts
 
 
-def families_with_causes(files: Iterable[str | Path]) -> Clusters:
+def families_with_causes(files: Paths) -> Clusters:
     """Number of families of the test samples of registrations with measured causes."""
     return families(files, lambda path, axes: Causes.load(path, axes).registrations)
 
@@ -53,7 +49,7 @@ class Quantity:
     concept: str | None = None
 
 
-def cell_of(metrics: pd.DataFrame, quantity: Quantity, test: int, clusters: Clusters | None = None) -> Cell | None:
+def cell_of(metrics: Frame, quantity: Quantity, test: int, clusters: Clusters | None = None) -> Cell | None:
     """Mean of a quantity over the concepts held out that the rows have, then over the seeds.
 
     Args:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
-from pathlib import Path
-from typing import TYPE_CHECKING
+from collections.abc import Collection, Mapping
 
 import numpy as np
 
 from gpca.active_learning.curves import read_curves
+from gpca.declarations.result import Figure, Frame, Paths
 from gpca.errors import InputError
 from gpca.evaluation.intervals import mean_interval
 from gpca.evaluation.measures import source_method_seed
@@ -28,10 +27,6 @@ from gpca.reporting.figures.style import (
 )
 from gpca.reporting.words import plural, span
 
-if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.figure import Figure
-
 MOST_LINES = 6  # in a panel; of more, none can be followed
 STYLES = {  # the paper's two strategies are thick, with their intervals; an unknown one has the style _OTHER
     "bald_kmeans": (BLUE, "-", 1.8),
@@ -49,7 +44,7 @@ _OTHER = (GRAY, "-", 0.9)
 
 
 def draw_curves(
-    curves: Mapping[tuple[str, str, str], pd.DataFrame],
+    curves: Mapping[tuple[str, str, str], Frame],
     sources: Mapping[str, str],
     rows: Mapping[str, str],
     lines: Mapping[str, str],
@@ -116,9 +111,7 @@ def draw_curves(
     return figure
 
 
-def mean_curves(
-    curve_files: Iterable[str | Path], held_out: Collection[str] | None = None
-) -> dict[tuple[str, str, str], pd.DataFrame]:
+def mean_curves(curve_files: Paths, held_out: Collection[str] | None = None) -> dict[tuple[str, str, str], Frame]:
     """Curves of accuracy in % by source, strategy and setting: labels, mean, low, high, number of seeds.
 
     The mean is over the concepts held out, then over the seeds, as are the intervals; of one seed they are NaN. Numbers

@@ -4,21 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from gpca.causes.judged import CEILING
 from gpca.declarations.experiment import Experiment, LeftOut
 from gpca.declarations.plan import Run
-from gpca.declarations.result import Paths, figure, numbers
+from gpca.declarations.result import Frame, Paths, figure, numbers
 from gpca.declarations.step import Step
 from gpca.errors import InputError, require_names
 from gpca.evaluation.measures import source_method_seed, tidy
 from gpca.io.csv_file import read_numbers
 from gpca.settings import Distinct, read_settings
 from gpca.steps.learning_curve import CURVE_COLUMNS, MEASURED, CurveSettings, labeled_samples
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 NAME = "learning_curve"
 FILES = "learning_curve/{curve_source}/seed{curve_seed}.csv"
@@ -83,7 +80,7 @@ LEARN = Step(
 )
 
 
-def read_curves(files: Paths) -> pd.DataFrame:
+def read_curves(files: Paths) -> Frame:
     """Read files named ``…/{source}/seed{seed}.csv`` into one frame with the further columns `source` and `seed`."""
     import pandas as pd
 
@@ -95,7 +92,7 @@ def read_curves(files: Paths) -> pd.DataFrame:
 
 
 @numbers("learning_curve.csv", rule="learning_curve_metrics", files=FILES)
-def collect(_run: Run, files: Paths) -> pd.DataFrame:
+def collect(_run: Run, files: Paths) -> Frame:
     """Means over the orders; ``concept`` is the number of samples."""
     means = read_curves(files).groupby(["source", "learner", "samples", "seed"], sort=False)[list(MEASURED)].mean()
     records = [

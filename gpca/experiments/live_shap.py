@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from gpca.declarations.experiment import Experiment
 from gpca.declarations.plan import Run
-from gpca.declarations.result import Paths, numbers, table
+from gpca.declarations.result import Frame, Paths, numbers, table
 from gpca.declarations.step import Step
 from gpca.evaluation.measures import read_all_metrics
 from gpca.explainers.registry import explainer_module
@@ -19,9 +19,6 @@ from gpca.reporting.tables.table import Column, Table
 from gpca.reporting.words import plural
 from gpca.settings import Bounds, Count
 from gpca.steps.live_shap import LOOKUP
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 PLAIN: dict[str, Any] = {"interval": False, "limits": (0, inf)}
 MEASURES = {  # column, and factor to its unit
@@ -74,7 +71,7 @@ EXPLAIN = Step(
 
 
 @numbers("live_shap.csv", rule="live_shap_metrics", paths="live_shap/{live_source}/seed{live_seed}.csv")
-def collect(run: Run, paths: Paths) -> pd.DataFrame:
+def collect(run: Run, paths: Paths) -> Frame:
     return read_all_metrics(paths)
 
 
@@ -87,7 +84,7 @@ def collect(run: Run, paths: Paths) -> pd.DataFrame:
     needs=("live_source",),
     metrics="live_shap.csv",
 )
-def live_shap(run: Run, metrics: pd.DataFrame) -> Table:
+def live_shap(run: Run, metrics: Frame) -> Table:
     sheet = TableBuilder("live_shap", {"source": "Dataset"})
     for (source,), labels in crossed(run.source_titles):
         rows = rows_where(metrics, source=source)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from gpca.causes.policy import NOTHING, QUEUE, Decision, RecoveryPolicy
 from gpca.declarations.experiment import Experiment
 from gpca.declarations.plan import Run
-from gpca.declarations.result import figure
+from gpca.declarations.result import Figure, figure
 from gpca.errors import InputError
 from gpca.experiments import registration_stages as stages_of
 from gpca.experiments.frames import encoder_title
@@ -24,9 +24,6 @@ from gpca.reporting.figures.cloud_views import draw_clouds, legend_of_clouds, wi
 from gpca.reporting.figures.diagram import Canvas
 from gpca.reporting.figures.panels import panels, write_below
 from gpca.reporting.figures.style import BLUE, CONCEPT_COLORS, GRAY, write_title
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 EXPERIMENT = Experiment(name="method", beside=("pipeline",))
 SECTION = "IV-A Datasets and controlled perturbations"

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from gpca.active_learning.curves import TABLE, collect_curves
 from gpca.active_learning.settings import ALL_LABELS, NEW_CONCEPT_STRATEGIES, NewConceptSettings
@@ -12,7 +11,7 @@ from gpca.causes.drawing import apportion
 from gpca.causes.truth import BORDERLINE, GEOMETRY, NOMINAL
 from gpca.declarations.experiment import Experiment
 from gpca.declarations.plan import Run
-from gpca.declarations.result import figure, numbers, table
+from gpca.declarations.result import Figure, Frame, Paths, figure, numbers, table
 from gpca.declarations.step import Plan, Step
 from gpca.encoders.registry import encoder_module
 from gpca.evaluation.measures import ALL, read_all_metrics
@@ -26,10 +25,6 @@ from gpca.reporting.tables.builder import TableBuilder, cautious_over, crossed
 from gpca.reporting.tables.cells import cell_of_repeats, clustered_cell, plain_cell, rows_where
 from gpca.reporting.tables.table import Cell, Column, Table
 from gpca.reporting.words import plural
-
-if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.figure import Figure
 
 SEEN = {
     "pretrained": "same samples, all concepts",
@@ -111,7 +106,7 @@ LEARN = Step(
 
 
 @numbers("new_concepts.csv", files="new_concepts/{source}/{new_concept_strategy}/seed{new_concept_seed}.csv")
-def collect(run: Run, files: Iterable[str | Path]) -> pd.DataFrame:
+def collect(run: Run, files: Paths) -> Frame:
     """Labels to the target, accuracies and areas of all learning curves, by seed."""
     return collect_curves(files, run.config["active_learning"]["target"])
 
@@ -121,7 +116,7 @@ METRICS = (read_all_metrics, ("active_learning.csv", "new_concepts.csv"))
 CLUSTERS = (families, "registrations/{source}/seed{new_concept_seed}.npz")
 
 
-def _rows(run: Run, metrics: pd.DataFrame) -> pd.DataFrame:
+def _rows(run: Run, metrics: Frame) -> Frame:
     return metrics[metrics["seed"].isin(seeds(run.config))]
 
 
@@ -139,7 +134,7 @@ def _rows(run: Run, metrics: pd.DataFrame) -> pd.DataFrame:
     cause_clusters=(families_with_causes, "causes/{source}/seed{new_concept_seed}.npz"),
 )
 def table15_new_concepts(
-    run: Run, metrics: pd.DataFrame, without_labels: pd.DataFrame, clusters: Clusters, cause_clusters: Clusters
+    run: Run, metrics: Frame, without_labels: Frame, clusters: Clusters, cause_clusters: Clusters
 ) -> Table:
     """Labels that each new concept costs in each embedding, and the accuracy that labels can reach."""
     learning, test = run.config["active_learning"], run.config["registrations"]["test"]
@@ -216,7 +211,7 @@ def table15_new_concepts(
     metrics=METRICS,
     clusters=CLUSTERS,
 )
-def table15_oracle(run: Run, metrics: pd.DataFrame, clusters: Clusters) -> Table:
+def table15_oracle(run: Run, metrics: Frame, clusters: Clusters) -> Table:
     """Labels to the target and final accuracy, by the share of wrong labels: embeddings × strategies."""
     learning, own, test = run.config["active_learning"], run.config["new_concepts"], run.config["registrations"]["test"]
     metrics = _rows(run, metrics)
@@ -265,7 +260,7 @@ STYLES = {
 }
 
 
-def read_curves_by_concepts(files: Iterable[str | Path]) -> dict[tuple[str, str, str], pd.DataFrame]:
+def read_curves_by_concepts(files: Paths) -> dict[tuple[str, str, str], Frame]:
     """Mean curves of the paper's strategy by source, kind of the new concepts, and embedding."""
     files = list(files)
     return {
@@ -294,7 +289,7 @@ def read_curves_by_concepts(files: Iterable[str | Path]) -> dict[tuple[str, str,
         ),
     ),
 )
-def new_concept_curves(run: Run, curves: Mapping[tuple[str, str, str], pd.DataFrame]) -> Figure:
+def new_concept_curves(run: Run, curves: Mapping[tuple[str, str, str], Frame]) -> Figure:
     """Accuracy over labels: kinds of new concepts × sources, a line for each embedding."""
     target = run.config["active_learning"]["target"]
     return draw_curves(curves, run.source_titles, FIGURE_TITLES, SEEN, STYLES, target)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from functools import partial
 from math import inf
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from gpca.attribution import diagnostics, weighted
 from gpca.attribution import learner_predictions as predicted
 from gpca.declarations.experiment import ByName, Experiment, LeftOut, Names
 from gpca.declarations.plan import Run
-from gpca.declarations.result import Paths, numbers, table
+from gpca.declarations.result import Frame, Paths, numbers, table
 from gpca.declarations.step import Step
 from gpca.encoders.registry import EncoderChanges, require_draws
 from gpca.errors import InputError
@@ -31,9 +31,6 @@ from gpca.reporting.words import in_words, span
 from gpca.seeds import generator
 from gpca.settings import Keys, changes_of
 from gpca.steps.shift import ShiftSettings
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 TABLE = "learners/"  # prefix of the set in the column `table` of the numbers
 RESAMPLES = 200
@@ -117,7 +114,7 @@ FIT = Step(
     prediction_files="learners/{source}/{learner}/seed{seed}.csv",
     set_files="shifted/{source}/seed{seed}.npz",
 )
-def collect(run: Run, prediction_files: Paths, set_files: Paths) -> tuple[pd.DataFrame, pd.DataFrame]:
+def collect(run: Run, prediction_files: Paths, set_files: Paths) -> tuple[Frame, Frame]:
     """Diagnostics of every source, learner and set: by seed, and over all seeds with intervals over families.
 
     In the second frame, means are over samples; areas, calibration errors and correlations are those of each seed.
@@ -155,7 +152,7 @@ def _of_rows(function, first_S: np.ndarray, second_S: np.ndarray, rows: np.ndarr
     return function(first_S[rows], second_S[rows], weights_B_n)
 
 
-def correlations(rows: pd.DataFrame) -> dict[str, float]:
+def correlations(rows: Frame) -> dict[str, float]:
     return {
         f"rho_{score}_{distance}": diagnostics.rank_correlation(rows[score], rows[distance])
         for score in predicted.scores_of(rows)
@@ -163,7 +160,7 @@ def correlations(rows: pd.DataFrame) -> dict[str, float]:
     }
 
 
-def probability_metrics(rows: pd.DataFrame) -> dict[str, float]:
+def probability_metrics(rows: Frame) -> dict[str, float]:
     """Accuracy, calibration errors, proper scores and the areas under risk and coverage of one set."""
     p_S_C, target_S = predicted.probabilities(rows)
     wrong_S = predicted.wrong(rows)
@@ -183,7 +180,7 @@ def probability_metrics(rows: pd.DataFrame) -> dict[str, float]:
     return values
 
 
-def bootstrap_bounds(rows: pd.DataFrame, *axes: object) -> dict[str, float]:
+def bootstrap_bounds(rows: Frame, *axes: object) -> dict[str, float]:
     """Bounds ``…_low`` and ``…_high`` of 95 % of `RESAMPLES` draws of one seed's samples, the same for all learners."""
     p_S_C, target_S = predicted.probabilities(rows)
     statistics: dict[str, tuple] = {
@@ -203,7 +200,7 @@ def bootstrap_bounds(rows: pd.DataFrame, *axes: object) -> dict[str, float]:
     return bounds
 
 
-def clusters_of(rows: pd.DataFrame) -> list[str]:
+def clusters_of(rows: Frame) -> list[str]:
     """Cluster of each sample: its family, apart from that of the same name in the set of the other source."""
     is_other = rows["set"] == "source"
     return [f"{'other/' * other}{name}" for other, name in zip(is_other, rows["cluster"], strict=True)]
@@ -239,7 +236,7 @@ def _show(metric: str, title: str, name: str = "in_distribution", source: str = 
     paper=True,
     **INTERVALS,
 )
-def table5_learners(run: Run, intervals: pd.DataFrame) -> Table:
+def table5_learners(run: Run, intervals: Frame) -> Table:
     columns = {
         "accuracy": _show("accuracy", "Accuracy (%)"),
         "rho": _show(RHO, "ρ", **RHO_LOOK),
@@ -267,7 +264,7 @@ def table5_learners(run: Run, intervals: pd.DataFrame) -> Table:
     paper=True,
     **INTERVALS,
 )
-def table5_compact(run: Run, intervals: pd.DataFrame) -> Table:
+def table5_compact(run: Run, intervals: Frame) -> Table:
     one = PRINTED_SOURCE if PRINTED_SOURCE in run.sources else list(run.sources)[-1]
     columns = {source: _show("accuracy", f"{title} (%)", source=source) for source, title in run.source_titles.items()}
     columns["rho"] = _show(RHO, "ρ", source=one, **RHO_LOOK)
@@ -290,7 +287,7 @@ def table5_compact(run: Run, intervals: pd.DataFrame) -> Table:
     and objects that neither encoder nor classifier saw.""",
     **INTERVALS,
 )
-def table5_shift(run: Run, intervals: pd.DataFrame) -> Table:
+def table5_shift(run: Run, intervals: Frame) -> Table:
     columns: dict[str, Show] = {}
     for name, title in SHIFTED.items():
         columns[f"accuracy_{name}"] = _show("accuracy", f"Acc., {title} (%)", name)
@@ -305,7 +302,7 @@ def table5_shift(run: Run, intervals: pd.DataFrame) -> Table:
 
 
 def _by_source(
-    name: str, run: Run, intervals: pd.DataFrame, columns: Mapping[str, Show], caption: str, notes: Iterable[str]
+    name: str, run: Run, intervals: Frame, columns: Mapping[str, Show], caption: str, notes: Iterable[str]
 ) -> Table:
     """A table of sources × learners; its first footnote counts the test samples of every set."""
     rows: list[Row] = crossed(("source", run.source_titles), ("method", learner_titles(run.config)))
@@ -321,6 +318,6 @@ def _by_source(
     return sheet.table(caption + run.stand_ins(shown), "quantity", (first, *notes), bold=columns, same=1)
 
 
-def samples_of_seed(intervals: pd.DataFrame, source: str, name: str) -> int:
+def samples_of_seed(intervals: Frame, source: str, name: str) -> int:
     rows = rows_where(intervals, table=TABLE + name, source=source, metric="accuracy")
     return int((rows["samples"] // rows["seeds"]).max())

@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gpca.active_learning.acquisition import EXPANSION, select, top
 from gpca.active_learning.settings import ActiveLearningSettings
 from gpca.declarations.plan import Run
-from gpca.declarations.result import figure
+from gpca.declarations.result import Figure, Frame, figure
 from gpca.errors import InputError
 from gpca.evaluation.measures import source_method_seed
 from gpca.experiments.frames import encoder_title
@@ -29,10 +28,6 @@ from gpca.reporting.figures import style
 from gpca.reporting.figures.cloud_views import draw_clouds, thinned
 from gpca.reporting.figures.diagram import Canvas
 from gpca.seeds import generator
-
-if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.figure import Figure
 
 ORDER = ("overlap", "pose", "noise")  # shown is the first with a failed registration, learned the first held out
 TITLES = {"bald_kmeans": "BALD + $k$-means", "random": "random"}  # strategies whose curves are drawn
@@ -135,7 +130,7 @@ def first_round(stages: Stages, held_out: str, settings: ActiveLearningSettings,
     return Round(rows_N, labeled, map_S_2, pool.bald_N, top(pool.bald_N, settings.batch * EXPANSION), chosen)
 
 
-def _curves(files: Sequence[Path]) -> tuple[str, dict[str, pd.DataFrame]]:
+def _curves(files: Sequence[Path]) -> tuple[str, dict[str, Frame]]:
     """Concept that was new, and the learning curves of that experiment by strategy."""
     for concept in ORDER:
         curves = {name: one for (_, name, setting), one in mean_curves(files, [concept]).items() if setting == SETTING}

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
 from gpca.causes.policy import Thresholds
 from gpca.declarations.experiment import Experiment, LeftOut, Names
 from gpca.declarations.plan import Run
-from gpca.declarations.result import table
+from gpca.declarations.result import Frame, Paths, table
 from gpca.declarations.step import Plan, Step
 from gpca.encoders.registry import EncoderChanges, encoder_module
 from gpca.errors import InputError, require_names, with_key
@@ -37,9 +36,6 @@ from gpca.reporting.tables.cells import plain_cell
 from gpca.reporting.tables.table import Table
 from gpca.reporting.words import plural
 from gpca.settings import Bounds, Count, Distinct, Keys, NotNegative, Share, changes_of, part_of
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 SECTION = "V Robotic deployment for action recovery"
 DECLARED = ("uncertain", "dominant", "improvement")  # thresholds of the config; null leaves one to the calibration
@@ -211,7 +207,7 @@ RECOVER = Step(
 )
 
 
-def mean_seconds(files: Iterable[str | Path]) -> dict[str, float]:
+def mean_seconds(files: Paths) -> dict[str, float]:
     """Policy -> mean seconds of a failure, of explaining and acting, over all files of seconds."""
     import pandas as pd
 
@@ -240,7 +236,7 @@ def mean_seconds(files: Iterable[str | Path]) -> dict[str, float]:
     seconds=(mean_seconds, "timings/recovery/seed{seed}.csv"),
 )
 def table8_recovery(
-    run: Run, metrics: pd.DataFrame, intervals: pd.DataFrame, differences: pd.DataFrame, seconds: Mapping[str, float]
+    run: Run, metrics: Frame, intervals: Frame, differences: Frame, seconds: Mapping[str, float]
 ) -> Table:
     """Recovery within 1 to `budget` actions, alone and against rivals, and the good ones acted on: policies."""
     import pandas as pd
@@ -304,7 +300,7 @@ def tables_title(run: Run) -> str:
     return f"Tables of the virtual camera, {run.source_titles[run.config['recovery']['objects']]}"
 
 
-def failure_counts(metrics: pd.DataFrame) -> str:
+def failure_counts(metrics: Frame) -> str:
     """How many failures of how many registrations there are by cause, in words."""
     rows = metrics[metrics["method"] == metrics["method"].iloc[0]]
     parts = []

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import nan
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from gpca.causes.policy import DOUBTED, DRAWN
 from gpca.declarations.plan import Run
-from gpca.declarations.result import figure
+from gpca.declarations.result import Figure, Frame, figure
 from gpca.errors import InputError
 from gpca.evaluation.intervals import wilson_interval
 from gpca.experiments.recovery import SECTION, policy_titles, tables_title
@@ -19,10 +19,6 @@ from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.figures import style
 from gpca.reporting.figures.panels import legend_below, panels
 from gpca.reporting.words import plural
-
-if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.figure import Figure
 
 METRICS = {"metrics": "recovery.csv"}
 ROW_IN = 0.33  # with less, the markers of one policy overlap
@@ -63,7 +59,7 @@ LOSSES = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)  # that the
     %). On the right, the share within all actions, by cause, of n failures each. The oracle knows the cause.""",
     **METRICS,
 )
-def recovery_rates(run: Run, metrics: pd.DataFrame) -> Figure:
+def recovery_rates(run: Run, metrics: Frame) -> Figure:
     """Left, rates within 1 to `budget` actions with their Wilson intervals; right, rates within all by cause."""
     budget, policies = run.config["recovery"]["loop"]["budget"], policy_titles(run.config)
     shown = [name for name in policies if pool_share(metrics, name, "recovered_within_1") is not None]
@@ -115,7 +111,7 @@ def _draw(axes, metrics, shown, metric: str, concept: str, offset: float, look: 
     left of the line are lower bounds.""",
     **METRICS,
 )
-def recovery_thresholds(run: Run, metrics: pd.DataFrame) -> Figure:
+def recovery_thresholds(run: Run, metrics: Frame) -> Figure:
     """The share recovered over the error below which a pose is right: a panel for each number of actions."""
     budget, success = run.config["recovery"]["loop"]["budget"], run.config["success"]
     policies, curve = policy_titles(run.config), success["curve"]
@@ -150,7 +146,7 @@ def recovery_thresholds(run: Run, metrics: pd.DataFrame) -> Figure:
     a gate acts on everything; a queued case counts as not recovered.""",
     **METRICS,
 )
-def recovery_costs(run: Run, metrics: pd.DataFrame) -> Figure:
+def recovery_costs(run: Run, metrics: Frame) -> Figure:
     """The loss over the factor on the costs of actions: a panel for each share of failures."""
     from matplotlib.ticker import FixedLocator
 
@@ -176,7 +172,7 @@ def recovery_costs(run: Run, metrics: pd.DataFrame) -> Figure:
 
 
 def losses(
-    metrics: pd.DataFrame, policy: str, budget: int, needless: float, failed: float, factor_F: np.ndarray
+    metrics: Frame, policy: str, budget: int, needless: float, failed: float, factor_F: np.ndarray
 ) -> np.ndarray:
     """Mean loss (F,) of a policy's registrations, of which a share has failed, by the factor on costs.
 
@@ -190,9 +186,7 @@ def losses(
     return failed * of_failures + (1 - failed) * (acted * needless + factor_F * cost_nominal)
 
 
-def _shown(
-    metrics: pd.DataFrame, policies: Mapping[str, str], looks: Mapping[str, Look], budget: int
-) -> dict[str, Look]:
+def _shown(metrics: Frame, policies: Mapping[str, str], looks: Mapping[str, Look], budget: int) -> dict[str, Look]:
     """Look of every policy that is drawn: those with one of their own, and the best fixed sequence."""
     whole = f"recovered_within_{budget}"
     shares = {name: share[0] for name in policies if (share := pool_share(metrics, name, whole))}
@@ -217,7 +211,7 @@ def _shown(
     needs=("learning_policy",),
     queues=(read_queues, "recovery/queue_seed{seed}.csv"),
 )
-def queued_labels(run: Run, queues: pd.DataFrame) -> Figure:
+def queued_labels(run: Run, queues: Frame) -> Figure:
     """The error over labels by order, with its interval: a panel for each policy that learns."""
     policies = policy_titles(run.config)
     shown = [name for name in policies if (queues["policy"] == name).any()]

@@ -5,12 +5,12 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from gpca.declarations.plan import Run
-from gpca.declarations.result import figure
+from gpca.declarations.result import Figure, figure
 from gpca.experiments.frame_views import draw_score_bars
 from gpca.experiments.recovery import SECTION, tables_title
 from gpca.io.arrays import load_arrays
@@ -20,9 +20,6 @@ from gpca.reporting.figures import style
 from gpca.reporting.figures.diagram import Canvas
 from gpca.reporting.figures.panels import legend_below, write_below
 from gpca.reporting.words import in_words, object_in_words, plural
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 ACTION = "new_view"  # that the example shows
 WORDS = {

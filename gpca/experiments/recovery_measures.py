@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gpca.causes.policy import NOTHING, QUEUE, QUEUE_COLUMNS
 from gpca.declarations.plan import Run
-from gpca.declarations.result import numbers
+from gpca.declarations.result import Frame, Paths, Series, numbers
 from gpca.evaluation.intervals import Clustered, wilson_interval
 from gpca.evaluation.measures import ALL, Measure, Parts, intervals, over_seeds, tidy
 from gpca.io.csv_file import numbers as number_column
@@ -18,9 +17,6 @@ from gpca.io.csv_file import read_csv, read_numbers
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.recovery.policies import ERROR_ONLY, is_fixed, policy_entry
 from gpca.seeds import seed_of_file
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 TABLE = "recovery"  # `table` and `source` of the rows
 ERRORS = ("error_before", "error_after")
@@ -33,7 +29,7 @@ SEQUENCE, ERROR = "sequence", "error"  # kinds of rivals
 FILES = "recovery/seed{seed}.csv"
 
 
-def read_recovery(path: str | Path) -> pd.DataFrame:
+def read_recovery(path: str | Path) -> Frame:
     """Read a file of the step ``recover``: numbers as numbers, `failed` and `recovered` as booleans, and its seed."""
     rows = read_csv(path, RECOVERY_COLUMNS, ("object", "symmetric", "concept", "score_*", "bald"))
     for name in ("episode", "table", "step", "tries"):
@@ -44,13 +40,13 @@ def read_recovery(path: str | Path) -> pd.DataFrame:
     return rows.assign(**booleans, seed=seed_of_file(path))
 
 
-def is_action(rows: pd.DataFrame) -> pd.Series:
+def is_action(rows: Frame) -> Series:
     """Which rows are of an action, as booleans."""
     return ~rows["action"].isin((QUEUE, NOTHING))
 
 
 @numbers("recovery.csv", files=FILES)
-def collect(run: Run, files: Iterable[str | Path]) -> pd.DataFrame:
+def collect(run: Run, files: Paths) -> Frame:
     """Measures by policy, cause and seed; results/README.md lists them."""
     recovery, curve = run.config["recovery"], run.config["success"]["curve"]
     treatments, costs, budget = dict(recovery["treatments"]), dict(recovery["costs"]), recovery["loop"]["budget"]
@@ -70,14 +66,14 @@ def collect(run: Run, files: Iterable[str | Path]) -> pd.DataFrame:
 
 
 def policy_metrics(
-    rows: pd.DataFrame, treatments: Mapping[str, str], costs: Mapping[str, float], budget: int
+    rows: Frame, treatments: Mapping[str, str], costs: Mapping[str, float], budget: int
 ) -> dict[str, float]:
     """Measures of one policy on the failures among the rows, and how often it acts on the others.
 
     Treatments are actions by concept, costs by action, in right poses; the budget is of actions per failure.
     """
 
-    def mean_cost(rows: pd.DataFrame, registrations: int) -> float:
+    def mean_cost(rows: Frame, registrations: int) -> float:
         return float(rows["action"].map(costs).sum() / registrations)
 
     fine, rows = rows[~rows["failed"]], rows[rows["failed"]]
@@ -102,7 +98,7 @@ def policy_metrics(
     return values | {FIRST + action: counts.get(action, 0) for action in (*treatments.values(), QUEUE)}
 
 
-def metrics_at(rows: pd.DataFrame, budget: int, curve: Iterable[float]) -> dict[str, float]:
+def metrics_at(rows: Frame, budget: int, curve: Iterable[float]) -> dict[str, float]:
     """Shares recovered by other limits of a right pose, each of the failures that are failures by it too.
 
     A policy that stopped at a pose that is right by the run's own limit would have stopped there, or before, by a wider
@@ -128,7 +124,7 @@ def at(metric: str, limit: float) -> str:
     return f"{metric}{AT}{100 * limit:g}"
 
 
-def pool_share(metrics: pd.DataFrame, policy: str, metric: str, concept: str = ALL) -> tuple[float, int] | None:
+def pool_share(metrics: Frame, policy: str, metric: str, concept: str = ALL) -> tuple[float, int] | None:
     """Share over the failures of all seeds, and their number; None where the metrics hold none.
 
     A wrong first action is a share of the failures that were acted on at all, an action on what did not fail one of
@@ -145,7 +141,7 @@ def pool_share(metrics: pd.DataFrame, policy: str, metric: str, concept: str = A
 
 
 @numbers("recovery_intervals.csv", files=FILES)
-def collect_intervals(run: Run, files: Iterable[str | Path]) -> pd.DataFrame:
+def collect_intervals(run: Run, files: Paths) -> Frame:
     """Shares of failures, of all and by cause, and ``acted_nominal`` of the good registrations, over all seeds.
 
     A cluster is a rendered table of a seed; the draws are the same for all policies.
@@ -165,7 +161,7 @@ def collect_intervals(run: Run, files: Iterable[str | Path]) -> pd.DataFrame:
     cases = cases.groupby(["method", *CASE, "cause"], sort=False)
     cases = cases.agg(step=("recovered", "min"), queued=("queued", "any"), first=("action", "first")).reset_index()
 
-    def by_cause(cases: pd.DataFrame) -> Parts:
+    def by_cause(cases: Frame) -> Parts:
         masks = {cause: (cases["cause"] == cause).to_numpy() for cause in CONCEPTS}
         return {ALL: np.ones(len(cases), bool)} | masks
 
@@ -179,7 +175,7 @@ def collect_intervals(run: Run, files: Iterable[str | Path]) -> pd.DataFrame:
 
 
 @numbers("recovery_differences.csv", files=FILES)
-def collect_differences(run: Run, files: Iterable[str | Path]) -> pd.DataFrame:
+def collect_differences(run: Run, files: Paths) -> Frame:
     """Paired differences of the shares that policies recover: `against` the best ``sequence``, or ``error`` only.
 
     The first is the best fixed sequence, repeats of one action included, by the same number of actions on the same
@@ -206,13 +202,13 @@ def collect_differences(run: Run, files: Iterable[str | Path]) -> pd.DataFrame:
     return intervals(records, "recovery")
 
 
-def steps_of(failures: pd.DataFrame) -> pd.DataFrame:
+def steps_of(failures: Frame) -> Frame:
     """After how many actions each failure (seed, table, episode) was recovered, or inf, by policy in columns."""
     step = failures["step"].where(failures["recovered"], np.inf)
     return step.groupby([*(failures[name] for name in CASE), failures["policy"]], sort=False).min().unstack()
 
 
-def read_queues(files: Iterable[str | Path]) -> pd.DataFrame:
+def read_queues(files: Paths) -> Frame:
     """``policy, order, labels, failures, error, low, high``: shares of the failures of all seeds.
 
     Only numbers of labels that every seed has are kept. Of random orders it is the mean; the bounds are Wilson's, as if
@@ -232,7 +228,7 @@ def read_queues(files: Iterable[str | Path]) -> pd.DataFrame:
     return together.assign(error=together["unsolved"] / together["failures"]).drop(columns="unsolved")
 
 
-def _read_all(files: Iterable[str | Path]) -> pd.DataFrame:
+def _read_all(files: Paths) -> Frame:
     import pandas as pd
 
     parts = [read_recovery(path) for path in files]
@@ -242,7 +238,7 @@ def _read_all(files: Iterable[str | Path]) -> pd.DataFrame:
     return rows.assign(method=rows["policy"])
 
 
-def _over_seeds(cases: pd.DataFrame, parts, measures: Mapping[str, Measure]) -> pd.DataFrame:
+def _over_seeds(cases: Frame, parts, measures: Mapping[str, Measure]) -> Frame:
     draws = Clustered.drawn(cases["seed"], _clusters(cases["seed"], cases["table"]), "recovery intervals")
     return over_seeds(cases.assign(table=TABLE, source=TABLE), parts, measures, draws)
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import inf
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from gpca.causes.judged import read_judged
 from gpca.causes.settings import CauseSettings
 from gpca.declarations.experiment import Experiment, LeftOut
 from gpca.declarations.plan import Run
-from gpca.declarations.result import Paths, figure, numbers, table
+from gpca.declarations.result import Frame, Paths, figure, numbers, table
 from gpca.declarations.step import Step
 from gpca.errors import require_names
 from gpca.evaluation.intervals import REPEATS
@@ -25,9 +25,6 @@ from gpca.reporting.sheet import Sheet, crossed, show
 from gpca.reporting.tables.table import Column
 from gpca.reporting.words import plural
 from gpca.settings import Count, Distinct, read_settings
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 MEASURED = ("balanced_accuracy", "dominant_accuracy", "auroc_failed", "regret", "false_alarm_rate")
 IN_WORDS = {POSE: "true pose", NOISE: "points without noise", OVERLAP: "missing surface"}  # truth about each cause
@@ -75,7 +72,7 @@ ORACLES = Step(
     prediction_files="oracles/{oracle_source}/{known}/seed{oracle_seed}.csv",
     causes_files="causes/{oracle_source}/seed{oracle_seed}.npz",
 )
-def collect_oracles(run: Run, prediction_files: Paths, causes_files: Paths) -> pd.DataFrame:
+def collect_oracles(run: Run, prediction_files: Paths, causes_files: Paths) -> Frame:
     """`MEASURED` by source and by what is known, and differences from the estimate, with intervals."""
     samples_of = by_source(with_pooled(read_judged(prediction_files, causes_files)))
     against = {"estimate": lambda name, names: [NOTHING]}

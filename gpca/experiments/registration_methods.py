@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from gpca.alignment.methods import registry
 from gpca.alignment.pose_error import SuccessSettings, success_within
 from gpca.declarations.experiment import ByName, Experiment, LeftOut, Names
 from gpca.declarations.plan import Run
-from gpca.declarations.result import numbers, table
+from gpca.declarations.result import Frame, Paths, numbers, table
 from gpca.declarations.step import Plan, Step
 from gpca.errors import InputError, require_names, with_key
 from gpca.evaluation.intervals import Clustered
@@ -37,9 +37,6 @@ from gpca.process.plugins import is_outside
 from gpca.reporting.sheet import Row, Sheet, show
 from gpca.reporting.tables.builder import missing_packages
 from gpca.steps.registration_trials import INITIAL, NO_START, SEVERITY_COLUMNS, PairSettings
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 NAME = "registration_methods"
 TRIAL_COLUMNS = ("add_relative", "rotation_error_rad", "translation_error", "points", *SEVERITY_COLUMNS)
@@ -117,21 +114,21 @@ def row_name(method: str, start: str) -> str:
     return method if start in (INITIAL, NO_START) else f"{start}+{method}"
 
 
-def read_trials(path: str | Path) -> pd.DataFrame:
+def read_trials(path: str | Path) -> Frame:
     """Read a file of the step: numbers as numbers, the rest as text."""
     columns = ("sample", "object", "concept", "start", "failure", *TRIAL_COLUMNS)
     rows = read_csv(path, columns, others=("symmetric", "fitness", "inlier_rmse"))
     return rows.assign(**{name: number_column(path, rows, name) for name in TRIAL_COLUMNS})
 
 
-def trials(files: Iterable[str | Path], objects: Iterable[str | Path]) -> pd.DataFrame:
+def trials(files: Paths, objects: Paths) -> Frame:
     """Rows of all files; the method is named with its start, and the cluster is the object's family in its source."""
     families = {}
     for path in objects:
         clouds = ObjectClouds.load(path)
         families[Path(path).stem] = {name: clouds.family(i) for i, name in enumerate(clouds.names)}
 
-    def read(path: Path) -> pd.DataFrame:
+    def read(path: Path) -> Frame:
         rows, (source, method, _) = read_trials(path), source_method_seed(path)
         family_N = rows["object"].map(families.get(source, {}))
         if family_N.isna().any():
@@ -143,7 +140,7 @@ def trials(files: Iterable[str | Path], objects: Iterable[str | Path]) -> pd.Dat
     return rows.assign(table=NAME, method=rows["row"])
 
 
-def parts(rows: pd.DataFrame, severities: Mapping[str, Iterable[float]]) -> Parts:
+def parts(rows: Frame, severities: Mapping[str, Iterable[float]]) -> Parts:
     """Masks of all rows, of each cause, and of each third of its severities."""
     masks = {ALL: np.ones(len(rows), bool)}
     for concept in CONCEPTS:
@@ -153,7 +150,7 @@ def parts(rows: pd.DataFrame, severities: Mapping[str, Iterable[float]]) -> Part
     return masks
 
 
-def share_of_milder(rows: pd.DataFrame, concept: str, severities: Mapping[str, Iterable[float]]) -> np.ndarray:
+def share_of_milder(rows: Frame, concept: str, severities: Mapping[str, Iterable[float]]) -> np.ndarray:
     """Share of a cause's drawn severities that is milder than each row's, in [0, 1].
 
     A pose error has two severities, each uniform in its range; it is as severe as the mean of their quantiles.
@@ -193,7 +190,7 @@ def measures(success: SuccessSettings) -> dict[str, Measure]:
     files="methods/{source}/{method}/seed{seed}.csv",
     objects="objects/{source}.npz",
 )
-def collect(run: Run, files: Iterable[str | Path], objects: Iterable[str | Path]) -> tuple[pd.DataFrame, pd.DataFrame]:
+def collect(run: Run, files: Paths, objects: Paths) -> tuple[Frame, Frame]:
     """Measures by seed, and over all sources and seeds with intervals over families of objects."""
     severities = dict(run.config["registrations"]["severities"])
     success = SuccessSettings(**run.config["success"])
@@ -208,10 +205,10 @@ def collect(run: Run, files: Iterable[str | Path], objects: Iterable[str | Path]
     )
 
 
-def read_seconds(files: Iterable[str | Path]) -> pd.DataFrame:
+def read_seconds(files: Paths) -> Frame:
     """Mean seconds by seed, apart from the other measures, because they differ from run to run."""
 
-    def read(path: Path) -> pd.DataFrame:
+    def read(path: Path) -> Frame:
         rows = read_csv(path, ("sample", "start", "seconds"))
         return rows.assign(seconds=number_column(path, rows, "seconds", least=0))
 
@@ -323,7 +320,7 @@ def method_rows(names: Iterable[str], global_start: str, initial: str = "Initial
                 yield Row([(key, title), (name, entry.title)], {"method": row_name(name, key)})
 
 
-def notes(run: Run, sheet: Sheet, intervals: pd.DataFrame) -> list[str]:
+def notes(run: Run, sheet: Sheet, intervals: Frame) -> list[str]:
     """Footnotes of all three tables."""
     pairs = int(intervals.loc[intervals["concept"] == ALL, "samples"].max())
     return [

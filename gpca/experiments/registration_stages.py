@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from gpca.attribution.predictions import concepts_of, read_predictions
 from gpca.causes.settings import Limits
 from gpca.causes.truth import BORDERLINE, FAILED, NOMINAL
 from gpca.declarations.plan import Run
+from gpca.declarations.result import Frame, Series
 from gpca.errors import InputError
 from gpca.experiments.frame_views import draw_scores
 from gpca.io.container import require_same_samples
@@ -25,9 +25,6 @@ from gpca.reporting.figures.cloud_views import widest_views
 from gpca.reporting.figures.style import GRAY, SMALL_PT, blues
 from gpca.reporting.words import object_in_words
 from gpca.rigid import inverse, scale_translation, transform
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 
 @dataclass(frozen=True)
@@ -44,7 +41,7 @@ class Stages:
 
     registrations: Registrations
     h_S_d: np.ndarray
-    predictions: pd.DataFrame
+    predictions: Frame
     u_S: np.ndarray
     u_clean: float
     limits: Limits
@@ -181,7 +178,7 @@ def observed_uncertainties(path: str | Path, registrations: Registrations) -> tu
     return u_S, limit
 
 
-def _median(rows: pd.DataFrame, concept: str) -> int:
+def _median(rows: Frame, concept: str) -> int:
     """Row of the median score of a concept."""
     ranked = rows.sort_values([f"score_{concept}", "sample"], kind="stable")
     return int(ranked.index[(len(ranked) - 1) // 2])
@@ -195,7 +192,7 @@ def draw_embedding(axes, h_d: np.ndarray) -> None:
     axes.spines[:].set(visible=True, linewidth=0.6, color=GRAY)
 
 
-def draw_scores_with_numbers(axes, sample: pd.Series) -> None:
+def draw_scores_with_numbers(axes, sample: Series) -> None:
     """Draw a sample's concept scores as bars ± one standard deviation, and write score ± deviation beside them."""
     draw_scores(axes, sample)
     for place, concept in enumerate(CONCEPTS):

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from math import inf, nan
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import Annotated, NamedTuple
 
 from gpca.comparison.published import HARDWARE, Number, printed_seconds, read_published
 from gpca.declarations.experiment import Experiment, Tidy
 from gpca.declarations.plan import Run
-from gpca.declarations.result import figure, table
+from gpca.declarations.result import Figure, Frame, figure, table
 from gpca.errors import InputError
 from gpca.evaluation.runtime_file import COMPONENTS, OF_ONE_EXPLANATION, read_runtime
 from gpca.experiments.frames import frames_of
@@ -22,10 +22,6 @@ from gpca.reporting.tables.cells import plain_cell
 from gpca.reporting.tables.table import EMPTY, Cell, Column, Table
 from gpca.reporting.words import plural
 from gpca.settings import Bounds
-
-if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.figure import Figure
 
 SECTION = "IV-E Real-world validation"
 INPUTS = {"runtime": (read_runtime, "runtime.csv"), "published": (read_published, {})}
@@ -52,7 +48,7 @@ EXPERIMENT = Experiment(name="runtime", sections={"runtime": RuntimeSettings}, t
     paper=True,
     **INPUTS,
 )
-def table7_runtime(run: Run, runtime: pd.DataFrame, published: Iterable[Number]) -> Table:
+def table7_runtime(run: Run, runtime: Frame, published: Iterable[Number]) -> Table:
     """Mean, standard deviation and median of each component in milliseconds, and the paper's numbers."""
     if runtime.empty:
         raise InputError("runtime", "has no rows", "run the step 'runtime' first")
@@ -117,7 +113,7 @@ class Stage(NamedTuple):
     name="runtime",
     **INPUTS,
 )
-def draw_runtime(run: Run, runtime: pd.DataFrame, published: Iterable[Number]) -> Figure:
+def draw_runtime(run: Run, runtime: Frame, published: Iterable[Number]) -> Figure:
     """Means of every stage of one explanation and of their sum, ours with one standard deviation."""
     series = stages_of(runtime, published)
     rows = [*(COMPONENTS[component] for component in OF_ONE_EXPLANATION), ALL_STAGES]
@@ -148,7 +144,7 @@ def draw_runtime(run: Run, runtime: pd.DataFrame, published: Iterable[Number]) -
     return drawing
 
 
-def stages_of(runtime: pd.DataFrame, published: Iterable[Number]) -> dict[str, dict[str, Stage]]:
+def stages_of(runtime: Frame, published: Iterable[Number]) -> dict[str, dict[str, Stage]]:
     """Times of the stages by what measured them: the paper, and here without and with a GPU."""
     measured = {
         (row.component, row.device): Stage(1e3 * row.mean_s, 1e3 * row.deviation_s) for row in runtime.itertuples()

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from math import inf
-from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gpca.causes.judged import CEILING, Judged, of_decisions, read_judged
 from gpca.causes.truth import ALL, BORDERLINE, FAILED, NOMINAL
 from gpca.declarations.plan import Run
-from gpca.declarations.result import numbers, table
+from gpca.declarations.result import Frame, Paths, numbers, table
 from gpca.evaluation.intervals import REPEATS, Clustered
 from gpca.evaluation.measures import POOLED, intervals
 from gpca.experiments import diagnosis
@@ -21,9 +18,6 @@ from gpca.reporting.sheet import Row, Sheet, Show, show, where
 from gpca.reporting.tables.cells import plain_cell
 from gpca.reporting.tables.table import Column
 from gpca.reporting.words import plural
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 DECISIONS = ("named_right", "regret")
 SMALL_MARGIN, LARGE_MARGIN = 0.01, 0.03  # diameters
@@ -57,9 +51,7 @@ def strata_of(samples: Judged) -> dict[tuple[str, str], np.ndarray]:
 
 
 @numbers("cause_strata.csv", prediction_files=diagnosis.DIAGNOSES, causes_files=diagnosis.CAUSES_FILES)
-def collect_strata(
-    run: Run, prediction_files: Iterable[str | Path], causes_files: Iterable[str | Path]
-) -> pd.DataFrame:
+def collect_strata(run: Run, prediction_files: Paths, causes_files: Paths) -> Frame:
     """Decisions of every explainer in every stratum that has samples, over all sources and seeds, with intervals."""
     samples_of = diagnosis.by_source(diagnosis.with_pooled(read_judged(prediction_files, causes_files)))
     source = POOLED if POOLED in samples_of else next(iter(samples_of))
@@ -124,7 +116,7 @@ def table9_strata(run: Run, strata):
         for stratum in strata_of_kind.items()
     ]
 
-    def counts(row: Row, subset: pd.DataFrame) -> dict:
+    def counts(row: Row, subset: Frame) -> dict:
         last = subset[subset["method"] == list(chosen)[-1]].iloc[-1]
         return {"samples": plain_cell(int(last["samples"]), int(last["seeds"]), int(last["samples"]))}
 

@@ -5,11 +5,11 @@ The tables and the figure stand in :mod:`gpca.experiments.scan_failures`.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field
@@ -33,7 +33,7 @@ from gpca.causes.settings import SCANS, ScanSamples
 from gpca.causes.truth import BORDERLINE, GEOMETRY
 from gpca.declarations.experiment import Experiment, LeftOut, Names
 from gpca.declarations.plan import Run
-from gpca.declarations.result import numbers
+from gpca.declarations.result import Frame, Paths, numbers
 from gpca.declarations.step import Step
 from gpca.encoders.registry import encoder_module
 from gpca.errors import InputError, with_key
@@ -52,9 +52,6 @@ from gpca.scans.scene import stratum_of
 from gpca.seeds import generator, seed_of_file
 from gpca.settings import Distinct, changes_of, fields_of
 from gpca.steps.scan_trials import TrialSettings
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 Learned = Distinct[Literal["objects", "scans"]]
 
@@ -200,10 +197,10 @@ FEWEST_OF_A_CAUSE = 5  # failures, or the cause counts in no mean over causes
 )
 def collect(
     run: Run,
-    causes_files: Iterable[str | Path],
-    sample_files: Iterable[str | Path],
-    prediction_files: Iterable[str | Path],
-) -> pd.DataFrame:
+    causes_files: Paths,
+    sample_files: Paths,
+    prediction_files: Paths,
+) -> Frame:
     """Measures with intervals over clusters of scenes and seeds, and counts.
 
     Sources are data sets of scans, and all of them together. Conditions are natural registrations of all starts or of
@@ -243,7 +240,7 @@ def collect(
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 
-def read_scan_causes(path: str | Path) -> pd.DataFrame:
+def read_scan_causes(path: str | Path) -> Frame:
     """Read what :func:`collect` returned; a value may lack an interval, and a difference from a gate.
 
     Raises InputError for a missing, empty or unreadable file, a missing column, a value that is no finite number.
@@ -251,7 +248,7 @@ def read_scan_causes(path: str | Path) -> pd.DataFrame:
     return read_numbers(path, COLUMNS, NUMBERS, optional=NUMBERS[4:]).assign(concept=ALL)
 
 
-def _read(causes_files, sample_files, prediction_files) -> tuple[pd.DataFrame, dict[tuple[str, str], Judged]]:
+def _read(causes_files, sample_files, prediction_files) -> tuple[Frame, dict[tuple[str, str], Judged]]:
     """A row for each registration, and the answers of each explainer, by where it learned and its name."""
     import pandas as pd
 
@@ -259,7 +256,7 @@ def _read(causes_files, sample_files, prediction_files) -> tuple[pd.DataFrame, d
         seed_of_file(path): read_predictions(path, labels=("scans", "learned", "explainer"))
         for path in prediction_files
     }
-    seen: list[pd.DataFrame] = []
+    seen: list[Frame] = []
     judged: dict[tuple[str, str], list[Judged]] = {}
     for causes_file, sample_file in zip(causes_files, sample_files, strict=True):
         source, seed = Path(causes_file).parent.name, seed_of_file(causes_file)

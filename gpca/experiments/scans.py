@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field
@@ -16,7 +16,7 @@ from pydantic import Field
 from gpca.alignment.methods.registry import installed, method_entry, method_module, require_global, require_settings
 from gpca.declarations.experiment import Experiment, LeftOut, Names
 from gpca.declarations.plan import Run, plain
-from gpca.declarations.result import numbers, table
+from gpca.declarations.result import Frame, Paths, numbers, table
 from gpca.declarations.step import Plan, Step, Wildcards
 from gpca.errors import InputError, require_names, with_key
 from gpca.evaluation.intervals import Clustered
@@ -33,9 +33,6 @@ from gpca.scans.source import ScanEntry, data_files, entry_of, place_of
 from gpca.settings import Bounds, Count, Share, fields_of, read_settings
 from gpca.steps.registration_trials import INITIAL
 from gpca.steps.scan_trials import TrialSettings
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -180,7 +177,7 @@ TEXTS = ("sample", "pair", "cluster", "kind", "rung", "start", "failure", "inlie
 
 
 @numbers("scans.csv", files="scan_trials/{scan_set}/{scan_method}/seed{scan_seed}.csv")
-def collect(run: Run, files: Iterable[str | Path]) -> pd.DataFrame:
+def collect(run: Run, files: Paths) -> Frame:
     """Recalls and failures of every data set, method and start, with intervals over scenes.
 
     ``concept`` is ``all``, a stratum, a rung of the ladder, or one of the benchmark's lists. A registration is correct
@@ -191,7 +188,7 @@ def collect(run: Run, files: Iterable[str | Path]) -> pd.DataFrame:
 
     strata, success = list(run.config["scans"]["strata"]), ScanSuccess(**run.config["scans"]["success"])
 
-    def parts(trials: pd.DataFrame) -> Parts:
+    def parts(trials: Frame) -> Parts:
         overlap_N = trials["overlap"].to_numpy()
         stratum_N = np.array([stratum_of(share, strata) or "" for share in overlap_N])
         masks = {ALL: np.ones(len(trials), bool)}
@@ -200,11 +197,11 @@ def collect(run: Run, files: Iterable[str | Path]) -> pd.DataFrame:
             masks[name] = (overlap_N >= low) & ((overlap_N < high) | ((high == 1) & (overlap_N == 1)))
         return masks | {name: (trials["rung"] == name).to_numpy() for name in trials["rung"].unique()}
 
-    def correct(trials: pd.DataFrame) -> np.ndarray:
+    def correct(trials: Frame) -> np.ndarray:
         limit_N = np.where(trials["kind"] == "room", success.room_m, success.object_share * trials["size_m"])
         return (trials["fitness"] > 0) & (trials["rmse_m"] < limit_N)
 
-    def close(trials: pd.DataFrame) -> np.ndarray:
+    def close(trials: Frame) -> np.ndarray:
         is_close = np.rad2deg(trials["rotation_error_rad"]) < CLOSE_DEG
         return (trials["fitness"] > 0) & is_close & (trials["translation_error_m"] < CLOSE_M)
 
@@ -231,7 +228,7 @@ def _rows(run: Run) -> Iterable[Row]:
             yield Row([(name, title), *row.labels], {"source": name} | dict(row.where))
 
 
-def _notes(run: Run, sheet: Sheet, intervals: pd.DataFrame, parts: Iterable[str]) -> list[str]:
+def _notes(run: Run, sheet: Sheet, intervals: Frame, parts: Iterable[str]) -> list[str]:
     """Footnotes on pairs, intervals, and what is correct."""
     success, counts = run.config["scans"]["success"], []
     for name, title in dict.fromkeys(row.labels[0] for row in sheet.rows):

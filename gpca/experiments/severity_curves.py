@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 from textwrap import wrap
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gpca.declarations.plan import Run
-from gpca.declarations.result import Paths, figure, numbers
+from gpca.declarations.result import Figure, Frame, Paths, figure, numbers
 from gpca.errors import InputError
 from gpca.evaluation.measures import source_method_seed
 from gpca.experiments.controls import SECTION, read_controls
@@ -17,10 +16,6 @@ from gpca.experiments.explained import titles
 from gpca.io.csv_file import read_numbers
 from gpca.reporting.figures.style import GRAY, SMALL_PT, write_title
 from gpca.steps.control_samples import PAPER, SAMPLE_COLUMNS, SEVERITIES
-
-if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.figure import Figure
 
 BY_CONCEPT = {"noise": ("noise",), "pose": ("rotation_deg", "translation"), "overlap": ("crop",)}
 REGISTRATION = "registration"  # in the column of explainers: the share of registrations that succeed
@@ -32,7 +27,7 @@ COLUMNS = ("concept", "method", "low", "high", "other_low", "other_high", "sampl
     files="controls/{source}/seed{control_seed}.csv",
     samples="control_samples/{source}/seed{control_seed}.csv",
 )
-def collect(run: Run, files: Paths, samples: Paths) -> pd.DataFrame:
+def collect(run: Run, files: Paths, samples: Paths) -> Frame:
     """Accuracy of every explainer and success of the registrations by severity, over all sources.
 
     Each range of severities has equally wide bins; pose errors have two ranges, rotation and translation.
@@ -73,7 +68,7 @@ def collect(run: Run, files: Paths, samples: Paths) -> pd.DataFrame:
     return frame.sort_values(list(COLUMNS[:6]), kind="stable", ignore_index=True)
 
 
-def read_severities(path: str | Path) -> pd.DataFrame:
+def read_severities(path: str | Path) -> Frame:
     """Read what :func:`collect` returned; only pose has bounds of a second severity, its translation."""
     return read_numbers(path, COLUMNS, COLUMNS[2:], optional=("other_low", "other_high"))
 

@@ -6,14 +6,14 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from textwrap import shorten
-from typing import TYPE_CHECKING, Annotated, Any, get_args
+from typing import Annotated, Any, get_args
 
 import numpy as np
 
 from gpca.comparison.readings import read_judged, summarize, unresolved
 from gpca.declarations.experiment import Experiment, Names, Tidy
 from gpca.declarations.plan import Run
-from gpca.declarations.result import figure, table
+from gpca.declarations.result import Figure, Frame, figure, table
 from gpca.errors import InputError
 from gpca.evaluation.measures import ALL
 from gpca.experiments import reading_words
@@ -23,17 +23,11 @@ from gpca.objects.entry import stand_in_clause
 from gpca.pairs.perturbation import CONCEPTS, Severities
 from gpca.reporting.tables.builder import TableBuilder, crossed, interval_over
 from gpca.reporting.tables.cells import cell_of_repeats, plain_cell, rows_where
-from gpca.reporting.tables.table import Cell, Column
+from gpca.reporting.tables.table import Cell, Column, Table
 from gpca.reporting.words import plural
 from gpca.settings import Bounds, Keys
 from gpca.steps.readings import groups
 from gpca.steps.readings.groups import FRAME_INPUT, FRAME_REPEATS, GROUPS, OtherSeverities, ReadingSizes
-
-if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.figure import Figure
-
-    from gpca.reporting.tables.table import Table
 
 RANGES = get_args(OtherSeverities)
 SAMPLES = "test_samples"
@@ -139,10 +133,10 @@ CONFUSED = {"pose": "overlap", "overlap": "pose"}
     metrics="readings/frame_input.csv",
     needs=("frame_input",),
 )
-def table6_inputs(run: Run, metrics: pd.DataFrame) -> Table:
+def table6_inputs(run: Run, metrics: Frame) -> Table:
     """Accuracy on depth frames by the cloud that the encoder sees."""
 
-    def share(rows: pd.DataFrame, metric: str, concept: str = ALL, is_count: bool = False) -> Cell | None:
+    def share(rows: Frame, metric: str, concept: str = ALL, is_count: bool = False) -> Cell | None:
         """Mean of a metric over the seeds, in percent of the test samples where it is a count."""
         rows = rows_where(rows, concept=concept).sort_values("seed")
         value_R, samples_R = (rows_where(rows, metric=name)["value"].to_numpy(float) for name in (metric, SAMPLES))
@@ -200,7 +194,7 @@ CHANCE = "chance"
     reproduction. Times are not included.""",
     **VERDICTS,
 )
-def table13_readings(run: Run, judged: pd.DataFrame) -> Table:
+def table13_readings(run: Run, judged: Frame) -> Table:
     """A row per missed number and group of readings that touches it; of stand-ins, per number that is touched."""
     table, every = TableBuilder("table13_readings", HEADS), []
     for key, by_group in summarize(judged).items():
@@ -257,7 +251,7 @@ LETTERS = 52  # of a number's name, which there is room for
     name="readings",
     **VERDICTS,
 )
-def draw_readings(run: Run, judged: pd.DataFrame) -> Figure:
+def draw_readings(run: Run, judged: Frame) -> Figure:
     """Readings of each number that is not reproduced as dots in a line, the lines of a group below its name.
 
     At the right stands how many of a number's readings are close.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from gpca.alignment.methods.registry import installed, method_entry, method_modu
 from gpca.attribution.predictions import read_predictions
 from gpca.declarations.experiment import EXPLAINERS, ByName, Experiment, LeftOut
 from gpca.declarations.plan import Run
-from gpca.declarations.result import Paths, numbers, table
+from gpca.declarations.result import Frame, Paths, numbers, table
 from gpca.declarations.step import Plan, Step, Wildcards
 from gpca.errors import require_names, with_key
 from gpca.evaluation.intervals import Clustered
@@ -26,9 +26,6 @@ from gpca.settings import Distinct
 from gpca.steps.exchange import ESTIMATOR, FAILURE, LABELS, ExchangeSettings, require_exchangeable
 from gpca.uncertainty.estimators.registry import estimator_entry, estimator_module
 from gpca.uncertainty.settings import MONTE_CARLO
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 ANOTHER = "another"  # all methods but the one that registered the training pairs
 SAMPLE = ["source", "seed", "split", "sample"]
@@ -106,7 +103,7 @@ EXPLAIN = Step(
 )
 
 
-def answers(files: Paths) -> pd.DataFrame:
+def answers(files: Paths) -> Frame:
     """Predictions of all files, and whether each is right, and the same as with Monte-Carlo.
 
     A sample without an estimate is wrong. The cluster is the object's family in its source.
@@ -125,7 +122,7 @@ def answers(files: Paths) -> pd.DataFrame:
     )
 
 
-def measured(rows: pd.DataFrame) -> Iterator[tuple[pd.DataFrame, Any, dict[str, Measure]]]:
+def measured(rows: Frame) -> Iterator[tuple[Frame, Any, dict[str, Measure]]]:
     """Samples, their parts and measures: of each explainer and estimator, or of each that learned from one method."""
     import pandas as pd
 
@@ -147,7 +144,7 @@ def measured(rows: pd.DataFrame) -> Iterator[tuple[pd.DataFrame, Any, dict[str, 
             yield both, lambda rows: {rows["learnt_from"].iloc[0]: np.ones(len(rows), bool)}, by_method
 
 
-def _by_concept(rows: pd.DataFrame) -> Parts:
+def _by_concept(rows: Frame) -> Parts:
     masks = {concept: (rows["concept_true"] == concept).to_numpy() for concept in rows["concept_true"].unique()}
     return {ALL: np.ones(len(rows), bool)} | masks
 
@@ -158,7 +155,7 @@ def _by_concept(rows: pd.DataFrame) -> Parts:
     rule="exchange_metrics",
     files="exchange/{exchange_source}/seed{exchange_seed}.csv",
 )
-def collect(run: Run, files: Paths) -> tuple[pd.DataFrame, pd.DataFrame]:
+def collect(run: Run, files: Paths) -> tuple[Frame, Frame]:
     """Measures by seed, and over all sources and seeds with intervals over families of objects.
 
     ``table`` is the explainer. For one that reads an uncertainty, ``method`` is the estimator and ``concept`` a

@@ -6,23 +6,20 @@ The paper's learners have a color, as everywhere; the others take theirs in turn
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from gpca.attribution.diagnostics import BINS, risk_coverage
 from gpca.attribution.learner_predictions import read_learner_predictions, sets_of, wrong
 from gpca.declarations.plan import Run
-from gpca.declarations.result import figure
+from gpca.declarations.result import Figure, figure
 from gpca.errors import InputError
 from gpca.experiments.out_of_distribution import SECTION, learner_titles
 from gpca.pairs.shifted_sets import DISTANCES, with_training_like
 from gpca.reporting.figures import style
 from gpca.reporting.figures.panels import legend_below, panels
 from gpca.reporting.figures.reliability import reliability_figure
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 SETS = {  # those of which Table V, alone or under shift, has ρ
     "in_distribution": "like the training",
