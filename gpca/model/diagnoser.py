@@ -76,19 +76,24 @@ class Diagnoser:
         reenactment = replace(self.reenactment, hypotheses=min(self.reenactment.hypotheses, QUICK_HYPOTHESES))
         return replace(self, points=min(self.points, QUICK_POINTS), reenactment=reenactment, guarantee=None)
 
-    def diagnose(self, observed: np.ndarray, model: np.ndarray, T_icp: np.ndarray) -> Diagnosis:
-        """Diagnose a registration; the same clouds give the same numbers.
+    @property
+    def truth(self) -> CauseSettings:
+        """Settings of the registrations that a re-enactment repeats."""
+        return CauseSettings(**vars(self.runs), moved=self.moved)
+
+    def diagnose(self, observed: np.ndarray, model: np.ndarray, T_icp: np.ndarray) -> tuple[Diagnosis, list[Enactment]]:
+        """Diagnose a registration, and return its re-enactments; the same clouds give the same numbers.
 
         Args:
             observed: (N, 3) at the initial pose, in diameters and in the model's frame.
             model: (M, 3).
             T_icp: (4, 4) result of ICP, maps the observed cloud to the model.
         """
-        features_F, reenacted = self.measured(observed, model, T_icp)
+        features_F, reenacted, enactments = self.measured(observed, model, T_icp)
         inputs_1_F = self.classifier.normalized(features_F[None])
         judged = self.classifier.judge(inputs_1_F)
         log_error = float(inputs_1_F[0] @ self.error_weights[:-1] + self.error_weights[-1])
-        return Diagnosis(
+        diagnosis = Diagnosis(
             failure=float(judged.failure_N[0]),
             threshold=self.threshold,
             causes=dict(zip(CONCEPTS, judged.causes_N_3[0].tolist(), strict=True)),
@@ -100,29 +105,12 @@ class Diagnoser:
             guarantee=Guaranteed.of(self.guarantee, state_probabilities(judged)) if self.guarantee else None,
             reenacted=reenacted,
         )
+        return diagnosis, enactments
 
-    def measured(self, observed: np.ndarray, model: np.ndarray, T_icp: np.ndarray) -> tuple[np.ndarray, Reenacted]:
-        """Return the features (F,) of the pair, and its re-enactment."""
-        pair = self.pair(observed, model, T_icp)
-        surface = ModelSurface(pair.model)
-        enactments, truth = self._enacted(pair, surface)
-        row = row_of(enactments, pair, self.reenactment, truth)
-        reenacted = Reenacted.of(enactments, row["weight"][: len(enactments)], T_icp, surface)
-        return reenactment_features(Reenactments.of_rows([row], truth))[0], reenacted
-
-    def enacted_again(
+    def measured(
         self, observed: np.ndarray, model: np.ndarray, T_icp: np.ndarray
-    ) -> tuple[list[Enactment], CauseSettings]:
-        """Repeat the re-enactments of :meth:`diagnose`, most probable first; return them and their settings."""
-        pair = self.pair(observed, model, T_icp)
-        return self._enacted(pair, ModelSurface(pair.model))
-
-    def _enacted(self, pair: ObservedPair, surface: ModelSurface) -> tuple[list[Enactment], CauseSettings]:
-        truth = CauseSettings(**vars(self.runs), moved=self.moved)
-        return reenact(pair, self.reenactment, truth, surface), truth
-
-    def pair(self, observed: np.ndarray, model: np.ndarray, T_icp: np.ndarray) -> ObservedPair:
-        """Return the pair with the results of ICP from other starts, as in training."""
+    ) -> tuple[np.ndarray, Reenacted, list[Enactment]]:
+        """Return the features (F,) of the pair with the results of ICP from other starts, and its re-enactment."""
         observed, model = (
             cloud[generator("diagnosis", role).permutation(len(cloud))[: self.points]]
             for role, cloud in (("observed", observed), ("model", model))
@@ -130,16 +118,13 @@ class Diagnoser:
         starts_n = exp(generator("diagnosis", "starts").normal(size=(self.runs.starts, 6)) * self.runs.deviation_6())
         starts_n[0] = T_icp
         T_n, fitness_n, rmse_n = BatchedICP(model, self.runs.icp).register(observed, starts_n)
-        T_back = inverse(T_n[0])
-        return ObservedPair(
-            observed=transform(T_n[0], observed),
-            model=model,
-            T_init=T_back,
-            T_runs=T_n @ T_back,
-            fitness_n=fitness_n,
-            inlier_rmse_n=rmse_n,
-            axes=("diagnosis",),
-        )
+        T_back, points = inverse(T_n[0]), transform(T_n[0], observed)
+        pair = ObservedPair(points, model, T_back, T_n @ T_back, fitness_n, rmse_n, axes=("diagnosis",))
+        surface = ModelSurface(model)
+        enactments = reenact(pair, self.reenactment, self.truth, surface)
+        row = row_of(enactments, pair, self.reenactment, self.truth)
+        reenacted = Reenacted.of(enactments, row["weight"][: len(enactments)], T_icp, surface)
+        return reenactment_features(Reenactments.of_rows([row], self.truth))[0], reenacted, enactments
 
     def state(self) -> dict[str, object]:
         """Return tensors, numbers and names for :meth:`from_state`."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -39,6 +39,12 @@ ADVICE = {  # per branch of the policy
     CHECK: "check what was given",
     QUEUE: "queue for labeling, so that the cause can be learned",
 }
+
+
+def plain(items: Sequence[tuple[str, Any]]) -> dict[str, Any]:
+    """Return the fields of a dataclass for JSON: arrays and tuples as lists."""
+    values = {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in items}
+    return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
 
 
 @dataclass(frozen=True)
@@ -197,8 +203,7 @@ class Reenacted:
 
     def as_dict(self) -> dict[str, object]:
         """Values for JSON."""
-        lists = ({"T_target_source": pose.T_target_source.tolist(), "axis": list(pose.axis)} for pose in self.poses)
-        return asdict(self) | {"poses": [asdict(pose) | own for pose, own in zip(self.poses, lists, strict=True)]}
+        return asdict(self, dict_factory=plain)
 
     def words(self, subject: str, unit: str) -> list[str]:
         """Describe each hypothesis relative to the result, such as ``the object also fits moved by 20 mm``."""
@@ -259,9 +264,7 @@ class Diagnosis:
 
     def as_dict(self) -> dict[str, object]:
         """Values for JSON."""
-        guarantee = self.guarantee and asdict(self.guarantee)
-        parts = {"guarantee": guarantee, "reenacted": self.reenacted.as_dict()}
-        return vars(self) | parts | {"state": self.state, "named": list(self.named)}
+        return asdict(self, dict_factory=plain) | {"state": self.state, "named": list(self.named)}
 
     def lines(self, unit: str) -> list[str]:
         """Lines of text, with lengths in this unit."""

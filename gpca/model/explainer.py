@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from time import perf_counter
 
@@ -121,13 +120,12 @@ class Explainer:
             outcome = self._aligned(clouds, register, method, notes)
         T_found = outcome.T_target_source
         voids = voids_of(clouds.source, clouds.target, outcome.fitness, self.model.familiar)
-        diagnosis, enact = None, None
+        diagnosis, enactments = None, []
         if diagnose:
             diagnoser = self.model.diagnoser.quick() if fast else self.model.diagnoser
             with _timed(seconds, "diagnosis"):
-                diagnosis = diagnoser.diagnose(clouds.source, clouds.target, T_found)
+                diagnosis, enactments = diagnoser.diagnose(clouds.source, clouds.target, T_found)
             diagnosis = replace(diagnosis.outside(clouds.frame, clouds.T_target_source_init), void=bool(voids))
-            enact = partial(diagnoser.enacted_again, clouds.source, clouds.target, T_found)
             notes += [FAST] if fast else []
         with _timed(seconds, "embedding"):
             h_1_d = self.embed(transform(T_found, clouds.source))
@@ -179,7 +177,8 @@ class Explainer:
             learned_from=self.model.learning,
             scene=Scene(
                 *(clouds.source, clouds.target, T_found, clouds.frame),
-                *(self.model.icp.correspondence_distance, Limits().failed, enact),
+                *(self.model.icp.correspondence_distance, Limits().failed),
+                *(enactments, self.model.diagnoser.truth),
             ),
         )
 

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from html import escape
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 
 from gpca.causes.truth import FAILED, NOMINAL
 from gpca.io.files import whole_file
 from gpca.model import page
-from gpca.model.diagnosis import ADVICE, CHECK, UNKNOWN, Diagnosis, Reenacted
+from gpca.model.diagnosis import ADVICE, CHECK, UNKNOWN, Diagnosis, Reenacted, plain
 from gpca.model.scene import Scene
 
 NOT_SURE = "not sure"
@@ -50,10 +51,34 @@ class PoseSpread:
         return self.diameter * math.sqrt(np.trace(self.covariance_6_6[3:, 3:]))
 
 
-class Page:
-    """An explanation that can be shown as the page that the method ``html`` of its class returns."""
+@dataclass(frozen=True, kw_only=True)
+class ExplainedRegistration:
+    """What is said of any registration: its result, what to do next, and how it is shown."""
 
-    html: Callable[..., str]
+    html: ClassVar[Callable[..., str]]
+
+    T_target_source: np.ndarray  # (4, 4) the resulting pose, in the unit of the points
+    fitness: float
+    inlier_rmse: float
+    method: str  # name of the registration method, or kind of the model's ICP
+    action: str  # what to do next: a branch of the policy (:mod:`gpca.causes.policy`), or `CHECK`
+    reason: str  # reason for this action
+    unit: str  # unit of all lengths
+    notes: tuple[str, ...] = ()  # changes made to the clouds, such as points that were left out
+    warnings: tuple[str, ...] = ()  # reasons to doubt the explanation
+    learned_from: str = ""  # training data
+    scene: Scene | None = field(default=None, repr=False, compare=False)  # data of the 3-D view
+
+    @property
+    def advice(self) -> str:
+        """What to do next, in words."""
+        return ADVICE.get(self.action, self.action)
+
+    def as_dict(self) -> dict[str, object]:
+        """Values for JSON."""
+        values = asdict(replace(self, scene=None), dict_factory=plain)
+        del values["scene"]
+        return values
 
     def save_html(self, path: str | Path, names: Mapping[str, str] | None = None) -> None:
         """Write :meth:`html` to a file."""
@@ -64,9 +89,15 @@ class Page:
         """Return the page for a notebook."""
         return page.framed(self.html())
 
+    def _report(self, body: Sequence[str], registration: str, *end: str) -> str:
+        warnings = [f"warning   {line}" for line in self.warnings]
+        rows = [" ".join(f"{number:12.6g}" for number in row) for row in self.T_target_source]
+        pose = ["", f"T_target_source, in {self.unit}", *rows]
+        return "\n".join([*warnings, *body, "", f"registration   {self.method}, {registration}", *pose, *end, ""])
 
-@dataclass(frozen=True)
-class Explanation(Page):
+
+@dataclass(frozen=True, kw_only=True)
+class Explanation(ExplainedRegistration):
     """One registration of an object, explained by a trained model.
 
     Attributes:
@@ -74,38 +105,23 @@ class Explanation(Page):
         scores, variances: GP-CA as in the paper, which sees only the aligned source and always names a concept: mean
             and variance over the posterior draws (Eqs. 4, 5).
         bald, entropy: uncertainty of these in nats: Eq. 7, and the entropy of the scores.
+        warnings: how the pair differs from the training data.
         scene: data of the 3-D view for :meth:`html`; None for explanations made in bulk.
     """
 
-    T_target_source: np.ndarray  # (4, 4) the resulting pose, in the unit of the points
-    fitness: float
-    inlier_rmse: float
-    method: str  # kind of the model's ICP, or name of a registration method
     diagnosis: Diagnosis | None  # state and causes, learned from measured causes; None if not requested
     scores: dict[str, float]
     variances: dict[str, float]
     bald: float
     entropy: float
     concept: str  # concept with the largest score (Eq. 6).
-    action: str  # what to do next: a branch of the policy (:mod:`gpca.causes.policy`), or `CHECK`
-    reason: str  # reason for this action
     spread: PoseSpread | None  # uncertainty of the pose by an estimator, if requested and available
-    unit: str  # unit of all lengths
     seconds: dict[str, float]  # duration of each stage, and ``total``
-    notes: tuple[str, ...] = ()  # changes made to the clouds, such as points that were left out
-    warnings: tuple[str, ...] = ()  # how the pair differs from the training data
-    learned_from: str = ""  # training data of the diagnosis
-    scene: Scene | None = field(default=None, repr=False, compare=False)
 
     @property
     def unknown(self) -> bool:
         """Whether neither diagnosis nor scores mean anything for this pair."""
         return self.action == CHECK
-
-    @property
-    def advice(self) -> str:
-        """What to do next, in words."""
-        return ADVICE.get(self.action, self.action)
 
     def as_dict(self) -> dict[str, object]:
         """Values for JSON."""
@@ -116,13 +132,13 @@ class Explanation(Page):
             "estimator": self.spread.estimator,
             "starts": self.spread.starts,
         }
-        return _plain(self) | {"diagnosis": self.diagnosis and self.diagnosis.as_dict(), "spread": spread}
+        return super().as_dict() | {"diagnosis": self.diagnosis and self.diagnosis.as_dict(), "spread": spread}
 
     def html(self, names: Mapping[str, str] | None = None) -> str:
         """Return a page that needs no other file: both clouds in 3-D, causes, poses, counterfactuals."""
         scene, explained = self.scene, self.as_dict()
         if scene is not None and self.unknown:
-            scene = replace(scene, enact=None)  # hypotheses mean nothing where scores mean nothing
+            scene = replace(scene, enactments=())  # hypotheses mean nothing where scores mean nothing
         diagnosis = None if self.unknown or scene is None else self.diagnosis
         body = [
             page.action(explained, self.advice),
@@ -150,73 +166,45 @@ class Explanation(Page):
                 *(f"{name:10}{self.scores[name]:8.3f}{self.variances[name]:10.4f}" for name in self.scores),
                 f"entropy {self.entropy:.3f} nats, BALD {self.bald:.3f} nats",
             ]
-        fit = f"fitness {self.fitness:.3f}, inlier RMSE {self.inlier_rmse:.4g} {self.unit}"
-        lines = [*_warning_lines(self.warnings), *body, "", f"registration   {self.method}, {fit}"]
+        lines = [f"fitness {self.fitness:.3f}, inlier RMSE {self.inlier_rmse:.4g} {self.unit}"]
         if self.spread is not None:
             scatter = f"{self.spread.rotation_deg:.2f}°, {self.spread.translation:.4g} {self.unit}"
             by = f"over {self.spread.starts} starts" if self.spread.starts else f"by {self.spread.estimator}"
             lines.append(f"pose spread    {scatter} (root mean square {by})")
         stages = ", ".join(f"{stage} {1e3 * seconds:.1f}" for stage, seconds in self.seconds.items())
-        lines += ["", *_pose_lines(self.T_target_source, self.unit), "", f"milliseconds   {stages}", ""]
-        return "\n".join(lines)
+        return self._report(body, "\n".join(lines), "", f"milliseconds   {stages}")
 
 
-@dataclass(frozen=True)
-class ScanExplanation(Page):
+@dataclass(frozen=True, kw_only=True)
+class ScanExplanation(ExplainedRegistration):
     """One registration of two partial scans of a scene, explained without training.
 
     Attributes:
         fitness, inlier_rmse: share of the source's voxels with a partner within two voxels; their RMSE.
         overlap: share of the source that lies on the target, and of the target that lies on the source.
-        action, reason: what to do next, a branch of the policy, and why.
-        notes, warnings: changes made to the clouds, and reasons to doubt the explanation.
     """
 
-    T_target_source: np.ndarray  # (4, 4) the resulting pose, in the unit of the points
-    fitness: float
-    inlier_rmse: float
-    method: str  # name of the registration method
     voxel: float  # edge length of the voxels
     state: str  # ``nominal``, ``failed`` or ``not sure``
     failure: float  # probability of a failure (:func:`gpca.model.scan_explainer.failure_of`), not calibrated
     limit: float  # error above which a registration counts as failed: root mean square over the common surface
     overlap: tuple[float, float]
     reenacted: Reenacted  # hypotheses of the true pose, and the effect of each cause
-    action: str
-    reason: str
-    unit: str  # unit of all lengths
     seconds: float  # duration
-    notes: tuple[str, ...] = ()
-    warnings: tuple[str, ...] = ()
     learned_from: str = LEARNED  # training data: none
-    scene: Scene | None = field(default=None, repr=False, compare=False)  # data of the 3-D view
-
-    @property
-    def advice(self) -> str:
-        """What to do next, in words."""
-        return ADVICE[self.action]
-
-    def as_dict(self) -> dict[str, object]:
-        """Values for JSON."""
-        return _plain(self) | {"overlap": list(self.overlap), "reenacted": self.reenacted.as_dict()}
 
     def text(self) -> str:
         """Return a report for a reader."""
         rmse, voxel, limit = (page.length(value, self.unit) for value in (self.inlier_rmse, self.voxel, self.limit))
-        lines = [
-            *_warning_lines(self.warnings),
+        body = [
             f"state     {self.state}",
             f"failure   probability {self.failure:.2f}, not calibrated, of an error above {limit}",
             f"overlap   {self._overlap()}",
             self.reenacted.effects_line(self.unit),
             *self.reenacted.pose_lines("the source", self.unit),
             f"action    {self.advice} ({self.reason})",
-            "",
-            f"registration   {self.method}, fitness {self.fitness:.3f}, inlier RMSE {rmse}, voxels of {voxel}",
-            "",
-            *_pose_lines(self.T_target_source, self.unit),
         ]
-        return "\n".join([*lines, ""])
+        return self._report(body, f"fitness {self.fitness:.3f}, inlier RMSE {rmse}, voxels of {voxel}")
 
     def html(self, names: Mapping[str, str] | None = None) -> str:
         """Return a page that needs no other file, as :meth:`Explanation.html` does."""
@@ -237,17 +225,3 @@ class ScanExplanation(Page):
     def _overlap(self) -> str:
         source, target = self.overlap
         return f"{source:.0%} of the source lies on the target, {target:.0%} of the target on the source"
-
-
-def _plain(explanation: Explanation | ScanExplanation) -> dict[str, object]:
-    values = {name: value for name, value in vars(explanation).items() if name != "scene"}
-    lists = {name: list(values[name]) for name in ("notes", "warnings")}
-    return values | lists | {"T_target_source": explanation.T_target_source.tolist()}
-
-
-def _warning_lines(warnings: tuple[str, ...]) -> list[str]:
-    return [f"warning   {line}" for line in warnings]
-
-
-def _pose_lines(T: np.ndarray, unit: str) -> list[str]:
-    return [f"T_target_source, in {unit}", *(" ".join(f"{number:12.6g}" for number in row) for row in T)]

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from time import perf_counter
 from typing import Any
 
@@ -48,6 +47,7 @@ CLOSE = 0.8  # distance between partners with an even chance of failure, root me
 CLOSE_STEEPNESS = 16.0  # of the probability in the logarithm of this distance
 GOOD, BAD = 0.2, 0.5  # probability of a failure below which the state is nominal, and from which it is failed
 LEAST_OVERLAP = 0.2  # share of the source below which a wrong pose fits as well as the right one
+TRUTH = CauseSettings(moved=OBSERVED)  # of re-enactments
 LEAST = 1e-6  # lower bound of arguments of logarithms
 
 
@@ -83,8 +83,7 @@ def explain_scans(
         notes.append(f"{method} failed: {outcome.failure}")
     T_found = outcome.T_target_source
     pair = scans.pair(T_found)
-    enact = partial(_enacted, scans, pair)
-    enactments, _ = enact()
+    enactments = _enacted(scans, pair)
     weight_k = weights_of(enactment.hypothesis for enactment in enactments)
     reenacted = Reenacted.of(enactments, weight_k, T_found, ModelSurface(pair.model)).outside(frame, T_init)
     failure, overlap = failure_of(scans, enactments, T_found), scans.overlap(T_found)
@@ -109,7 +108,11 @@ def explain_scans(
         seconds=perf_counter() - started,
         notes=tuple(notes),
         warnings=(warning,) if overlap[0] < LEAST_OVERLAP else (),
-        scene=Scene(scans.source, scans.target, T_found, frame, SHOWN_REACH * scans.voxel, LIMIT, enact),
+        scene=Scene(
+            *(scans.source, scans.target, T_found, frame, SHOWN_REACH * scans.voxel, LIMIT),
+            enactments=enactments,
+            truth=TRUTH,
+        ),
     )
 
 
@@ -137,16 +140,15 @@ def _prepared(
     return Scans(source, frame.coordinates(clouds["target"]), voxel / frame.diameter), frame, notes
 
 
-def _enacted(scans: Scans, pair: ObservedPair) -> tuple[list[Enactment], CauseSettings]:
+def _enacted(scans: Scans, pair: ObservedPair) -> list[Enactment]:
     """Re-enact a pair, with hypotheses refined on all voxels and weighted by their fit, the best first."""
-    truth = CauseSettings(moved=OBSERVED)
-    enactments = reenact_scan(pair, 1.0, ReenactmentSettings(), truth)
+    enactments = reenact_scan(pair, 1.0, ReenactmentSettings(), TRUTH)
     T_k = scans.refined(np.stack([enactment.hypothesis.T for enactment in enactments]))
     refined = [
         replace(enactment, hypothesis=replace(enactment.hypothesis, T=T, log_posterior=-INDEPENDENT * scans.misfit(T)))
         for enactment, T in zip(enactments, T_k, strict=True)
     ]
-    return sorted(refined, key=lambda enactment: -enactment.hypothesis.log_posterior), truth
+    return sorted(refined, key=lambda enactment: -enactment.hypothesis.log_posterior)
 
 
 def failure_of(scans: Scans, enactments: Sequence[Enactment], T_found: np.ndarray) -> float:

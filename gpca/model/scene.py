@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from base64 import b64encode
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
@@ -38,10 +38,7 @@ class Possibility:
 
 @dataclass(frozen=True)
 class Scene:
-    """A registration in the target's canonical frame and in its diameters.
-
-    Where there was a re-enactment, `enact` repeats it with the same random numbers, when the scene is drawn.
-    """
+    """A registration in the target's canonical frame and in its diameters."""
 
     source: np.ndarray  # (N, 3) at its initial pose
     target: np.ndarray  # (M, 3)
@@ -49,7 +46,8 @@ class Scene:
     frame: CanonicalFrame  # the target's, in the user's unit
     reach: float  # correspondence distance of ICP, diameters
     limit: float  # error above which a registration counts as failed, diameters
-    enact: Callable[[], tuple[list[Enactment], CauseSettings]] | None = None
+    enactments: Sequence[Enactment] = ()  # most probable first
+    truth: CauseSettings = field(default_factory=CauseSettings)  # their settings
 
     @property
     def aligned(self) -> np.ndarray:
@@ -59,13 +57,12 @@ class Scene:
     @cached_property
     def possibilities(self) -> tuple[Possibility, ...]:
         """Hypotheses of the true pose, most probable first; empty without a re-enactment."""
-        if self.enact is None:
+        if not self.enactments:
             return ()
-        enactments, truth = self.enact()
-        weight_k = weights_of(enactment.hypothesis for enactment in enactments)
+        weight_k = weights_of(enactment.hypothesis for enactment in self.enactments)
         possibilities = []
-        for enactment, weight in zip(enactments, weight_k, strict=True):
-            candidate, registrar = enactment.candidate, Registrar(enactment.candidate, truth, misses=True)
+        for enactment, weight in zip(self.enactments, weight_k, strict=True):
+            candidate, registrar = enactment.candidate, Registrar(enactment.candidate, self.truth, misses=True)
             clouds = []
             for causes in SUBSETS:
                 applied = tuple(cause for cause in causes if candidate.applied[cause])
