@@ -5,7 +5,7 @@ ICP is the compiled loop, not Open3D's as for those samples (docs/protocol.md#tw
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -14,7 +14,7 @@ from time import perf_counter
 import numpy as np
 import torch
 
-from gpca.alignment.icp import Method, clipped_cost
+from gpca.alignment.icp import clipped_cost
 from gpca.alignment.methods.interface import Outcome, Pair
 from gpca.alignment.methods.registry import make_method
 from gpca.causes.policy import NOTHING, Decision, RecoveryPolicy
@@ -34,7 +34,7 @@ from gpca.objects.canonical_frame import CanonicalFrame, thin
 from gpca.objects.surface import as_points
 from gpca.rigid import inverse, transform
 from gpca.seeds import generator, seed_of
-from gpca.uncertainty.estimators.interface import CovarianceEstimate, RegisteredPair
+from gpca.uncertainty.estimators.interface import RegisteredPair
 from gpca.uncertainty.estimators.registry import make_estimator
 from gpca.uncertainty.settings import MONTE_CARLO, UncertaintySettings
 from gpca.uncertainty.spread import run_from_starts
@@ -42,11 +42,6 @@ from gpca.uncertainty.spread import run_from_starts
 FAST = f"fast: at most {QUICK_POINTS} points and {QUICK_HYPOTHESES} poses were re-enacted, and nothing is promised"
 GOOD_FITNESS = 0.9  # fitness from which an initial pose is not doubted
 INVERSE_COST = 0.5  # an inverse initial pose that ends with a smaller share of the cost was probably meant
-METHOD_NAMES: dict[Method, str] = {  # registration methods that equal the model's kinds of ICP
-    "point_to_point": "point_to_point",
-    "point_to_plane": "point_to_plane",
-    "generalized": "gicp",
-}
 
 
 class Explainer:
@@ -105,11 +100,6 @@ class Explainer:
             InputError: too few points, NaN, implausible unit, very different sizes, an initial pose that is not rigid,
                 unknown method or estimator, missing package, or an estimator that has to be trained.
         """
-        register = None if method is None else make_method(method)
-        estimate = None
-        if uncertainty is not None:
-            options = {"starts": uncertainty.starts} if estimator == MONTE_CARLO else {}
-            estimate = make_estimator(estimator, options)
         started = perf_counter()
         seconds: dict[str, float] = {}
         notes: list[str] = []
@@ -117,7 +107,7 @@ class Explainer:
             inputs = (source_points, target_points, T_target_source_init, unit, frame)
             clouds = Clouds.prepared(*inputs, self.model.cloud_points, self.model.icp, notes)
         with _timed(seconds, "icp"):
-            outcome = self._aligned(clouds, register, method, notes)
+            outcome = self._aligned(clouds, method, notes)
         T_found = outcome.T_target_source
         voids = voids_of(clouds.source, clouds.target, outcome.fitness, self.model.familiar)
         diagnosis, enactments = None, []
@@ -141,12 +131,12 @@ class Explainer:
                     f"the pair is {diagnosis.unlikeness:.1f} times as far from the registrations that the diagnosis "
                     "was trained on as 99 % of these are from one another"
                 )
-            if T_target_source_init is not None and register is None and self._fits_inverted(clouds, outcome):
+            if T_target_source_init is not None and method is None and self._fits_inverted(clouds, outcome):
                 warnings.append("the inverse of the initial pose fits far better: is it T_source_target?")
         spread = None
-        if uncertainty is not None and estimate is not None:
+        if uncertainty is not None:
             with _timed(seconds, "uncertainty"):
-                spread = self._spread(clouds, outcome, method, estimator, estimate, uncertainty, notes)
+                spread = self._spread(clouds, outcome, method, estimator, uncertainty, notes)
         if voids:
             decision = Decision(CHECK, "", ", ".join(void.check for void in voids))
         elif diagnosis is None:
@@ -232,14 +222,13 @@ class Explainer:
         clouds_D_N_3 = torch.from_numpy(aligned.astype(np.float32)[np.array(rows_D_N)])
         return self.model.encoder(clouds_D_N_3.to(self._device)).mean(dim=0, keepdim=True).cpu().numpy()
 
-    def _aligned(
-        self, clouds: Clouds, register: Callable[[Pair], Outcome] | None, method: str | None, notes: list[str]
-    ) -> Outcome:
+    def _aligned(self, clouds: Clouds, method: str | None, notes: list[str]) -> Outcome:
         """Register by the model's own ICP or by the given method; a failure adds a note."""
-        if register is None:
-            poses_1, fitness_1, rmse_1 = clouds.icp.register(clouds.source, np.eye(4)[None])
-            return Outcome(poses_1[0], float(fitness_1[0]), float(rmse_1[0]))
-        outcome = register(Pair(clouds.source, clouds.target, seed=seed_of("explanation", method)).with_normals())
+        if method is None:
+            [T], [fitness], [rmse] = clouds.icp.register(clouds.source, np.eye(4)[None])
+            return Outcome(T, float(fitness), float(rmse))
+        pair = Pair(clouds.source, clouds.target, seed=seed_of("explanation", method)).with_normals()
+        outcome = make_method(method)(pair)
         notes += [] if outcome.converged else [f"{method} failed: {outcome.failure}"]
         return Outcome(outcome.T_target_source, float(outcome.fitness), float(outcome.inlier_rmse))
 
@@ -249,24 +238,24 @@ class Explainer:
         outcome: Outcome,
         method: str | None,
         estimator: str,
-        estimate: Callable[[RegisteredPair], CovarianceEstimate],
         settings: UncertaintySettings,
         notes: list[str],
     ) -> PoseSpread | None:
         """Estimate the uncertainty of the pose; a failure adds a note."""
         source, diameter = thin(clouds.source, settings.icp_points, "spread"), clouds.frame.diameter
-        if method is None and estimator == MONTE_CARLO:
+        starts = settings.starts if estimator == MONTE_CARLO else None
+        if method is None and starts:
             xi_n_6 = generator("explanation", "starts").normal(size=(settings.starts, 6)) * settings.deviation_6()
             runs = run_from_starts(clouds.icp, source, np.eye(4), xi_n_6)
-            return PoseSpread(runs.covariance(outcome.T_target_source), diameter, MONTE_CARLO, settings.starts)
+            return PoseSpread(runs.covariance(outcome.T_target_source), diameter, estimator, starts)
         target = thin(clouds.target, settings.icp_points, "spread", "target")
         pair = Pair(source, target, seed=seed_of("explanation", "estimate")).with_normals()
-        name = method or METHOD_NAMES[self.model.icp.method]
-        estimated = estimate(RegisteredPair(pair, outcome, name, settings.deviation_6()))
+        own = "gicp" if self.model.icp.method == "generalized" else self.model.icp.method  # the method of that name
+        estimate = make_estimator(estimator, {"starts": starts} if starts else {})
+        estimated = estimate(RegisteredPair(pair, outcome, method or own, settings.deviation_6()))
         if estimated.covariance_6_6 is None:
             notes.append(f"{estimator} gives no covariance: {estimated.failure}")
             return None
-        starts = settings.starts if estimator == MONTE_CARLO else None
         return PoseSpread(estimated.covariance_6_6, diameter, estimator, starts)
 
     def _fits_inverted(self, clouds: Clouds, outcome: Outcome) -> bool:

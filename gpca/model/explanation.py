@@ -137,13 +137,14 @@ class Explanation(ExplainedRegistration):
     def html(self, names: Mapping[str, str] | None = None) -> str:
         """Return a page that needs no other file: both clouds in 3-D, causes, poses, counterfactuals."""
         scene, explained = self.scene, self.as_dict()
-        if scene is not None and self.unknown:
+        body = [page.action(explained, self.advice)]
+        if scene and self.unknown:
             scene = replace(scene, enactments=())  # hypotheses mean nothing where scores mean nothing
-        diagnosis = None if self.unknown or scene is None else self.diagnosis
-        body = [
-            page.action(explained, self.advice),
-            *([] if self.unknown else [page.promise(explained), page.causes(explained)]),
-            page.poses(diagnosis.reenacted, "the object", self.unit, observation=True) if diagnosis else "",
+        elif self.diagnosis and not self.unknown:
+            body += [page.promise(self.diagnosis.guarantee), page.causes(self.diagnosis, self.unit)]
+            if scene:
+                body.append(page.poses(self.diagnosis.reenacted, "the object", self.unit, observation=True))
+        body += [
             page.counterfactuals(scene, self.unit) if scene else "",
             "" if self.unknown else page.as_in_the_paper(explained),
             page.details(explained, {"training": self.learned_from} | dict(names or {})),

@@ -9,7 +9,7 @@ import numpy as np
 
 from gpca.causes.truth import BY_SIZE
 from gpca.model.explanation import Explanation
-from gpca.model.scene import Scene, distances, taken_out
+from gpca.model.scene import Scene, taken_out
 from gpca.reporting.figures import style
 from gpca.reporting.figures.cloud_views import thinned, widest_views
 from gpca.rigid import transform
@@ -87,6 +87,7 @@ def _draw_clouds(panel, scene: Scene, source: np.ndarray, view: np.ndarray):
     """Draw the target in gray and the source by its distances, from back to front; return what has the colors."""
     from matplotlib import colormaps
     from matplotlib.colors import ListedColormap
+    from scipy.spatial import cKDTree
 
     target, source = thinned(scene.target, POINTS), thinned(source, POINTS)
     at, ahead = target @ view.T, source @ view.T
@@ -94,7 +95,7 @@ def _draw_clouds(panel, scene: Scene, source: np.ndarray, view: np.ndarray):
     order = np.argsort(ahead[:, 2], kind="stable")
     colors = ListedColormap(colormaps["viridis"](np.linspace(BRIGHTEST, 0, 256)))
     look = {"cmap": colors, "vmin": 0, "vmax": scene.reach * scene.frame.diameter, "linewidths": 0}
-    far = distances(source, scene.target)[order] * scene.frame.diameter
+    far = cKDTree(scene.target).query(source)[0][order] * scene.frame.diameter
     shown = panel.scatter(ahead[order, 0], ahead[order, 1], s=2, c=far, **look)
     panel.set(aspect="equal")
     panel.set_axis_off()

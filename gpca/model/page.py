@@ -1,6 +1,6 @@
 """The HTML page of an explanation: one file that needs no other and no network; text from users is escaped.
 
-In all functions, `explained` is :meth:`gpca.model.explanation.Explanation.as_dict`.
+Everywhere, `explained` is :meth:`gpca.model.explanation.Explanation.as_dict`.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from gpca.causes.policy import NOTHING
 from gpca.causes.truth import BY_SIZE
 from gpca.evaluation.conformal import ALARM, GOOD
 from gpca.guarantee.guarantee import STATES
-from gpca.model.diagnosis import IN_WORDS, UNKNOWN, Reenacted
+from gpca.model.diagnosis import IN_WORDS, UNKNOWN, Diagnosis, Guaranteed, Reenacted
 from gpca.model.scene import ASSETS, WITHOUT, Scene, taken_out
 
 FRAME_HEIGHT = 900  # of a notebook's frame, pixels
@@ -49,8 +49,7 @@ def framed(html: str) -> str:
 
 def headline(explained: Mapping) -> str:
     """State the result in one line."""
-    diagnosis = explained["diagnosis"]
-    if diagnosis is None:
+    if (diagnosis := explained["diagnosis"]) is None:
         return f"<h1>The leading concept is {escape(explained['concept'])}</h1>"
     state = diagnosis["state"]
     title = {
@@ -75,42 +74,37 @@ def action(explained: Mapping, advice: str) -> str:
     return section("What to do", f'<p class="action">{do}</p><p>Reason: {escape(explained["reason"])}.</p>')
 
 
-def promise(explained: Mapping) -> str:
-    if (diagnosis := explained["diagnosis"]) is None:
-        return ""
-    if (guarantee := diagnosis["guarantee"]) is None:
+def promise(guarantee: Guaranteed | None) -> str:
+    if guarantee is None:
         return section("What is guaranteed", "<p>Nothing: a fast explanation, or a model without a guarantee.</p>")
     chips = "".join(
-        f'<li class="{"in" if state in guarantee["states"] else "out"}">{escape(IN_WORDS.get(state, state))}</li>'
+        f'<li class="{"in" if state in guarantee.states else "out"}">{escape(IN_WORDS.get(state, state))}</li>'
         for state in STATES
     )
     counted = (
-        f"It was calibrated on {guarantee['families']} families of shapes that the classifier had not learned, and "
+        f"It was calibrated on {guarantee.families} families of shapes that the classifier had not learned, and "
         "holds for objects that are to those of the training as these are to one another."
-        if guarantee["families"]
+        if guarantee.families
         else "It was calibrated on single registrations of objects that the classifier had not learned."
     )
     risks = {
-        GOOD: f"At most {guarantee['missed']:.0%} of all failures are called good.",
-        ALARM: f"At most {guarantee['false_alarms']:.0%} of all good registrations are called failed.",
+        GOOD: f"At most {guarantee.missed:.0%} of all failures are called good.",
+        ALARM: f"At most {guarantee.false_alarms:.0%} of all good registrations are called failed.",
     }
-    risk = risks.get(guarantee["call"], "Neither “good” nor “failed” would keep its promise here.")
-    call = f'<span class="call {CALLS.get(guarantee["call"], "doubt")}">{escape(guarantee["call"])}</span>'
+    risk = risks.get(guarantee.call, "Neither “good” nor “failed” would keep its promise here.")
+    call = f'<span class="call {CALLS.get(guarantee.call, "doubt")}">{escape(guarantee.call)}</span>'
     return section(
         "What is guaranteed",
         f'<ul class="chips" aria-label="Set of states">{chips}</ul>'
-        f"<p>The true state is one of those marked: {guarantee['level']:.0%} of such sets hold it. {counted}</p>"
+        f"<p>The true state is one of those marked: {guarantee.level:.0%} of such sets hold it. {counted}</p>"
         f"<p>Failure alarm: {call}. {risk}</p>",
     )
 
 
-def causes(explained: Mapping) -> str:
-    if (diagnosis := explained["diagnosis"]) is None:
-        return ""
-    effects = diagnosis["reenacted"]["effects"]
+def causes(diagnosis: Diagnosis, unit: str) -> str:
     bars = (
-        bar(cause, share, diagnosis["variances"][cause], length(effects[cause], explained["unit"]))
-        for cause, share in diagnosis["causes"].items()
+        bar(cause, share, diagnosis.variances[cause], length(diagnosis.reenacted.effects[cause], unit))
+        for cause, share in diagnosis.causes.items()
     )
     note = (
         "Probability that each is a cause, if the registration failed, ± the standard deviation of the posterior; "

@@ -117,13 +117,6 @@ def flat(T: np.ndarray) -> list[float]:
     return [float(f"{value:.7g}") for value in T.ravel()]
 
 
-def distances(points: np.ndarray, target: np.ndarray) -> np.ndarray:
-    """Return the distance (N,) from each point (N, 3) to its nearest neighbor in the target (M, 3)."""
-    from scipy.spatial import cKDTree
-
-    return cKDTree(target).query(points)[0]
-
-
 def taken_out(subset: int, without: Mapping[str, str] = WITHOUT) -> str:
     """Describe a subset of the causes by the causes that it leaves out."""
     gone = [without[name] for cause, name in enumerate(CONCEPTS) if cause not in SUBSETS[subset]]

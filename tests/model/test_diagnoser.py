@@ -36,7 +36,7 @@ def cloud():
 
 
 def test_what_is_read_is_what_the_reenactment_says(diagnoser, cloud):
-    features, said = diagnoser.measured(cloud, cloud[::2], np.eye(4))
+    features, said, _ = diagnoser.measured(cloud, cloud[::2], np.eye(4))
     assert features.shape == (FEATURE_COUNT,)
     assert said.error == pytest.approx(np.exp(features[FEATURES.index("mean_error_7")]))
     assert said.noise == features[FEATURES.index("first_noise")]
@@ -44,8 +44,8 @@ def test_what_is_read_is_what_the_reenactment_says(diagnoser, cloud):
 
 
 def test_the_same_clouds_give_the_same_diagnosis_also_after_the_way_to_a_file(diagnoser, cloud):
-    first = diagnoser.diagnose(cloud, cloud[::2], np.eye(4))
-    again = Diagnoser.from_state(diagnoser.state()).diagnose(cloud, cloud[::2], np.eye(4))
+    first, _ = diagnoser.diagnose(cloud, cloud[::2], np.eye(4))
+    again, _ = Diagnoser.from_state(diagnoser.state()).diagnose(cloud, cloud[::2], np.eye(4))
     assert json.dumps(first.as_dict()) == json.dumps(again.as_dict())
     assert 0 <= first.failure <= 1
     assert set(first.causes) == set(first.variances) == {"noise", "pose", "overlap"}
@@ -58,7 +58,7 @@ def test_a_quick_diagnosis_reenacts_less_and_promises_nothing(diagnoser, cloud):
     quick = large.quick()
     assert (quick.points, quick.reenactment.hypotheses) == (384, 2)
     assert diagnoser.quick().points == diagnoser.points < 384
-    said = quick.diagnose(cloud, cloud[::2], np.eye(4))
+    said, _ = quick.diagnose(cloud, cloud[::2], np.eye(4))
     assert said.guarantee is None
     assert 1 <= len(said.reenacted.poses) <= 2
 
