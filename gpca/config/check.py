@@ -7,7 +7,7 @@ from functools import partial
 from typing import Any
 
 from gpca.causes.settings import CauseSettings
-from gpca.config.layers import check_left_out, in_order, names_left_out, with_defaults, with_types, without_false
+from gpca.config import layers
 from gpca.config.schema import whole_config
 from gpca.declarations.experiment import LeftOut
 from gpca.declarations.registry import experiments
@@ -32,9 +32,9 @@ def read(config: dict, command_line: Mapping, as_module: bool = False) -> tuple[
     gives to this one as a module lacks the defaults. Returned are the config in the order of the defaults, without what
     it leaves out, with the limit of success in all sections, and the sources that :func:`check` returns.
     """
-    whole = in_order(with_types(with_defaults(config) if as_module else config, command_line))
+    whole = layers.in_order(layers.with_types(layers.with_defaults(config) if as_module else config, command_line))
     sources = check(whole)
-    return with_success(without_false(whole)), sources
+    return with_success(layers.without_false(whole)), sources
 
 
 def check(config: dict) -> dict[str, dict]:
@@ -44,11 +44,11 @@ def check(config: dict) -> dict[str, dict]:
     """
     require_plain(config, "config key")
     with_key("plugins", use, config.get("plugins") or [])
-    whole = without_false(config)
+    whole = layers.without_false(config)
     read_settings(whole_config(), whole, "config key")
     whole = with_success(whole)
-    check_left_out(config)
-    left_out = partial(names_left_out, config)
+    layers.check_left_out(config)
+    left_out = partial(layers.names_left_out, config)
     if whole["run"].lower() in RESERVED:
         raise InputError("config key run", f"results/{whole['run']} is reserved", "choose another name")
     if whole["data_dir"] is not None:
@@ -59,6 +59,7 @@ def check(config: dict) -> dict[str, dict]:
         raise InputError("config key downloads", f"{existing} is not a folder", "name a folder; it need not exist")
     _check_registrations(whole)
     _check_names(whole, left_out)
+    layers.check_listed(whole, left_out)
     for experiment in experiments():
         experiment.check(whole, left_out)
     return {

@@ -5,7 +5,7 @@ A merged config can add to mappings but take nothing away, hence the ``false``.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from copy import deepcopy
 from dataclasses import fields
 from functools import cache, partial, reduce
@@ -140,6 +140,13 @@ def check_left_out(config: Mapping[str, Any]) -> None:
     for key, names in {**OPTIONAL, **SWITCHES}.items():
         if names.known:
             require_names(key, sorted(names_left_out(config, key)), names.known(), names.noun)
+
+
+def check_listed(config: Mapping[str, Any], left_out: Callable[[str], set[str]]) -> None:
+    """Raise an InputError for a name in a list that the mapping to choose from does not have."""
+    for key, of in LISTED.items():
+        if isinstance(of, str):
+            require_names(key, _at(config, key) or (), _at(config, of), OPTIONAL[of].noun, left_out(of))
 
 
 def names_left_out(config: Mapping[str, Any], key: str) -> set[str]:

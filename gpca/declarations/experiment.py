@@ -86,8 +86,8 @@ class Experiment:
         check: refuses, with an InputError, sections that their types allow and that no run can use.
         optional_entries: keys of mappings of which any entry may be false -> names that they have.
         switches: keys of mappings name -> true or false, which are read as the list of the names that are true.
-        lists: keys of lists and mappings -> the names that they lose where the config leaves out others: those left
-            out of the mapping at a key, or what a function returns.
+        lists: keys of lists and mappings -> the key of the mapping that has their names, of which they lose those that
+            the config leaves out; or a function that returns the names that they lose.
         notices: lines on stderr when a run with this config begins.
     """
 

@@ -8,11 +8,11 @@ from math import inf
 from typing import Any
 
 from gpca.attribution.predictions import read_predictions
-from gpca.declarations.experiment import Experiment, LeftOut
+from gpca.declarations.experiment import Experiment
 from gpca.declarations.plan import Run
 from gpca.declarations.result import Figure, Frame, Paths, figure, numbers, table
 from gpca.declarations.step import Step
-from gpca.errors import InputError, require_names
+from gpca.errors import InputError
 from gpca.evaluation.intervals import Clustered
 from gpca.evaluation.measures import ALL, intervals, source_method_seed, tidy
 from gpca.io.csv_file import numbers as number_column
@@ -35,12 +35,6 @@ class Section(KernelGrid):
     sources: Distinct[str]
 
 
-def check(config: dict, left_out: LeftOut) -> None:
-    """Check the names of the sources."""
-    sources = config["kernel_grid"]["sources"]
-    require_names("kernel_grid.sources", sources, config["sources"], "source", left_out("sources"))
-
-
 def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
     """The sources, and the kernels of the printed rows that are fitted."""
     grid = config["kernel_grid"]
@@ -56,7 +50,6 @@ EXPERIMENT = Experiment(
     name="kernel_grid",
     sections={"kernel_grid": Section},
     names=names,
-    check=check,
     lists={"kernel_grid.sources": "sources"},
 )
 

@@ -11,7 +11,7 @@ from gpca.declarations.experiment import Experiment, LeftOut
 from gpca.declarations.plan import Run
 from gpca.declarations.result import Frame, Paths, figure, numbers
 from gpca.declarations.step import Step
-from gpca.errors import InputError, require_names
+from gpca.errors import InputError
 from gpca.evaluation.measures import source_method_seed, tidy
 from gpca.io.csv_file import read_numbers
 from gpca.settings import Distinct, read_settings
@@ -28,9 +28,8 @@ class Section(CurveSettings):
     sources: Distinct[str]
 
 
-def check(config: dict, left_out: LeftOut) -> None:
+def check(config: dict, _left_out: LeftOut) -> None:
     section = config[NAME]
-    require_names("learning_curve.sources", section["sources"], config["sources"], "source", left_out("sources"))
     pool = labeled_samples(config["causes"]) + section["further"]
     if max(section["sizes"]) > pool:
         fault = f"{max(section['sizes'])} is more than the {pool} labeled samples that there are"

@@ -107,7 +107,6 @@ class RealWorldSettings:
 def check(config: dict, left_out: LeftOut) -> None:
     """Check that the names in the section exist, without reading data."""
     section, encoders_left_out = config["real_world"], left_out("encoders")
-    require_names("real_world.backbones", section["backbones"], config["encoders"], "encoder", encoders_left_out)
     if REAL_WORLD in config["sources"]:
         fault = "is reserved for the frames of real_world"
         raise InputError(f"config key sources.{REAL_WORLD}", fault, "choose another name")
@@ -141,7 +140,6 @@ def _check_training(config: dict) -> None:
         if section["virtual"] and not section[needed]:
             fault = f"needs real_world.{needed}: {why}"
             raise InputError("config key real_world.virtual", fault, f"set {needed}, or virtual to null")
-    require_names("real_world.training", list(section["training"] or {}), encoders, "encoder", set())
     shown = (*section["backbones"], *section["published"].values())
     for name in shown:
         changes = {"pretraining": pretraining_of(section, name), "training": (section["training"] or {}).get(name, {})}
@@ -202,5 +200,7 @@ EXPERIMENT = Experiment(
     check=check,
     optional_entries={"real_world.datasets": Names("dataset"), "real_world.explainers": EXPLAINERS},
     lists={f"real_world.{name}": "encoders" for name in ("backbones", "condition_backbones", "published", "training")}
-    | {f"real_world.{name}": "reductions" for name in ("reductions", "condition_reductions")},
+    | {  # among these may be "none"
+        f"real_world.{name}": lambda left_out: left_out("reductions") for name in ("reductions", "condition_reductions")
+    },
 )

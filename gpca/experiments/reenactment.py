@@ -8,11 +8,10 @@ from typing import Any
 
 from gpca.causes.judged import read_judged
 from gpca.causes.settings import CauseSettings
-from gpca.declarations.experiment import Experiment, LeftOut
+from gpca.declarations.experiment import Experiment
 from gpca.declarations.plan import Run
 from gpca.declarations.result import Frame, Paths, figure, numbers, table
 from gpca.declarations.step import Step
-from gpca.errors import require_names
 from gpca.evaluation.intervals import REPEATS
 from gpca.evaluation.measures import POOLED
 from gpca.experiments.cause_figures import draw_reenactment
@@ -38,11 +37,6 @@ class Section:
     seeds: Count
 
 
-def check(config: dict, left_out: LeftOut) -> None:
-    chosen = config["oracles"]["sources"]
-    require_names("oracles.sources", chosen, config["sources"], "source", left_out("sources"))
-
-
 EXPERIMENT = Experiment(
     name="reenactment",
     sections={"oracles": Section},
@@ -51,7 +45,6 @@ EXPERIMENT = Experiment(
         "oracle_source": list(config["oracles"]["sources"]),
         "oracle_seed": list(config["seeds"])[: config["oracles"]["seeds"]],
     },
-    check=check,
     lists={"oracles.sources": "sources"},
 )
 ORACLES = Step(

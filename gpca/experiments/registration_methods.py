@@ -49,16 +49,12 @@ DRAWN = {
 }
 
 
-def check(config: dict, names_left_out: LeftOut) -> None:
+def check(config: dict, left_out: LeftOut) -> None:
     """Check that every method takes its settings, and that the global start is one that runs here."""
     for name, settings in config["methods"].items():
         with_key(f"methods.{name}", registry.require_settings, name, settings or {})
-    pairs, gone = config["method_pairs"], names_left_out("methods")
-    for part in ("points_of", "neighbors_of"):
-        named = list(pairs.get(part) or {})
-        require_names(f"method_pairs.{part}", named, config["methods"], "registration method", gone)
-    key, start = "method_pairs.global_start", pairs["global_start"]
-    require_names(key, [start], config["methods"], "registration method", gone)
+    key, start = "method_pairs.global_start", config["method_pairs"]["global_start"]
+    require_names(key, [start], config["methods"], "registration method", left_out("methods"))
     with_key(key, registry.require_global, start)
     if package := registry.left_out([start]).get(start):
         fault = f"'{start}' needs the package {package}, which is not installed"

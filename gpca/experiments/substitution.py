@@ -14,7 +14,7 @@ from gpca.declarations.experiment import EXPLAINERS, ByName, Experiment, LeftOut
 from gpca.declarations.plan import Run
 from gpca.declarations.result import Frame, Paths, numbers, table
 from gpca.declarations.step import Plan, Step, Wildcards
-from gpca.errors import require_names, with_key
+from gpca.errors import with_key
 from gpca.evaluation.intervals import Clustered
 from gpca.evaluation.measures import ALL, POOLED, Measure, Parts, over_seeds, per_seed, read_samples
 from gpca.experiments.explained import explainer_settings, require_explained
@@ -39,9 +39,7 @@ class Section(ExchangeSettings):
     explainers: ByName
 
 
-def check(config: dict, names_left_out: LeftOut) -> None:
-    for key, noun in {"sources": "source", "methods": "registration method", "estimators": "estimator"}.items():
-        require_names(f"exchange.{key}", config["exchange"][key], config[key], noun, names_left_out(key))
+def check(config: dict, _left_out: LeftOut) -> None:
     for key, name in require_explained(config, "exchange.explainers"):
         with_key(key, require_exchangeable, name)
 

@@ -48,7 +48,7 @@ def test_they_have_the_published_sizes():
     ("key", "value", "message"),
     [
         ("real_world.published", {"dgcnn": "dgcnn2"}, "real_world.published: no encoder 'dgcnn2'; choose one of dgcnn"),
-        ("real_world.published", {"pointnet3": "dgcnn_1024"}, "real_world.published: no backbone 'pointnet3'"),
+        ("real_world.published", {"pointnet3": "dgcnn_1024"}, "real_world.published: no encoder 'pointnet3'"),
         ("real_world.published", {"dgcnn": "pointnet"}, "real_world.published: 'pointnet' has rows already"),
         (
             "real_world.published",
