@@ -1,4 +1,4 @@
-"""Rivals of GP-CA that read the embedding of the aligned source alone, as it does in the paper.
+"""Rivals of GP-CA that read the embedding of the aligned source alone, as it does in the paper; GP-CA by other code.
 
 The same explainers name causes, with "nominal" as a further class.
 """
@@ -9,10 +9,11 @@ from functools import partial
 
 import numpy as np
 
-from gpca.causes.dataset import LABELS
+from gpca.classifier.settings import GPCArguments
 from gpca.errors import InputError
 from gpca.explainers.classifiers import known_concepts
-from gpca.explainers.interface import ExplainerEntry, ScoringExplainer, attached
+from gpca.explainers.gpca import GPCA
+from gpca.explainers.interface import DrawingExplainer, ExplainerEntry, ScoringExplainer, attached, of_causes
 from gpca.pairs.dataset import Registrations
 from gpca.settings import Positive
 
@@ -68,24 +69,30 @@ class SoftmaxHead(ScoringExplainer):
         return softmax(attached(registrations, "head_logits"), axis=1)
 
 
-class CauseVectors(ConceptVectors):
-    """A concept activation vector for each label against the others."""
+class GpytorchGPCA(DrawingExplainer):
+    """GP-CA in gpytorch's own classes, a check: it agrees with ``gpca_paper`` within rounding."""
 
-    labels = LABELS
+    def __init__(self, source: str, seed: int, **settings: GPCArguments) -> None:
+        from gpca.classifier.gpytorch_classes import GpytorchGPC
+        from gpca.classifier.settings import GPCSettings
 
+        self._gpc = GpytorchGPC(self.labels, GPCSettings(**settings), source, seed)
 
-class CauseHead(SoftmaxHead):
-    """The head of an encoder that was trained on the causes."""
+    def fit(self, registrations: Registrations) -> None:
+        self._gpc.fit(registrations.embedding, registrations.concept)
 
-    labels = LABELS
+    def summary(self, registrations: Registrations) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        return self._gpc.attribute(registrations.embedding)
 
 
 _entry = partial(ExplainerEntry, sees=("source",), reads="embeddings")
 EXPLAINERS = {
     "concept_vectors": _entry("Concept activation vectors", ConceptVectors),
     "softmax_head": _entry("Softmax head", SoftmaxHead),
+    "gpca_gpytorch": _entry("GP-CA (gpytorch's classes)", GpytorchGPCA),
 }
 CAUSE_EXPLAINERS = {
-    "softmax_head": _entry("Softmax head (aligned source)", CauseHead),
-    "concept_vectors": _entry("Concept activation vectors", CauseVectors),
+    "softmax_head": _entry("Softmax head (aligned source)", of_causes(SoftmaxHead)),
+    "concept_vectors": _entry("Concept activation vectors", of_causes(ConceptVectors)),
+    "gpca": _entry("GP-CA (aligned source)", of_causes(GPCA)),
 }

@@ -12,7 +12,7 @@ import numpy as np
 
 from baselines.gates import GATES, NominalThreshold, motion_alarm
 from gpca.causes.dataset import LABELS
-from gpca.explainers.interface import ExplainerEntry, ScoringExplainer
+from gpca.explainers.interface import ExplainerEntry, ScoringExplainer, of_causes
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS, HalfTurn
 from gpca.seeds import generator
@@ -63,18 +63,6 @@ class ThresholdRule(ScoringExplainer):
         return (name_N[:, None] == np.array(CONCEPTS)).astype(float)
 
 
-class CauseChance(Chance):
-    """Chance over nominal, noise, pose and overlap."""
-
-    labels = LABELS
-
-
-class CauseMostFrequent(MostFrequent):
-    """The most frequent of nominal, noise, pose and overlap."""
-
-    labels = LABELS
-
-
 class CauseRule(ThresholdRule):
     """The rule, with "nominal" by the one of three gates (:mod:`baselines.gates`) that is best in training."""
 
@@ -98,8 +86,8 @@ EXPLAINERS = {
     "rule": ExplainerEntry("Rule of three lines", ThresholdRule, ("pair", "motion")),
 }
 CAUSE_EXPLAINERS = {
-    "chance": ExplainerEntry("Chance", CauseChance, ()),
-    "most_frequent": ExplainerEntry("Most frequent label", CauseMostFrequent, ()),
+    "chance": ExplainerEntry("Chance", of_causes(Chance), ()),
+    "most_frequent": ExplainerEntry("Most frequent label", of_causes(MostFrequent), ()),
     "rule": ExplainerEntry(
         "Rule, nominal by the best gate", CauseRule, ("pair", "motion", "runs"), reads="descriptors"
     ),

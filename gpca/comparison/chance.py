@@ -82,7 +82,7 @@ def chance(comparison: pd.DataFrame, tolerances: Mapping[str, Tolerance]) -> dic
 
 def is_close(number: Number, value: float, at_least: bool, tolerance: Tolerance) -> bool:
     """Return whether a value, in the number's unit, lies within the close tolerance; a lower bound never does."""
-    return not at_least and abs(verdicts.distance(verdicts.exactly(number), value, tolerance)) <= 1
+    return not at_least and abs(verdicts.distance(number, value, tolerance)) <= 1
 
 
 def weights(numbers: Sequence[Number]) -> np.ndarray:

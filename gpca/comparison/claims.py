@@ -23,7 +23,7 @@ from gpca.attribution.predictions import concepts_of, read_predictions
 from gpca.comparison.published import UNITS, Counterpart
 from gpca.comparison.values import RUNTIME, ShareDraws, runtime_mean, values_by_seed
 from gpca.comparison.verdicts import INCONCLUSIVE, NOT_COMPARABLE, NOT_RUN
-from gpca.evaluation.intervals import NO_WIDTH, mean_interval
+from gpca.evaluation.intervals import NO_WIDTH, mean_interval, student_factor
 from gpca.evaluation.measures import ALL, TIDY_COLUMNS, source_method_seed
 from gpca.io.csv_file import read_numbers
 from gpca.io.structured_text import load_own_yaml
@@ -136,12 +136,11 @@ def judge(
     results = {**results, PREDICTIONS: score_measures(claims, prediction_files)}
     records = []
     for claim in claims:
-        fields = {name: getattr(claim, name) for name in ("sentence", "place", "note", "margin_set", "values_known")}
-        fields["claim"] = claim.name
+        fields = {"claim": claim.name, **vars(claim)}
         if not claim.compared:
-            records.append({**fields, "verdict": NOT_RUN, "claim_verdict": NOT_RUN})
+            of_comparison = dict.fromkeys(("test", "unit", "margin", "ratio"))
+            records.append(fields | of_comparison | {"verdict": NOT_RUN, "claim_verdict": NOT_RUN})
             continue
-        fields |= {name: getattr(claim, name) for name in ("test", "unit", "margin", "ratio")}
         rows, strict_verdicts = [], []
         strict = 1 - (1 - LEVEL) / len(claim.compared)
         for compared in claim.compared:
@@ -161,7 +160,10 @@ def judge(
                 elif difference.at_floor:
                     verdict = strict_verdict = INCONCLUSIVE
                 else:
-                    verdict, strict_verdict = (_verdict(claim, difference, level) for level in (LEVEL, strict))
+                    censored = difference.at_least, difference.at_most
+                    verdict, strict_verdict = (
+                        verdict_of_interval(claim, *difference.bounds[level], *censored) for level in (LEVEL, strict)
+                    )
             rows.append(fields | row | {"verdict": verdict})
             strict_verdicts.append(strict_verdict)
         verdicts = {row["verdict"] for row in rows}
@@ -186,36 +188,28 @@ def _name(value: Counterpart | float, compared: Compared) -> str:
     return "+".join(value.methods)
 
 
-def _verdict(claim: Claim, difference: ClaimDifference, level: float) -> str:
-    """Return the verdict by an interval; a censored difference leaves one of the answers open."""
-    may_rise, may_fall = difference.at_least, difference.at_most
-    if claim.test == "less":
-        may_rise, may_fall = may_fall, may_rise
-    is_open = {
-        SUPPORTED: may_fall or (may_rise and claim.test == "equivalent"),
-        SMALLER: may_rise or may_fall,
-        REFUTED: may_rise,
-    }
-    verdict = verdict_of_interval(claim, *difference.bounds[level])
-    return INCONCLUSIVE if is_open.get(verdict) else verdict
+def verdict_of_interval(claim: Claim, low: float, high: float, may_rise: bool = False, may_fall: bool = False) -> str:
+    """Return whether a difference, of logarithms with `ratio`, with these bounds supports or refutes the claim.
 
-
-def verdict_of_interval(claim: Claim, low: float, high: float) -> str:
-    """Return whether a difference, of logarithms with `ratio`, with these bounds supports or refutes the claim."""
+    A censored difference, which may rise or fall, leaves one of the answers open.
+    """
     margin = math.log(claim.margin) if claim.ratio else claim.margin
     if claim.test == "less":
-        low, high = -high, -low
+        low, high, may_rise, may_fall = -high, -low, may_fall, may_rise
     if math.isnan(low) or math.isnan(high):
         return INCONCLUSIVE
     if claim.test in ("greater", "less"):
         supported, refuted = low > 0 and high >= margin, high < 0
         if 0 <= high < margin:
-            return SMALLER
+            return INCONCLUSIVE if may_rise or may_fall else SMALLER
     elif claim.test == "not_worse":
         supported, refuted = low > -margin, high < -margin
     else:
         supported, refuted = -margin < low and high < margin, low > margin or high < -margin
-    return SUPPORTED if supported else REFUTED if refuted else INCONCLUSIVE
+        may_fall |= may_rise
+    if supported:
+        return INCONCLUSIVE if may_fall else SUPPORTED
+    return REFUTED if refuted and not may_rise else INCONCLUSIVE
 
 
 def difference_of(
@@ -283,8 +277,6 @@ def _runtime_difference(
     claim: Claim, compared: Compared, rows: pd.DataFrame, levels: Iterable[float]
 ) -> ClaimDifference | None:
     """Compare mean seconds of independent measurements; logarithms by the delta method."""
-    from scipy.stats import t as student_t
-
     means = [mean for counterpart in compared.counterparts if (mean := runtime_mean(rows, counterpart)) is not None]
     if len(means) < 2:
         return None
@@ -295,7 +287,7 @@ def _runtime_difference(
     else:
         factor = UNITS[claim.unit].factor
         value, error = factor * (one - other), factor * math.hypot(error, other_error)
-    widths = {level: student_t.ppf((1 + level) / 2, n - 1) * error if n > 1 else math.nan for level in levels}
+    widths = {level: student_factor(n, level) * error for level in levels}
     return ClaimDifference(value, {level: (value - width, value + width) for level, width in widths.items()}, n)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from gpca.comparison.published import Number
 from gpca.comparison.values import value_of_run
-from gpca.comparison.verdicts import NOT_COMPARABLE, NOT_REPRODUCED, Tolerance, distance, exactly
+from gpca.comparison.verdicts import NOT_COMPARABLE, NOT_REPRODUCED, Tolerance, distance
 from gpca.io import csv_file
 from gpca.io.csv_file import read_csv
 
@@ -37,22 +38,21 @@ def judge_readings(
     import pandas as pd
 
     judged = comparison.set_index(NUMBER)[["reproduced", "verdict"]]
-    parts = dict(iter(readings.groupby("table", sort=False)))
-    named = ["source", "method", "concept"]
-    holds = {name: set(rows[named].itertuples(index=False, name=None)) for name, rows in parts.items()}
+    places: dict[tuple, dict[str, pd.DataFrame]] = defaultdict(dict)  # source, method and concept -> table -> rows
+    for (name, *place), rows in readings.groupby(["table", "source", "method", "concept"], sort=False):
+        places[tuple(place)][name] = rows
     records = []
     for number in numbers:
-        if (counterpart := number.counterpart) is None or len(counterpart.sources) > 1:
+        if (counterpart := number.counterpart) is None:
             continue
-        wanted = (*counterpart.sources, *counterpart.methods, counterpart.concept)
         shared = (*number.key, number.unit, number.value, number.upper, *judged.loc[number.key])
-        for name in (name for name in parts if wanted in holds[name]):
+        for name, rows in places.get((*counterpart.sources, *counterpart.methods, counterpart.concept), {}).items():
             there = replace(number, counterpart=replace(counterpart, file=READINGS, table=name))
-            reproduced = value_of_run(there, {READINGS: parts[name]})
+            reproduced = value_of_run(there, {READINGS: rows})
             if reproduced is None:
                 continue
             group, _, reading = name.partition("/")
-            apart = distance(exactly(number), reproduced.value, tolerances[number.unit])
+            apart = distance(number, reproduced.value, tolerances[number.unit])
             close = not reproduced.at_least and abs(apart) <= 1
             measured = (round(reproduced.value, 6), reproduced.at_least, reproduced.n, round(apart, 6), close)
             records.append((*shared, group, reading, *measured))

@@ -13,6 +13,7 @@ from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
+from functools import cache
 from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, NamedTuple
@@ -29,22 +30,22 @@ NOT_COMPARED = (  # made from times, which differ from run to run
     *("comparison.csv", "claims.csv", "tables/claims.csv"),
 )
 TIMES = "*seconds*"
-KINDS = (  # file, metric or column, kind of value; the first that fits
-    ("*", "*rho*", "correlation"),
-    ("*", "rotation_deg", "degrees"),
-    ("*", "spearman_error", "correlation"),
-    *(("*", pattern, "nats") for pattern in ("kl_*", "nne*", "nees*")),
-    *(("tables/table12_*", pattern, "share") for pattern in ("auroc_failed", "lead")),
-    *(("*", pattern, "nats") for pattern in ("*nll*", "*elbo*")),
-    *(("*", f"*{counted}*", "count") for counted in ("labels", "epochs", "samples", "delay", "calls", "parameters")),
-    ("*", "clusters", "count"),
-    *(("*", pattern, "count") for pattern in ("predicted_as_*", "first_*", "*_wrong")),
-    *(("*recovery.csv", counted, "count") for counted in ("episodes", "tries", "acted_first", "actions", "nominal")),
-    ("*recovery.csv", "failures_at_*", "count"),
-    *(("tables/table5_*", pattern, "share") for pattern in ("*aurc", "augrc", "brier")),
-    *(("tables/*", pattern, "share") for pattern in ("ece*", "nominal_calibration")),
-    ("tables/*", "*", "percent"),
-    ("*", "*", "share"),
+_COUNTS = "*labels* *epochs* *samples* *delay* *calls* *parameters* clusters predicted_as_* first_* *_wrong"
+KINDS = tuple(  # file, metric or column, kind of value; the first that fits
+    (file, pattern, kind)
+    for file, patterns, kind in (
+        ("*", "*rho* spearman_error", "correlation"),
+        ("*", "rotation_deg", "degrees"),
+        ("*", "kl_* nne* nees* *nll* *elbo*", "nats"),
+        ("tables/table12_*", "auroc_failed lead", "share"),
+        ("*", _COUNTS, "count"),
+        ("*recovery.csv", "episodes tries acted_first actions nominal failures_at_*", "count"),
+        ("tables/table5_*", "*aurc augrc brier", "share"),
+        ("tables/*", "ece* nominal_calibration", "share"),
+        ("tables/*", "*", "percent"),
+        ("*", "*", "share"),
+    )
+    for pattern in patterns.split()
 )
 SAMPLE_COUNTS = ("test_samples", "episodes")  # metrics that count the samples of the other metrics' shares
 SHARES_OF_RUNS = ("reached", "recognised")  # of the seeds' runs, not of the test samples
@@ -187,6 +188,7 @@ def read_means(path: Path, samples_of_source: Mapping[str, int] = MappingProxyTy
     return {key: mean for key, mean in means.items() if not fnmatchcase(mean.quantity, TIMES)}
 
 
+@cache
 def kind_of(file: str, quantity: str) -> str:
     """Return the kind of a quantity in a file."""
     return next(kind for files, names, kind in KINDS if fnmatchcase(file, files) and fnmatchcase(quantity, names))

@@ -21,7 +21,7 @@ from gpca.active_learning.curves import CENSORED_BY
 from gpca.attribution.metrics import PREDICTED_AS
 from gpca.attribution.predictions import read_predictions
 from gpca.comparison.published import UNITS, Counterpart, Number
-from gpca.evaluation.intervals import LEVEL, Clustered, interval, mean_interval, weighted_mean
+from gpca.evaluation.intervals import LEVEL, Clustered, interval, mean_interval, student_factor, weighted_mean
 from gpca.evaluation.measures import ALL, read_metrics, source_method_seed
 from gpca.evaluation.runtime_file import read_runtime
 
@@ -74,8 +74,6 @@ def value_of_run(
 
     `results` are as :func:`read_results` reads them, `clusters` of :func:`cluster_draws`.
     """
-    from scipy.stats import t as student_t
-
     counterpart = number.counterpart
     if counterpart is None or counterpart.file not in results:
         return None
@@ -83,7 +81,7 @@ def value_of_run(
         if (timed := runtime_mean(results[RUNTIME], counterpart)) is None:
             return None
         mean, error, n = timed
-        half_width = float(student_t.ppf(0.975, n - 1) * error) if n > 1 else math.nan
+        half_width = student_factor(n) * error
         reproduced = Reproduced(mean, mean - half_width, mean + half_width, n)
     else:
         by_seed, at_least = values_by_seed(results[counterpart.file], counterpart)

@@ -11,13 +11,14 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from gpca.comparison.published import TIMES, Counterpart, Number, Reason, reason_of
 from gpca.comparison.values import RUNTIME, Reproduced, ShareDraws, deviation_interval, value_of_run
 from gpca.errors import InputError
+from gpca.evaluation.intervals import student_factor
 from gpca.objects.entry import STAND_IN, title_of
 from gpca.settings import NotNegative
 
@@ -62,8 +63,7 @@ class Tolerance:
         return math.log(value) if value > 0 else value if math.isnan(value) else -math.inf
 
 
-@dataclass(frozen=True)
-class Printed:
+class Printed(NamedTuple):
     """A printed number, or the range from `value` to `upper`."""
 
     value: float
@@ -71,17 +71,6 @@ class Printed:
     rounding: float  # half of its last digit
     low: float  # of its 95 % interval, up to `high`; `value` and `upper` where its sampling error is unknown
     high: float
-
-    def difference(self, value: float, tolerance: Tolerance) -> float:
-        """Return a value minus the nearest number that is printed alike, both scaled; 0 within the rounding."""
-        least, most = (tolerance.scale(x) for x in (self.value - self.rounding, self.upper + self.rounding))
-        scaled = tolerance.scale(value)
-        return _minus(scaled, min(max(scaled, least), most))
-
-
-def exactly(number: Number) -> Printed:
-    """Return the number without sampling error."""
-    return Printed(number.value, number.upper, number.rounding, number.value, number.upper)
 
 
 def printed_of(number: Number, deviation: Number | None = None) -> Printed:
@@ -93,9 +82,7 @@ def printed_of(number: Number, deviation: Number | None = None) -> Printed:
     if number.counterpart and number.counterpart.statistic == "deviation" and number.paper_n > 1:
         low, high = deviation_interval(number.value, number.paper_n)
     elif deviation and deviation.paper_n > 1:
-        from scipy.stats import t as student_t
-
-        half_width = student_t.ppf(0.975, deviation.paper_n - 1) * deviation.value / math.sqrt(deviation.paper_n)
+        half_width = student_factor(deviation.paper_n) * deviation.value / math.sqrt(deviation.paper_n)
         low, high = number.value - half_width, number.upper + half_width
     elif number.unit == "%" and number.paper_n:
         from scipy.stats import binomtest
@@ -119,7 +106,7 @@ def verdict_of(printed: Printed, reproduced: Reproduced, tolerance: Tolerance) -
     """
     scale = tolerance.scale
     near, far = scale(tolerance.reproduced), scale(tolerance.close)
-    difference = printed.difference(reproduced.value, tolerance)
+    difference = _difference(printed, reproduced.value, tolerance)
     if reproduced.at_least:
         return NOT_REPRODUCED if difference > far else INCONCLUSIVE
     value, (run_low, run_high) = scale(reproduced.value), (scale(bound) for bound in reproduced.interval())
@@ -133,9 +120,16 @@ def verdict_of(printed: Printed, reproduced: Reproduced, tolerance: Tolerance) -
     return CLOSE if abs(difference) <= far else NOT_REPRODUCED
 
 
-def distance(printed: Printed, value: float, tolerance: Tolerance) -> float:
+def _difference(printed: Printed | Number, value: float, tolerance: Tolerance) -> float:
+    """Return a value minus the nearest number that is printed alike, both scaled; 0 within the rounding."""
+    least, most = (tolerance.scale(x) for x in (printed.value - printed.rounding, printed.upper + printed.rounding))
+    scaled = tolerance.scale(value)
+    return _minus(scaled, min(max(scaled, least), most))
+
+
+def distance(number: Number, value: float, tolerance: Tolerance) -> float:
     """Return a value's distance from the printed number, in units of the close tolerance; 0 within its rounding."""
-    return printed.difference(value, tolerance) / tolerance.scale(tolerance.close)
+    return _difference(number, value, tolerance) / tolerance.scale(tolerance.close)
 
 
 def compare(

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
+from functools import cache
 from math import sqrt
 from statistics import NormalDist
 from typing import NamedTuple
@@ -108,13 +109,19 @@ def wilson_interval(successes: float, trials: int, level: float = LEVEL) -> tupl
     return max(0.0, low), min(1.0, high)
 
 
+@cache
+def student_factor(repeats: int, level: float = LEVEL) -> float:
+    """Half of Student's interval of a mean, in standard errors; NaN for one repeat."""
+    from scipy.stats import t as student_t
+
+    return float(student_t.ppf((1 + level) / 2, repeats - 1))
+
+
 def mean_interval(values_R: Iterable[float], level: float = LEVEL) -> Estimate:
     """Mean of R repeats and the bounds of its Student t-interval, mean ± t_{R-1} s / √R, not clipped.
 
     One repeat has NaN bounds; a NaN repeat makes all three NaN; none raises ValueError.
     """
-    from scipy.stats import t as student_t
-
     values_R = np.asarray(list(values_R), dtype=float)
     if values_R.size == 0:
         raise ValueError("interval of no repeats")
@@ -122,7 +129,7 @@ def mean_interval(values_R: Iterable[float], level: float = LEVEL) -> Estimate:
     if values_R.size == 1:
         return Estimate(mean, np.nan, np.nan)
     standard_error = values_R.std(ddof=1) / np.sqrt(values_R.size)
-    half_width = float(student_t.ppf((1 + level) / 2, values_R.size - 1) * standard_error)
+    half_width = float(student_factor(values_R.size, level) * standard_error)
     return Estimate(mean, mean - half_width, mean + half_width)
 
 

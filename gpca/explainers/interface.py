@@ -91,6 +91,13 @@ class ScoringExplainer:
         raise NotImplementedError
 
 
+def of_causes(explainer: type) -> type:
+    """Return the explainer with the labels of causes in place of the concepts."""
+    from gpca.causes.dataset import LABELS
+
+    return type(f"Cause{explainer.__name__}", (explainer,), {"labels": LABELS})
+
+
 class ClassifierExplainer(ScoringExplainer):
     """Scores are the probabilities of an initially unfitted scikit-learn classifier on some features."""
 

@@ -19,7 +19,16 @@ from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS, SEVERITIES
 from gpca.process.progress import progress
 from gpca.seeds import generator, seed_of
-from gpca.uncertainty.interventions import MIDDLE, UNTOUCHED, UPPER, KnobRuns, Knobs, RemedyRuns
+from gpca.uncertainty.interventions import (
+    MIDDLE,
+    UNTOUCHED,
+    UPPER,
+    Clouds,
+    KnobRuns,
+    Knobs,
+    PairDraws,
+    RemedyRuns,
+)
 from gpca.uncertainty.outcomes import Outcomes
 from gpca.uncertainty.settings import CONDITIONS, CORNERS, LATIN, SALTELLI, Remedies, UncertaintySettings
 from gpca.uncertainty.spread import Spread, divergence
@@ -33,15 +42,11 @@ ADDITIVE_KNOBS = (
 )
 
 
-# Source and target of a pair, its initial pose and its reference pose.
-Clouds = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
-
-
 @dataclass(frozen=True)
 class Design:
     """A list of K conditions; `evaluate` returns the outcomes of all for a pair with its starts and random numbers."""
 
-    evaluate: Callable[[RegisteredRow, np.ndarray, UncertaintySettings, np.random.Generator], list[Spread]]
+    evaluate: Callable[[RegisteredRow, PairDraws], list[Spread]]
     conditions: tuple[str, ...]
     reference: int = 0  # number of the clean condition
     splits: tuple[str, ...] = ("test",)  # which rows are evaluated
@@ -79,40 +84,29 @@ class RegisteredRow:
         return Knobs(float(self._severity["noise"]), float(spread), float(self._severity["crop"]))
 
 
-def _turned(
-    knobs: Callable[[], Iterable[Knobs]],
-    pair: RegisteredRow,
-    xi_n_6: np.ndarray,
-    settings: UncertaintySettings,
-    random: np.random.Generator,
-) -> list[Spread]:
+def _turned(knobs: Callable[[], Iterable[Knobs]], pair: RegisteredRow, draws: PairDraws) -> list[Spread]:
     """Turn the knobs on top of the observed pair."""
-    runs = KnobRuns(*pair.observed(settings.icp_points, random), xi_n_6, settings, random)
+    runs = KnobRuns(pair.observed(draws.settings.icp_points, draws.random), draws)
     return [runs(each) for each in knobs()]
 
 
-def _removal(
-    pair: RegisteredRow, xi_n_6: np.ndarray, settings: UncertaintySettings, random: np.random.Generator
-) -> list[Spread]:
-    runs = RemedyRuns(pair.source, pair.target, pair.T_init, pair.T_icp, xi_n_6, settings, random)
+def _removal(pair: RegisteredRow, draws: PairDraws) -> list[Spread]:
+    runs = RemedyRuns((pair.source, pair.target, pair.T_init, pair.T_icp), draws)
     return [runs(Remedies(*switches)) for switches in CORNERS]
 
 
-def _oracle(
-    pair: RegisteredRow, xi_n_6: np.ndarray, settings: UncertaintySettings, random: np.random.Generator
-) -> list[Spread]:
-    runs = KnobRuns(*pair.clean(settings.icp_points), xi_n_6, settings, random)
-    true = pair.true_knobs(settings)
+def _oracle(pair: RegisteredRow, draws: PairDraws) -> list[Spread]:
+    runs, true = KnobRuns(pair.clean(draws.settings.icp_points), draws), pair.true_knobs(draws.settings)
     # Two of the three knobs are at rest, so the eight corners are two settings, and each is run once.
     return [runs(Knobs(*np.where(switches, true, UNTOUCHED))) for switches in CORNERS]
 
 
-def _causal(
-    pair: RegisteredRow, xi_n_6: np.ndarray, settings: UncertaintySettings, random: np.random.Generator
-) -> list[Spread]:
-    n = settings.icp_points
-    pairs = (pair.clean(n, 1), pair.clean(n, 2), pair.observed(n, random))
-    return [KnobRuns(*clouds, xi_n_6, settings, random)(UNTOUCHED) for clouds in pairs]
+def _causal(pair: RegisteredRow, draws: PairDraws) -> list[Spread]:
+    n = draws.settings.icp_points
+    return [
+        KnobRuns(clouds, draws)(UNTOUCHED)
+        for clouds in (pair.clean(n, 1), pair.clean(n, 2), pair.observed(n, draws.random))
+    ]
 
 
 @cache
@@ -164,13 +158,13 @@ def design_rows(registrations: Registrations, design: str, samples: int | None) 
     return np.flatnonzero(chosen)
 
 
-def _random_numbers(
+def draws_of(
     registrations: Registrations, row: int, source: str, seed: int, settings: UncertaintySettings
-) -> tuple[np.ndarray, np.random.Generator]:
-    """Return the twists (n, 6) of a registration's starts, and the generator of all else."""
+) -> PairDraws:
+    """Return what the runs of a registration share; its random numbers are named by source, seed, split and number."""
     axes = (source, seed, "uncertainty", registrations.split[row], registrations.sample[row])
     xi_n_6 = generator(*axes, "starts").normal(size=(settings.starts, 6)) * settings.deviation_6()
-    return xi_n_6, generator(*axes, "clouds")
+    return PairDraws(xi_n_6, settings, generator(*axes, "clouds"))
 
 
 def evaluate_design(
@@ -178,15 +172,13 @@ def evaluate_design(
 ) -> tuple[Outcomes, np.ndarray, np.ndarray]:
     """Run every condition of the design for every registration: the outcomes, seconds (S, K) and those in ICP (S, K).
 
-    The random numbers of a sample are named by source, seed, split and number, not by the design: the observed pair has
-    the same starts in all of them.
+    The random numbers of a sample do not depend on the design: the observed pair has the same starts in all of them.
     """
     entry = DESIGNS[design]
     observed = registrations if entry.oracle else registrations.without_labels()
     rows = []
     for i in progress(range(len(observed)), f"uncertainty ({design}) of {source}, seed {seed}"):
-        xi_n_6, random = _random_numbers(observed, i, source, seed, settings)
-        rows.append(entry.evaluate(RegisteredRow(observed, i), xi_n_6, settings, random))
+        rows.append(entry.evaluate(RegisteredRow(observed, i), draws_of(observed, i, source, seed, settings)))
     columns: dict[str, Any] = {
         field.name: np.array([[getattr(outcome, field.name) for outcome in row] for row in rows])
         for field in fields(Spread)
@@ -208,9 +200,9 @@ class LiveUncertainty:
         self, registrations: Registrations, row: int, source: str, seed: int, settings: UncertaintySettings
     ) -> None:
         self.icp_calls, self._floor = 0, settings.floor
-        xi_n_6, random = _random_numbers(registrations, row, source, seed, settings)
+        draws = draws_of(registrations, row, source, seed, settings)
         pair = RegisteredRow(registrations.without_labels(), row)
-        self._runs = KnobRuns(*pair.observed(settings.icp_points, random), xi_n_6, settings, random)
+        self._runs = KnobRuns(pair.observed(settings.icp_points, draws.random), draws)
         self._clean_6_6 = self._covariance(UNTOUCHED)
 
     def __call__(self, knobs: Knobs) -> float:

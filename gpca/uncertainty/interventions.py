@@ -57,25 +57,27 @@ class KnobbedSource:
         return (self._source + knobs.noise * self._jitter)[kept]
 
 
+# Source (N, 3) and target (Q, 3) of a pair, in diameters, each in its own frame; its initial pose and the reference
+# pose, from which the spread is measured.
+Clouds = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+
+
+class PairDraws(NamedTuple):
+    """What all runs of one pair share."""
+
+    xi_n_6: np.ndarray  # twists of the starts
+    settings: UncertaintySettings
+    random: np.random.Generator  # of all else
+
+
 class KnobRuns:
-    """The function f of one pair; a setting that was evaluated is not evaluated again.
+    """The function f of one pair; a setting that was evaluated is not evaluated again."""
 
-    Clouds (N, 3) and (Q, 3) are in diameters, each in its own frame; the spread is measured from T_ref.
-    """
-
-    def __init__(
-        self,
-        source: np.ndarray,
-        target: np.ndarray,
-        T_target_source_init: np.ndarray,
-        T_ref: np.ndarray,
-        xi_n_6: np.ndarray,
-        settings: UncertaintySettings,
-        random: np.random.Generator,
-    ) -> None:
-        self._source, self._target = KnobbedSource(source, random), target
-        self._T_init, self.T_ref, self._xi_n_6, self._settings = T_target_source_init, T_ref, xi_n_6, settings
-        self._icp = BatchedICP(target, settings.icp)
+    def __init__(self, clouds: Clouds, draws: PairDraws) -> None:
+        source, self._target, self._T_init, self.T_ref = clouds
+        self._xi_n_6, self._settings, random = draws
+        self._source = KnobbedSource(source, random)
+        self._icp = BatchedICP(self._target, self._settings.icp)
         self._seen: dict[Knobs, Spread] = {}
 
     def __call__(self, knobs: Knobs) -> Spread:
@@ -104,23 +106,13 @@ FEWEST_TRIMMED = 16  # where a trimmed target would have fewer, nothing is trimm
 class RemedyRuns:
     """Runs of one observed pair under every combination of remedies.
 
-    Clouds (N, 3) and (Q, 3) are in diameters, each in its own frame; ICP sees fewer of their points than denoising and
-    the residual do.
+    ICP sees fewer of the clouds' points than denoising and the residual do; the reference pose is that of ICP.
     """
 
-    def __init__(
-        self,
-        source: np.ndarray,
-        target: np.ndarray,
-        T_target_source_init: np.ndarray,
-        T_target_source_icp: np.ndarray,
-        xi_n_6: np.ndarray,
-        settings: UncertaintySettings,
-        random: np.random.Generator,
-    ) -> None:
-        self._xi_n_6, self._settings = xi_n_6, settings
-        self._T_init, self._T_icp = T_target_source_init, T_target_source_icp
-        self._observed, self._target = source[random.permutation(len(source))], target
+    def __init__(self, clouds: Clouds, draws: PairDraws) -> None:
+        source, self._target, self._T_init, self._T_icp = clouds
+        self._xi_n_6, self._settings, random = draws
+        self._observed = source[random.permutation(len(source))]
 
     def __call__(self, remedies: Remedies) -> Spread:
         """Evaluate one combination; work that several share is done, and charged, once."""

@@ -155,13 +155,11 @@ def test_nothing_is_learned_from_the_scene_that_is_asked_about(diagnosis, monkey
             assert BORDERLINE not in registrations.concept and NOMINAL in registrations.concept
 
         def explain(self, registrations):
-            from baselines.untrained import CauseChance
-
             assert not self._known & set(registrations.cluster)
             assert (registrations.concept == "").all() and "causes" not in registrations.attached
             assert np.isnan(registrations.T_target_source_true).all()
             asked.append(len(registrations))
-            return CauseChance("scans", 100).explain(registrations)
+            return entry.make("scans", 100).explain(registrations)
 
     entry = scan_causes.explainer_entry("chance", scan_causes.CAUSES)
     monkeypatch.setattr(scan_causes, "explainer_entry", lambda *_: replace(entry, make=Spy))

@@ -16,15 +16,19 @@ from gpca.uncertainty.designs import (
     evaluate_design,
     sample_knobs,
 )
-from gpca.uncertainty.interventions import MIDDLE, UNTOUCHED, UPPER, Knobs
+from gpca.uncertainty.interventions import MIDDLE, UNTOUCHED, UPPER, Knobs, PairDraws
 from gpca.uncertainty.settings import CONDITIONS, CORNERS, LATIN, SALTELLI, UncertaintySettings
 
 SETTINGS = UncertaintySettings(starts=13, icp_points=60)
 XI = np.random.default_rng(0).normal(size=(13, 6)) * SETTINGS.deviation_6()
 
 
+def draws(settings, seed):
+    return PairDraws(XI, settings, np.random.default_rng(seed))
+
+
 def outcomes(design, registrations, row, settings=SETTINGS):
-    return DESIGNS[design].evaluate(RegisteredRow(registrations, row), XI, settings, np.random.default_rng(row))
+    return DESIGNS[design].evaluate(RegisteredRow(registrations, row), draws(settings, row))
 
 
 def numbers(made):

@@ -17,6 +17,7 @@ from gpca.uncertainty.interventions import (
     UPPER,
     KnobRuns,
     Knobs,
+    PairDraws,
     Remedies,
     RemedyRuns,
     best_of_neighbors,
@@ -35,7 +36,7 @@ T_INIT, T_REF = exp(np.array([[0.1, 0, 0, 0, 0.02, 0], [0.0, 0.1, 0, 0.01, 0, 0]
 
 
 def knob_runs(source=SOURCE, target=TARGET, seed=0):
-    return KnobRuns(source, target, T_INIT, T_REF, XI, SETTINGS, np.random.default_rng(seed))
+    return KnobRuns((source, target, T_INIT, T_REF), PairDraws(XI, SETTINGS, np.random.default_rng(seed)))
 
 
 @pytest.fixture()
@@ -168,7 +169,8 @@ def test_empty_overlap_is_flagged_and_finite():
 
 
 def test_the_same_points_as_source_and_target_give_a_finite_outcome():
-    runs = KnobRuns(TARGET, TARGET, np.eye(4), np.eye(4), 0.05 * XI, SETTINGS, np.random.default_rng(0))
+    draws = PairDraws(0.05 * XI, SETTINGS, np.random.default_rng(0))
+    runs = KnobRuns((TARGET, TARGET, np.eye(4), np.eye(4)), draws)
     still, noisy = runs(UNTOUCHED), runs(Knobs(0.03))
     assert still.degenerate and np.isfinite(still.covariance).all()
     assert still.residual == pytest.approx(np.log(1e-6)) and noisy.residual > still.residual
@@ -285,7 +287,7 @@ def remedy_runs(concept, number, points):
     source, target = PERTURBATIONS[concept](clean[:points], STRONG, random).points, clean[points:]
     T_icp = BatchedICP(target, SETTINGS_REMEDIES.icp).register(source, np.eye(4)[None])[0][0]
     xi_n_6 = random.normal(size=(13, 6)) * SETTINGS_REMEDIES.deviation_6()
-    return RemedyRuns(source, target, np.eye(4), T_icp, xi_n_6, SETTINGS_REMEDIES, random)
+    return RemedyRuns((source, target, np.eye(4), T_icp), PairDraws(xi_n_6, SETTINGS_REMEDIES, random))
 
 
 @pytest.mark.parametrize(
@@ -332,7 +334,8 @@ def test_what_several_combinations_share_is_worked_out_by_the_first_that_needs_i
 def test_no_overlap_at_all_gives_finite_flagged_outcomes():
     xi_n_6 = np.random.default_rng(0).normal(size=(13, 6)) * SETTINGS_REMEDIES.deviation_6()
     far = sphere(200, 1) + np.array([50.0, 0.0, 0.0])
-    evaluate = RemedyRuns(sphere(200), far, np.eye(4), np.eye(4), xi_n_6, SETTINGS_REMEDIES, np.random.default_rng(0))
+    draws = PairDraws(xi_n_6, SETTINGS_REMEDIES, np.random.default_rng(0))
+    evaluate = RemedyRuns((sphere(200), far, np.eye(4), np.eye(4)), draws)
     for switches in CORNERS:
         outcome = evaluate(Remedies(*switches))
         assert outcome.degenerate and np.isfinite(outcome.covariance).all() and np.isfinite(outcome.residual)
@@ -343,7 +346,7 @@ def test_what_is_given_is_not_changed():
     xi_n_6, T = np.full((13, 6), 0.01), exp(np.full((1, 6), 0.05))[0]
     given = (source, target, T, T.copy(), xi_n_6)
     before = [array.copy() for array in given]
-    evaluate = RemedyRuns(*given, SETTINGS_REMEDIES, np.random.default_rng(0))
+    evaluate = RemedyRuns(given[:4], PairDraws(xi_n_6, SETTINGS_REMEDIES, np.random.default_rng(0)))
     for switches in CORNERS:
         evaluate(Remedies(*switches))
     assert all(np.array_equal(array, expected) for array, expected in zip(given, before, strict=True))

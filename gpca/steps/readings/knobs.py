@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -13,10 +14,9 @@ from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.progress import progress
 from gpca.rigid import inverse, transform
-from gpca.seeds import generator
 from gpca.steps.readings.files import Row, RunFiles
 from gpca.steps.readings.groups import Reading
-from gpca.uncertainty.designs import KNOB_RANGE, STEP, RegisteredRow, design_rows
+from gpca.uncertainty.designs import KNOB_RANGE, STEP, RegisteredRow, design_rows, draws_of
 from gpca.uncertainty.interventions import MIDDLE, UNTOUCHED, KnobRuns, Knobs
 from gpca.uncertainty.settings import CORNERS, UncertaintySettings
 from gpca.uncertainty.spread import divergence, log_determinant, log_residual
@@ -105,11 +105,10 @@ def runs_of(
     """Concept of each registration, and its Monte-Carlo ICP by pair: the observed one, and a clean one."""
     observed = registrations.without_labels()
     for row in progress(range(len(registrations)), title):
-        axes = (source, seed, "uncertainty", observed.split[row], observed.sample[row])
-        xi_n_6 = generator(*axes, "starts").normal(size=(starts, 6)) * settings.deviation_6()
-        random, pair = generator(*axes, "clouds"), RegisteredRow(observed, row)
-        by_name = {"observed": pair.observed(settings.icp_points, random), "clean": pair.clean(settings.icp_points)}
-        made = {name: (clouds, KnobRuns(*clouds, xi_n_6, settings, random)) for name, clouds in by_name.items()}
+        draws = draws_of(observed, row, source, seed, replace(settings, starts=starts))
+        points, pair = settings.icp_points, RegisteredRow(observed, row)
+        by_name = {"observed": pair.observed(points, draws.random), "clean": pair.clean(points)}
+        made = {name: (clouds, KnobRuns(clouds, draws)) for name, clouds in by_name.items()}
         yield str(registrations.concept[row]), made
 
 

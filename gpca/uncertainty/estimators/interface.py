@@ -13,8 +13,9 @@ from typing import Literal
 
 import numpy as np
 
+from gpca.alignment.batched_icp import BatchedICP, BatchedPlaneICP
 from gpca.alignment.icp import ICPSettings
-from gpca.alignment.methods.interface import CORRESPONDENCE_DISTANCE, FEWEST, MAX_ITERATIONS, Outcome, Pair
+from gpca.alignment.methods.interface import CORRESPONDENCE_DISTANCE, FEWEST, Outcome, Pair
 from gpca.alignment.methods.registry import make_method, method_entry
 from gpca.rigid import exp, inverse, log, point_jacobians, rigid_motion, transform
 
@@ -96,42 +97,25 @@ class RegisteredPair:
         """
         if method_entry(self.method).is_global:
             raise FailedEstimate(f"'{self.method}' reads no initial pose, so that its results do not spread")
-        return self.twists_of(*self._register(exp(xi_n_6) @ self.pair.T_target_source_init))
+        pair, starts_n = self.pair, exp(xi_n_6) @ self.pair.T_target_source_init
+        if self.method == POINT_TO_POINT:
+            poses_n, fitness_n, _ = BatchedICP(pair.target, ICPSettings()).register(pair.source, starts_n)
+        elif self.method == POINT_TO_PLANE:
+            if pair.target_normals is None:
+                raise FailedEstimate("the target has no normals")
+            icp = BatchedPlaneICP(pair.target, pair.target_normals, ICPSettings())
+            poses_n, fitness_n, _ = icp.register(pair.source, starts_n)
+        else:
+            outcomes = list(map(make_method(self.method), map(pair.started_at, starts_n)))
+            poses_n = np.array([outcome.T_target_source for outcome in outcomes])
+            fitness_n = np.array([outcome.fitness for outcome in outcomes])
+        return self.twists_of(poses_n, fitness_n > 0)
 
     def twists_of(self, poses_n: np.ndarray, found_n: np.ndarray) -> np.ndarray:
         """Return those of the poses (n, 4, 4) that were found (n,) as twists about this one; too few are a failure."""
         if found_n.sum() < FEWEST_RUNS:
             raise FailedEstimate(f"fewer than {FEWEST_RUNS} runs found a correspondence")
         return log(poses_n[found_n] @ inverse(self.T_target_source))
-
-    @cached_property
-    def _register(self) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]:
-        """From starts (n, 4, 4) to the results and whether any correspondence was found (n,)."""
-        pair, settings = self.pair, ICPSettings("point_to_point", CORRESPONDENCE_DISTANCE, MAX_ITERATIONS)
-        if self.method in (POINT_TO_POINT, POINT_TO_PLANE):
-            from gpca.alignment.batched_icp import BatchedICP, BatchedPlaneICP
-
-            icp: BatchedICP | BatchedPlaneICP
-            if self.method == POINT_TO_POINT:
-                icp = BatchedICP(pair.target, settings)
-            elif pair.target_normals is None:
-                raise FailedEstimate("the target has no normals")
-            else:
-                icp = BatchedPlaneICP(pair.target, pair.target_normals, settings)
-
-            def at_once(starts_n: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-                poses_n, fitness_n, _ = icp.register(pair.source, starts_n)
-                return poses_n, fitness_n > 0
-
-            return at_once
-        register = make_method(self.method)
-
-        def one_by_one(starts_n: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            outcomes = [register(pair.started_at(start)) for start in starts_n]
-            found_n = np.array([outcome.fitness > 0 for outcome in outcomes])
-            return np.array([outcome.T_target_source for outcome in outcomes]), found_n
-
-        return one_by_one
 
 
 @dataclass(frozen=True)
