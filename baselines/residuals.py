@@ -6,12 +6,12 @@ pose both, and the spread of the Monte-Carlo poses of ICP. Like GP-CA, the class
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import partial
 from typing import Annotated
 
 import numpy as np
 
+from baselines.values import charged
 from gpca.classifier.scores import Attribution
 from gpca.explainers.classifiers import standardized_regression
 from gpca.explainers.interface import ClassifierExplainer, ExplainerEntry, attached, measured
@@ -44,16 +44,7 @@ class Residuals(ClassifierExplainer):
         return np.column_stack([self.describe(registrations).attached["residuals_both_ways"], log_determinant_N])
 
     def explain(self, registrations: Registrations) -> Attribution:
-        attribution = super().explain(registrations)
-        seconds_N, icp_seconds_N, icp_calls_N = (
-            attached(registrations, name)[:, OBSERVED] for name in ("seconds", "icp_seconds", "icp_calls")
-        )
-        return replace(
-            attribution,
-            seconds_N=attribution.seconds_N + seconds_N,
-            icp_seconds_N=icp_seconds_N,
-            icp_calls_N=icp_calls_N.astype(int),
-        )
+        return charged(super().explain(registrations), registrations, [OBSERVED])
 
 
 def residuals(registrations: Registrations) -> np.ndarray:

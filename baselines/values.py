@@ -7,7 +7,7 @@ values are standardized over the training split; with labels a classifier reads 
 from __future__ import annotations
 
 from collections.abc import Callable
-from time import perf_counter
+from dataclasses import replace
 from typing import Literal, get_args
 
 import numpy as np
@@ -19,7 +19,6 @@ from gpca.classifier.scores import Attribution
 from gpca.explainers.classifiers import standardized_regression
 from gpca.explainers.interface import ClassifierExplainer, ScoringExplainer, attached
 from gpca.pairs.dataset import Registrations
-from gpca.pairs.perturbation import CONCEPTS
 from gpca.settings import Positive
 
 Values = Callable[[np.ndarray], np.ndarray]  # from the worth (S, K) of the conditions to values (S, 3)
@@ -28,29 +27,30 @@ WORTHS: tuple[str, ...] = get_args(Worth)
 SMALLEST = 1e-4  # diameters: smaller changes are rounding and chance
 
 
-class ChargedValues(ScoringExplainer):
-    """Base of explainers that are charged with the conditions of a design that they need; None stands for all."""
+def charged(attribution: Attribution, registrations: Registrations, conditions: list[int] | None) -> Attribution:
+    """Return the attribution with the time and the runs of ICP of these conditions; None stands for all."""
+    columns = slice(None) if conditions is None else conditions
+    seconds_N, icp_seconds_N, icp_calls_N = (
+        attached(registrations, name)[:, columns].sum(axis=1) for name in ("seconds", "icp_seconds", "icp_calls")
+    )
+    return replace(
+        attribution,
+        seconds_N=seconds_N + attribution.seconds_N,
+        icp_seconds_N=icp_seconds_N,
+        icp_calls_N=icp_calls_N.astype(int),
+    )
 
-    def __init__(self, values: Values, conditions: list[int] | None) -> None:
+
+class ChargedValues(ScoringExplainer):
+    """Base of explainers that are charged with the conditions of a design that they need."""
+
+    def __init__(self, values: Values, conditions: list[int] | None, source: str, seed: int) -> None:
         self._values, self._conditions = values, conditions
 
     def explain(self, registrations: Registrations) -> Attribution:
         """Score by the values; equal scores name no concept."""
-        started = perf_counter()
-        scores_N_3 = self.scores(registrations)
-        own_seconds = (perf_counter() - started) / len(registrations)
-        columns = slice(None) if self._conditions is None else self._conditions
-        seconds_N, icp_seconds_N, icp_calls_N = (
-            attached(registrations, name)[:, columns].sum(axis=1) for name in ("seconds", "icp_seconds", "icp_calls")
-        )
-        return Attribution.of_scores(
-            CONCEPTS,
-            scores_N_3,
-            seconds=seconds_N + own_seconds,
-            icp_seconds=icp_seconds_N,
-            icp_calls=icp_calls_N,
-            abstained_N=np.ptp(scores_N_3, axis=1) == 0,
-        )
+        attribution = charged(super().explain(registrations), registrations, self._conditions)
+        return replace(attribution, abstained_N=np.ptp(attribution.scores_N_C, axis=1) == 0)
 
     def of_remedies(self, registrations: Registrations, worth: str) -> np.ndarray:
         """Return the values (S, 3) by the drops of a worth; corner b of the first 8 has remedy i where b has bit i."""
@@ -59,9 +59,6 @@ class ChargedValues(ScoringExplainer):
 
 class KnobValues(ChargedValues):
     """The knob with the largest value of the uncertainty names the concept; nothing is learned."""
-
-    def __init__(self, values: Values, conditions: list[int] | None, source: str, seed: int) -> None:
-        super().__init__(values, conditions)
 
     def scores(self, registrations: Registrations) -> np.ndarray:
         return self._values(attached(registrations, "uncertainty"))
@@ -73,7 +70,7 @@ class ScaledValues(ChargedValues):
     def __init__(
         self, values: Values, conditions: list[int], source: str, seed: int, worth: Worth = "uncertainty"
     ) -> None:
-        super().__init__(values, conditions)
+        super().__init__(values, conditions, source, seed)
         self._worth = worth
 
     def fit(self, registrations: Registrations) -> None:
@@ -90,7 +87,7 @@ class LearnedValues(ChargedValues, ClassifierExplainer):
     def __init__(
         self, values: Values, conditions: list[int], source: str, seed: int, inverse_regularisation: Positive = 1.0
     ) -> None:
-        ChargedValues.__init__(self, values, conditions)
+        ChargedValues.__init__(self, values, conditions, source, seed)
         ClassifierExplainer.__init__(self, standardized_regression(inverse_regularisation))
 
     def features(self, registrations: Registrations) -> np.ndarray:

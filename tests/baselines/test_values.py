@@ -127,7 +127,7 @@ def test_only_the_corners_that_it_needs_are_charged(name, attached):
 def test_a_charge_is_that_of_its_conditions_and_the_time_since_the_start_shared_out(attached, monkeypatch):
     n, times = len(attached), iter([100.0, 154.0])
     scores = np.random.default_rng(0).normal(size=(n, 3))
-    monkeypatch.setattr("baselines.values.perf_counter", lambda: next(times))
+    monkeypatch.setattr("gpca.explainers.interface.perf_counter", lambda: next(times))
     attribution = KnobValues(lambda _: scores, [1, 3], "tiny", 0).explain(attached)
     assert attribution.icp_calls_N.tolist() == [2 * i + 2 + 8 for i in range(n)]
     assert attribution.icp_seconds_N == pytest.approx(1e-3 * attribution.icp_calls_N)

@@ -167,19 +167,27 @@ def test_a_number_stands_for_itself_and_of_factors_the_logarithms_are_compared()
     assert row.verdict == "inconclusive"  # nothing has no logarithm
 
 
-def test_labels_that_ended_before_the_target_leave_one_answer_open():
-    bald = replace(LABELS, methods=("bald",))
-    claim = Claim("fewer", "s", "p", "less", 1.0, "labels", compared=(Compared(bald, LABELS),))
+def labels_of(bald, random, reached_bald=1, reached_random=1):
+    """Labels of two strategies by seed, and whether the first seed reached the target."""
+    values = {
+        ("bald", "labels_to_target"): bald,
+        ("random", "labels_to_target"): random,
+        ("bald", "reached"): [reached_bald, *bald[1:]],
+        ("random", "reached"): [reached_random, *random[1:]],
+    }
     table = {"concept": "overlap", "table": "active_learning/pretrained"}
+    rows = [tidy(each, method=method, metric=metric, **table) for (method, metric), each in values.items()]
+    return {"active_learning.csv": pd.concat(rows)}
 
-    def verdict(of_bald, of_random, reached_bald=1, reached_random=1):
-        rows = [
-            tidy(values, method=method, metric="labels_to_target", **table)
-            for method, values in (("bald", of_bald), ("random", of_random))
-        ]
-        reached = [tidy([r, 1], method=m, metric="reached", **table)
-                   for m, r in (("bald", reached_bald), ("random", reached_random))]  # fmt: skip
-        return judged(claim, **{"active_learning.csv": pd.concat(rows + reached)})["verdict"][0]
+
+FEWER = Claim(
+    "fewer", "s", "p", "less", 1.0, "labels", compared=(Compared(replace(LABELS, methods=("bald",)), LABELS),)
+)
+
+
+def test_labels_that_ended_before_the_target_leave_one_answer_open():
+    def verdict(*labels, **reached):
+        return judged(FEWER, **labels_of(*labels, **reached))["verdict"][0]
 
     assert verdict([10, 11], [60, 61]) == verdict([10, 11], [60, 61], reached_random=0) == "supported"
     assert verdict([10, 11], [60, 61], reached_bald=0) == "inconclusive"
@@ -188,17 +196,10 @@ def test_labels_that_ended_before_the_target_leave_one_answer_open():
 
 
 def test_both_at_the_first_batch_of_labels_say_nothing():
-    bald = replace(LABELS, methods=("bald",))
-    claim = Claim("fewer", "s", "p", "less", 1.25, "labels", ratio=True, compared=(Compared(bald, LABELS),))
-    table = {"concept": "overlap", "table": "active_learning/pretrained"}
+    claim = replace(FEWER, margin=1.25, ratio=True)
 
     def row(of_bald, of_random, floors):
-        rows = [
-            tidy(values, method=method, metric=metric, **table)
-            for method, values in (("bald", of_bald), ("random", of_random))
-            for metric, values in (("labels_to_target", values), ("reached", [1] * len(values)))
-        ]
-        [row] = judge([claim], {"active_learning.csv": pd.concat(rows)}, OBJECTS, floors=floors).itertuples()
+        [row] = judge([claim], labels_of(of_bald, of_random), OBJECTS, floors=floors).itertuples()
         return row
 
     first = row([4, 4, 4], [4, 4, 4], {"labels": 4})

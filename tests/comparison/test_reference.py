@@ -40,64 +40,67 @@ def test_the_same_numbers_are_identical(folders, capsys):
     assert out.endswith(": 2 identical, 0 rounding, 0 different, 0 missing\n")
 
 
+KERNELS = [("kernels", "ycb", "rbf", "accuracy", "all", seed, 0.5) for seed in (0, 1)]
+ELBO = [("k", "ycb", "rbf", "elbo", "all", seed, seed) for seed in (0, 1)]
+LABELS = [("a", "ycb", "random", "labels_to_target", "all", 0, 100)]
+ACCURACY, TABLE = "gpca,accuracy,all,0,0.9\n", "tables/table1.csv"
+
+
 @pytest.mark.parametrize(
-    ("old", "new", "verdict"),
+    ("file", "rows", "old", "new", "settings", "verdict"),
     [
         # Of 200 samples 4 √(0.05 · 200) = 12.6 may be decided otherwise in balance: a mean by 0.0632.
-        ("gpca,accuracy,all,0,0.9\n", "gpca,accuracy,all,0,1.0\n", "rounding"),
-        ("gpca,accuracy,all,0,0.9\n", "gpca,accuracy,all,0,0.77\n", "different"),
-        ("noise,all,0,50\n", "noise,all,0,62\n", "rounding"),  # 12 of 200 samples
-        ("noise,all,0,50\n", "noise,all,0,63\n", "different"),
-        ("b,accuracy,all,0,0.8\n", "b,accuracy,all,0,0.5\n", "different"),  # within the interval of two seeds
+        ("metrics.csv", (), ACCURACY, "gpca,accuracy,all,0,1.0\n", {}, "rounding"),
+        ("metrics.csv", (), ACCURACY, "gpca,accuracy,all,0,0.77\n", {}, "different"),
+        ("metrics.csv", (), "noise,all,0,50\n", "noise,all,0,62\n", {}, "rounding"),  # 12 of 200 samples
+        ("metrics.csv", (), "noise,all,0,50\n", "noise,all,0,63\n", {}, "different"),
+        ("metrics.csv", (), "b,accuracy,all,0,0.8\n", "b,accuracy,all,0,0.5\n", {}, "different"),  # within two seeds'
+        # A file that counts no samples has those of its source.
+        ("kernels.csv", KERNELS, "all,0,0.5", "all,0,0.62", {}, "rounding"),
+        ("kernels.csv", KERNELS, "all,0,0.5", "all,0,0.62", {"deviations": 0}, "different"),
+        ("kernels.csv", KERNELS, "all,0,0.5", "all,0,0.62", {"flipped": 0}, "different"),
+        # What is no share of samples may differ by the reference's interval, and counts by a ratio.
+        ("kernels.csv", ELBO, "all,0,0", "all,0,6", {}, "rounding"),
+        ("kernels.csv", ELBO, "all,0,0", "all,0,6", {"half_widths": 0}, "different"),
+        ("active_learning.csv", LABELS, "all,0,100", "all,0,124", {}, "rounding"),
+        ("active_learning.csv", LABELS, "all,0,100", "all,0,124", {"ratio": 0.2}, "different"),
+        # A table has its samples in a column.
+        (TABLE, (), "gpca,90.0", "gpca,98.9", {}, "rounding"),
+        (TABLE, (), "gpca,90.0", "gpca,99.1", {}, "different"),
     ],
 )
-def test_what_rounding_does_to_a_share_follows_from_the_number_of_its_samples(folders, capsys, old, new, verdict):
-    change(folders[0] / "metrics.csv", old, new)
-    assert outcomes(folders)["metrics.csv"].verdict == verdict
-    assert check(folders) == (verdict == "different")
-    out = capsys.readouterr().out
-    assert "1 of 4 values differ" in out
-    level = describe()["instructions"]
-    assert out.endswith(f"\nreference: A processor, {_kind()}{level}\nrun: A processor, {_kind()}{level}\n")
-
-
-def _kind():
-    return "".join(f"{name} {describe()[name]}, " for name in ("family", "model") if describe()[name])
+def test_what_rounding_explains(folders, capsys, file, rows, old, new, settings, verdict):
+    for folder in folders if rows else ():
+        write(folder / file, TIDY, rows)
+    change(folders[0] / file, old, new)
+    outcome = outcomes(folders, **settings)[file]
+    assert outcome.verdict == verdict
+    if (rows, verdict) == (KERNELS, "rounding"):
+        assert "(12 of 200 samples, where 13 are expected at most)" in outcome.detail
+    if not settings:
+        assert check(folders) == (verdict == "different")
+        out = capsys.readouterr().out
+        assert f"1 of {4 if file == 'metrics.csv' else 2 if file == TABLE else 1} values differ" in out
+        cpu = "".join(f"{name} {describe()[name]}, " for name in ("family", "model") if describe()[name])
+        cpu += describe()["instructions"]
+        assert out.endswith(f"\nreference: A processor, {cpu}\nrun: A processor, {cpu}\n") or file != "metrics.csv"
 
 
 def test_without_samples_the_tolerance_of_the_kind_holds(folders):
     for folder in (*folders, *folders):  # both seeds
         change(folder / "metrics.csv", "gpca,test_samples", "gpca,samples")
-    change(folders[0] / "metrics.csv", "gpca,accuracy,all,0,0.9\n", "gpca,accuracy,all,0,0.919\n")
+    change(folders[0] / "metrics.csv", ACCURACY, "gpca,accuracy,all,0,0.919\n")
     assert outcomes(folders)["metrics.csv"].verdict == "rounding"  # the mean by 0.0095, 0.01 is allowed
     change(folders[0] / "metrics.csv", "0.919\n", "0.921\n")
     assert outcomes(folders)["metrics.csv"].verdict == "different"
 
 
-def test_files_that_count_no_samples_have_those_of_their_source(folders):
-    for folder in folders:
-        write(folder / "kernels.csv", TIDY, [("kernels", "ycb", "rbf", "accuracy", "all", s, 0.5) for s in (0, 1)])
-    change(folders[0] / "kernels.csv", "all,0,0.5", "all,0,0.62")
-    outcome = outcomes(folders)["kernels.csv"]
-    assert outcome.verdict == "rounding"
-    assert "(12 of 200 samples, where 13 are expected at most)" in outcome.detail
-    assert outcomes(folders, deviations=0)["kernels.csv"].verdict == "different"
-    assert outcomes(folders, flipped=0)["kernels.csv"].verdict == "different"
-
-
 def test_one_of_many_values_is_enough_and_is_named(folders):
     """As when 31 of 180 samples were called rounding, in a file of which all else agreed."""
-    rows = [
-        ("kernels", "ycb", f"rbf{i}", "accuracy", "all", seed, 0.5 + seed / 10) for i in range(400) for seed in (0, 1)
-    ]
-    for folder in folders:
+    for folder, more in zip(folders, (0.2, 0.0), strict=True):
+        rows = [("kernels", "ycb", f"rbf{i}", "accuracy", "all", seed, 0.5 + seed / 10 + more * (i == 7))
+                for i in range(400) for seed in (0, 1)]  # fmt: skip
         write(folder / "kernels.csv", TIDY, rows)
-    for seed in (0, 1):
-        change(
-            folders[0] / "kernels.csv",
-            f"rbf7,accuracy,all,{seed},0.{5 + seed}",
-            f"rbf7,accuracy,all,{seed},0.{7 + seed}",
-        )
     outcome = outcomes(folders)["kernels.csv"]
     assert outcome.verdict == "different"
     assert outcome.detail.startswith(
@@ -105,41 +108,21 @@ def test_one_of_many_values_is_enough_and_is_named(folders):
     )
 
 
-def test_what_is_no_share_of_samples_may_differ_by_the_references_interval(folders):
-    for folder in folders:
-        write(folder / "kernels.csv", TIDY, [("k", "ycb", "rbf", "elbo", "all", seed, seed) for seed in (0, 1)])
-    change(folders[0] / "kernels.csv", "all,0,0", "all,0,6")
-    assert outcomes(folders)["kernels.csv"].verdict == "rounding"
-    assert outcomes(folders, half_widths=0)["kernels.csv"].verdict == "different"
-
-
-def test_labels_may_differ_by_a_ratio_and_yes_and_no_are_results(folders):
-    for folder in folders:
-        write(folder / "active_learning.csv", TIDY, [("a", "ycb", "random", "labels_to_target", "all", 0, 100)])
-    change(folders[0] / "active_learning.csv", "all,0,100", "all,0,124")
-    assert outcomes(folders)["active_learning.csv"].verdict == "rounding"
-    assert outcomes(folders, ratio=0.2)["active_learning.csv"].verdict == "different"
+def test_yes_and_no_are_results(folders):
     heads = ("learner", "accurate", "mean", "ci_low", "ci_high", "n_seeds", "n_test")
-    for folder in folders:
-        write(folder / "tables/table5_answers.csv", heads, [("gpca", "yes", 1.0, "", "", 1, 9)])
-    change(folders[0] / "tables/table5_answers.csv", "gpca,yes", "gpca,no")
+    for folder, answer in zip(folders, ("no", "yes"), strict=True):
+        write(folder / "tables/table5_answers.csv", heads, [("gpca", answer, 1.0, "", "", 1, 9)])
     assert outcomes(folders)["tables/table5_answers.csv"].verdict == "identical"
 
 
 def test_the_largest_difference_is_measured_by_what_is_allowed(folders):
-    change(folders[0] / "metrics.csv", "gpca,accuracy,all,0,0.9\n", "gpca,accuracy,all,0,0.76\n")
+    change(folders[0] / "metrics.csv", ACCURACY, "gpca,accuracy,all,0,0.76\n")
     change(folders[0] / "metrics.csv", "noise,all,0,50\n", "noise,all,0,52\n")
     assert outcomes(folders)["metrics.csv"].detail == (
         "2 of 4 values differ, 1 by more than rounding explains; the worst, "
         "attribution / ycb / gpca / accuracy / all: -0.07, where 0.06325 is allowed "
         "(14 of 200 samples, where 13 are expected at most)"
     )
-
-
-@pytest.mark.parametrize(("mean", "verdict"), [(98.9, "rounding"), (99.1, "different")])
-def test_a_table_has_its_samples_in_a_column(folders, mean, verdict):
-    change(folders[0] / "tables/table1.csv", "gpca,90.0", f"gpca,{mean}")
-    assert outcomes(folders)["tables/table1.csv"].verdict == verdict
 
 
 def test_times_are_not_compared(folders):
@@ -184,28 +167,26 @@ def one_line(capsys):
     return lines[0]
 
 
-def test_values_that_differ_under_another_config_are_not_called_rounding(folders, capsys):
-    change(folders[0] / "metrics.csv", "gpca,accuracy,all,0,0.9\n", "gpca,accuracy,all,0,0.99\n")
-    assert outcomes(folders)["metrics.csv"].verdict == "rounding"
-    change(folders[1] / "metrics.csv.provenance.json", "c0ffee", "tea")
+def test_values_that_differ_under_another_config_are_not_called_rounding(folders):
+    here, there = (folder / "metrics.csv.provenance.json" for folder in folders)
+    original = there.read_text()
+    change(there, "c0ffee", "tea")
+    assert outcomes(folders)["metrics.csv"].verdict == "identical"  # whatever made the same values
+    change(folders[0] / "metrics.csv", ACCURACY, "gpca,accuracy,all,0,0.99\n")
     outcome = outcomes(folders)["metrics.csv"]
     assert outcome.verdict == "different"
     assert outcome.detail.endswith("; config differs in seeds")
-    (folders[0] / "metrics.csv.provenance.json").unlink()
+    there.write_text(original)
     assert outcomes(folders)["metrics.csv"].verdict == "rounding"
-
-
-def test_the_same_values_under_another_config_are_identical(folders):
-    change(folders[1] / "metrics.csv.provenance.json", "c0ffee", "tea")
-    assert outcomes(folders)["metrics.csv"].verdict == "identical"
-
-
-def test_a_section_that_is_newer_than_the_reference_explains_nothing(folders):
-    change(folders[0] / "metrics.csv", "gpca,accuracy,all,0,0.9\n", "gpca,accuracy,all,0,0.99\n")
-    change(folders[0] / "metrics.csv.provenance.json", '"seeds"', '"causes": "tea", "seeds"')
+    change(here, '"seeds"', '"causes": "tea", "seeds"')  # a section that is newer than the reference
     assert outcomes(folders)["metrics.csv"].verdict == "rounding"
-    change(folders[0] / "metrics.csv.provenance.json", '"seeds": "c0ffee"', '"others": "c0ffee"')
+    change(here, '"seeds": "c0ffee"', '"others": "c0ffee"')
     assert outcomes(folders)["metrics.csv"].verdict == "different"
+    here.unlink()
+    assert outcomes(folders)["metrics.csv"].verdict == "rounding"
+
+
+HEAD, TABLE_HEAD = ",".join(TIDY) + "\n", ",".join(HEADS) + "\n"
 
 
 @pytest.mark.parametrize(
@@ -214,22 +195,10 @@ def test_a_section_that_is_newer_than_the_reference_explains_nothing(folders):
         ("metrics.csv", "attribution\n1\n", "is neither tidy metrics nor a table; regenerate it"),
         ("metrics.csv", "attribution\n", "has no rows; regenerate it"),
         ("metrics.csv", "", "is empty; make it with snakemake"),
-        (
-            "metrics.csv",
-            ",".join(TIDY) + "\na,ycb,gpca,accuracy,all,0,nan\n",
-            "'value' is 'nan', not a finite number; regenerate it",
-        ),
-        (
-            "metrics.csv",
-            ",".join(TIDY) + "\na,ycb,gpca,accuracy,all,0,0.9,0.8\n",
-            "has rows with more entries than columns",
-        ),
-        ("metrics.csv", ",".join(TIDY) + "\na,ycb,gpca\n", "'value' is '', not a finite number"),
-        (
-            "tables/table1.csv",
-            ",".join(HEADS) + "\nycb,gpca,many,1,2,5,100,False\n",
-            "'mean' is 'many', not a finite number",
-        ),
+        ("metrics.csv", HEAD + "a,ycb,gpca,accuracy,all,0,nan\n", "'value' is 'nan', not a finite number; regenerate"),
+        ("metrics.csv", HEAD + "a,ycb,gpca,accuracy,all,0,0.9,0.8\n", "has rows with more entries than columns"),
+        ("metrics.csv", HEAD + "a,ycb,gpca\n", "'value' is '', not a finite number"),
+        (TABLE, TABLE_HEAD + "ycb,gpca,many,1,2,5,100,False\n", "'mean' is 'many', not a finite number"),
     ],
 )
 def test_a_broken_file_is_named(folders, capsys, broken, content, message):
@@ -249,7 +218,7 @@ def test_no_run_and_no_reference(folders, capsys):
 
 
 def test_settings_replace_the_configs(folders, capsys):
-    change(folders[0] / "metrics.csv", "gpca,accuracy,all,0,0.9\n", "gpca,accuracy,all,0,1.0\n")
+    change(folders[0] / "metrics.csv", ACCURACY, "gpca,accuracy,all,0,1.0\n")
     tolerances = json.dumps({"tolerances": SETTINGS["tolerances"] | {"share": 0.06}})
     assert check(folders, "--settings", tolerances) == 0
     assert check(folders, "--settings", '{"tolerances": {"shares": 1}}') == 2
@@ -287,38 +256,25 @@ def test_a_config_that_does_not_say_what_agrees_is_named(folders, capsys, tmp_pa
 
 
 @pytest.mark.parametrize(
-    ("file", "quantity", "kind"),
-    [
-        ("metrics.csv", "accuracy", "share"),
-        ("metrics.csv", "predicted_as_pose", "count"),
-        ("active_learning.csv", "labels_to_target", "count"),
-        ("diagnostics.csv", "rho_max_score_knn_analytical_low", "correlation"),
-        ("diagnostics.csv", "nll", "nats"),
-        ("kernels.csv", "elbo", "nats"),
-        ("recovery.csv", "recovered_within_3", "share"),
-        ("recovery.csv", "first_queue", "count"),
-        ("tables/table8_recovery.csv", "actions", "count"),
-        ("estimators.csv", "kl_rotation_data", "nats"),
-        ("estimators.csv", "nees_truth", "nats"),
-        ("estimators.csv", "coverage_starts", "share"),
-        ("tables/table12_uncertainty.csv", "coverage", "percent"),
-        ("tables/table12_failures.csv", "spearman_error", "correlation"),
-        ("tables/table12_failures.csv", "lead", "share"),
-        ("registration_methods.csv", "add", "share"),
-        ("registration_methods.csv", "rotation_deg", "degrees"),
-        ("tables/table11_registration.csv", "rotation_deg", "degrees"),
-        ("tables/table11_severity.csv", "pose_low", "percent"),
-        ("tables/table4_grid.csv", "ece", "share"),
-        ("tables/table9_causes.csv", "nominal_calibration", "share"),
-        ("tables/table10_controls.csv", "paper_auroc_wrong", "count"),
-        ("tables/table5_learners.csv", "ece", "share"),
-        ("tables/table5_shift.csv", "ece_severity", "share"),
-        ("tables/table5_learners.csv", "rho", "correlation"),
-        ("tables/table1_single_baselines.csv", "gpca_paper", "percent"),
-    ],
+    ("kind", "places"),
+    {
+        "share": "metrics:accuracy recovery:recovered_within_3 estimators:coverage_starts registration_methods:add "
+        "tables/table12_failures:lead tables/table4_grid:ece tables/table9_causes:nominal_calibration "
+        "tables/table5_learners:ece tables/table5_shift:ece_severity",
+        "count": "metrics:predicted_as_pose active_learning:labels_to_target recovery:first_queue "
+        "tables/table8_recovery:actions tables/table10_controls:paper_auroc_wrong",
+        "correlation": "diagnostics:rho_max_score_knn_analytical_low tables/table12_failures:spearman_error "
+        "tables/table5_learners:rho",
+        "nats": "diagnostics:nll kernels:elbo estimators:kl_rotation_data estimators:nees_truth",
+        "percent": "tables/table12_uncertainty:coverage tables/table11_severity:pose_low "
+        "tables/table1_single_baselines:gpca_paper",
+        "degrees": "registration_methods:rotation_deg tables/table11_registration:rotation_deg",
+    }.items(),
 )
-def test_every_quantity_is_of_a_kind(file, quantity, kind):
-    assert kind_of(file, quantity) == kind
+def test_every_quantity_is_of_a_kind(kind, places):
+    for place in places.split():
+        file, quantity = place.split(":")
+        assert kind_of(f"{file}.csv", quantity) == kind, place
     assert {of for *_, of in KINDS} == set(SETTINGS["tolerances"])
 
 

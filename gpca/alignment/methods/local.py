@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from functools import partial
 from importlib import import_module
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -59,35 +59,23 @@ def align_compiled(
 
 def align_by_open3d(
     method: Method,
+    kernel: Kernel | None,
     pair: Pair,
     correspondence_distance: float = CORRESPONDENCE_DISTANCE,
     max_iterations: int = MAX_ITERATIONS,
 ) -> Outcome:
-    """Run Open3D's loop; planes have the normals of the target."""
-    return _align_by_open3d(method, pair, correspondence_distance, max_iterations)
-
-
-def align_robust(
-    kernel: Kernel,
-    pair: Pair,
-    correspondence_distance: float = CORRESPONDENCE_DISTANCE,
-    max_iterations: int = MAX_ITERATIONS,
-) -> Outcome:
-    """Minimize one of Open3D's robust kernels of the distances to planes."""
-    constant = SCALE**2 if kernel == "GMLoss" else SCALE  # Open3D's Geman-McClure takes its square
-    loss = getattr(require_open3d().pipelines.registration, kernel)(constant)
-    return _align_by_open3d("point_to_plane", pair, correspondence_distance, max_iterations, loss)
-
-
-def _align_by_open3d(method: Method, pair: Pair, distance: float, max_iterations: int, loss: Any = None) -> Outcome:
+    """Run Open3D's loop, with a robust kernel of the distances to planes or none; planes have the target's normals."""
     normals = None if method == "point_to_point" else pair.normals("target")
-    icp = ICP(pair.target, normals, ICPSettings(method, distance, max_iterations), loss)
-    found = icp.register(pair.source, pair.T_target_source_init)
-    if found.fitness == 0:
-        raise FailedRegistration(f"no source point has a target point within {distance:g} diameters")
-    further = ICP(pair.target, normals, ICPSettings(method, distance, 1), loss).register(
-        pair.source, found.T_target_source
+    constant = SCALE**2 if kernel == "GMLoss" else SCALE  # Open3D's Geman-McClure takes its square
+    loss = getattr(require_open3d().pipelines.registration, kernel)(constant) if kernel else None
+    full, single = (
+        ICP(pair.target, normals, ICPSettings(method, correspondence_distance, iterations), loss)
+        for iterations in (max_iterations, 1)
     )
+    found = full.register(pair.source, pair.T_target_source_init)
+    if found.fitness == 0:
+        raise FailedRegistration(f"no source point has a target point within {correspondence_distance:g} diameters")
+    further = single.register(pair.source, found.T_target_source)
     failure = failure_of_a_step(pair, found.T_target_source, further.T_target_source, max_iterations)
     return Outcome(found.T_target_source, found.fitness, found.inlier_rmse, failure)
 
@@ -125,14 +113,17 @@ def align_by_small_gicp(
     return Outcome.at(pair, T_found, correspondence_distance, failure)
 
 
+_to_planes = partial(align_by_open3d, "point_to_plane")
 METHODS = {
     "point_to_point": MethodEntry("ICP, point-to-point", align_compiled),
-    "point_to_point_open3d": MethodEntry("ICP, point-to-point (Open3D)", partial(align_by_open3d, "point_to_point")),
-    "point_to_plane": MethodEntry("ICP, point-to-plane", partial(align_by_open3d, "point_to_plane")),
-    "huber": MethodEntry("ICP, point-to-plane, Huber", partial(align_robust, "HuberLoss")),
-    "cauchy": MethodEntry("ICP, point-to-plane, Cauchy", partial(align_robust, "CauchyLoss")),
-    "geman_mcclure": MethodEntry("ICP, point-to-plane, Geman-McClure", partial(align_robust, "GMLoss")),
-    "tukey": MethodEntry("ICP, point-to-plane, Tukey", partial(align_robust, "TukeyLoss")),
-    "gicp": MethodEntry("GICP", partial(align_by_open3d, "generalized")),
+    "point_to_point_open3d": MethodEntry(
+        "ICP, point-to-point (Open3D)", partial(align_by_open3d, "point_to_point", None)
+    ),
+    "point_to_plane": MethodEntry("ICP, point-to-plane", partial(_to_planes, None)),
+    "huber": MethodEntry("ICP, point-to-plane, Huber", partial(_to_planes, "HuberLoss")),
+    "cauchy": MethodEntry("ICP, point-to-plane, Cauchy", partial(_to_planes, "CauchyLoss")),
+    "geman_mcclure": MethodEntry("ICP, point-to-plane, Geman-McClure", partial(_to_planes, "GMLoss")),
+    "tukey": MethodEntry("ICP, point-to-plane, Tukey", partial(_to_planes, "TukeyLoss")),
+    "gicp": MethodEntry("GICP", partial(align_by_open3d, "generalized", None)),
     "gicp_small": MethodEntry("GICP (small_gicp)", align_by_small_gicp, package="small_gicp"),
 }
