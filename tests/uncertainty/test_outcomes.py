@@ -7,6 +7,7 @@ from gpca.uncertainty.outcomes import Outcomes, read_seconds, write_seconds
 
 COLUMNS = tuple(Outcomes.array_fields())
 S, K = 6, 4
+CONDITIONS = ("none", "noise", "pose+noise", "x")
 
 
 def made(sample=range(S), split=("train",) * 2 + ("test",) * 4, seed=0):
@@ -26,9 +27,6 @@ def made(sample=range(S), split=("train",) * 2 + ("test",) * 4, seed=0):
 def seconds_of(outcomes, seed=0):
     seconds = np.random.default_rng(seed).uniform(0.001, 2, size=outcomes.uncertainty.shape).round(6)
     return seconds, (0.9 * seconds).round(6)
-
-
-# The npz
 
 
 def test_outcomes_survive_the_file_and_give_the_same_bytes(tmp_path):
@@ -67,45 +65,30 @@ def test_faulty_files_are_refused_in_one_line_with_their_name(tmp_path, name, da
 
 def test_the_table_has_a_column_for_every_condition(tmp_path):
     outcomes = made()
-    outcomes.write_table(tmp_path / "seed0.csv", ("none", "noise", "pose+noise", "x"))
+    outcomes.write_table(tmp_path / "seed0.csv", CONDITIONS)
     rows = pd.read_csv(tmp_path / "seed0.csv")
-    assert list(rows.columns) == [
-        "sample",
-        "split",
-        *(f"uncertainty_{c}" for c in ("none", "noise", "pose+noise", "x")),
-    ]
+    assert list(rows.columns) == ["sample", "split", *(f"uncertainty_{c}" for c in CONDITIONS)]
     assert rows["sample"].tolist() == outcomes.sample.tolist() and rows["split"].tolist() == outcomes.split.tolist()
     assert np.allclose(rows.filter(like="uncertainty_"), outcomes.uncertainty, atol=5.1e-7)
 
 
-# Attaching
-
-
-@pytest.fixture()
-def of_registrations(registrations):
-    """Outcomes of some registrations of both splits, in an order of their own, and their seconds."""
-    rows = np.array([50, 3, 36, 0, 17, 37, 36 - 1])
+def test_what_is_attached_belongs_to_the_sample(registrations):
+    rows = np.array([50, 3, 36, 0, 17, 37, 36 - 1])  # of both splits, in an order of their own
     outcomes = made(registrations.sample[rows], registrations.split[rows])
-    return rows, outcomes, *seconds_of(outcomes)
-
-
-def test_what_is_attached_belongs_to_the_sample(registrations, of_registrations):
-    rows, outcomes, seconds, icp_seconds = of_registrations
+    seconds, icp_seconds = seconds_of(outcomes)
     shuffled = registrations.subset(np.random.default_rng(0).permutation(len(registrations)))
     for given in (registrations, shuffled):
         attached = outcomes.attach_to(given, seconds, icp_seconds)
-        assert (
-            attached.sample.tolist() == outcomes.sample.tolist() and attached.split.tolist() == outcomes.split.tolist()
-        )
+        assert attached.sample.tolist() == outcomes.sample.tolist()
+        assert attached.split.tolist() == outcomes.split.tolist()
         for i, row in enumerate(rows):
             assert np.array_equal(attached.cloud(i), registrations.cloud(row))
             assert np.array_equal(attached.target(i), registrations.target(row))
             assert attached.concept[i] == registrations.concept[row]
             assert np.array_equal(attached.T_target_source_icp[i], registrations.T_target_source_icp[row])
-        for name in ("covariance", "uncertainty", "residual", "degenerate", "icp_calls"):
-            assert np.array_equal(attached.attached[name], getattr(outcomes, name))
-        assert np.array_equal(attached.attached["seconds"], seconds)
-        assert np.array_equal(attached.attached["icp_seconds"], icp_seconds)
+        expected = vars(outcomes) | {"seconds": seconds, "icp_seconds": icp_seconds}
+        for name in (*COLUMNS[2:], "seconds", "icp_seconds"):
+            assert np.array_equal(attached.attached[name], expected[name])
 
 
 @pytest.mark.parametrize(("sample", "split"), [(99, "test"), (20, "test"), (0, "validate")])
@@ -114,9 +97,6 @@ def test_samples_that_the_registrations_lack_are_refused(registrations, sample, 
     outcomes = made([0, sample], ("test", split))
     with pytest.raises(InputError, match="samples that the registrations lack; regenerate both"):
         outcomes.attach_to(registrations, *seconds_of(outcomes))
-
-
-# The seconds
 
 
 def test_seconds_survive_the_file(tmp_path):

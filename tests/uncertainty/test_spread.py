@@ -37,9 +37,6 @@ def twists(n=13, seed=0, scale=1.0):
     return np.random.default_rng(seed).normal(size=(n, 6)) * SETTINGS.deviation_6() * scale
 
 
-# The divergence
-
-
 def test_equal_covariances_do_not_diverge():
     for seed in range(20):
         assert divergence(covariance(seed), covariance(seed), 1e-6) == pytest.approx(0, abs=1e-9)
@@ -102,18 +99,12 @@ def test_the_log_determinant_is_that_of_the_floored_covariance():
     assert log_determinant(np.stack([covariance(0), covariance(1)]), 1e-6).shape == (2,)
 
 
-# Settings
-
-
 def test_the_starts_have_the_root_mean_square_angle_and_length_of_the_settings():
     settings = UncertaintySettings(start_rotation_deg=20, start_translation=0.3)
     xi_n_6 = np.random.default_rng(0).normal(size=(20_000, 6)) * settings.deviation_6()
     angle, length = (np.sqrt(np.square(part).sum(axis=1).mean()) for part in (xi_n_6[:, :3], xi_n_6[:, 3:]))
     assert np.rad2deg(angle) == pytest.approx(20, rel=0.02)
     assert length == pytest.approx(0.3, rel=0.02)
-
-
-# Runs
 
 
 @pytest.mark.parametrize("about", [np.zeros(6), np.array([0.3, -1.0, 0.5, 0.2, 0.1, -0.4])])
@@ -141,12 +132,9 @@ def test_a_spread_is_flagged_below_the_floor_only():
     assert not runs(exp(1.1 * deviation * unit)).degenerate(SETTINGS.floor)
     one_axis = unit * [1, 0, 0, 0, 0, 0]
     assert not runs(exp(3 * deviation * one_axis)).degenerate(SETTINGS.floor)
-
-
-def test_no_correspondence_in_any_run_is_flagged_however_wide_the_spread():
-    poses_n = exp(twists())
-    assert runs(poses_n, fitness=0.0).degenerate(SETTINGS.floor)
-    assert not runs(poses_n, fitness=np.eye(13)[4]).degenerate(SETTINGS.floor)
+    # Without a correspondence in any run, however wide it is.
+    assert runs(exp(twists()), fitness=0.0).degenerate(SETTINGS.floor)
+    assert not runs(exp(twists()), fitness=np.eye(13)[4]).degenerate(SETTINGS.floor)
 
 
 def test_the_cost_is_the_mean_of_the_squares_cut_off_at_the_distance():
@@ -169,11 +157,7 @@ def test_icp_runs_once_from_each_start_about_the_initial_pose():
     assert made.icp_calls == 13 and made.icp_seconds > 0
 
 
-# Outcomes
-
-
-def result(made, source, target, T_ref=None):
-    T_ref = np.eye(4) if T_ref is None else T_ref
+def result(made, source, target, T_ref=np.eye(4)):  # noqa: B008
     return summarize_runs(made, cKDTree(source), target, T_ref, SETTINGS, perf_counter())
 
 
