@@ -8,6 +8,9 @@ from gpca.alignment.icp import ICP, METHODS, ICPSettings
 from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS, PERTURBATIONS, Severities
 from gpca.rigid import exp
+from tests.uncertainty.estimators.cases import ellipsoid
+
+from .methods import pairs
 
 DEVIATION = np.array([0.1, 0.1, 0.1, 0.03, 0.03, 0.03])
 TO_PLANES = ICPSettings("point_to_plane")
@@ -17,12 +20,10 @@ def starts(n, seed=0, spread=1.0):
     return exp(np.random.default_rng(seed).normal(size=(n, 6)) * DEVIATION * spread)
 
 
-def clouds(objects, index, seed=0, points=250):
+def clouds(objects, index):
     """Disjoint points of one object, relative to its diameter: source, target and the target's normals."""
-    order = np.random.default_rng(seed).permutation(len(objects.points(index)))
-    all_points, all_normals = objects.points(index).astype(float) / objects.diameters_m[index], objects.normals(index)
-    source, target = order[:points], order[points : 2 * points]
-    return all_points[source], all_points[target], all_normals[target]
+    source, target, _, normals = pairs.clouds(objects, index)
+    return source, target, normals
 
 
 def by_open3d(source, target, normals, settings, poses_n):
@@ -49,20 +50,12 @@ def test_many_runs_end_where_open3d_ends(objects, concept, index):
     assert np.isin(result[1] * len(source), np.arange(len(source) + 1)).all()
 
 
-@pytest.mark.parametrize(
-    "settings",
-    [
-        ICPSettings(max_iterations=1),
-        ICPSettings(max_iterations=3),
-        ICPSettings(correspondence_distance=0.02),
-        ICPSettings(correspondence_distance=0.5),
-        ICPSettings(correspondence_distance=5.0),
-    ],
-)
-def test_iterations_and_distance_count_as_in_open3d(objects, settings):
+def test_iterations_and_distance_count_as_in_open3d(objects):
     source, target, _ = clouds(objects, 1)
-    result = BatchedICP(target, settings).register(source, starts(8))
-    assert_same(result, by_open3d(source, target, None, settings, starts(8)))
+    few = (ICPSettings(max_iterations=most) for most in (1, 3))
+    for settings in (*few, *(ICPSettings(correspondence_distance=distance) for distance in (0.02, 0.5, 5.0))):
+        result = BatchedICP(target, settings).register(source, starts(8))
+        assert_same(result, by_open3d(source, target, None, settings, starts(8)))
 
 
 def test_another_unit_of_length_makes_the_same_steps_as_open3d(objects):
@@ -87,13 +80,7 @@ def test_without_correspondences_a_run_stays_where_it_began(objects):
     assert_same((poses, fitness, rmse), by_open3d(source, target, None, ICPSettings(), poses_n))
 
 
-POOR = {
-    "plane": lambda points: points * [1, 1, 0],
-    "line": lambda points: points * [0, 0, 1],
-    "few": lambda points: points[:3],
-    "small": lambda points: points * 1e-3,
-    "one point many times": lambda points: points[[0] * 20],
-}
+POOR = pairs.POOR | {"small": lambda points: points * 1e-3}
 
 
 @pytest.mark.parametrize("poor", POOR)
@@ -186,8 +173,7 @@ def test_single_precision_and_strided_clouds_are_taken(objects):
     source, target, _ = clouds(objects, 0)
     expected = BatchedICP(target.astype(np.float32).astype(float), ICPSettings()).register(source[::2], starts(3))
     result = BatchedICP(target.astype(np.float32), ICPSettings()).register(source[::2], starts(3))
-    for one, other in zip(result, expected, strict=True):
-        assert np.array_equal(one, other)
+    assert_same(result, expected, atol=0)
     fortran = np.asfortranarray(source[::2])
     assert_same(BatchedICP(np.asfortranarray(target), ICPSettings()).register(fortran, starts(3)), expected, atol=1e-6)
 
@@ -204,15 +190,8 @@ def test_too_few_points_and_nan_are_refused(objects, method, faulty):
         BatchedICP(faulty, ICPSettings(method), faulty)
 
 
-def ellipsoid(seed, points=300):
-    directions = np.random.default_rng(seed).normal(size=(points, 3))
-    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    normals = directions / [0.5, 0.35, 0.2]
-    return directions * [0.5, 0.35, 0.2], normals / np.linalg.norm(normals, axis=1, keepdims=True)
-
-
 def test_runs_to_planes_end_where_open3d_ends():
-    (target, normals), (source, _) = ellipsoid(0), ellipsoid(1, 250)
+    (target, normals), (source, _) = ellipsoid(0, 300), ellipsoid(1, 250)
     starts_n = exp(np.random.default_rng(2).normal(size=(20, 6)) * 0.08)
     poses_n, fitness_n, rmse_n = BatchedPlaneICP(target, normals, TO_PLANES).register(source, starts_n)
     icp = ICP(target, normals, TO_PLANES)
@@ -232,7 +211,7 @@ def test_what_planes_leave_open_stays():
 
 
 def test_without_correspondences_a_run_to_planes_stays_where_it_began():
-    target, normals = ellipsoid(0)
+    target, normals = ellipsoid(0, 300)
     far = exp(np.array([[0, 0, 0, 5.0, 0, 0], np.zeros(6)]))
     poses_2, fitness_2, rmse_2 = BatchedPlaneICP(target, normals, TO_PLANES).register(target, far)
     assert (poses_2[0] == far[0]).all()

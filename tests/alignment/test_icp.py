@@ -43,12 +43,6 @@ def test_an_unknown_method_is_named():
         ICPSettings("icp2")
 
 
-@pytest.mark.parametrize("method", ["point_to_plane", "generalized"])
-def test_methods_of_planes_need_normals(target, method):
-    with pytest.raises(InputError, match="no normals"):
-        ICP(target[0], None, ICPSettings(method))
-
-
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory):
     """The first object of YCB in data/."""

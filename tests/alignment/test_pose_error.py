@@ -22,11 +22,8 @@ def add_error(points, T_estimated, T_true):
     return pose_error(points, T_estimated, T_true, symmetric=False)
 
 
-def test_add_of_a_shift_is_its_length(square):
+def test_add_of_a_shift_is_its_length_and_a_symmetric_object_is_judged_by_its_nearest_points(square):
     assert add_error(square, pose(shift=(3.0, 0, 4.0)), pose()) == pytest.approx(5.0)
-
-
-def test_a_symmetric_object_is_judged_by_its_nearest_points(square):
     assert add_error(square, pose(90), pose()) == pytest.approx(2.0)
     assert adds_error(square, pose(90), pose()) == pytest.approx(0.0, abs=1e-12)
     assert pose_error(square, pose(90), pose(), symmetric=True) < 1e-12
@@ -44,21 +41,16 @@ def test_no_error_depends_on_where_the_camera_is(square):
     assert errors[0] == pytest.approx(errors[1])
 
 
-def test_errors_of_many_poses_are_those_of_each(square):
+def test_errors_of_many_poses_are_those_of_each_and_the_nearest_point_is_sought_among_all(square):
     poses = np.stack([pose(20), pose(0, shift=(0.1, 0.2, 0.0)), pose(90)])
     errors = PoseErrors(square, 3, symmetric=False)(poses)
     assert errors == pytest.approx([add_error(square[:3], T, pose()) for T in poses])
-
-
-def test_the_nearest_point_is_sought_among_all_and_not_among_the_judged(square):
     errors = PoseErrors(square, 2, symmetric=True)(np.stack([pose(90), pose(180)]))
     assert errors == pytest.approx([0, 0], abs=1e-12)
 
 
 def test_a_displacement_is_the_rms_distance_that_points_are_moved():
     points = np.random.default_rng(0).normal(size=(50, 3))
-    T = np.eye(4)
-    T[:3, :3] = Rotation.from_rotvec([0.3, -0.2, 0.5]).as_matrix()
-    T[:3, 3] = [0.1, 0.2, -0.3]
+    T = pose(37, "y", (0.1, 0.2, -0.3))
     expected = np.sqrt(np.square(transform(T, points) - points).sum(axis=1).mean())
     assert displacements(np.array([np.eye(4), T]), points) == pytest.approx([0, expected])

@@ -16,6 +16,15 @@ def clouds(objects, index, seed=0, points=250):
     return all_points[source], all_points[target], all_normals[source].astype(float), all_normals[target].astype(float)
 
 
+POOR = {
+    "plane": lambda points: points * [1, 1, 0],
+    "line": lambda points: points * [0, 0, 1],
+    "three": lambda points: points[:3],
+    "five": lambda points: points[:5],
+    "one point many times": lambda points: points[[0] * 20],
+}
+
+
 def small_motion(objects, index=0, seed=0):
     """A pair that any local method aligns, with normals of the model, and its true pose."""
     source, target, source_normals, target_normals = clouds(objects, index, seed)
