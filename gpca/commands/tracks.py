@@ -145,14 +145,11 @@ def add_ship_predictions_arguments(parser: ArgumentParser) -> None:
 
 def run_ship_predictions(options: Namespace) -> None:
     """Write the published predictions of each track from a finished run; the same run gives the same bytes."""
-    from gpca.config.check import read
-    from gpca.config.layers import read_file, with_defaults
     from gpca.tracks.shipping import collect
 
     total = 0
     for track in map(track_of, options.tracks):
-        config, _ = read(with_defaults(*map(read_file, track.layers)), {})
-        published = collect(track, options.folder, config)
+        published = collect(track, options.folder, track.config())
         published.save(path := options.out / f"{track.name}.npz")
         total += path.stat().st_size
         print(f"{path}: {len(published.methods)} methods, {len(published.rows)} samples, version {published.version}")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -153,16 +153,6 @@ def as_text(table: Table) -> str:
     return "\n".join([printed["caption"], "", *lines, "", *printed["footnotes"]])
 
 
-class Board(NamedTuple):
-    """The table of a track, as the page shows it."""
-
-    title: str
-    heads: Sequence[str]  # of the columns
-    labels: int  # number of columns of text; the others are sorted as numbers
-    rows: Sequence[tuple[bool, Sequence[Mapping[str, Any]]]]  # whether it is submitted, cells {text, value, link, bold}
-    notes: Sequence[str]
-
-
 def read_submissions(folder: Path) -> tuple[dict[str, list[Submission]], list[str]]:
     """Return the submissions of a folder by track, and the faults of all files, a line each."""
     submissions: dict[str, list[Submission]] = {}
@@ -194,8 +184,12 @@ def write_page(submissions: Mapping[str, Sequence[Submission]], path: Path) -> N
         partial.write_text(environment.get_template(TEMPLATE).render(boards=boards), encoding="utf-8")
 
 
-def board_of(published: Published, submissions: Sequence[Submission]) -> Board:
-    """Return the table of a track with submissions among the published rows."""
+def board_of(published: Published, submissions: Sequence[Submission]) -> dict[str, Any]:
+    """Return the table of a track with submissions among the published rows, as the page shows it.
+
+    Its first ``labels`` columns are text, the others are sorted as numbers. A row says whether it is submitted, and has
+    cells {text, value, link, bold}.
+    """
     head_of = {submission.method.name: submission.head for submission in submissions}
     submitted = {submission.method.name: submission.method for submission in submissions}
     scores, _ = score(published, submitted)
@@ -213,6 +207,10 @@ def board_of(published: Published, submissions: Sequence[Submission]) -> Board:
             shown[labels - 2]["link"] = link
         shown += [{"text": head.get(key, "–"), "bold": False, "value": head.get(key, "")} for key in HEAD_COLUMNS]
         rows.append((name in head_of, shown))
-    title = f"{published.track.name}: {published.track.title}"
-    notes = [f"Samples {published.version}.", *table.footnotes]
-    return Board(title, [*printed["heads"], *(key.capitalize() for key in HEAD_COLUMNS)], labels, rows, notes)
+    return {
+        "title": f"{published.track.name}: {published.track.title}",
+        "heads": [*printed["heads"], *(key.capitalize() for key in HEAD_COLUMNS)],
+        "labels": labels,
+        "rows": rows,
+        "notes": [f"Samples {published.version}.", *table.footnotes],
+    }

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import zipfile
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 
 from gpca.causes.judged import SampleTruth
-from gpca.causes.truth import SUBSETS, Truth
+from gpca.causes.truth import Truth
 from gpca.errors import InputError
 from gpca.io.arrays import REAL, TEXT, WHOLE, load_arrays
+from gpca.io.container import FLAG, Container, array
 from gpca.io.files import whole_file
 from gpca.objects.source import DATA
 from gpca.process.code_files import ROOT
@@ -35,29 +36,26 @@ def require_clone(subject: str) -> None:
 
 
 @dataclass(frozen=True)
-class Rows:
-    """N test samples of a track, part by part, with their truth; errors and uncertainties (N, 8), all others (N,)."""
+class Rows(Container):
+    """N test samples of a track, part by part, with their truth."""
 
-    source: np.ndarray
-    seed: np.ndarray
-    sample: np.ndarray
-    object: np.ndarray
-    cluster: np.ndarray
-    concept: np.ndarray
-    symmetric: np.ndarray
-    start: np.ndarray  # of depth frames: kind of start, its instance, dataset and scene
-    instance: np.ndarray
-    scene: np.ndarray
-    counted: np.ndarray  # in measures, unlike scenes whose true poses were made by ICP, and scans with added noise
-    error: np.ndarray
-    uncertainty: np.ndarray
-    error_again: np.ndarray  # from other starts
-    uncertainty_again: np.ndarray
-    error_shown: np.ndarray  # of the shown registration
-    uncertainty_limit: np.ndarray  # of nominal registrations, nats
-
-    def __len__(self) -> int:
-        return len(self.sample)
+    source: np.ndarray = array("N", TEXT)
+    seed: np.ndarray = array("N", WHOLE)
+    sample: np.ndarray = array("N", WHOLE)
+    object: np.ndarray = array("N", TEXT)
+    cluster: np.ndarray = array("N", TEXT)
+    concept: np.ndarray = array("N", TEXT)
+    symmetric: np.ndarray = array("N", FLAG)
+    start: np.ndarray = array("N", TEXT)  # of depth frames: kind of start, its instance, dataset and scene
+    instance: np.ndarray = array("N", WHOLE)
+    scene: np.ndarray = array("N", TEXT)
+    counted: np.ndarray = array("N", FLAG)  # in measures, unlike scenes with poses by ICP, and scans with added noise
+    error: np.ndarray = array("N 8")
+    uncertainty: np.ndarray = array("N 8")
+    error_again: np.ndarray = array("N 8")  # from other starts
+    uncertainty_again: np.ndarray = array("N 8")
+    error_shown: np.ndarray = array("N")  # of the shown registration
+    uncertainty_limit: np.ndarray = array("N")  # of nominal registrations, nats
 
     def parts(self) -> Iterator[tuple[str, int, np.ndarray]]:
         """Yield source, seed and row numbers of each part, in order."""
@@ -112,8 +110,7 @@ class Published:
 
     def save(self, path: Path) -> None:
         """Write the npz; equal contents give equal bytes."""
-        arrays = {name: getattr(self.rows, name) for name in _SHAPES}
-        arrays |= {name: np.array(self.limits[name]) for name in LIMITS}
+        arrays = self.rows.arrays | {name: np.array(self.limits[name]) for name in LIMITS}
         arrays |= {f"method_{name}": np.array([getattr(each, name) for each in self.methods]) for name in _WORDS}
         arrays |= {name: np.stack([getattr(each, name) for each in self.methods]) for name in ("scores", "named")}
         files = sorted(self.hashes.items())
@@ -131,12 +128,12 @@ class Published:
             remedy = f"restore it, or make it from a run: gpca ship-predictions --tracks {track.name}"
             raise InputError(path, "no such file, in which the published rows are", remedy)
         labels = len(track.labels)
-        shapes: dict[str, tuple[int | str, ...]] = dict(_SHAPES) | dict.fromkeys(LIMITS, ())
+        declared = Rows.array_fields()
+        shapes = {name: each.shape for name, each in declared.items()} | dict.fromkeys(LIMITS, ())
         shapes |= {f"method_{name}": ("M",) for name in _WORDS} | {"scores": ("M", "N", labels), "named": ("M", "N")}
         shapes |= {"files": ("F",), "sha256": ("F",), "commit": ()}
-        kinds = dict.fromkeys(shapes, TEXT) | dict.fromkeys((*LIMITS, *_REAL, "scores"), REAL)
-        kinds |= dict.fromkeys(("seed", "sample", "instance", "named", "method_icp_calls"), WHOLE)
-        kinds |= {"symmetric": "b", "counted": "b"}
+        kinds = dict.fromkeys(shapes, TEXT) | {name: each.kind for name, each in declared.items()}
+        kinds |= dict.fromkeys((*LIMITS, "scores"), REAL) | dict.fromkeys(("named", "method_icp_calls"), WHOLE)
         arrays = load_arrays(path, shapes, kinds)
         if not ((arrays["named"] >= NOTHING_NAMED) & (arrays["named"] < labels)).all():
             raise InputError(path, "names labels that the track does not have", "restore it")
@@ -144,7 +141,7 @@ class Published:
         methods = zip(*words, arrays["scores"], arrays["named"], strict=True)
         return cls(
             track=track,
-            rows=Rows(**{name: arrays[name] for name in _SHAPES}),
+            rows=Rows(**{name: arrays[name] for name in declared}),
             limits={name: float(arrays[name]) for name in LIMITS},
             methods=tuple(Method(*each) for each in methods),
             hashes=dict(zip(arrays["files"].tolist(), arrays["sha256"].tolist(), strict=True)),
@@ -153,11 +150,6 @@ class Published:
 
 
 _WORDS = ("name", "title", "reads", "icp_calls")
-_BY_SUBSET = ("error", "uncertainty", "error_again", "uncertainty_again")
-_REAL = (*_BY_SUBSET, "error_shown", "uncertainty_limit")
-_SHAPES: Mapping[str, tuple[int | str, ...]] = {
-    field.name: ("N", len(SUBSETS)) if field.name in _BY_SUBSET else ("N",) for field in fields(Rows)
-}
 
 
 def sha256_of_arrays(path: str | Path) -> str:

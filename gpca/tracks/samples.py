@@ -57,12 +57,8 @@ class TrackSamples:
     @cached_property
     def config(self) -> dict[str, Any]:
         """The config of the track's run."""
-        from gpca.config.check import read
-        from gpca.config.layers import read_file, with_defaults
-
         require_clone(f"track {self.track.name}")
-        local = {"plugins": named(), "data_dir": str(self.data_dir) if self.data_dir else None}
-        return read(with_defaults(*map(read_file, self.track.layers), local), {})[0]
+        return self.track.config(plugins=named(), data_dir=str(self.data_dir) if self.data_dir else None)
 
     def parts(self) -> list[tuple[str, int, np.ndarray]]:
         """Return source, seed and row numbers of the published samples that are cached or whose data is available."""
@@ -172,37 +168,33 @@ def run_recipe() -> None:
 def recipe_of(file: str, config: Mapping[str, Any]) -> Recipe:
     """Return how the rules of the workflow make a file of a run, such as ``causes/ycb/seed0.npz``."""
     kind, *rest = PurePosixPath(file).with_suffix("").parts
-    data = {name: config[name] for name in ("data_dir", "downloads")}
-    icp = {"icp": config["registrations"]["icp"]}
-    if kind in ("objects", "instances"):
-        points = {"surface_points": config["objects"]["surface_points"]}
-        source, section = rest[0], config["real_world"]
-        if source != REAL_WORLD:
-            given = {"source": source, "settings": config["sources"][source], **data, **points}
-            outputs = {"out": f"objects/{source}.npz"}
-            return Recipe("gpca.steps.pairs:objects", given, _splits("objects", config), outputs)
-        settings = {"datasets": section["datasets"], "initial_pose": section["initial_pose"]}
-        given = {"source": source, "settings": settings | {"role": config["splits"]["role"]}, **data, **points}
-        outputs = {name: f"{name}/{source}.npz" for name in ("instances", "objects")}
-        return Recipe("gpca.steps.frames:instances", given, _splits("scenes", config), outputs)
     if kind == "timings":  # an output of the same step
         return recipe_of(f"{rest[1]}/{rest[0]}/{rest[2]}.npz", config)
+    data = {name: config[name] for name in ("data_dir", "downloads")}
+    icp = {"icp": config["registrations"]["icp"]}
+    frames = config["real_world"]
+    of_frames = {"datasets": frames["datasets"], "role": config["splits"]["role"]}
+    if kind in ("objects", "instances"):
+        source = rest[0]
+        given = {"source": source, **data, "surface_points": config["objects"]["surface_points"]}
+        if source != REAL_WORLD:
+            given |= {"settings": config["sources"][source]}
+            outputs = {"out": f"objects/{source}.npz"}
+            return Recipe("gpca.steps.pairs:objects", given, _splits("objects", config), outputs)
+        given |= {"settings": of_frames | {"initial_pose": frames["initial_pose"]}}
+        outputs = {name: f"{name}/{source}.npz" for name in ("instances", "objects")}
+        return Recipe("gpca.steps.frames:instances", given, _splits("scenes", config), outputs)
     seed = int(rest[-1].removeprefix("seed"))
+    diagnosis, causes, controls = config["diagnosis"], config["causes"], config["controls"]
     if kind in ("frame_causes", "frame_starts") or (kind == "reenactments" and rest[0] == REAL_WORLD):
-        section = config["real_world"]
-        settings = {
-            "datasets": section["datasets"],
-            "role": config["splits"]["role"],
-            "causes": config["causes"],
-            **icp,
-        }
+        settings = of_frames | {"causes": causes} | icp
         inputs = _splits("scenes", config) | {name: f"{name}/{REAL_WORLD}.npz" for name in ("instances", "objects")}
         outputs = {"frame_causes": f"frame_causes/seed{seed}.npz", "starts": f"frame_starts/seed{seed}.npz"}
-        step, more = "frame_causes", {"frames": section["causes"]}
         if kind == "reenactments":
-            step, more = "reenact_frames", {"reenactment": config["diagnosis"]["reenactment"] | section["reenactment"]}
+            step, more = "reenact_frames", {"reenactment": diagnosis["reenactment"] | frames["reenactment"]}
             inputs, outputs = inputs | outputs, {"reenactments": f"reenactments/{REAL_WORLD}/seed{seed}.npz"}
         else:
+            step, more = "frame_causes", {"frames": frames["causes"]}
             outputs |= {"samples": f"frame_causes/seed{seed}.csv"}
         given = {"source": REAL_WORLD, "seed": seed, **data, "settings": settings | more}
         return Recipe(f"gpca.steps.frames:{step}", given, inputs, outputs)
@@ -221,15 +213,14 @@ def recipe_of(file: str, config: Mapping[str, Any]) -> Recipe:
 
         place = place_of(entry_of(config["scans"]["datasets"][source]), config["data_dir"])
         given |= {"settings": measurement_settings(config, source), "place": str(place or "")}
-        outputs = {"scan_causes": path("scan_causes"), "descriptors": path("scan_descriptors")}
-        outputs |= {"reenactments": path("scan_reenactments"), "samples": path("scan_causes", "csv")}
+        outputs = {"scan_causes": path("scan_causes"), "samples": path("scan_causes", "csv")}
+        outputs |= {name: path(f"scan_{name}") for name in ("descriptors", "reenactments")}
         return Recipe("gpca.steps.scan_causes:measure", given, {}, outputs)
-    diagnosis, causes = config["diagnosis"], config["causes"]
     step, inputs = "gpca.steps.causes:causes", {"causes": path("causes"), "causes_timings": timings("causes")}
     outputs = {kind: path(kind), "timings": timings(kind)}
     if kind in ("causes", HARD):
         inputs = {"objects": f"objects/{source}.npz"}
-        settings = causes | (config["controls"]["hard"] if kind == HARD else {}) | icp
+        settings = causes | (controls["hard"] if kind == HARD else {}) | icp
         outputs = {"causes": path(kind), "candidates": path(kind, "csv"), "timings": timings(kind)}
     elif kind == "descriptors":
         step, settings = "gpca.steps.causes:describe", diagnosis["descriptors"] | icp
@@ -241,9 +232,9 @@ def recipe_of(file: str, config: Mapping[str, Any]) -> Recipe:
         outputs = {"weights": path("cause_encoders", "pt"), "curve": path("cause_encoders", "csv")}
         outputs |= {"embeddings": path("cause_embeddings"), "timings": timings("cause_embeddings")}
     elif kind == "control_embeddings":
-        controls = {name: value for name, value in config["controls"].items() if name not in ("explainers", "hard")}
-        settings = {"controls": controls, "encoder": config["encoders"][config["embedding"]["encoder"]]}
-        given |= {"control": HARD}
+        encoder = config["encoders"][config["embedding"]["encoder"]]
+        controls = {name: value for name, value in controls.items() if name not in ("explainers", "hard")}
+        settings, given = {"controls": controls, "encoder": encoder}, given | {"control": HARD}
         step, inputs = "gpca.steps.control_samples:train", {"registrations": path(HARD)}
         outputs = {"embeddings": path(f"{kind}/{HARD}"), "curve": path(f"{kind}/{HARD}", "csv")}
     else:

@@ -23,7 +23,7 @@ from gpca.objects.canonical import BY_ICP
 from gpca.steps.control_samples import HARD
 from gpca.tracks.published import LIMITS, NO_CALLS, NOTHING_NAMED, Method, Published, Rows, sha256_of_arrays
 from gpca.tracks.samples import recipe_of
-from gpca.tracks.track import FRAMES_TRACK, HARD_TRACK, SCANS_TRACK, Track
+from gpca.tracks.track import DEFAULT, FRAMES_TRACK, HARD_TRACK, SCANS_TRACK, Track
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -35,7 +35,7 @@ Key = tuple[str, str]  # name of an explainer, and its training data if there is
 def collect(track: Track, run: Path, config: Mapping[str, Any]) -> Published:
     """Return what is shipped with a track, from the folder of a run and its config."""
     parts = [part for part in track.parts(config) if not track.may_lack(part[0]) or (run / track.file(*part)).is_file()]
-    for part in parts if track.layers else ():  # otherwise nobody could make the samples again
+    for part in parts if track.run != DEFAULT else ():  # otherwise nobody could make the samples again
         settings = _provenance(run / track.file(*part)).get("settings")
         expected = recipe_of(track.file(*part), config).given["settings"]
         if settings is not None and settings != json.loads(json.dumps(expected)):

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from functools import reduce
 from itertools import product
 from operator import getitem
-from pathlib import Path
 from typing import Any
 
 from gpca.causes.dataset import LABELS
@@ -62,10 +61,13 @@ class Track:
         seeds = list(config["seeds"])[: entry(self.seeds) if self.seeds else None]
         return [(source, seed) for seed, source in product(seeds, self.sources or entry(self.listed))]
 
-    @property
-    def layers(self) -> list[Path]:
-        """The configs that override the default one."""
-        return [] if self.run == DEFAULT else [ROOT / "config" / f"{self.run}.yaml"]
+    def config(self, **local: Any) -> dict[str, Any]:
+        """Return the config of the run that the samples are of, with these keys of this machine."""
+        from gpca.config.check import read
+        from gpca.config.layers import read_file, with_defaults
+
+        layers = [] if self.run == DEFAULT else [read_file(ROOT / "config" / f"{self.run}.yaml")]
+        return read(with_defaults(*layers, local), {})[0]
 
     def may_lack(self, source: str) -> bool:
         """Return whether the samples of a source may be left out, as its data has to be obtained."""
