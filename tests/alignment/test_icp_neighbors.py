@@ -56,19 +56,14 @@ def check(target, found_at):
     for query in found_at:
         row, radius = nearest(*query, room, *target)
         true, true_row = tree.query(query)
-        if row < 0:
-            assert true >= target.distance - within
-        else:
+        if row >= 0:
             assert true < target.distance + within
-            assert np.linalg.norm(target.points[row] - query) <= true + within
             same.append(row == true_row)
         direction = random.normal(size=3)
         moved = query + direction * radius * random.choice([0.5, 0.999]) / np.linalg.norm(direction)
-        true_moved = tree.query(moved)[0]
-        if row < 0:
-            assert true_moved >= target.distance - within
-        else:
-            assert np.linalg.norm(target.points[row] - moved) <= true_moved + within
+        for at in (query, moved):
+            away = target.distance if row < 0 else np.linalg.norm(target.points[row] - at)
+            assert tree.query(at)[0] >= away - within
         radii.append(radius)
     return np.array(same), np.array(radii)
 

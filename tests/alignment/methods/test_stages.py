@@ -45,19 +45,15 @@ def test_weights_of_a_robust_kernel_give_open3ds_pose(objects, kernel):
     np.testing.assert_allclose(T, make_method(kernel)(pair).T_target_source, rtol=0, atol=1e-6)
 
 
-def test_few_matches_and_no_weight_are_failures(objects):
-    pair, _ = small_motion(objects)
-    with pytest.raises(FailedRegistration, match="fewer than 3 correspondences"):
-        run_stages(pair, Stages(reject=lambda matches: matches.kept(np.arange(2))), 50)
-    with pytest.raises(FailedRegistration, match="no correspondence has any weight"):
-        run_stages(pair, Stages(weigh=lambda matches: np.zeros(len(matches.distance))), 50)
-
-
-def test_normals_of_the_source_turn_with_it(objects):
+def test_normals_of_the_source_turn_with_it_and_few_matches_and_no_weight_are_failures(objects):
     pair, T_true = small_motion(objects)
     matches = Stages().match(pair, T_true)
     assert np.median(matches.cosines()) == pytest.approx(1, abs=1e-6)  # most neighbors lie on the same face
     assert np.median(Stages().match(pair, np.eye(4)).cosines()) < 0.999
+    with pytest.raises(FailedRegistration, match="fewer than 3 correspondences"):
+        run_stages(pair, Stages(reject=lambda matches: matches.kept(np.arange(2))), 50)
+    with pytest.raises(FailedRegistration, match="no correspondence has any weight"):
+        run_stages(pair, Stages(weigh=lambda matches: np.zeros(len(matches.distance))), 50)
 
 
 @pytest.mark.parametrize("share", [0.3, 0.6, 0.95])
@@ -122,7 +118,7 @@ def test_samples_are_drawn_by_the_seed_of_the_pair(objects):
         assert not np.array_equal(sample(pair), sample(other))
 
 
-def test_rejections_keep_what_they_say(objects):
+def test_rejections_keep_what_they_say_and_weights_fall_with_distance_and_angle(objects):
     pair, _ = perturbed(objects, 0, "noise")
     matches = Stages(distance=0.1).match(pair, np.eye(4))
     d, cosines = matches.distance, matches.cosines()
@@ -130,22 +126,14 @@ def test_rejections_keep_what_they_say(objects):
     assert np.array_equal(by_distance.distance, d[d <= d.mean() + 2.5 * d.std()])
     assert np.array_equal(by_normals.rows, matches.rows[cosines >= np.cos(np.pi / 4)])
     assert np.array_equal(np.sort(worst.distance), np.sort(d)[: round(0.9 * len(d))])
+    assert [nearest(d, count).tolist() for count in (1, 0)] == [[d.argmin()]] * 2  # never none
     for part in (by_normals, worst):
         assert 0 < len(part.distance) < len(d)
         np.testing.assert_allclose(np.linalg.norm(pair.target[part.rows] - part.source, axis=1), part.distance)
 
-
-def test_weights_fall_with_distance_and_angle(objects):
-    pair, _ = perturbed(objects, 0, "noise")
-    matches = Stages(distance=0.1).match(pair, np.eye(4))
     np.testing.assert_allclose(stages.weigh_distance(matches), 1 - matches.distance / 0.1)
-    weights, cosines = stages.weigh_normals(matches), matches.cosines()
+    weights = stages.weigh_normals(matches)
     assert np.array_equal(weights[cosines > 0], np.minimum(cosines[cosines > 0], 1)) and not weights[cosines < 0].any()
-
-
-def test_the_nearest_are_never_none():
-    assert nearest(np.array([3.0, 1.0, 2.0]), 2).tolist() == [1, 2]
-    assert nearest(np.array([3.0, 1.0, 2.0]), 0).tolist() == [1]
 
 
 def brute_force(source, target, kept):

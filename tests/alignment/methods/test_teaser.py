@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from gpca.alignment.methods.teaser import gnc_rotation, largest_clique, solve, vote
-from gpca.rigid import inverse, rotate, rotation_angle_rad, transform
+from gpca.rigid import inverse, rigid_motion, rotate, rotation_angle_rad, transform
 
 NOISE = 0.01
 
@@ -13,9 +13,7 @@ NOISE = 0.01
 def correspondences(n, outliers, seed, noise=NOISE):
     """Points in a unit cube, their images under a random motion within the noise, and which of them are right."""
     random = np.random.default_rng(seed)
-    T_true = np.eye(4)
-    T_true[:3, :3] = Rotation.random(random_state=seed).as_matrix()
-    T_true[:3, 3] = random.uniform(-1, 1, 3)
+    T_true = rigid_motion(Rotation.random(random_state=seed).as_matrix(), random.uniform(-1, 1, 3))
     source = random.uniform(-0.5, 0.5, size=(n, 3))
     offsets = random.normal(size=(n, 3))
     offsets *= noise * random.uniform(size=(n, 1)) / np.linalg.norm(offsets, axis=1, keepdims=True)
@@ -47,12 +45,8 @@ def test_without_noise_the_pose_is_exact(seed):
     T, inliers = solve(source, target, 1e-6)
     assert_near(T, T_true, 1e-6, 1e-9)
     assert np.array_equal(inliers, right)
-
-
-def test_where_no_three_agree_there_is_no_pose():
-    points = np.eye(3)
-    assert solve(points, 5 * points, NOISE) is None
-    assert solve(points[:0], points[:0], NOISE) is None
+    assert solve(np.eye(3), 5 * np.eye(3), NOISE) is None  # no three agree
+    assert solve(source[:0], target[:0], NOISE) is None
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -60,9 +54,7 @@ def test_the_rotation_withstands_half_of_wrong_differences(seed):
     source, target, T_true, right = correspondences(60, 0.5, seed)
     target = target - T_true[:3, 3]
     R, weights = gnc_rotation(source, target, 1.5 * NOISE)
-    T = np.eye(4)
-    T[:3, :3] = R
-    assert rotation_angle_rad(T @ inverse(T_true)) < 0.02
+    assert rotation_angle_rad(rigid_motion(R) @ inverse(T_true)) < 0.02
     assert weights[right].min() > 0.99
     residuals = np.linalg.norm(target - rotate(R, source), axis=1)
     assert residuals[weights > 0.99].max() < 1.6 * NOISE and residuals[weights < 0.01].min() > 1.4 * NOISE
@@ -116,10 +108,6 @@ def test_a_search_that_is_cut_short_says_so_and_gives_a_clique():
     assert np.array_equal(clique, again)
 
 
-def test_a_clique_of_all_nodes_is_not_too_deep():
-    assert len(largest_clique(np.ones((1200, 1200), bool))[0]) == 1200
-
-
-def test_graphs_without_edges_or_nodes():
-    assert len(largest_clique(np.zeros((3, 3), bool))[0]) == 1
-    assert len(largest_clique(np.zeros((0, 0), bool))[0]) == 0
+@pytest.mark.parametrize(("graph", "largest"), [(np.ones((1200,) * 2), 1200), (np.zeros((3, 3)), 1), (np.eye(0), 0)])
+def test_a_clique_of_all_nodes_is_not_too_deep_and_a_graph_needs_no_edges_or_nodes(graph, largest):
+    assert len(largest_clique(graph.astype(bool))[0]) == largest

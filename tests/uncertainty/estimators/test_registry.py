@@ -7,6 +7,7 @@ import pytest
 
 from gpca.alignment.methods.interface import Outcome, Pair
 from gpca.errors import InputError
+from gpca.rigid import exp, transform
 from gpca.uncertainty.estimators import registry
 from gpca.uncertainty.estimators.interface import EstimatorEntry, Example, intrinsic_frame, inverse_hessian
 from gpca.uncertainty.estimators.registry import (
@@ -37,19 +38,14 @@ def test_every_estimator_has_an_entry():
 
 
 @pytest.mark.parametrize("name", sorted(NAMES))
-def test_an_estimate_is_a_covariance(name):
+def test_an_estimate_is_a_covariance_and_without_correspondences_it_fails(name):
+    estimate = make_estimator(name, QUICK.get(name), EXAMPLES)
     method = "point_to_plane" if name == "bonnabel" else "point_to_point"
-    said = make_estimator(name, QUICK.get(name), EXAMPLES)(described(method=method))
+    said = estimate(described(method=method))
     assert said.failure == ""
     assert said.covariance_6_6.shape == (6, 6)
     assert (said.covariance_6_6 == said.covariance_6_6.T).all()
     assert np.linalg.eigvalsh(said.covariance_6_6).min() > 0
-
-
-@pytest.mark.parametrize("name", sorted(NAMES))
-def test_without_correspondences_it_fails_and_raises_nothing(name):
-    estimate = make_estimator(name, QUICK.get(name), EXAMPLES)
-    method = "point_to_plane" if name == "bonnabel" else "point_to_point"
     lost = replace(described(method=method), outcome=Outcome(FAR, 0.0, 0.0, "no source point is near"))
     assert estimate(lost).covariance_6_6 is None
     assert estimate(lost).failure == "no source point is near"
@@ -58,14 +54,14 @@ def test_without_correspondences_it_fails_and_raises_nothing(name):
     assert wrong.failure == "fewer than 3 correspondences at the pose" or name in ("monte_carlo", "cello", "learned")
 
 
-def test_starts_from_which_nothing_is_found_are_counted_as_failed():
+def test_starts_from_which_nothing_is_found_a_method_without_a_start_and_missing_normals_are_failures():
     source, normals = ellipsoid(0)
-    pair = replace(registered(), pair=Pair(source, source, FAR, normals, normals))
+    lost = replace(registered(), pair=Pair(source, source, FAR, normals, normals))
+    bare = replace(registered("point_to_plane"), pair=replace(registered().pair, target_normals=None))
     for name in ("monte_carlo", "brossard"):
-        assert make_estimator(name)(pair).failure == "fewer than 7 runs found a correspondence"
-
-
-def test_a_method_that_reads_no_initial_pose_does_not_spread():
+        assert make_estimator(name)(lost).failure == "fewer than 7 runs found a correspondence"
+    for name in ("bonnabel", "brossard", "monte_carlo"):
+        assert make_estimator(name)(bare).failure == "the target has no normals"
     said = make_estimator("monte_carlo")(registered("fgr"))
     assert said.failure == "'fgr' reads no initial pose, so that its results do not spread"
 
@@ -76,12 +72,6 @@ def test_any_local_method_can_be_run_from_starts():
         for method in ("point_to_plane", "huber")
     )
     assert np.sqrt(np.trace(one_by_one)) == pytest.approx(np.sqrt(np.trace(batched)), rel=0.5)
-
-
-def test_without_normals_what_needs_them_fails():
-    bare = replace(registered("point_to_plane"), pair=replace(registered().pair, target_normals=None))
-    for name in ("bonnabel", "brossard", "monte_carlo"):
-        assert make_estimator(name)(bare).failure == "the target has no normals"
 
 
 def test_a_covariance_that_is_not_finite_is_a_failure(monkeypatch):
@@ -123,8 +113,6 @@ def test_the_inverse_of_a_hessian_or_why_there_is_none():
 
 
 def test_the_intrinsic_frame_turns_with_the_cloud():
-    from gpca.rigid import exp, transform
-
     cloud = ellipsoid(0)[0] ** 3 + 0.3 * ellipsoid(0)[0]
     T = exp(np.array([[0.4, -0.8, 0.5, 0.1, 0.2, 0.3]]))[0]
     frame = intrinsic_frame(cloud)
