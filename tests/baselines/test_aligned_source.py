@@ -62,16 +62,11 @@ def test_an_embedding_that_tells_nothing_is_refused(embedded):
         ConceptVectors("tiny", 0).fit(replace(train, attached={"embedding": np.ones((36, 4))}))
 
 
-def by_head(registrations, logits):
-    entry = explainer_entry("softmax_head")
-    assert entry.reads == "embeddings"
-    return entry.make("tiny", 0).explain(replace(registrations, attached={"head_logits": logits}))
-
-
 def test_scores_are_the_softmax_of_the_logits_even_of_large_ones(registrations):
     logits = np.random.default_rng(0).normal(scale=3, size=(len(registrations), 3))
     logits[0] = [1000.0, 1000.0, 0.0]
-    attribution = by_head(registrations, logits)
+    explainer = explainer_entry("softmax_head").make("tiny", 0)
+    attribution = explainer.explain(replace(registrations, attached={"head_logits": logits}))
     weights = np.exp(logits[1:])
     assert attribution.scores_N_C[0] == pytest.approx([0.5, 0.5, 0.0])
     assert attribution.scores_N_C[1:] == pytest.approx(weights / weights.sum(axis=1, keepdims=True))
@@ -83,32 +78,20 @@ def test_scores_are_the_softmax_of_the_logits_even_of_large_ones(registrations):
 SETTINGS = {"iterations": 15, "inducing": 8, "draws": 100, "learning_rate": 0.05}
 
 
-@pytest.fixture(scope="module")
-def halves(registrations):
-    random = np.random.default_rng(0)
-    h_S_6 = random.normal(size=(len(registrations), 6)).astype(np.float32)
+def test_gpytorchs_classes_say_what_gp_ca_says(registrations):
+    h_S_6 = np.random.default_rng(0).normal(size=(len(registrations), 6)).astype(np.float32)
     h_S_6[:, :3] += 3 * (registrations.concept[:, None] == np.array(CONCEPTS))
     embedded = replace(registrations, attached={"embedding": h_S_6})
-    return [embedded.subset(embedded.rows(split)) for split in ("train", "test")]
-
-
-def explained(name, train, test, seed=0):
-    explainer = explainer_entry(name).make("tiny", seed, **SETTINGS)
-    explainer.fit(train)
-    return explainer.explain(test.without_labels())
-
-
-def test_it_says_what_gp_ca_says(halves):
-    ours, theirs = (explained(name, *halves) for name in ("gpca_paper", "gpca_gpytorch"))
+    train, test = (embedded.subset(embedded.rows(split)) for split in ("train", "test"))
+    ours, theirs = (explainer_entry(name).make("tiny", 0, **SETTINGS) for name in ("gpca_paper", "gpca_gpytorch"))
+    with pytest.raises(InputError, match="3 samples for 3 classes"):
+        theirs.fit(train.subset(np.arange(3)))
+    for explainer in (ours, theirs):
+        explainer.fit(train)
+    ours, theirs = (explainer.explain(test.without_labels()) for explainer in (ours, theirs))
     assert theirs.predicted_N.tolist() == ours.predicted_N.tolist()
-    assert np.mean(theirs.predicted_N == halves[1].concept) > 0.6  # chance is a third
+    assert np.mean(theirs.predicted_N == test.concept) > 0.6  # chance is a third
     for name in ("scores_N_C", "variances_N_C", "bald_N"):
         assert getattr(theirs, name) == pytest.approx(getattr(ours, name), abs=1e-4)
     assert not theirs.icp_calls_N.any()
     assert (theirs.seconds_N > 0).all()
-
-
-def test_too_few_labels_are_refused_in_one_line(halves):
-    train, test = halves
-    with pytest.raises(InputError, match="3 samples for 3 classes"):
-        explained("gpca_gpytorch", train.subset(np.arange(3)), test)

@@ -10,14 +10,9 @@ QUICK = {"learning_rate": 0.1, "iterations": 60, "inducing": 16, "draws": 200, "
 NAMES = ("analytical_gpc", "analytical_gpc_no_counts")
 
 
-def fitted(name, registrations, **settings):
-    explainer = explainer_entry(name).make("tiny", 0, **QUICK | settings)
-    explainer.fit(registrations.subset(registrations.rows("train")))
-    return explainer
-
-
 def test_it_names_the_concept_and_needs_no_label_and_no_other_sample(registrations):
-    explainer = fitted("analytical_gpc", registrations)
+    explainer = explainer_entry("analytical_gpc").make("tiny", 0, **QUICK)
+    explainer.fit(registrations.subset(registrations.rows("train")))
     attribution = explainer.explain(registrations.without_labels())
     assert np.mean(attribution.predicted_N == registrations.concept) > 0.8
     assert (attribution.variances_N_C > 0).all()
@@ -33,13 +28,9 @@ def test_the_point_count_ratio_is_the_last_feature_of_the_one_and_none_of_the_ot
     assert np.array_equal(with_counts[:, -1], ratio_S)
     assert np.array_equal(with_counts[:, :-1], without)
     assert np.array_equal(without[:, 0], registrations.inlier_rmse)
-
-
-def test_the_points_drawn_are_named_by_split_and_sample(registrations):
-    features_S_F = AnalyticalGPC("tiny", 0, **QUICK)._inputs(registrations)
-    rows = np.array([50, 7, 20])
-    assert np.array_equal(AnalyticalGPC("tiny", 0, **QUICK)._inputs(registrations.subset(rows)), features_S_F[rows])
-    assert not np.array_equal(AnalyticalGPC("tiny", 1, **QUICK)._inputs(registrations), features_S_F)
+    rows = np.array([50, 7, 20])  # the points drawn are named by split and sample
+    assert np.array_equal(AnalyticalGPC("tiny", 0, **QUICK)._inputs(registrations.subset(rows)), with_counts[rows])
+    assert not np.array_equal(AnalyticalGPC("tiny", 1, **QUICK)._inputs(registrations), with_counts)
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -69,13 +69,10 @@ def scores(explainer, pairs):
     return explainer.explain(pairs.without_labels()).scores_N_C
 
 
-def test_it_says_what_it_reads_and_which_runs_that_costs():
+def test_what_the_runs_tell_is_learned_beside_the_clouds(explainers, pairs):
     entries = [explainer_entry(name, CAUSES) for name in NAMES]
     assert [entry.sight for entry in entries] == ["pair + motion + further runs", "pair"]
     assert [icp_calls(entry.sees, 13, DescriptorSettings()) for entry in entries] == [12, 0]
-
-
-def test_what_the_runs_tell_is_learned_beside_the_clouds(explainers, pairs):
     found = explainers["gpca_pair_dgcnn"].explain(pairs.without_labels())
     assert found.concepts == LABELS
     assert (found.predicted_N == pairs.concept).mean() > 0.5

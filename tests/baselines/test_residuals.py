@@ -64,19 +64,15 @@ def test_the_third_feature_is_the_log_determinant_of_the_observed_condition_abov
 
 
 @pytest.mark.parametrize("name", RIVALS)
-def test_they_name_the_concept_and_need_no_label_and_no_other_sample(name, attached):
-    assert explainer_entry(name).reads == "uncertainty/removal"
+def test_they_name_the_concept_by_the_observed_condition_and_need_no_label_and_no_other_sample(name, attached):
+    entry = explainer_entry(name)
+    assert entry.reads == "uncertainty/removal" and entry.observed_only and not entry.oracle
     explainer = fitted(name, attached)
     attribution = explainer.explain(attached.without_labels())
     test = attached.rows("test")
     assert np.mean(attribution.predicted_N[test] == attached.concept[test]) > 0.8
     rows = np.array([7, 50, 3])
     assert explainer.explain(attached.subset(rows)).scores_N_C == pytest.approx(attribution.scores_N_C[rows], abs=1e-12)
-
-
-@pytest.mark.parametrize("name", RIVALS)
-def test_the_observed_condition_is_charged(name, attached):
-    attribution = fitted(name, attached).explain(attached)
     assert np.array_equal(attribution.icp_calls_N, attached.attached["icp_calls"][:, 0])
     assert np.array_equal(attribution.icp_seconds_N, attached.attached["icp_seconds"][:, 0])
     assert (attribution.seconds_N > attached.attached["seconds"][:, 0]).all()
@@ -97,15 +93,6 @@ def test_the_config_may_set_what_they_take():
     require_settings("residuals_rules", {"depth": 2, "smallest_leaf": 0.1, "floor": 1e-5})
     with pytest.raises(InputError, match="setting floor"):
         require_settings("residuals_forest", {"floor": 0})
-
-
-def test_it_reads_the_observed_pair_alone_so_that_controls_can_run_it():
-    entry = explainer_entry("residuals_rules")
-    assert entry.observed_only
-    assert not entry.oracle
-
-
-@pytest.mark.parametrize("wrong", [{"depth": 0}, {"smallest_leaf": 0.6}, {"smallest_leaf": 0}, {"leaves": 3}])
-def test_a_tree_that_cannot_be_is_refused(wrong):
-    with pytest.raises(InputError, match="setting"):
-        require_settings("residuals_rules", wrong)
+    for wrong in ({"depth": 0}, {"smallest_leaf": 0.6}, {"smallest_leaf": 0}, {"leaves": 3}):
+        with pytest.raises(InputError, match="setting"):
+            require_settings("residuals_rules", wrong)
