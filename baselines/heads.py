@@ -7,6 +7,7 @@ Monte-Carlo dropout (Gal & Ghahramani 2016), or Laplace's approximation over the
 
 from __future__ import annotations
 
+import math
 from functools import partial
 from itertools import pairwise
 from typing import Annotated, Any
@@ -51,6 +52,8 @@ class Heads:
         import torch
         from sklearn.preprocessing import StandardScaler
 
+        from gpca.portable import Adam
+
         self._scaler = StandardScaler().fit(h_N_d)
         inputs_N_d, targets_N = self._inputs(h_N_d), torch.from_numpy(target_N)
         random = torch.Generator().manual_seed(seed_of(*self._axes))
@@ -58,10 +61,8 @@ class Heads:
         for width, outputs in pairwise((h_N_d.shape[1], self._hidden, len(CONCEPTS))):
             weight = torch.randn((self._heads, width, outputs), generator=random) * (2 / width) ** 0.5
             self._layers += [weight.requires_grad_(), torch.zeros((self._heads, 1, outputs), requires_grad=True)]
-        # Fused, because the plain form takes torch.sqrt, whose last bit depends on the processor's vendor.
-        optimizer = torch.optim.AdamW(self._layers, self._learning_rate, weight_decay=self._weight_decay, fused=True)
-        schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, self._steps)
-        for _ in range(self._steps):
+        optimizer = Adam(self._layers, self._learning_rate, self._weight_decay)
+        for step in range(self._steps):
             rows_E_B = torch.rand((self._heads, len(targets_N)), generator=random).argsort(dim=1)[:, :BATCH_SIZE]
             hidden_E_B_H = self._hidden_units(inputs_N_d[rows_E_B])
             if self._rate:
@@ -73,7 +74,8 @@ class Heads:
             # Scaled so that a head's gradient is that of its loss, however many are trained beside it.
             (loss * self._heads).backward()
             optimizer.step()
-            schedule.step()
+            falls = [1 + math.cos(math.pi * passed / self._steps) for passed in (step, step + 1)]
+            optimizer.learning_rate *= falls[1] / falls[0]
 
     def hidden(self, h_N_d: np.ndarray) -> np.ndarray:
         """Return the hidden units (E, N, H) of the embeddings."""

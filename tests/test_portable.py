@@ -4,7 +4,7 @@ import sys
 import pytest
 import torch
 
-from gpca.portable import Adam, log_sum_exp, logarithm, square_root
+from gpca.portable import Adam, log_sum_exp, logarithm, one_cycle, square_root
 from gpca.process.code_files import ROOT
 
 
@@ -38,17 +38,36 @@ def fitted(make, dtype):
 
 
 @pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
-def test_steps_are_those_of_torch_to_the_bit(dtype):
-    ours = fitted(lambda weights: Adam(weights, 0.1), dtype)
-    theirs = fitted(lambda weights: torch.optim.Adam(weights, lr=0.1, fused=True), dtype)
+@pytest.mark.parametrize("decay", [0.0, 0.01])
+def test_steps_are_those_of_torch_to_the_bit(dtype, decay):
+    ours = fitted(lambda weights: Adam(weights, 0.1, decay), dtype)
+    theirs = fitted(lambda weights: torch.optim.AdamW(weights, lr=0.1, weight_decay=decay, fused=True), dtype)
     assert all(torch.equal(*pair) for pair in zip(ours, theirs, strict=True))
 
 
-def test_torchs_compiler_is_not_loaded():
-    code = """import sys, numpy as np
-from gpca.classifier.gpc import GPC, GPCSettings
-settings = GPCSettings(iterations=2, inducing=2, draws=4)
-GPC(('a', 'b'), settings, 0).fit(np.arange(8.0).reshape(4, 2), np.array(['a', 'b'] * 2))
-print('torch._dynamo' in sys.modules)"""
+@pytest.mark.parametrize("steps", [5, 6, 100])
+def test_one_cycle_is_torchs_to_the_bit(steps):
+    optimizer = torch.optim.AdamW([torch.zeros(1, requires_grad=True)], 1e-3)
+    schedule = torch.optim.lr_scheduler.OneCycleLR(optimizer, 1e-3, steps, pct_start=0.25)
+    for step in range(steps + 1):
+        [group] = optimizer.param_groups
+        assert one_cycle(step, steps, 1e-3, 0.25) == (group["lr"], group["betas"][0])
+        optimizer.step()
+        if step < steps:
+            schedule.step()
+
+
+FITS = {
+    "GPC": """from gpca.classifier.gpc import GPC, GPCSettings
+GPC(("a", "b"), GPCSettings(iterations=2, inducing=2, draws=4), 0).fit(inputs, np.array(["a", "b"] * 2))""",
+    "heads": """from baselines.heads import Heads
+Heads(0, steps=2).fit(inputs, np.arange(4) % 2)""",
+}
+
+
+@pytest.mark.parametrize("fit", FITS)
+def test_torchs_compiler_is_not_loaded(fit):
+    begin = "import sys, numpy as np\ninputs = np.arange(8.0).reshape(4, 2)"
+    code = f"{begin}\n{FITS[fit]}\nprint('torch._dynamo' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
     assert done.stdout == "False\n"

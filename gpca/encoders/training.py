@@ -24,6 +24,7 @@ from gpca.errors import InputError
 from gpca.io.files import Axes, require_axes, require_file
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
+from gpca.portable import Adam, one_cycle
 from gpca.process.progress import progress
 from gpca.seeds import generator, seed_of
 
@@ -150,12 +151,8 @@ class _Training:
         self._axes, self._settings, self._draw = axes, settings, task.draw
         self._targets_S = torch.from_numpy(np.array([task.classes.index(name) for name in registrations.concept]))
         self._batches = -(-len(rows) // settings.batch_size)
-        rate = settings.learning_rate
-        steps = max(5, settings.epochs * self._batches)  # a quarter of 4 would be one step, a rise of no length
-        # Fused, because the plain form takes torch.sqrt, whose last bit depends on the processor's vendor.
-        self._optimizer = torch.optim.AdamW(model.parameters(), rate, weight_decay=settings.weight_decay, fused=True)
-        self._schedule = torch.optim.lr_scheduler.OneCycleLR(self._optimizer, rate, steps, pct_start=RISING)
-        self.state: dict[str, Any] = {"model": model, "optimizer": self._optimizer, "schedule": self._schedule}
+        self._optimizer = Adam(model.parameters(), settings.learning_rate, settings.weight_decay)
+        self.state: dict[str, Any] = {"model": model, "optimizer": self._optimizer}
         self.title = f"{settings.backbone} on {axes[0]}, seed {axes[1]}"
 
     def run_epoch(self, epoch: int) -> dict[str, float]:
@@ -164,7 +161,8 @@ class _Training:
         torch.manual_seed(seed_of(*self._axes, "dropout", epoch))  # the same in a resumed training
         loss_sum = correct = 0.0
         order = generator(*self._axes, "order", epoch).permutation(self._rows)
-        for batch_rows in np.array_split(order, self._batches):
+        for batch, batch_rows in enumerate(np.array_split(order, self._batches)):
+            self._schedule(epoch * self._batches + batch)
             outputs_B_C, targets_B = self._predict(batch_rows, "epoch", epoch)
             loss = nn.functional.cross_entropy(outputs_B_C, targets_B)
             if (penalty := getattr(self._model.encoder, "penalty", None)) is not None:
@@ -172,13 +170,18 @@ class _Training:
             self._optimizer.zero_grad()
             loss.backward()
             self._optimizer.step()
-            self._schedule.step()
             loss_sum += loss.item() * len(batch_rows)
             correct += float((outputs_B_C.argmax(dim=1) == targets_B).sum())
         if not np.isfinite(loss_sum):
             raise InputError(self.title, f"the loss is not finite in epoch {epoch + 1}", "lower encoder.learning_rate")
         means = {"loss": loss_sum / len(self._rows), "accuracy": correct / len(self._rows)}
-        return {"learning_rate": self._optimizer.param_groups[0]["lr"], **means}
+        self._schedule((epoch + 1) * self._batches)
+        return {"learning_rate": self._optimizer.learning_rate, **means}
+
+    def _schedule(self, step: int) -> None:
+        steps = max(5, self._settings.epochs * self._batches)  # a quarter of 4 would be one, a rise of no length
+        rate_and_beta1 = one_cycle(step, steps, self._settings.learning_rate, RISING)
+        self._optimizer.learning_rate, self._optimizer.beta1 = rate_and_beta1
 
     @torch.inference_mode()
     def validate(self, rows: np.ndarray) -> dict[str, float]:
