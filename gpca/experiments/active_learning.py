@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, replace
+from typing import Any
 
 from gpca.active_learning.acquisition import STREAMS, require_strategy, strategies, strategy_module
 from gpca.active_learning.curves import TABLE, collect_curves
@@ -18,22 +17,18 @@ from gpca.active_learning.settings import (
 )
 from gpca.declarations.experiment import Experiment, LeftOut, Names
 from gpca.declarations.plan import Run
-from gpca.declarations.result import figure, numbers, table
+from gpca.declarations.result import Figure, Frame, Paths, figure, numbers, table
 from gpca.declarations.step import Plan, Step
-from gpca.encoders.registry import EncoderChanges, encoder_module, require_draws
+from gpca.encoders.registry import EncoderChanges, require_draws
 from gpca.errors import require_names
-from gpca.experiments.label_counts import COUNT, Clusters, Quantity, cell_of, families
+from gpca.experiments.label_counts import COUNT, Clusters, families, label_cells, quantity
 from gpca.experiments.label_curves import STYLES, draw_curves, mean_curves
 from gpca.pairs.perturbation import Concept
-from gpca.reporting.tables.builder import TableBuilder, cautious_over, crossed
-from gpca.reporting.tables.cells import rows_where
-from gpca.reporting.tables.table import Cell, Column, Table
+from gpca.reporting.sheet import Row, Sheet, Show, crossed
+from gpca.reporting.tables.builder import cautious_over
+from gpca.reporting.tables.table import Table
 from gpca.reporting.words import plural
 from gpca.settings import Distinct, PositiveShare
-
-if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.figure import Figure
 
 NAME = "active_learning"
 PAPERS_HELD_OUT = "overlap"  # the paper's GPC knows noise and pose (Sec. IV-C)
@@ -98,18 +93,14 @@ def _seed_settings(plan: Plan, wildcards: Any) -> dict[str, Any]:
     return settings | {"rare": rare | {"shares": rare["shares"][:1]}}
 
 
-def _encoder(plan: Plan) -> dict[str, Any]:
-    return plan.config["encoders"][plan.config["embedding"]["encoder"]]
-
-
 EMBED_WITHOUT = Step(
     name="embed_without",
     run="gpca.steps.active_learning:embed_without",
     inputs={"registrations": "registrations/{source}/seed{seed}.npz"},
     outputs={"out": "embeddings/{source}/without/seed{seed}.npz"},
-    settings=lambda plan, wildcards: _encoder(plan) | plan.config["active_learning"]["without"],
+    settings=lambda plan, wildcards: plan.encoder | plan.config["active_learning"]["without"],
     params={"concepts": lambda plan, wildcards: plan.config["active_learning"]["held_out"]},
-    modules=lambda plan: [encoder_module(_encoder(plan))],
+    modules=lambda plan: [plan.encoder_module],
     priority=7,
 )
 LEARN = Step(
@@ -129,7 +120,7 @@ LEARN = Step(
 
 
 @numbers("active_learning.csv", files="active_learning/{source}/{strategy}/seed{seed}.csv")
-def collect(run: Run, files: Iterable[str | Path]) -> pd.DataFrame:
+def collect(run: Run, files: Paths) -> Frame:
     """Labels to the target, accuracies and areas of all learning curves, by seed."""
     return collect_curves(files, run.config["active_learning"]["target"])
 
@@ -152,30 +143,27 @@ CURVES = {"curve_files": "active_learning/{source}/{pool_strategy}/seed{seed}.cs
     paper=True,
     **INPUTS,
 )
-def table3_active_learning(run: Run, metrics: pd.DataFrame, clusters: Clusters) -> Table:
+def table3_active_learning(run: Run, metrics: Frame, clusters: Clusters) -> Table:
     """Labels to the target accuracy by BALD, also with k-means, and at random (Table III): sources × settings.
 
     Settings with a rare new concept, which the paper's classifier learns, stand first.
     """
     learning = run.config["active_learning"]
-    rows = metrics[metrics["concept"] == PAPERS_HELD_OUT]
     shares = learning["rare"]["shares"] if learning["rare"] else ()
     settings = {rare_setting(share): f"all concepts; {100 * share:g} % of the pool new" for share in shares} | SETTINGS
     chosen = {"bald_kmeans": "BALD + k-means", "bald": "BALD", "random": "random"}
-    labels_by = {
-        f"labels_{name}": Quantity("labels_to_target", Column(f"Labels, {words}", **COUNT), name)
+    labels = {
+        f"labels_{name}": quantity("labels_to_target", f"Labels, {words}", name, **COUNT)
         for name, words in chosen.items()
     }
-    quantities = labels_by | {
-        "accuracy_bald_kmeans": Quantity("final_accuracy", Column("Acc. BALD (%)"), strategy="bald_kmeans"),
-        "accuracy_random": Quantity("final_accuracy", Column("Acc. random (%)"), strategy="random"),
-        "epochs_bald_kmeans": Quantity("epochs_at_target", Column("Epochs", **COUNT), strategy="bald_kmeans"),
+    columns = labels | {
+        "accuracy_bald_kmeans": quantity("final_accuracy", "Acc. BALD (%)", "bald_kmeans"),
+        "accuracy_random": quantity("final_accuracy", "Acc. random (%)", "random"),
+        "epochs_bald_kmeans": quantity("epochs_at_target", "Epochs", "bald_kmeans", **COUNT),
     }
-    builder = TableBuilder("table3_active_learning", {"source": "Dataset", "setting": "Encoder saw"})
-    for (source, setting), labels in crossed(run.source_titles, settings):
-        selected = rows_where(rows, source=source, table=TABLE + setting)
-        builder.add_row(labels, _cells(run, selected, quantities, clusters))
-    builder.compare_across(labels_by)
+    rows = crossed(("source", run.source_titles), ("setting", settings))
+    of_papers = metrics[metrics["concept"] == PAPERS_HELD_OUT]
+    sheet = _sheet(run, "table3_active_learning", ("source", "setting"), rows, columns, of_papers, clusters)
     other = "Other rows: " if shares else ""
     notes = [
         *_rare_note(learning),
@@ -184,7 +172,30 @@ def table3_active_learning(run: Run, metrics: pd.DataFrame, clusters: Clusters) 
         "Epochs: passes of the retraining that reached the target. Acc.: after all labels.",
     ]
     caption = f"Labels until a GPC that knew noise and pose reaches {learning['target']:.0%} on all concepts"
-    return _table(run, builder, caption, quantities, notes)
+    return _table(run, sheet, caption, notes, bold_across=labels)
+
+
+HEADS = {"source": "Dataset", "setting": "Encoder saw", "strategy": "Strategy"}
+
+
+def _sheet(
+    run: Run,
+    name: str,
+    heads: Iterable[str],
+    rows: list[Row],
+    columns: Mapping[str, Show],
+    metrics: Frame,
+    clusters: Clusters,
+) -> Sheet:
+    metrics = metrics.assign(setting=metrics["table"].str.removeprefix(TABLE))
+    cell = label_cells(run.config["registrations"]["test"], clusters)
+    return Sheet(name, {head: HEADS[head] for head in heads}, rows, columns, metrics, cell=cell)
+
+
+def _table(run: Run, sheet: Sheet, caption: str, notes: Iterable[str], **compared: Any) -> Table:
+    over = f"{cautious_over(sheet.most_seeds(), run.config['registrations']['test'])}."
+    caption += run.stand_ins(partly=False)
+    return sheet.table(caption, "quantity", (over, *notes), keep_empty=True, **compared)
 
 
 @figure(
@@ -198,7 +209,7 @@ def table3_active_learning(run: Run, metrics: pd.DataFrame, clusters: Clusters) 
     in every panel; the other strategies are shared out among the panels of a setting.""",
     **CURVES,
 )
-def active_learning_curves(run: Run, curve_files: Iterable[str | Path]) -> Figure:
+def active_learning_curves(run: Run, curve_files: Paths) -> Figure:
     """Accuracy over labels, mean over the concepts held out, then over the seeds."""
     return _draw(run, curve_files, ROWS)
 
@@ -211,12 +222,12 @@ def active_learning_curves(run: Run, curve_files: Iterable[str | Path]) -> Figur
     of the two thick curves, which stand in every panel.""",
     **CURVES,
 )
-def active_learning_overlap(run: Run, curve_files: Iterable[str | Path]) -> Figure:
+def active_learning_overlap(run: Run, curve_files: Paths) -> Figure:
     """Accuracy over labels in the paper's experiment, in which overlap is new, and common in the pool or rare."""
     return _draw(run, curve_files, OVERLAP_ROWS, (PAPERS_HELD_OUT,))
 
 
-def _draw(run: Run, files: Iterable[str | Path], rows: Mapping[str, str], held_out: Collection[str] | None = None):
+def _draw(run: Run, files: Paths, rows: Mapping[str, str], held_out: Collection[str] | None = None):
     learning = run.config["active_learning"]
     by_strategy = mean_curves(files, held_out).items()
     curves = {(source, setting, strategy): curve for (source, strategy, setting), curve in by_strategy}
@@ -230,26 +241,24 @@ def _draw(run: Run, files: Iterable[str | Path], rows: Mapping[str, str], held_o
     start from the same labels. Area gain is the mean accuracy over the budget minus that of random choice.""",
     **INPUTS,
 )
-def table3_extended(run: Run, metrics: pd.DataFrame, clusters: Clusters) -> Table:
+def table3_extended(run: Run, metrics: Frame, clusters: Clusters) -> Table:
     """Every strategy, encoder and concept held out, with means over the three where one column is for all."""
     learning = run.config["active_learning"]
-    quantities = {
-        f"labels_{c}": Quantity("labels_to_target", Column(f"Labels, {c}", **COUNT), concept=c)
-        for c in _concepts(metrics)
+    columns = {
+        f"labels_{c}": quantity("labels_to_target", f"Labels, {c}", concept=c, **COUNT) for c in _concepts(metrics)
     } | {
-        "reached": Quantity("reached", Column("Reached (%)", decimals=0, interval=False)),
-        "final_accuracy": Quantity("final_accuracy", Column("Accuracy (%)")),
-        "final_accuracy_new": Quantity("final_accuracy_new", Column("New (%)")),
-        "area_under_curve": Quantity("area_under_curve", Column("Area (%)")),
-        "area_gain": Quantity("area_gain", Column("Gain (%)", limits=(-100, 100))),
+        "reached": quantity("reached", "Reached (%)", decimals=0, interval=False),
+        "final_accuracy": quantity("final_accuracy", "Accuracy (%)"),
+        "final_accuracy_new": quantity("final_accuracy_new", "New (%)"),
+        "area_under_curve": quantity("area_under_curve", "Area (%)"),
+        "area_gain": quantity("area_gain", "Gain (%)", limits=(-100, 100)),
     }
-    builder = TableBuilder("table3_extended", {"source": "Dataset", "setting": "Encoder saw", "strategy": "Strategy"})
     pool = {name: title for name, title in titles(learning["strategies"]).items() if name not in STREAMS}
-    for (source, setting, strategy), labels in crossed(run.source_titles, SETTINGS, pool):
-        selected = rows_where(metrics, source=source, table=TABLE + setting, method=strategy)
-        is_rival = not require_strategy(strategy).oracle
-        builder.add_row(labels, _cells(run, selected, quantities, clusters), rival=is_rival)
-    builder.compare_down([key for key in quantities if key != "reached"], same=2)
+    rows = [
+        replace(row, rival=not require_strategy(row.where["method"]).oracle)
+        for row in crossed(("source", run.source_titles), ("setting", SETTINGS), ("method", pool))
+    ]
+    sheet = _sheet(run, "table3_extended", HEADS, rows, columns, metrics, clusters)
     notes = [
         _protocol(run),
         "Labels: until the target, by the concept held out. Reached: share of the runs that reached it. Accuracy: "
@@ -258,7 +267,7 @@ def table3_extended(run: Run, metrics: pd.DataFrame, clusters: Clusters) -> Tabl
         "concepts held out, then over the seeds.",
     ]
     caption = f"Active learning of a held-out concept by every strategy, to {learning['target']:.0%}"
-    return _table(run, builder, caption, quantities, notes)
+    return _table(run, sheet, caption, notes, bold=[key for key in columns if key != "reached"], same=2)
 
 
 @table(
@@ -268,25 +277,21 @@ def table3_extended(run: Run, metrics: pd.DataFrame, clusters: Clusters) -> Tabl
     concept is recognized, and the number of labels that this costs.""",
     **INPUTS,
 )
-def table3_stream(run: Run, metrics: pd.DataFrame, clusters: Clusters) -> Table:
+def table3_stream(run: Run, metrics: Frame, clusters: Clusters) -> Table:
     """Labels that a stream asks for, arrivals until a new concept is recognized, accuracy: sources × learners."""
     learning = run.config["active_learning"]
     stream = learning["stream"]
-    quantities = {
-        f"delay_{c}": Quantity("delay", Column(f"Delay, {c}", **COUNT), concept=c) for c in _concepts(metrics)
-    } | {
-        "labels": Quantity("labels", Column("Labels", interval=False, **COUNT)),
-        "new_labels": Quantity("new_labels", Column("Labels of the new", interval=False, **COUNT)),
-        "running_accuracy": Quantity("running_accuracy", Column("Running (%)")),
-        "final_accuracy": Quantity("final_accuracy", Column("Accuracy (%)")),
-        "final_accuracy_new": Quantity("final_accuracy_new", Column("New (%)")),
+    columns = {f"delay_{c}": quantity("delay", f"Delay, {c}", concept=c, **COUNT) for c in _concepts(metrics)} | {
+        "labels": quantity("labels", "Labels", interval=False, **COUNT),
+        "new_labels": quantity("new_labels", "Labels of the new", interval=False, **COUNT),
+        "running_accuracy": quantity("running_accuracy", "Running (%)"),
+        "final_accuracy": quantity("final_accuracy", "Accuracy (%)"),
+        "final_accuracy_new": quantity("final_accuracy_new", "New (%)"),
     }
-    builder = TableBuilder("table3_stream", {"source": "Dataset", "strategy": "Strategy"})
     streams = {name: title for name, title in titles(learning["strategies"]).items() if name in STREAMS}
-    for (source, strategy), labels in crossed(run.source_titles, streams):
-        selected = rows_where(metrics, source=source, table=TABLE + "pretrained", method=strategy)
-        builder.add_row(labels, _cells(run, selected, quantities, clusters))
-    builder.compare_down([key for key in quantities if "labels" not in key], same=1)
+    rows = crossed(("source", run.source_titles), ("method", streams))
+    pretrained = metrics[metrics["table"] == f"{TABLE}pretrained"]
+    sheet = _sheet(run, "table3_stream", ("source", "strategy"), rows, columns, pretrained, clusters)
     notes = [
         f"{stream['arrivals']} samples arrive one by one; the first {stream['quiet']} are of the two known "
         f"concepts ({learning['initial']} labeled samples at the start); a third of the others is new. A label "
@@ -297,29 +302,12 @@ def table3_stream(run: Run, metrics: pd.DataFrame, clusters: Clusters) -> Table:
         "known. Accuracy, New: on all test samples and those of the new concept, at the end. All but Delay are "
         "means over the concepts held out, then over the seeds.",
     ]
-    return _table(run, builder, "A new concept in a stream of registrations", quantities, notes)
+    bold = [key for key in columns if "labels" not in key]
+    return _table(run, sheet, "A new concept in a stream of registrations", notes, bold=bold, same=1)
 
 
-def _concepts(metrics: pd.DataFrame) -> list[str]:
+def _concepts(metrics: Frame) -> list[str]:
     return list(dict.fromkeys(metrics["concept"]))
-
-
-def _table(
-    run: Run, builder: TableBuilder, caption: str, quantities: Mapping[str, Quantity], notes: Iterable[str]
-) -> Table:
-    return builder.build(
-        caption=caption + run.stand_ins(partly=False),
-        column_head="quantity",
-        columns={key: quantity.column for key, quantity in quantities.items()},
-        footnotes=(f"{cautious_over(builder.most_seeds(), run.config['registrations']['test'])}.", *notes),
-    )
-
-
-def _cells(
-    run: Run, metrics: pd.DataFrame, quantities: Mapping[str, Quantity], clusters: Clusters
-) -> dict[str, Cell | None]:
-    test = run.config["registrations"]["test"]
-    return {key: cell_of(metrics, quantity, test, clusters) for key, quantity in quantities.items()}
 
 
 def _protocol(run: Run) -> str:

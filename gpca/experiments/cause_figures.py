@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,6 +12,7 @@ from gpca.causes.candidate import replay
 from gpca.causes.dataset import LABELS, Causes
 from gpca.causes.settings import CauseSettings
 from gpca.causes.truth import ALL, BY_SIZE, FAILED, SUBSETS
+from gpca.declarations.result import Figure, Paths
 from gpca.errors import InputError
 from gpca.evaluation.measures import source_method_seed
 from gpca.objects.canonical import ObjectClouds
@@ -25,9 +25,6 @@ from gpca.reporting.figures.style import SMALL_PT, TEXT_WIDTH_IN, blues, use_sty
 from gpca.reporting.words import object_in_words
 from gpca.rigid import transform
 from gpca.seeds import seed_of_file
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 PANEL_IN = 1.3
 PANELS_IN = 3.0  # of the eight counterfactuals, two in each of four rows
@@ -42,7 +39,7 @@ GAP = 0.5  # of a row, between the measured shares and the scores, which are non
 def draw_causes_example(
     objects_npz: str | Path,
     causes_npz: str | Path,
-    predictions_csv: Sequence[str | Path],
+    predictions_csv: Paths,
     settings: CauseSettings,
     explainers: Mapping[str, str],
     title: str,
@@ -99,7 +96,7 @@ def is_clear(causes: Causes) -> np.ndarray:
     return phi_S_3.max(axis=1) >= CLEAR * phi_S_3.sum(axis=1)
 
 
-def _scores(causes: Causes, row: int, files: Sequence[str | Path], explainers: Mapping[str, str]):
+def _scores(causes: Causes, row: int, files: Paths, explainers: Mapping[str, str]):
     """Titles of the rows, their numbers (R, 4), and who is right: the measured shares first."""
     registrations, truth = causes.registrations, causes.truth
     phi = np.maximum(truth.phi[row], 0)

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from math import inf
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from gpca.causes.judged import BINS, CEILING, joined, read_judged
 from gpca.causes.settings import CauseSettings
 from gpca.causes.truth import BORDERLINE, NOMINAL
 from gpca.declarations.plan import Run
-from gpca.declarations.result import figure, table
+from gpca.declarations.result import Frame, figure, table
 from gpca.evaluation.intervals import REPEATS
 from gpca.evaluation.measures import POOLED
 from gpca.experiments.cause_figures import draw_causes_example
@@ -25,9 +25,6 @@ from gpca.reporting.sheet import Row, Sheet, crossed, show, where, with_label
 from gpca.reporting.tables.cells import interval_cell, plain_cell, rows_where
 from gpca.reporting.tables.table import Cell, Column
 from gpca.reporting.words import plural
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 NEAR = 10  # points above chance up to which the untrained rule is near it
 SECTION = "Beyond the paper: what made a registration fail"
@@ -61,10 +58,10 @@ def reads(cost: Mapping) -> tuple[str, str]:
     return cost["sees"], cost["sees"]
 
 
-def counts_and_calls(costs: Mapping[str, Mapping]) -> Callable[[Row, pd.DataFrame], dict[str, Cell]]:
+def counts_and_calls(costs: Mapping[str, Mapping]) -> Callable[[Row, Frame], dict[str, Cell]]:
     """The function that gives a row of a sheet its most samples, and the runs of ICP of its explainer."""
 
-    def cells(row: Row, subset: pd.DataFrame) -> dict[str, Cell]:
+    def cells(row: Row, subset: Frame) -> dict[str, Cell]:
         judged, seeds = subset["samples"].max(), int(subset["seeds"].iloc[0])
         calls = costs.get(row.where["method"], {}).get("icp_calls")
         shown = {"samples": plain_cell(judged, seeds, int(judged))}
@@ -150,7 +147,7 @@ def table9_causes(run: Run, intervals):
     return sheet.table(caption, "metric", notes, bold=[key for key in SHOWN if key not in NOT_COMPARED], same=1)
 
 
-def rule_near_chance(intervals: pd.DataFrame, sources: Iterable[str], **wanted: object) -> str:
+def rule_near_chance(intervals: Frame, sources: Iterable[str], **wanted: object) -> str:
     """Sentence on the untrained rule's share, its distance from chance, and whether its interval ends near that.
 
     Of all sources together, or of the first that has the rule; `wanted` are further entries of the row.

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from itertools import permutations
 from math import inf
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,7 +12,7 @@ from gpca.attribution.metrics import read_causal
 from gpca.attribution.predictions import concepts_of, read_predictions
 from gpca.declarations.experiment import Experiment, Tidy
 from gpca.declarations.plan import Run
-from gpca.declarations.result import Paths, figure, table
+from gpca.declarations.result import Frame, Paths, figure, table
 from gpca.errors import InputError
 from gpca.evaluation.intervals import Clustered, Estimate
 from gpca.evaluation.measures import ALL, intervals, read_all_metrics, source_method_seed
@@ -25,9 +24,6 @@ from gpca.reporting.tables.builder import TableBuilder, over_clusters
 from gpca.reporting.tables.cells import cell_of_repeats, clustered_cell, rows_where
 from gpca.reporting.tables.table import EMPTY, Cell, Column
 from gpca.reporting.words import span
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 PREDICTIONS = "predictions/{source}/{explainer}/seed{seed}.csv"
 PREDICTED = {"prediction_files": PREDICTIONS, "causal_files": "uncertainty/{source}/causal/seed{seed}.csv"}
@@ -42,7 +38,7 @@ EXPERIMENT = Experiment(
 )
 
 
-def collect_intervals(prediction_files: Paths, causal_files: Paths = ()) -> pd.DataFrame:
+def collect_intervals(prediction_files: Paths, causal_files: Paths = ()) -> Frame:
     """Accuracies of `metrics.csv` over all seeds, with 95 % intervals (:mod:`gpca.evaluation.measures`).
 
     - accuracy: of all test samples and of each concept; an abstained sample is wrong.
@@ -54,7 +50,7 @@ def collect_intervals(prediction_files: Paths, causal_files: Paths = ()) -> pd.D
     import pandas as pd
 
     causal_paths = {source_method_seed(path)[::2]: path for path in causal_files}
-    parts: dict[tuple[str, str], list[pd.DataFrame]] = {}
+    parts: dict[tuple[str, str], list[Frame]] = {}
     for path in prediction_files:
         source, method, seed = source_method_seed(path)
         rows = read_predictions(path)
@@ -76,7 +72,7 @@ def collect_intervals(prediction_files: Paths, causal_files: Paths = ()) -> pd.D
     return intervals(records, "predictions")
 
 
-def _accuracies(rows: pd.DataFrame, draws: Clustered) -> Iterator[tuple[str, str, Clustered, Estimate]]:
+def _accuracies(rows: Frame, draws: Clustered) -> Iterator[tuple[str, str, Clustered, Estimate]]:
     """Yield metric, concept, the samples that it is over, and its estimate."""
     concepts = concepts_of(rows)
     true_N, named_N = (rows[name].to_numpy(str) for name in ("concept_true", "concept_predicted"))

@@ -5,19 +5,15 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Mapping
 from itertools import product
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gpca.attribution.metrics import ABSTAINED, PREDICTED_AS
 from gpca.causes.truth import NOMINAL
+from gpca.declarations.result import Figure, Frame
 from gpca.errors import InputError
 from gpca.reporting.figures.panels import draw_percentages
 from gpca.reporting.figures.style import CONCEPT_COLORS, GRAY, LIGHT_GRAY, SMALL_PT, TEXT_WIDTH_IN, use_style
-
-if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.figure import Figure
 
 WIDEST_KEY = 3  # concepts fit into a line over the names of the explainers
 LABEL_IN = 1.45  # width of the explainers' titles
@@ -33,7 +29,7 @@ GAP_IN = 0.2  # between matrix and bars, and after the bars
 ROW_GAP_IN = 0.1
 
 
-def draw_confusions_figure(metrics: pd.DataFrame, sources: Mapping[str, str], explainers: Mapping[str, str]) -> Figure:
+def draw_confusions_figure(metrics: Frame, sources: Mapping[str, str], explainers: Mapping[str, str]) -> Figure:
     """Draw two panels for each explainer (rows) and source (columns), pooled over the seeds.
 
     The matrix is the share in % of each true concept that is taken for each concept; what is missing to 100 is
@@ -92,7 +88,7 @@ def draw_confusions_figure(metrics: pd.DataFrame, sources: Mapping[str, str], ex
     return figure
 
 
-def pooled_confusions(metrics: pd.DataFrame) -> dict[tuple[str, str], pd.DataFrame]:
+def pooled_confusions(metrics: Frame) -> dict[tuple[str, str], Frame]:
     """(Source, explainer) -> counts over all seeds: rows true concepts; columns predicted, abstained last."""
     counts = metrics[metrics["metric"].str.startswith(PREDICTED_AS)]
     counts = counts.assign(predicted=counts["metric"].str.removeprefix(PREDICTED_AS))
@@ -103,7 +99,7 @@ def pooled_confusions(metrics: pd.DataFrame) -> dict[tuple[str, str], pd.DataFra
     return pooled
 
 
-def counts_and_shares(confusion: pd.DataFrame) -> tuple[np.ndarray, np.ndarray]:
+def counts_and_shares(confusion: Frame) -> tuple[np.ndarray, np.ndarray]:
     """Counts (C, C) of true concepts (rows) that are taken for each (columns), and shares of the row with abstained."""
     counts_C_C1 = confusion.reindex(list(confusion.columns[:-1])).to_numpy(float)
     return counts_C_C1[:, :-1], counts_C_C1[:, :-1] / counts_C_C1.sum(axis=1, keepdims=True)
@@ -122,7 +118,7 @@ def letters(concepts: list[str]) -> list[str]:
     return ["OK" if concept == NOMINAL else concept[:length].capitalize() for concept in concepts]
 
 
-def draw_matrix(axes, confusion: pd.DataFrame, head: bool, numbers_pt: float = SMALL_PT) -> None:
+def draw_matrix(axes, confusion: Frame, head: bool, numbers_pt: float = SMALL_PT) -> None:
     """Draw the rows' shares; a concept without samples has none. Predicted concepts are named only at the `head`."""
     concepts = list(confusion.columns[:-1])
     _, shares_C_C = counts_and_shares(confusion)
@@ -134,7 +130,7 @@ def draw_matrix(axes, confusion: pd.DataFrame, head: bool, numbers_pt: float = S
     axes.tick_params(length=0, pad=1.5, labelsize=SMALL_PT, labeltop=True, labelbottom=False)
 
 
-def draw_bars(axes, confusion: pd.DataFrame, head: bool, abstained: bool = True) -> None:
+def draw_bars(axes, confusion: Frame, head: bool, abstained: bool = True) -> None:
     """Draw the predicted classes' shares of all samples, with a dash at each concept's true share."""
     concepts = list(confusion.columns[:-1])
     names = [*letters(concepts), "–"] if abstained else letters(concepts)

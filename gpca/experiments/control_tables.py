@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from math import inf
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from gpca.declarations.plan import Run
-from gpca.declarations.result import Paths, figure, table
+from gpca.declarations.result import Figure, Frame, Paths, Series, figure, table
 from gpca.errors import InputError
 from gpca.evaluation.intervals import REPEATS
 from gpca.evaluation.measures import ALL, POOLED, source_method_seed, tidy
@@ -26,10 +26,6 @@ from gpca.reporting.tables.table import Cell, Column
 from gpca.reporting.words import plural, span
 from gpca.steps import control_samples as samples_of
 from gpca.steps.control_samples import HARD, PAPER, TRANSFER, UNSEEN, trained_otherwise
-
-if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.figure import Figure
 
 INTERVALS = {"intervals": "control_intervals.csv"}
 TITLES = {
@@ -135,7 +131,7 @@ def table10_controls(run: Run, intervals):
     return sheet.table(caption, "control", notes, bold=[name for name in names if name != "shuffled"], same=1)
 
 
-def transfers(intervals: pd.DataFrame) -> pd.DataFrame:
+def transfers(intervals: Frame) -> Frame:
     """Accuracies by the source tested and, in the column ``concept``, the source trained on, which may be the same."""
     rows = rows_where(intervals, metric="accuracy", against="")
     same = rows_where(rows, table=PAPER)
@@ -222,7 +218,7 @@ def table10_encoders(run: Run, intervals):
     forms = {name: words for name, words in explainers.items() if name in GPCA_FORMS}
     accuracy = rows_where(intervals, metric="accuracy")
 
-    def by_objects(source: str, method: str, against: str = "") -> dict[str, pd.Series]:
+    def by_objects(source: str, method: str, against: str = "") -> dict[str, Series]:
         rows = rows_where(accuracy, source=source, method=method, against=against).set_index("table")
         return {objects: rows.loc[objects] for objects in OBJECTS if objects in rows.index}
 
@@ -268,7 +264,7 @@ def table10_encoders(run: Run, intervals):
     )
 
 
-def _with_seeds(words: str, rows: Iterable[pd.Series]) -> str:
+def _with_seeds(words: str, rows: Iterable[Series]) -> str:
     seeds = [row["seeds"] for row in rows]
     return f"{words}, {plural(span(seeds), 'seed')}" if seeds else words
 
@@ -276,7 +272,7 @@ def _with_seeds(words: str, rows: Iterable[pd.Series]) -> str:
 SECONDS = {"learning_seconds": 1, "seconds": 1e3}  # column of the files -> factor to the table's unit
 
 
-def read_costs(files: Paths) -> pd.DataFrame:
+def read_costs(files: Paths) -> Frame:
     """Seconds to learn, and of one registration, of files ``…/{source}/controls/seed{seed}.csv``."""
     records = []
     for path in files:

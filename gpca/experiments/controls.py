@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from gpca.attribution.predictions import read_predictions
 from gpca.causes.settings import NOT_OF_CAUSES, CauseSettings
 from gpca.declarations.experiment import EXPLAINERS, ByName, Experiment, LeftOut
 from gpca.declarations.plan import Run
-from gpca.declarations.result import Paths, numbers
+from gpca.declarations.result import Frame, Paths, numbers
 from gpca.declarations.step import Plan, Step, Wildcards
 from gpca.errors import InputError, with_key
 from gpca.evaluation.intervals import UNTRAINED, Clustered, best_of, interval, weighted_mean
@@ -25,9 +25,6 @@ from gpca.io.csv_file import numbers as number_column
 from gpca.settings import changes_of
 from gpca.steps import control_samples as samples
 from gpca.steps.control_samples import HARD, PAPER, RETRAINED, TRAININGS, TRANSFER, UNSEEN, plain_of
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 CALLS, AUROC = "icp_calls", "auroc_error"
 SECTION = "Beyond the paper: what explainers look at, and whether it carries over"
@@ -166,7 +163,7 @@ EXPLAIN = Step(
 )
 
 
-def read_controls(files: Paths) -> pd.DataFrame:
+def read_controls(files: Paths) -> Frame:
     """Predictions of files named ``…/{source trained on}/seed{seed}.csv``; `source` is the one that is tested.
 
     ``cluster`` names the family with its source. An abstained sample is not ``right``. ``bald`` is NaN where there is
@@ -195,7 +192,7 @@ def read_controls(files: Paths) -> pd.DataFrame:
     return pd.concat(frames, ignore_index=True)
 
 
-def auroc_error(rows: pd.DataFrame, score: str, weights_B_N: np.ndarray) -> np.ndarray:
+def auroc_error(rows: Frame, score: str, weights_B_N: np.ndarray) -> np.ndarray:
     """Area (B,) under the ROC curve by which a score separates wrong from right; NaN where it cannot."""
     from gpca.causes.judged import ranking
 
@@ -205,7 +202,7 @@ def auroc_error(rows: pd.DataFrame, score: str, weights_B_N: np.ndarray) -> np.n
 
 
 @numbers("controls.csv", rule="control_metrics", files="controls/{source}/seed{control_seed}.csv")
-def collect(run: Run, files: Paths) -> pd.DataFrame:
+def collect(run: Run, files: Paths) -> Frame:
     """Accuracy, and AUROC of errors by entropy and by BALD, by seed; ``table`` is the control.
 
     ``concept`` is ``all``, and for transfer the source that was trained on.
@@ -229,7 +226,7 @@ Values = dict[str, np.ndarray]  # metric -> values (1 + B,)
 
 
 @numbers("control_intervals.csv", files="controls/{source}/seed{control_seed}.csv")
-def collect_intervals(run: Run, files: Paths) -> pd.DataFrame:
+def collect_intervals(run: Run, files: Paths) -> Frame:
     """Accuracy and AUROC of every control and explainer over all seeds, with differences, by source and over all.
 
     Of transfer there is a row for each source trained on, and one for all others together. Draws of families and seeds
@@ -270,7 +267,7 @@ def collect_intervals(run: Run, files: Paths) -> pd.DataFrame:
     return intervals(records, "controls")
 
 
-def _values(rows: pd.DataFrame, draws: Clustered) -> Values:
+def _values(rows: Frame, draws: Clustered) -> Values:
     values = {
         "accuracy": weighted_mean(rows["right"].to_numpy(), draws.weights),
         AUROC: auroc_error(rows, "entropy", draws.weights),

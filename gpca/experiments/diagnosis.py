@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from gpca.causes.settings import DescriptorSettings
 from gpca.causes.truth import BORDERLINE
 from gpca.declarations.experiment import ByName, Experiment, LeftOut, Names
 from gpca.declarations.plan import Run
-from gpca.declarations.result import Paths, numbers
+from gpca.declarations.result import Frame, Paths, numbers
 from gpca.declarations.step import Step, Wildcards
 from gpca.encoders.registry import NamedEncoder, require_backbone, require_draws
 from gpca.errors import InputError, with_key
@@ -26,9 +26,6 @@ from gpca.explainers.interface import BARE, REENACTED, icp_calls
 from gpca.explainers.registry import CAUSES, explainer_entry, explainer_module, explainers, require_settings
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.settings import part_of
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 NAME = "diagnosis"
 TABLE = "causes"
@@ -132,7 +129,7 @@ DIAGNOSES = "diagnoses/{source}/{cause_explainer}/seed{seed}.csv"
 @numbers(
     "causes.csv", "cause_intervals.csv", rule="cause_metrics", prediction_files=DIAGNOSES, causes_files=CAUSES_FILES
 )
-def collect(run: Run, prediction_files: Paths, causes_files: Paths) -> tuple[pd.DataFrame, pd.DataFrame]:
+def collect(run: Run, prediction_files: Paths, causes_files: Paths) -> tuple[Frame, Frame]:
     """Confusions and measures of all test samples by seed, and the measures over all seeds with intervals.
 
     Borderline samples are in no confusion.
@@ -158,7 +155,7 @@ def collect(run: Run, prediction_files: Paths, causes_files: Paths) -> tuple[pd.
     prediction_files="feature_diagnoses/{source}/{feature_explainer}/seed{seed}.csv",
     causes_files=CAUSES_FILES,
 )
-def collect_by_features(run: Run, prediction_files: Paths, causes_files: Paths) -> pd.DataFrame:
+def collect_by_features(run: Run, prediction_files: Paths, causes_files: Paths) -> Frame:
     """Measures over all seeds with intervals, of learners that differ in what they read."""
     return compared_by_source(by_source(with_pooled(read_judged(prediction_files, causes_files))))
 
@@ -197,7 +194,7 @@ def compared_by_source(
     axis: str = "cause intervals",
     metrics: Iterable[str] = tuple(MEASURES),
     against: Mapping[str, Rivals] = AGAINST,
-) -> pd.DataFrame:
+) -> Frame:
     """Measures of every source and explainer with intervals over objects and seeds, and differences from rivals."""
     records: list[tuple] = []
     for source, by_explainer in samples_of.items():

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from gpca.alignment.methods.registry import method_entry
 from gpca.declarations.plan import Run
-from gpca.declarations.result import figure
+from gpca.declarations.result import Frame, figure
 from gpca.errors import InputError
 from gpca.experiments.estimator_tables import SECTION
 from gpca.reporting.figures import style
@@ -20,9 +20,6 @@ from gpca.reporting.figures.style import BLACK, GRAY, SMALL_PT
 from gpca.seeds import seed_of_file
 from gpca.uncertainty.estimates import REFERENCES, ReferenceSamples, covariance_of, read_estimate_files
 from gpca.uncertainty.estimators.registry import estimator_entry
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 LEVELS = np.linspace(0.01, 0.99, 99)
 FEWEST_SAMPLES = 20  # of the reference, that a registration shows
@@ -137,7 +134,7 @@ def draw_estimators(run: Run, estimates, samples_npz):
     return drawn
 
 
-def _chosen(reference: pd.DataFrame, samples: ReferenceSamples, method: str, path: str | Path) -> dict[str, int]:
+def _chosen(reference: Frame, samples: ReferenceSamples, method: str, path: str | Path) -> dict[str, int]:
     """Row in the samples of the registration of each kind whose error is the median."""
     enough_S = (np.diff(samples.offsets) >= FEWEST_SAMPLES) & (samples.method == method)
     enough_S &= samples.kind == SHOWN.removeprefix("reference_")
@@ -200,7 +197,7 @@ def draw_ellipses(
     return left_out
 
 
-def _draw_scatter(panel, rows: pd.DataFrame, title: str, color: str, limits: tuple[float, float]) -> None:
+def _draw_scatter(panel, rows: Frame, title: str, color: str, limits: tuple[float, float]) -> None:
     """Draw errors over predicted spreads; on the diagonal the prediction is right on average."""
     from matplotlib.ticker import FixedLocator, NullLocator
 
@@ -229,7 +226,7 @@ def coverages(mahalanobis_S: np.ndarray) -> np.ndarray:
     return (mahalanobis_S[:, None] <= chi2.ppf(LEVELS, 6)).mean(axis=0)
 
 
-def _draw_coverage(panel, rows_of: Mapping[str, pd.DataFrame]) -> None:
+def _draw_coverage(panel, rows_of: Mapping[str, Frame]) -> None:
     panel.plot([0, 100], [0, 100], color=GRAY, linewidth=0.6)
     for name, rows in rows_of.items():
         succeeded = rows[~rows["failed"].to_numpy()]

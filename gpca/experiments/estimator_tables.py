@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from math import inf
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from gpca.alignment.methods.registry import method_entry
 from gpca.declarations.plan import Run
-from gpca.declarations.result import table
+from gpca.declarations.result import Frame, table
 from gpca.evaluation.intervals import REPEATS
 from gpca.experiments import estimators
 from gpca.reporting.tables.builder import TableBuilder, crossed
@@ -15,9 +15,6 @@ from gpca.reporting.tables.cells import interval_cell, plain_cell, rows_where
 from gpca.reporting.tables.table import Cell, Column
 from gpca.reporting.words import plural
 from gpca.uncertainty.estimates import KINDS
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 SECTION = "Beyond the paper: how uncertain a pose is"
 INTERVALS = {"intervals": (estimators.read_intervals, "estimator_intervals.csv")}
@@ -44,17 +41,17 @@ def _methods(run: Run) -> dict[str, str]:
     return run.titles(method_entry, run.config["estimator_pairs"]["methods"])
 
 
-def _values(intervals: pd.DataFrame, method: str, state: str, name: str) -> pd.DataFrame:
+def _values(intervals: Frame, method: str, state: str, name: str) -> Frame:
     return rows_where(intervals, method=method, state=state, estimator=name).set_index("metric")
 
 
-def _cell(values: pd.DataFrame, metric: str) -> Cell | None:
+def _cell(values: Frame, metric: str) -> Cell | None:
     if metric not in values.index:
         return None
     return interval_cell(values.loc[metric], factor=100 if metric.startswith("coverage") else 1)
 
 
-def _count(values: pd.DataFrame, metric: str) -> Cell | None:
+def _count(values: Frame, metric: str) -> Cell | None:
     if metric not in values.index:
         return None
     row = values.loc[metric]

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from gpca.alignment.methods.registry import method_module, methods, require_loca
 from gpca.causes.judged import ranking
 from gpca.declarations.experiment import ByName, Experiment, LeftOut, Names
 from gpca.declarations.plan import Run
-from gpca.declarations.result import numbers
+from gpca.declarations.result import Frame, Paths, Series, numbers
 from gpca.declarations.step import Plan, Step, Wildcards
 from gpca.errors import InputError, with_key
 from gpca.evaluation.intervals import interval, pigeonhole_weights
@@ -30,9 +30,6 @@ from gpca.uncertainty.estimates import (
     read_estimate_files,
 )
 from gpca.uncertainty.estimators import registry
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 
 def check(config: dict, _left_out: LeftOut) -> None:
@@ -146,7 +143,7 @@ FILES = "estimates/{source}/{estimate}/seed{seed}.csv"
 
 
 @numbers("estimators.csv", rule="estimator_metrics", files=FILES)
-def collect_estimates(_run: Run, files: Iterable[str | Path]) -> pd.DataFrame:
+def collect_estimates(_run: Run, files: Paths) -> Frame:
     """Metrics by source, estimator and seed; results/README.md lists them.
 
     ``concept`` is the registration method and the state. A metric that is not defined, such as the area where all
@@ -165,7 +162,7 @@ def collect_estimates(_run: Run, files: Iterable[str | Path]) -> pd.DataFrame:
 
 
 @numbers("estimator_intervals.csv", files=FILES)
-def collect_intervals(_run: Run, files: Iterable[str | Path]) -> pd.DataFrame:
+def collect_intervals(_run: Run, files: Paths) -> Frame:
     """Metrics over all sources and seeds, with the 95 % interval of a bootstrap over families and seeds (`COLUMNS`).
 
     Of the area under the ROC curve, the rival is the best gate on the same registrations, and the difference from it
@@ -173,7 +170,7 @@ def collect_intervals(_run: Run, files: Iterable[str | Path]) -> pd.DataFrame:
     """
     import pandas as pd
 
-    parts: dict[str, list[pd.DataFrame]] = {}
+    parts: dict[str, list[Frame]] = {}
     for (source, estimator, seed), rows in read_estimate_files(files).items():
         parts.setdefault(estimator, []).append(rows.assign(source=source, seed=seed))
     pooled = {estimator: pd.concat(own, ignore_index=True) for estimator, own in parts.items()}
@@ -184,7 +181,7 @@ def collect_intervals(_run: Run, files: Iterable[str | Path]) -> pd.DataFrame:
     return pd.DataFrame(records, columns=list(COLUMNS))
 
 
-def _of_method(method: str, rows_of: Mapping[str, pd.DataFrame]) -> list[tuple]:
+def _of_method(method: str, rows_of: Mapping[str, Frame]) -> list[tuple]:
     """Records of one method; all estimators have the same registrations in the same order."""
     known = next(iter(rows_of.values()))
     cluster_N = (known["source"] + "/" + known["cluster"]).to_numpy()
@@ -218,13 +215,13 @@ def _of_method(method: str, rows_of: Mapping[str, pd.DataFrame]) -> list[tuple]:
     return records
 
 
-def of_state(rows: pd.DataFrame) -> dict[str, np.ndarray]:
+def of_state(rows: Frame) -> dict[str, np.ndarray]:
     """Which rows (N,) are of each state."""
     failed_N = rows["failed"].to_numpy()
     return {SUCCEEDED: ~failed_N, FAILED: failed_N, BOTH: np.ones(len(rows), bool)}
 
 
-def measure(rows: pd.DataFrame, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
+def measure(rows: Frame, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
     """Metrics (B,) of registrations by their weights (B, N); NaN where one is not defined.
 
     Of each kind of reference, and of the true pose (`truth`) but for the divergences:
@@ -264,7 +261,7 @@ def measure(rows: pd.DataFrame, weights_B_N: np.ndarray) -> dict[str, np.ndarray
     return metrics
 
 
-def trimmed_mean(values: pd.Series, weights_B_N: np.ndarray, trimmed: float = TRIMMED) -> np.ndarray:
+def trimmed_mean(values: Series, weights_B_N: np.ndarray, trimmed: float = TRIMMED) -> np.ndarray:
     """Means (B,) over the middle of the weight, a share left out at either end; NaNs are ignored."""
     values_N = values.to_numpy(float)
     known_n = np.flatnonzero(np.isfinite(values_N))
@@ -280,12 +277,12 @@ def trimmed_mean(values: pd.Series, weights_B_N: np.ndarray, trimmed: float = TR
         return (kept_B_n * values_N[order_n]).sum(axis=1) / kept_B_n.sum(axis=1)
 
 
-def read_intervals(path: str | Path) -> pd.DataFrame:
+def read_intervals(path: str | Path) -> Frame:
     """Read what :func:`collect_intervals` returned; where there is no rival, the difference is NaN."""
     return csv_file.read_numbers(path, COLUMNS, (*COLUMNS[4:9], *COLUMNS[10:]), optional=(*COLUMNS[7:9], *COLUMNS[10:]))
 
 
-def collect_estimate_seconds(files: Iterable[str | Path]) -> pd.DataFrame:
+def collect_estimate_seconds(files: Paths) -> Frame:
     """Estimator, method and the median seconds of files ``…/{source}/estimator_{name}/seed{seed}.csv``.
 
     Apart from the metrics, because times differ from run to run and metrics must not.

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,16 +11,13 @@ from gpca.attribution.diagnostics import brier_score, calibration_error, negativ
 from gpca.attribution.metrics import attribution_metrics
 from gpca.attribution.predictions import concepts_of, read_predictions
 from gpca.declarations.plan import Run
-from gpca.declarations.result import numbers
+from gpca.declarations.result import Frame, Paths, numbers
 from gpca.errors import InputError
 from gpca.evaluation.intervals import Clustered
 from gpca.evaluation.measures import ALL, intervals, source_method_seed, tidy
 from gpca.experiments.frame_labels import collect_labels
 from gpca.experiments.frames import TOGETHER, reduced_backbones
 from gpca.pairs.dataset import read_samples_of_frames
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 SEEN, UNSEEN, DATASET = "seen", "unseen", "dataset/"  # beside `TOGETHER` in the column `table`
 SAMPLE = ["seed", "sample"]
@@ -39,11 +35,11 @@ FRAME_FILES = {
 )
 def collect(
     run: Run,
-    prediction_files: Iterable[str | Path],
-    pose_files: Iterable[str | Path],
-    one_encoder_files: Iterable[str | Path] = (),
-    label_files: Sequence[str | Path] = (),
-) -> pd.DataFrame:
+    prediction_files: Paths,
+    pose_files: Paths,
+    one_encoder_files: Paths = (),
+    label_files: Paths = (),
+) -> Frame:
     """Metrics by seed of prediction files.
 
     The column `table` says of which test samples (:func:`parts_by_file`). Beside the metrics of
@@ -73,8 +69,8 @@ def collect(
 
 
 def parts_by_file(
-    prediction_files: Iterable[str | Path], pose_files: Iterable[str | Path]
-) -> Iterator[tuple[str, str, int, list[str], dict[str, pd.DataFrame]]]:
+    prediction_files: Paths, pose_files: Paths
+) -> Iterator[tuple[str, str, int, list[str], dict[str, Frame]]]:
     """Source, method, seed and concepts of each file of predictions, and its test rows by part.
 
     ``attribution`` is all of them, ``seen`` those of objects that a training sample shows, ``unseen`` the others,
@@ -104,9 +100,7 @@ def parts_by_file(
 
 
 @numbers("real_world_intervals.csv", **FRAME_FILES)
-def collect_intervals(
-    run: Run, prediction_files: Iterable[str | Path], pose_files: Iterable[str | Path]
-) -> pd.DataFrame:
+def collect_intervals(run: Run, prediction_files: Paths, pose_files: Paths) -> Frame:
     """Accuracies of `real_world.csv` over all seeds, with 95 % intervals (:mod:`gpca.evaluation.measures`).
 
     - accuracy: of every part of the test samples that the column `table` names; of all of them by concept as well.
@@ -118,7 +112,7 @@ def collect_intervals(
     import pandas as pd
 
     first = reduced_backbones(run.config["real_world"])[0]
-    frames: dict[tuple[str, str], list[pd.DataFrame]] = {}
+    frames: dict[tuple[str, str], list[Frame]] = {}
     for source, method, seed, _, parts in parts_by_file(prediction_files, pose_files):
         test = parts.pop(TOGETHER)
         is_in = {name: test.index.isin(part.index) for name, part in parts.items()}

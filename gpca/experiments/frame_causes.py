@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from gpca.causes.judged import CEILING, MEASURES, Judged, ceiling_of, joined, ju
 from gpca.causes.truth import BORDERLINE, FAILED, GEOMETRY, NOMINAL, Truth
 from gpca.declarations.experiment import Experiment
 from gpca.declarations.plan import Run
-from gpca.declarations.result import numbers, table
+from gpca.declarations.result import Frame, Paths, numbers, table
 from gpca.declarations.step import Plan, Step
 from gpca.encoders.registry import encoder_module
 from gpca.errors import InputError
@@ -39,9 +38,6 @@ from gpca.reporting.tables.cells import plain_cell
 from gpca.reporting.tables.table import Cell, Column
 from gpca.reporting.words import dataset_in_words, plural
 from gpca.seeds import generator, seed_of_file
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 SAMPLE_COLUMNS = ("sample", "instance", "start", "dataset", "scene", "truth", "missed")
 SAMPLES = "test_samples"
@@ -126,11 +122,11 @@ DIAGNOSE_FRAMES_OUTSIDE = replace(
 )
 def collect(
     run: Run,
-    causes_files: Iterable[str | Path],
-    sample_files: Iterable[str | Path],
-    prediction_files: Iterable[str | Path],
-    outside_files: Iterable[str | Path] = (),
-) -> pd.DataFrame:
+    causes_files: Paths,
+    sample_files: Paths,
+    prediction_files: Paths,
+    outside_files: Paths = (),
+) -> Frame:
     """Measures of explainers that learned from no frame, with intervals; the source is ``real_rgbd/{kind of start}``.
 
     An instance counts once in a measure, however many starts and seeds it has, and intervals are over scenes, since
@@ -148,7 +144,7 @@ def collect(
     import pandas as pd
 
     samples_of: dict[str, list[Judged]] = {}
-    tested: list[pd.DataFrame] = []
+    tested: list[Frame] = []
     outside, files = list(outside_files), [list(each) for each in (causes_files, sample_files, prediction_files)]
     if not files[0] or len(set(map(len, files))) > 1:
         raise InputError("causes of frames", "need files of every seed", "give the same number of each kind")
@@ -198,7 +194,7 @@ def ends_of(truth: Truth) -> np.ndarray:
     return np.where((truth.state == FAILED) & (truth.dominant == GEOMETRY), GEOMETRY, labels_of(truth))
 
 
-def count_ends(samples: pd.DataFrame, things: Iterable[str], whole: str) -> Counter[str]:
+def count_ends(samples: Frame, things: Iterable[str], whole: str) -> Counter[str]:
     """Numbers of samples by their `end`, of different things among them, and of all, by the name `whole`."""
     counts: Counter[str] = Counter(samples["end"].tolist())
     counts.update({f"{name}s": samples[name].nunique() for name in things})
@@ -206,7 +202,7 @@ def count_ends(samples: pd.DataFrame, things: Iterable[str], whole: str) -> Coun
     return counts
 
 
-def counts_in(rows: pd.DataFrame) -> dict[str, int]:
+def counts_in(rows: Frame) -> dict[str, int]:
     """Counts by name, and the number that `failed` by a cause; nothing where there are none."""
     named = zip(rows["metric"], rows["value"], strict=True)
     counts = {metric.removeprefix("count_"): int(value) for metric, value in named}
@@ -325,12 +321,12 @@ def table9_frame_counts(run: Run, intervals):
 
 
 def sheet_of_counts(
-    name: str, heads: Mapping[str, str], rows: Iterable[Row], titles: Mapping[str, str], measured: pd.DataFrame
+    name: str, heads: Mapping[str, str], rows: Iterable[Row], titles: Mapping[str, str], measured: Frame
 ) -> Sheet:
     """Sheet of the counts with these titles, of which the first is of all."""
     whole = next(iter(titles))
 
-    def more(_row: Row, subset: pd.DataFrame) -> dict[str, Cell]:
+    def more(_row: Row, subset: Frame) -> dict[str, Cell]:
         counts = counts_in(subset)
         return {key: plain_cell(counts[key], 1, counts[whole]) for key in titles}
 

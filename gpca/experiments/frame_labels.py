@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from math import inf
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from gpca.active_learning.curves import TABLE, collect_curves
 from gpca.active_learning.settings import ALL_LABELS, PAIR, FrameLabelSettings
 from gpca.declarations.experiment import Experiment, LeftOut
 from gpca.declarations.plan import Run
-from gpca.declarations.result import table
+from gpca.declarations.result import Frame, Paths, table
 from gpca.declarations.step import Step
 from gpca.errors import InputError, require_names
 from gpca.experiments.frames import encoder_title, title_of_frames
@@ -20,9 +19,6 @@ from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.tables.builder import TableBuilder, mean_over
 from gpca.reporting.tables.cells import cell_of_repeats, rows_where
 from gpca.reporting.tables.table import Cell, Column, Table
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 TO_TARGET = ("labels_to_target", "epochs_to_target", "reached")  # metrics that differ by target accuracy
 ONE_TARGET = "epochs_at_target"  # left out, because there are several targets
@@ -82,7 +78,7 @@ LEARN = Step(
 )
 
 
-def collect_labels(label_files: Sequence[str | Path], targets: Iterable[float]) -> list[pd.DataFrame]:
+def collect_labels(label_files: Paths, targets: Iterable[float]) -> list[Frame]:
     """Metrics of learning curves on depth frames, by seed, for targets of the accuracy on the test samples.
 
     The column `table` names the embedding, ``active_learning/{backbone}`` or ``active_learning/pair``. Metrics that
@@ -113,7 +109,7 @@ ENDS = {  # column -> metric, strategy, and how it is shown
     after="real_world_failures",
     metrics="real_world.csv",
 )
-def table6_labels(run: Run, metrics: pd.DataFrame) -> Table:
+def table6_labels(run: Run, metrics: Frame) -> Table:
     """Labels that BALD and random choice need, by target, and accuracies: embeddings × strategies."""
     section, frames = run.config["frame_labels"], run.config["real_world"]
     percents = [in_percent(target) for target in section["targets"]]

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from gpca.attribution.diagnostics import BINS
 from gpca.attribution.predictions import concepts_of, read_predictions
 from gpca.declarations.plan import Run
-from gpca.declarations.result import figure
+from gpca.declarations.result import Figure, Frame, Paths, figure
 from gpca.errors import InputError
 from gpca.evaluation.measures import source_method_seed
 from gpca.experiments.confusions import counts_and_shares, pooled_confusions
@@ -40,10 +40,6 @@ from gpca.reporting.figures.style import (
 )
 from gpca.reporting.words import BOP_TITLES, object_of_frames
 from gpca.rigid import inverse, transform
-
-if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.figure import Figure
 
 SECTION = "IV-E Real-world validation"
 LOST_TO = {OCCLUDER: "an occluder", HALF_SPACE: "a half-space"}
@@ -165,7 +161,7 @@ def draw_real_world_example(
     return drawing
 
 
-def read_samples(poses_csv: str | Path, predictions_csv: str | Path) -> pd.DataFrame:
+def read_samples(poses_csv: str | Path, predictions_csv: str | Path) -> Frame:
     """Poses and predictions of all samples side by side, in the order of the registrations.
 
     Raises InputError for an unusable file, or files of different samples.
@@ -177,7 +173,7 @@ def read_samples(poses_csv: str | Path, predictions_csv: str | Path) -> pd.DataF
     return poses.join(predictions[[name for name in predictions.columns if name not in poses.columns]])
 
 
-def choose_sample(samples: pd.DataFrame, path: str | Path, pixels_I: np.ndarray, success: float) -> int:
+def choose_sample(samples: Frame, path: str | Path, pixels_I: np.ndarray, success: float) -> int:
     """Row of the test sample of overlap that is shown; instance i shows ``pixels_I[i]`` colored pixels.
 
     It is one that an occluder covers, that is attributed rightly, and that ICP moved to a wrong pose from a right one;
@@ -228,7 +224,7 @@ def covered(own_P_2: np.ndarray, kept_P_2: np.ndarray, shape: tuple[int, int]) -
     name="confusion_real_world",
     metrics=(read_together, "real_world.csv"),
 )
-def draw_real_world_confusions(run: Run, metrics: pd.DataFrame) -> Figure:
+def draw_real_world_confusions(run: Run, metrics: Frame) -> Figure:
     """A matrix for each backbone with the first reduction: shares of each true concept in %, and counts."""
     frames = run.config["real_world"]
     first = next(iter(frames["reductions"]))
@@ -269,8 +265,8 @@ def draw_real_world_failures(
     run: Run,
     objects_npz: str | Path,
     registrations_npz: Sequence[str | Path],
-    poses_csv: Sequence[str | Path],
-    predictions_csv: Sequence[str | Path],
+    poses_csv: Paths,
+    predictions_csv: Paths,
 ) -> Figure:
     """The test samples of all seeds that were attributed wrongly with the highest score, one of each instance.
 
@@ -303,7 +299,7 @@ def draw_real_world_failures(
     return drawing
 
 
-def mistakes_of(poses_csv: Sequence[str | Path], predictions_csv: Sequence[str | Path]) -> pd.DataFrame:
+def mistakes_of(poses_csv: Paths, predictions_csv: Paths) -> Frame:
     """Wrongly attributed test samples, the most confident first, one of each instance and concept."""
     import pandas as pd
 
@@ -329,7 +325,7 @@ def mistakes_of(poses_csv: Sequence[str | Path], predictions_csv: Sequence[str |
     needs=("compared_backbone",),
     prediction_files="predictions/{frames}/{unreduced}/seed{seed}.csv",
 )
-def draw_frame_reliability(run: Run, prediction_files: Iterable[str | Path]) -> Figure:
+def draw_frame_reliability(run: Run, prediction_files: Paths) -> Figure:
     """Accuracy over confidence on the test samples of depth frames, all seeds together."""
     methods = unreduced_methods(run.config["real_world"])
     parts: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {}

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gpca.declarations.result import Series
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.figures.style import CONCEPT_COLORS, SMALL_PT
 
-if TYPE_CHECKING:
-    import pandas as pd
 
-
-def draw_scores(axes, row: pd.Series) -> None:
+def draw_scores(axes, row: Series) -> None:
     """Draw a sample's concept scores as bars with ± one standard deviation, the true concept's name in bold."""
     deviations = [np.sqrt(row[f"variance_{concept}"]) for concept in CONCEPTS]
     draw_score_bars(axes, [row[f"score_{concept}"] for concept in CONCEPTS], row["concept_true"], deviations)

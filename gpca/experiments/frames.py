@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from gpca.declarations.result import Frame
 from gpca.evaluation.measures import read_metrics
 from gpca.experiments.explained import titles
 from gpca.frames.source import REAL_WORLD, resolve_datasets
 from gpca.objects.entry import title_of
 from gpca.reporting.words import dataset_in_words
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 TOGETHER = "attribution"  # all test samples, in the column `table`
 CLASSIC = {
@@ -70,7 +68,7 @@ def unreduced_methods(frames: Mapping) -> dict[str, str]:
     return {name: encoder_title(*name.split("-")) for name in backbones} | titles(frames["explainers"])
 
 
-def read_together(path: str | Path) -> pd.DataFrame:
+def read_together(path: str | Path) -> Frame:
     """Rows of ``real_world.csv`` that Table VI shows: all test samples of the frames, by seed.
 
     Raises:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gpca.declarations.experiment import Experiment, LeftOut
 from gpca.declarations.plan import Run
-from gpca.declarations.result import Paths, figure, numbers, table
+from gpca.declarations.result import Figure, Frame, Paths, figure, numbers, table
 from gpca.declarations.step import Step, encoder_of
 from gpca.encoders.registry import DIFFERENTIABLE, DGCNNOptions, EncoderSettings
 from gpca.errors import InputError
@@ -24,10 +23,6 @@ from gpca.reporting.tables.cells import cell_of_repeats, rows_where
 from gpca.reporting.tables.table import Cell, Column
 from gpca.reporting.words import plural
 from gpca.steps.gradients import DELETION_COLUMNS, RANDOM, GradientSettings
-
-if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.figure import Figure
 
 
 def check(config: dict, _left_out: LeftOut) -> None:
@@ -84,7 +79,7 @@ TCAV_VALUES = ("score", "chance", "p", "significant", "probe")
     deletions="saliency/{gradient_source}/seed{seed}.csv",
     tests="tcav/{gradient_source}/seed{seed}.csv",
 )
-def collect(run: Run, deletions: Paths, tests: Paths) -> pd.DataFrame:
+def collect(run: Run, deletions: Paths, tests: Paths) -> Frame:
     """Fall of the score by order and share of deleted points, and TCAV's tests, by source and seed."""
     records: list[tuple] = []
     for path in deletions:

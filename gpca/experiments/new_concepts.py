@@ -17,7 +17,7 @@ from gpca.encoders.registry import encoder_module
 from gpca.evaluation.measures import ALL, read_all_metrics
 from gpca.experiments.active_learning import learning_settings
 from gpca.experiments.concept_attribution import PREDICTIONS, collect_intervals
-from gpca.experiments.label_counts import COUNT, Clusters, Quantity, cell_of, families, families_with_causes
+from gpca.experiments.label_counts import COUNT, Clusters, families, families_with_causes, label_cells, quantity
 from gpca.experiments.label_curves import draw_curves, mean_curves
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.figures.style import BLUE, GRAY, GREEN, SKY_BLUE, VERMILION
@@ -139,22 +139,23 @@ def table15_new_concepts(
     """Labels that each new concept costs in each embedding, and the accuracy that labels can reach."""
     learning, test = run.config["active_learning"], run.config["registrations"]["test"]
     metrics = _rows(run, metrics)
-    labels = {f"labels_{c}": Quantity("labels_to_target", Column(f"Labels, {c}", **COUNT), PAPERS, c) for c in CONCEPTS}
-    labels["labels_random"] = Quantity("labels_to_target", Column("Labels, random choice", **COUNT), "random")
-    accuracies = {"all_labels": Quantity("final_accuracy", Column("Acc., pool labeled (%)"), ALL_LABELS)}
+    labels = {f"labels_{c}": quantity("labels_to_target", f"Labels, {c}", PAPERS, c, **COUNT) for c in CONCEPTS}
+    labels["labels_random"] = quantity("labels_to_target", "Labels, random choice", "random", **COUNT)
+    accuracies = {"all_labels": quantity("final_accuracy", "Acc., pool labeled (%)", ALL_LABELS)}
     within = Column(f"Within {WITHIN} labels (%)", decimals=0, interval=False)
     tests = tests_with_causes(run)
     with_causes = {}
     for cause in NEW_CAUSES:
-        with_causes[cause] = Quantity("final_accuracy", Column(f"{cause.capitalize()}, BALD (%)"), PAPERS, cause)
-        with_causes[f"{cause}_all"] = Quantity(
-            "final_accuracy", Column(f"{cause.capitalize()}, pool labeled (%)", interval=False), ALL_LABELS, cause
+        title = cause.capitalize()
+        with_causes[cause] = quantity("final_accuracy", f"{title}, BALD (%)", PAPERS, cause)
+        with_causes[f"{cause}_all"] = quantity(
+            "final_accuracy", f"{title}, pool labeled (%)", ALL_LABELS, cause, interval=False
         )
     builder = TableBuilder("table15_new_concepts", {"source": "Dataset", "seen": "Encoder learned from"})
     for (source, setting), titles in crossed(run.source_titles, SEEN):
         selected = rows_where(metrics, source=source, table=TABLE + setting)
         rows = selected[selected["concept"].isin(CONCEPTS)]
-        cells = {key: cell_of(rows, quantity, test, clusters) for key, quantity in (labels | accuracies).items()}
+        cells = {key: label_cells(test, clusters)(rows, column) for key, column in (labels | accuracies).items()}
         of_papers = rows_where(rows, method=PAPERS)
         wide = of_papers.pivot_table(index=["seed", "concept"], columns="metric", values="value")
         if {"labels_to_target", "reached"} <= set(wide):
@@ -162,8 +163,8 @@ def table15_new_concepts(
             shares = 100 * done.groupby(level="seed").mean()
             cells["within"] = cell_of_repeats(shares, test * len(shares))
         cells |= {
-            key: cell_of(selected, quantity, tests[str(quantity.concept)], cause_clusters)
-            for key, quantity in with_causes.items()
+            key: label_cells(tests[column.where["concept"]], cause_clusters)(selected, column)
+            for key, column in with_causes.items()
         }
         builder.add_row(titles, cells, rival=setting != "pretrained")
     for (source, explainer), titles in crossed(run.source_titles, NO_LABELS):
@@ -178,8 +179,7 @@ def table15_new_concepts(
         if key == GEOMETRY and cell.seeds < builder.most_seeds():
             fewer[builder.labels[row][0][1]] = f"{builder.labels[row][0][1]}: {plural(cell.seeds, 'seed')}"
     of_fewer = f" ({', '.join(fewer.values())})" if fewer else ""
-    columns = {key: quantity.column for key, quantity in labels.items()} | {"within": within}
-    columns |= {key: quantity.column for key, quantity in (accuracies | with_causes).items()}
+    columns = labels | {"within": within} | accuracies | with_causes
     return builder.build(
         caption=f"Labels until a new concept is known, to {learning['target']:.0%}, by what the encoder saw before"
         + run.stand_ins(partly=False),
@@ -216,8 +216,8 @@ def table15_oracle(run: Run, metrics: Frame, clusters: Clusters) -> Table:
     learning, own, test = run.config["active_learning"], run.config["new_concepts"], run.config["registrations"]["test"]
     metrics = _rows(run, metrics)
     shares = [0, *(round(100 * share) for share in own["errors"])]
-    labels = {f"labels_{share}": Column(f"Labels, {share} % wrong", **COUNT) for share in shares}
-    accuracies = {f"accuracy_{share}": Column(f"Acc., {share} % wrong (%)") for share in shares}
+    labels = {f"labels_{share}": quantity("labels_to_target", f"Labels, {share} % wrong", **COUNT) for share in shares}
+    accuracies = {f"accuracy_{share}": quantity("final_accuracy", f"Acc., {share} % wrong (%)") for share in shares}
     builder = TableBuilder(
         "table15_oracle", {"source": "Dataset", "seen": "Encoder learned from", "strategy": "Strategy"}
     )
@@ -229,9 +229,8 @@ def table15_oracle(run: Run, metrics: Frame, clusters: Clusters) -> Table:
             name = TABLE + (f"{setting}_errors_{share}" if share else setting)
             cell_rows = rows_where(metrics, source=source, table=name, method=strategy)
             cell_rows = cell_rows[cell_rows["concept"].isin(CONCEPTS)]
-            for key, metric in (("labels", "labels_to_target"), ("accuracy", "final_accuracy")):
-                quantity = Quantity(metric, Column(""))
-                cells[f"{key}_{share}"] = cell_of(cell_rows, quantity, test, clusters)
+            for key, column in ((f"labels_{share}", labels), (f"accuracy_{share}", accuracies)):
+                cells[key] = label_cells(test, clusters)(cell_rows, column[key])
         builder.add_row(titles, cells)
     builder.compare_down([*labels, *accuracies], same=2)
     return builder.build(

@@ -53,17 +53,34 @@ def with_label(rows: Iterable[Row], label_of: Callable[[Row], str]) -> list[Row]
     return [replace(row, labels=[*row.labels, (label_of(row),) * 2]) for row in rows]
 
 
+def interval_of(rows: pd.DataFrame, column: Show) -> Cell | None:
+    """Cell of the one row that a column chooses, with its interval; by default, a row that is no difference."""
+    chosen = where(rows, {"against": ""} | dict(column.where))
+    return interval_cell(chosen.iloc[0], factor=column.factor) if len(chosen) else None
+
+
+def means_over_seeds(test_samples: int = 0) -> Callable[[pd.DataFrame, Show], Cell | None]:
+    """How numbers by seed become cells: their mean of each seed, then that of all, of so many test samples each."""
+
+    def cell(rows: pd.DataFrame, column: Show) -> Cell | None:
+        values_R = column.factor * where(rows, column.where).groupby("seed")["value"].mean()
+        return cell_of_repeats(values_R.to_numpy(), test_samples * len(values_R))
+
+    return cell
+
+
 class Sheet(TableBuilder):
     """A table that is being made; an InputError says that it has no row.
 
     Args:
         name, heads: name of the table, titles of its labels by key.
         rows, columns: what it shows; rows and columns without any number are left out.
-        intervals: numbers with an interval each (:func:`gpca.evaluation.measures.read_clustered`).
+        intervals: numbers, with an interval each by default (:func:`gpca.evaluation.measures.read_clustered`).
         by_seed: name -> numbers by seed; the first frame counts the test samples.
         sources: those over which numbers by seed are averaged, in rows that name no source.
         blank: tells of row and column key whether the cell stays empty.
         more: function of a row and its numbers, if it has any, that returns further cells by column.
+        cell: makes a cell of a row's numbers and a column.
     """
 
     def __init__(
@@ -76,7 +93,8 @@ class Sheet(TableBuilder):
         by_seed: Mapping[str, pd.DataFrame] | None = None,
         sources: Sequence[str] = (),
         blank: Callable[[Row, str], bool] = lambda row, key: False,
-        more: Callable[[Row, pd.DataFrame], Mapping[str, Cell]] = lambda row, subset: {},
+        more: Callable[[Row, pd.DataFrame], Mapping[str, Cell | None]] = lambda row, subset: {},
+        cell: Callable[[pd.DataFrame, Show], Cell | None] = interval_of,
     ) -> None:
         super().__init__(name, heads)
         self.columns = columns
@@ -89,8 +107,8 @@ class Sheet(TableBuilder):
                     continue
                 if column.frame:
                     cells[key] = _over_sources(row, column, by_seed or {}, sources)
-                elif len(chosen := where(subset, {"against": ""} | dict(column.where))):
-                    cells[key] = interval_cell(chosen.iloc[0], factor=column.factor)
+                else:
+                    cells[key] = cell(subset, column)
             self.add_row(row.labels, cells | dict(more(row, subset) if len(subset) else {}), row.rival)
             if len(self.labels) > len(self.rows):
                 self.rows.append(row)
