@@ -9,9 +9,10 @@ from gpca.explainers.registry import explainer_entry
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.uncertainty.designs import STEP, sample_knobs
 from gpca.uncertainty.interventions import UNTOUCHED, UPPER
+from gpca.uncertainty.settings import CORNERS
 
 KINDS = {"sa_prcc_additive": "latin", "sa_sobol_additive": "saltelli"}
-ADDITIVE = ("sa_local_additive", *KINDS)
+ADDITIVE = ("shap_additive", "sa_local_additive", *KINDS)
 # Weights with which no knob alone decides the order of the outputs, in which the first counts most.
 WEIGHTS_3 = np.array([4.0, 1.0, 0.5])
 
@@ -22,8 +23,8 @@ def explain(name, registrations):
 
 def unit_knobs(name):
     """The settings (K, 3) behind the conditions of that explainer's design, each knob in units of its range."""
-    if name == "sa_local_additive":
-        return np.vstack([np.zeros((8, 3)), STEP * np.eye(3)])
+    if name not in KINDS:
+        return np.vstack([CORNERS, STEP * np.eye(3)])
     settings_K_3 = np.vstack([UNTOUCHED, sample_knobs(KINDS[name])])
     return (settings_K_3 - UNTOUCHED) / np.subtract(UPPER, UNTOUCHED)
 
@@ -99,7 +100,7 @@ def test_what_never_changes_has_no_sensitivity():
 
 
 @pytest.mark.parametrize("name", ADDITIVE)
-def test_the_knob_to_which_the_uncertainty_is_most_sensitive_names_the_concept(name, registrations):
+def test_the_knob_that_changes_the_uncertainty_most_names_the_concept_and_is_charged(name, registrations):
     attached = with_uncertainty(name, registrations)
     attribution = explain(name, attached.without_labels())
     assert attribution.predicted_N.tolist() == attached.concept.tolist()
@@ -107,26 +108,14 @@ def test_the_knob_to_which_the_uncertainty_is_most_sensitive_names_the_concept(n
     rows = np.array([7, 50, 3])
     assert explain(name, attached.subset(rows)).scores_N_C == pytest.approx(attribution.scores_N_C[rows], abs=1e-12)
 
-
-def test_local_scores_are_the_slopes_in_nats_per_range(registrations):
-    attribution = explain("sa_local_additive", with_uncertainty("sa_local_additive", registrations))
-    assert np.sort(attribution.scores_N_C) == pytest.approx(np.tile(np.sort(WEIGHTS_3), (len(registrations), 1)))
-
-
-@pytest.mark.parametrize("name", ADDITIVE)
-def test_an_explainer_is_charged_with_the_conditions_that_it_needs(name, registrations):
-    attached = with_uncertainty(name, registrations)
-    counted = [0, 8, 9, 10] if name == "sa_local_additive" else np.arange(len(unit_knobs(name)))
+    if name not in KINDS:  # a slope in nats per range, a Shapley value
+        assert np.sort(attribution.scores_N_C) == pytest.approx(np.tile(np.sort(WEIGHTS_3), (len(registrations), 1)))
+    counted = {"sa_local_additive": [0, 8, 9, 10], "shap_additive": range(8)}.get(name, range(len(unit_knobs(name))))
     calls_N = attached.attached["icp_calls"][:, counted].sum(axis=1)
-    attribution = explain(name, attached)
     assert np.array_equal(attribution.icp_calls_N, calls_N)
     assert attribution.icp_seconds_N == pytest.approx(0.1 * calls_N)
     assert (attribution.seconds_N > 0.2 * calls_N).all()
-
-
-@pytest.mark.parametrize("name", ADDITIVE)
-def test_where_no_knob_changes_anything_no_concept_is_named(name, registrations):
-    attached = with_uncertainty(name, registrations)
+    assert not attribution.abstained_N.any()
     uncertainty = attached.attached["uncertainty"].copy()
     uncertainty[[0, 5]] = [[0.0], [7.3]]
     constant = replace(attached, attached={**attached.attached, "uncertainty": uncertainty})
@@ -134,3 +123,4 @@ def test_where_no_knob_changes_anything_no_concept_is_named(name, registrations)
     assert np.flatnonzero(attribution.abstained_N).tolist() == [0, 5]
     assert np.flatnonzero(attribution.predicted_N == "").tolist() == [0, 5]
     assert np.isfinite(attribution.scores_N_C).all()
+    assert name in KINDS or not attribution.scores_N_C[[0, 5]].any()

@@ -50,20 +50,14 @@ def accuracy(attribution, registrations):
 
 @pytest.mark.parametrize("worth", WORTHS)
 @pytest.mark.parametrize("name", SCALED)
-def test_a_remedy_that_helps_every_pair_most_is_not_always_named(name, worth, attached):
+def test_a_remedy_that_helps_every_pair_most_is_not_always_named_and_the_chosen_worth_counts(name, worth, attached):
     plain = single_drops(-attached.attached[worth])
     assert (plain.argmax(axis=1) == 1).all()
     attribution = fitted(name, attached, worth=worth).explain(attached.without_labels())
     assert accuracy(attribution, attached) == 1
-
-
-@pytest.mark.parametrize("name", SCALED)
-def test_only_the_chosen_worth_counts(name, attached):
     other = with_arrays(attached, residual=np.random.default_rng(1).normal(size=(len(attached), 8)))
-    for worth, expected in (("uncertainty", True), ("residual", False)):
-        before = fitted(name, attached, worth=worth).explain(attached).scores_N_C
-        after = fitted(name, other, worth=worth).explain(other).scores_N_C
-        assert np.array_equal(before, after) is expected
+    after = fitted(name, other, worth=worth).explain(other).scores_N_C
+    assert np.array_equal(attribution.scores_N_C, after) is (worth == "uncertainty")
 
 
 def test_scores_count_from_the_training_mean_in_training_deviations(attached):
@@ -88,11 +82,8 @@ def test_test_rows_do_not_touch_the_scaling(name, attached):
 @pytest.mark.parametrize("name", LEARNED)
 def test_learning_separates_the_concepts_by_either_worth(name, attached):
     nothing = np.random.default_rng(1).normal(size=(len(attached), 8))
-    for registrations in (
-        attached,
-        with_arrays(attached, residual=nothing),
-        with_arrays(attached, uncertainty=nothing),
-    ):
+    for arrays in ({}, {"residual": nothing}, {"uncertainty": nothing}):
+        registrations = with_arrays(attached, **arrays)
         attribution = fitted(name, registrations).explain(registrations.without_labels())
         assert attribution.scores_N_C.sum(axis=1) == pytest.approx(1)
         assert accuracy(attribution, registrations) > 0.9
@@ -100,17 +91,13 @@ def test_learning_separates_the_concepts_by_either_worth(name, attached):
     assert accuracy(fitted(name, neither).explain(neither), neither) < 0.8
 
 
-@pytest.mark.parametrize("absent", CONCEPTS)
 @pytest.mark.parametrize("name", LEARNED)
-def test_a_concept_absent_from_training_scores_0(name, absent, attached):
-    seen = attached.concept != absent
-    attribution = fitted(name, attached.subset(np.flatnonzero(seen))).explain(attached)
-    assert (attribution.scores_N_C[:, CONCEPTS.index(absent)] == 0).all()
-    assert np.mean(attribution.predicted_N[seen] == attached.concept[seen]) > 0.9
-
-
-@pytest.mark.parametrize("name", LEARNED)
-def test_learning_from_one_concept_alone_is_refused(name, attached):
+def test_a_concept_absent_from_training_scores_0_and_one_alone_is_refused(name, attached):
+    for absent in CONCEPTS:
+        seen = attached.concept != absent
+        attribution = fitted(name, attached.subset(np.flatnonzero(seen))).explain(attached)
+        assert (attribution.scores_N_C[:, CONCEPTS.index(absent)] == 0).all()
+        assert np.mean(attribution.predicted_N[seen] == attached.concept[seen]) > 0.9
     with pytest.raises(InputError, match="training registrations: cover fewer than two concepts"):
         fitted(name, attached.subset(np.flatnonzero(attached.concept == "noise")))
 
@@ -137,15 +124,12 @@ def test_a_charge_is_that_of_its_conditions_and_the_time_since_the_start_shared_
     assert np.array_equal(attribution.scores_N_C, scores)
 
 
-def test_equal_scores_name_no_concept_but_two_equal_largest_do(attached):
+def test_equal_scores_name_no_concept_but_two_equal_largest_do_and_corners_are_the_first_conditions(attached):
     scores = np.tile([[1.0, 2.0, 3.0]], (len(attached), 1))
     scores[4], scores[9], scores[11] = 0.0, -2.5, [2.0, 2.0, 0.0]
     attribution = KnobValues(lambda _: scores, [0], "tiny", 0).explain(attached)
     assert np.flatnonzero(attribution.abstained_N).tolist() == [4, 9]
     assert attribution.predicted_N[[4, 9, 11]].tolist() == ["", "", CONCEPTS[0]]
-
-
-def test_corners_are_the_first_eight_conditions(attached):
     eleven = np.arange(len(attached) * 11, dtype=float).reshape(-1, 11)
     read = KnobValues(lambda worth: -worth, None, "tiny", 0).of_remedies
     assert np.array_equal(read(with_arrays(attached, uncertainty=eleven), "uncertainty"), eleven[:, :8])

@@ -1,5 +1,7 @@
 """What shuffled values score, and what values in their places do."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -15,8 +17,6 @@ PRINTED = 40.0 + 5 * np.arange(10)
 
 def comparison(values, **more):
     """Of ten numbers of one column, each beside two equal repeats of a value in percent."""
-    from dataclasses import replace
-
     numbers = [
         number(value, row=f"row {i}", counterpart=replace(ACCURACY, methods=(f"m{i}",)), **more)
         for i, value in enumerate(PRINTED)
@@ -48,8 +48,6 @@ def test_shuffled_values_score_as_chance():
 
 
 def test_times_are_shuffled_in_seconds_and_single_values_not_at_all():
-    from dataclasses import replace
-
     def of(component):
         return replace(TIME, methods=(component,))
 

@@ -1,16 +1,27 @@
 """The joint reading with the most close numbers is found, and its chance is that of a search on dealt numbers."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
 
 from gpca.comparison.chance import is_close, p_value, permuted, weights
-from gpca.comparison.joint_reading import CHOICES, PARTS, numbers_asked, part_name, scores_of_values, search, values_of
-from gpca.comparison.published import Counterpart, Number, read_published
+from gpca.comparison.joint_reading import (
+    CHOICES,
+    PARTS,
+    TABLES,
+    numbers_asked,
+    part_name,
+    scores_of_values,
+    search,
+    values_of,
+)
+from gpca.comparison.published import Number, read_published
 from gpca.errors import InputError
-from gpca.evaluation.measures import TIDY_COLUMNS
 from gpca.experiments.joint_reading import names
-from tests.comparison.made_up import TOLERANCES
+
+from .made_up import ACCURACY, TOLERANCES, tidy
 
 GRID = {choice: ["only"] for choice in CHOICES} | {
     "severities": ["protocol", "weaker"],
@@ -20,13 +31,13 @@ GRID = {choice: ["only"] for choice in CHOICES} | {
 
 
 def number(table, value, method, column="GP-CA", unit="%", metric="accuracy", upper=None):
-    counterpart = Counterpart("a.csv", "a", ("ycb",), (method,), (metric,), "all", "mean")
+    counterpart = replace(ACCURACY, methods=(method,), metrics=(metric,))
     return Number(table, "YCB", column, value, upper or value, 1, unit, "", "", counterpart, "")
 
 
 def measured(values):
-    rows = [(name, "shapes", method, metric, "all", 0, value) for (name, method, metric), value in values.items()]
-    return pd.DataFrame(rows, columns=list(TIDY_COLUMNS))
+    return pd.concat(tidy([value], "shapes", method, metric, table=name)
+                     for (name, method, metric), value in values.items())  # fmt: skip
 
 
 SHAP, LABELS = number("I", 30.0, "shap"), number("III", 14.0, "bald", unit="labels", metric="labels_to_target")
@@ -87,9 +98,8 @@ def test_deals_stay_within_their_group_and_are_the_same_every_time():
     for within, of in (("unit", lambda n: (n.table, n.unit)), ("column", lambda n: (n.table, n.column, n.unit))):
         dealt_D_K = permuted(printed, within, 50)
         np.testing.assert_array_equal(np.sort(dealt_D_K, axis=1), np.tile(np.arange(len(printed)), (50, 1)))
-        assert all(
-            of(printed[place]) == of(number) for row in dealt_D_K for place, number in zip(row, printed, strict=True)
-        )
+        group_K = np.unique([str(of(number)) for number in printed], return_inverse=True)[1]
+        assert (group_K[dealt_D_K] == group_K).all()
         np.testing.assert_array_equal(dealt_D_K, permuted(printed, within, 50))
         assert len(np.unique(dealt_D_K, axis=0)) > 10
 
@@ -98,15 +108,12 @@ def test_each_table_weighs_the_same_each_value_counts_once_and_every_choice_matt
     printed = numbers_asked(read_published())
     weight_K = weights(printed)
     assert weight_K.sum() == pytest.approx(1)
-    tables = {table: sum(w for w, n in zip(weight_K, printed, strict=True) if n.table == table) for table in PARTS_OF}
-    assert list(tables.values()) == pytest.approx([0.2] * 5)
+    table_K = np.array([number.table for number in printed])
+    assert [weight_K[table_K == table].sum() for table in TABLES] == pytest.approx([0.2] * 5)
     assert len(printed) == 54
     assert len(numbers_asked(read_published(), ["ycb"])) == 25
     assert not [number for number in printed if number.same_as]
     assert {choice for of_part in PARTS.values() for choice in of_part} == set(CHOICES)
-
-
-PARTS_OF = ("I", "II", "III", "IV", "V")
 
 
 def test_close_is_within_the_second_tolerance_and_no_lower_bound():

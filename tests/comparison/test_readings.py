@@ -5,7 +5,6 @@ import pytest
 
 from gpca.comparison.readings import chance_of, judge_readings, read_judged, summarize, with_readings
 from gpca.errors import InputError
-from gpca.evaluation.measures import TIDY_COLUMNS
 from gpca.experiments import reading_words
 
 from .made_up import ACCURACY, LABELS, TOLERANCES, compared, number, tidy
@@ -28,24 +27,19 @@ def judged(printed, values, here=0.97):
 
 
 @pytest.mark.parametrize(
-    ("printed", "values", "where", "nearest"),
+    ("value", "where", "words"),
     [
-        (50.0, {"random": 0.515, "kmeans": 0.97}, "produced", "random"),
-        (50.0, {"random": 0.30, "kmeans": 0.97}, "between", "random"),
-        (50.0, {"random": 0.60, "kmeans": 0.97}, "outside", "random"),
+        (0.515, "produced", "1 of 2 readings are close"),
+        (0.30, "between", "none of 2 readings is close"),
+        (0.60, "outside", "outside of all 2"),
     ],
 )
-def test_a_number_is_produced_or_between_readings_or_outside(printed, values, where, nearest):
-    found, comparison = judged(printed, values)
+def test_a_number_is_produced_or_between_readings_or_outside(value, where, words):
+    found, comparison = judged(50.0, {"random": value, "kmeans": 0.97})
     of = summarize(found)[KEY]["start"]
-    assert (of.where, of.nearest, of.readings) == (where, nearest, 2)
-    assert (of.least, of.most) == (100 * min(values.values()), 100 * max(values.values()))
+    assert (of.where, of.nearest, of.readings, of.least, of.most) == (where, "random", 2, 100 * value, 97)
     [reason] = with_readings(comparison, found, WORDS)["reason"]
-    assert {
-        "produced": "1 of 2 readings are close",
-        "between": "none of 2 readings is close",
-        "outside": "outside of all 2",
-    }[where] in reason
+    assert words in reason
 
 
 def test_a_number_that_is_reproduced_needs_no_reading():
@@ -67,15 +61,12 @@ def test_a_lower_bound_is_no_value_and_a_ratio_is_measured_by_its_logarithm():
     labels = number(14, decimals=0, unit="labels", counterpart=LABELS)
     own = tidy([200.0, 200.0], method="random", metric="labels_to_target", concept="overlap", table=LABELS.table)
     results = {"active_learning.csv": own}
-    rows = [
-        ("pool/all", "ycb", "random", metric, "overlap", 0, value)
-        for metric, value in (("labels_to_target", 14), ("reached", 0))
-    ]
-    rows += [
-        ("pool/few", "ycb", "random", metric, "overlap", 0, value)
-        for metric, value in (("labels_to_target", 130.5), ("reached", 1))
-    ]
-    frame = pd.DataFrame(rows, columns=list(TIDY_COLUMNS))
+    values = {"all": {"labels_to_target": 14, "reached": 0}, "few": {"labels_to_target": 130.5, "reached": 1}}
+    frame = pd.concat(
+        tidy([value], method="random", metric=metric, concept="overlap", table=f"pool/{name}")
+        for name, metrics in values.items()
+        for metric, value in metrics.items()
+    )
     found = judge_readings([labels], compared([labels], results), frame, TOLERANCES).set_index("reading")
     assert found.loc["all", "at_least"]
     assert not found["close"].any()
