@@ -142,9 +142,8 @@ def search(
     order = np.argsort(-np.round(share_G.ravel(), 9), kind="stable")
     best = []
     for index in order[:shown]:
-        at = np.unravel_index(index, shape)
-        joint = {choice: grid[choice][int(i)] for choice, i in zip(CHOICES, at, strict=True)}
-        best.append((joint, float(share_G.ravel()[index])))
+        at = zip(CHOICES, np.unravel_index(index, shape), strict=True)
+        best.append(({choice: grid[choice][int(i)] for choice, i in at}, float(share_G.ravel()[index])))
     best_at = np.unravel_index(order[0], shape)
     close_K = [np.broadcast_to(close[index], shape)[best_at] for close, index in zip(closes, index_K, strict=True)]
     by_chance = {}
@@ -248,17 +247,10 @@ def judge(
         reproduced, at_least = of_run.loc[number.key]
         run_value = (float(reproduced or "nan"), at_least == "True")  # empty where the run has no such value
         upper = number.upper if number.upper > number.value else math.nan
-        row: tuple = (
-            *number.key,
-            number.unit,
-            number.value,
-            upper,
-            *run_value,
-            is_close(number, *run_value, tolerance),
-        )
-        row += (round(value[0], 6), value[1], is_close(number, *value, tolerance), measured["seed"].nunique())
+        ours = (*run_value, is_close(number, *run_value, tolerance))
+        of_joint = (round(value[0], 6), value[1], is_close(number, *value, tolerance), measured["seed"].nunique())
         close = counts.loc[number.key].tolist() if number.key in counts.index else [0, 0]
-        rows.append((*row, *close))
+        rows.append((*number.key, number.unit, number.value, upper, *ours, *of_joint, *close))
         joint_values.append(value)
         run_values.append(run_value)
     records = scores_of_values(numbers, joint_values, tolerances, deals, EVALUATED)

@@ -7,7 +7,8 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from types import ModuleType
+from typing import TYPE_CHECKING, NamedTuple
 
 from gpca.comparison.published import Number
 from gpca.comparison.values import value_of_run
@@ -107,16 +108,6 @@ class GroupSummary(NamedTuple):
         return "produced" if self.close else "between" if self.inside else "outside"
 
 
-class Words(Protocol):
-    """Titles of the groups of readings and of their choices."""
-
-    def group(self, name: str) -> str:
-        """Return what a group leaves open."""
-
-    def reading(self, group: str, name: str) -> str:
-        """Return the choices of a reading of that group."""
-
-
 def unresolved(judged: pd.DataFrame) -> pd.DataFrame:
     """Return the rows of numbers that are not reproduced, or not comparable because of their objects."""
     return judged[judged["verdict"].isin([NOT_REPRODUCED, NOT_COMPARABLE])]
@@ -146,8 +137,11 @@ def summarize(judged: pd.DataFrame) -> dict[tuple[str, str, str], dict[str, Grou
     return summaries
 
 
-def sentence(groups: Mapping[str, GroupSummary], words: Words) -> str:
-    """Return the sentences of a reason about the readings, one for each group."""
+def sentence(groups: Mapping[str, GroupSummary], words: ModuleType) -> str:
+    """Return the sentences of a reason about the readings, one for each group.
+
+    The words are titles: ``group(name)`` of what a group leaves open, ``reading(group, name)`` of a reading's choices.
+    """
     sentences = []
     for name, of in groups.items():
         span, nearest = f"{of.least:.3g} to {of.most:.3g}", f"{of.value:.3g} ({words.reading(name, of.nearest)})"
@@ -161,7 +155,7 @@ def sentence(groups: Mapping[str, GroupSummary], words: Words) -> str:
     return " ".join(sentences)
 
 
-def with_readings(comparison: pd.DataFrame, judged: pd.DataFrame, words: Words) -> pd.DataFrame:
+def with_readings(comparison: pd.DataFrame, judged: pd.DataFrame, words: ModuleType) -> pd.DataFrame:
     """Return the comparison with the readings' values in the reasons of misses."""
     summaries = summarize(judged[judged["verdict"] == NOT_REPRODUCED])
     reasons = [

@@ -5,24 +5,11 @@ import yaml
 
 from gpca.active_learning.acquisition import STRATEGIES
 from gpca.comparison import published
-from gpca.comparison.published import (
-    NONE_YET,
-    PUBLISHED,
-    TABLES,
-    TEXT,
-    UNITS,
-    Reason,
-    printed_seconds,
-    read_lines,
-    read_published,
-    read_reasons,
-    reason_of,
-)
 from gpca.evaluation.runtime_file import COMPONENTS
 from gpca.experiments.kernel_grid import PRINTED, setting_name
 from gpca.process.code_files import ROOT
 
-NUMBERS = read_published()
+NUMBERS = published.read_published()
 CONFIG = yaml.safe_load((ROOT / "config/config.yaml").read_text())
 FILES = {
     *("metrics.csv", "timings.csv", "active_learning.csv", "kernels.csv", "diagnostics.csv", "real_world.csv"),
@@ -31,9 +18,14 @@ FILES = {
 
 
 def test_every_cell_is_there_once_with_its_rounding_and_every_unit_has_a_tolerance():
-    cells = {(name, row, column) for name, table in TABLES.items() for row in table.rows for column in table.columns}
-    assert {number.key for number in NUMBERS if number.table != TEXT} == cells
-    assert set(CONFIG["comparison"]["tolerances"]) == set(UNITS)
+    cells = {
+        (name, row, column)
+        for name, table in published.TABLES.items()
+        for row in table.rows
+        for column in table.columns
+    }
+    assert {number.key for number in NUMBERS if number.table != published.TEXT} == cells
+    assert set(CONFIG["comparison"]["tolerances"]) == set(published.UNITS)
     rounding = {number.key: number.rounding for number in NUMBERS}
     assert rounding["V", "GPC", "AUC"] == pytest.approx(0.00005)
     assert rounding["I", "YCB", "SA"] == pytest.approx(0.05)
@@ -49,10 +41,10 @@ def test_numbers_are_as_printed():
         ("V", "Linear SVM", "ρ"): "-0.011",
         ("VI", "PointNet, AE", "Std. Dev."): "12.53",
         ("VII", "GPC retraining (optional)", "Time"): "10 to 30",
-        (TEXT, "Analytical features, YCB", "Accuracy"): "66",
-        (TEXT, "Random, depth frames", "Labels to 70 %"): "101",
-        (TEXT, "DGCNN, depth frames, overlap", "Taken for pose"): "23.0",
-        (TEXT, "ICP and DGCNN", "Time"): "4.2",
+        (published.TEXT, "Analytical features, YCB", "Accuracy"): "66",
+        (published.TEXT, "Random, depth frames", "Labels to 70 %"): "101",
+        (published.TEXT, "DGCNN, depth frames, overlap", "Taken for pose"): "23.0",
+        (published.TEXT, "ICP and DGCNN", "Time"): "4.2",
     }
     assert {key: texts[key] for key in printed} == printed
 
@@ -93,7 +85,7 @@ def test_table_vs_gpc_is_the_matern_row_whose_values_it_prints():
 
 
 def test_times_come_in_seconds():
-    seconds = printed_seconds(NUMBERS)
+    seconds = published.printed_seconds(NUMBERS)
     assert set(seconds) == {"icp", "features", "sampling", "scores", "bald", "retraining"}
     assert seconds["sampling"].value == pytest.approx(0.010)
     assert (seconds["retraining"].value, seconds["retraining"].upper) == (10, 30)
@@ -101,12 +93,12 @@ def test_times_come_in_seconds():
 
 
 def test_the_file_keeps_the_rules_of_its_columns():
-    assert [line for line in read_lines(PUBLISHED) if None in (*line, *line.values())] == []
+    assert [line for line in published.read_lines(published.PUBLISHED) if None in (*line, *line.values())] == []
     keys = [number.key for number in NUMBERS]
     assert len(set(keys)) == len(keys)
     for at, number in enumerate(NUMBERS):
-        assert number.table in TABLES, number
-        assert number.unit in UNITS, number
+        assert number.table in published.TABLES, number
+        assert number.unit in published.UNITS, number
         assert all((*number.key, number.place)), number
         assert number.upper >= number.value, number
         assert all(round(bound, number.decimals) == bound for bound in (number.value, number.upper)), number
@@ -134,7 +126,7 @@ def test_several_sources_methods_and_metrics_are_read(tmp_path, monkeypatch):
     }  # fmt: skip
     (tmp_path / "published.csv").write_text(",".join(line) + "\n" + ",".join(line.values()) + "\n")
     monkeypatch.setattr(published, "PUBLISHED", tmp_path / "published.csv")
-    [number] = read_published()
+    [number] = published.read_published()
     means = number.counterpart
     assert (means.sources, means.methods, means.metrics) == (("ycb", "linemod"), ("icp", "features"), ("a", "b"))
     assert number.text() == "31.4 to 40.0"
@@ -142,12 +134,16 @@ def test_several_sources_methods_and_metrics_are_read(tmp_path, monkeypatch):
 
 def test_the_first_reason_that_fits_counts_and_all_are_of_printed_numbers():
     [number] = [number for number in NUMBERS if number.key == ("I", "YCB", "SHAP")]
-    reasons = [Reason("II", "*", "*", "a"), Reason("I", "Y*", "SHAP", "b"), Reason("*", "*", "*", "c")]
-    assert reason_of(number, reasons) == "b"
-    assert reason_of(number, reasons[2:]) == "c"
-    assert reason_of(number, reasons[:1]) == NONE_YET
-    reasons = read_reasons()
+    reasons = [
+        published.Reason("II", "*", "*", "a"),
+        published.Reason("I", "Y*", "SHAP", "b"),
+        published.Reason("*", "*", "*", "c"),
+    ]
+    assert published.reason_of(number, reasons) == "b"
+    assert published.reason_of(number, reasons[2:]) == "c"
+    assert published.reason_of(number, reasons[:1]) == published.NONE_YET
+    reasons = published.read_reasons()
     assert len(reasons) > 20
     for reason in reasons:
         assert reason.text, reason
-        assert any(reason_of(number, [reason]) == reason.text for number in NUMBERS), reason
+        assert any(published.reason_of(number, [reason]) == reason.text for number in NUMBERS), reason

@@ -9,26 +9,11 @@ import pytest
 import yaml
 from scipy.stats import chi2
 
+from gpca.comparison import verdicts
 from gpca.comparison.markdown import comparison_markdown, summary
 from gpca.comparison.published import NONE_YET, UNITS, Reason, read_published, read_reasons, reason_of
 from gpca.comparison.readings import READINGS
 from gpca.comparison.values import Reproduced, read_results, value_of_run
-from gpca.comparison.verdicts import (
-    COMPARISON_COLUMNS,
-    ONE_REPEAT,
-    TOO_WIDE,
-    VERDICTS,
-    Printed,
-    Tolerance,
-    citations,
-    cited_number,
-    compare,
-    counts,
-    filled,
-    judged_once,
-    printed_of,
-    verdict_of,
-)
 from gpca.declarations.registry import experiments
 from gpca.errors import InputError
 from gpca.process.code_files import ROOT
@@ -36,41 +21,31 @@ from gpca.process.code_files import ROOT
 from .made_up import ACCURACY, OBJECTS, TIME, TOLERANCES, compared, number, runtime, tidy
 
 NAN = math.nan
-POINTS = Tolerance(1, 3)
-FACTOR = Tolerance(1.5, 3, factor=True)
-
-
-# --- the rule ---
+POINTS = verdicts.Tolerance(1, 3)
+FACTOR = verdicts.Tolerance(1.5, 3, factor=True)
 
 
 def printed(value=90.0, upper=None, decimals=1, low=None, high=None):
     upper = upper or value
-    return Printed(value, upper, 0.5 * 10.0**-decimals, value if low is None else low, upper if high is None else high)
+    return verdicts.Printed(
+        value, upper, 0.5 * 10.0**-decimals, value if low is None else low, upper if high is None else high
+    )
 
 
 @pytest.mark.parametrize(
-    ("value", "half_width", "verdict"),
-    [
-        (90.0, 0.0, "reproduced"),
-        (91.04, 0.0, "reproduced"),  # a tolerance of 1, and half a digit of rounding
-        (91.06, 0.0, "close"),
-        (88.96, 0.1, "reproduced"),
-        (92.0, 1.9, "close"),
-        (92.0, 2.0, "reproduced"),  # the interval holds the printed value
-        (93.04, 0.0, "close"),
-        (93.06, 0.0, "not reproduced"),
-        (86.94, 0.1, "not reproduced"),
-        (90.0, 3.0, "reproduced"),
-        (90.0, 3.1, "inconclusive"),  # the same mean, but it could be anything near
-        (86.0, 3.1, "inconclusive"),
-        (83.0, 3.9, "not reproduced"),  # however wide, all of it is beyond
-        (90.0, NAN, "inconclusive"),
-        (50.0, NAN, "inconclusive"),
-    ],
+    ("verdict", "found"),
+    {
+        # A tolerance of 1, and half a digit of rounding; 92 ± 2 holds the printed value.
+        "reproduced": [(90.0, 0.0), (91.04, 0.0), (88.96, 0.1), (92.0, 2.0), (90.0, 3.0)],
+        "close": [(91.06, 0.0), (92.0, 1.9), (93.04, 0.0)],
+        "not reproduced": [(93.06, 0.0), (86.94, 0.1), (83.0, 3.9)],  # however wide, all of the last is beyond
+        "inconclusive": [(90.0, 3.1), (86.0, 3.1), (90.0, NAN), (50.0, NAN)],  # it could be anything near
+    }.items(),
 )
-def test_the_rule_in_percentage_points(value, half_width, verdict):
-    found = Reproduced(value, value - half_width, value + half_width, 5)
-    assert verdict_of(printed(90.0), found, POINTS) == verdict
+def test_the_rule_in_percentage_points(verdict, found):
+    for value, half_width in found:
+        reproduced = Reproduced(value, value - half_width, value + half_width, 5)
+        assert verdicts.verdict_of(printed(90.0), reproduced, POINTS) == verdict, value
 
 
 def test_a_printed_range_is_a_band():
@@ -81,56 +56,55 @@ def test_a_printed_range_is_a_band():
         95.1: "not reproduced",
         83: "close",
     }.items():
-        assert verdict_of(printed(86.0, upper=92.0), Reproduced(value, value, value, 5), POINTS) == verdict
+        assert verdicts.verdict_of(printed(86.0, upper=92.0), Reproduced(value, value, value, 5), POINTS) == verdict
 
 
 def test_the_papers_own_error_adds_to_that_of_the_run_whose_wider_interval_counts():
     found = Reproduced(94.0, 92.8, 95.2, 5)  # 4 points above, less half a digit
-    assert verdict_of(printed(90.0), found, POINTS) == "not reproduced"
-    assert verdict_of(printed(90.0, low=88.0, high=92.0), found, POINTS) == "not reproduced"  # 1.2 and 2 make 2.3
-    assert verdict_of(printed(90.0, low=87.0, high=93.0), found, POINTS) == "inconclusive"  # 1.2 and 3 make 3.2
+    assert verdicts.verdict_of(printed(90.0), found, POINTS) == "not reproduced"
+    assert (
+        verdicts.verdict_of(printed(90.0, low=88.0, high=92.0), found, POINTS) == "not reproduced"
+    )  # 1.2 and 2 make 2.3
+    assert (
+        verdicts.verdict_of(printed(90.0, low=87.0, high=93.0), found, POINTS) == "inconclusive"
+    )  # 1.2 and 3 make 3.2
     near = Reproduced(92.2, 91.0, 93.4, 5)
-    assert verdict_of(printed(90.0), near, POINTS) == "close"
-    assert verdict_of(printed(90.0, low=88.0, high=92.0), near, POINTS) == "reproduced"
+    assert verdicts.verdict_of(printed(90.0), near, POINTS) == "close"
+    assert verdicts.verdict_of(printed(90.0, low=88.0, high=92.0), near, POINTS) == "reproduced"
     found = Reproduced(92.0, 91.5, 92.5, 5)
-    assert verdict_of(printed(90.0), found, POINTS) == "close"
-    assert verdict_of(printed(90.0), replace(found, cluster_low=89.9, cluster_high=92.1), POINTS) == "reproduced"
-    assert verdict_of(printed(90.0), replace(found, cluster_low=80.0, cluster_high=92.1), POINTS) == "inconclusive"
+    assert verdicts.verdict_of(printed(90.0), found, POINTS) == "close"
+    assert (
+        verdicts.verdict_of(printed(90.0), replace(found, cluster_low=89.9, cluster_high=92.1), POINTS) == "reproduced"
+    )
+    assert (
+        verdicts.verdict_of(printed(90.0), replace(found, cluster_low=80.0, cluster_high=92.1), POINTS)
+        == "inconclusive"
+    )
     assert replace(found, cluster_low=80.0, cluster_high=92.1).interval() == (80.0, 92.5)
     assert Reproduced(92.0, NAN, NAN, 1, cluster_low=91.0, cluster_high=93.0).interval() == (91.0, 93.0)
 
 
 @pytest.mark.parametrize(
-    ("value", "low", "high", "verdict"),
-    [
-        (0.67, 0.66, 0.68, "reproduced"),
-        (1.5, 1.5, 1.5, "reproduced"),
-        (1.6, 1.59, 1.61, "close"),
-        (0.35, 0.35, 0.35, "close"),
-        (3.2, 3.1, 3.3, "not reproduced"),
-        (0.004, 0.003, 0.005, "not reproduced"),
-        (0.5, -0.2, 1.2, "inconclusive"),  # down to nothing: no factor
-        (0.02, -0.1, 0.1, "not reproduced"),
-        (0.0, 0.0, 0.0, "not reproduced"),
-    ],
+    ("verdict", "found"),
+    {
+        "reproduced": [(0.67, 0.66, 0.68), (1.5, 1.5, 1.5)],
+        "close": [(1.6, 1.59, 1.61), (0.35, 0.35, 0.35)],
+        "not reproduced": [(3.2, 3.1, 3.3), (0.004, 0.003, 0.005), (0.02, -0.1, 0.1), (0.0, 0.0, 0.0)],
+        "inconclusive": [(0.5, -0.2, 1.2)],  # down to nothing: no factor
+    }.items(),
 )
-def test_times_and_counts_are_compared_by_factor(value, low, high, verdict):
-    assert verdict_of(printed(1.0, decimals=2), Reproduced(value, low, high, 5), FACTOR) == verdict
+def test_times_and_counts_are_compared_by_factor(verdict, found):
+    for interval in found:
+        assert verdicts.verdict_of(printed(1.0, decimals=2), Reproduced(*interval, 5), FACTOR) == verdict, interval
 
 
-def test_a_lower_bound_is_judged_only_where_it_is_beyond():
+def test_tolerances_have_an_order_and_a_lower_bound_is_judged_only_where_it_is_beyond():
+    for order in ((3, 1), (-1, 1), (0.9, 2, True)):
+        with pytest.raises(InputError, match="must satisfy"):
+            verdicts.Tolerance(*order)
     labels = printed(14, decimals=0)
-    assert verdict_of(labels, Reproduced(44, NAN, NAN, 5, at_least=True), FACTOR) == "not reproduced"
-    assert verdict_of(labels, Reproduced(14, NAN, NAN, 5, at_least=True), FACTOR) == "inconclusive"
-
-
-@pytest.mark.parametrize("given", [(3, 1), (-1, 1), (0.9, 2, True)])
-def test_tolerances_have_an_order(given):
-    with pytest.raises(InputError, match="must satisfy"):
-        Tolerance(*given)
-
-
-# --- verdicts and reasons ---
+    assert verdicts.verdict_of(labels, Reproduced(44, NAN, NAN, 5, at_least=True), FACTOR) == "not reproduced"
+    assert verdicts.verdict_of(labels, Reproduced(14, NAN, NAN, 5, at_least=True), FACTOR) == "inconclusive"
 
 
 def test_every_verdict_and_its_reason():
@@ -155,19 +129,19 @@ def test_every_verdict_and_its_reason():
         number(row="no file", counterpart=TIME, unit="s"),
     ]
     rows = compared(numbers, results, reasons=[Reason("I", "far", "*", "Other data.")])
-    assert tuple(rows.columns) == COMPARISON_COLUMNS
+    assert tuple(rows.columns) == verdicts.COMPARISON_COLUMNS
     assert list(zip(rows["verdict"], rows["reason"], strict=True)) == [
         ("reproduced", ""),
         ("close", NONE_YET),
         ("not reproduced", "Other data."),
-        ("inconclusive", TOO_WIDE),
-        ("inconclusive", ONE_REPEAT),
+        ("inconclusive", verdicts.TOO_WIDE),
+        ("inconclusive", verdicts.ONE_REPEAT),
         ("not comparable", "nobody measured it"),
         ("not run", "metrics.csv holds no such value"),
         ("not run", "runtime.csv holds no such value"),
     ]
     assert list(rows["difference"][:3]) == pytest.approx([0, -2, 8])
-    assert counts(rows) == dict(zip(VERDICTS, (1, 1, 2, 1, 1, 2), strict=True))
+    assert verdicts.counts(rows) == dict(zip(verdicts.VERDICTS, (1, 1, 2, 1, 1, 2), strict=True))
 
 
 def test_a_value_is_judged_once_and_its_repeats_are_marked():
@@ -177,7 +151,7 @@ def test_a_value_is_judged_once_and_its_repeats_are_marked():
     rows = compared([first, other, repeat], {"metrics.csv": pd.concat(same)})
     assert rows["repeat_of"].tolist() == ["", "", "I / YCB / GP-CA"]
     assert rows["verdict"].tolist() == ["reproduced", "reproduced", "not reproduced"]
-    assert counts(judged_once(rows)) == dict.fromkeys(VERDICTS, 0) | {"reproduced": 2}
+    assert verdicts.counts(verdicts.judged_once(rows)) == dict.fromkeys(verdicts.VERDICTS, 0) | {"reproduced": 2}
     results = {"metrics.csv": pd.concat([tidy([0.9, 0.9]), tidy([0.9, 0.92], method="same")])}
     assert compared([first, repeat], results)["repeat_of"].tolist() == ["", ""]  # the run has made it another value
 
@@ -192,7 +166,7 @@ def test_stand_ins_are_shown_but_never_compared_and_units_need_a_tolerance():
     assert set(rows["objects"]) == {"YCB (procedural stand-in)"}
     assert "only real ones are compared" in summary(rows)
     with pytest.raises(InputError, match=r"comparison\.tolerances: has no unit '%'; add its tolerance"):
-        compare([number()], {}, OBJECTS, {}, [])
+        verdicts.compare([number()], {}, OBJECTS, {}, [])
 
 
 def test_a_printed_deviation_belongs_to_the_mean_of_the_same_counterpart_and_is_counted_apart():
@@ -202,11 +176,8 @@ def test_a_printed_deviation_belongs_to_the_mean_of_the_same_counterpart_and_is_
     assert (rows["deviation"][0], rows["statistic"].tolist()) == (3.0, ["mean", "deviation"])
     assert rows["paper_high"][0] == pytest.approx(94.5 + 2.776445 * 3 / 5**0.5)  # Student's of five repeats
     assert math.isnan(rows["deviation"][1])
-    assert len(judged_once(rows)) == 1
+    assert len(verdicts.judged_once(rows)) == 1
     assert "1 are standard deviations: 1 inconclusive." in summary(rows)
-
-
-# --- the page ---
 
 
 def test_the_page_counts_first_and_gives_each_reason_once():
@@ -236,19 +207,19 @@ def test_the_page_counts_first_and_gives_each_reason_once():
 
 
 def test_printed_shares_deviations_and_means_have_the_interval_of_their_samples():
-    printed = printed_of(number(97.8, paper_n=180))
+    printed = verdicts.printed_of(number(97.8, paper_n=180))
     centre, half_width = 96.753, 2.360  # of 176 in 180, by the formula of Wilson (1927)
     assert (printed.low, printed.high) == pytest.approx((centre - half_width, centre + half_width), abs=0.05)
-    assert printed_of(number(100.0, paper_n=300)).high == 100
-    assert printed_of(number(100.0, paper_n=300)).low == pytest.approx(100 * 300 / (300 + 1.959964**2))
+    assert verdicts.printed_of(number(100.0, paper_n=300)).high == 100
+    assert verdicts.printed_of(number(100.0, paper_n=300)).low == pytest.approx(100 * 300 / (300 + 1.959964**2))
     deviation = number(2.0, counterpart=replace(ACCURACY, statistic="deviation"), paper_n=5)
-    own = printed_of(deviation)
+    own = verdicts.printed_of(deviation)
     assert chi2.cdf(4 * (2.0 / own.low) ** 2, 4) == pytest.approx(0.975)
     assert chi2.cdf(4 * (2.0 / own.high) ** 2, 4) == pytest.approx(0.025)
-    mean = printed_of(number(85.0), deviation)
+    mean = verdicts.printed_of(number(85.0), deviation)
     assert mean.high - 85 == pytest.approx(2.776445 * 2 / 5**0.5)
     assert 85 - mean.low == pytest.approx(mean.high - 85)
-    printed = printed_of(number(350.0, 550.0, -1, "labels"))
+    printed = verdicts.printed_of(number(350.0, 550.0, -1, "labels"))
     assert (printed.low, printed.high, printed.rounding) == (350, 550, 5)
 
 
@@ -259,29 +230,29 @@ OF_REASONS = {reason: [n for n in NUMBERS if reason_of(n, [reason]) == reason.te
 
 @pytest.fixture(scope="module")
 def reference():
-    files = {fields["file"] for reason in REASONS for fields in citations(reason.text)}
+    files = {fields["file"] for reason in REASONS for fields in verdicts.citations(reason.text)}
     return read_results(path for path in sorted(REFERENCE.glob("*.csv")) if path.name in files)
 
 
 def test_a_reason_is_filled_with_what_was_run_in_the_unit_that_it_names():
     text = "Longer training gives {metrics.csv attribution @ gpca accuracy all %} %. The paper is silent."
     results = {"metrics.csv": pd.concat([tidy([0.9, 0.8], method="gpca"), tidy([0.1, 0.1])])}
-    assert filled(text, number(50.0), results) == "Longer training gives 85.0 %. The paper is silent."
+    assert verdicts.filled(text, number(50.0), results) == "Longer training gives 85.0 %. The paper is silent."
     own = "Here it is {metrics.csv attribution @ @ @ @ share}."
-    assert filled(own, number(50.0), results) == "Here it is 0.1."
+    assert verdicts.filled(own, number(50.0), results) == "Here it is 0.1."
     text = "It is {metrics.csv attribution @ gpca accuracy all %} %. The paper is silent."
-    assert filled(text, number(50.0), {"metrics.csv": tidy([0.1])}) == "The paper is silent."
-    assert filled(text, number(50.0), {}) == "The paper is silent."
+    assert verdicts.filled(text, number(50.0), {"metrics.csv": tidy([0.1])}) == "The paper is silent."
+    assert verdicts.filled(text, number(50.0), {}) == "The paper is silent."
     rows = [
         tidy([value], metric=metric, concept="overlap") for metric, value in (("labels_to_target", 60), ("reached", 0))
     ]
     text = "It takes {a.csv attribution @ @ labels_to_target overlap labels} labels."
-    assert filled(text, number(50.0), {"a.csv": pd.concat(rows)}) == "It takes more than 60 labels."
+    assert verdicts.filled(text, number(50.0), {"a.csv": pd.concat(rows)}) == "It takes more than 60 labels."
 
 
 @pytest.mark.parametrize("reason", REASONS, ids=lambda reason: f"{reason.table} {reason.row} {reason.column}")
 def test_every_reason_cites_a_run_of_the_suite(reason, reference):
-    cited = citations(reason.text)
+    cited = verdicts.citations(reason.text)
     assert cited
     assert {fields["unit"] for fields in cited} <= set(UNITS)
     assert {fields["file"] for fields in cited} <= {tidy.file for each in experiments() for tidy in each.tidy}
@@ -290,7 +261,7 @@ def test_every_reason_cites_a_run_of_the_suite(reason, reference):
         value_of_run(asked, reference)
         for fields in kept
         for of in OF_REASONS[reason]
-        if (asked := cited_number(of, fields)) is not None
+        if (asked := verdicts.cited_number(of, fields)) is not None
     ]
     # What the reference does not keep was made by the same steps.
     assert not kept or any(value is not None for value in found)
@@ -309,7 +280,7 @@ def test_no_reason_gives_up_and_none_quotes_a_number_that_stands_on_no_page():
 def test_readings_that_reasons_cite_are_of_the_grid():
     grid = yaml.safe_load((ROOT / "config/readings.yaml").read_text())["readings"]["groups"]
     for reason in REASONS:
-        for fields in citations(reason.text):
+        for fields in verdicts.citations(reason.text):
             if fields["file"] == READINGS:
                 group, *values = fields["table"].split("/")
                 assert len(values) == len(grid[group])

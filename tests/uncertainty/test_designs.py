@@ -6,16 +6,7 @@ import pytest
 from gpca.errors import InputError
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.rigid import transform
-from gpca.uncertainty.designs import (
-    ADDITIVE_KNOBS,
-    DESIGNS,
-    KNOB_RANGE,
-    STEP,
-    LiveUncertainty,
-    RegisteredRow,
-    evaluate_design,
-    sample_knobs,
-)
+from gpca.uncertainty import designs
 from gpca.uncertainty.interventions import MIDDLE, UNTOUCHED, UPPER, Knobs, PairDraws
 from gpca.uncertainty.settings import CONDITIONS, CORNERS, LATIN, SALTELLI, UncertaintySettings
 
@@ -28,7 +19,7 @@ def draws(settings, seed):
 
 
 def outcomes(design, registrations, row, settings=SETTINGS):
-    return DESIGNS[design].evaluate(RegisteredRow(registrations, row), draws(settings, row))
+    return designs.DESIGNS[design].evaluate(designs.RegisteredRow(registrations, row), draws(settings, row))
 
 
 def numbers(made):
@@ -39,7 +30,7 @@ def numbers(made):
 def evaluated(registrations):
     """Outcomes of every design for one test sample of each concept."""
     rows = [np.flatnonzero((registrations.split == "test") & (registrations.concept == c))[0] for c in CONCEPTS]
-    return {design: {int(row): outcomes(design, registrations, row) for row in rows} for design in DESIGNS}
+    return {design: {int(row): outcomes(design, registrations, row) for row in rows} for design in designs.DESIGNS}
 
 
 def test_corner_bits_are_switches():
@@ -50,23 +41,23 @@ def test_corner_bits_are_switches():
 
 
 def test_every_design_that_is_named_can_be_run():
-    assert DESIGNS.keys() == CONDITIONS.keys()
+    assert designs.DESIGNS.keys() == CONDITIONS.keys()
     assert all(len(set(conditions)) == len(conditions) for conditions in CONDITIONS.values())
 
 
 def test_the_names_of_the_corners_are_what_is_switched_on():
     knobs = ("untouched", "noise", "pose", "noise+pose", "overlap", "noise+overlap", "pose+overlap")
     knobs += ("noise+pose+overlap",)
-    assert DESIGNS["oracle"].conditions == DESIGNS["additive"].conditions[:8] == knobs
-    assert DESIGNS["additive"].conditions[8:] == ("noise_step", "pose_step", "overlap_step")
-    assert DESIGNS["removal"].conditions == (
+    assert designs.DESIGNS["oracle"].conditions == designs.DESIGNS["additive"].conditions[:8] == knobs
+    assert designs.DESIGNS["additive"].conditions[8:] == ("noise_step", "pose_step", "overlap_step")
+    assert designs.DESIGNS["removal"].conditions == (
         *("observed", "denoise", "restart", "denoise+restart", "trim", "denoise+trim", "restart+trim"),
         "denoise+restart+trim",
     )
-    assert DESIGNS["removal"].conditions[DESIGNS["removal"].reference] == "denoise+restart+trim"
-    assert DESIGNS["causal"].conditions == ("reference", "clean", "observed")
-    assert len(DESIGNS["latin"].conditions) == 1 + LATIN
-    assert len(DESIGNS["saltelli"].conditions) == 1 + 5 * SALTELLI
+    assert designs.DESIGNS["removal"].conditions[designs.DESIGNS["removal"].reference] == "denoise+restart+trim"
+    assert designs.DESIGNS["causal"].conditions == ("reference", "clean", "observed")
+    assert len(designs.DESIGNS["latin"].conditions) == 1 + LATIN
+    assert len(designs.DESIGNS["saltelli"].conditions) == 1 + 5 * SALTELLI
 
 
 def test_the_settings_of_the_knobs_are_in_the_order_of_the_names(registrations, monkeypatch):
@@ -81,7 +72,7 @@ def test_the_settings_of_the_knobs_are_in_the_order_of_the_names(registrations, 
 
     monkeypatch.setattr(designs, "KnobRuns", Recorded)
     outcomes("additive", registrations, 40)
-    for knobs, name in zip(asked[:8], DESIGNS["additive"].conditions[:8], strict=True):
+    for knobs, name in zip(asked[:8], designs.DESIGNS["additive"].conditions[:8], strict=True):
         expected = [
             middle if concept in name.split("+") else rest
             for concept, middle, rest in zip(CONCEPTS, MIDDLE, UNTOUCHED, strict=True)
@@ -89,11 +80,11 @@ def test_the_settings_of_the_knobs_are_in_the_order_of_the_names(registrations, 
         assert knobs == tuple(expected)
     for i, knobs in enumerate(asked[8:]):
         step = np.array(knobs) - UNTOUCHED
-        assert step[i] == pytest.approx(0.1 * KNOB_RANGE[i]) and np.count_nonzero(step) == 1
-    assert STEP == 0.1 and np.allclose(KNOB_RANGE, [0.03, 5.0, 0.6])
+        assert step[i] == pytest.approx(0.1 * designs.KNOB_RANGE[i]) and np.count_nonzero(step) == 1
+    assert designs.STEP == 0.1 and np.allclose(designs.KNOB_RANGE, [0.03, 5.0, 0.6])
     asked.clear()
     outcomes("latin", registrations, 40)
-    assert asked[0] == UNTOUCHED and np.array_equal(asked[1:], sample_knobs("latin"))
+    assert asked[0] == UNTOUCHED and np.array_equal(asked[1:], designs.sample_knobs("latin"))
 
 
 def test_icp_runs_once_for_every_setting_that_differs(evaluated):
@@ -132,9 +123,9 @@ def test_the_clean_pairs_are_the_same_in_every_design_and_differ_among_each_othe
         assert not np.array_equal(reference.covariance, observed.covariance)
 
 
-@pytest.mark.parametrize("design", DESIGNS)
+@pytest.mark.parametrize("design", designs.DESIGNS)
 def test_only_the_oracle_is_told_what_was_perturbed_and_cannot_do_without(registrations, evaluated, design):
-    assert DESIGNS[design].oracle == (design == "oracle")
+    assert designs.DESIGNS[design].oracle == (design == "oracle")
     for row, made in evaluated[design].items():
         if design == "oracle":
             with pytest.raises(InputError, match="knob 'noise': nan"):
@@ -162,14 +153,14 @@ def test_the_true_knobs_are_the_severities(registrations, noise, rotation_deg, t
         severity_translation=np.array([translation]),
         severity_crop=np.array([crop]),
     )
-    assert RegisteredRow(one, 0).true_knobs(SETTINGS) == pytest.approx(expected)
+    assert designs.RegisteredRow(one, 0).true_knobs(SETTINGS) == pytest.approx(expected)
     wider = UncertaintySettings(start_rotation_deg=20.0, start_translation=0.1)
-    assert RegisteredRow(one, 0).true_knobs(wider).spread == pytest.approx(max(1.0, expected[1] / 2))
+    assert designs.RegisteredRow(one, 0).true_knobs(wider).spread == pytest.approx(max(1.0, expected[1] / 2))
 
 
 def test_a_pair_is_the_source_in_its_own_frame(registrations):
     for row in range(0, len(registrations), 7):
-        pair = RegisteredRow(registrations, row)
+        pair = designs.RegisteredRow(registrations, row)
         assert np.allclose(transform(pair.T_icp, pair.source), registrations.cloud(row), atol=1e-6)
         assert np.array_equal(pair.target, registrations.target(row))
         translation_m = registrations.T_target_source_icp[row][:3, 3]
@@ -177,7 +168,7 @@ def test_a_pair_is_the_source_in_its_own_frame(registrations):
 
 
 def test_observed_and_clean_pairs_hold_as_many_points_as_asked_for(registrations):
-    pair = RegisteredRow(registrations, 40)
+    pair = designs.RegisteredRow(registrations, 40)
     source, target, T_init, T_ref = pair.observed(60, np.random.default_rng(0))
     assert len(source) == len(target) == 60
     assert len(np.unique(source, axis=0)) == 60 and np.isin(source, pair.source).all()
@@ -196,15 +187,15 @@ def test_observed_and_clean_pairs_hold_as_many_points_as_asked_for(registrations
 
 @pytest.mark.parametrize(("kind", "settings"), [("latin", LATIN), ("saltelli", 5 * SALTELLI)])
 def test_sampled_knobs_lie_within_the_ranges(kind, settings):
-    sampled = sample_knobs(kind)
+    sampled = designs.sample_knobs(kind)
     assert sampled.shape == (settings, 3)
     assert (sampled >= UNTOUCHED).all() and (sampled <= UPPER).all()
-    assert (np.ptp(sampled, axis=0) > 0.8 * KNOB_RANGE).all()
-    sample_knobs.cache_clear()
-    assert np.array_equal(sample_knobs(kind), sampled)
+    assert (np.ptp(sampled, axis=0) > 0.8 * designs.KNOB_RANGE).all()
+    designs.sample_knobs.cache_clear()
+    assert np.array_equal(designs.sample_knobs(kind), sampled)
 
 
-@pytest.mark.parametrize("design", DESIGNS)
+@pytest.mark.parametrize("design", designs.DESIGNS)
 def test_a_source_and_target_of_the_same_points_are_survived(registrations, design):
     one = registrations.subset(np.array([40]))
     eye = np.eye(4)[None]
@@ -226,12 +217,12 @@ def test_a_source_and_target_of_the_same_points_are_survived(registrations, desi
 @pytest.mark.parametrize("row", range(3))
 def test_live_uncertainty_has_the_values_of_the_table_in_any_order_and_keeps_nothing(registrations, row):
     tests = registrations.subset(registrations.rows("test")[:3])
-    outcomes, *_ = evaluate_design("additive", tests, "tiny", 0, SETTINGS)
-    live = LiveUncertainty(tests, row, "tiny", 0, SETTINGS)
+    outcomes, *_ = designs.evaluate_design("additive", tests, "tiny", 0, SETTINGS)
+    live = designs.LiveUncertainty(tests, row, "tiny", 0, SETTINGS)
     assert live.icp_calls == 13  # the clean run
-    values = [live(knobs) for knobs in reversed(ADDITIVE_KNOBS)]
+    values = [live(knobs) for knobs in reversed(designs.ADDITIVE_KNOBS)]
     assert values[::-1] == pytest.approx(outcomes.uncertainty[row], abs=1e-9)
     assert np.ptp(values) > 0
     assert live(UNTOUCHED) == 0
     assert live(Knobs(0.02, 2.0, 0.2)) == live(Knobs(0.02, 2.0, 0.2))
-    assert live.icp_calls == 13 * (1 + len(ADDITIVE_KNOBS) + 3)
+    assert live.icp_calls == 13 * (1 + len(designs.ADDITIVE_KNOBS) + 3)

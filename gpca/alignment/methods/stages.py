@@ -171,8 +171,7 @@ def align_variant(
 
 def sample_at_random(pair: Pair) -> np.ndarray:
     """Return the rows of a share of the source's points."""
-    order_N = generator("sampling", "random", pair.seed).permutation(len(pair.source))
-    return np.sort(order_N[: max(1, round(SAMPLED * len(order_N)))])
+    return _share_of(generator("sampling", "random", pair.seed).permutation(len(pair.source)))
 
 
 def sample_normal_space(pair: Pair) -> np.ndarray:
@@ -191,7 +190,11 @@ def sample_normal_space(pair: Pair) -> np.ndarray:
     first_N = np.repeat(np.cumsum(sizes_D) - sizes_D, sizes_D)
     turn_N = np.empty(len(order_N), np.int64)
     turn_N[np.argsort(direction_N, kind="stable")] = np.arange(len(order_N)) - first_N
-    return np.sort(order_N[np.argsort(turn_N, kind="stable")][: max(1, round(SAMPLED * len(order_N)))])
+    return _share_of(order_N[np.argsort(turn_N, kind="stable")])
+
+
+def _share_of(order_N: np.ndarray) -> np.ndarray:
+    return np.sort(order_N[: max(1, round(SAMPLED * len(order_N)))])
 
 
 def reject_distance(matches: Matches) -> Matches:

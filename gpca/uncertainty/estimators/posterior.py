@@ -11,6 +11,7 @@ from functools import partial
 
 import numpy as np
 
+from gpca.alignment.batched_icp import make_target, pulls
 from gpca.alignment.methods.interface import CORRESPONDENCE_DISTANCE
 from gpca.rigid import exp, inverse, log
 from gpca.seeds import generator
@@ -27,20 +28,14 @@ class Posterior:
     """
 
     def __init__(self, registered: RegisteredPair) -> None:
-        from gpca.alignment.batched_icp import make_target
-
         matches = registered.matches()
         self._source, self._T = registered.pair.source, registered.T_target_source
         self._precision = 1 / max(matches.variance, SMALLEST_VARIANCE)
-        self._prior_precision_6 = registered.deviation_6**-2.0
-        self._prior_6 = log((registered.pair.T_target_source_init @ inverse(self._T))[None])[0]
+        self.prior_precision_6 = registered.deviation_6**-2.0
+        self.prior_6 = log((registered.pair.T_target_source_init @ inverse(self._T))[None])[0]
         self._target = make_target(registered.pair.target, CORRESPONDENCE_DISTANCE)
         curvature_6_6 = np.einsum("nik,nil->kl", matches.jacobians, matches.jacobians) * self._precision
-        self.covariance = np.linalg.inv(curvature_6_6 + np.diag(self._prior_precision_6))
-
-    def prior_sample(self, normal_n_6: np.ndarray) -> np.ndarray:
-        """Return draws (n, 6) of the prior, of standard normal numbers."""
-        return self._prior_6 + normal_n_6 / np.sqrt(self._prior_precision_6)
+        self.covariance = np.linalg.inv(curvature_6_6 + np.diag(self.prior_precision_6))
 
     def slope_of_batch(self, xi_n_6: np.ndarray, batch: int, random: np.random.Generator) -> np.ndarray:
         """Return :meth:`slope` of so many of the source's points, drawn anew at each call."""
@@ -49,12 +44,10 @@ class Posterior:
 
     def slope(self, xi_n_6: np.ndarray, rows: np.ndarray | None = None) -> np.ndarray:
         """Return ∂ ln p/∂ξ (n, 6); of some of the source's points alone, they count for all."""
-        from gpca.alignment.batched_icp import pulls
-
         points = self._source if rows is None else self._source[rows]
         pulls_n_6, fitness_n, _ = pulls(self._target, points, exp(xi_n_6) @ self._T)
         matched_n = fitness_n * len(self._source)
-        of_prior_n_6 = (self._prior_6 - xi_n_6) * self._prior_precision_6
+        of_prior_n_6 = (self.prior_6 - xi_n_6) * self.prior_precision_6
         return of_prior_n_6 - self._precision * matched_n[:, None] * pulls_n_6
 
 
@@ -117,7 +110,7 @@ def stein_icp(
     posterior = Posterior(registered)
     random = generator("stein_icp", registered.pair.seed)
     slope = partial(posterior.slope_of_batch, batch=batch, random=random)
-    start_n_6 = posterior.prior_sample(random.normal(size=(particles, 6)))
+    start_n_6 = posterior.prior_6 + random.normal(size=(particles, 6)) / np.sqrt(posterior.prior_precision_6)
     return np.cov(descend(slope, start_n_6, steps, learning_rate), rowvar=False)
 
 

@@ -11,14 +11,6 @@ import pytest
 
 from gpca.alignment.methods import registry
 from gpca.alignment.methods.interface import MethodEntry, Outcome, Pair
-from gpca.alignment.methods.registry import (
-    left_out,
-    make_method,
-    method_entry,
-    method_module,
-    methods,
-    require_settings,
-)
 from gpca.alignment.pose_error import pose_error
 from gpca.errors import InputError
 from gpca.rigid import require_rigid
@@ -27,26 +19,26 @@ from tests.documents import ROOT
 from .pairs import POOR, clouds, error, perturbed, small_motion
 
 OPTIONAL = {"gicp_small": "small_gicp", "kiss_matcher": "kiss_matcher"}
-RUNNING = sorted(set(methods()) - set(left_out(methods())))
-LOCAL = [name for name in RUNNING if not method_entry(name).is_global]
-GLOBAL = [name for name in RUNNING if method_entry(name).is_global]
+RUNNING = sorted(set(registry.methods()) - set(registry.left_out(registry.methods())))
+LOCAL = [name for name in RUNNING if not registry.method_entry(name).is_global]
+GLOBAL = [name for name in RUNNING if registry.method_entry(name).is_global]
 WITHOUT_NORMALS = {"point_to_point", "point_to_point_open3d", "trimmed", *OPTIONAL}
 
 
 def test_every_method_is_found_and_has_a_title_of_its_own():
-    entries = methods()
+    entries = registry.methods()
     assert {name: entry.package for name, entry in entries.items() if entry.package} == OPTIONAL
     assert len({entry.title for entry in entries.values()}) == len(entries)
     for name, entry in entries.items():
-        assert name in vars(import_module(method_module(name)))["METHODS"]
-        assert method_entry(name) is entry
+        assert name in vars(import_module(registry.method_module(name)))["METHODS"]
+        assert registry.method_entry(name) is entry
 
 
 @pytest.mark.parametrize("name", LOCAL)
 @pytest.mark.parametrize("seed", [0, 1])
 def test_a_local_method_aligns_what_lies_close(objects, name, seed):
     pair, T_true = small_motion(objects, seed=seed)
-    outcome = make_method(name)(pair)
+    outcome = registry.make_method(name)(pair)
     assert outcome.failure == "" and outcome.fitness > 0.9
     require_rigid(outcome.T_target_source, name)
     before, after = (pose_error(pair.source, T, T_true, False) for T in (np.eye(4), outcome.T_target_source))
@@ -57,7 +49,7 @@ def test_a_local_method_aligns_what_lies_close(objects, name, seed):
 def test_a_global_method_needs_no_initial_pose(objects, name):
     pair, T_true = perturbed(objects, 1, "pose", seed=2)
     half_turn = np.diag([1.0, -1.0, -1.0, 1.0])
-    outcomes = [make_method(name)(pair.started_at(start)) for start in (np.eye(4), half_turn)]
+    outcomes = [registry.make_method(name)(pair.started_at(start)) for start in (np.eye(4), half_turn)]
     assert error(pair, outcomes[0], T_true) < 0.1
     assert np.array_equal(outcomes[0].T_target_source, outcomes[1].T_target_source)
 
@@ -67,7 +59,7 @@ def test_what_is_given_is_not_changed_and_a_repetition_is_the_same(objects, name
     pair, _ = perturbed(objects, 1, "overlap")
     names = ("source", "target", "T_target_source_init", "source_normals", "target_normals")
     before = [getattr(pair, part).copy() for part in names]
-    method = make_method(name)
+    method = registry.make_method(name)
     first, second = method(pair), method(pair)
     assert first.T_target_source.tobytes() == second.T_target_source.tobytes()
     first.T_target_source[:] = 0  # what is returned is no view of what was given
@@ -90,7 +82,7 @@ def test_without_normals_a_registration_fails(objects, name):
     source, target, _, _ = clouds(objects, 0)
     start = np.eye(4)
     start[0, 3] = 0.01
-    outcome = make_method(name)(Pair(source, target, start))
+    outcome = registry.make_method(name)(Pair(source, target, start))
     assert "has no normals" in outcome.failure
     assert not outcome.converged and outcome.fitness == 0
     assert np.array_equal(outcome.T_target_source, start)
@@ -101,7 +93,7 @@ def test_without_correspondences_a_registration_fails(objects, name):
     pair, _ = small_motion(objects)
     far = np.eye(4)
     far[2, 3] = 5
-    outcome = make_method(name)(pair.started_at(far))
+    outcome = registry.make_method(name)(pair.started_at(far))
     assert "within 0.1 diameters" in outcome.failure or "correspondences are left" in outcome.failure
     assert np.array_equal(outcome.T_target_source, far)
 
@@ -109,7 +101,7 @@ def test_without_correspondences_a_registration_fails(objects, name):
 @pytest.mark.parametrize("name", LOCAL)
 def test_a_method_that_is_still_on_its_way_has_failed(objects, name):
     pair, _ = perturbed(objects, 2, "pose", seed=0)
-    outcome = make_method(name, {"max_iterations": 1})(pair)
+    outcome = registry.make_method(name, {"max_iterations": 1})(pair)
     assert outcome.failure == "has not converged in 1 iterations"
     assert not np.array_equal(outcome.T_target_source, np.eye(4))
 
@@ -119,7 +111,7 @@ def test_a_method_that_is_still_on_its_way_has_failed(objects, name):
 def test_poor_clouds_give_a_rigid_pose_and_no_exception(objects, name, poor):
     source, target, _, _ = clouds(objects, 0)
     pair = Pair(POOR[poor](source), POOR[poor](target)).with_normals()
-    outcome = make_method(name)(pair)
+    outcome = registry.make_method(name)(pair)
     require_rigid(outcome.T_target_source, name)
     assert 0 <= outcome.fitness <= 1 and np.isfinite(outcome.inlier_rmse)
 
@@ -128,17 +120,17 @@ def test_a_pose_that_is_not_finite_is_a_failure(objects, monkeypatch):
     pair, T_true = small_motion(objects)
     broken = MethodEntry("Broken", lambda pair: replace(Outcome.at(pair, T_true, 0.1), T_target_source=T_true * np.nan))
     monkeypatch.setattr(registry.REGISTRY, "by_module", lambda: {"broken": {"broken": broken}})
-    outcome = make_method("broken")(pair)
+    outcome = registry.make_method("broken")(pair)
     assert outcome.failure == "the pose is not finite"
     assert np.array_equal(outcome.T_target_source, np.eye(4))
 
 
 def test_a_missing_package_is_named(monkeypatch):
     monkeypatch.setattr(registry, "find_spec", lambda name: None)
-    assert left_out(["point_to_point", *OPTIONAL]) == OPTIONAL
+    assert registry.left_out(["point_to_point", *OPTIONAL]) == OPTIONAL
     for name, package in OPTIONAL.items():
         with pytest.raises(InputError, match=f"'{name}': needs the package {package}; install it or leave"):
-            make_method(name)
+            registry.make_method(name)
 
 
 @pytest.mark.parametrize(
@@ -156,7 +148,7 @@ def test_a_missing_package_is_named(monkeypatch):
 )
 def test_settings_that_a_method_does_not_take_are_refused(name, settings, words):
     with pytest.raises(InputError, match=words):
-        require_settings(name, settings)
+        registry.require_settings(name, settings)
 
 
 class Refusing:
@@ -176,7 +168,7 @@ def test_kiss_matcher_fails_where_it_refuses_and_is_not_asked_where_it_would_end
 ):
     monkeypatch.setitem(sys.modules, "kiss_matcher", Refusing())
     monkeypatch.setattr(registry, "find_spec", lambda name: True)
-    outcome = make_method("kiss_matcher", {"voxel": voxel})(small_motion(objects)[0])
+    outcome = registry.make_method("kiss_matcher", {"voxel": voxel})(small_motion(objects)[0])
     few = f"of the source, voxels of {voxel:g} diameters leave too few points"
     assert outcome.failure == ("KISS-Matcher: Too small voxel size" if voxel == 0.1 else few)
 
@@ -210,7 +202,7 @@ def digests():
     points *= np.array([0.5, 0.3, 0.2]) / np.linalg.norm(points, axis=-1, keepdims=True)
     pair = Pair(points[0] + random.normal(scale=0.01, size=(400, 3)) + [0.03, -0.02, 0.01], points[1], seed=3)
     for name in RUNNING:
-        outcome = make_method(name)(pair.with_normals())
+        outcome = registry.make_method(name)(pair.with_normals())
         told = outcome.T_target_source.tobytes() + np.array([outcome.fitness, outcome.inlier_rmse]).tobytes()
         yield f"{name} {hashlib.sha256(told).hexdigest()} {outcome.failure}".rstrip()
 

@@ -10,13 +10,6 @@ from gpca.errors import InputError
 from gpca.rigid import exp, transform
 from gpca.uncertainty.estimators import registry
 from gpca.uncertainty.estimators.interface import EstimatorEntry, Example, intrinsic_frame, inverse_hessian
-from gpca.uncertainty.estimators.registry import (
-    estimator_entry,
-    estimator_module,
-    estimators,
-    make_estimator,
-    require_estimator_settings,
-)
 
 from .cases import FAR, ellipsoid, registered
 
@@ -32,14 +25,14 @@ def described(**changes):
 
 
 def test_every_estimator_has_an_entry():
-    assert set(estimators()) == NAMES
-    assert {estimator_module(name).rsplit(".", 1)[1] for name in NAMES} == {"analytic", "learned", "posterior"}
-    assert {name for name in NAMES if estimator_entry(name).learn} == {"cello", "learned"}
+    assert set(registry.estimators()) == NAMES
+    assert {registry.estimator_module(name).rsplit(".", 1)[1] for name in NAMES} == {"analytic", "learned", "posterior"}
+    assert {name for name in NAMES if registry.estimator_entry(name).learn} == {"cello", "learned"}
 
 
 @pytest.mark.parametrize("name", sorted(NAMES))
 def test_an_estimate_is_a_covariance_and_without_correspondences_it_fails(name):
-    estimate = make_estimator(name, QUICK.get(name), EXAMPLES)
+    estimate = registry.make_estimator(name, QUICK.get(name), EXAMPLES)
     method = "point_to_plane" if name == "bonnabel" else "point_to_point"
     said = estimate(described(method=method))
     assert said.failure == ""
@@ -59,16 +52,16 @@ def test_starts_from_which_nothing_is_found_a_method_without_a_start_and_missing
     lost = replace(registered(), pair=Pair(source, source, FAR, normals, normals))
     bare = replace(registered("point_to_plane"), pair=replace(registered().pair, target_normals=None))
     for name in ("monte_carlo", "brossard"):
-        assert make_estimator(name)(lost).failure == "fewer than 7 runs found a correspondence"
+        assert registry.make_estimator(name)(lost).failure == "fewer than 7 runs found a correspondence"
     for name in ("bonnabel", "brossard", "monte_carlo"):
-        assert make_estimator(name)(bare).failure == "the target has no normals"
-    said = make_estimator("monte_carlo")(registered("fgr"))
+        assert registry.make_estimator(name)(bare).failure == "the target has no normals"
+    said = registry.make_estimator("monte_carlo")(registered("fgr"))
     assert said.failure == "'fgr' reads no initial pose, so that its results do not spread"
 
 
 def test_any_local_method_can_be_run_from_starts():
     batched, one_by_one = (
-        make_estimator("monte_carlo", {"starts": 8})(registered(method, noise=0.01)).covariance_6_6
+        registry.make_estimator("monte_carlo", {"starts": 8})(registered(method, noise=0.01)).covariance_6_6
         for method in ("point_to_plane", "huber")
     )
     assert np.sqrt(np.trace(one_by_one)) == pytest.approx(np.sqrt(np.trace(batched)), rel=0.5)
@@ -77,13 +70,16 @@ def test_any_local_method_can_be_run_from_starts():
 def test_a_covariance_that_is_not_finite_is_a_failure(monkeypatch):
     entry = EstimatorEntry("Wild", "starts", estimate=lambda registered: np.full((6, 6), np.nan))
     monkeypatch.setattr(registry.REGISTRY, "by_module", lambda: {"wild": {"wild": entry}})
-    assert make_estimator("wild")(registered()).failure == "the covariance is not finite"
+    assert registry.make_estimator("wild")(registered()).failure == "the covariance is not finite"
 
 
 def test_one_that_learns_needs_examples_and_fails_at_too_few():
     with pytest.raises(InputError, match=r"'cello': learns from registrations .* choose one of .*censi"):
-        make_estimator("cello")
-    assert make_estimator("cello", {}, EXAMPLES[:5])(described()).failure == "5 registrations to learn from, not 8"
+        registry.make_estimator("cello")
+    assert (
+        registry.make_estimator("cello", {}, EXAMPLES[:5])(described()).failure
+        == "5 registrations to learn from, not 8"
+    )
 
 
 @pytest.mark.parametrize(
@@ -98,7 +94,7 @@ def test_one_that_learns_needs_examples_and_fails_at_too_few():
 )
 def test_unknown_names_and_settings_are_refused(name, settings, message):
     with pytest.raises(InputError, match=message):
-        require_estimator_settings(name, settings)
+        registry.require_estimator_settings(name, settings)
 
 
 def test_the_inverse_of_a_hessian_or_why_there_is_none():
