@@ -62,7 +62,7 @@ class LearnedPairGPCA(PairDescription, GPCA):
         """Train the encoder with a head on all labeled pairs, and return a function that attaches its embeddings."""
         from gpca.encoders.dgcnn import PAIR_ENCODERS
         from gpca.encoders.registry import EncoderSettings
-        from gpca.encoders.training import TrainingTask, embed, train_encoder
+        from gpca.encoders.training import embed, train_encoder
 
         motion = self._prefix + "encoder_motion"
 
@@ -74,9 +74,9 @@ class LearnedPairGPCA(PairDescription, GPCA):
         options: dict[str, Any] = {"motion": labeled.attached[motion].shape[1]}
         settings = EncoderSettings(ENCODER, self._draw_points, draws=2, options=options, **self._training)
         draw = partial(draw_pairs, self._prefix + "points", motion)
-        task = TrainingTask(self.labels, make=lambda: PAIR_ENCODERS[ENCODER](**options), draw=draw)
+        make = partial(PAIR_ENCODERS[ENCODER], **options)
         all_rows = replace(labeled, split=np.full(len(labeled), "train"))
-        model, _ = train_encoder(all_rows, *self._axes, settings, task=task)
+        model, _ = train_encoder(all_rows, *self._axes, settings, classes=self.labels, make=make, draw=draw)
 
         def with_embeddings(pairs: Registrations) -> Registrations:
             described = self.describe(pairs)

@@ -98,7 +98,7 @@ def test_an_encoder(config, added_modules, registrations, monkeypatch):
 
 def test_an_acquisition_strategy(config, registrations, monkeypatch, tmp_path):
     from gpca.active_learning.curves import POOL_COLUMNS, collect_curves, write_curves
-    from gpca.active_learning.rounds import initial_gpc, make_task, run_rounds
+    from gpca.active_learning.rounds import initial_gpc, make_task
     from gpca.active_learning.settings import ActiveLearningSettings
     from gpca.classifier.settings import GPCSettings
     from gpca.declarations.plan import Run
@@ -118,7 +118,7 @@ def test_an_acquisition_strategy(config, registrations, monkeypatch, tmp_path):
     start = initial_gpc(task, settings, "tiny", 0)
     paths = []
     for name in config["active_learning"]["strategies"]:
-        steps = run_rounds(task.project(start), start, name, settings, "tiny", 0)
+        steps = [step for step, _ in rounds(task.project(start), start, name, settings, "tiny", 0)]
         assert [step["labels"] for step in steps] == [0, 4, 8]
         paths.append(tmp_path / f"tiny/{name}/seed0.csv")
         paths[-1].parent.mkdir(parents=True)

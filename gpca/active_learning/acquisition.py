@@ -19,20 +19,13 @@ EXPANSION = 4  # K: BALD with k-means clusters the B·K most uncertain samples
 
 @dataclass(frozen=True)
 class Pool:
-    """N unlabeled samples and the classifier's scores.
+    """N unlabeled samples and the classifier's scores."""
 
-    Attributes:
-        h_N_d: embeddings, standardized.
-        scores_N_C, bald_N: mean class probabilities (Eq. 4) and BALD in nats (Eq. 7).
-        h_labeled_L_d: embeddings of the labeled samples.
-        truth_N: true classes, for oracle strategies.
-    """
-
-    h_N_d: np.ndarray
-    scores_N_C: np.ndarray
-    bald_N: np.ndarray
-    h_labeled_L_d: np.ndarray
-    truth_N: np.ndarray
+    h_N_d: np.ndarray  # embeddings, standardized
+    scores_N_C: np.ndarray  # mean class probabilities (Eq. 4)
+    bald_N: np.ndarray  # nats (Eq. 7)
+    h_labeled_L_d: np.ndarray  # embeddings of the labeled samples
+    truth_N: np.ndarray  # true classes, for oracle strategies
 
 
 Choose = Callable[[Pool, int, np.random.Generator], np.ndarray]
@@ -40,18 +33,12 @@ Choose = Callable[[Pool, int, np.random.Generator], np.ndarray]
 
 @dataclass(frozen=True)
 class Strategy:
-    """A registered strategy.
-
-    Attributes:
-        choose: called with pool, batch size and generator; may return fewer rows, or repeated ones.
-        oracle: whether it reads the true classes.
-        needs_scores: whether it reads the classifier's scores.
-    """
+    """A registered strategy."""
 
     title: str
-    choose: Choose
-    oracle: bool = False
-    needs_scores: bool = True
+    choose: Choose  # called with pool, batch size and generator; may return fewer rows, or repeated ones
+    oracle: bool = False  # whether it reads the true classes
+    needs_scores: bool = True  # whether it reads the classifier's scores
 
 
 def strategies() -> dict[str, Strategy]:
@@ -123,7 +110,7 @@ def balanced_kmeans(
     h_n_d: np.ndarray, clusters: int, random: np.random.Generator, most: int = 100
 ) -> tuple[np.ndarray, np.ndarray]:
     """Clusters (n,) of equally many samples each at the least cost (Malinen and Fränti 2014), and centroids (B, d)."""
-    from scipy.optimize import linear_sum_assignment  # here: planning reads names only
+    from scipy.optimize import linear_sum_assignment
     from scipy.spatial.distance import cdist
     from sklearn.cluster import kmeans_plusplus
 
@@ -178,32 +165,30 @@ def typiclust(pool: Pool, batch: int, random: np.random.Generator) -> np.ndarray
 
 def _with_labeled(strategy, pool: Pool, batch: int) -> np.ndarray:
     """Query a strategy that reads the embeddings of the labeled samples, not their labels."""
-    labels = np.concatenate([np.full(len(pool.h_N_d), np.nan), np.zeros(len(pool.h_labeled_L_d))])
+    labels = np.repeat([np.nan, 0], [len(pool.h_N_d), len(pool.h_labeled_L_d)])
     return strategy.query(np.concatenate([pool.h_N_d, pool.h_labeled_L_d]), labels, batch_size=batch)
 
 
+def power_bald(pool: Pool, batch: int, random: np.random.Generator) -> np.ndarray:
+    """Draw without replacement in proportion to BALD (Kirsch et al. 2023, β = 1) by Gumbel top-k.
+
+    In their comparison, it equals BatchBALD without joint entropies.
+    """
+    return top(np.log(np.maximum(pool.bald_N, 1e-12)) + random.gumbel(size=len(pool.bald_N)), batch)
+
+
+BLIND = {"needs_scores": False}
 STRATEGIES = {
-    "random": Strategy(
-        "Random", lambda pool, batch, random: random.permutation(len(pool.h_N_d))[:batch], needs_scores=False
-    ),
-    "random_stratified": Strategy(
-        "Stratified random (knows the truth)", random_stratified, oracle=True, needs_scores=False
-    ),
+    "random": Strategy("Random", lambda pool, batch, random: random.permutation(len(pool.h_N_d))[:batch], **BLIND),
+    "random_stratified": Strategy("Stratified random (knows the truth)", random_stratified, oracle=True, **BLIND),
     "entropy": Strategy("Entropy", by_scores("entropy")),
     "margin": Strategy("Margin", by_scores("margin_sampling")),
     "bald": Strategy("BALD", lambda pool, batch, random: top(pool.bald_N, batch)),
     "bald_kmeans": Strategy("BALD + k-means (paper)", bald_kmeans),
-    # Draws without replacement in proportion to BALD (Kirsch et al. 2023, β = 1) by Gumbel top-k, equal to BatchBALD
-    # in their comparison, without joint entropies.
-    "bald_stochastic": Strategy(
-        "PowerBALD",
-        lambda pool, batch, random: top(
-            np.log(np.maximum(pool.bald_N, 1e-12)) + random.gumbel(size=len(pool.bald_N)), batch
-        ),
-    ),
+    "bald_stochastic": Strategy("PowerBALD", power_bald),
     "badge": Strategy("BADGE", badge),
-    "coreset": Strategy("CoreSet", coreset, needs_scores=False),
-    "typiclust": Strategy("TypiClust", typiclust, needs_scores=False),
+    "coreset": Strategy("CoreSet", coreset, **BLIND),
+    "typiclust": Strategy("TypiClust", typiclust, **BLIND),
 }
 
 STREAMS = {

@@ -29,12 +29,8 @@ def write_curves(
 ) -> None:
     import pandas as pd
 
-    rows = [
-        {"setting": setting, "held_out": held_out, **step}
-        for (setting, held_out), steps in curves.items()
-        for step in steps
-    ]
-    write_csv(path, pd.DataFrame(rows)[list(columns)])
+    parts = [pd.DataFrame(steps).assign(setting=key[0], held_out=key[1]) for key, steps in curves.items()]
+    write_csv(path, pd.concat(parts)[list(columns)])
 
 
 def read_curves(path: str | Path) -> dict[tuple[str, str], pd.DataFrame]:

@@ -33,16 +33,12 @@ LONGEST_NAME = 200  # characters
 
 @dataclass(frozen=True)
 class Queue(Container):
-    """S registrations without labels, in the canonical frames and the diameters of their targets.
-
-    The `object_name` is that of the files, as ``source to target``; clouds are kept as in
-    :class:`gpca.pairs.dataset.Registrations`, beside the embedding `h` of each aligned source.
-    """
+    """S registrations without labels, with clouds as in :class:`gpca.pairs.dataset.Registrations`."""
 
     remedy: ClassVar[str] = "queue the registrations again"
 
-    object_name: np.ndarray = array("S", TEXT)
-    h: np.ndarray = array("S d")
+    object_name: np.ndarray = array("S", TEXT)  # of the files, as ``source to target``
+    h: np.ndarray = array("S d")  # embeddings of the aligned sources
     points: np.ndarray = array("P 3", offsets="offsets")
     offsets: np.ndarray = array("S+1", WHOLE)
     target_points: np.ndarray = array("Q 3", offsets="target_offsets")
@@ -72,9 +68,7 @@ def is_queue(path: str | Path) -> bool:
 def add_to_queue(path: str | Path, aligned: np.ndarray, target: np.ndarray, h_1_d: np.ndarray, name: str) -> int:
     """Append a registration to a file, which need not exist, and return the number of registrations in it.
 
-    Args:
-        aligned, target: (N, 3) and (M, 3), in the target's canonical frame and diameters.
-        h_1_d: (1, d) embedding of the aligned source (:meth:`gpca.model.explainer.Explainer.embed`).
+    The clouds (N, 3) are in the target's canonical frame and diameters; `h_1_d` is the aligned source's embedding.
     """
     path = Path(path)
     one = Queue(
@@ -95,12 +89,7 @@ def add_to_queue(path: str | Path, aligned: np.ndarray, target: np.ndarray, h_1_
 
 
 class LabelFile:
-    """Labels in a CSV to which every answer is appended at once, so that interrupted labeling loses nothing.
-
-    Args:
-        path: the file; it need not exist.
-        samples: those that may be labeled.
-    """
+    """Labels of the given samples in a CSV, which need not exist; every answer is appended and written at once."""
 
     def __init__(self, path: str | Path, samples: Mapping[Key, object]) -> None:
         self.path = Path(path)
@@ -127,13 +116,10 @@ class LabelFile:
 
     def add(self, key: Key, concept: str) -> None:
         """Append one answer and write it to disk."""
-        new = not self.path.is_file() or self.path.stat().st_size == 0
         self.path.parent.mkdir(parents=True, exist_ok=True)
         with self.path.open("a", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            if new:
-                writer.writerow(LABEL_COLUMNS)
-            writer.writerow((key[1], key[0], concept))
+            rows = [(key[1], key[0], concept)] if file.tell() else [LABEL_COLUMNS, (key[1], key[0], concept)]
+            csv.writer(file, lineterminator="\n").writerows(rows)
         self.labels[key] = concept
 
 
@@ -158,12 +144,7 @@ class Question:
 class Session:
     """A growing set of labels and the classifier trained on them; new concepts extend its classes.
 
-    Args:
-        h_S_d, keys: embeddings of all samples, split and number of each.
-        start: labels before the first question.
-        labels: the file of answers; the classifier learns those that it contains at once.
-        strategy: of :mod:`gpca.active_learning.acquisition`; it picks the questions.
-        gpc: a trained classifier to continue with; then `start` may be empty.
+    The classifier learns the labels of `start` and of the file. With a trained one to continue, `start` may be empty.
     """
 
     def __init__(
@@ -217,8 +198,8 @@ class Session:
             return []
         projection = self.gpc.project(self.h_S_d[left])
         scores_N_C, variances_N_C, bald_N = self.gpc.attribute(projection)
-        labeled = self.h_S_d[[self._rows[key] for key in (*self._start, *self.answered)]]
-        inputs_L_d = [*self._earlier, *([self.gpc.project(labeled).inputs_N_d] if len(labeled) else [])]
+        labeled = [self._rows[key] for key in (*self._start, *self.answered)]
+        inputs_L_d = [*self._earlier, *([self.gpc.project(self.h_S_d[labeled]).inputs_N_d] if labeled else [])]
         pool = Pool(projection.inputs_N_d, scores_N_C, bald_N, np.concatenate(inputs_L_d), np.full(len(left), ""))
         chosen = select(self._strategy, pool, batch, self._random)
         return [Question(left[i], scores_N_C[i], variances_N_C[i], float(bald_N[i])) for i in chosen]

@@ -22,12 +22,9 @@ Step = dict[str, float]
 
 
 class Retraining:
-    """Fits classifiers on growing sets of labels.
+    """Fits classifiers on growing sets of labels of a task.
 
-    Args:
-        task: initial, pool and test samples, not projected.
-        warm: whether a fit continues from the last one.
-        sees_pool: whether scaling, inducing inputs and lengthscale are initialized on the pool too.
+    A `warm` fit continues from the last one; `sees_pool`: it is standardized and started on the pool too.
     """
 
     def __init__(
@@ -51,10 +48,8 @@ class Retraining:
         self, iterations: Iterable[int], queried: Sequence[int], before: GPC | None
     ) -> Iterator[tuple[int, GPC]]:
         """Yield each number of passes over the labels, in rising order, and the classifier after it."""
-        initial, pool, rows = self.task.initial, self.task.pool, list(queried)
-        h_L_d = np.concatenate([initial.h, pool.h[rows]])
-        concept_L = np.concatenate([initial.concept_N, pool.concept_N[rows]])
-        around = np.concatenate([initial.h, pool.h]) if self._sees_pool else None
+        h_L_d, concept_L = self.task.labeled(list(queried))
+        around = self.task.labeled()[0] if self._sees_pool else None
         gpc = GPC(CONCEPTS, self.settings, *self._axes)
         for done in gpc.fit_up_to(iterations, h_L_d, concept_L, around, before if self._warm else None):
             yield done, gpc
@@ -87,14 +82,10 @@ class Learned:
 def learn(
     retraining: Retraining, strategy: str, settings: RetrainingSettings, targets: Sequence[float], *axes: object
 ) -> Learned:
-    """Spend labels with one strategy until all targets are reached, and at least `settings.least`.
+    """Spend labels with one strategy until all target accuracies are reached, and at least `settings.least`.
 
-    In a round that first reaches a target, labels are also added one by one, to count them exactly; if the strategy
-    ranks them, the most uncertain comes first.
-
-    Args:
-        targets: accuracies on the test samples; the curve has a step at each. With a single one, ``epochs`` of that
-            step are the passes up to the target instead of those of the whole retraining.
+    In a round that first reaches a target, labels are also added one by one, to count them exactly: the curve has a
+    step at each target. With a single one, its ``epochs`` are the passes up to the target, not of the whole retraining.
     """
     task = retraining.task
     random = generator(*axes, "retraining", task.held_out, strategy)

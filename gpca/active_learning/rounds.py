@@ -69,6 +69,12 @@ class LabelingTask(Generic[Inputs]):
         parts = (Samples(gpc.project(part.h), part.concept_N) for part in (self.initial, self.pool, self.test))
         return LabelingTask(self.held_out, *parts)
 
+    def labeled(self: LabelingTask[np.ndarray], rows: list[int] | slice = slice(None)) -> tuple[np.ndarray, np.ndarray]:
+        """Return embeddings and concepts of the initial samples and of rows of the pool, by default all."""
+        initial, pool = self.initial, self.pool
+        concept_L = np.concatenate([initial.concept_N, pool.concept_N[rows]])
+        return np.concatenate([initial.h, pool.h[rows]]), concept_L
+
 
 def make_task(
     samples: Registrations | Embedded,
@@ -78,12 +84,9 @@ def make_task(
     classes: tuple[str, ...] = CONCEPTS,
     new_share: float | None = None,
 ) -> LabelingTask[np.ndarray]:
-    """Split the training samples into initial labeled samples and the pool of all others.
+    """Split the training samples into initial ones, equally many of each other concept, and the pool of the rest.
 
-    Args:
-        held_out: concept without initial labels.
-        classes: all concepts; the others have equally many initial samples.
-        new_share: share (below 1) of the held-out concept in the pool, if there are enough samples; None keeps all.
+    `new_share` is that of the held-out concept in the pool, if there are enough samples; None keeps all.
     """
     train = generator(*axes, "initial", held_out).permutation(samples.rows("train"))
     concept_S = samples.concept
@@ -114,15 +117,9 @@ def initial_gpc(
     Otherwise, no inducing input would be near the new concept.
     """
     gpc = GPC(classes, settings.gpc, *axes, "active_learning", task.held_out)
-    around = np.concatenate([task.initial.h, task.pool.h])
-    gpc.fit(task.initial.h, task.initial.concept_N, around)
+    gpc.fit(task.initial.h, task.initial.concept_N, task.labeled()[0])
     gpc.level()
     return gpc
-
-
-def run_rounds(*given: Any, **options: Any) -> list[dict[str, float]]:
-    """Spend the budget of labels with one strategy: the steps of :func:`rounds`."""
-    return [step for step, _ in rounds(*given, **options)]
 
 
 def rounds(
@@ -136,12 +133,8 @@ def rounds(
     """Yield a step per round, the first before any label, and the rows of the pool labeled so far.
 
     A step has ``labels``, ``new_labels`` of the held-out concept, ``accuracy`` on all test samples, ``accuracy_new`` on
-    those of the held-out concept, and ``epochs`` of the retraining.
-
-    Args:
-        task: projected by `gpc`.
-        gpc: result of :func:`initial_gpc`; it is not changed.
-        answers_N: the oracle's answers for the pool; by default, the truth.
+    those of the held-out concept, and ``epochs`` of the retraining. The `gpc` of :func:`initial_gpc`, which projected
+    the task, is not changed. By default, the oracle's answers for the pool are the truth.
     """
     random = generator(*axes, "active_learning", task.held_out, strategy)
     gpc, needs_scores = copy(gpc), require_strategy(strategy).needs_scores
@@ -170,23 +163,18 @@ def pool_of(
     return Pool(h.inputs_N_d, scores_N_C, bald_N, labeled, task.pool.concept_N[left])
 
 
-def step_of(task: LabelingTask, gpc: GPC, queried: list[int], epochs: int) -> dict[str, float]:
-    accuracy, accuracy_new = accuracies(task, gpc)
+def step_of(task: LabelingTask, classifier: Any, queried: list[int], epochs: int) -> dict[str, float]:
+    """Return a step of :func:`rounds`; an accuracy without test samples is NaN."""
+    named_N = np.array(classifier.classes)[classifier.scores(task.test.h).argmax(axis=1)]
+    right_N = named_N == task.test.concept_N
+    new_N = task.test.concept_N == task.held_out
     return {
         "labels": len(queried),
-        "new_labels": int(np.sum(task.pool.concept_N[queried] == task.held_out)) if queried else 0,
-        "accuracy": accuracy,
-        "accuracy_new": accuracy_new,
+        "new_labels": int((task.pool.concept_N[queried] == task.held_out).sum()) if queried else 0,
+        "accuracy": float(right_N.mean()),
+        "accuracy_new": float(right_N[new_N].mean()) if new_N.any() else float("nan"),
         "epochs": epochs,
     }
-
-
-def accuracies(task: LabelingTask, classifier) -> tuple[float, float]:
-    """Return the accuracy on all test samples and on those of the held-out concept; NaN if there are none."""
-    scores_N_C = classifier.scores(task.test.h)
-    right_N = np.array(classifier.classes)[scores_N_C.argmax(axis=1)] == task.test.concept_N
-    new_N = task.test.concept_N == task.held_out
-    return float(right_N.mean()), float(right_N[new_N].mean()) if new_N.any() else float("nan")
 
 
 def answers(concept_N: np.ndarray, classes: tuple[str, ...], share: float, *axes: object) -> np.ndarray:
@@ -230,12 +218,10 @@ def run_trial(
         answers_N = answers(task.pool.concept_N, classes, errors, *axes, held_out)
         for strategy in strategies:
             if strategy != ALL_LABELS:
-                curve = run_rounds(projected, gpc, strategy, settings, *axes, answers_N=answers_N)
+                curve = [step for step, _ in rounds(projected, gpc, strategy, settings, *axes, answers_N=answers_N)]
             elif not errors:
                 # The classifier is fitted again on all labels, as the limit of what labels can give.
-                h_L_d = np.concatenate([task.initial.h, task.pool.h])
-                labels_L = np.concatenate([task.initial.concept_N, task.pool.concept_N])
-                full = GPC(classes, settings.gpc, *axes, ALL_LABELS, held_out).fit(h_L_d, labels_L)
+                full = GPC(classes, settings.gpc, *axes, ALL_LABELS, held_out).fit(*task.labeled())
                 last = step_of(task.project(full), full, list(range(len(task.pool))), settings.gpc.iterations)
                 curve = [step_of(projected, gpc, [], epochs=0), last]
             else:

@@ -13,19 +13,14 @@ from gpca.settings import Bounds, Count, Different, Distinct, OpenShare, Positiv
 
 @dataclass(frozen=True)
 class ActiveLearningSettings:
-    """Rounds of labeling, equal for every strategy: the budget is L `labels`, of which a round has a B, the `batch`.
+    """Rounds of labeling, equal for every strategy."""
 
-    Attributes:
-        initial: number of initial labels of the other concepts, balanced.
-        iterations, tolerance: largest number of passes over the labels in a retraining, and its convergence.
-        gpc: the initial classifier; its kernel and inducing inputs are kept.
-    """
-
-    initial: Annotated[int, Bounds(minimum=2)] = 120
-    labels: Count = 60
-    batch: Count = 4
-    iterations: Count = 100
-    tolerance: PositiveShare = 1e-3
+    initial: Annotated[int, Bounds(minimum=2)] = 120  # labels of the other concepts, balanced
+    labels: Count = 60  # L, the budget
+    batch: Count = 4  # B, labels of a round
+    iterations: Count = 100  # at most, passes over the labels in a retraining
+    tolerance: PositiveShare = 1e-3  # at which a retraining has converged
+    # The initial classifier; its kernel and inducing inputs are kept.
     gpc: GPCSettings = field(default_factory=lambda: GPCSettings(learning_rate=0.1))
 
     @classmethod
@@ -40,31 +35,21 @@ LOOK_EVERY = 5  # passes over the labels between evaluations, when passes up to 
 
 @dataclass(frozen=True)
 class RetrainingSettings:
-    """Rounds of labeling with a full fit of the classifier, as in the paper.
+    """Rounds of labeling with a full fit of the classifier, as in the paper."""
 
-    Attributes:
-        labels: the budget; the pool may be smaller.
-        least: least number of labels, even if the target is reached earlier; later rounds have `late_batch`.
-    """
-
-    labels: Count = 60
-    least: Count = 60
+    labels: Count = 60  # the budget; the pool may be smaller
+    least: Count = 60  # even if the target is reached earlier
     batch: Count = 4
-    late_batch: Count = 25
+    late_batch: Count = 25  # of rounds after the least labels
     gpc: GPCSettings = field(default_factory=GPCSettings)
 
 
 @dataclass(frozen=True)
 class RareSettings(RetrainingSettings):
-    """Rounds of labeling for a concept that is rare in the pool.
+    """Rounds of labeling for a concept that is rare in the pool."""
 
-    Attributes:
-        shares: shares of the concept in the pool, one run each.
-        beside_seeds: number of seeds with more than the first share; null: all.
-    """
-
-    shares: Distinct[OpenShare] = (0.05,)
-    beside_seeds: Count | None = None
+    shares: Distinct[OpenShare] = (0.05,)  # of the concept in the pool, one run each
+    beside_seeds: Count | None = None  # number of seeds with more than the first share; null: all
 
 
 JUDGED_SHARE = 0.05  # the paper's numbers are compared with the run of this share (docs/comparison.md)
@@ -77,20 +62,13 @@ def rare_setting(share: float) -> str:
 
 @dataclass(frozen=True)
 class StreamSettings:
-    """Arrivals of a stream and its budget of labels.
-
-    Attributes:
-        quiet: number of arrivals before the new concept, which is a third of the later ones.
-        budget: share of labeled arrivals, on average.
-        window: number of arrivals for the threshold on BALD and for the running accuracy.
-        every: arrivals per row of the result.
-    """
+    """Arrivals of a stream and its budget of labels."""
 
     arrivals: Annotated[int, Bounds(minimum=2)] = 300
-    quiet: Count = 60
-    budget: PositiveShare = 0.1
-    window: Annotated[int, Bounds(minimum=2)] = 50
-    every: Count = 10
+    quiet: Count = 60  # arrivals before the new concept, which is a third of the later ones
+    budget: PositiveShare = 0.1  # share of labeled arrivals, on average
+    window: Annotated[int, Bounds(minimum=2)] = 50  # arrivals for the threshold on BALD and for the running accuracy
+    every: Count = 10  # arrivals per row of the result
 
 
 ALL_LABELS = "all_labels"  # the whole pool at once, an upper bound
@@ -98,33 +76,25 @@ PAIR = "pair"  # embedding of a depth frame that consists of measurements of the
 NEW_CONCEPT_STRATEGIES = ("bald_kmeans", "random", ALL_LABELS)
 # Embeddings by encoders of other jobs, and what they require.
 FROM_OTHERS = {"other_samples": "two seeds or more", "other_source": "two sources or more"}
+Points = Annotated[int, Bounds(minimum=32, maximum=65536)]
 SeenBy = Literal["other_samples", "other_source", "pair"]
 NewCause = Literal["nominal", "geometry"]
 
 
 @dataclass(frozen=True)
 class NewConceptSettings:
-    """New concepts that no encoder was trained on.
-
-    Attributes:
-        embeddings: by an encoder trained on other samples of the source, or on another source; or descriptors of the
-            pair.
-        errors: shares of wrong answers of the oracle.
-        erring: embeddings for which these oracles are asked.
-        causes: new concepts with measured truth: nominal, or a shape that cannot hold the pose.
-        geometry_train, geometry_test: largest number of samples of the latter, beside those of the other causes.
-        geometry_candidates: largest number of candidates for them per split.
-    """
+    """New concepts that no encoder was trained on."""
 
     seeds: Count = 3
+    # By an encoder trained on other samples of the source, or on another source; or descriptors of the pair.
     embeddings: Distinct[SeenBy] = ("other_samples", "other_source", "pair")
-    errors: Distinct[OpenShare] = (0.05, 0.1, 0.2, 0.3)
-    erring: Distinct[SeenBy] = ("other_samples", "pair")
-    points: Annotated[int, Bounds(minimum=32, maximum=65536)] = 512
-    causes: Distinct[NewCause] = ("nominal", "geometry")
-    geometry_train: Annotated[int, Bounds(minimum=2)] = 60
-    geometry_test: Annotated[int, Bounds(minimum=1)] = 30
-    geometry_candidates: Count = 1500
+    errors: Distinct[OpenShare] = (0.05, 0.1, 0.2, 0.3)  # shares of wrong answers of the oracle
+    erring: Distinct[SeenBy] = ("other_samples", "pair")  # embeddings for which these oracles are asked
+    points: Points = 512
+    causes: Distinct[NewCause] = ("nominal", "geometry")  # the latter is a shape that cannot hold the pose
+    geometry_train: Annotated[int, Bounds(minimum=2)] = 60  # at most, beside the samples of the other causes
+    geometry_test: Count = 30
+    geometry_candidates: Count = 1500  # at most, per split
 
     def __post_init__(self) -> None:
         if missing := set(self.erring) - set(self.embeddings):
@@ -134,23 +104,15 @@ class NewConceptSettings:
 
 @dataclass(frozen=True)
 class FrameLabelSettings:
-    """Learning a new concept on depth frames, where it differs from a concept that is rare on whole objects.
-
-    Attributes:
-        backbones: encoders whose embeddings are learned from, if the depth frames have them.
-        held_out: the new concepts, in turn.
-        initial: labeled samples of the other concepts before the first query, balanced.
-        share: of the new concept in the pool.
-        least: least number of labels, even if all targets are reached earlier.
-        targets: accuracies on the test samples to which labels are counted.
-    """
+    """Learning a new concept on depth frames, where it differs from a concept that is rare on whole objects."""
 
     seeds: Count = 1
+    # Encoders whose embeddings are learned from, if the depth frames have them.
     backbones: Annotated[tuple[str, ...], Different(fewest=0)] = ("dgcnn", "pointnet2")
-    held_out: Distinct[Concept] = ("overlap",)
-    initial: Annotated[int, Bounds(minimum=2)] = 10
-    share: OpenShare = 0.05
+    held_out: Distinct[Concept] = ("overlap",)  # the new concepts, in turn
+    initial: Annotated[int, Bounds(minimum=2)] = 10  # labels of the other concepts, balanced
+    share: OpenShare = 0.05  # of the new concept in the pool
     labels: Count = 60
-    least: Count = 20
-    targets: Distinct[PositiveShare] = (0.65, 0.7, 0.75)
-    points: Annotated[int, Bounds(minimum=32, maximum=65536)] = 512
+    least: Count = 20  # labels, even if all targets are reached earlier
+    targets: Distinct[PositiveShare] = (0.65, 0.7, 0.75)  # accuracies on the test samples to which labels are counted
+    points: Points = 512

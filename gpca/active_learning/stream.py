@@ -12,7 +12,7 @@ from copy import copy
 
 import numpy as np
 
-from gpca.active_learning.rounds import LabelingTask, accuracies
+from gpca.active_learning.rounds import LabelingTask, step_of
 from gpca.active_learning.settings import ActiveLearningSettings, StreamSettings
 from gpca.active_learning.stream_models import BayesianLayer, MondrianForest
 from gpca.classifier.gpc import GPC
@@ -31,9 +31,8 @@ Attribute = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]]
 class StreamLearner:
     """A model in the place of the GPC: the initial samples are learned at once, and labels as they come.
 
-    Args:
-        learn: adds samples (N, d) and their numbers of concepts (N,).
-        attribute: returns scores (N, C), their variances (N, C), and the utility of a label for each sample (N,).
+    It learns samples (N, d) and their numbers of concepts (N,), and attributes scores and variances (N, C), and the
+    utility of a label for each sample (N,).
     """
 
     classes = CONCEPTS
@@ -70,9 +69,8 @@ def mondrian_learner(task: LabelingTask[Projection], *axes: object) -> StreamLea
 def layer_learner(task: LabelingTask[Projection], *axes: object) -> StreamLearner:
     """A Bayesian layer on the frozen encoder, after CLEVER (Lee et al. 2025); asks by the lack of confidence.
 
-    CLEVER's network has a Laplace approximation whose prior is its earlier posterior, and asks for a demonstration if
-    it is not confident. Here, one linear layer replaces its progressive columns, the initial concepts the data of its
-    prior, one label a demonstration, and the budget manager its thresholds.
+    In place of CLEVER's progressive columns stands one linear layer, of the data of its prior the initial concepts, of
+    a demonstration one label, and of its thresholds the budget manager.
     """
     layer = BayesianLayer(task.initial.h.inputs_N_d.shape[1], len(CONCEPTS), DEVIATION)
     normal_M_C = generator(*axes, "layer").normal(size=(DRAWS, len(CONCEPTS)))
@@ -95,11 +93,8 @@ def arrival_order(task: LabelingTask, stream: StreamSettings, *axes: object) -> 
     new, others = order[is_new], order[~is_new]
     n_new = round((stream.arrivals - stream.quiet) / len(np.unique(task.pool.concept_N)))
     if n_new > len(new) or stream.arrivals - n_new > len(others) or n_new < 1:
-        raise InputError(
-            f"a stream of {stream.arrivals} arrivals",
-            f"needs a larger pool than {len(others)} known and {len(new)} new samples",
-            "lower active_learning.stream.arrivals",
-        )
+        fault = f"needs a larger pool than {len(others)} known and {len(new)} new samples"
+        raise InputError(f"a stream of {stream.arrivals} arrivals", fault, "lower active_learning.stream.arrivals")
     rest = others[stream.quiet : stream.arrivals - n_new]
     return np.concatenate([others[: stream.quiet], random.permutation(np.concatenate([new[:n_new], rest]))])
 
@@ -118,10 +113,8 @@ def run_stream(
     Incremental Quantile Filter, Kottke et al. 2015); ``stream_random`` asks at random. The others ask as
     ``stream_bald`` does, with learners and uncertainties of their own.
 
-    Returns:
-        One row per `every` arrivals: ``arrived``; ``present``, whether the quiet time is over; ``labels``;
-        ``new_labels`` of the new concept; ``running`` accuracy over the last `window` arrivals, each judged before its
-        label; ``accuracy`` and ``accuracy_new`` on the test samples.
+    A row per `every` arrivals has ``arrived``; ``present``, whether the quiet time is over; ``running`` accuracy over
+    the last `window` arrivals, each judged before its label; and a step of :func:`gpca.active_learning.rounds.rounds`.
     """
     from skactiveml.stream import StreamRandomSampling
     from skactiveml.stream.budgetmanager import BalancedIncrementalQuantileFilter
@@ -137,16 +130,10 @@ def run_stream(
     queried: list[int] = []
 
     def row() -> dict[str, float]:
-        accuracy, accuracy_new = accuracies(task, learner)
-        return {
-            "arrived": len(right),
-            "present": int(len(right) >= stream.quiet),
-            "labels": len(queried),
-            "new_labels": int(np.sum(task.pool.concept_N[queried] == task.held_out)) if queried else 0,
-            "running": float(np.mean(right[-stream.window :])) if right else float("nan"),
-            "accuracy": accuracy,
-            "accuracy_new": accuracy_new,
-        }
+        running = float(np.mean(right[-stream.window :])) if right else float("nan")
+        present = int(len(right) >= stream.quiet)
+        step = step_of(task, learner, queried, epochs=0)
+        return {"arrived": len(right), "present": present, "running": running, **step}
 
     rows = [row()]
     for arrived in arrival_order(task, stream, *axes):

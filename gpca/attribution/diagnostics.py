@@ -1,7 +1,7 @@
 """The worth of an explainer's uncertainty: whether it separates right from wrong, and whether it is calibrated.
 
-Functions of S test samples: ``wrong_S`` whether each was named wrongly, ``confidence_S`` any score that is higher where
-the explainer is surer, ``p_S_C`` class probabilities and ``target_S`` the numbers of the true classes.
+Of S test samples: ``wrong_S`` whether each was named wrongly, ``confidence_S`` any score that is higher where the
+explainer is surer, ``p_S_C`` class probabilities and ``target_S`` the numbers of the true classes.
 """
 
 from __future__ import annotations
@@ -10,15 +10,14 @@ from collections.abc import Callable
 
 import numpy as np
 
+from gpca.evaluation.intervals import quantile_bounds
+
 BINS = 15  # calibration errors are measured over so many (Guo et al. 2017)
 LEAST_PROBABILITY = 1e-12  # that a true class counts with
 
 
 def risk_coverage(confidence_S: np.ndarray, wrong_S: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return coverage k / S and risk, the share of errors among the k most confident samples, for k = 1 … S.
-
-    Samples of equal confidence come in no order; the risk is its mean over all orders of them.
-    """
+    """Return coverage k / S and risk, the share of errors among the k most confident samples, for k = 1 … S."""
     k_S = np.arange(1, len(wrong_S) + 1)
     return k_S / len(wrong_S), _cumulative_errors(confidence_S, wrong_S) / k_S
 
@@ -36,7 +35,7 @@ def excess_aurc(confidence_S: np.ndarray, wrong_S: np.ndarray) -> float:
 def augrc(confidence_S: np.ndarray, wrong_S: np.ndarray) -> float:
     """Return the area under the generalized risk, errors among the k most confident over S (Traub et al. 2024).
 
-    The share of undetected failures. At error rate e it is about e² / 2 at best, e / 2 in random order.
+    At error rate e it is about e² / 2 at best, e / 2 in random order.
     """
     return float(_cumulative_errors(confidence_S, wrong_S).mean() / len(wrong_S))
 
@@ -44,8 +43,8 @@ def augrc(confidence_S: np.ndarray, wrong_S: np.ndarray) -> float:
 def calibration_error(p_S_C: np.ndarray, target_S: np.ndarray, adaptive: bool = False) -> float:
     """Return the expected calibration error of the largest probability (ECE).
 
-    The mean over `BINS` bins of |mean confidence - accuracy|, weighted by their samples. The bins are equally wide, a
-    confidence of 1 in the last; or, `adaptive`, hold equally many samples.
+    The mean over `BINS` bins of |mean confidence - accuracy|, weighted by their samples. The bins are equally wide or,
+    `adaptive`, hold equally many samples.
     """
     return _binned_gap(p_S_C.max(axis=1), p_S_C.argmax(axis=1) == target_S, adaptive)
 
@@ -80,8 +79,7 @@ def bootstrap_interval(
     """Return the percentile interval (95 %) of a statistic over resamples of the S samples (Efron 1979)."""
     n = len(samples[0])
     values_R = [statistic(*(array[rows_S] for array in samples)) for rows_S in random.integers(n, size=(resamples, n))]
-    low, high = np.quantile(values_R, [(1 - 0.95) / 2, (1 + 0.95) / 2])
-    return float(low), float(high)
+    return quantile_bounds(np.array(values_R))
 
 
 def _cumulative_errors(confidence_S: np.ndarray, wrong_S: np.ndarray) -> np.ndarray:
@@ -93,10 +91,8 @@ def _cumulative_errors(confidence_S: np.ndarray, wrong_S: np.ndarray) -> np.ndar
 
 
 def _binned_gap(p_S: np.ndarray, hit_S: np.ndarray, adaptive: bool = False) -> float:
+    bin_S = np.minimum((p_S * BINS).astype(int), BINS - 1)  # a confidence of 1 is in the last
     if adaptive:
-        bin_S = np.empty(len(p_S), int)
         bin_S[np.argsort(p_S, kind="stable")] = np.arange(len(p_S)) * BINS // len(p_S)
-    else:
-        bin_S = np.minimum((p_S * BINS).astype(int), BINS - 1)
     gaps_B = np.bincount(bin_S, weights=p_S - hit_S, minlength=BINS)
     return float(np.abs(gaps_B).sum() / len(p_S))

@@ -42,7 +42,7 @@ def read_learner_predictions(prediction_files: Iterable[str | Path], set_files: 
     for path in prediction_files:
         source, learner, seed = source_method_seed(path)
         rows = read_predictions(path, ("set",))
-        p_S_C = rows[[f"score_{concept}" for concept in concepts_of(rows)]].to_numpy()
+        p_S_C, _ = probabilities(rows)
         if not (p_S_C >= 0).all() or not np.allclose(p_S_C.sum(axis=1), 1, atol=1e-4):
             raise InputError(path, "scores are negative or do not sum to one", "a learner must give probabilities")
         uncertainties = {"max_score": 1 - p_S_C.max(axis=1), "entropy": numbers(path, rows, "entropy")}
@@ -63,19 +63,15 @@ def read_learner_predictions(prediction_files: Iterable[str | Path], set_files: 
 def sets_of(rows: pd.DataFrame) -> dict[str, pd.DataFrame]:
     """Rows of every set, and of every shifted set together with those that are like the training."""
     alone = {name: rows[rows["set"] == name] for name in TRAINED_ON if (rows["set"] == name).any()}
-    together = {
-        with_training_like(name): rows[rows["set"].isin([name, TRAINED_ON[name]])]
-        for name in alone
-        if TRAINED_ON[name] != name
-    }
-    return alone | together
+    shifted = [name for name in alone if TRAINED_ON[name] != name]
+    return alone | {with_training_like(name): rows[rows["set"].isin([name, TRAINED_ON[name]])] for name in shifted}
 
 
 def probabilities(rows: pd.DataFrame) -> tuple[np.ndarray, np.ndarray]:
     """p_S_C, and the numbers target_S of the true concepts."""
     concepts = concepts_of(rows)
-    p_S_C = rows[[f"score_{concept}" for concept in concepts]].to_numpy()
-    return p_S_C, rows["concept_true"].map(concepts.index).to_numpy()
+    target_S = rows["concept_true"].map(concepts.index).to_numpy()
+    return rows[[f"score_{concept}" for concept in concepts]].to_numpy(), target_S
 
 
 def wrong(rows: pd.DataFrame) -> np.ndarray:
@@ -91,16 +87,14 @@ def scores_of(rows: pd.DataFrame) -> list[str]:
 def estimates_of_scores(rows: pd.DataFrame, samples: Clustered) -> dict[str, Estimate]:
     """Accuracy, mean confidence, ece, nll and Brier score of the samples, given their rows of predictions."""
     p_S_C, target_S = probabilities(rows)
-
-    def calibration_error(of: np.ndarray, weights_B_n: np.ndarray) -> np.ndarray:
-        return weighted.calibration_error(p_S_C[of], target_S[of], weights_B_n)
-
     p_true_S = np.maximum(p_S_C[np.arange(len(target_S)), target_S], LEAST_PROBABILITY)
     squares_S = np.square(p_S_C - np.eye(p_S_C.shape[1])[target_S]).sum(axis=1)
     return {
         "accuracy": samples.share(~wrong(rows)),
         "confidence": samples.mean(p_S_C.max(axis=1), (0, 1)),
-        "ece": samples.over_seeds(calibration_error, (0, 1)),
+        "ece": samples.over_seeds(
+            lambda of, weights_B_n: weighted.calibration_error(p_S_C[of], target_S[of], weights_B_n), (0, 1)
+        ),
         "nll": samples.mean(-np.log(p_true_S), (0, np.inf)),
         "brier": samples.mean(squares_S, (0, 2)),
     }

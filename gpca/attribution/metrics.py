@@ -5,7 +5,7 @@ An abstained sample counts as wrong, so that an explainer cannot gain by staying
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,28 +24,20 @@ CAUSAL_QUANTILE = 0.95  # above this quantile of the clean uncertainties begins 
 _CAUSAL_COLUMNS = ("sample", "split", "uncertainty_observed", "uncertainty_clean")
 
 
-def accuracy(concept_true_S: np.ndarray, concept_predicted_S: np.ndarray, abstained_S: np.ndarray) -> float:
-    """Return the share in [0, 1] of the S samples whose concept was named and right."""
-    return float(np.mean((concept_true_S == concept_predicted_S) & ~abstained_S))
-
-
 def concept_accuracy(
-    concept_true_S: np.ndarray, concept_predicted_S: np.ndarray, abstained_S: np.ndarray, concepts: Iterable[str]
+    concept_true_S: np.ndarray, concept_predicted_S: np.ndarray, abstained_S: np.ndarray, concepts: Sequence[str]
 ) -> dict[str, float]:
-    """Return for each concept that has samples the accuracy over these (its recall)."""
-    of_concept = {concept: concept_true_S == concept for concept in concepts}
-    return {
-        concept: accuracy(concept_true_S[mask], concept_predicted_S[mask], abstained_S[mask])
-        for concept, mask in of_concept.items()
-        if mask.any()
-    }
+    """Return the accuracy over `ALL` samples, and over those of each concept that has some (its recall)."""
+    right_S = (concept_true_S == concept_predicted_S) & ~abstained_S
+    masks = {concept: concept_true_S == concept for concept in concepts}
+    of_concept = {concept: float(np.mean(right_S[mask])) for concept, mask in masks.items() if mask.any()}
+    return {ALL: float(np.mean(right_S)), **of_concept}
 
 
 def confusion(
-    concept_true_S: np.ndarray, concept_predicted_S: np.ndarray, abstained_S: np.ndarray, concepts: Iterable[str]
+    concept_true_S: np.ndarray, concept_predicted_S: np.ndarray, abstained_S: np.ndarray, concepts: Sequence[str]
 ) -> np.ndarray:
     """Return counts (C, C + 1): rows the true concepts, columns the predicted ones and, last, the abstained."""
-    concepts = list(concepts)
     columns = [(concept_predicted_S == concept) & ~abstained_S for concept in concepts] + [abstained_S]
     return np.array([[np.sum(column & (concept_true_S == true)) for column in columns] for true in concepts])
 
@@ -54,7 +46,7 @@ def permuted_accuracy(confusion_C_C1: np.ndarray) -> float:
     """Return the largest accuracy over all one-to-one relabelings of the predicted concepts (Kuhn 1955).
 
     Far above the plain accuracy it shows that an explainer tells the concepts apart but names them wrongly. It looks at
-    the truth, so it is an upper bound and never a result: of many balanced guesses it is slightly above 1/C.
+    the truth, so it is an upper bound: of many balanced guesses it is slightly above 1/C.
     """
     from scipy.optimize import linear_sum_assignment
 
@@ -63,10 +55,7 @@ def permuted_accuracy(confusion_C_C1: np.ndarray) -> float:
 
 
 def read_uncertainties(path: str | Path) -> tuple[pd.Series, float]:
-    """Return the uncertainty of each observed pair, and the 95th percentile of that of the clean ones.
-
-    The file holds those of one source and seed (KL divergences in nats). The first are indexed by (split, sample).
-    """
+    """Return the uncertainty (nats) of each observed pair by (split, sample), and the clean ones' 95th percentile."""
     rows = read_csv(path, _CAUSAL_COLUMNS, others=("uncertainty_*",))
     require_samples(path, rows)
     limit = numbers(path, rows, "uncertainty_clean").quantile(CAUSAL_QUANTILE)
@@ -80,11 +69,10 @@ def read_causal(path: str | Path) -> pd.Series:
 
 
 def collect(prediction_files: Iterable[str | Path], causal_files: Iterable[str | Path] = ()) -> pd.DataFrame:
-    """Return the tidy metrics (`TIDY_COLUMNS`) of prediction files named `…/{source}/{explainer}/seed{seed}.csv`.
+    """Return the tidy metrics (results/README.md) of prediction files named `…/{source}/{explainer}/seed{seed}.csv`.
 
-    results/README.md lists them; the column `table` is "attribution". Values are shares in [0, 1], counts or means
-    per sample. Causal metrics are those of the sources and seeds of `causal_files`, named
-    `…/{source}/{design}/seed{seed}.csv`; they may hold more samples than an explainer explains.
+    Causal metrics are those of the sources and seeds of `causal_files`, named `…/{source}/{design}/seed{seed}.csv`;
+    they may hold more samples than an explainer explains.
     """
     causal = {}
     for path in causal_files:
@@ -103,7 +91,7 @@ def collect(prediction_files: Iterable[str | Path], causal_files: Iterable[str |
                 raise InputError(causal_path, fault, "regenerate both from the same config")
             shown = test[is_causal[keys].to_numpy()]
             metrics["causal_samples"] = {ALL: len(shown)}
-            metrics |= {"causal_accuracy": {ALL: accuracy(*_judged(shown))}} if len(shown) else {}
+            metrics |= {"causal_accuracy": concept_accuracy(*_judged(shown), ())} if len(shown) else {}
         for metric, of_concept in metrics.items():
             records += [("attribution", source, method, metric, c, seed, float(v)) for c, v in of_concept.items()]
     return tidy(records, "predictions")
@@ -115,7 +103,7 @@ def attribution_metrics(test: pd.DataFrame, concepts: list[str]) -> dict[str, di
     counts = confusion(*judged, concepts)
     samples = {concept: n for concept, n in zip(concepts, counts.sum(axis=1), strict=True) if n}
     metrics = {
-        "accuracy": {ALL: accuracy(*judged)} | concept_accuracy(*judged, concepts),
+        "accuracy": concept_accuracy(*judged, concepts),
         "test_samples": {ALL: len(test)} | samples,
         "clusters": {ALL: test["cluster"].nunique()} | test.groupby("concept_true")["cluster"].nunique().to_dict(),
         "abstention_rate": {ALL: test["abstained"].mean()},
@@ -146,10 +134,7 @@ def _samples(rows: pd.DataFrame) -> pd.MultiIndex:
 
 
 def collect_timings(timing_files: Iterable[str | Path]) -> pd.DataFrame:
-    """Return mean `seconds_per_sample` and `icp_seconds_per_sample` of test rows, tidy, with table "runtime".
-
-    They are no part of the metrics, as times differ from run to run.
-    """
+    """Return mean `seconds_per_sample` and `icp_seconds_per_sample` of test rows, which differ from run to run."""
     records = []
     for path in timing_files:
         source, method, seed = source_method_seed(path)

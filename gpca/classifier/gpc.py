@@ -24,29 +24,20 @@ from gpca.seeds import generator
 
 
 class GPC:
-    """Gaussian process classifier over embeddings; classes may still have no labels.
-
-    Args:
-        classes: (C,) the label space, in the order of the score columns.
-        axes: name the random numbers (source, seed, …).
-    """
+    """Gaussian process classifier over embeddings; classes may lack labels. The axes name its random numbers."""
 
     _scaler: Standardization
     _prior: Prior
     _latents: Latents
 
     def __init__(self, classes: tuple[str, ...], settings: GPCSettings, *axes: object) -> None:
-        self.classes = classes
-        self.settings = settings
-        self._axes = axes
-        self._sites: Sites | None = None  # None before the first refinement
+        self.classes, self.settings, self._axes = classes, settings, axes
+        self._sites = Sites.silent(0, 0)  # before the first refinement
 
     def fit(self, h_N_d: np.ndarray, labels_N: np.ndarray, around_R_d: np.ndarray | None = None) -> GPC:
-        """Maximize the ELBO (variational parameters, inducing inputs, covariance parameters).
+        """Maximize the ELBO over variational parameters, inducing inputs and covariance parameters.
 
-        Args:
-            around_R_d: embeddings that determine the standardization and the start of inducing inputs and lengthscale;
-                by default the labeled ones.
+        Standardization and start are those of `around_R_d`, by default the labeled embeddings.
         """
         for _ in self.fit_up_to([self.settings.iterations], h_N_d, labels_N, around_R_d):
             pass
@@ -62,8 +53,7 @@ class GPC:
     ) -> Iterator[int]:
         """Yield each number of iterations in rising order; the classifier is then as :meth:`fit` would leave it.
 
-        With `before`, a classifier of the same classes, the fit starts from its standardization, covariance, inducing
-        inputs and posterior.
+        The fit may start from the result of a classifier `before` of the same classes.
         """
         if before is None:
             around_R_d = h_N_d if around_R_d is None else around_R_d
@@ -89,7 +79,7 @@ class GPC:
                 self._latents = model.latents()
                 self._labeled = self.project(h_N_d)
                 self._targets_N = targets_N
-                self._sites = None
+                self._sites = Sites.silent(0, 0)
                 yield done
 
     def scaling(self, around_R_d: np.ndarray) -> Standardization:
@@ -113,19 +103,14 @@ class GPC:
     def update(
         self, h_L_d: np.ndarray | Projection, labels_L: np.ndarray, iterations: int = 100, tolerance: float = 1e-3
     ) -> int:
-        """Learn further labels at fixed covariance and inducing inputs, jointly with the earlier ones.
-
-        `h_L_d` are embeddings or their :meth:`project`-ion. Returns the number of passes over all labels; for
-        `iterations` and `tolerance` see :func:`gpca.classifier.latents.refine`.
-        """
+        """Learn further labels at fixed covariance and inducing inputs, as :meth:`refine` does."""
         self._labeled = self._labeled.followed_by(self.project(h_L_d))
         self._targets_N = np.concatenate([self._targets_N, self._targets(labels_L)])
         return self.refine(iterations, tolerance)
 
     def refine(self, iterations: int = 100, tolerance: float = 1e-3) -> int:
-        """Optimize the posterior at fixed covariance and inducing inputs, from the last posterior or the prior."""
-        sites = Sites.silent(0, 0) if self._sites is None else self._sites
-        sites = sites.extend(len(self._targets_N), len(self.classes))
+        """Optimize the posterior at fixed covariance and inducing inputs; return the passes over all labels."""
+        sites = self._sites.extend(len(self._targets_N), len(self.classes))
         self._sites, self._latents, done = refine(self._labeled, self._targets_N, sites, iterations, tolerance)
         return done
 
@@ -136,9 +121,8 @@ class GPC:
     def grow(self, name: str) -> None:
         """Add a class whose covariance is the geometric mean of the others', and refit the posterior."""
         if not name or name in self.classes:
-            raise InputError(
-                f"concept '{name}'", "is empty or already known", f"the known ones are {', '.join(self.classes)}"
-            )
+            known = f"the known ones are {', '.join(self.classes)}"
+            raise InputError(f"concept '{name}'", "is empty or already known", known)
         self.classes = (*self.classes, name)
         self._set_prior(self._prior.grow())
 
@@ -168,8 +152,7 @@ class GPC:
     def attribute(self, h_N_d: np.ndarray | Projection) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return scores_N_C, variances_N_C and bald_N from M posterior draws (Eqs. 4, 5, 7).
 
-        All points share the same M·C standard normal numbers, so a point's result does not depend on the others. None
-        of the three uses correlations between points, so marginals suffice.
+        All points share the same M·C standard normal numbers, so a point's result does not depend on the others.
         """
         return summarize_marginals(*self.posterior(h_N_d), self._draws())
 

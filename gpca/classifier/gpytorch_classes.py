@@ -14,14 +14,12 @@ import torch
 from torch import Tensor
 from torch.overrides import TorchFunctionMode
 
+from gpca.classifier.gpc import GPC
 from gpca.classifier.latents import expected_log_likelihood
-from gpca.classifier.scores import summarize_marginals
-from gpca.classifier.settings import GPCSettings
 from gpca.classifier.sparse_gp import Standardization, Start
 from gpca.errors import InputError
 from gpca.portable import Adam, square_root
 from gpca.process.progress import progress
-from gpca.seeds import generator
 
 
 class LatentGPs(gpytorch.models.ApproximateGP):
@@ -38,7 +36,7 @@ class LatentGPs(gpytorch.models.ApproximateGP):
         self.covar_module = covariance
 
     def forward(self, inputs: Tensor) -> gpytorch.distributions.MultivariateNormal:
-        """Return the prior at inputs."""
+        """Return the prior."""
         return gpytorch.distributions.MultivariateNormal(self.mean_module(inputs), self.covar_module(inputs))
 
     @property
@@ -69,25 +67,16 @@ def ascend(model: LatentGPs, inputs_N_d: Tensor, targets_N: Tensor, learning_rat
         yield loss.item()
 
 
-class GpytorchGPC:
-    """:class:`gpca.classifier.gpc.GPC` by gpytorch: same arguments, seeds and results, but no later labels."""
+class GpytorchGPC(GPC):
+    """:class:`gpca.classifier.gpc.GPC` by gpytorch: same seeds and results, but fitted once, on the labeled samples."""
 
-    def __init__(self, classes: tuple[str, ...], settings: GPCSettings, *axes: object) -> None:
-        self.classes = classes
-        self.settings = settings
-        self._axes = axes
-
-    def fit(self, h_N_d: np.ndarray, labels_N: np.ndarray) -> GpytorchGPC:
-        """Maximize the ELBO on labeled embeddings."""
-        for _ in self.fit_up_to([self.settings.iterations], h_N_d, labels_N):
-            pass
-        return self
-
-    def fit_up_to(self, iterations: Iterable[int], h_N_d: np.ndarray, labels_N: np.ndarray) -> Iterator[int]:
+    def fit_up_to(
+        self, iterations: Iterable[int], h_N_d: np.ndarray, labels_N: np.ndarray, *_start: None
+    ) -> Iterator[int]:
         """Yield each number of iterations in rising order; the classifier is then as :meth:`fit` would leave it."""
         self._scaler = Standardization.of(h_N_d)
         self._inputs_N_d = self._scaler.tensor(h_N_d)
-        self._targets_N = np.array([self.classes.index(label) for label in labels_N], dtype=np.int64)
+        self._targets_N = self._targets(labels_N)
         start = Start.of(self._inputs_N_d, len(self.classes), self.settings, self._axes)
         self._model = LatentGPs(start.covariance, start.inducing_M_d)
         steps = ascend(self._model, self._inputs_N_d, torch.from_numpy(self._targets_N), self.settings.learning_rate)
@@ -104,11 +93,6 @@ class GpytorchGPC:
     def posterior(self, h_N_d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return mean and standard deviation (N, C) of the latent logits q(f(h))."""
         return self._marginals(self._scaler.tensor(h_N_d))
-
-    def attribute(self, h_N_d: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return scores_N_C, variances_N_C and bald_N from M posterior draws (Eqs. 4, 5, 7)."""
-        normal_M_C = generator(*self._axes, "draws").normal(size=(self.settings.draws, len(self.classes)))
-        return summarize_marginals(*self.posterior(h_N_d), normal_M_C)
 
     def elbo(self) -> float:
         """Return the evidence lower bound per labeled sample in nats."""

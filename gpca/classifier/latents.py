@@ -55,9 +55,8 @@ class Latents:
         """Return KL(q(v) ‖ N(0, I)) in nats."""
         _, log_determinants = np.linalg.slogdet(self.covariance_C_M_M)
         traces = np.trace(self.covariance_C_M_M, axis1=1, axis2=2)
-        return 0.5 * float(
-            (traces + np.square(self.mean_C_M).sum(axis=1) - self.mean_C_M.shape[1] - log_determinants).sum()
-        )
+        squares = np.square(self.mean_C_M).sum(axis=1)
+        return 0.5 * float((traces + squares - self.mean_C_M.shape[1] - log_determinants).sum())
 
 
 @dataclass(frozen=True)
@@ -95,14 +94,8 @@ def refine(
     """Maximize the ELBO of the softmax likelihood by natural gradients; each iteration passes once over all labels.
 
     Conjugate-computation variational inference (Khan & Lin 2017): a step toward the sites with precision
-    E_q[p_c (1 - p_c)] and mean gradient E_q[1{y = c} - p_c]. It converges in some ten steps without a tuned rate.
-
-    Args:
-        sites: the start; those of an earlier call, extended, continue from its result.
-        iterations, tolerance: maximum number of steps, and change of a probability at which they end.
-
-    Returns:
-        the sites, their posterior, and the number of iterations.
+    E_q[p_c (1 - p_c)] and mean gradient E_q[1{y = c} - p_c]. It converges in some ten steps without a tuned rate, and
+    ends where no probability changes by the tolerance. Returns the sites, their posterior, and the iterations done.
     """
     wanted_N_C = np.eye(sites.linear_N_C.shape[1])[targets_N]
     latents, normal_Q_1_C = sites.posterior(projection), _normal_points(wanted_N_C.shape[1])[:, None]
@@ -115,9 +108,8 @@ def refine(
             return sites, latents, iteration - 1
         curvature_N_C = p_N_C - np.square(p_Q_N_C).mean(axis=0)
         linear_N_C = wanted_N_C - p_N_C + curvature_N_C * mean_N_C
-        sites = Sites(
-            (1 - step) * sites.linear_N_C + step * linear_N_C, (1 - step) * sites.precision_N_C + step * curvature_N_C
-        )
+        linear_N_C = (1 - step) * sites.linear_N_C + step * linear_N_C
+        sites = Sites(linear_N_C, (1 - step) * sites.precision_N_C + step * curvature_N_C)
         latents, before_N_C = sites.posterior(projection), p_N_C
     return sites, latents, iterations
 

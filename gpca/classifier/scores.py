@@ -78,10 +78,9 @@ def entropy(p: np.ndarray) -> np.ndarray:
 
 
 def summarize_draws(logits_M_N_C: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return scores (N, C), variances (N, C) and BALD (N,) of M posterior draws of the latent logits.
+    """Return scores (N, C), variances (N, C) and BALD (N,) of M posterior draws of the latent logits (Eqs. 2, 4, 5, 7).
 
-    Eqs. 2, 4, 5 and 7 of the paper: p^(m) = softmax(f^(m)), ŝ = mean over m, v = mean squared deviation over m,
-    BALD = H[ŝ] - mean over m of H[p^(m)].
+    With p = softmax(f), ŝ = mean of p over the draws, v = mean of (p - ŝ)², BALD = H[ŝ] - mean of H[p].
     """
     return _summarize(np.array(logits_M_N_C.T, order="C", dtype=float))
 
@@ -91,7 +90,7 @@ def summarize_marginals(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Summarize draws mean + deviation · normal of independent latents, as :func:`summarize_draws` does.
 
-    All N points share the M·C numbers. Blocks of points that fit the processor's cache follow one another.
+    All N points share the M·C numbers. A block of points fits the processor's cache.
     """
     parts = [_summarize(logits_C_N_M) for logits_C_N_M in _drawn(mean_N_C, deviation_N_C, normal_M_C, block)]
     scores_N_C, variances_N_C, bald_N = (np.concatenate(part) for part in zip(*parts, strict=True))

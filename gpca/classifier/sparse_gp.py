@@ -53,14 +53,7 @@ COVARIANCES = {
 class Scaled(gpytorch.kernels.ScaleKernel):
     """Scales over a covariance of the same batch shape: no shapes to broadcast, for which torch would load SymPy."""
 
-    @property
-    def batch_shape(self) -> torch.Size:
-        """Return that of the scales."""
-        return self._batch_shape
-
-    @batch_shape.setter
-    def batch_shape(self, shape: torch.Size) -> None:
-        self._batch_shape = shape
+    batch_shape = property(lambda self: self._batch_shape, lambda self, shape: setattr(self, "_batch_shape", shape))
 
 
 def make_covariance(name: str, n_classes: int, lengthscale: float) -> gpytorch.kernels.ScaleKernel:
@@ -185,17 +178,13 @@ class Prior:
         with torch.no_grad():
             K_C_M_N = cross_covariance(self.covariance, self.inducing_M_d, inputs_N_d).double().numpy()
             variance_C_N = variance(self.covariance, inputs_N_d).double().numpy() + JITTER
-        weights_C_M_N = np.stack(
-            [solve_triangular(L, K, lower=True) for L, K in zip(self._cholesky_C_M_M, K_C_M_N, strict=True)]
-        )
+        pairs = zip(self._cholesky_C_M_M, K_C_M_N, strict=True)
+        weights_C_M_N = np.stack([solve_triangular(L, K, lower=True) for L, K in pairs])
         residual_C_N = variance_C_N - np.square(weights_C_M_N).sum(axis=1)
         return Projection(inputs_N_d.numpy(), np.swapaxes(weights_C_M_N, 1, 2), np.maximum(residual_C_N, 0))
 
     def means(self, inputs_N_d: Tensor, mean_C_M: np.ndarray) -> Tensor:
-        """Return the latents' means (N, C), float64, differentiable in the standardized inputs.
-
-        `mean_C_M` is the mean of the whitened inducing values.
-        """
+        """Return the latents' means (N, C), float64, differentiable in the standardized inputs, by whitened ones."""
         weights_C_M = np.stack([solve_triangular(L.T, m) for L, m in zip(self._cholesky_C_M_M, mean_C_M, strict=True)])
         K_C_M_N = cross_covariance(self.covariance, self.inducing_M_d.double(), inputs_N_d.double())
         return torch.einsum("cmn,cm->nc", K_C_M_N, torch.from_numpy(weights_C_M))
@@ -236,10 +225,7 @@ def _geometric_mean(values_C: Tensor) -> Tensor:
 
 @dataclass(frozen=True)
 class Standardization:
-    """Means and deviations (d,) of inputs; a constant input has the deviation 1.
-
-    scikit-learn fits it, but is not needed to apply it: loading it takes a second.
-    """
+    """Means and deviations (d,) of inputs, 1 for a constant input; scikit-learn, slow to load, only fits it."""
 
     mean_d: np.ndarray
     scale_d: np.ndarray
@@ -264,13 +250,9 @@ class Standardization:
 
 @dataclass(frozen=True)
 class Start:
-    """The start of a fit, the same for :mod:`gpca.classifier.gpc` and :mod:`gpca.classifier.gpytorch_classes`.
+    """The start of a fit, the same for :mod:`gpca.classifier.gpc` and :mod:`gpca.classifier.gpytorch_classes`."""
 
-    Attributes:
-        covariance: its lengthscale is the median distance; with gpytorch's default, an RBF kernel on some hundred
-            dimensions stays at chance.
-    """
-
+    # Its lengthscale is the median distance: with gpytorch's, an RBF kernel on some hundred dimensions stays at chance.
     covariance: gpytorch.kernels.ScaleKernel
     inducing_M_d: Tensor  # k-means centers of the standardized inputs, at most as many as there are distinct inputs
     seed: int  # of the initial variational mean and the samples of the likelihood

@@ -102,10 +102,7 @@ class EdgeConv(nn.Module):
         self.norm = BatchNorm(out_features)
 
     def forward(self, x_B_N_F: torch.Tensor, sizes: Sequence[int] | None = None) -> torch.Tensor:
-        """Map features (B, N, F_in) to (B, N, F_out) on the graph of the input features.
-
-        With `sizes`, B is 1 and the N points are clouds of these sizes, one after the other.
-        """
+        """Map features (B, N, F_in) to (B, N, F_out) on the graph of the input features; see :func:`knn_indices`."""
         neighbors_B_N_k = knn_indices(x_B_N_F, self.k, sizes)
         w1, w2 = self.weight.chunk(2, dim=1)
         ac_B_N_2F = linear(x_B_N_F, torch.cat([w1, w2 - w1]))
@@ -133,9 +130,8 @@ def knn_indices(x_B_N_F: torch.Tensor, k: int, sizes: Sequence[int] | None = Non
     x_B_N_F = x_B_N_F.detach()
     n_points = x_B_N_F.shape[1]
     if n_points < k:
-        raise InputError(
-            f"cloud of {n_points} points", f"has fewer than {k} neighbors per point", "raise draw_points or lower k"
-        )
+        fault = f"has fewer than {k} neighbors per point"
+        raise InputError(f"cloud of {n_points} points", fault, "raise draw_points or lower k")
     # |x_j|² - 2 x_i·x_j, as one product of [x_i ; 1] and [-2 x_j ; |x_j|²]: |x_i|² is the same for a whole row and does
     # not change which points are nearest.
     rows_B_N_G = torch.cat([x_B_N_F, x_B_N_F.new_ones((*x_B_N_F.shape[:2], 1))], dim=-1)

@@ -115,8 +115,6 @@ class PointNet2(nn.Module):
     Two inputs differ from the published ones, unless `as_published`. Absolute coordinates are features too (as normals
     are in the published network): relative coordinates alone hide where a ball lies until the last level. And relative
     coordinates are divided by the radius: ten times smaller than the absolute ones, they would be learned late.
-
-    The second level has a quarter of the centroids, and balls twice as large, in diameters, of twice as many points.
     """
 
     def __init__(
@@ -129,9 +127,8 @@ class PointNet2(nn.Module):
     ) -> None:
         super().__init__()
         w = width
-        self.embedding_size, self.centroids = 16 * w, centroids
+        self.embedding_size, self.centroids, self.as_published = 16 * w, centroids, as_published
         self.balls = ((radius, neighbours), (2 * radius, 2 * neighbours))
-        self.as_published = as_published
         first = GroupMLP(0 if as_published else 3, (w, w, 2 * w))
         self.levels = nn.ModuleList([first, GroupMLP(2 * w, (2 * w, 2 * w, 4 * w))])
         self.whole = GroupMLP(4 * w, (4 * w, 8 * w, self.embedding_size))
@@ -171,8 +168,7 @@ class PointNeXt(nn.Module):
     """PointNeXt-S for classification (Qian et al. 2022): a stem, four stages of set abstraction, the whole cloud.
 
     Each stage halves the points and doubles the channels. The first radius of 0.15 is for clouds of diameter 2, so here
-    0.075 diameters, growing by 1.5 with each stage. As published, absolute coordinates enter the stem, so every stage
-    sees the frame.
+    0.075 diameters, growing by 1.5 with each stage. As published, absolute coordinates enter the stem.
     """
 
     def __init__(self, width: int = 32, radius: float = 0.075, neighbours: int = 32) -> None:

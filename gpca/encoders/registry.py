@@ -61,7 +61,6 @@ class DGCNNOptions:
 
     @property
     def embedding_size(self) -> int:
-        """Length of an embedding."""
         return 2 * self.point_features
 
 
@@ -73,7 +72,6 @@ class PointNetOptions:
 
     @property
     def embedding_size(self) -> int:
-        """Length of an embedding."""
         return 16 * self.width
 
 
@@ -118,8 +116,7 @@ class EncoderSettings:
     learning_rate: PositiveShare = 4e-3  # peak of AdamW's one-cycle schedule (Smith & Topin 2019)
     weight_decay: Share = 1e-2  # of AdamW
     options: dict = field(default_factory=dict)  # further arguments of the backbone
-    # If given, each draw has a random number of points from this one to `draw_points`, so that the density carries no
-    # information. Only DGCNN takes such draws.
+    # If given, a draw has a random number of points from this one to `draw_points`: its density carries no information.
     fewest_points: Annotated[int, Bounds(minimum=32)] | None = None
     head: Literal["linear", "two_layer"] = "linear"  # trained together with the encoder, then dropped
     reading: Reading = "aligned"  # the cloud that the encoder sees (:mod:`gpca.pairs.synthesis`)
@@ -133,10 +130,10 @@ class EncoderSettings:
         if (points := self.fewest_points or self.draw_points) < neighbors:
             fault = f"{neighbors} neighbors are too many for draws of {points} points"
             raise InputError("encoder option 'k'", fault, "lower it, or draw more points")
-        if self.fewest_points is not None and self.backbone not in OF_ANY_SIZE:
+        if self.fewest_points and self.backbone not in OF_ANY_SIZE:
             fault = f"backbone '{self.backbone}' accepts clouds of one size only"
             raise InputError("encoder setting 'fewest_points'", fault, f"leave it out, or use {OF_ANY_SIZE[0]}")
-        if self.fewest_points is not None and self.fewest_points > self.draw_points:
+        if self.fewest_points and self.fewest_points > self.draw_points:
             fault = f"{self.fewest_points} exceeds draw_points, {self.draw_points}"
             raise InputError("encoder setting 'fewest_points'", fault, "lower it")
 

@@ -10,7 +10,7 @@ import hashlib
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from copy import deepcopy
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -38,8 +38,8 @@ def draw_points(
 ) -> torch.Tensor | list[torch.Tensor]:
     """Draw `n_points` random points of each row's aligned cloud, (B, N, 3) float32; small clouds repeat points.
 
-    Seeds are named by the axes, the split and the sample. With `fewest`, the result is B clouds (N, 3) with a random
-    number of points from `fewest` to `n_points`, or all points of a smaller cloud.
+    With `fewest`, the result is B clouds (N, 3) with a random number of points from `fewest` to `n_points`, or all
+    points of a smaller cloud.
     """
     clouds = []
     for row in rows:
@@ -75,24 +75,17 @@ def make_model(
     return Classifier(encoder, head)
 
 
-@dataclass(frozen=True)
-class TrainingTask:
-    """The task of an encoder: its view of a registration, and the classes of its head."""
-
-    classes: tuple[str, ...] = CONCEPTS  # the possible values of ``concept``
-    make: Callable[[], nn.Module] | None = None  # makes an encoder that is not in the registry
-    draw: Draw = draw_points  # the encoder's input for some rows, drawn anew in every epoch
-
-
 def train_encoder(
     registrations: Registrations,
     source: str,
     seed: int,
     settings: EncoderSettings,
     checkpoint: Path | None = None,
-    task: TrainingTask = TrainingTask(),
+    classes: tuple[str, ...] = CONCEPTS,
     start: Mapping[str, torch.Tensor] | None = None,
     group_S: np.ndarray | None = None,
+    make: Callable[[], nn.Module] | None = None,
+    draw: Draw = draw_points,
 ) -> tuple[Classifier, list[dict[str, float]]]:
     """Train on the rows of split ``train``; a share of their groups can be held out for validation.
 
@@ -103,17 +96,24 @@ def train_encoder(
             from it and ends with the same weights as an unbroken run.
         start: initial weights; random by default.
         group_S: (S,) rows of one group are held out together. By default, consecutive rows of one object.
+        make: makes an encoder that is not in the registry.
 
     Returns the model, and for each epoch: epoch, learning_rate, loss, accuracy, and those of the validation.
     """
     torch.manual_seed(seed_of(source, seed, "encoder", settings.backbone))
-    model = make_model(settings, task.classes, task.make and task.make()).to(best_device())
+    model = make_model(settings, classes, make and make()).to(best_device())
     if start is not None:
         model.load_state_dict(start)
     rows, held_out = _held_out(registrations, source, seed, settings.validation_share, group_S)
     if len(rows) < 2:
         raise InputError(f"registrations of {source}, seed {seed}", "have no training samples", "increase their number")
-    training = _Training(model, registrations, rows, task, (source, seed), settings)
+    targets_S = torch.from_numpy(np.array([classes.index(name) for name in registrations.concept]))
+
+    def predict(batch: np.ndarray, *axes: object) -> tuple[torch.Tensor, torch.Tensor]:
+        clouds = _drawn(draw, settings, registrations, batch, source, seed, *axes)
+        return model(clouds), targets_S[batch].to(best_device())
+
+    training = _Training(model, predict, rows, settings, (source, seed))
     best = deepcopy(model) if len(held_out) else model
     state = training.state | ({"best": best} if len(held_out) else {})
     identity = repr((source, seed, asdict(settings), *_fingerprints(registrations, start or {})))
@@ -139,17 +139,10 @@ class _Training:
     """A model with its optimizer and schedule, and its training rows."""
 
     def __init__(
-        self,
-        model: Classifier,
-        registrations: Registrations,
-        rows: np.ndarray,
-        task: TrainingTask,
-        axes: Axes,
-        settings: EncoderSettings,
+        self, model: Classifier, predict: Callable, rows: np.ndarray, settings: EncoderSettings, axes: Axes
     ) -> None:
-        self._model, self._registrations, self._rows = model, registrations, rows
-        self._axes, self._settings, self._draw = axes, settings, task.draw
-        self._targets_S = torch.from_numpy(np.array([task.classes.index(name) for name in registrations.concept]))
+        self._model, self._predict, self._rows = model, predict, rows
+        self._axes, self._settings = axes, settings
         self._batches = -(-len(rows) // settings.batch_size)
         self._optimizer = Adam(model.parameters(), settings.learning_rate, settings.weight_decay)
         self.state: dict[str, Any] = {"model": model, "optimizer": self._optimizer}
@@ -194,12 +187,6 @@ class _Training:
         loss = nn.functional.cross_entropy(outputs_R_C, targets_R).item()
         return {"validation_loss": loss, "validation_accuracy": correct / len(rows)}
 
-    def _predict(self, rows: np.ndarray, *axes: object) -> tuple[torch.Tensor, torch.Tensor]:
-        """Return the head's outputs (B, C) for a draw from each row, named by the axes, and the rows' targets."""
-        points, fewest = self._settings.draw_points, self._settings.fewest_points
-        clouds = self._draw(self._registrations, rows, points, *self._axes, *axes, fewest=fewest)
-        return self._model(_on_device(clouds)), self._targets_S[rows].to(best_device())
-
 
 def _held_out(
     registrations: Registrations, source: str, seed: int, share: float, group_S: np.ndarray | None
@@ -215,7 +202,8 @@ def _held_out(
     return rows[~is_held_out], rows[is_held_out]
 
 
-def _on_device(clouds: Any) -> Any:
+def _drawn(draw: Draw, settings: EncoderSettings, registrations: Registrations, rows: np.ndarray, *axes: object) -> Any:
+    clouds = draw(registrations, rows, settings.draw_points, *axes, fewest=settings.fewest_points)
     device = best_device()
     return clouds.to(device) if isinstance(clouds, torch.Tensor) else [cloud.to(device) for cloud in clouds]
 
@@ -251,8 +239,7 @@ def _resume(checkpoint: Path | None, identity: str, state: dict) -> list[dict]:
 
 def write_weights(path: str | Path, model: Classifier, axes: Axes) -> None:
     """Write a model for :func:`load_model`; `axes` are the source and the seed of the training samples."""
-    source, seed = axes
-    write_tensors(path, {"weights": model.state_dict(), "source": source, "seed": seed})
+    write_tensors(path, {"weights": model.state_dict(), "source": axes[0], "seed": axes[1]})
 
 
 def load_model(
@@ -262,11 +249,7 @@ def load_model(
     axes: Axes | None = None,
     unlike: Axes | None = None,
 ) -> Classifier:
-    """Load encoder and head, trained with these settings and classes, for inference.
-
-    Source and seed of the training samples have to be `axes`, and must not be `unlike`. Missing, damaged, pickled or
-    another encoder's weights raise an InputError.
-    """
+    """Load encoder and head for inference; source and seed of their samples have to be `axes`, and not `unlike`."""
     model = make_model(settings, classes)
     remedy = "regenerate them with Snakemake"
     require_file(path, "no such weights", remedy)
@@ -293,18 +276,15 @@ def embed(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return embeddings h (S, d) of all rows and the head's logits (S, C) at them; float32.
 
-    h is the mean over ``draws`` draws of N points, each named by sample and draw. One draw uses a quarter of a cloud
-    of 2048 points; averaging several halves the classifier's errors on unseen clouds.
+    h is the mean over ``draws`` draws of N points. One uses a quarter of a cloud of 2048 points; averaging several
+    halves the classifier's errors on unseen clouds.
     """
     model.to(best_device()).eval()
     batches = np.array_split(np.arange(len(registrations)), -(-len(registrations) // settings.batch_size))
-    points, fewest = settings.draw_points, settings.fewest_points
     parts = []
     for rows in progress(batches, f"embeddings of {source}, seed {seed}"):
-        draws = [
-            draw(registrations, rows, points, source, seed, "embedding", number, fewest=fewest)
-            for number in range(settings.draws)
-        ]
-        parts.append(torch.stack([model.encoder(_on_device(clouds)) for clouds in draws]).mean(dim=0))
+        axes = [(source, seed, "embedding", number) for number in range(settings.draws)]
+        draws = [model.encoder(_drawn(draw, settings, registrations, rows, *of_draw)) for of_draw in axes]
+        parts.append(torch.stack(draws).mean(dim=0))
     h_S_d = torch.cat(parts)
     return h_S_d.cpu().numpy(), model.head(h_S_d).cpu().numpy()

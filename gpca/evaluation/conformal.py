@@ -23,13 +23,11 @@ GOOD, NOT_SURE, ALARM = OUTCOMES = ("good", "not sure", "failed")
 
 
 def upper_bound(value_N: np.ndarray, level: float, family_N: np.ndarray | None = None) -> float:
-    """Return a bound that a new sample exceeds with a probability of at most 1 - `level`.
+    """Return a bound that a new sample exceeds with a probability of at most 1 - `level`; infinity for too few samples.
 
     Sample by sample, it is the value of rank ⌈(N + 1) level⌉ (Vovk et al. 2005). Family by family, each of K families
     has the weight 1 / (K + 1), distributed equally over its samples; the new sample's family, whose values are
     arbitrary, has the same weight (hierarchical conformal prediction, Lee, Barber and Willett 2023).
-
-    It is infinity if there are too few samples or families. Without families, samples are exchangeable one by one.
     """
     if family_N is None:
         rank = ceil((len(value_N) + 1) * level - ROUNDING)
@@ -47,7 +45,6 @@ def confident_upper_bound(value_N: np.ndarray, level: float, confidence: float) 
     :func:`upper_bound` holds on average over draws of the calibration samples; this bound holds for the given ones,
     except for the share 1 - `confidence` of draws. It is the smallest of the sorted values above which the upper
     Clopper-Pearson bound of the share is at most 1 - `level`; samples have to be independent.
-    It is infinity if there are too few samples.
     """
     from scipy.stats import binom
 
@@ -56,10 +53,9 @@ def confident_upper_bound(value_N: np.ndarray, level: float, confidence: float) 
     return float(np.sort(value_N)[-sure]) if sure else inf
 
 
-def highest_level(samples: int, family_N: np.ndarray | None = None) -> float:
-    """Return the largest level with a finite :func:`upper_bound`: N / (N + 1), or K / (K + 1) for K families."""
-    count = samples if family_N is None else len(np.unique(family_N))
-    return count / (count + 1)
+def highest_level(family_N: np.ndarray) -> float:
+    """Return the largest level with a finite :func:`upper_bound` by K families, K / (K + 1)."""
+    return (count := len(np.unique(family_N))) / (count + 1)
 
 
 @dataclass(frozen=True)
@@ -84,9 +80,9 @@ class StateSets:
 def nonconformity(scores_N_K: np.ndarray, kind: Nonconformity) -> np.ndarray:
     """Return the nonconformity (N, K) of each state for each sample.
 
-    - ``probability``: 1 minus the score (Sadinle, Lei and Wasserman 2019), which gives the smallest sets;
-    - ``cumulative``: sum of all scores that are at least as large (Romano, Sesia and Candès 2020, without
-      randomization), which covers hard samples more evenly.
+    ``probability``, 1 minus the score, gives the smallest sets (Sadinle, Lei and Wasserman 2019); ``cumulative``, the
+    sum of all scores that are at least as large, covers hard samples more evenly (Romano, Sesia and Candès 2020,
+    without randomization).
     """
     if kind == PROBABILITY:
         return 1 - scores_N_K
@@ -120,10 +116,9 @@ def calibrate_sets(
 
 @dataclass(frozen=True)
 class FailureAlarm:
-    """An alarm with two thresholds; between them, it is not sure.
+    """An alarm with two thresholds, infinite where there were too few samples; between them, it is not sure.
 
-    The thresholds are infinite where there were too few samples. With a confidence, both risks hold for these
-    thresholds; without, on average over draws of the calibration samples.
+    With a confidence, both risks hold for these thresholds; without, on average over draws of the calibration samples.
     """
 
     missed: float  # largest probability that a failed registration is called good
@@ -150,11 +145,8 @@ def calibrate_alarm(
 
     A failure is missed with at most the probability that its score lies below the bound that failures seldom fall below
     (conformal risk control, Angelopoulos et al. 2024, of a loss of 0 or 1); false alarms likewise. If the bounds leave
-    a gap in which both calls are allowed, its middle becomes the only threshold.
-
-    Args:
-        failure_N: score of failure of samples that were not used for training.
-        confidence: use :func:`confident_upper_bound` instead.
+    a gap in which both calls are allowed, its middle becomes the only threshold. With a `confidence`,
+    :func:`confident_upper_bound` takes the place of :func:`upper_bound`. No sample may have been used for training.
     """
     require_share("risk of missed failures", missed)
     require_share("risk of false alarms", false_alarms)

@@ -24,7 +24,6 @@ LEVEL = 0.95
 NO_WIDTH = 1e-9  # an interval this narrow differs from a point by rounding alone
 ANYTHING = (-np.inf, np.inf)  # limits of a value that has none
 UNTRAINED = ("chance", "most_frequent", "rule")  # explainers of baselines/untrained.py
-NO_OTHER = ("", np.nan, np.nan, np.nan)  # in the place of a difference
 
 
 class Estimate(NamedTuple):
@@ -39,9 +38,9 @@ def pigeonhole_weights(random: np.random.Generator, *factors: np.ndarray) -> np.
     """Number of times that each of N samples is drawn, (`REPEATS`, N), by their levels of factors such as the seed."""
     weights_B_N = np.ones((REPEATS, len(factors[0])))
     for factor_N in factors:
-        names, number_N = np.unique(factor_N, return_inverse=True)
-        drawn_B_K = random.multinomial(len(names), np.full(len(names), 1 / len(names)), size=REPEATS)
-        weights_B_N *= drawn_B_K[:, number_N]
+        levels_K, number_N = np.unique(factor_N, return_inverse=True)
+        share_K = np.full(len(levels_K), 1 / len(levels_K))
+        weights_B_N *= random.multinomial(len(levels_K), share_K, size=REPEATS)[:, number_N]
     return weights_B_N
 
 
@@ -64,20 +63,16 @@ def interval(
     value, (low, high) = float(value_B[0]), quantile_bounds(value_B[1:], level)
     if drawn_B_N is None or np.isnan(low):
         return Estimate(value, low, high)
-    trials = independent(drawn_B_N) if high - low <= NO_WIDTH else 0
-    middle = (low + high) / 2
-    if difference:
-        if not trials:
-            return Estimate(value, low, high)
-        # The difference is the share of the samples that only one of the two gets right; it may be up to that bound.
-        least, most = wilson_interval(min(abs(middle), 1.0) * trials, trials, level)
-        if abs(middle) <= NO_WIDTH:
-            return Estimate(value, -most, most)
-        return Estimate(value, least, most) if middle > 0 else Estimate(value, -most, -least)
-    if trials:
-        low, high = wilson_interval(min(max(middle, 0.0), 1.0) * trials, trials, level)
+    if high - low <= NO_WIDTH and (trials := independent(drawn_B_N)):
+        # A difference is the share of the samples that only one of the two gets right; it may be up to that bound.
+        middle = (low + high) / 2
+        low, high = wilson_interval(min(abs(middle) if difference else max(middle, 0.0), 1.0) * trials, trials, level)
+        if difference and abs(middle) <= NO_WIDTH:
+            low = -high
+        elif difference and middle < 0:
+            low, high = -high, -low
     samples = drawn_B_N.shape[1] if samples is None else samples
-    if samples and np.isfinite(value):
+    if samples and not difference and np.isfinite(value):
         least, most = wilson_interval(min(max(value, 0.0), 1.0) * samples, samples, level)
         low, high = min(low, least), max(high, most)
     return Estimate(value, low, high)
@@ -136,7 +131,7 @@ def mean_interval(values_R: Iterable[float], level: float = LEVEL) -> Estimate:
 def weighted_mean(value_N: np.ndarray, weights_B_N: np.ndarray) -> np.ndarray:
     """Mean of a value by weights of its samples (B,); NaN where no sample has weight."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        return (weights_B_N * value_N).sum(axis=1) / weights_B_N.sum(axis=1)
+        return (weights_B_N * np.asarray(value_N, float)).sum(axis=1) / weights_B_N.sum(axis=1)
 
 
 @dataclass(frozen=True)
@@ -168,17 +163,16 @@ class Clustered:
 
     def share(self, right_N: np.ndarray) -> Estimate:
         """Share of the samples that are right."""
-        return interval(weighted_mean(np.asarray(right_N, float), self.weights), self.weights[1:])
+        return interval(weighted_mean(right_N, self.weights), self.weights[1:])
 
     def difference(self, right_N: np.ndarray, other_N: np.ndarray) -> Estimate:
         """Share that is right minus another share of the same samples, paired by draw."""
-        value_B = weighted_mean(np.asarray(right_N, float), self.weights)
-        value_B = value_B - weighted_mean(np.asarray(other_N, float), self.weights)
+        value_B = weighted_mean(right_N, self.weights) - weighted_mean(other_N, self.weights)
         return interval(value_B, self.weights[1:], difference=True)
 
     def mean(self, value_N: np.ndarray, limits: tuple[float, float] = ANYTHING) -> Estimate:
         """Mean of a value that is no share, with bounds within its limits."""
-        return self.estimate(weighted_mean(np.asarray(value_N, float), self.weights), limits)
+        return self.estimate(weighted_mean(value_N, self.weights), limits)
 
     def over_seeds(
         self, measure: Callable[[np.ndarray, np.ndarray], np.ndarray], limits: tuple[float, float] = ANYTHING
@@ -218,10 +212,3 @@ def best_of(values: Mapping[str, np.ndarray], names: Collection[str], least_is_b
     finite = [name for name in names if name in values and np.isfinite(values[name][0])]
     sign = -1 if least_is_best else 1
     return max(finite, key=lambda name: sign * values[name][0], default="")
-
-
-def difference(
-    values: Mapping[str, np.ndarray], name: str, other: str, drawn_B_N: np.ndarray | None = None
-) -> tuple[str, float, float, float]:
-    """Other method, paired difference from it and its bounds; `NO_OTHER` where there is none. See :func:`interval`."""
-    return (other, *interval(values[name] - values[other], drawn_B_N, difference=True)) if other else NO_OTHER

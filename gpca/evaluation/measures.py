@@ -16,7 +16,7 @@ import numpy as np
 
 from gpca.errors import InputError
 from gpca.evaluation.intervals import ANYTHING, Clustered, best_of, interval, weighted_mean
-from gpca.io.csv_file import numbers, read_csv, read_numbers, write_csv
+from gpca.io.csv_file import read_numbers, write_csv
 from gpca.seeds import seed_of_file
 
 if TYPE_CHECKING:
@@ -48,13 +48,12 @@ class Measure:
     least_is_best: bool = False  # of two values, the smaller one is better
     factor: float = 1.0  # from the mean to the measure's unit
 
-    def values(self, samples: pd.DataFrame, weights_B_N: np.ndarray | None = None) -> np.ndarray:
-        """Values (B,) by weights of the samples; without weights, that of the samples themselves."""
+    def values(self, samples: pd.DataFrame, weights_B_N: np.ndarray) -> np.ndarray:
+        """Values (B,) by weights of the samples."""
         if self.statistic is not None:
-            return self.statistic(samples, np.ones((1, len(samples))) if weights_B_N is None else weights_B_N)
-        value_N = np.asarray(samples[self.of] if isinstance(self.of, str) else self.of(samples), float)
-        mean = [value_N.mean()] if weights_B_N is None else weighted_mean(value_N, weights_B_N)
-        return np.asarray(mean) * self.factor
+            return self.statistic(samples, weights_B_N)
+        value_N = samples[self.of] if isinstance(self.of, str) else self.of(samples)
+        return weighted_mean(value_N, weights_B_N) * self.factor
 
 
 COUNT = Measure(statistic=lambda _samples, weights_B_N: weights_B_N.sum(axis=1), limits=ANYTHING)  # of samples
@@ -82,7 +81,7 @@ def per_seed(
         for part, mask_N in parts(rows).items():
             subset = rows[mask_N]
             for name, measure in _taken(part, measures) if len(subset) else ():
-                if np.isfinite(value := measure.values(subset)[0]):
+                if np.isfinite(value := measure.values(subset, np.ones((1, len(subset))))[0]):
                     records.append((*keys, name, part, seed, float(value)))
             if len(subset) and TEST_SAMPLES not in measures:
                 records.append((*keys, TEST_SAMPLES, part, seed, float(len(subset))))
@@ -90,15 +89,9 @@ def per_seed(
 
 
 def over_seeds(
-    samples: pd.DataFrame,
-    parts: Callable[[pd.DataFrame], Parts],
-    measures: Mapping[str, Measure],
-    draws: Clustered,
+    samples: pd.DataFrame, parts: Callable[[pd.DataFrame], Parts], measures: Mapping[str, Measure], draws: Clustered
 ) -> pd.DataFrame:
-    """`COLUMNS` of each measure by table, source, method and part, over all seeds.
-
-    The index of the samples selects their draws, so all methods of the same samples share them.
-    """
+    """`COLUMNS` of each measure by table, source, method and part, over all seeds; an index selects draws."""
     import pandas as pd
 
     records = []
@@ -106,10 +99,9 @@ def over_seeds(
         for part, mask_N in parts(rows).items():
             subset, drawn = rows[mask_N], draws.subset(rows.index.to_numpy()[mask_N])
             for name, measure in _taken(part, measures) if len(subset) else ():
-                if measure.limits is SHARE:
-                    estimate = interval(measure.values(subset, drawn.weights), drawn.weights[1:])
-                else:
-                    estimate = drawn.estimate(measure.values(subset, drawn.weights), measure.limits)
+                value_B = measure.values(subset, drawn.weights)
+                is_share = measure.limits is SHARE
+                estimate = interval(value_B, drawn.weights[1:]) if is_share else drawn.estimate(value_B, measure.limits)
                 records.append(drawn.record((*keys, name, part), estimate))
     return pd.DataFrame(records, columns=list(COLUMNS))
 
@@ -126,10 +118,8 @@ def compared(
 ) -> list[tuple]:
     """Rows of `KEYS`, `AGAINST` and `NUMBERS`: a measure of several methods on the same samples, and differences.
 
-    Args:
-        keys: table and source.
-        values: method -> the measure (1 + B,) of the samples and of every draw; methods without a value are left out.
-        against: kind of rival -> function that returns the rivals; the difference is from the best of them.
+    `keys` are table and source; `values` are those (1 + B,) of the samples and of every draw, NaN where a method has
+    none. A difference is from the best of the rivals of a kind.
     """
     values = {method: value_B for method, value_B in values.items() if np.isfinite(value_B[0])}
     drawn_B_N = draws.weights[1:] if limits is SHARE else None
@@ -151,7 +141,7 @@ def compared(
 def intervals(records: list[tuple], name: str) -> pd.DataFrame:
     """Frame of `COLUMNS`, or of `KEYS`, `AGAINST` and `NUMBERS`; `name` says what the records are of."""
     with_rivals = bool(records) and len(records[0]) > len(COLUMNS)
-    return _frame(records, (*KEYS, *AGAINST, *NUMBERS) if with_rivals else COLUMNS, name, "run its step first")
+    return tidy(records, name, (*KEYS, *AGAINST, *NUMBERS) if with_rivals else COLUMNS, "run its step first")
 
 
 def read_clustered(path: str | Path) -> pd.DataFrame:
@@ -169,10 +159,7 @@ def read_rows(path: str | Path) -> pd.DataFrame:
 
 def read_metrics(path: str | Path) -> pd.DataFrame:
     """Read a file of values by seed."""
-    rows = read_csv(path, TIDY_COLUMNS)
-    rows["seed"] = numbers(path, rows, "seed").astype(int)
-    rows["value"] = numbers(path, rows, "value")
-    return rows
+    return read_numbers(path, TIDY_COLUMNS, ("seed", "value")).astype({"seed": int})
 
 
 def read_all_metrics(paths: Iterable[str | Path]) -> pd.DataFrame:
@@ -187,12 +174,13 @@ def write_metrics(metrics: pd.DataFrame, path: str | Path) -> None:
     write_csv(path, metrics, form=None)
 
 
-def tidy(records: list[tuple], name: str) -> pd.DataFrame:
+def tidy(
+    records: list[tuple],
+    name: str,
+    columns: Sequence[str] = TIDY_COLUMNS,
+    remedy: str = "name at least one explainer in the config",
+) -> pd.DataFrame:
     """Frame of `TIDY_COLUMNS`; `name` says what the records are of."""
-    return _frame(records, TIDY_COLUMNS, name, "name at least one explainer in the config")
-
-
-def _frame(records: list[tuple], columns: Sequence[str], name: str, remedy: str) -> pd.DataFrame:
     import pandas as pd
 
     if not records:

@@ -37,7 +37,7 @@ from gpca.declarations.result import Frame, Paths, numbers
 from gpca.declarations.step import Step
 from gpca.encoders.registry import encoder_module
 from gpca.errors import InputError, with_key
-from gpca.evaluation.intervals import NO_OTHER, best_of, difference, interval, pigeonhole_weights
+from gpca.evaluation.intervals import best_of, interval, pigeonhole_weights
 from gpca.evaluation.measures import ALL, POOLED
 from gpca.experiments.frame_causes import count_ends, ends_of
 from gpca.experiments.scans import EACH_SET, ChoiceSettings, files_of_set, place_of_set
@@ -182,6 +182,7 @@ EVERY = "all"  # strata
 NATURAL, ADDED = "natural", "noise_added"  # conditions of what is measured; counts are of kinds of start as well
 COUNTED = ("registrations", "pairs", "clusters", *LABELS, BORDERLINE, GEOMETRY, "missed")
 GATE = "gate_"  # how the names of gates begin
+NO_LEAD = ("", np.nan, np.nan, np.nan)
 CAUSES = "cause_accuracy"
 SAMPLES = "test_samples"  # that are nominal or failed; also where nothing else can be measured
 MEASURED = (SAMPLES, "auroc_failed", "false_alarm_rate", "state_accuracy", CAUSES, "regret")
@@ -232,7 +233,7 @@ def collect(
                     counts = count_ends(chosen, ("pair", "cluster"), "registrations")
                     place = source, condition, stratum, SCANS, TRUTH
                     own = (len(chosen), counts["clusters"], chosen["seed"].nunique())
-                    nothing = (np.nan, np.nan, *NO_OTHER)
+                    nothing = (np.nan, np.nan, *NO_LEAD)
                     rows += [(*place, f"count_{kind}", *own, float(counts[kind]), *nothing) for kind in COUNTED]
             if condition in (NATURAL, ADDED) and of_N.any():
                 parts = {key: every.subset(of_N) for key, every in judged.items()}
@@ -296,10 +297,10 @@ def _measures(
         counted_N = counted_of_scans(any_samples, metric)
         drawn_B_n = drawn_B_N[:, counted_N] if metric in (*SHARES, CAUSES) else None
         gates = [names[other] for other in judged if other[1].startswith(GATE) and other != key]
-        lead = NO_OTHER
-        if key[1] != CEILING and metric != SAMPLES:
-            gate = best_of(of_metric, gates, metric in SMALLER_IS_BETTER)
-            lead = difference(of_metric, names[key], gate, drawn_B_n)
+        lead = NO_LEAD
+        gate = best_of(of_metric, gates, metric in SMALLER_IS_BETTER)
+        if gate and key[1] != CEILING and metric != SAMPLES:
+            lead = (gate, *interval(value_B - of_metric[gate], drawn_B_n, difference=True))
         counts = int(counted_N.sum()), len(set(cluster_N[counted_N])), len(set(any_samples.seed[counted_N].tolist()))
         yield (*place, *key, metric, *counts, *interval(value_B, drawn_B_n), *lead)
 

@@ -203,7 +203,7 @@ def learn(
     # Sets of states hold for new families if there are enough families. The alarm's level is too high for their number:
     # it is calibrated on single samples, and holds as far as registrations of a new family are like the others.
     scores_N_5 = state_probabilities(judged)
-    family_N = clear.family_N if highest_level(0, clear.family_N) >= LEVEL else None
+    family_N = clear.family_N if highest_level(clear.family_N) >= LEVEL else None
     by_family, single = (
         calibrate(scores_N_5, clear.state_N, families, level=LEVEL, missed=MISSED, false_alarms=false_alarms)
         for families in (family_N, None)

@@ -9,7 +9,7 @@ import numpy as np
 from gpca.active_learning.acquisition import STREAMS, strategies
 from gpca.active_learning.curves import POOL_COLUMNS, STREAM_COLUMNS, write_curves
 from gpca.active_learning.retraining import Retraining, learn
-from gpca.active_learning.rounds import initial_gpc, make_task, run_rounds
+from gpca.active_learning.rounds import initial_gpc, make_task, rounds
 from gpca.active_learning.settings import ActiveLearningSettings, RareSettings, StreamSettings, rare_setting
 from gpca.active_learning.stream import run_stream
 from gpca.encoders.registry import EncoderSettings
@@ -65,7 +65,8 @@ def learn_actively(job: Job) -> None:
             projected = task.project(gpc)
             for strategy in job.strategies:
                 if strategy not in STREAMS:
-                    curves[strategy][setting, concept] = run_rounds(projected, gpc, strategy, settings, *axes, setting)
+                    steps = rounds(projected, gpc, strategy, settings, *axes, setting)
+                    curves[strategy][setting, concept] = [step for step, _ in steps]
                 elif setting == "pretrained":
                     curves[strategy][setting, concept] = run_stream(projected, gpc, strategy, settings, stream, *axes)
         if (section := job.settings.get("rare")) and NEW in held_out:

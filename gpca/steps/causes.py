@@ -90,7 +90,7 @@ def train_on_causes(job: Job) -> None:
     """
     import pandas as pd
 
-    from gpca.encoders.training import TrainingTask, embed, train_encoder, write_weights
+    from gpca.encoders.training import embed, train_encoder, write_weights
 
     settings = EncoderSettings(**job.settings)
     checkpoint = job.weights.with_suffix(".checkpoint")
@@ -101,7 +101,7 @@ def train_on_causes(job: Job) -> None:
         causes = Causes.load(job.causes, axes)
         registrations = causes.registrations
         seconds_S, icp_seconds_S = read_timings(job.causes_timings, registrations)
-        model, curve = train_encoder(with_label(causes), *axes, settings, checkpoint, TrainingTask(LABELS))
+        model, curve = train_encoder(with_label(causes), *axes, settings, checkpoint, LABELS)
         started = perf_counter()
         h_S_d, logits_S_C = embed(model, registrations, *axes, settings)
         seconds = (perf_counter() - started) / len(h_S_d)

@@ -11,12 +11,12 @@ from gpca.active_learning.rounds import (
     Embedded,
     NewConceptTrial,
     Samples,
-    accuracies,
     answers,
     initial_gpc,
     make_task,
-    run_rounds,
+    rounds,
     run_trial,
+    step_of,
 )
 from gpca.active_learning.settings import NEW_CONCEPT_STRATEGIES, ActiveLearningSettings, NewConceptSettings
 from gpca.classifier.settings import GPCSettings
@@ -48,8 +48,13 @@ def task(embedded, gpc):
 
 
 def learned(task, gpc, strategy="bald_kmeans", **changed):
-    steps = run_rounds(task, gpc, strategy, dataclasses.replace(SETTINGS, **changed), "tiny", 0)
+    steps = [step for step, _ in rounds(task, gpc, strategy, dataclasses.replace(SETTINGS, **changed), "tiny", 0)]
     return {name: [step[name] for step in steps] for name in steps[0]}
+
+
+def accuracies(task, gpc):
+    step = step_of(task, gpc, [], epochs=0)
+    return step["accuracy"], step["accuracy_new"]
 
 
 def count(samples):

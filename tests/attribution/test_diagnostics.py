@@ -17,17 +17,15 @@ def confident(p, n_classes=3):
 
 
 def test_areas_of_the_perfect_a_random_and_the_worst_order():
-    perfect = -WRONG.astype(float)
-    assert d.aurc(perfect, WRONG) == pytest.approx(E + (1 - E) * np.log(1 - E), abs=1e-3)
+    perfect, constant, worst = ~WRONG, np.zeros(len(WRONG)), WRONG
+    areas = (E + (1 - E) * np.log(1 - E), E, worst_aurc(E))
+    generalized = (E**2 / 2, E / 2, E - E**2 / 2)
+    for confidence, area, of_failures in zip((perfect, constant, worst), areas, generalized, strict=True):
+        assert d.aurc(confidence, WRONG) == pytest.approx(area, abs=1e-3)
+        assert d.augrc(confidence, WRONG) == pytest.approx(of_failures, abs=1e-3)
     assert d.excess_aurc(perfect, WRONG) == 0
-    assert d.augrc(perfect, WRONG) == pytest.approx(E**2 / 2, abs=1e-3)
-    constant = np.zeros(len(WRONG))
     assert d.aurc(constant, WRONG) == pytest.approx(E)
-    assert d.augrc(constant, WRONG) == pytest.approx(E / 2, abs=1e-3)
     assert d.aurc(RANDOM.normal(size=len(WRONG)), WRONG) == pytest.approx(E, abs=0.02)
-    worst = WRONG.astype(float)
-    assert d.aurc(worst, WRONG) == pytest.approx(worst_aurc(E), abs=1e-3)
-    assert d.augrc(worst, WRONG) == pytest.approx(E - E**2 / 2, abs=1e-3)
 
 
 def worst_aurc(error_rate):
@@ -79,13 +77,11 @@ def test_bins_hold_a_confidence_of_one_differ_by_their_kind_and_are_of_every_cla
 
 
 def test_proper_scores_of_certain_and_uniform_predictions():
-    target = np.array([0, 1, 2])
-    assert d.negative_log_likelihood(np.eye(3), target) == 0
-    assert d.brier_score(np.eye(3), target) == 0
-    assert d.negative_log_likelihood(np.full((3, 3), 1 / 3), target) == pytest.approx(np.log(3))
-    assert d.brier_score(np.full((3, 3), 1 / 3), target) == pytest.approx(2 / 3)
-    assert d.brier_score(np.eye(3)[[1, 2, 0]], target) == 2
-    assert np.isfinite(d.negative_log_likelihood(np.eye(3)[[1, 2, 0]], target))
+    target, uniform, wrong = np.array([0, 1, 2]), np.full((3, 3), 1 / 3), np.eye(3)[[1, 2, 0]]
+    scores = [[score(p, target) for score in (d.negative_log_likelihood, d.brier_score)] for p in (np.eye(3), uniform)]
+    assert scores == [[0, 0], [pytest.approx(np.log(3)), pytest.approx(2 / 3)]]
+    assert d.brier_score(wrong, target) == 2
+    assert np.isfinite(d.negative_log_likelihood(wrong, target))
 
 
 def test_rank_correlation_is_of_ranks_and_defined_for_constants():

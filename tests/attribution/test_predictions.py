@@ -13,10 +13,8 @@ from gpca.pairs.perturbation import CONCEPTS
 
 def attribution(n, seed=0, **changed):
     random = np.random.default_rng(seed)
-    variances, bald = random.uniform(size=(n, 3)), random.uniform(size=n)
-    given = {"variances_N_C": variances, "bald_N": bald, "abstained_N": np.zeros(n, bool), "icp_calls_N": np.arange(n)}
-    times = {"seconds_N": np.zeros(n), "icp_seconds_N": np.zeros(n)}
-    return Attribution(CONCEPTS, random.dirichlet([1, 1, 1], n), **(given | times | changed))
+    given = {"variances_N_C": random.uniform(size=(n, 3)), "bald_N": random.uniform(size=n), "icp_calls": np.arange(n)}
+    return Attribution.of_scores(CONCEPTS, random.dirichlet([1, 1, 1], n), seconds=0.0, **(given | changed))
 
 
 def prediction_file(path, **columns):
@@ -38,21 +36,18 @@ def test_the_prediction_file_has_the_columns_and_values_of_the_schema(tmp_path, 
         *("score_noise", "score_pose", "score_overlap", "variance_noise", "variance_pose", "variance_overlap"),
         *("bald", "entropy", "abstained", "icp_calls"),
     ]
-    assert rows["sample"].astype(int).tolist() == registrations.sample.tolist()
-    assert rows["object"].tolist() == registrations.object_name.tolist()
-    assert rows["concept_true"].tolist() == registrations.concept.tolist()
-    assert rows["concept_predicted"].tolist() == made.predicted_N.tolist()
+    same = {"sample": registrations.sample.astype(str), "object": registrations.object_name}
+    same |= {"concept_true": registrations.concept, "concept_predicted": made.predicted_N}
+    for name, column in (same | {"icp_calls": made.icp_calls_N}).items():
+        assert rows[name].tolist() == column.tolist(), name
     assert rows.loc[4, "concept_predicted"] == "" and rows["abstained"].sum() == 1
-    assert np.allclose(rows.filter(like="score_"), made.scores_N_C, atol=5.1e-7)
-    assert np.allclose(rows.filter(like="variance_"), made.variances_N_C, atol=5.1e-7)
-    assert np.allclose(rows["bald"].astype(float), made.bald_N, atol=5.1e-7)
-    assert rows["icp_calls"].tolist() == made.icp_calls_N.tolist()
+    numbers = np.column_stack([made.scores_N_C, made.variances_N_C, made.bald_N])
+    assert np.allclose(rows.filter(regex="score_|variance_|bald").astype(float), numbers, atol=5.1e-7)
 
 
 def test_an_explainer_without_variances_and_bald_leaves_them_empty(tmp_path, registrations):
-    n, path = len(registrations), tmp_path / "seed0.csv"
-    nothing = {"variances_N_C": np.full((n, 3), np.nan), "bald_N": np.full(n, np.nan)}
-    write_predictions(path, registrations, attribution(n, **nothing))
+    path = tmp_path / "seed0.csv"
+    write_predictions(path, registrations, attribution(len(registrations), variances_N_C=None, bald_N=None))
     rows = read_predictions(path)
     assert rows.filter(like="variance_").isna().all(axis=None)
     assert set(rows["bald"]) == {""}

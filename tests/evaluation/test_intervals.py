@@ -5,11 +5,9 @@ import pytest
 
 from baselines import untrained
 from gpca.evaluation.intervals import (
-    NO_OTHER,
     REPEATS,
     UNTRAINED,
     best_of,
-    difference,
     independent,
     interval,
     mean_interval,
@@ -124,11 +122,8 @@ def test_the_best_untrained_one_is_beaten_by_a_paired_difference():
     assert VALUES["good"][1:].std() > 0
     assert UNTRAINED == tuple(untrained.EXPLAINERS) == tuple(untrained.CAUSE_EXPLAINERS)
     assert best_of(VALUES, UNTRAINED) == "rule" and best_of(VALUES, UNTRAINED, least_is_best=True) == "chance"
-    other, value, low, high = difference(VALUES, "good", "rule")
-    assert (other, value) == ("rule", pytest.approx(RIGHT["good"].mean() - RIGHT["rule"].mean()))
+    value, low, high = interval(VALUES["good"] - VALUES["rule"], difference=True)
     assert 0 < low < value < high
-    shifted = {"a": VALUES["good"], "b": VALUES["good"] - 0.1}  # an interval of the differences, not of the two
-    assert difference(shifted, "a", "b")[1:] == pytest.approx((0.1, 0.1, 0.1))
+    assert value == pytest.approx(RIGHT["good"].mean() - RIGHT["rule"].mean())
     alone = {"good": VALUES["good"], "rule": np.full(1 + REPEATS, np.nan)}
     assert best_of(alone, UNTRAINED) == ""
-    assert difference(VALUES, "good", "") is NO_OTHER

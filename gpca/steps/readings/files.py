@@ -11,7 +11,7 @@ import numpy as np
 
 from gpca.alignment.icp import ICPSettings
 from gpca.attribution.diagnostics import aurc, calibration_error, rank_correlation
-from gpca.attribution.metrics import accuracy, concept_accuracy
+from gpca.attribution.metrics import concept_accuracy
 from gpca.attribution.predictions import read_predictions
 from gpca.errors import InputError
 from gpca.evaluation.measures import ALL, TIDY_COLUMNS, read_all_metrics, source_method_seed, write_metrics
@@ -133,9 +133,8 @@ def accuracies(true_S: np.ndarray, scores_S_C: np.ndarray) -> Values:
 
 def accuracies_of_named(true_S: np.ndarray, named_S: np.ndarray) -> Values:
     """Accuracies of the concepts that were named."""
-    none_S = np.zeros(len(true_S), bool)
-    by_concept = concept_accuracy(true_S, named_S, none_S, CONCEPTS)
-    return {("accuracy", c): v for c, v in ({ALL: accuracy(true_S, named_S, none_S)} | by_concept).items()}
+    by_concept = concept_accuracy(true_S, named_S, np.zeros(len(true_S), bool), CONCEPTS)
+    return {("accuracy", concept): value for concept, value in by_concept.items()}
 
 
 def table5(true_S: np.ndarray, scores_S_C: np.ndarray, distance_S: np.ndarray) -> Values:
