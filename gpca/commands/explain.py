@@ -64,11 +64,10 @@ def run_explain(options: Namespace) -> int:
         require_format(cloud)
     T_init = read_pose(options.init) if options.init else None
     if options.scans:
-        sources = [read_scan(source) for source in options.source]
-        target, frame = read_scan(options.target), None
+        *sources, target = map(read_scan, (*options.source, options.target))
     else:
-        sources = [read_points(source, options.unit)[0] for source in options.source]
-        target, frame = read_points(options.target, options.unit)
+        *others, (target, frame) = (read_points(path, options.unit) for path in (*options.source, options.target))
+        sources = [points for points, _ in others]
     # Unknown methods and estimators are reported here, so that no message blames a file for them.
     if options.method is not None:
         from gpca.alignment.methods.registry import make_method
@@ -101,11 +100,14 @@ def run_explain(options: Namespace) -> int:
         explainer, learned = Explainer(model), f"model {path}: {model.learning}"
         names["model"] = str(path)
         extra["trained_on"] = f"{model.title} (procedural stand-in)" if model.stand_in else model.title
-        uncertainty = UncertaintySettings() if options.uncertainty or options.estimator else None
-        estimator = options.estimator or MONTE_CARLO
-        asked = {"frame": frame, "uncertainty": uncertainty, "estimator": estimator, "method": options.method}
-        by_model: Callable[..., Explanation] = explainer.explain
-        explain = partial(by_model, **asked, fast=options.fast)
+        explain = partial(
+            explainer.explain,
+            frame=frame,
+            uncertainty=UncertaintySettings() if options.uncertainty or options.estimator else None,
+            estimator=options.estimator or MONTE_CARLO,
+            method=options.method,
+            fast=options.fast,
+        )
     status = 0
     for name, source in zip(map(str, options.source), sources, strict=True):
         try:

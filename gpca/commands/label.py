@@ -25,6 +25,7 @@ from gpca.jobs.provenance import record_provenance
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.figures.cloud_views import draw_query
+from gpca.reporting.words import plural
 from gpca.settings import read_settings
 
 if TYPE_CHECKING:
@@ -59,7 +60,14 @@ def run_label(options: Namespace) -> None:
     require_outputs([path for path in outputs if path], [path for path in read if path])
     require_file(options.registrations, "no such file", "make it with Snakemake, or by 'gpca explain --queue'")
     queued = is_queue(options.registrations)
-    _require_fitting(options, queued)
+    place = "is not for the queue of an explanation" if queued else "is for the queue of an explanation alone"
+    for name in ("embeddings", "predictions") if queued else ("model", "out"):
+        if getattr(options, name):
+            raise InputError(f"--{name}", place, "leave it out")
+    if queued and options.settings:
+        raise InputError("--settings", "are those of the model where a queue is labeled", "leave them out")
+    if not queued and options.embeddings is None:
+        raise InputError("--embeddings", "is missing", "name the embeddings of the registrations")
     registrations: Registrations | Queue
     model: Model | None = None
     start: dict[tuple[str, int], str] = {}
@@ -94,18 +102,6 @@ def run_label(options: Namespace) -> None:
             labels.add(keys[question.row], SKIPPED if answer == "/skip" else answer)
         _retrain(session)
     return _finish(session, registrations, model, options)
-
-
-def _require_fitting(options: Namespace, queued: bool) -> None:
-    """Reject options that do not apply to a queue, or to a run."""
-    place = "is not for the queue of an explanation" if queued else "is for the queue of an explanation alone"
-    for name in ("embeddings", "predictions") if queued else ("model", "out"):
-        if getattr(options, name):
-            raise InputError(f"--{name}", place, "leave it out")
-    if queued and options.settings:
-        raise InputError("--settings", "are those of the model where a queue is labeled", "leave them out")
-    if not queued and options.embeddings is None:
-        raise InputError("--embeddings", "is missing", "name the embeddings of the registrations")
 
 
 def _queued(options: Namespace) -> tuple[Queue, Model]:
@@ -157,9 +153,7 @@ def _ask(
 
 
 def _retrain(session: Session) -> None:
-    learned = session.retrain()
-    answers = "1 answer" if learned == 1 else f"{learned} answers"
-    print(f"  learned {answers}; concepts: {', '.join(session.gpc.classes)}")
+    print(f"  learned {plural(session.retrain(), 'answer')}; concepts: {', '.join(session.gpc.classes)}")
 
 
 def _finish(session: Session, registrations: Registrations | Queue, model: Model | None, options: Namespace) -> None:

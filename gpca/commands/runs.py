@@ -105,9 +105,9 @@ def run_compare(options: Namespace) -> int:
     write_comparison(folders, tables, alone, titles, options.out)
     width = max((len(table.name) for table in tables), default=0)
     for table in tables:
-        differing = sum(table.counts.get(kind, 0) for kind in (DIFFERENT, APART, ALONE))
-        words = f"{differing} of {sum(table.counts.values())} entries differ" if differing else "the same"
-        words += f", {apart} with intervals apart" if (apart := table.counts.get(APART, 0)) else ""
+        differing = sum(table.kinds.get(kind, 0) for kind in (DIFFERENT, APART, ALONE))
+        words = f"{differing} of {sum(table.kinds.values())} entries differ" if differing else "the same"
+        words += f", {apart} with intervals apart" if (apart := table.kinds.get(APART, 0)) else ""
         print(f"{table.name:<{width}}  {words}")
     for folder, names in zip(folders, alone, strict=True):
         if names:

@@ -7,7 +7,6 @@ import json
 import re
 from argparse import ArgumentParser, Namespace
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from textwrap import fill
@@ -96,18 +95,13 @@ def licenses_of(origin: str, objects: Path) -> list[License]:
     """Return the licenses of the datasets of a file or an address."""
     licenses = [
         License(dataset, entry["license"], entry["known"])
-        for dataset, entry in _listed_licenses().items()
+        for dataset, entry in load_own_yaml(LICENSES).items()
         if any(word in origin for word in entry["found"])
     ]
     if not licenses:
         fault = f"was made from '{Path(origin).name}', which is from a dataset without a known license"
         raise InputError(objects, fault, f"add the dataset to {LICENSES}")
     return licenses
-
-
-@cache
-def _listed_licenses() -> Mapping[str, Mapping]:
-    return load_own_yaml(LICENSES)
 
 
 def _record_path(path: Path) -> Path:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -26,8 +25,7 @@ RULE = "rule"
 PAPERS_RIVALS = {"shap_additive": "SHAP", "sa_local_additive": "sensitivity analysis"}
 
 
-@dataclass(frozen=True)
-class Finding:
+class Finding(NamedTuple):
     """A number, a sentence or two about it, and the table with the details."""
 
     number: str
@@ -35,8 +33,7 @@ class Finding:
     result: str
 
 
-@dataclass(frozen=True)
-class Titles:
+class Titles(NamedTuple):
     """Titles of explainers: of concepts with ``title`` and ``oracle``, and of causes."""
 
     explainers: Mapping[str, Mapping]
@@ -149,10 +146,8 @@ def _pooled(intervals: pd.DataFrame, titles: Titles, metric: str) -> tuple[pd.Da
 
 
 def _frames(metrics: pd.DataFrame, titles: Titles) -> Iterator[Finding]:
-    means = [
-        accuracies.mean() for name, accuracies in _accuracies(metrics).items() if "-" in name
-    ]  # backbone-reduction
-    if means:
+    # Names are of backbone and reduction.
+    if means := [accuracies.mean() for name, accuracies in _accuracies(metrics).items() if "-" in name]:
         span = _span(np.array(means))
         text = f"On objects in depth frames, GP-CA is right in {span} of the cases, depending on encoder and reduction."
         yield Finding(span, text, "table6_backbones")

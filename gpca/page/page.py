@@ -9,7 +9,6 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
-from typing import Any
 
 from gpca.alignment.icp import ICPSettings
 from gpca.causes.settings import CauseSettings
@@ -44,7 +43,7 @@ class Shown:
 
 
 @dataclass(frozen=True)
-class Run:
+class FinishedRun:
     """A run with what its page needs besides its results."""
 
     name: str
@@ -59,7 +58,7 @@ class Run:
     command: str  # that makes what is missing
 
 
-def write_page(folder: str | Path, run: Run) -> None:
+def write_page(folder: str | Path, run: FinishedRun) -> None:
     """Write ``index.html`` of a finished run into its folder ``results/{run}``.
 
     The page needs only the tables and figures beside it. It shows comparison and findings if the folder has the
@@ -72,13 +71,13 @@ def write_page(folder: str | Path, run: Run) -> None:
     missing += [str(path) for path in sample_files if not path.is_file()]
     if missing:
         raise InputError(folder, f"lacks {', '.join(missing)}", f"make them with '{run.command}'")
-    shown = {result.name for result in run.results}
+    shown = {result.name: result for result in run.results}
     links = Links(folder, shown)
     sections = {
         section: [_content(folder, result, run, links) for result in results]
         for section, results in by_section(run.results).items()
     }
-    key_figure = next((result for name in KEY_FIGURES for result in run.results if result.name == name), None)
+    key_figure = next((shown[name] for name in KEY_FIGURES if name in shown), None)
     suffix = {"tables": "csv", "figures": "pdf"}
     recorded = [folder / f"{result.kind}/{result.name}.{suffix[result.kind]}" for result in run.results]
     icp = run.config.get("registrations", {}).get("icp", {})
@@ -111,13 +110,8 @@ def render(template: str = "index.html.jinja", **content) -> str:
         words = section.removeprefix("Beyond the paper: ")
         return words[:1].upper() + words[1:]
 
-    options: dict[str, Any] = {
-        "autoescape": True,
-        "undefined": StrictUndefined,
-        "trim_blocks": True,
-        "lstrip_blocks": True,
-    }
-    environment = Environment(loader=FileSystemLoader([TEMPLATES, ASSETS]), **options)
+    loader, blocks = FileSystemLoader([TEMPLATES, ASSETS]), {"trim_blocks": True, "lstrip_blocks": True}
+    environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, **blocks)
     environment.filters["anchor"] = lambda title: re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-")
     environment.filters["short"] = short
     environment.filters["yaml"] = lambda value: yaml.safe_dump(value, sort_keys=False, allow_unicode=True, width=100)
@@ -151,7 +145,7 @@ def read_provenance(files: Iterable[Path]) -> dict[str, dict[str, int]]:
     return {fact: dict(counts.most_common()) for fact, counts in facts.items()}
 
 
-def _content(folder: Path, result: Shown, run: Run, links: Links) -> dict:
+def _content(folder: Path, result: Shown, run: FinishedRun, links: Links) -> dict:
     """Return one table or figure for the template."""
     from PIL import Image
 

@@ -83,9 +83,18 @@ def page_samples(files: Mapping[str, str | Path], source: Mapping, limits: Limit
 
 def first_of_each_concept(registrations: Registrations) -> list[int]:
     """Return the rows of `RULE`, concept by concept."""
-    test = registrations.rows("test")
+    return _first_of_each(registrations, registrations.concept, np.ones(len(registrations), bool), OF_EACH_CONCEPT)
+
+
+def first_of_each_cause(causes: Causes) -> list[int]:
+    """Return the rows of `CAUSES_RULE`, concept by concept."""
+    return _first_of_each(causes.registrations, causes.truth.dominant, causes.truth.state == FAILED, 1)
+
+
+def _first_of_each(registrations: Registrations, concept_S: np.ndarray, chosen_S: np.ndarray, count: int) -> list[int]:
+    test = np.flatnonzero((registrations.split == "test") & chosen_S)
     in_order = test[np.argsort(registrations.sample[test], kind="stable")]
-    return [int(row) for c in CONCEPTS for row in in_order[registrations.concept[in_order] == c][:OF_EACH_CONCEPT]]
+    return [int(row) for concept in CONCEPTS for row in in_order[concept_S[in_order] == concept][:count]]
 
 
 def severity_words(registrations: Registrations, row: int) -> str:
@@ -136,14 +145,6 @@ def cause_samples(files: Mapping[str, str | Path], source: Mapping, settings: Ca
             }
         )
     return samples
-
-
-def first_of_each_cause(causes: Causes) -> list[int]:
-    """Return the rows of `CAUSES_RULE`, concept by concept."""
-    registrations, truth = causes.registrations, causes.truth
-    failed = np.flatnonzero((registrations.split == "test") & (truth.state == FAILED))
-    in_order = failed[np.argsort(registrations.sample[failed], kind="stable")]
-    return [int(row) for concept in CONCEPTS for row in in_order[truth.dominant[in_order] == concept][:1]]
 
 
 def packed_registration(

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from os.path import commonpath, relpath
 from pathlib import Path
 from typing import NamedTuple
@@ -25,8 +25,7 @@ _NUMBER = re.compile(rf"(?:> )?({_DIGITS})(?: ± ({_DIGITS})| \(({_DIGITS}) to (
 Folders = tuple[Path, Path]  # results/{run} of two runs, or their references
 
 
-@dataclass(frozen=True)
-class PrintedTable:
+class PrintedTable(NamedTuple):
     """A table as readers see it."""
 
     caption: str  # the line above it
@@ -46,17 +45,15 @@ class PrintedTable:
 
 
 class PrintedNumber(NamedTuple):
-    """A number with the bounds of its interval, None where none is printed."""
+    """A number with the bounds of its interval."""
 
     value: float
-    low: float | None
-    high: float | None
+    low: float  # NaN where none is printed
+    high: float
     decimals: int
 
     def is_apart(self, other: PrintedNumber) -> bool:
         """Return whether both have intervals, which do not overlap."""
-        if self.low is None or self.high is None or other.low is None or other.high is None:
-            return False
         return self.high < other.low or other.high < self.low
 
 
@@ -87,14 +84,13 @@ def read_number(text: str) -> PrintedNumber | None:
     if match is None:
         return None
     value = float(match[1])
-    low, high = (float(end) if end else None for end in (match[3], match[4]))
+    low, high = (float(end) if end else math.nan for end in (match[3], match[4]))
     if match[2]:
         low, high = value - float(match[2]), value + float(match[2])
     return PrintedNumber(value, low, high, len(match[1].partition(".")[2]))
 
 
-@dataclass(frozen=True)
-class TwoTables:
+class TwoTables(NamedTuple):
     """A table of both runs, cell by cell."""
 
     name: str
@@ -103,7 +99,7 @@ class TwoTables:
     heads: Sequence[str]  # as in :class:`PrintedTable`; those of the second alone come last
     labels: int
     rows: Sequence[tuple[Sequence[str], Sequence[Mapping[str, str]]]]  # names of each row, and its cells
-    counts: Mapping[str, int]  # of the kinds
+    kinds: Mapping[str, int]  # number of cells of each
 
 
 def compare_tables(folders: Folders, titles: Mapping[str, str]) -> tuple[list[TwoTables], list[list[str]]]:
@@ -122,9 +118,9 @@ def compare_tables(folders: Folders, titles: Mapping[str, str]) -> tuple[list[Tw
         for key in dict.fromkeys([*first, *second]):
             cells = [_cell(*(rows_of.get(key, {}).get(head, "") for rows_of in (first, second))) for head in heads]
             rows.append((key[:-1], cells))
-        counts = Counter(cell["kind"] for _, cells in rows for cell in cells)
+        kinds = Counter(cell["kind"] for _, cells in rows for cell in cells)
         heads = [*one.heads[:labels], *heads]
-        tables.append(TwoTables(name, titles.get(name, name), one.caption, heads, labels, rows, counts))
+        tables.append(TwoTables(name, titles.get(name, name), one.caption, heads, labels, rows, kinds))
     one_names, other_names = (paths.keys() for paths in files)
     return tables, [sorted(one_names - other_names), sorted(other_names - one_names)]
 
@@ -157,18 +153,17 @@ def write_comparison(
     figures = [{figure.stem: figure for figure in folder.glob("figures/*.png")} for folder in folders]
     facts, sections, numbers = zip(*map(_recorded, folders), strict=True)
     kinds = {kind: [", ".join(values.get(kind, ["–"])) for values in facts] for kind in {**facts[0], **facts[1]}}
-    judged = [key for key in numbers[0] if key in numbers[1]]
     text = render(
         "compare.html.jinja",
         names=names,
         facts=[(kind, *values) for kind, values in kinds.items() if kind != CONFIG and values[0] != values[1]],
         sections=sorted(
-            name for name in {**sections[0], **sections[1]} if sections[0].get(name) != sections[1].get(name)
+            name for name in {**sections[0], **sections[1]} if len({each.get(name) for each in sections}) > 1
         ),
         verdicts=[
-            {**numbers[0][key], "one": numbers[0][key], "other": numbers[1][key]}
-            for key in judged
-            if numbers[0][key]["verdict"] != numbers[1][key]["verdict"]
+            {**one, "one": one, "other": other}
+            for one, other in ((numbers[0][key], numbers[1][key]) for key in numbers[0] if key in numbers[1])
+            if one["verdict"] != other["verdict"]
         ],
         tables=tables,
         alone=alone,
@@ -186,15 +181,14 @@ def write_comparison(
         partial.write_text(text, encoding="utf-8")
 
 
-def _recorded(folder: Path) -> tuple[dict[str, dict[str, int]], dict[str, set[str]], dict[tuple[str, ...], dict]]:
+def _recorded(folder: Path) -> tuple[dict[str, dict[str, int]], dict[str, frozenset[str]], dict[tuple[str, ...], dict]]:
     """Return the recorded facts of a run, hashes of the config's sections, and numbers compared with the paper's."""
     files = sorted([*folder.glob("tables/*.csv"), *folder.glob("*.csv")])
-    hashes: dict[str, set[str]] = {}
-    for path in files:
-        record = path.with_name(f"{path.name}.provenance.json")
+    hashes: dict[str, frozenset[str]] = {}
+    for record in (path.with_name(f"{path.name}.provenance.json") for path in files):
         sections = json.loads(record.read_text(encoding="utf-8"))["config_sha256"] if record.is_file() else None
         for section, digest in (sections or {}).items():
-            hashes.setdefault(section, set()).add(digest)
+            hashes[section] = hashes.get(section, frozenset()) | {digest}
     compared = page_comparison(folder / "comparison.csv")
     rows = [row for table in (compared["tables"] if compared else ()) for row in table["rows"]]
     return read_provenance(files), hashes, {number_of(row): row for row in rows}

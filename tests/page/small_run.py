@@ -3,7 +3,7 @@
 from html.parser import HTMLParser
 
 from gpca.page.findings import Titles
-from gpca.page.page import Run, Shown
+from gpca.page.page import FinishedRun, Shown
 
 TABLES = ["table2_per_concept", "table1_single_baselines", "table4_mine"]
 FIGURES = ["objects_bricks", "reliability"]
@@ -70,4 +70,4 @@ def run_of(folder, **changes):
         },
         "command": "snakemake -j2 results/tiny/index.html",
     }
-    return Run(**entries | changes)
+    return FinishedRun(**entries | changes)

@@ -5,7 +5,7 @@ from pathlib import Path
 from gpca.jobs.job import workflow_script
 from gpca.page.crate import write_crate
 from gpca.page.findings import Titles
-from gpca.page.page import Run, Shown, write_page
+from gpca.page.page import FinishedRun, Shown, write_page
 
 with workflow_script(snakemake):
     given, files = snakemake.params, snakemake.input
@@ -21,7 +21,7 @@ with workflow_script(snakemake):
         source: {"objects": objects, "causes": causes}
         for source, objects, causes in zip(given.measured, files.objects, files.causes, strict=True)
     }
-    run = Run(
+    run = FinishedRun(
         name=given.run,
         seeds=given.config["seeds"],
         sources=given.sources,
