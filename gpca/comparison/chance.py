@@ -41,10 +41,7 @@ class Agreement(NamedTuple):
 
 
 def chance(comparison: pd.DataFrame, tolerances: Mapping[str, Tolerance]) -> dict[str, Agreement]:
-    """Return table (and `ALL`) -> agreement of the judged means, each value once.
-
-    The comparison is what :func:`gpca.comparison.verdicts.compare` returns, or read from its file.
-    """
+    """Return table (and `ALL`) -> agreement of the judged means of a comparison, each value once."""
     rows = verdicts.judged_once(comparison)
     rows = rows[rows["verdict"].isin(verdicts.JUDGED)]
     kinds = rows["unit"].where(~rows["unit"].isin(TIMES), "time")

@@ -220,10 +220,7 @@ def difference_of(
     levels: Iterable[float],
     floor: float | None = None,
 ) -> ClaimDifference | None:
-    """Return a comparison's difference in the claim's unit, with intervals of these levels; None if the run lacks it.
-
-    `floor` is the minimum of the unit.
-    """
+    """Return a difference in the claim's unit, with intervals of these levels; None if the run lacks it."""
     files, factor = {counterpart.file for counterpart in compared.counterparts}, UNITS[claim.unit].factor
     if not files <= set(results):
         return None

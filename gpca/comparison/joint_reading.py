@@ -116,7 +116,6 @@ def search(
     Args:
         printed: the numbers and others, which take their places in as many permutations as `deals`.
         measured: tidy rows of one source that stands for theirs, with `table` as :func:`part_name` has it.
-        shown: number of readings in `best`.
     """
     shape = tuple(len(grid[choice]) for choice in CHOICES)
     closes = []  # whether each number's values are close to each printed one (P, …), with an axis for every choice
@@ -142,8 +141,8 @@ def search(
     order = np.argsort(-np.round(share_G.ravel(), 9), kind="stable")
     best = []
     for index in order[:shown]:
-        at = zip(CHOICES, np.unravel_index(index, shape), strict=True)
-        best.append(({choice: grid[choice][int(i)] for choice, i in at}, float(share_G.ravel()[index])))
+        places = zip(CHOICES, np.unravel_index(index, shape), strict=True)
+        best.append(({choice: grid[choice][int(i)] for choice, i in places}, float(share_G.ravel()[index])))
     best_at = np.unravel_index(order[0], shape)
     close_K = [np.broadcast_to(close[index], shape)[best_at] for close, index in zip(closes, index_K, strict=True)]
     by_chance = {}
@@ -230,10 +229,7 @@ def judge(
     tolerances: Mapping[str, Tolerance],
     deals: int,
 ) -> tuple[list[tuple], list[Record]]:
-    """A row of `VERDICT_COLUMNS` for each number, and the scores of the joint reading and of the protocol.
-
-    They are made from tidy rows of the joint reading, the text of the run's comparison, and the judged readings.
-    """
+    """A row of `VERDICT_COLUMNS` for each number, and the scores of the joint reading and of the protocol."""
     of_run = comparison.set_index(["table", "row", "column"])[["reproduced", "at_least"]]
     counts = readings.groupby(["table", "row", "column"])["close"].agg(["size", "sum"])
     rows, joint_values, run_values = [], [], []

@@ -70,10 +70,7 @@ def measured_on(paths: Iterable[str | Path]) -> str:
 def value_of_run(
     number: Number, results: Mapping[str, pd.DataFrame], clusters: Mapping[Counterpart, ShareDraws] | None = None
 ) -> Reproduced | None:
-    """Return the run's value for a printed number, in its unit; None where the run has none.
-
-    `results` are as :func:`read_results` reads them, `clusters` of :func:`cluster_draws`.
-    """
+    """Return the run's value for a printed number, in its unit; None where the run has none."""
     counterpart = number.counterpart
     if counterpart is None or counterpart.file not in results:
         return None

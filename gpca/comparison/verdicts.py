@@ -144,10 +144,9 @@ def compare(
     """Return `COMPARISON_COLUMNS`, a row per printed number, in its unit.
 
     Args:
-        results: as :func:`gpca.comparison.values.read_results` reads them, with the files that reasons cite.
+        results: by the name of the file, those that reasons cite among them.
         objects: source -> ``{"title": str, "stand_in": bool}``; "model" is what the explained model was trained on.
         hardware: the machine of the measured times, where their file does not say.
-        clusters: as :func:`gpca.comparison.values.cluster_draws` returns them.
     """
     import pandas as pd
 

@@ -161,7 +161,7 @@ def design_rows(registrations: Registrations, design: str, samples: int | None) 
 def draws_of(
     registrations: Registrations, row: int, source: str, seed: int, settings: UncertaintySettings
 ) -> PairDraws:
-    """Return what the runs of a registration share; its random numbers are named by source, seed, split and number."""
+    """Return what the runs of a registration share, in whichever design."""
     axes = (source, seed, "uncertainty", registrations.split[row], registrations.sample[row])
     xi_n_6 = generator(*axes, "starts").normal(size=(settings.starts, 6)) * settings.deviation_6()
     return PairDraws(xi_n_6, settings, generator(*axes, "clouds"))
@@ -170,10 +170,7 @@ def draws_of(
 def evaluate_design(
     design: str, registrations: Registrations, source: str, seed: int, settings: UncertaintySettings
 ) -> tuple[Outcomes, np.ndarray, np.ndarray]:
-    """Run every condition of the design for every registration: the outcomes, seconds (S, K) and those in ICP (S, K).
-
-    The random numbers of a sample do not depend on the design: the observed pair has the same starts in all of them.
-    """
+    """Run every condition of the design for every registration: outcomes, seconds (S, K) and those in ICP (S, K)."""
     entry = DESIGNS[design]
     observed = registrations if entry.oracle else registrations.without_labels()
     rows = []

@@ -106,7 +106,7 @@ def test_the_settings_decide(registrations):
     assert (higher.uncertainty[:, 1:] < made.uncertainty[:, 1:]).all()
 
 
-@pytest.mark.parametrize("design", ["additive", "removal", "oracle"])
+@pytest.mark.parametrize("design", DESIGNS)
 def test_what_was_perturbed_is_hidden_from_all_but_the_oracle(registrations, monkeypatch, design):
     shown = []
 
@@ -119,4 +119,7 @@ def test_what_was_perturbed_is_hidden_from_all_but_the_oracle(registrations, mon
     evaluate(design, registrations, registrations.rows("test")[:1])
     (given,) = shown
     told = given.concept[0] in CONCEPTS and np.isfinite(given.severity_noise[0])
-    assert told == (design == "oracle")
+    assert told == (design == "oracle") == DESIGNS[design].oracle
+    if told:
+        with pytest.raises(InputError, match="knob 'noise': nan"):
+            evaluate(design, registrations.without_labels(), registrations.rows("test")[:1])

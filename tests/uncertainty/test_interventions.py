@@ -140,6 +140,10 @@ def test_overlap_cuts_off_that_share_beyond_a_plane_and_more_of_the_same_side_wh
         sides = side[:, None] * np.column_stack([SOURCE, np.ones(len(SOURCE))])
         assert linprog(np.zeros(4), A_ub=sides, b_ub=-np.ones(len(SOURCE)), bounds=(None, None)).status == 0
     assert set(kept[2]) < set(kept[1]) < set(kept[0])
+    for points in (3, 4, 20):
+        result = knob_runs(SOURCE[:points])(Knobs(overlap=MOST.overlap))
+        assert len(calls[-1][0]) == 3
+        assert np.isfinite(result.covariance).all() and np.isfinite(result.residual)
 
 
 def test_all_knobs_together_are_each_of_them(calls):
@@ -149,13 +153,6 @@ def test_all_knobs_together_are_each_of_them(calls):
     (noisy, _, _), (cut, _, _), (both, _, xi_n_6) = calls
     assert np.array_equal(both, noisy[rows_of(cut)])
     assert np.array_equal(xi_n_6, 3.0 * XI)
-
-
-@pytest.mark.parametrize("points", [3, 4, 20])
-def test_the_heaviest_cut_leaves_three_points_and_a_finite_outcome(calls, points):
-    result = knob_runs(SOURCE[:points])(Knobs(overlap=MOST.overlap))
-    assert len(calls[0][0]) == 3
-    assert np.isfinite(result.covariance).all() and np.isfinite(result.residual)
 
 
 def test_empty_overlap_and_the_same_points_are_flagged_and_finite():
@@ -182,16 +179,13 @@ def plane(n, seed=0):
     return np.random.default_rng(seed).uniform(-0.5, 0.5, size=(n, 3)) * [1, 1, 0]
 
 
-def test_noise_on_a_plane_is_taken_away():
+def test_noise_on_a_plane_is_taken_away_and_far_outliers_are_removed_and_no_others():
     noisy = plane(300) + np.random.default_rng(1).normal(scale=0.02, size=(300, 3))
     smooth = denoise(noisy)
     assert smooth[:, 2].std() < 0.5 * noisy[:, 2].std()
     assert len(smooth) > 250
     tilt = np.array([[0.6, 0, 0.8], [0, 1, 0], [-0.8, 0, 0.6]])
     assert np.allclose(denoise(noisy @ tilt.T + 3), smooth @ tilt.T + 3, atol=1e-9)
-
-
-def test_far_outliers_are_removed_and_no_others():
     clean = plane(200)
     outliers = np.array([[0.0, 0.0, 2.0], [3.0, 0.0, 0.0], [-2.0, -2.0, 1.0]])
     smooth = denoise(np.concatenate([clean[:100], outliers, clean[100:]]))
@@ -215,14 +209,9 @@ def test_the_target_is_trimmed_to_what_the_source_covers():
     assert np.array_equal(kept, target[covered])
     assert 0.4 < covered.mean() < 0.65
     assert np.array_equal(trim(target, target, 0.1), target)
-
-
-@pytest.mark.parametrize("covered", [0, 1, FEWEST_TRIMMED - 1, FEWEST_TRIMMED])
-def test_with_hardly_any_overlap_nothing_is_trimmed(covered):
-    target = plane(200)
-    source = np.concatenate([target[:covered], target + np.array([0, 0, 20.0])])
-    kept = trim(target, source, 1e-6)
-    assert len(kept) == (covered if covered >= FEWEST_TRIMMED else 200)
+    for few in (0, 1, FEWEST_TRIMMED - 1, FEWEST_TRIMMED):  # with hardly any overlap nothing is trimmed
+        kept = trim(target, np.concatenate([target[:few], target + np.array([0, 0, 20.0])]), 1e-6)
+        assert len(kept) == (few if few >= FEWEST_TRIMMED else 300)
 
 
 def runs(cost):

@@ -42,27 +42,6 @@ def test_outcomes_survive_the_file_and_give_the_same_bytes(tmp_path):
     assert first == again != other
 
 
-@pytest.mark.parametrize(
-    ("name", "damage", "expected"),
-    [
-        ("split", None, "'split' is missing"),
-        ("uncertainty", lambda a: a * np.nan, "'uncertainty' contains NaN"),
-        ("covariance", lambda a: a[:, 0], "'covariance' is 6×6×6, not 6×K×6×6"),
-    ],
-)
-def test_faulty_files_are_refused_in_one_line_with_their_name(tmp_path, name, damage, expected):
-    path = tmp_path / "seed0.npz"
-    arrays = {column: getattr(made(), column) for column in COLUMNS}
-    array = arrays.pop(name)
-    if damage:
-        arrays[name] = damage(array)
-    np.savez(path, **arrays)
-    with pytest.raises(InputError, match=expected) as caught:
-        Outcomes.load(path)
-    assert str(caught.value).startswith(f"{path}: ") and "\n" not in str(caught.value)
-    assert "with Snakemake" in str(caught.value)
-
-
 def test_the_table_has_a_column_for_every_condition(tmp_path):
     outcomes = made()
     outcomes.write_table(tmp_path / "seed0.csv", CONDITIONS)

@@ -59,10 +59,7 @@ def bayesian_icp(
     batch: int = 128,
     step_size: float = 0.1,
 ) -> np.ndarray:
-    """Return the covariance of the twists that the chains visit after `burn_in` steps; they begin at the pose.
-
-    Bayesian ICP (Maken, Ramos & Ott, ICRA 2020): stochastic gradient Langevin dynamics on mini-batches of the source.
-    """
+    """Return the covariance of what chains from the pose visit by SGLD on mini-batches (Maken et al., ICRA 2020)."""
     posterior = Posterior(registered)
     random = generator("bayesian_icp", registered.pair.seed)
     slope = partial(posterior.slope_of_batch, batch=batch, random=random)
@@ -102,7 +99,7 @@ BETA_1, BETA_2, EPSILON = 0.9, 0.999, 1e-8  # Adam's defaults, as the authors ta
 def stein_icp(
     registered: RegisteredPair, particles: int = 100, steps: int = 150, batch: int = 150, learning_rate: float = 0.01
 ) -> np.ndarray:
-    """Return the covariance of the particles of Stein ICP (Maken, Ramos & Ott, RA-L 2022), from prior to posterior.
+    """Return the covariance of particles that go from prior to posterior by SVGD (Maken et al., RA-L 2022).
 
     By Stein variational gradient descent (Liu & Wang 2016), particles are drawn to where the posterior is high and
     repel each other by the kernel's slope.
