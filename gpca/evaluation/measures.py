@@ -56,17 +56,25 @@ class Measure:
         return weighted_mean(value_N, weights_B_N) * self.factor
 
 
+def by_value(samples: pd.DataFrame, column: str, values: Iterable[str]) -> dict[str, np.ndarray]:
+    """Masks of all samples, and of those with each value in a column."""
+    masks = {value: (samples[column] == value).to_numpy() for value in values}
+    return {ALL: np.ones(len(samples), bool)} | masks
+
+
 COUNT = Measure(statistic=lambda _samples, weights_B_N: weights_B_N.sum(axis=1), limits=ANYTHING)  # of samples
 
 
-def read_samples(files: Iterable[str | Path], read: Callable[[Path], pd.DataFrame]) -> pd.DataFrame:
+def read_samples(
+    files: Iterable[str | Path], read: Callable[[Path], pd.DataFrame], names: tuple[str, ...] = ("source", "method")
+) -> pd.DataFrame:
     """Rows of files named ``…/{source}/{method}/seed{seed}.csv``, with these three as columns."""
     import pandas as pd
 
     frames = []
     for path in files:
-        source, method, seed = source_method_seed(path)
-        frames.append(read(Path(path)).assign(source=source, method=method, seed=seed))
+        *folders, seed = source_method_seed(path)
+        frames.append(read(Path(path)).assign(**dict(zip(names, folders[-len(names) :], strict=True)), seed=seed))
     if not frames:
         raise InputError("samples", "no files were given", "run their step first")
     return pd.concat(frames, ignore_index=True)

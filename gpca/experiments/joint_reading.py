@@ -72,7 +72,6 @@ def check(config: dict, _left_out: LeftOut) -> None:
 
 
 def names(config: Mapping[str, Any], sources: Mapping[str, Mapping]) -> dict[str, Any]:
-    """Seeds, source and severities of development; none where the source that they stand for is left out."""
     section = config["joint_reading"]
     is_run = section["stands_for"] in sources and bool(section["seeds"])
     development = section["source"] if is_run else ""
@@ -90,7 +89,6 @@ EXPERIMENT = Experiment(
 
 
 def _sections(plan: Plan) -> dict[str, Any]:
-    """What joint readings leave as it is."""
     config, section = plan.config, plan.config["joint_reading"]
     return {
         "sizes": {"samples": section["samples"]},
@@ -103,7 +101,6 @@ def _sections(plan: Plan) -> dict[str, Any]:
 
 
 def _step(**declared: Any) -> Step:
-    """Step of a run that has a joint reading."""
     return Step(when=lambda plan: bool(plan.names["development_seed"]), priority=9, **declared)
 
 
@@ -203,7 +200,6 @@ KNOBS = {"low": "knobs at the lower ends", "middle": "knobs at the middles", "hi
     needs=("development_seed",),
 )
 def table16_joint_reading(run: Run, verdicts: Frame, scores: Frame, choice: Frame):
-    """A row per printed mean of Tables I to V, each value of ours once."""
     table = TableBuilder("table16_joint_reading", HEADS)
     for row in verdicts.itertuples():
         key = (row.table, row.row, row.column)
@@ -228,7 +224,6 @@ def table16_joint_reading(run: Run, verdicts: Frame, scores: Frame, choice: Fram
         return dict(zip(rows["metric"], rows["value"], strict=True))
 
     def sentence(samples: str, method: str, subject: str) -> str:
-        """The close numbers, their share, and the share by chance."""
         score = measured(samples, method)
         largest = "the largest share would be" if samples == DEVELOPMENT else "it would be"
         return (

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf
+from pathlib import Path
 from typing import Any
 
 from gpca.attribution.predictions import read_predictions
@@ -14,9 +15,9 @@ from gpca.declarations.result import Figure, Frame, Paths, figure, numbers, tabl
 from gpca.declarations.step import Step
 from gpca.errors import InputError
 from gpca.evaluation.intervals import Clustered
-from gpca.evaluation.measures import ALL, intervals, source_method_seed, tidy
+from gpca.evaluation.measures import ALL, intervals, read_samples, tidy
 from gpca.io.csv_file import numbers as number_column
-from gpca.io.csv_file import read_csv
+from gpca.io.csv_file import read_numbers
 from gpca.reporting.figures.style import BLACK, BLUE, COLUMN_WIDTH_IN, GRAY, ORANGE
 from gpca.reporting.sheet import Row, Sheet, show
 from gpca.reporting.tables.builder import interval_over
@@ -36,7 +37,6 @@ class Section(KernelGrid):
 
 
 def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
-    """The sources, and the kernels of the printed rows that are fitted."""
     grid = config["kernel_grid"]
     printed = [
         kernel
@@ -77,52 +77,36 @@ def setting_name(kernel: str, learning_rate: float, iterations: int) -> str:
 
 def read_grids(files: Paths) -> Frame:
     """Read files named `…/{source}/seed{seed}.csv` into one frame with the further columns `source` and `seed`."""
-    import pandas as pd
-
-    parts = []
-    for path in files:
-        _, source, seed = source_method_seed(path)
-        rows = read_csv(path, GRID_COLUMNS)
-        for column in GRID_COLUMNS[1:]:
-            rows[column] = number_column(path, rows, column)
-        parts.append(rows.assign(source=source, seed=seed, iterations=rows["iterations"].astype(int)))
-    if not parts:
-        raise InputError("kernels", "no files were given", "name a source in kernel_grid.sources")
-    return pd.concat(parts, ignore_index=True)
+    rows = read_samples(files, lambda path: read_numbers(path, GRID_COLUMNS, GRID_COLUMNS[1:]), ("source",))
+    return rows.astype({"iterations": int})
 
 
 @numbers("kernels.csv", files=GRID_FILES)
 def collect(run: Run, files: Paths) -> Frame:
     """`MEASURES` of every setting, by seed."""
-    records = [
-        (TABLE, row.source, setting_name(row.kernel, row.learning_rate, row.iterations), measure, ALL, row.seed, value)
-        for row in read_grids(files).itertuples()
-        for measure in MEASURES
-        for value in [float(getattr(row, measure))]
-    ]
+    records = []
+    for row in read_grids(files).itertuples():
+        keys = TABLE, row.source, setting_name(row.kernel, row.learning_rate, row.iterations)
+        records += [(*keys, measure, ALL, row.seed, float(getattr(row, measure))) for measure in MEASURES]
     return tidy(records, "kernels")
 
 
 @numbers("kernel_intervals.csv", files="kernel_predictions/{kernel_source}/seed{seed}.csv")
 def collect_intervals(run: Run, files: Paths) -> Frame:
     """All measures but the ELBO over all seeds, with intervals over families; a source's settings share the draws."""
-    import pandas as pd
-
     from gpca.attribution.learner_predictions import estimates_of_scores
 
-    by_source: dict[str, list[Frame]] = {}
-    for path in files:
-        _, source, seed = source_method_seed(path)
+    def read(path: Path) -> Frame:
         rows = read_predictions(path, SETTING)
-        setting = {name: number_column(path, rows, name) for name in SETTING[1:]}
-        by_source.setdefault(source, []).append(rows.assign(seed=seed, **setting))
+        return rows.assign(**{name: number_column(path, rows, name) for name in SETTING[1:]})
+
     records = []
-    for source, frames in by_source.items():
-        for (kernel, rate, iterations), rows in pd.concat(frames).groupby([*SETTING], sort=False):
-            samples = Clustered.drawn(rows["seed"], rows["cluster"], "kernel intervals", source)
-            estimates = estimates_of_scores(rows, samples)
-            keys = TABLE, source, setting_name(kernel, rate, int(iterations))
-            records += [samples.record((*keys, name, ALL), estimates[name]) for name in MEASURES if name in estimates]
+    answers = read_samples(files, read, ("source",))
+    for (source, kernel, rate, iterations), rows in answers.groupby(["source", *SETTING], sort=False):
+        samples = Clustered.drawn(rows["seed"], rows["cluster"], "kernel intervals", source)
+        estimates = estimates_of_scores(rows, samples)
+        keys = TABLE, source, setting_name(kernel, rate, int(iterations))
+        records += [samples.record((*keys, name, ALL), estimates[name]) for name in MEASURES if name in estimates]
     return intervals(records, "kernels")
 
 
@@ -150,8 +134,7 @@ COLUMNS = {
     intervals="kernel_intervals.csv",
 )
 def table4_kernels(run: Run, intervals):
-    """Accuracy of the printed settings that were fitted: settings × sources."""
-    again = [(kernel + BY_GPYTORCH, rate, iterations) for kernel, rate, iterations in PRINTED]
+    again = [(kernel + BY_GPYTORCH, *schedule) for kernel, *schedule in PRINTED]
     rows = [Row(labels(setting), {"method": setting_name(*setting)}) for setting in (*PRINTED, *again)]
     columns = {name: show("accuracy", title, where={"source": name}) for name, title in titles(run).items()}
     sheet = Sheet("table4_kernels", HEADS, rows, columns, intervals)
@@ -172,7 +155,6 @@ def table4_kernels(run: Run, intervals):
     grid=(read_grids, GRID_FILES),
 )
 def kernel_learning_curves(run: Run, grid) -> Figure:
-    """Means over the seeds; the printed accuracies stand beside those of their settings."""
     grid = grid[grid["kernel"].isin(COLORS)]  # gpytorch's own classes would draw the same curves
     shown = {name: title for name, title in titles(run).items() if (grid["source"] == name).any()}
     if not shown:
@@ -253,7 +235,6 @@ def printed_accuracies(source: str) -> dict[tuple[str, float, int], float]:
     intervals="kernel_intervals.csv",
 )
 def table4_grid(run: Run, grid, intervals):
-    """Accuracy and calibration of every setting: sources and settings × measures."""
     settings = list(grid[list(SETTING)].drop_duplicates().itertuples(index=False, name=None))
     rows = [
         Row([(source, title), *labels(setting)], {"source": source, "method": setting_name(*setting)})
@@ -261,13 +242,11 @@ def table4_grid(run: Run, grid, intervals):
         for setting in settings
     ]
     sheet = Sheet("table4_grid", {"source": "Dataset", **HEADS}, rows, COLUMNS, intervals)
-    by_setting = {
-        (source, setting_name(*setting)): values_R
-        for (source, *setting), values_R in grid.groupby(["source", *SETTING])["elbo"]
-    }
-    for i, row in enumerate(sheet.rows):
-        if cell := cell_of_repeats(by_setting[row.where["source"], row.where["method"]], 0):
-            sheet.cells[i, "elbo"] = cell
+    for (source, *setting), values_R in grid.groupby(["source", *SETTING])["elbo"]:
+        row = {"source": source, "method": setting_name(*setting)}
+        sheet.cells |= {
+            (i, "elbo"): cell_of_repeats(values_R, 0) for i, each in enumerate(sheet.rows) if each.where == row
+        }
     notes = (
         f"{over(sheet)}. Bold: best accuracy and NLL of a dataset.",
         "Confidence: mean of the largest score. ECE: its gap to the accuracy over 15 equally wide bins, mean of "
@@ -281,27 +260,22 @@ def table4_grid(run: Run, grid, intervals):
 
 
 def titles(run: Run) -> dict[str, str]:
-    """Titles of the sources of the grid."""
     return {name: title for name, title in run.source_titles.items() if name in run.config["kernel_grid"]["sources"]}
 
 
 def labels(setting: tuple) -> list[tuple[str, str]]:
-    """Labels of a row by its kernel, learning rate and iterations."""
     kernel, rate, iterations = setting
     return [(kernel, TITLES[kernel]), (f"{rate:g}", f"{rate:g}"), (str(iterations), str(iterations))]
 
 
 def over(sheet: Sheet) -> str:
-    """Start of the footnote on seeds, samples and intervals, without a full stop."""
     cell = next(cell for cell in sheet.cells.values() if cell.test_samples)
     return sheet.over(cell.test_samples // cell.seeds)
 
 
 def stand_ins(run: Run, intervals: Frame) -> str:
-    """Clause of a caption on stand-ins among the sources with results."""
     return run.stand_ins([name for name in titles(run) if (intervals["source"] == name).any()], partly=False)
 
 
 def gpytorch_note(sheet: Sheet) -> list[str]:
-    """Footnote on the rows in gpytorch's own classes, if there are any."""
     return [GPYTORCH_NOTE] if any(key.endswith(BY_GPYTORCH) for row in sheet.rows for key, _ in row.labels) else []

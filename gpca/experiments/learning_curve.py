@@ -12,7 +12,7 @@ from gpca.declarations.plan import Run
 from gpca.declarations.result import Frame, Paths, figure, numbers
 from gpca.declarations.step import Step
 from gpca.errors import InputError
-from gpca.evaluation.measures import source_method_seed, tidy
+from gpca.evaluation.measures import read_samples, tidy
 from gpca.io.csv_file import read_numbers
 from gpca.settings import Distinct, read_settings
 from gpca.steps.learning_curve import CURVE_COLUMNS, MEASURED, CurveSettings, labeled_samples
@@ -80,14 +80,7 @@ LEARN = Step(
 
 
 def read_curves(files: Paths) -> Frame:
-    """Read files named ``…/{source}/seed{seed}.csv`` into one frame with the further columns `source` and `seed`."""
-    import pandas as pd
-
-    curves = []
-    for path in files:
-        _, source, seed = source_method_seed(path)
-        curves.append(read_numbers(path, CURVE_COLUMNS, CURVE_COLUMNS[1:]).assign(source=source, seed=seed))
-    return pd.concat(curves, ignore_index=True)
+    return read_samples(files, lambda path: read_numbers(path, CURVE_COLUMNS, CURVE_COLUMNS[1:]), ("source",))
 
 
 @numbers("learning_curve.csv", rule="learning_curve_metrics", files=FILES)

@@ -39,7 +39,6 @@ PAPERS, WITHIN = "bald_kmeans", 20  # labels that a new concept may cost
 
 
 def seeds(config: Mapping[str, Any]) -> list[int]:
-    """Seeds of this experiment."""
     return list(config["seeds"])[: config["new_concepts"]["seeds"]]
 
 
@@ -107,7 +106,6 @@ LEARN = Step(
 
 @numbers("new_concepts.csv", files="new_concepts/{source}/{new_concept_strategy}/seed{new_concept_seed}.csv")
 def collect(run: Run, files: Paths) -> Frame:
-    """Labels to the target, accuracies and areas of all learning curves, by seed."""
     return collect_curves(files, run.config["active_learning"]["target"])
 
 
@@ -136,7 +134,6 @@ def _rows(run: Run, metrics: Frame) -> Frame:
 def table15_new_concepts(
     run: Run, metrics: Frame, without_labels: Frame, clusters: Clusters, cause_clusters: Clusters
 ) -> Table:
-    """Labels that each new concept costs in each embedding, and the accuracy that labels can reach."""
     learning, test = run.config["active_learning"], run.config["registrations"]["test"]
     metrics = _rows(run, metrics)
     labels = {f"labels_{c}": quantity("labels_to_target", f"Labels, {c}", PAPERS, c, **COUNT) for c in CONCEPTS}
@@ -212,7 +209,6 @@ def table15_new_concepts(
     clusters=CLUSTERS,
 )
 def table15_oracle(run: Run, metrics: Frame, clusters: Clusters) -> Table:
-    """Labels to the target and final accuracy, by the share of wrong labels: embeddings × strategies."""
     learning, own, test = run.config["active_learning"], run.config["new_concepts"], run.config["registrations"]["test"]
     metrics = _rows(run, metrics)
     shares = [0, *(round(100 * share) for share in own["errors"])]
@@ -260,7 +256,6 @@ STYLES = {
 
 
 def read_curves_by_concepts(files: Paths) -> dict[tuple[str, str, str], Frame]:
-    """Mean curves of the paper's strategy by source, kind of the new concepts, and embedding."""
     files = list(files)
     return {
         (source, row, setting): curve
@@ -289,7 +284,6 @@ def read_curves_by_concepts(files: Paths) -> dict[tuple[str, str, str], Frame]:
     ),
 )
 def new_concept_curves(run: Run, curves: Mapping[tuple[str, str, str], Frame]) -> Figure:
-    """Accuracy over labels: kinds of new concepts × sources, a line for each embedding."""
     target = run.config["active_learning"]["target"]
     return draw_curves(curves, run.source_titles, FIGURE_TITLES, SEEN, STYLES, target)
 

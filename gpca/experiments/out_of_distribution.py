@@ -223,7 +223,6 @@ CALIBRATION = "ECE: expected calibration error over 15 equally wide bins."
 
 
 def _show(metric: str, title: str, name: str = "in_distribution", source: str = "", **look: Any) -> Show:
-    """Column of a metric of a set, of one source if it is given."""
     return show(metric, title, where={"table": TABLE + name} | ({"source": source} if source else {}), **look)
 
 

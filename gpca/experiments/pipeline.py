@@ -59,7 +59,6 @@ def fig4_pipeline(
     uncertainties: Path,
     curve_files: Sequence[Path],
 ) -> Figure:
-    """Stages from clouds to scores of one sample, and one round of active learning with its learning curve."""
     stages = Stages.load(registrations, embeddings, predictions, uncertainties, run.config["causes"]["limits"])
     row = stages.choose(ORDER[0], registrations, *ORDER[1:])
     new, curves = _curves(curve_files)

@@ -28,7 +28,6 @@ def retrained_on(config: Mapping, severities: str) -> dict[str, Any]:
 
 
 def _files(plan: Plan, name: str) -> dict[str, list[str]]:
-    """Files that a group of readings reads, by kind."""
     config, group, readings = plan.config, GROUPS[name], plan.config["readings"]
     if name == FRAME_INPUT:
         backbone, seeds = plan.names["clouded_backbone"], config["seeds"][: readings["frame_seeds"]]
@@ -193,8 +192,6 @@ def _other_cloud(
     changes: Callable[[Plan], Mapping | None] = _training,
     **options: Any,
 ) -> Step:
-    """Step of an encoder of depth frames that sees another cloud, with changes of its section of the config."""
-
     def settings(plan: Plan, wildcards: Any) -> dict[str, Any]:
         encoder = plan.config["encoders"][plan.names["clouded_backbone"]]
         icp = {"icp": plan.config["registrations"]["icp"]}

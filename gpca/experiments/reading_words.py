@@ -102,7 +102,6 @@ def reading(group: str, name: str) -> str:
 
 
 def value(choice: str, name: str) -> str:
-    """A value of a choice as words."""
     words = WORDS.get(choice, {})
     if name not in words and choice in NUMBERS:
         return NUMBERS[choice].format(name)

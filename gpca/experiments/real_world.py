@@ -105,7 +105,6 @@ class RealWorldSettings:
 
 
 def check(config: dict, left_out: LeftOut) -> None:
-    """Check that the names in the section exist, without reading data."""
     section, encoders_left_out = config["real_world"], left_out("encoders")
     if REAL_WORLD in config["sources"]:
         fault = "is reserved for the frames of real_world"
@@ -154,7 +153,6 @@ def _check_training(config: dict) -> None:
 
 
 def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
-    """Rows of Table VI, conditions of the initial pose, and the files of their predictions."""
     frames, seeds = config["real_world"], list(config["seeds"])
     backbones, published = reduced_backbones(frames), published_backbones(frames)
     published_seeds = seeds[: frames.get("published_seeds")]

@@ -94,7 +94,6 @@ class RecoverySettings:
 
 
 def check(config: dict, left_out: LeftOut) -> None:
-    """Check the actions, the concepts that they treat, the policies, thresholds and ranges."""
     section = config["recovery"]
     require_names("recovery.objects", [section["objects"]], config["sources"], "source", left_out("sources"))
     for name, settings in section["actions"].items():
@@ -141,12 +140,10 @@ def _entries(config: Mapping[str, Any]) -> dict[str, PolicyEntry]:
 
 
 def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
-    """Policies that learn, from rehearsals or from a person's labels."""
     return {"learning_policy": [name for name, each in _entries(config).items() if each.learns or each.queues]}
 
 
 def policy_titles(config: Mapping[str, Any]) -> dict[str, str]:
-    """Titles of the policies."""
     return {name: entry.title for name, entry in _entries(config).items()}
 
 
@@ -163,12 +160,10 @@ EXPERIMENT = Experiment(
 
 
 def explained(plan: Plan) -> list[str]:
-    """Explainers that the policies of a run read."""
     return sorted({entry.explainer for entry in _entries(plan.config).values() if entry.explainer})
 
 
 def standing(plan: Plan) -> dict[str, Any]:
-    """Entry of the source whose objects stand on the tables."""
     return dict(plan.sources[plan.config["recovery"]["objects"]])
 
 
@@ -238,7 +233,6 @@ def mean_seconds(files: Paths) -> dict[str, float]:
 def table8_recovery(
     run: Run, metrics: Frame, intervals: Frame, differences: Frame, seconds: Mapping[str, float]
 ) -> Table:
-    """Recovery within 1 to `budget` actions, alone and against rivals, and the good ones acted on: policies."""
     import pandas as pd
 
     budget, seeds = run.config["recovery"]["loop"]["budget"], metrics["seed"].nunique()
@@ -296,7 +290,6 @@ def table8_recovery(
 
 
 def tables_title(run: Run) -> str:
-    """Title of the tables and of the objects on them."""
     return f"Tables of the virtual camera, {run.source_titles[run.config['recovery']['objects']]}"
 
 

@@ -60,7 +60,6 @@ LOSSES = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)  # that the
     **METRICS,
 )
 def recovery_rates(run: Run, metrics: Frame) -> Figure:
-    """Left, rates within 1 to `budget` actions with their Wilson intervals; right, rates within all by cause."""
     budget, policies = run.config["recovery"]["loop"]["budget"], policy_titles(run.config)
     shown = [name for name in policies if pool_share(metrics, name, "recovered_within_1") is not None]
     if not shown:
@@ -112,7 +111,6 @@ def _draw(axes, metrics, shown, metric: str, concept: str, offset: float, look: 
     **METRICS,
 )
 def recovery_thresholds(run: Run, metrics: Frame) -> Figure:
-    """The share recovered over the error below which a pose is right: a panel for each number of actions."""
     budget, success = run.config["recovery"]["loop"]["budget"], run.config["success"]
     policies, curve = policy_titles(run.config), success["curve"]
     shown = _shown(metrics, policies, ALARMED, budget)
@@ -147,7 +145,6 @@ def recovery_thresholds(run: Run, metrics: Frame) -> Figure:
     **METRICS,
 )
 def recovery_costs(run: Run, metrics: Frame) -> Figure:
-    """The loss over the factor on the costs of actions: a panel for each share of failures."""
     from matplotlib.ticker import FixedLocator
 
     recovery, policies = run.config["recovery"], policy_titles(run.config)
@@ -212,7 +209,6 @@ def _shown(metrics: Frame, policies: Mapping[str, str], looks: Mapping[str, Look
     queues=(read_queues, "recovery/queue_seed{seed}.csv"),
 )
 def queued_labels(run: Run, queues: Frame) -> Figure:
-    """The error over labels by order, with its interval: a panel for each policy that learns."""
     policies = policy_titles(run.config)
     shown = [name for name in policies if (queues["policy"] == name).any()]
     highest = 100 * queues[queues["policy"].isin(shown)]["high"].max()

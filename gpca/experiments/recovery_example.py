@@ -111,7 +111,6 @@ def fig1_recovery_example(run: Run, example_npz: str | Path) -> Figure:
 
 
 def _draw_view(panel, image: np.ndarray, mask: np.ndarray, true: np.ndarray, placed: np.ndarray) -> None:
-    """The part of an image around both outlines; the visible part of the object is outlined in full."""
     panel.imshow(image)
     for silhouette, color, line in ((true, *HIDDEN), (mask, *VISIBLE), (placed, *PLACED)):
         if silhouette.any():

@@ -41,7 +41,6 @@ def read_recovery(path: str | Path) -> Frame:
 
 
 def is_action(rows: Frame) -> Series:
-    """Which rows are of an action, as booleans."""
     return ~rows["action"].isin((QUEUE, NOTHING))
 
 

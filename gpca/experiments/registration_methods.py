@@ -50,7 +50,6 @@ DRAWN = {
 
 
 def check(config: dict, left_out: LeftOut) -> None:
-    """Check that every method takes its settings, and that the global start is one that runs here."""
     for name, settings in config["methods"].items():
         with_key(f"methods.{name}", registry.require_settings, name, settings or {})
     key, start = "method_pairs.global_start", config["method_pairs"]["global_start"]
@@ -76,7 +75,6 @@ EXPERIMENT = Experiment(
 
 
 def _registered(plan: Plan) -> list[str]:
-    """Methods of a job, and the global one whose pose gives the others a start."""
     return list(dict.fromkeys([*plan.names["method"], plan.config["method_pairs"]["global_start"]]))
 
 
@@ -111,7 +109,6 @@ def row_name(method: str, start: str) -> str:
 
 
 def read_trials(path: str | Path) -> Frame:
-    """Read a file of the step: numbers as numbers, the rest as text."""
     columns = ("sample", "object", "concept", "start", "failure", *TRIAL_COLUMNS)
     rows = read_csv(path, columns, others=("symmetric", "fitness", "inlier_rmse"))
     return rows.assign(**{name: number_column(path, rows, name) for name in TRIAL_COLUMNS})
@@ -163,8 +160,6 @@ def share_of_milder(rows: Frame, concept: str, severities: Mapping[str, Iterable
 
 
 def measures(success: SuccessSettings) -> dict[str, Measure]:
-    """Successes, failures and errors; a method that gave up has no success."""
-
     def within(limit: float, *only: str) -> Measure:
         return Measure(lambda rows: (rows["failure"] == "") & (rows["add_relative"] < limit), only=only)
 
@@ -243,7 +238,6 @@ COSTS = {
     seconds=(read_seconds, "timings/{source}/method_{method}/seed{seed}.csv"),
 )
 def table11_registration(run: Run, intervals, metrics, seconds):
-    """Successes in all and by cause, errors, points and milliseconds: starts × methods."""
     by_seed = {"metrics": metrics, "seconds": seconds}
     columns = CAUSES | ERRORS | COSTS
     sheet = Sheet("table11_registration", HEADS, rows_of(run), columns, intervals, by_seed, list(run.sources))
@@ -266,7 +260,6 @@ def table11_registration(run: Run, intervals, metrics, seconds):
     **INTERVALS,
 )
 def table11_limits(run: Run, intervals):
-    """Successes by the error below which a registration is one: starts × methods by limits."""
     curve = run.config["success"]["curve"]
     columns = {(name := success_within(limit)): show(name, f"{100 * limit:g} % d (%)") for limit in curve}
     sheet = Sheet("table11_limits", HEADS, rows_of(run), columns, intervals)
@@ -283,7 +276,6 @@ def table11_limits(run: Run, intervals):
     **INTERVALS,
 )
 def table11_severity(run: Run, intervals):
-    """Successes by cause and severity: starts × methods by causes × bins."""
     columns = {
         f"{cause}_{name}": show("success", f"{cause.capitalize()}, {name} (%)", f"{cause}_{name}", decimals=0)
         for cause in CONCEPTS
@@ -300,7 +292,6 @@ def table11_severity(run: Run, intervals):
 
 
 def rows_of(run: Run) -> Iterable[Row]:
-    """Rows of all methods."""
     return method_rows(run.config["methods"], run.config["method_pairs"]["global_start"])
 
 
@@ -317,7 +308,6 @@ def method_rows(names: Iterable[str], global_start: str, initial: str = "Initial
 
 
 def notes(run: Run, sheet: Sheet, intervals: Frame) -> list[str]:
-    """Footnotes of all three tables."""
     pairs = int(intervals.loc[intervals["concept"] == ALL, "samples"].max())
     return [
         f"{sheet.over(pairs // sheet.seeds)}. A success is off by less than the config's `success.error` of the "
@@ -328,7 +318,6 @@ def notes(run: Run, sheet: Sheet, intervals: Frame) -> list[str]:
 
 
 def missing_methods(names: Iterable[str]) -> list[str]:
-    """Footnote on the methods whose package is not installed, if there are any."""
     return missing_packages(
         {registry.method_entry(name).title: package for name, package in registry.left_out(names).items()}
     )

@@ -134,7 +134,6 @@ FILES = {
 
 
 def title_of_sample(run: Run, object_name: str) -> str:
-    """Title of the source that figures show, and the object's name in words."""
     source = run.config["figures"]["source"]
     return f"{run.source_titles[source]}: {object_in_words(object_name, run.datasets[source])}"
 
@@ -179,7 +178,6 @@ def observed_uncertainties(path: str | Path, registrations: Registrations) -> tu
 
 
 def _median(rows: Frame, concept: str) -> int:
-    """Row of the median score of a concept."""
     ranked = rows.sort_values([f"score_{concept}", "sample"], kind="stable")
     return int(ranked.index[(len(ranked) - 1) // 2])
 

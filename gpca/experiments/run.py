@@ -35,7 +35,6 @@ def explainer_of(method: str, names: Mapping[str, Any]) -> str:
 
 
 def _embedded(names: Mapping[str, Any]) -> list[str]:
-    """Return the rows of depth frames that read embeddings."""
     return [*names["backbone"], *names["published"]]
 
 

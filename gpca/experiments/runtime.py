@@ -49,7 +49,6 @@ EXPERIMENT = Experiment(name="runtime", sections={"runtime": RuntimeSettings}, t
     **INPUTS,
 )
 def table7_runtime(run: Run, runtime: Frame, published: Iterable[Number]) -> Table:
-    """Mean, standard deviation and median of each component in milliseconds, and the paper's numbers."""
     if runtime.empty:
         raise InputError("runtime", "has no rows", "run the step 'runtime' first")
     printed = printed_seconds(published)
@@ -114,7 +113,6 @@ class Stage(NamedTuple):
     **INPUTS,
 )
 def draw_runtime(run: Run, runtime: Frame, published: Iterable[Number]) -> Figure:
-    """Means of every stage of one explanation and of their sum, ours with one standard deviation."""
     series = stages_of(runtime, published)
     rows = [*(COMPONENTS[component] for component in OF_ONE_EXPLANATION), ALL_STAGES]
     drawing, [[panel]] = panels(1, 1, 0.9 + ROW_IN * len(rows))
@@ -163,5 +161,4 @@ def stages_of(runtime: Frame, published: Iterable[Number]) -> dict[str, dict[str
 
 
 def model_title(run: Run) -> str:
-    """Title of what the model learned from: a source, or the depth frames."""
     return title_of(run.sources.get(run.config["model"]["source"]) or frames_of(run.config))

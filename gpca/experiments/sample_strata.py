@@ -97,7 +97,6 @@ SHOWN_STATES = {
     strata="cause_strata.csv",
 )
 def table9_strata(run: Run, strata):
-    """How often a few explainers are right in every stratum, and what their answer leaves on the table."""
     explainers = diagnosis.cause_titles(run.config)
     failed = where(strata, {"concept": "state_failed", "metric": "regret", "against": ""})
     regret = failed.set_index("method")["value"]
@@ -143,7 +142,6 @@ def table9_strata(run: Run, strata):
     intervals="cause_intervals.csv",
 )
 def table9_shown(run: Run, intervals):
-    """How well explainers tell the state by the mean over starts, and that of the registration shown."""
     present = set(intervals["source"])
     pooled = POOLED if POOLED in present else next(name for name in run.sources if name in present)
     rows = [

@@ -70,13 +70,11 @@ class Section(ScanSamples):
 
 
 def check(config: dict, _left_out: LeftOut) -> None:
-    """Check that every explainer exists, and takes the settings that it has in the diagnosis."""
     for name, settings in settings_of_explainers(config).items():
         with_key(f"scan_causes.explainers.{name}", require_settings, name, settings, CAUSE_EXPLAINERS)
 
 
 def settings_of_explainers(config: Mapping[str, Any]) -> dict[str, dict]:
-    """Settings of each explainer of scans."""
     of_diagnosis = config["diagnosis"]["explainers"]
     return {name: of_diagnosis.get(name) or {} for name in config["scan_causes"]["explainers"]}
 
@@ -87,7 +85,6 @@ def reenactment_settings(config: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def measurement_settings(config: Mapping[str, Any], scan_set: str) -> dict[str, Any]:
-    """Settings of the step that measures the causes of a data set of scans."""
     scans = config["scans"]
     first = scans["global_start"]
     return {
@@ -325,5 +322,4 @@ def _frequent(samples: Judged) -> list[str]:
 
 
 def counted_of_scans(samples: Judged, metric: str) -> np.ndarray:
-    """Mask (N,) of the samples over which a measure is taken."""
     return np.isin(samples.label, _frequent(samples)) if metric == CAUSES else counted(samples, metric)

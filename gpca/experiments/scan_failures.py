@@ -67,7 +67,6 @@ ROW_IN = 0.30
     **MEASURED,
 )
 def table18_scan_causes(run: Run, measured):
-    """How well explainers detect natural failures of scans, and name their causes: data sets × explainers."""
     starts = run.config["causes"]["starts"]
     descriptors = DescriptorSettings(**plain(run.config["diagnosis"]["descriptors"]))
     reenactment = ReenactmentSettings(**plain(scans.reenactment_settings(run.config))).calls(starts)
@@ -141,7 +140,6 @@ def table18_scan_causes(run: Run, measured):
     **MEASURED,
 )
 def table18_scan_counts(run: Run, measured):
-    """Numbers of registrations by state and cause: data sets × kinds of start, or noise added × overlap."""
     added = sorted(name for name in set(measured["condition"]) if name.startswith(f"{ADDED}_"))
     conditions = STARTS | {name: f"{name.removeprefix(ADDED + '_')} times the sensor's noise added" for name in added}
     rows = [
@@ -171,7 +169,6 @@ def table18_scan_counts(run: Run, measured):
     **MEASURED,
 )
 def scan_failures(run: Run, measured):
-    """A panel for each data set and kind of start, in it a bar for each stratum of overlap, with its numbers."""
     from matplotlib.patches import Patch
 
     titles, strata = titles_of_scans(run.config), strata_of(measured)
@@ -220,7 +217,6 @@ def counts_of(measured, source: str, condition: str, stratum: str) -> Mapping[st
 
 
 def strata_of(measured) -> list[str]:
-    """Strata of which registrations were counted."""
     return sorted(set(where(measured, {"method": TRUTH})["stratum"]) - {EVERY})
 
 

@@ -72,7 +72,6 @@ class ScanSettings(ChoiceSettings, TrialSettings):
 
 
 def check(config: dict, left_out: LeftOut) -> None:
-    """Check the settings of methods on scans, and that the data sets that are not optional exist."""
     section = config["scans"]
     with_key("scans", read_settings, ChoiceSettings, fields_of(section, ChoiceSettings))
     for name, settings in section["methods"].items():
@@ -95,13 +94,11 @@ def present(config: Mapping[str, Any]) -> dict[str, ScanEntry]:
 
 
 def titles_of_scans(config: Mapping[str, Any]) -> dict[str, str]:
-    """Titles of the data sets that exist, by name."""
     entries = present(config)
     return {name: title_of({"title": entry.title, "stand_in": entry.stand_in}) for name, entry in entries.items()}
 
 
 def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
-    """The data sets that exist, those among them whose protocol is published, the seeds and the methods."""
     there = present(config)
     return {
         "scan_set": list(there),
@@ -125,7 +122,6 @@ EACH_SET = {"source": "scan_set", "seed": "scan_seed"}  # of scans and seed
 
 
 def files_of_set(plan: Plan, wildcards: Wildcards) -> list[Path]:
-    """Files of a data set of scans."""
     return data_files(present(plan.config)[wildcards.source], plan.config["data_dir"])
 
 
@@ -222,14 +218,12 @@ INTERVALS = {"intervals": "scans.csv"}
 
 
 def _rows(run: Run) -> Iterable[Row]:
-    """Rows of data sets, starts and methods."""
     for name, title in titles_of_scans(run.config).items():
         for row in method_rows(run.config["methods"], run.config["scans"]["global_start"], "Ladder"):
             yield Row([(name, title), *row.labels], {"source": name} | dict(row.where))
 
 
 def _notes(run: Run, sheet: Sheet, intervals: Frame, parts: Iterable[str]) -> list[str]:
-    """Footnotes on pairs, intervals, and what is correct."""
     success, counts = run.config["scans"]["success"], []
     for name, title in dict.fromkeys(row.labels[0] for row in sheet.rows):
         recalls = where(intervals, {"source": name, "metric": RECALL})
@@ -259,7 +253,6 @@ def _notes(run: Run, sheet: Sheet, intervals: Frame, parts: Iterable[str]) -> li
     seconds=(read_seconds, "timings/{scan_set}/method_{scan_method}/seed{scan_seed}.csv"),
 )
 def table17_scans(run: Run, intervals, seconds):
-    """Recalls in all and by stratum of overlap, and seconds: data sets × starts × methods."""
     strata = {stratum_name(*ends): ends for ends in pairwise(run.config["scans"]["strata"])}
     columns = {key: show(RECALL, f"{low:g} to {high:g} (%)", key) for key, (low, high) in strata.items()}
     seconds_look: dict[str, Any] = {"decimals": 2, "interval": False, "limits": (0, inf), "least_is_best": True}
@@ -289,7 +282,6 @@ def table17_scans(run: Run, intervals, seconds):
     **INTERVALS,
 )
 def table17_ladder(run: Run, intervals):
-    """Recalls of local methods by the rung that they start on: data sets × methods by rungs."""
     rungs = {(rung := Rung(**each)).name: rung for each in run.config["scans"]["ladder"]}
     columns = {
         key: show(RECALL, f"{rung.rotation_deg:g}°, {rung.translation_m:g} m (%)", key) for key, rung in rungs.items()
@@ -310,7 +302,6 @@ def table17_ladder(run: Run, intervals):
     **INTERVALS,
 )
 def table17_published(run: Run, intervals):
-    """Recalls of global methods by list: this run's on each benchmark, and published ones of other features."""
     entries = {name: method_entry(name) for name in installed(run.config["methods"])}
     titles = titles_of_scans(run.config)
     rows = [

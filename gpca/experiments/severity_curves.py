@@ -10,7 +10,7 @@ import numpy as np
 from gpca.declarations.plan import Run
 from gpca.declarations.result import Figure, Frame, Paths, figure, numbers
 from gpca.errors import InputError
-from gpca.evaluation.measures import source_method_seed
+from gpca.evaluation.measures import read_samples
 from gpca.experiments.controls import SECTION, read_controls
 from gpca.experiments.explained import titles
 from gpca.io.csv_file import read_numbers
@@ -42,16 +42,10 @@ def collect(run: Run, files: Paths, samples: Paths) -> Frame:
     edges = {name: np.linspace(low, high, bins + 1) for name, (low, high) in limits.items()}
     predictions = read_controls(files)
     predictions = predictions[predictions["control"] == PAPER]
-    frames = []
-    for path in samples:
-        _, source, seed = source_method_seed(path)
-        rows = read_numbers(path, SAMPLE_COLUMNS, (*SEVERITIES, "error"))
-        rows = rows[rows["control"] == PAPER].assign(source=source, seed=seed)
-        for name in SEVERITIES:  # the first bin where it was not applied
-            number_N = np.searchsorted(edges[name], rows[name], side="right") - 1
-            rows[f"bin_{name}"] = np.clip(number_N, 0, bins - 1)
-        frames.append(rows)
-    table = pd.concat(frames, ignore_index=True)
+    table = read_samples(samples, lambda path: read_numbers(path, SAMPLE_COLUMNS, (*SEVERITIES, "error")), ("source",))
+    table = table[table["control"] == PAPER].reset_index(drop=True)
+    for name in SEVERITIES:  # the first bin where it was not applied
+        table[f"bin_{name}"] = np.clip(np.searchsorted(edges[name], table[name], side="right") - 1, 0, bins - 1)
     joined = predictions.merge(
         table, on=["source", "seed", "sample"], suffixes=("", "_of_sample"), validate="many_to_one"
     )

@@ -102,7 +102,6 @@ class Plain(Column):
 
 
 def plain_column(title: str) -> Plain:
-    """Column of numbers without intervals."""
     return Plain(title, interval=False, limits=(-math.inf, math.inf))
 
 
@@ -112,7 +111,6 @@ def plain_cells(values: Mapping[str, float], seeds: float) -> dict[str, Cell | N
 
 
 def stand_ins(run: Run) -> str:
-    """Clause of a caption on stand-ins among the sources and the depth frames."""
     return stand_in_clause([*run.sources.values(), frames_of(run.config)])
 
 
@@ -134,8 +132,6 @@ CONFUSED = {"pose": "overlap", "overlap": "pose"}
     needs=("frame_input",),
 )
 def table6_inputs(run: Run, metrics: Frame) -> Table:
-    """Accuracy on depth frames by the cloud that the encoder sees."""
-
     def share(rows: Frame, metric: str, concept: str = ALL, is_count: bool = False) -> Cell | None:
         """Mean of a metric over the seeds, in percent of the test samples where it is a count."""
         rows = rows_where(rows, concept=concept).sort_values("seed")

@@ -16,7 +16,7 @@ from gpca.declarations.result import Frame, Paths, numbers, table
 from gpca.declarations.step import Plan, Step, Wildcards
 from gpca.errors import with_key
 from gpca.evaluation.intervals import Clustered
-from gpca.evaluation.measures import ALL, POOLED, Measure, Parts, over_seeds, per_seed, read_samples
+from gpca.evaluation.measures import ALL, POOLED, Measure, by_value, over_seeds, per_seed, read_samples
 from gpca.experiments.explained import explainer_settings, require_explained
 from gpca.experiments.registration_methods import missing_methods
 from gpca.explainers.registry import explainer_entry, explainer_module
@@ -106,8 +106,8 @@ def answers(files: Paths) -> Frame:
 
     A sample without an estimate is wrong. The cluster is the object's family in its source.
     """
-    rows = read_samples(files, lambda path: read_predictions(path, (*LABELS, FAILURE)))
-    rows = rows.assign(source=rows["method"], table=rows["explainer"], method=rows["asked_of"])
+    rows = read_samples(files, lambda path: read_predictions(path, (*LABELS, FAILURE)), ("source",))
+    rows = rows.assign(table=rows["explainer"], method=rows["asked_of"])
     failed_N = rows[FAILURE] != ""
     usual = rows[rows["asked_of"] == MONTE_CARLO].set_index(["explainer", *SAMPLE])["concept_predicted"]
     usual_N = usual.reindex(rows.set_index(["explainer", *SAMPLE]).index).to_numpy()
@@ -135,16 +135,11 @@ def measured(rows: Frame) -> Iterator[tuple[Frame, Any, dict[str, Measure]]]:
     for (exchanged, _), explained in rows.groupby(["exchanged", "explainer"], sort=False):
         for learnt_from, subset in explained.groupby("learnt_from", sort=False):
             if exchanged == ESTIMATOR:
-                yield subset, _by_concept, by_estimator
+                yield subset, lambda rows: by_value(rows, "concept_true", rows["concept_true"].unique()), by_estimator
                 continue
             others = subset[subset["asked_of"] != learnt_from].assign(method=ANOTHER)
             both = pd.concat([subset, others]) if subset["asked_of"].nunique() > 1 else subset
             yield both, lambda rows: {rows["learnt_from"].iloc[0]: np.ones(len(rows), bool)}, by_method
-
-
-def _by_concept(rows: Frame) -> Parts:
-    masks = {concept: (rows["concept_true"] == concept).to_numpy() for concept in rows["concept_true"].unique()}
-    return {ALL: np.ones(len(rows), bool)} | masks
 
 
 @numbers(

@@ -50,10 +50,6 @@ OTHER_LOOKS: tuple[tuple[str, Any, float], ...] = (
     learned=(read_learner_predictions, {"prediction_files": PREDICTIONS}),
 )
 def coverage_risk(run: Run, learned: Mapping) -> Figure:
-    """Mean over the seeds of the risk, by the largest score, on the test samples like the training's.
-
-    The paper's learners are above, and below are the others beside GP-CA. A panel in which no classifier errs says so.
-    """
     shown, columns = _shown(run, learned)
     paper, others = _paper_first(shown), [name for name in shown if name not in style.METHOD_LOOKS]
     beside = [name for name in paper if name == BESIDE_OTHERS]
@@ -126,11 +122,6 @@ def reliability(run: Run, learned: Mapping) -> Figure:
     ),
 )
 def uncertainty_vs_distance(run: Run, learned: Mapping) -> Figure:
-    """Mean of 1 - largest score over the distance to the training samples: sources as columns, sets as rows.
-
-    The paper's learners are shown, or if there are none of them the others, with 95 % intervals. In each panel stands
-    the number n of samples, those of all seeds together.
-    """
     learners, columns = _shown(run, learned)
     names = _paper_first(learners) or list(learners)[: len(style.METHOD_LOOKS)]
     shown = {name: learners[name] for name in names}
@@ -189,12 +180,10 @@ def _looks(shown: Iterable[str]) -> dict[str, dict[str, Any]]:
 
 
 def _paper_first(learners: Iterable[str]) -> list[str]:
-    """Learners with a look of their own, in the order of the looks."""
     return [name for name in style.METHOD_LOOKS if name in set(learners)]
 
 
 def _write_legend(drawing: Figure, shown: Mapping[str, str], looks: Mapping[str, dict[str, Any]]) -> None:
-    """Name the line of every learner, the paper's first."""
     from matplotlib.lines import Line2D
 
     ordered = [*_paper_first(shown), *(name for name in shown if name not in style.METHOD_LOOKS)]
@@ -212,6 +201,5 @@ def _shown(run: Run, learned: Mapping) -> tuple[dict[str, str], dict[str, str]]:
 
 
 def _of(learned: Mapping, source: str, learner: str, of_set: str) -> list:
-    """Rows of a set, seed by seed."""
     parts = [rows[rows["set"] == of_set] for key, rows in learned.items() if key[:2] == (source, learner)]
     return [rows for rows in parts if len(rows)]
