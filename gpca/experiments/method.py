@@ -15,7 +15,7 @@ from gpca.errors import InputError
 from gpca.experiments import registration_stages as stages_of
 from gpca.experiments.frames import encoder_title
 from gpca.experiments.recovery_example import short_action
-from gpca.experiments.registration_stages import FILES, Stages, title_of_sample
+from gpca.experiments.registration_stages import FILES, Staged, title_of_sample
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS, SEVERITIES_OF
@@ -53,7 +53,7 @@ THRESHOLD: dict[str, Any] = {"color": style.BLACK, "linestyle": (0, (3, 2)), "li
 )
 def fig2_overview(run: Run, registrations: Path, embeddings: Path, predictions: Path, uncertainties: Path) -> Figure:
     treatments = dict(run.config["recovery"]["treatments"])
-    stages = Stages.load(registrations, embeddings, predictions, uncertainties, run.config["causes"]["limits"])
+    stages = Staged.load(registrations, embeddings, predictions, uncertainties, run.config["causes"]["limits"])
     row = stages.choose(CONCEPT, registrations)
     sample = stages.predictions.iloc[row]
     if (named := sample["concept_predicted"]) not in treatments:
@@ -109,7 +109,7 @@ def fig2_overview(run: Run, registrations: Path, embeddings: Path, predictions: 
     return canvas.figure
 
 
-def decide(stages: Stages, row: int, policy: RecoveryPolicy) -> Decision:
+def decide(stages: Staged, row: int, policy: RecoveryPolicy) -> Decision:
     """Decision on a row from what GP-CA knows, never from the true error of its pose.
 
     Nothing is done where the uncertainty u is below that of 95 % of the clean pairs; else the policy decides.

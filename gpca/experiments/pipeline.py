@@ -18,7 +18,7 @@ from gpca.experiments.frames import encoder_title
 from gpca.experiments.label_curves import STYLES, mean_curves
 from gpca.experiments.registration_stages import (
     FILES,
-    Stages,
+    Staged,
     draw_embedding,
     draw_scores_with_numbers,
     title_of_sample,
@@ -59,7 +59,7 @@ def fig4_pipeline(
     uncertainties: Path,
     curve_files: Sequence[Path],
 ) -> Figure:
-    stages = Stages.load(registrations, embeddings, predictions, uncertainties, run.config["causes"]["limits"])
+    stages = Staged.load(registrations, embeddings, predictions, uncertainties, run.config["causes"]["limits"])
     row = stages.choose(ORDER[0], registrations, *ORDER[1:])
     new, curves = _curves(curve_files)
     source, _, seed = source_method_seed(curve_files[0])
@@ -101,7 +101,7 @@ class Round:
     chosen: np.ndarray
 
 
-def first_round(stages: Stages, held_out: str, settings: ActiveLearningSettings, source: str, seed: int) -> Round:
+def first_round(stages: Staged, held_out: str, settings: ActiveLearningSettings, source: str, seed: int) -> Round:
     """Fit the classifier that does not know a concept yet, and let the paper's strategy choose from the pool.
 
     Start, pool and classifier are those of the run's learning curves with this source and seed.
@@ -138,7 +138,7 @@ def _curves(files: Sequence[Path]) -> tuple[str, dict[str, Frame]]:
     raise InputError("active learning", f"has no curve of {' or '.join(TITLES)}", "run one of these strategies")
 
 
-def _draw_inference(canvas: Canvas, stages: Stages, row: int, encoder: str, labeling: Round) -> None:
+def _draw_inference(canvas: Canvas, stages: Staged, row: int, encoder: str, labeling: Round) -> None:
     sample = stages.predictions.iloc[row]
     middle_in = 2.66
     captions_in = 2.17
@@ -177,7 +177,7 @@ def _draw_inference(canvas: Canvas, stages: Stages, row: int, encoder: str, labe
     )
 
 
-def _draw_active_learning(canvas: Canvas, stages: Stages, labeling: Round, new: str, curves: Mapping) -> None:
+def _draw_active_learning(canvas: Canvas, stages: Staged, labeling: Round, new: str, curves: Mapping) -> None:
     """Draw pool, score, diversify, annotate, retrain from right to left: the way back of the loop."""
     heads_in = 1.58
     captions_in = 0.08
@@ -242,6 +242,6 @@ def _draw_active_learning(canvas: Canvas, stages: Stages, labeling: Round, new: 
     panel.legend(loc="lower right", borderaxespad=0, handlelength=1.2, borderpad=0.1, labelspacing=0.2)
 
 
-def _draw_thumbnail(axes, stages: Stages, row: int) -> None:
+def _draw_thumbnail(axes, stages: Staged, row: int) -> None:
     target_Q_3, source_P_3 = stages.seen(row)["icp"]
     draw_clouds(axes, target_Q_3[::3], source_P_3[::3], size=0.4)

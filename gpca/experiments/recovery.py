@@ -14,7 +14,7 @@ from gpca.declarations.experiment import Experiment, LeftOut, Names
 from gpca.declarations.plan import Run
 from gpca.declarations.result import Frame, Paths, table
 from gpca.declarations.step import Plan, Step
-from gpca.encoders.registry import EncoderChanges, encoder_module
+from gpca.encoders.registry import EncoderChanges
 from gpca.errors import InputError, require_names, with_key
 from gpca.experiments.recovery_measures import ERROR, SEQUENCE, pool_share
 from gpca.explainers.registry import explainer_entry, explainer_module, require_settings
@@ -35,7 +35,7 @@ from gpca.reporting.tables.builder import over_clusters
 from gpca.reporting.tables.cells import plain_cell
 from gpca.reporting.tables.table import Table
 from gpca.reporting.words import plural
-from gpca.settings import Bounds, Count, Distinct, Keys, NotNegative, Share, changes_of, part_of
+from gpca.settings import Bounds, Count, Distinct, Keys, NotNegative, OpenShare, Share, changes_of, part_of
 
 SECTION = "V Robotic deployment for action recovery"
 DECLARED = ("uncertain", "dominant", "improvement")  # thresholds of the config; null leaves one to the calibration
@@ -54,10 +54,10 @@ class DeclaredThresholds:
 
 
 @dataclass(frozen=True)
-class Gate:
+class FalseAlarms:
     """How many of the good registrations gated policies may act on."""
 
-    false_alarms: Annotated[float, Bounds(exclusiveMinimum=0, exclusiveMaximum=1)]
+    false_alarms: OpenShare
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class Estimator(InitialPoseSettings):
 
 
 @dataclass(frozen=True)
-class RecoverySettings:
+class Section:
     """Recovery from failed registrations, in a closed loop on tables of the virtual camera."""
 
     objects: str
@@ -78,7 +78,7 @@ class RecoverySettings:
     costs: dict[str, Share]
     needless: Share
     thresholds: DeclaredThresholds
-    gate: Gate
+    gate: FalseAlarms
     rehearsals: Count
     loop: Annotated[dict, part_of(LoopSettings, without=("success", "cloud_points", "icp"))]
     train: TrainSamples
@@ -109,38 +109,29 @@ def check(config: dict, left_out: LeftOut) -> None:
         fault = "one action treats two concepts"
         raise InputError("config key recovery.treatments", fault, "give each concept its own")
     for name in section["policies"]:
-        explainer = with_key("recovery.policies", policy_entry, name, tuple(section["actions"])).explainer
-        if explainer:
+        if explainer := with_key("recovery.policies", policy_entry, name, tuple(section["actions"])).explainer:
             settings = config["explainers"].get(explainer) or {}
             with_key(f"explainers.{explainer}", require_settings, explainer, settings)
             if design := explainer_entry(explainer).design:
                 key = f"recovery.policies.{name}"
                 require_names(key, [design], config["uncertainty"], "uncertainty", left_out("uncertainty"))
     thresholds = {name: section["thresholds"][name] for name in DECLARED}
-    thresholds = {name: value for name, value in thresholds.items() if value is not None}
-    with_key("recovery.thresholds", lambda: Thresholds(**thresholds))
-    ranges: dict[str, Any] = {name: tuple(section[name]) for name in ("noise_scale", "hidden")}
-    with_key("recovery", lambda: SituationSettings(**ranges))
+    given = {name: value for name, value in thresholds.items() if value is not None}
+    with_key("recovery.thresholds", lambda: Thresholds(**given))
+    with_key("recovery", lambda: SituationSettings(tuple(section["noise_scale"]), tuple(section["hidden"])))
 
 
 def policies_without(left_out: LeftOut) -> set[str]:
     """Policies that go with the actions and the uncertainty that the config leaves out."""
-    designs = left_out("uncertainty")
     reading = {name: entry.explainer for name, entry in named_policies().items() if entry.explainer}
     actions = [action for action in ACTIONS if action not in left_out("recovery.actions")]
-    return {
-        *(policies(tuple(ACTIONS)).keys() - policies(actions).keys()),
-        *(name for name, explainer in reading.items() if explainer_entry(explainer).design in designs),
-    }
+    gone = {name for name, each in reading.items() if explainer_entry(each).design in left_out("uncertainty")}
+    return gone | (policies(tuple(ACTIONS)).keys() - policies(actions).keys())
 
 
 def _entries(config: Mapping[str, Any]) -> dict[str, PolicyEntry]:
     actions = tuple(config["recovery"]["actions"])
     return {name: policy_entry(name, actions) for name in config["recovery"]["policies"]}
-
-
-def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
-    return {"learning_policy": [name for name, each in _entries(config).items() if each.learns or each.queues]}
 
 
 def policy_titles(config: Mapping[str, Any]) -> dict[str, str]:
@@ -150,8 +141,10 @@ def policy_titles(config: Mapping[str, Any]) -> dict[str, str]:
 EXPERIMENT = Experiment(
     name="recovery",
     beside=("recovery_measures", "recovery_example", "recovery_curves"),
-    sections={"recovery": RecoverySettings},
-    names=names,
+    sections={"recovery": Section},
+    names=lambda config, sources: {
+        "learning_policy": [name for name, each in _entries(config).items() if each.learns or each.queues]
+    },
     check=check,
     optional_entries={"recovery.actions": Names("action", lambda: ACTIONS)},
     switches={"recovery.policies": Names("policy", lambda: policies(tuple(ACTIONS)))},
@@ -182,7 +175,7 @@ RECOVER = Step(
         **{name: plan.config[name] for name in ("recovery", "success", "registrations")},
         "objects": plan.config["sources"][plan.config["recovery"]["objects"]],
         "scenes": plan.config["real_world"]["scenes"],
-        "encoder": plan.config["encoders"][plan.config["embedding"]["encoder"]] | plan.config["recovery"]["encoder"],
+        "encoder": plan.encoder | plan.config["recovery"]["encoder"],
         "uncertainty": plan.config["uncertainty"].get("removal", {}),
         "reenactment": plan.config["diagnosis"]["reenactment"],
         "explainers": {name: plan.config["explainers"].get(name) or {} for name in explained(plan)},
@@ -193,7 +186,7 @@ RECOVER = Step(
         )
     },
     modules=lambda plan: [
-        encoder_module(plan.config["encoders"][plan.config["embedding"]["encoder"]]),
+        plan.encoder_module,
         *map(explainer_module, explained(plan)),
         *filter(None, map(policy_module, plan.config["recovery"]["policies"])),
         *source_modules(standing(plan)),
@@ -212,8 +205,6 @@ def mean_seconds(files: Paths) -> dict[str, float]:
         rows = rows[rows["failed"] == "True"]
         rows["seconds"] = sum(number_column(path, rows, name) for name in SECONDS)
         parts.append(rows.groupby(["policy", "episode"])["seconds"].sum())
-    if not parts:
-        raise InputError("recovery", "no timing files were given", "run the step recover")
     return pd.concat(parts).groupby(level="policy").mean().to_dict()
 
 
@@ -244,14 +235,11 @@ def table8_recovery(
         **within,
         "acted_nominal": show("acted_nominal", "Acts on good (%)", decimals=0, least_is_best=True),
         **{
-            f"{metric}_{against}": show(
-                metric,
-                f"{metric.rpartition('_')[2]}: to {words} (points)",
-                where={"against": against},
-                limits=(-100, 100),
+            f"recovered_within_{k}_{against}": show(
+                f"recovered_within_{k}", f"{k}: to {words} (points)", where={"against": against}, limits=(-100, 100)
             )
             for against, words in AGAINST.items()
-            for metric in (first, last)
+            for k in (1, budget)
         },
         **{f"{last}_{cause}": show(last, f"{cause.capitalize()} (%)", cause, **plain) for cause in CONCEPTS},
         "queued": show("queued", "Queued (%)", **plain),
@@ -262,11 +250,10 @@ def table8_recovery(
     rows = [Row([(name, title)], {"method": name}) for name, title in policy_titles(run.config).items()]
     sheet = Sheet("table8_recovery", {"policy": "Policy"}, rows, columns, pd.concat([intervals, differences]))
     for i, row in enumerate(sheet.rows):
-        policy, failures = row.where["method"], sheet.cells[i, first].test_samples
-        if mean := pool_share(metrics, policy, "cost"):
-            sheet.cells[i, "cost"] = plain_cell(mean[0], seeds, failures)
-        if policy in seconds:
-            sheet.cells[i, "seconds"] = plain_cell(seconds[policy], seeds, failures)
+        cost, _ = pool_share(metrics, row.where["method"], "cost") or (None, 0)
+        for key, value in {"cost": cost, "seconds": seconds.get(row.where["method"])}.items():
+            if value is not None:
+                sheet.cells[i, key] = plain_cell(value, seeds, sheet.cells[i, first].test_samples)
     failures = sheet.cells[0, first].test_samples
     good = max((cell.test_samples for (_, key), cell in sheet.cells.items() if key == "acted_nominal"), default=0)
     notes = (

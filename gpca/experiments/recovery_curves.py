@@ -61,9 +61,7 @@ LOSSES = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)  # that the
 )
 def recovery_rates(run: Run, metrics: Frame) -> Figure:
     budget, policies = run.config["recovery"]["loop"]["budget"], policy_titles(run.config)
-    shown = [name for name in policies if pool_share(metrics, name, "recovered_within_1") is not None]
-    if not shown:
-        raise InputError("metrics", "have no recovery rates", "run the step recover first")
+    shown = _with_rates(metrics, policies)
     drawing, [axes] = panels(1, 2, 0.75 + ROW_IN * len(shown), sharey=True, width_ratios=(1.5, 1))
     for k in range(1, budget + 1):
         offset = APART * (k - (budget + 1) / 2)
@@ -92,8 +90,8 @@ def recovery_rates(run: Run, metrics: Frame) -> Figure:
 
 def _draw(axes, metrics, shown, metric: str, concept: str, offset: float, look: Mapping[str, str]) -> None:
     """Rates of one kind, a little above or below the middle of each policy's row, with their intervals."""
-    rates_or_none = {row: pool_share(metrics, name, metric, concept) for row, name in enumerate(shown)}
-    rates = {row: rate for row, rate in rates_or_none.items() if rate is not None}
+    found = ((row, pool_share(metrics, name, metric, concept)) for row, name in enumerate(shown))
+    rates = {row: rate for row, rate in found if rate}
     for row, (share, trials) in rates.items():
         low, high = wilson_interval(share * trials, trials)
         axes.plot([100 * low, 100 * high], [row + offset] * 2, color=look["color"], linewidth=0.8)
@@ -127,8 +125,7 @@ def recovery_thresholds(run: Run, metrics: Frame) -> Figure:
         panel.minorticks_off()
         panel.set(title=f"within {plural(k, 'action')}", ylim=(-2, 102), xlabel="error allowed (% of the diameter)")
     drawn[0].set_ylabel("recovered (%)")
-    handles, labels = drawn[0].get_legend_handles_labels()
-    legend_below(drawing, handles, labels, 3)
+    legend_below(drawing, *drawn[0].get_legend_handles_labels(), 3)
     counts = [pool_share(metrics, next(iter(shown)), at("recovered_within_1", limit)) for limit in curve]
     of = ", ".join(f"{count[1]} at {100 * limit:g} %" for limit, count in zip(curve, counts, strict=True) if count)
     style.write_title(drawing, f"{tables_title(run)}: failures: {of}")
@@ -162,8 +159,7 @@ def recovery_costs(run: Run, metrics: Frame) -> Figure:
         panel.set_xticks([0.3, 1, 3], ["0.3", "1", "3"])
         panel.minorticks_off()
     drawn[0].set_ylabel("loss per registration")
-    handles, labels = drawn[0].get_legend_handles_labels()
-    legend_below(drawing, handles, labels, 3)
+    legend_below(drawing, *drawn[0].get_legend_handles_labels(), 3)
     style.write_title(drawing, tables_title(run))
     return drawing
 
@@ -185,17 +181,21 @@ def losses(
 
 def _shown(metrics: Frame, policies: Mapping[str, str], looks: Mapping[str, Look], budget: int) -> dict[str, Look]:
     """Look of every policy that is drawn: those with one of their own, and the best fixed sequence."""
-    whole = f"recovered_within_{budget}"
-    shares = {name: share[0] for name in policies if (share := pool_share(metrics, name, whole))}
-    if not shares:
-        raise InputError("metrics", "have no recovery rates", "run the step recover first")
-    shown = {name: look for name, look in looks.items() if name in shares}
+    present = _with_rates(metrics, policies)
+    shown = {name: look for name, look in looks.items() if name in present}
     sums = {  # of the recoveries within 1, 2, … actions
         name: sum((pool_share(metrics, name, f"recovered_within_{k}") or (0.0,))[0] for k in range(1, budget + 1))
-        for name in shares
+        for name in present
         if name.startswith(("sequence_", "always_"))
     }
     return shown | ({max(sums, key=sums.__getitem__): ALWAYS} if sums else {})
+
+
+def _with_rates(metrics: Frame, policies: Mapping[str, str]) -> list[str]:
+    shown = [name for name in policies if pool_share(metrics, name, "recovered_within_1")]
+    if not shown:
+        raise InputError("metrics", "have no recovery rates", "run the step recover first")
+    return shown
 
 
 @figure(

@@ -11,7 +11,7 @@ from gpca.causes.policy import NOTHING, QUEUE, QUEUE_COLUMNS
 from gpca.declarations.plan import Run
 from gpca.declarations.result import Frame, Paths, Series, numbers
 from gpca.evaluation.intervals import Clustered, wilson_interval
-from gpca.evaluation.measures import ALL, Measure, Parts, intervals, over_seeds, tidy
+from gpca.evaluation.measures import ALL, Measure, by_value, intervals, over_seeds, tidy
 from gpca.io.csv_file import numbers as number_column
 from gpca.io.csv_file import read_csv, read_numbers
 from gpca.pairs.perturbation import CONCEPTS
@@ -147,7 +147,12 @@ def collect_intervals(run: Run, files: Paths) -> Frame:
     """
     import pandas as pd
 
-    rows = _read_all(files)
+    def over_all(cases: Frame, causes: Sequence[str], measures: Mapping[str, Measure]) -> Frame:
+        draws = Clustered.drawn(cases["seed"], cases["cluster"], "recovery intervals")
+        cases = cases.assign(table=TABLE, source=TABLE)
+        return over_seeds(cases, lambda rows: by_value(rows, "cause", causes), measures, draws)
+
+    rows = _read_all(files).rename(columns={"policy": "method"})
     within = {
         f"recovered_within_{k}": Measure(lambda cases, k=k: cases["step"] <= k)  # type: ignore[misc]
         for k in range(1, run.config["recovery"]["loop"]["budget"] + 1)
@@ -155,20 +160,12 @@ def collect_intervals(run: Run, files: Paths) -> Frame:
     left_alone = Measure(lambda cases: cases["first"] == NOTHING)
     shares = {"queued": Measure("queued"), **within, "left_alone": left_alone}
     failures, good = rows[rows["failed"]], rows[~rows["failed"]].reset_index(drop=True)
-    step = failures["step"].where(failures["recovered"], np.inf)
-    cases = failures.assign(recovered=step, queued=failures["action"] == QUEUE)
-    cases = cases.groupby(["method", *CASE, "cause"], sort=False)
-    cases = cases.agg(step=("recovered", "min"), queued=("queued", "any"), first=("action", "first")).reset_index()
-
-    def by_cause(cases: Frame) -> Parts:
-        masks = {cause: (cases["cause"] == cause).to_numpy() for cause in CONCEPTS}
-        return {ALL: np.ones(len(cases), bool)} | masks
-
-    parts = [_over_seeds(cases, by_cause, shares)]
+    cases = failures.assign(step=steps_taken(failures), queued=failures["action"] == QUEUE)
+    cases = cases.groupby(["method", *CASE, "cluster", "cause"], sort=False)
+    cases = cases.agg(step=("step", "min"), queued=("queued", "any"), first=("action", "first")).reset_index()
+    parts = [over_all(cases, CONCEPTS, shares)]
     if len(good):
-        parts.append(
-            _over_seeds(good, lambda rows: {ALL: np.ones(len(rows), bool)}, {"acted_nominal": Measure(is_action)})
-        )
+        parts.append(over_all(good, (), {"acted_nominal": Measure(is_action)}))
     order = {name: place for place, name in enumerate(rows["method"].unique())}
     return pd.concat(parts).sort_values("method", key=lambda names: names.map(order), kind="stable")
 
@@ -184,9 +181,12 @@ def collect_differences(run: Run, files: Paths) -> Frame:
     recovery = run.config["recovery"]
     actions = list(recovery["actions"])
     rows = _read_all(files)
-    steps = steps_of(rows[rows["failed"]])
-    seeds, tables, _ = zip(*steps.index, strict=True)
-    draws = Clustered.drawn(seeds, _clusters(seeds, tables), "recovery differences")
+    failures = rows[rows["failed"]]
+    cases = [failures[name] for name in ("seed", "cluster", "episode")]
+    # After how many actions each failure was recovered, or inf, by policy in columns.
+    steps = steps_taken(failures).groupby([*cases, failures["policy"]], sort=False).min().unstack()
+    seeds, clusters, _ = zip(*steps.index, strict=True)
+    draws = Clustered.drawn(seeds, clusters, "recovery differences")
     fixed = [name for name in steps.columns if is_fixed(name, actions)]
     records = []
     for k in range(1, recovery["loop"]["budget"] + 1):
@@ -201,10 +201,9 @@ def collect_differences(run: Run, files: Paths) -> Frame:
     return intervals(records, "recovery")
 
 
-def steps_of(failures: Frame) -> Frame:
-    """After how many actions each failure (seed, table, episode) was recovered, or inf, by policy in columns."""
-    step = failures["step"].where(failures["recovered"], np.inf)
-    return step.groupby([*(failures[name] for name in CASE), failures["policy"]], sort=False).min().unstack()
+def steps_taken(failures: Frame) -> Series:
+    """Number of actions after which a row's failure was recovered, or inf."""
+    return failures["step"].where(failures["recovered"], np.inf)
 
 
 def read_queues(files: Paths) -> Frame:
@@ -234,13 +233,4 @@ def _read_all(files: Paths) -> Frame:
     if not parts:
         return intervals([], "recovery")
     rows = pd.concat(parts, ignore_index=True)
-    return rows.assign(method=rows["policy"])
-
-
-def _over_seeds(cases: Frame, parts, measures: Mapping[str, Measure]) -> Frame:
-    draws = Clustered.drawn(cases["seed"], _clusters(cases["seed"], cases["table"]), "recovery intervals")
-    return over_seeds(cases.assign(table=TABLE, source=TABLE), parts, measures, draws)
-
-
-def _clusters(seeds: Sequence, tables: Sequence) -> list[str]:
-    return [f"{seed}/{table}" for seed, table in zip(seeds, tables, strict=True)]
+    return rows.assign(cluster=rows["seed"].astype(str) + "/" + rows["table"].astype(str))

@@ -28,7 +28,7 @@ from gpca.rigid import inverse, scale_translation, transform
 
 
 @dataclass(frozen=True)
-class Stages:
+class Staged:
     """S registrations of one source and seed, with the results of all stages.
 
     Attributes:
@@ -54,7 +54,7 @@ class Stages:
         predictions_csv: str | Path,
         uncertainty_csv: str | Path,
         limits: Mapping[str, float],
-    ) -> Stages:
+    ) -> Staged:
         """Read the files of the stages; the limits are those of the config's section ``causes``."""
         registrations = Registrations.load(registrations_npz)
         h_S_d = read_embedding(embeddings_npz, registrations)["embedding"]

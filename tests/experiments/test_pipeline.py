@@ -12,7 +12,7 @@ from gpca.active_learning.settings import ActiveLearningSettings
 from gpca.declarations.plan import Run
 from gpca.errors import InputError
 from gpca.experiments.pipeline import fig4_pipeline, first_round
-from gpca.experiments.registration_stages import Stages, severity_text
+from gpca.experiments.registration_stages import Staged, severity_text
 from tests.figures import assert_words_are_large_enough_and_inside, words_of
 
 from .runs import SOLIDS
@@ -47,11 +47,11 @@ def curve_files(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def asked(stage_files):
-    return first_round(Stages.load(*stage_files), "overlap", ActiveLearningSettings.from_dict(LEARNING), "solids", 0)
+    return first_round(Staged.load(*stage_files), "overlap", ActiveLearningSettings.from_dict(LEARNING), "solids", 0)
 
 
 def test_the_round_is_the_first_of_the_run_and_its_pool_the_trainings(asked, stage_files):
-    stages, settings = Stages.load(*stage_files), ActiveLearningSettings.from_dict(LEARNING)
+    stages, settings = Staged.load(*stage_files), ActiveLearningSettings.from_dict(LEARNING)
     of = stages.registrations
     assert sorted([*asked.rows_N, *asked.labeled]) == of.rows("train").tolist()
     assert set(of.concept[asked.labeled]) == {"noise", "pose"}
@@ -68,7 +68,7 @@ def test_the_round_asks_about_the_most_uncertain_and_about_different_ones(asked)
 
 
 def test_the_map_separates_what_the_embedding_separates(asked, stage_files):
-    concept_S = Stages.load(*stage_files).registrations.concept
+    concept_S = Staged.load(*stage_files).registrations.concept
     centres = [asked.map_S_2[concept_S == concept].mean(axis=0) for concept in ("noise", "pose", "overlap")]
     for i in range(3):
         assert np.linalg.norm(centres[i] - centres[i - 1]) > 1
@@ -80,7 +80,7 @@ def test_the_numbers_are_those_of_the_files_and_the_bytes_the_same_again(stage_f
 
     same_bytes(draw)
     written = words_of(draw())
-    stages = Stages.load(*stage_files)
+    stages = Staged.load(*stage_files)
     row = stages.choose("overlap", stage_files[0], "pose", "noise")
     sample, of = stages.predictions.iloc[row], stages.registrations
     assert f"{sample['score_overlap']:.2f}±0.05" in written

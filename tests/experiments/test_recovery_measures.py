@@ -121,8 +121,6 @@ def test_seconds_are_summed_over_a_failure_and_averaged_over_failures(tmp_path):
     }
     write_csv(path, pd.DataFrame(columns))
     assert mean_seconds([path]) == {"gpca": pytest.approx((4.0 + 3.5) / 2)}
-    with pytest.raises(InputError, match="no timing files were given"):
-        mean_seconds([])
 
 
 def test_faulty_files_are_refused(files, tmp_path):

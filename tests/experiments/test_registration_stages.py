@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from gpca.errors import InputError
-from gpca.experiments.registration_stages import Stages
+from gpca.experiments.registration_stages import Staged
 
 
 @pytest.fixture(scope="module")
 def stages(stage_files):
-    return Stages.load(*stage_files)
+    return Staged.load(*stage_files)
 
 
 def of_test(stages, concept):
@@ -20,7 +20,7 @@ def of_test(stages, concept):
 
 
 def test_the_sample_shown_failed_and_is_more_uncertain_than_clean_pairs(stages, stage_files, monkeypatch):
-    monkeypatch.setattr(Stages, "error", lambda self, row: 0.05 if self.registrations.sample[row] % 2 else 0.012)
+    monkeypatch.setattr(Staged, "error", lambda self, row: 0.05 if self.registrations.sample[row] % 2 else 0.012)
     failed = [r for r in of_test(stages, "pose").index if stages.error(r) > 0.03]
     uncertain = [r for r in failed if stages.u_S[r] > stages.u_clean]
     assert stages.u_clean == 1
@@ -33,7 +33,7 @@ def test_the_sample_shown_failed_and_is_more_uncertain_than_clean_pairs(stages, 
 
 def test_another_concept_is_shown_where_none_of_the_first_failed(stages, stage_files, monkeypatch):
     poses = set(of_test(stages, "pose").index)
-    monkeypatch.setattr(Stages, "error", lambda self, row: 0.05 if row in poses else 0.012)
+    monkeypatch.setattr(Staged, "error", lambda self, row: 0.05 if row in poses else 0.012)
     row = stages.choose("overlap", stage_files[0], "overlap", "noise", "pose")
     assert row == stages.choose("pose", stage_files[0])
     alone = stages.choose("overlap", stage_files[0])  # has none that failed, but some that are uncertain
@@ -42,7 +42,7 @@ def test_another_concept_is_shown_where_none_of_the_first_failed(stages, stage_f
 
 
 def test_where_none_is_uncertain_the_fit_is_a_poor_one(stages, stage_files, monkeypatch):
-    monkeypatch.setattr(Stages, "error", lambda self, row: 0.012)
+    monkeypatch.setattr(Staged, "error", lambda self, row: 0.012)
     stages = replace(stages, u_clean=9.0)
     row = stages.choose("pose", stage_files[0])
     test = of_test(stages, "pose")
@@ -59,9 +59,9 @@ def sample_number(stages, row):
 
 def test_states_follow_the_limits_of_the_config(stage_files, monkeypatch):
     *files, _ = stage_files
-    monkeypatch.setattr(Stages, "error", lambda self, row: 0.012)
-    assert Stages.load(*files, {"nominal": 0.001, "failed": 0.01}).state(0) == "failed"
-    assert Stages.load(*files, {"nominal": 0.001, "failed": 0.02}).state(0) == "borderline"
+    monkeypatch.setattr(Staged, "error", lambda self, row: 0.012)
+    assert Staged.load(*files, {"nominal": 0.001, "failed": 0.01}).state(0) == "failed"
+    assert Staged.load(*files, {"nominal": 0.001, "failed": 0.02}).state(0) == "borderline"
 
 
 def test_uncertainties_of_other_samples_are_refused(stage_files, tmp_path):
@@ -70,7 +70,7 @@ def test_uncertainties_of_other_samples_are_refused(stage_files, tmp_path):
     with pytest.raises(
         InputError, match=r"seed0\.csv: its samples differ from those of the registrations; regenerate both"
     ):
-        Stages.load(*files, tmp_path / "seed0.csv", limits)
+        Staged.load(*files, tmp_path / "seed0.csv", limits)
 
 
 @pytest.mark.parametrize(
@@ -89,4 +89,4 @@ def test_predictions_that_do_not_fit_are_refused(stage_files, tmp_path, old, new
     assert old in text
     (tmp_path / "predictions.csv").write_text(text.replace(old, new))
     with pytest.raises(InputError, match=rf"predictions\.csv: .*({message})"):
-        Stages.load(registrations, embeddings, tmp_path / "predictions.csv", *others)
+        Staged.load(registrations, embeddings, tmp_path / "predictions.csv", *others)
