@@ -44,6 +44,17 @@ def require_names(
 
 
 @contextmanager
+def refusing(subject: object, fault: str, remedy: str) -> Iterator[None]:
+    """Raise an InputError for any other error, whose message takes the place of ``{}`` in the fault."""
+    try:
+        yield
+    except InputError:
+        raise
+    except Exception as error:
+        raise InputError(subject, fault.replace("{}", str(error)), remedy) from error
+
+
+@contextmanager
 def one_line() -> Iterator[None]:
     """End the process with one line for an InputError or OSError."""
     try:

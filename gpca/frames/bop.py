@@ -8,14 +8,14 @@ named ``obj_000014_48_1002`` by its object, the scene, and the image with the nu
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from gpca.errors import InputError
+from gpca.errors import InputError, refusing
 from gpca.io.files import read_image
 from gpca.io.structured_text import finite_numbers, read_json
 from gpca.numerals import whole
@@ -39,10 +39,8 @@ def read_images(path: Path) -> dict[int, Any]:
     """Return the entries of scene_camera.json or scene_gt.json by image number; InputError for a faulty file."""
     images: dict[int, Any] = {}
     for key, entry in read_json(path, "a scene's JSON file", REMEDY).items():
-        try:
+        with refusing(path, f"its key {key[:40]!r} is not an image number", REMEDY):
             image = whole(key)
-        except ValueError as fault:
-            raise InputError(path, f"its key {key[:40]!r} is not an image number", REMEDY) from fault
         if image in images:
             raise InputError(path, f"image {image} occurs twice", "keep one of the two")
         images[image] = entry
@@ -57,10 +55,8 @@ def read_camera(entry: Any, subject: str) -> tuple[np.ndarray, float]:
         raise InputError(matrix_subject, "is not a camera matrix", "give fx s cx, 0 fy cy, 0 0 1, row by row")
     focal_px = np.diag(camera_3_3)[:2]
     if not ((focal_px >= FOCAL_PX[0]) & (focal_px <= FOCAL_PX[1])).all():
-        lengths = " and ".join(f"{length:.6g}" for length in focal_px)
-        raise InputError(
-            matrix_subject, f"has the focal lengths {lengths} px", "they must be positive; check fx and fy"
-        )
+        fault = f"has the focal lengths {focal_px[0]:.6g} and {focal_px[1]:.6g} px"
+        raise InputError(matrix_subject, fault, "they must be positive; check fx and fy")
     if abs(camera_3_3[:2]).max() > FOCAL_PX[1]:
         raise InputError(matrix_subject, "has a skew or principal point outside any image", "give them in pixels")
     (scale,) = _numbers(entry, "depth_scale", 1, subject)
@@ -153,10 +149,8 @@ def read_frames(folders: Iterable[Path], split: str = "test") -> list[Frame]:
         raise InputError(", ".join(map(str, folders)), fault, "check location or split")
     frames: dict[tuple[int, int], Frame] = {}
     for folder in (path.parent for path in scene_files):
-        try:
+        with refusing(folder, "the name of a scene's folder is not a number", "name it like 000001"):
             scene = whole(folder.name)
-        except ValueError as fault:
-            raise InputError(folder, "the name of a scene's folder is not a number", "name it like 000001") from fault
         cameras, truths = (read_images(folder / f"scene_{name}.json") for name in ("camera", "gt"))
         colors = folder / ("rgb" if (folder / "rgb").is_dir() else "gray")
         for image, truth in truths.items():
@@ -229,23 +223,21 @@ def _needed_image(folder: Path, stem: str) -> Path:
 
 
 def from_entry(entry: dict, folder: Path) -> Iterator[Surface]:
-    """Return the surfaces of an entry: keys `objects` (ids, default all) and `views_per_instance` (default 6)."""
+    """Yield some views of each object, spread over its frames; those with too few points are named on stderr.
+
+    Keys of the entry are `objects` (ids, default all) and `views_per_instance` (default 6).
+    """
     if meters_per(entry.get("unit") or "mm") != meters_per("mm"):
         raise InputError(f"unit '{entry['unit']}'", "is not that of BOP frames", "leave unit out")
-    return cut_out_views(folder, entry.get("objects"), entry.get("views_per_instance", VIEWS))
-
-
-def cut_out_views(folder: Path, objects: Sequence[int] | None = None, views: int = VIEWS) -> Iterator[Surface]:
-    """Yield up to `views` of each object, spread over its frames; those with too few points are named on stderr."""
     shown: dict[int, list] = {}
     for frame in read_frames([folder]):
         for place, annotation in enumerate(frame.annotations):
             shown.setdefault(annotation.object_id, []).append((frame, place))
-    wanted = sorted(shown) if not objects else sorted(objects)
+    wanted = sorted(entry.get("objects") or shown)
     if missing := [number for number in wanted if number not in shown]:
         raise InputError(folder, f"no frame shows object {missing[0]}", "check objects in the config")
     for number in wanted:
-        for frame, place in evenly(shown[number], views):
+        for frame, place in evenly(shown[number], entry.get("views_per_instance", VIEWS)):
             try:
                 points_m, _ = measured_points(frame, frame.annotations[place], frame.depth_m())
             except TooFewPoints as fault:

@@ -18,6 +18,7 @@ from gpca.objects.canonical import DRAWN, EVALUATION, TRAINING, ObjectClouds, Pl
 from gpca.objects.source import folders
 from gpca.objects.surface import Surface
 from gpca.process.environment import require_open3d
+from gpca.rigid import rigid_motion
 from gpca.seeds import generator
 
 
@@ -112,9 +113,8 @@ def models_of_ids(dataset: Dataset, ids: Iterable[int] | None = None) -> dict[in
     if unknown := [number for number in ids if not (folder / f"obj_{number:06d}.ply").is_file()]:
         raise InputError(f"{dataset.name}: object {unknown[0]}", f"has no model in {folder}", "fetch the models again")
     models = {}
-    for number, surface in zip(ids, bop.surfaces(folder, dataset.unit, ids), strict=True):
-        T_model_object = np.eye(4)
-        T_model_object[:3, 3] = bounding_center(surface)
+    for number, surface in zip(ids, bop.read_models(folder, dataset.unit, ids, info), strict=True):
+        T_model_object = rigid_motion(np.eye(3), bounding_center(surface))
         name = f"{dataset.name} {info[number].get('name', surface.name)}"
         centered = Surface(name, surface.vertices_m - T_model_object[:3, 3], surface.faces)
         models[number] = CenteredModel(centered, T_model_object, bop.read_symmetries(info, number))

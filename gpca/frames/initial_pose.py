@@ -15,7 +15,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from gpca.errors import InputError
+from gpca.errors import InputError, refusing
 from gpca.io.csv_file import ANY, numbers, read_csv
 from gpca.numerals import decimal, whole
 from gpca.pairs.perturbation import HalfTurn, Shift
@@ -47,13 +47,10 @@ def read_bop_results(
     scored_poses: dict[tuple[int, int, int], list[tuple[float, np.ndarray]]] = {}
     ratios = []
     for line, row in enumerate(rows.to_dict("records"), start=2):
-        subject = f"{path}: line {line}"
-        key = []
+        subject, key = f"{path}: line {line}", []
         for column in ("scene_id", "im_id", "obj_id"):
-            try:
+            with refusing(subject, f"{column} is {row[column][:40]!r}, not a whole number", REMEDY):
                 key.append(whole(row[column].strip()))
-            except ValueError as fault:
-                raise InputError(subject, f"{column} is {row[column][:40]!r}, not a whole number", REMEDY) from fault
         scene, image, number = key
         if (scene, image) not in distances_m:
             raise InputError(subject, f"the dataset has no image {image} of scene {scene}", "check results or split")
@@ -61,21 +58,17 @@ def read_bop_results(
             raise InputError(subject, f"the dataset has no object {number}", "check results, or fetch the models again")
         entries = {}
         for column, count in (("score", 1), ("R", 9), ("t", 3)):
-            try:
+            with refusing(subject, f"{column} contains values that are not finite numbers: {{}}", REMEDY):
                 entries[column] = np.array([decimal(text) for text in row[column].replace(",", " ").split()])
-            except ValueError as fault:
-                message = f"{column} contains values that are not finite numbers: {fault}"
-                raise InputError(subject, message, REMEDY) from fault
-            if len(entries[column]) != count:
-                message = f"{column} has {len(entries[column])} entries, not {count}"
-                raise InputError(subject, message, "separate them by spaces")
+            if (found := len(entries[column])) != count:
+                raise InputError(subject, f"{column} has {found} entries, not {count}", "separate them by spaces")
             if not (abs(entries[column]) < 1e100).all():  # no norm of these overflows
                 raise InputError(subject, f"{column} contains a number that is out of bounds", REMEDY)
         pose = rigid_motion(entries["R"].reshape(3, 3), entries["t"] / 1000)
         require_rotation(pose, subject)
         if pose[2, 3] <= 0:
-            message = f"t has z = {1e3 * pose[2, 3]:.6g} mm, not in front of the camera"
-            raise InputError(subject, message, "leave out failed estimates")
+            fault = f"t has z = {1e3 * pose[2, 3]:.6g} mm, not in front of the camera"
+            raise InputError(subject, fault, "leave out failed estimates")
         if annotated := distances_m[scene, image]:
             ratios.append(float(np.linalg.norm(pose[:3, 3]) / np.median(annotated)))
             _require_unit(subject, ratios[-1], ONE_OFF)
@@ -232,10 +225,10 @@ class GlobalRegistration:
         best, best_share = np.eye(4), -1.0
         for number in range(self._settings.tries):
             o3d.utility.random.seed((seed + number) % 2**31)
-            clouds = (source, model, source_features, model_features)
-            by_points, criteria = registration.TransformationEstimationPointToPoint(), (4000, 0.999)
             coarse = registration.registration_ransac_based_on_feature_matching(
-                *clouds, False, reach_m, by_points, 3, checkers, registration.RANSACConvergenceCriteria(*criteria)
+                *(source, model, source_features, model_features, False, reach_m),
+                *(registration.TransformationEstimationPointToPoint(), 3, checkers),
+                registration.RANSACConvergenceCriteria(4000, 0.999),
             )
             to_planes = registration.TransformationEstimationPointToPlane()
             stop = registration.ICPConvergenceCriteria(max_iteration=20)

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from gpca.errors import InputError
+from gpca.errors import InputError, refusing
 from gpca.io.files import require_file
 from gpca.io.structured_text import finite_numbers, read_json
 from gpca.numerals import whole
@@ -26,37 +26,31 @@ DIAMETER_TOLERANCE = 0.05
 
 def from_entry(entry: dict, folder: Path) -> Iterator[Surface]:
     """Return surfaces of a configured source: keys `objects` (ids, default all) and `unit` (default mm)."""
-    return surfaces(folder, entry.get("unit") or "mm", entry.get("objects"))
-
-
-def surfaces(folder: str | Path, unit: str = "mm", objects: Sequence[int] | None = None) -> Iterator[Surface]:
-    """Yield the models `objects` (ids; all when None), sorted and named ``obj_000001``.
-
-    The folder holds obj_*.ply itself, or models/ with them. InputError also where a diameter is not the listed one.
-    """
-    models = models_folder(Path(folder))
-    scale = meters_per(unit)
-    info = read_models_info(models / "models_info.json")
-    listed_mm = {number: model["diameter"] for number, model in info.items()}
-    ids = list(objects or ())
-    if objects is None:
+    models = models_folder(folder)
+    ids = list(entry.get("objects") or ())
+    if not ids:
         for path in models.glob("obj_[0-9]*.ply"):
-            try:
+            with refusing(path, "is not named obj_{number}.ply", "name it like obj_000001.ply"):
                 ids.append(whole(path.stem.removeprefix("obj_")))
-            except ValueError as error:
-                raise InputError(path, "is not named obj_{number}.ply", "name it like obj_000001.ply") from error
-    ids.sort()
+    info = read_models_info(models / "models_info.json")
+    return read_models(models, entry.get("unit") or "mm", sorted(ids), info)
+
+
+def read_models(models: Path, unit: str, ids: Sequence[int], info: Mapping[int, dict]) -> Iterator[Surface]:
+    """Yield the models of these objects, named ``obj_000001``; InputError where a diameter is not the listed one."""
     require_models(models, ids)
-    if unlisted := [number for number in ids if number not in listed_mm]:
+    if unlisted := [number for number in ids if number not in info]:
         raise InputError(models / "models_info.json", f"lists no object {unlisted[0]}", "fetch the models again")
     for number in ids:
-        path = _model(models, number)
-        surface = read_surface(path, scale)
+        path, listed_mm = _model(models, number), info[number]["diameter"]
+        surface = read_surface(path, meters_per(unit))
         measured_mm = 1e3 * diameter(surface.vertices_m, path)
-        if abs(measured_mm - listed_mm[number]) > DIAMETER_TOLERANCE * listed_mm[number]:
-            fault = f"its diameter is {measured_mm:.4g} mm in unit {unit}, but models_info.json lists"
+        if abs(measured_mm - listed_mm) > DIAMETER_TOLERANCE * listed_mm:
+            fault = (
+                f"its diameter is {measured_mm:.4g} mm in unit {unit}, but models_info.json lists {listed_mm:.4g} mm"
+            )
             remedy = "check unit in the config (BOP models are in mm), or fetch the models again"
-            raise InputError(path, f"{fault} {listed_mm[number]:.4g} mm", remedy)
+            raise InputError(path, fault, remedy)
         yield surface
 
 
@@ -125,25 +119,21 @@ def require_symmetries(listed: Mapping[str, Any], subject: str) -> None:
     ``symmetries_discrete`` are matrices of 16 numbers, row by row; ``symmetries_continuous`` have an ``axis`` and an
     ``offset`` of 3 numbers each, in millimeters.
     """
-    for n, matrix in enumerate(_entries(listed, "symmetries_discrete", subject)):
+    for key in ("symmetries_discrete", "symmetries_continuous"):
+        if not isinstance(listed.get(key, []), list):
+            raise InputError(f"{subject}, {key}", "is not a list", "list the symmetries, or leave the key out")
+    for n, matrix in enumerate(listed.get("symmetries_discrete", ())):
         place = f"{subject}, symmetries_discrete {n}"
         T = finite_numbers(matrix, 16, place, "it", REMEDY).reshape(4, 4)
         R = T[:3, :3]
         if not (np.allclose(R @ R.T, np.eye(3), atol=1e-3) and np.linalg.det(R) > 0 and (T[3] == (0, 0, 0, 1)).all()):
             raise InputError(place, "is not a rotation and a shift", "give a rigid transform, row by row")
-    for n, turn in enumerate(_entries(listed, "symmetries_continuous", subject)):
+    for n, turn in enumerate(listed.get("symmetries_continuous", ())):
         place = f"{subject}, symmetries_continuous {n}"
         axis, offset = (turn.get(key) if isinstance(turn, Mapping) else None for key in ("axis", "offset"))
         if not np.linalg.norm(finite_numbers(axis, 3, place, "axis", REMEDY)) > 0:
             raise InputError(place, "axis has no direction", "give the axis of revolution, such as 0 0 1")
         finite_numbers(offset, 3, place, "offset", REMEDY)
-
-
-def _entries(listed: Mapping[str, Any], key: str, subject: str) -> list:
-    entries = listed.get(key, [])
-    if not isinstance(entries, list):
-        raise InputError(f"{subject}, {key}", "is not a list", "list the symmetries, or leave the key out")
-    return entries
 
 
 def find_symmetries(points_N_3: np.ndarray, diameter: float) -> dict[str, list]:

@@ -7,13 +7,13 @@ mesh, without a word; so files of text are first checked to hold what they decla
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import IO
 
 import numpy as np
 
-from gpca.errors import InputError
+from gpca.errors import InputError, refusing
 from gpca.io.files import require_file
 from gpca.numerals import decimal
 from gpca.objects.canonical import require_points
@@ -25,13 +25,8 @@ METERS_PER_UNIT = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 
 def from_entry(entry: dict, folder: Path) -> Iterator[Surface]:
     """Return surfaces of a configured source: keys `files` (patterns, default all meshes of the folder) and `unit`."""
-    return surfaces(files_in(folder, entry.get("files"), SUFFIXES), entry.get("unit"))
-
-
-def surfaces(paths: Iterable[Path], unit: str | None) -> Iterator[Surface]:
-    """Yield one surface per file, named by the file's stem."""
-    scale = meters_per(unit)
-    return (read_surface(path, scale) for path in paths)
+    scale = meters_per(entry.get("unit"))
+    return (read_surface(path, scale) for path in files_in(folder, entry.get("files"), SUFFIXES))
 
 
 def meters_per(unit: str | None) -> float:
@@ -46,25 +41,19 @@ def files_in(folder: str | Path, patterns: Sequence[str] | None, suffixes: Seque
 
     InputError for no such folder, an empty one, a pattern without a match, a match of another format.
     """
-    folder = Path(folder)
-    formats = ", ".join(suffixes)
+    folder, formats = Path(folder), ", ".join(suffixes)
     if not folder.is_dir():
         raise InputError(folder, "no such folder", "check location and data_dir in the config")
-    if patterns is None:
-        files = {path for path in folder.iterdir() if path.name.lower().endswith(tuple(suffixes))}
-        if not files:
-            raise InputError(folder, f"the folder has none of {formats}", "check location, or set files")
-        return sorted(files)
-    files = set()
-    for pattern in patterns:
-        matches = {path for path in folder.glob(pattern) if path.is_file()}
-        if not matches:
-            raise InputError(folder / pattern, "no file matches", "check files in the config")
-        files |= matches
-    for path in sorted(files):
-        if not path.name.lower().endswith(tuple(suffixes)):
-            raise InputError(path, "has an unsupported format", f"let files match {formats} only")
-    return sorted(files)
+    matches = {pattern: {path for path in folder.glob(pattern) if path.is_file()} for pattern in patterns or ()}
+    if none := [pattern for pattern, files in matches.items() if not files]:
+        raise InputError(folder / none[0], "no file matches", "check files in the config")
+    found = sorted(folder.iterdir() if patterns is None else set().union(*matches.values()))
+    files = [path for path in found if path.name.lower().endswith(tuple(suffixes))]
+    if patterns is not None and (others := [path for path in found if path not in files]):
+        raise InputError(others[0], "has an unsupported format", f"let files match {formats} only")
+    if not files:
+        raise InputError(folder, f"the folder has none of {formats}", "check location, or set files")
+    return files
 
 
 def read_surface(path: Path, scale: float) -> Surface:
@@ -75,10 +64,10 @@ def read_surface(path: Path, scale: float) -> Surface:
     """
     remedy, suffix = "fetch or export it again", path.suffix.lower()
     require_file(path, "no such file", remedy)
-    try:
-        if check := CHECKS.get(suffix):
-            with path.open("rb") as file:
-                check(file)
+    # A malformed file makes the parsers raise nearly anything.
+    with refusing(path, f"is truncated or not a readable {path.suffix} file ({{}})", remedy):
+        with path.open("rb") as file:
+            CHECKS[suffix](file)
         import trimesh
 
         # Unprocessed: processing would drop NaN vertices and merge others in silence.
@@ -95,10 +84,6 @@ def read_surface(path: Path, scale: float) -> Surface:
                         raise ValueError(f"lists of element {name} differ in length")
                     if field.encode() in CORNERS and (lengths < 3).any():
                         raise ValueError(f"element {name} has rows of {lengths[0]} corners")
-    except InputError:
-        raise
-    except Exception as fault:  # a malformed file makes the parsers raise nearly anything
-        raise InputError(path, f"is truncated or not a readable {path.suffix} file ({fault})", remedy) from fault
     vertices = np.asarray(getattr(loaded, "vertices", np.zeros((0, 3))), dtype=np.float64)
     faces = np.asarray(getattr(loaded, "faces", np.zeros((0, 3))), dtype=np.int64)
     require_points(vertices, path)

@@ -13,15 +13,15 @@ import io
 import struct
 import warnings
 import zipfile
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing
+from collections.abc import Callable, Iterator
+from contextlib import closing, suppress
 from importlib import import_module
 from itertools import groupby
 from pathlib import Path, PurePosixPath
 
 import numpy as np
 
-from gpca.errors import InputError
+from gpca.errors import InputError, refusing
 from gpca.io.files import require_file, require_memory
 from gpca.numerals import whole
 from gpca.objects.canonical import require_points
@@ -115,22 +115,20 @@ def _lzf_decompress(data: bytes, size: int) -> bytearray:
     """
     out, i = bytearray(), 0
     while i < len(data) and len(out) <= size:
-        control = data[i]
-        i += 1
-        if control < 32:
-            out += data[i : i + control + 1]
-            i += control + 1
+        length, offset = data[i] >> 5, (data[i] & 31) << 8
+        if length == 0:
+            out += data[i + 1 : i + offset // 256 + 2]
+            i += offset // 256 + 2
             continue
-        length = control >> 5
         if length == 7:
-            length += data[i]
             i += 1
-        start = len(out) - ((control & 31) << 8) - data[i] - 1
-        i += 1
+            length += data[i]
+        start = len(out) - offset - data[i + 1] - 1
         if start < 0:
             raise ValueError("its compressed data is damaged")
         earlier = out[start : start + length + 2]
         out += (earlier * ((length + 2) // len(earlier) + 1))[: length + 2]
+        i += 2
     return out
 
 
@@ -144,7 +142,8 @@ COLUMNS_REMEDY = "export it as three columns x, y, z"
 
 def _numpy_file(path: Path) -> np.ndarray:
     """Read an npy, or the array of points of an npz: by its name, or the only one."""
-    try:
+    # numpy and zipfile raise errors of many kinds for a damaged file.
+    with refusing(path, f"is not a readable {path.suffix} file ({{}})", "save it again"):
         if path.suffix.lower() == ".npz":
             with zipfile.ZipFile(path) as members:
                 size = sum(info.file_size for info in members.infolist())
@@ -160,10 +159,6 @@ def _numpy_file(path: Path) -> np.ndarray:
                     fault = f"holds several arrays ({several}), none of them named 'points'"
                     raise InputError(path, fault, "rename one")
                 array = archive[names[0]]
-    except InputError:
-        raise
-    except Exception as fault:  # numpy and zipfile raise errors of many kinds for a damaged file
-        raise InputError(path, f"is not a readable {path.suffix} file ({fault})", "save it again") from fault
     if array.dtype.names:
         if not set(AXES) <= set(array.dtype.names):
             raise InputError(path, f"has the fields {', '.join(array.dtype.names[:8])}, not x, y, z", COLUMNS_REMEDY)
@@ -191,45 +186,37 @@ def _text(path: Path) -> np.ndarray:
         raise InputError(path, "has no points", COLUMNS_REMEDY)
     separator = next((sign for sign in SEPARATORS if sign in lines[0]), None)
     words = [word.strip().strip('"').lower() for word in lines[0].split(separator)]
-    are_numbers = [_is_number(word) for word in words]
-    columns: tuple[int, ...] = (0, 1, 2)
-    if not any(are_numbers):
+    names_columns, columns = not any(map(_is_number, words)), (0, 1, 2)
+    if names_columns:
         if not set(AXES) <= set(words):
             raise InputError(path, f"has the columns {', '.join(words[:8])}, not x, y, z", COLUMNS_REMEDY)
-        columns = tuple(words.index(axis) for axis in AXES)
-    is_head = not any(are_numbers) or (len(words) == 1 and len(lines) > 1)
+        columns = tuple(map(words.index, AXES))
+    is_head = names_columns or (len(words) == 1 and len(lines) > 1)
     if not is_head and len(words) < 3:
         raise InputError(path, f"has {len(words)} columns", COLUMNS_REMEDY)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)  # of a table without rows
-            text = io.StringIO("\n".join(lines[is_head:]))
-            table = np.loadtxt(text, np.float64, delimiter=separator, ndmin=2, usecols=columns, comments=None)
-    except (ValueError, IndexError) as fault:
-        raise InputError(path, f"is no table of numbers ({fault})", COLUMNS_REMEDY) from fault
+    with warnings.catch_warnings(), refusing(path, "is no table of numbers ({})", COLUMNS_REMEDY):
+        warnings.simplefilter("ignore", UserWarning)  # of a table without rows
+        text = io.StringIO("\n".join(lines[is_head:]))
+        table = np.loadtxt(text, np.float64, delimiter=separator, ndmin=2, usecols=columns, comments=None)
     if table.shape[1] != 3 or not len(table):
         raise InputError(path, "has no points", COLUMNS_REMEDY)
     return table
 
 
 def _is_number(word: str) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True
+    with suppress(ValueError):
+        return float(word) is not None
+    return False
 
 
 def _kitti(path: Path) -> np.ndarray:
-    remedy = "give a scan of KITTI, or save it as npy"
+    rows, remedy = "rows of 4 float32 (x, y, z, intensity)", "give a scan of KITTI, or save it as npy"
     if path.stat().st_size % (4 * KITTI_COLUMNS):
-        fault = f"has {path.stat().st_size} bytes, which are no rows of 4 float32 (x, y, z, intensity)"
-        raise InputError(path, fault, remedy)
+        raise InputError(path, f"has {path.stat().st_size} bytes, which are no {rows}", remedy)
     points = np.fromfile(path, "<f4").reshape(-1, KITTI_COLUMNS)[:, :3].astype(np.float64)
     with np.errstate(invalid="ignore"):
         if not (np.abs(points) <= FARTHEST_KITTI).all():
-            fault = "holds no rows of 4 float32 (x, y, z, intensity) in meters, as scans of KITTI do"
-            raise InputError(path, fault, remedy)
+            raise InputError(path, f"holds no {rows} in meters, as scans of KITTI do", remedy)
     return points
 
 
@@ -265,13 +252,9 @@ def read_scanner_file(path: Path) -> np.ndarray:
         if name == "laspy":
             return np.asarray(module.read(path).xyz, np.float64)
         with closing(module.E57(str(path))) as file:
-            if not file.scan_count:
-                raise InputError(path, "holds no scan", "export it again")
             scans = [file.read_scan(number, ignore_missing_fields=True) for number in range(file.scan_count)]
         axes = [[scan[f"cartesian{axis}"] for axis in "XYZ"] for scan in scans]
         return np.concatenate([np.stack(xyz, axis=1) for xyz in axes]).astype(np.float64)
-    except InputError:
-        raise
     except Exception as fault:  # of many kinds, some from C++
         remedy = INSTALL[name] if "LazBackend" in str(fault) else "export it again, or as PLY"
         raise InputError(path, f"cannot be read ({fault})", remedy) from fault
@@ -282,22 +265,17 @@ READS_ARCHIVES = True  # only a few of the 600 views in a tar are read, so nothi
 
 
 def from_entry(entry: dict, place: Path) -> Iterator[Surface]:
-    """Return surfaces of a configured source: keys `files`, `unit` (default m), `views_per_instance` (default 6)."""
-    paths = [place] if place.is_file() else files_in(place, entry.get("files"), SUFFIXES)
-    return surfaces(paths, entry.get("unit", "m"), entry.get("views_per_instance", 6))
+    """Yield views of each instance in PCD files and tars of them, spread evenly in the order of sequence and frame.
 
-
-def surfaces(paths: Sequence[Path], unit: str = "m", views_per_instance: int = 6) -> Iterator[Surface]:
-    """Yield views of each instance of PCD files and tars of them, spread evenly in the order of sequence and frame.
-
-    `views_per_instance` is the most of one tar or of the single files. InputError for a damaged file, or a tar without
-    PCD.
+    Keys of the entry are `files`, `unit` (default m) and `views_per_instance` (default 6): the most of one tar, or of
+    the single files. InputError for a damaged file, or a tar without PCD.
     """
-    scale = meters_per(unit)
+    paths = [place] if place.is_file() else files_in(place, entry.get("files"), SUFFIXES)
+    scale, most = meters_per(entry.get("unit", "m")), entry.get("views_per_instance", 6)
     single = [path for path in paths if path.suffix.lower() == ".pcd"]
     for path in single:
         require_file(path, "no such file", "check files in the config")
-    yield from _chosen([(path.stem, path.read_bytes, str(path)) for path in single], scale, views_per_instance)
+    yield from _chosen([(path.stem, path.read_bytes, str(path)) for path in single], scale, most)
     for path in (path for path in paths if path not in single):
         with open_archive(path) as members:
             views = [
@@ -307,14 +285,12 @@ def surfaces(paths: Sequence[Path], unit: str = "m", views_per_instance: int = 6
             ]
             if not views:
                 raise InputError(path, "the archive has no .pcd file", "check url or files in the config")
-            yield from _chosen(views, scale, views_per_instance)
+            yield from _chosen(views, scale, most)
 
 
-def _chosen(
-    views: list[tuple[str, Callable[[], bytes], str]], scale: float, views_per_instance: int
-) -> Iterator[Surface]:
-    """Yield the chosen of views, each a name, what reads its bytes, and a subject for messages."""
+def _chosen(views: list[tuple[str, Callable[[], bytes], str]], scale: float, most: int) -> Iterator[Surface]:
+    """Yield some views of each instance: a view is a name, what reads its bytes, and a subject for messages."""
     views = sorted(views, key=lambda view: view_order(view[0]))
     for _, group in groupby(views, key=lambda view: instance_of(view[0])):
-        for name, read, subject in evenly(list(group), views_per_instance):
+        for name, read, subject in evenly(list(group), most):
             yield Surface(name, parse_pcd(read(), subject) * scale, None)

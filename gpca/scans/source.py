@@ -16,7 +16,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from gpca.errors import InputError
+from gpca.errors import InputError, refusing
 from gpca.io.arrays import REAL, load_arrays
 from gpca.io.csv_file import ANY, numbers, read_csv
 from gpca.io.files import require_file
@@ -92,11 +92,9 @@ def npz_scenes(entry: ScanEntry, place: Path) -> Iterator[ScannedScene]:
     listed = _read_pairs(files[0].parent / PAIRS)
     for path in files:
         require_file(path, "no such file", "correct location", np.inf)
-        try:
-            with zipfile.ZipFile(path) as archive:
-                members = [name.removesuffix(".npy") for name in archive.namelist()]
-        except Exception as fault:  # zipfile raises errors of many kinds for a damaged archive
-            raise InputError(path, "is not a readable npz archive", "fetch it again") from fault
+        # zipfile raises errors of many kinds for a damaged archive.
+        with refusing(path, "is not a readable npz archive", "fetch it again"), zipfile.ZipFile(path) as archive:
+            members = [name.removesuffix(".npy") for name in archive.namelist()]
         poses = next((name for name in NPZ_POSES if name in members), None)
         if poses is None:
             raise InputError(path, f"has neither {' nor '.join(NPZ_POSES)}", NPZ_REMEDY)
@@ -164,10 +162,8 @@ def read_poses(path: Path) -> dict[str, np.ndarray]:
         if Path(name).name != name or name in poses:
             fault = f"'{name}' is no name of a file beside it, or stands there twice"
             raise InputError(subject, fault, POSES_REMEDY)
-        try:
+        with refusing(subject, "{}", POSES_REMEDY):
             poses[name] = np.array([decimal(word) for word in words]).reshape(4, 4)
-        except ValueError as fault:
-            raise InputError(subject, str(fault), POSES_REMEDY) from fault
         require_rigid(poses[name], subject)
     if not poses:
         raise InputError(path, "has no poses", POSES_REMEDY)
@@ -188,10 +184,10 @@ BENCHMARK_REMEDY = "fetch the benchmark again"
 def benchmark_scenes(entry: ScanEntry, place: Path) -> Iterator[ScannedScene]:
     """Yield the scene of each folder with fragments, by name; InputError for a faulty one."""
     folder = place / "fragments" if (place / "fragments").is_dir() else place
-    found = sorted({path.parent for path in folder.glob("*/cloud_bin_*.ply")})
-    if not found:
+    scene_folders = sorted({path.parent for path in folder.glob("*/cloud_bin_*.ply")})
+    if not scene_folders:
         raise InputError(folder, "has no <scene>/cloud_bin_<number>.ply", "correct location")
-    for scene_folder in found:
+    for scene_folder in scene_folders:
         evaluation = f"{scene_folder.name}-evaluation"
         folders = (scene_folder, scene_folder.with_name(evaluation), place / "gt_result" / evaluation)
         log = next((path for path in (folder / "gt.log" for folder in folders) if path.is_file()), None)
@@ -217,13 +213,11 @@ def read_log(path: Path) -> dict[tuple[str, str], np.ndarray]:
     poses = {}
     for start in range(0, len(lines), LINES_OF_PAIR):
         (head, *rows), subject = lines[start : start + LINES_OF_PAIR], f"{path}, pair {start // LINES_OF_PAIR + 1}"
-        try:
-            if len(head) != 3 or any(len(row) != 4 for row in rows):
-                raise ValueError("it has not 3 numbers and then 4 in each of 4 lines")
+        if len(head) != 3 or any(len(row) != 4 for row in rows):
+            raise InputError(subject, "it has not 3 numbers and then 4 in each of 4 lines", BENCHMARK_REMEDY)
+        with refusing(subject, "{}", BENCHMARK_REMEDY):
             target, source = (str(whole(word)) for word in head[:2])
             T_target_source = np.array([[decimal(word) for word in row] for row in rows])
-        except ValueError as fault:
-            raise InputError(subject, str(fault), BENCHMARK_REMEDY) from fault
         require_rigid(T_target_source, subject)
         if (target, source) in poses or target == source:
             raise InputError(subject, f"pairs {target} with {source} once more, or with itself", BENCHMARK_REMEDY)
@@ -235,14 +229,12 @@ def _read_overlaps(path: Path) -> dict[tuple[str, str], float]:
     """Return the overlap of each pair in a file; none where there is no file."""
     shares = {}
     for subject, words in _lines_of(path) if path.is_file() else ():
-        try:
+        with refusing(subject, "{}", BENCHMARK_REMEDY):
             if len(words) != 3:
                 raise ValueError(f"has {len(words)} numbers instead of target, source and overlap")
             target, source, share = str(whole(words[0])), str(whole(words[1])), decimal(words[2])
             if not 0 <= share <= 1:
                 raise ValueError(f"the overlap {share:g} is no share")
-        except ValueError as fault:
-            raise InputError(subject, str(fault), BENCHMARK_REMEDY) from fault
         shares[target, source] = share
     return shares
 

@@ -24,7 +24,7 @@ from .tiny import surfaces as meshes
 
 def test_a_view_of_a_frame_is_what_was_measured_of_the_object(scenes, tiny):
     instances, objects = tiny
-    found = list(bop.cut_out_views(scenes, views=100))
+    found = list(bop.from_entry({"views_per_instance": 100}, scenes))
     assert len(found) == len(instances)
     assert len({view.name for view in found}) == len(found)
     assert {instance_of(view.name) for view in found} == {f"obj_{number:06d}" for number in range(1, 6)}
@@ -42,9 +42,9 @@ def test_views_are_few_and_of_the_objects_that_are_wanted(scenes):
     assert len(found) == 2 and all(name.startswith("obj_000002_") for name in found)
     assert evenly([1, 2, 3, 4], 2) == [1, 3] and evenly([1, 2], 9) == [1, 2]
     with pytest.raises(InputError, match="no frame shows object 77; check objects"):
-        list(bop.cut_out_views(scenes, [77]))
+        list(bop.from_entry({"objects": [77]}, scenes))
     with pytest.raises(InputError, match="unit 'm': is not that of BOP frames"):
-        bop.from_entry({"unit": "m"}, scenes)
+        list(bop.from_entry({"unit": "m"}, scenes))
 
 
 def test_a_view_with_next_to_no_points_is_left_out_and_named(scenes, tmp_path, capsys):
@@ -56,7 +56,9 @@ def test_a_view_with_next_to_no_points_is_left_out_and_named(scenes, tmp_path, c
     from PIL import Image
 
     Image.fromarray(np.zeros_like(np.asarray(Image.open(mask)))).save(mask)
-    whole, fewer = (len(list(bop.cut_out_views(folder, views=99))) for folder in (scenes, tmp_path / "tiny"))
+    whole, fewer = (
+        len(list(bop.from_entry({"views_per_instance": 99}, folder))) for folder in (scenes, tmp_path / "tiny")
+    )
     assert fewer == whole - 1
     assert f"skipped: {mask}" in capsys.readouterr().err
 

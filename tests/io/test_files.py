@@ -18,7 +18,7 @@ from gpca.model.file import Model
 from gpca.objects import point_files
 from gpca.objects.bop import read_models_info
 from gpca.objects.downloads import open_archive
-from gpca.objects.mesh_folder import files_in, surfaces
+from gpca.objects.mesh_folder import read_surface
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -85,8 +85,8 @@ READERS = {
     "mine.yaml": read_mapping,
     "pose.txt": read_pose,
     "data.zip": lambda path: next(iter(open_archive(path).__enter__())),
-    "view.pcd": lambda path: next(point_files.surfaces(files_in(path.parent, None, point_files.SUFFIXES))),
-    "part.obj": lambda path: next(surfaces(files_in(path.parent, None, (".obj",)), "m")),
+    "view.pcd": lambda path: next(point_files.from_entry({}, path.parent)),
+    "part.obj": lambda path: read_surface(path, 1.0),
     **{f"cloud.{suffix}": lambda path: read_points(path, "m") for suffix in ("ply", "pcd", "obj", "stl", "off")},
 }
 everywhere = pytest.mark.parametrize("name", READERS)

@@ -13,7 +13,6 @@ from gpca.objects.bop import (
     find_symmetries,
     from_entry,
     read_symmetries,
-    surfaces,
     symmetric_turn,
 )
 from gpca.objects.canonical import canonical_cloud
@@ -38,14 +37,14 @@ def folder(tmp_path):
 
 
 def test_all_models_in_metres(folder):
-    found = list(surfaces(folder))
+    found = list(from_entry({}, folder))
     assert [surface.name for surface in found] == ["obj_000001", "obj_000002", "obj_000010"]
     assert np.ptp(found[0].vertices_m, axis=0) == pytest.approx([0.031, 0.04, 0.12])
 
 
 def test_folder_of_the_models_or_above_an_unpacked_set(folder):
     for place in (folder / "models", folder.parent):
-        assert len(list(surfaces(place))) == 3
+        assert len(list(from_entry({}, place))) == 3
 
 
 def test_listed_objects_only(folder):
@@ -58,7 +57,7 @@ def test_listed_objects_only(folder):
 def test_unit_is_checked_against_the_listed_diameter(folder):
     for unit in ("m", "cm"):
         with pytest.raises(InputError, match=rf"obj_000001\.ply: .* in unit {unit}, .*check unit"):
-            list(surfaces(folder, unit))
+            list(from_entry({"unit": unit}, folder))
 
 
 @pytest.mark.parametrize(("factor", "passes"), [(1.04, True), (1.06, False), (0.94, False)])
@@ -68,10 +67,10 @@ def test_tolerance_of_the_diameter(folder, factor, passes):
     info["2"]["diameter"] *= factor
     path.write_text(json.dumps(info))
     if passes:
-        assert len(list(surfaces(folder))) == 3
+        assert len(list(from_entry({}, folder))) == 3
     else:
         with pytest.raises(InputError, match="obj_000002"):
-            list(surfaces(folder))
+            list(from_entry({}, folder))
 
 
 @pytest.mark.parametrize(
@@ -91,21 +90,21 @@ def test_bad_models_info(folder, content):
     path = folder / "models" / "models_info.json"
     path.unlink() if content is None else path.write_text(content)
     with pytest.raises(InputError, match=r"models_info\.json"):
-        list(surfaces(folder))
+        list(from_entry({}, folder))
 
 
 @pytest.mark.parametrize("name", ["obj_1_0.ply", "obj_1٣.ply", "obj_000001_old.ply"])
 def test_a_model_without_a_plain_number_in_its_name(folder, name):
     (folder / "models" / name).write_bytes((folder / "models/obj_000001.ply").read_bytes())
     with pytest.raises(InputError, match=rf"{name}: is not named obj_\{{number\}}\.ply; name it like"):
-        list(surfaces(folder))
+        list(from_entry({}, folder))
 
 
 def test_missing_and_empty_folder(tmp_path):
     with pytest.raises(InputError, match="nowhere: no such folder"):
-        list(surfaces(tmp_path / "nowhere"))
+        list(from_entry({}, tmp_path / "nowhere"))
     with pytest.raises(InputError, match="has no models"):
-        list(surfaces(tmp_path))
+        list(from_entry({}, tmp_path))
 
 
 create = trimesh.creation

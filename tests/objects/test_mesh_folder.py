@@ -8,7 +8,7 @@ import pytest
 import trimesh
 
 from gpca.errors import InputError
-from gpca.objects.mesh_folder import SUFFIXES, files_in, from_entry, meters_per, surfaces
+from gpca.objects.mesh_folder import SUFFIXES, files_in, from_entry, meters_per, read_surface
 
 from ..hostile import refusal
 
@@ -46,7 +46,7 @@ KINDS = ("binary.ply", "ascii.ply", "quads.ply", "plain.obj", "binary.stl", "asc
 
 
 def read(path, unit="mm"):
-    return next(surfaces([path], unit))
+    return read_surface(path, meters_per(unit))
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -321,8 +321,6 @@ def test_more_text_than_can_be_parsed_is_not_read(name, tmp_path):
 
 
 def test_the_same_files_unspoilt_are_read(tmp_path):
-    from gpca.objects.mesh_folder import files_in, surfaces
-
     for name, content in {"ball.ply": ply(), "ball.off": off(), "ball.obj": obj()}.items():
         (tmp_path / name).write_text(content)
     (tmp_path / "back.obj").write_text(obj(faces=BALL.faces - 162))
@@ -332,5 +330,5 @@ def test_the_same_files_unspoilt_are_read(tmp_path):
     (tmp_path / "two_solids.stl").write_text(stl_text() + "\n" + stl_text().replace("solid", "solid other"))
     (tmp_path / "binary.ply").write_bytes(binary(lambda content, start: None))
     (tmp_path / "binary.stl").write_bytes(stl(lambda content: None))
-    for surface in surfaces(files_in(tmp_path, None, (".ply", ".obj", ".off", ".stl")), "mm"):
+    for surface in from_entry({"unit": "mm"}, tmp_path):
         np.testing.assert_allclose(np.ptp(surface.vertices_m, axis=0), 0.1, atol=1e-6)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gpca.errors import InputError
-from gpca.objects.point_files import from_entry, parse_pcd, read_scanner_file, read_table, surfaces
+from gpca.objects.point_files import from_entry, parse_pcd, read_scanner_file, read_table
 
 # The layout of the UW dataset.
 HEADER = """# .PCD v.7 - Point Cloud Data file format
@@ -267,7 +267,7 @@ def mug_tar(tmp_path):
 
 
 def test_views_are_spread_evenly_over_sequences_and_frames(mug_tar):
-    found = list(surfaces([mug_tar]))
+    found = list(from_entry({}, mug_tar))
     assert [surface.name for surface in found] == [
         f"coffee_mug_1_{sequence}_{frame}" for sequence in (1, 2, 4) for frame in (1, 11)
     ]
@@ -289,9 +289,9 @@ def test_single_files_tars_and_instances_together(tmp_path, mug_tar):
 def test_faults_name_the_tar_and_its_member(tmp_path):
     wrong = write_tar(tmp_path / "wrong.tar", {"a/mug_1_1_1.pcd": view(1).replace(b"FIELDS", b"FEILDS")})
     with pytest.raises(InputError, match=r"wrong\.tar, member a/mug_1_1_1\.pcd: .*FIELDS"):
-        list(surfaces([wrong]))
+        list(from_entry({}, wrong))
     with pytest.raises(InputError, match=r"empty\.tar: the archive has no \.pcd"):
-        list(surfaces([write_tar(tmp_path / "empty.tar", {"readme.txt": b""})]))
+        list(from_entry({}, write_tar(tmp_path / "empty.tar", {"readme.txt": b""})))
 
 
 @pytest.mark.parametrize("kept", [0.1, 0.5, 0.8])
@@ -299,7 +299,7 @@ def test_truncated_tar(mug_tar, kept):
     content = mug_tar.read_bytes()
     mug_tar.write_bytes(content[: int(kept * len(content))])
     with pytest.raises(InputError, match=r"coffee_mug_1\.tar: is a truncated"):
-        list(surfaces([mug_tar]))
+        list(from_entry({}, mug_tar))
 
 
 def test_missing_and_empty_folder(tmp_path):
