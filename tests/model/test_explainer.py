@@ -106,42 +106,46 @@ def test_many_are_explained_as_one_by_one_and_a_fault_names_its_pair(explainer, 
         list(explainer.explain_many([(source, target), (source[:10], target)], diagnose=False))
 
 
+FAR = "initial pose: puts the source .* diameters .* translation in m"
+SPREAD = UncertaintySettings()
+
+
 def moved(x):
     T = np.eye(4)
     T[0, 3] = x
     return T
 
 
-def changed(**changes):
-    return lambda source, target: {"source_points": source, "target_points": target} | changes
-
-
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda s, t: changed(source_points=s[:10])(s, t), "source: has 10 points; give 64"),
-        (lambda s, t: changed(target_points=t[:10])(s, t), "target: has 10 points"),
-        (lambda s, t: changed(source_points=s * np.nan)(s, t), "source: .*contain NaN"),
-        (lambda s, t: changed(source_points=s[:, :2])(s, t), "source: has the shape .*, not \\(N, 3\\)"),
-        (lambda s, t: changed(source_points=s.T)(s, t), "source: has the shape .* transpose it"),
-        (changed(target_points="cloud.ply"), "target: is a str, not a cloud of points"),
-        (lambda s, t: changed(source_points=10 * s)(s, t), "source: is .* times as large as the target; give both"),
-        (lambda s, t: changed(source_points=s / 10)(s, t), "source: is 0.* times as large as the target"),
-        (changed(unit="mm"), "target: its diameter is"),
-        (changed(unit="feet"), "unit 'feet'"),
-        (changed(T_target_source_init=2 * np.eye(4)), "initial pose: the pose is not a rigid transform"),
-        (changed(T_target_source_init=moved(1e16)), "initial pose: the pose has a translation of 1e\\+16"),
-        (changed(T_target_source_init=moved(1e15)), "initial pose: puts the source .* diameters .* translation in m"),
-        (changed(T_target_source_init=moved(200.0)), "initial pose: puts the source .* diameters .* translation in m"),
-        (lambda s, t: changed(source_points=(s + 1e6).astype(np.float32))(s, t), "source: at .* float32 has steps of"),
-        (lambda s, t: changed(target_points=(t + 1e6).astype(np.float32))(s, t), "target: at .* subtract an offset"),
-        (lambda s, t: changed(source_points=s + 1e15)(s, t), "source: at .* float64 has steps of"),
-        (changed(T_target_source_init=np.eye(3)), r"initial pose: the pose has shape \(3, 3\)"),
+        (lambda s, t: {"source_points": s[:10]}, "source: has 10 points; give 64"),
+        (lambda s, t: {"target_points": t[:10]}, "target: has 10 points"),
+        (lambda s, t: {"source_points": s * np.nan}, "source: .*contain NaN"),
+        (lambda s, t: {"source_points": s[:, :2]}, "source: has the shape .*, not \\(N, 3\\)"),
+        (lambda s, t: {"source_points": s.T}, "source: has the shape .* transpose it"),
+        (lambda s, t: {"target_points": "cloud.ply"}, "target: is a str, not a cloud of points"),
+        (lambda s, t: {"source_points": 10 * s}, "source: is .* times as large as the target; give both"),
+        (lambda s, t: {"source_points": s / 10}, "source: is 0.* times as large as the target"),
+        (lambda s, t: {"unit": "mm"}, "target: its diameter is"),
+        (lambda s, t: {"unit": "feet"}, "unit 'feet'"),
+        (lambda s, t: {"T_target_source_init": 2 * np.eye(4)}, "initial pose: the pose is not a rigid transform"),
+        (lambda s, t: {"T_target_source_init": moved(1e16)}, "initial pose: the pose has a translation of 1e\\+16"),
+        (lambda s, t: {"T_target_source_init": moved(1e15)}, FAR),
+        (lambda s, t: {"T_target_source_init": moved(200.0)}, FAR),
+        (lambda s, t: {"source_points": (s + 1e6).astype(np.float32)}, "source: at .* float32 has steps of"),
+        (lambda s, t: {"target_points": (t + 1e6).astype(np.float32)}, "target: at .* subtract an offset"),
+        (lambda s, t: {"source_points": s + 1e15}, "source: at .* float64 has steps of"),
+        (lambda s, t: {"T_target_source_init": np.eye(3)}, r"initial pose: the pose has shape \(3, 3\)"),
+        (lambda s, t: {"method": "icp"}, "registration method 'icp': unknown"),
+        (lambda s, t: {"method": ""}, "registration method '': unknown"),
+        (lambda s, t: {"uncertainty": SPREAD, "estimator": "gauss"}, "estimator 'gauss': unknown"),
+        (lambda s, t: {"uncertainty": SPREAD, "estimator": "cello"}, "'cello': learns from registrations"),
     ],
 )
 def test_bad_input_is_one_line(explainer, pair, change, message):
     with pytest.raises(InputError, match=message):
-        explainer.explain(**change(*pair))
+        explainer.explain(**dict(zip(("source_points", "target_points"), pair, strict=True)) | change(*pair))
 
 
 def test_the_package_offers_the_explainer_without_loading_it():
@@ -185,20 +189,6 @@ def test_a_failed_registration_is_noted(explainer, pair):
     assert lost.notes[0].startswith("point_to_plane failed: no source point has a target point within 0.1 diameters")
     assert any("so the scores are meaningless" in warning for warning in lost.warnings)
     assert lost.fitness == 0
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"method": "icp"}, "registration method 'icp': unknown"),
-        ({"method": ""}, "registration method '': unknown"),
-        ({"uncertainty": UncertaintySettings(), "estimator": "gauss"}, "estimator 'gauss': unknown"),
-        ({"uncertainty": UncertaintySettings(), "estimator": "cello"}, "'cello': learns from registrations"),
-    ],
-)
-def test_a_method_that_cannot_be_asked_is_refused(explainer, pair, arguments, message):
-    with pytest.raises(InputError, match=message):
-        explainer.explain(*pair, **arguments)
 
 
 def test_the_spread_of_the_pose_is_measured_where_it_is_asked_for(explainer, pair):

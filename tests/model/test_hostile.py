@@ -6,7 +6,6 @@ import zipfile
 import numpy as np
 import pytest
 import torch
-import trimesh
 
 from gpca.errors import InputError
 from gpca.model.file import Model
@@ -33,11 +32,7 @@ def put(path, value):
 
 
 def drop(path):
-    def spoil(content):
-        inner, last = part(content, path)
-        del inner[last]
-
-    return spoil
+    return lambda content: part(content, path)[0].pop(path.rpartition("/")[2])
 
 
 def spoil(path, change):
@@ -232,9 +227,7 @@ def test_a_file_that_is_no_model_is_refused(fault, folder):
 
 
 def flip(content, position):
-    changed = bytearray(content)
-    changed[position] ^= 1 << (position % 8)
-    return bytes(changed)
+    return content[:position] + bytes([content[position] ^ 1 << (position % 8)]) + content[position + 1 :]
 
 
 @pytest.mark.parametrize("share", [0.05, 0.5, 0.95])
@@ -279,10 +272,6 @@ def test_a_flipped_bit_anywhere_is_found_or_harmless(saved, tmp_path):
 POINTS = np.random.default_rng(0).normal(size=(200, 3)) * 30
 
 
-def cloud(points):
-    return lambda path: trimesh.PointCloud(points).export(path)
-
-
 def ascii_cloud(rows, properties="xyz"):
     head = "\n".join(
         ["ply", "format ascii 1.0", f"element vertex {len(rows)}", *(f"property float {p}" for p in properties)]
@@ -299,14 +288,11 @@ def pcd(rows):
 CLOUDS = {
     "empty.ply": ascii_cloud([]),
     "nothing.ply": lambda path: path.touch(),
-    "one.ply": cloud(POINTS[:1]),
-    "few.ply": cloud(POINTS[:63]),
     "nan.ply": ascii_cloud([*POINTS[1:], ("nan", 0, 0)]),
     "two.ply": ascii_cloud(POINTS[:, :2], "xy"),
     "wide.ply": ascii_cloud([(1051, *row) for row in POINTS]),
     "same.ply": ascii_cloud([(1, 2, 3)] * 200),
     "huge.ply": ascii_cloud(POINTS * 1e30),
-    "metres.ply": cloud(POINTS / 1000),
     "giant.ply": lambda path: path.open("wb").truncate(5 * 10**9),
     "device.ply": lambda path: path.symlink_to("/dev/zero"),
     "folder.ply": lambda path: path.mkdir(),
@@ -335,12 +321,8 @@ def test_points_that_cannot_be_explained_are_refused(name, role, folder):
 
 POSES = {
     "empty": "",
-    "short": "1 0 0 0",
     "words": "one " * 16,
-    "nan": "nan " * 16,
     "mirrored": "-1 0 0 0  0 1 0 0  0 0 1 0  0 0 0 1",
-    "scaled": "2 0 0 0  0 2 0 0  0 0 2 0  0 0 0 1",
-    "last row": "1 0 0 0  0 1 0 0  0 0 1 0  0 0 0 2",
     "giant": "0 " * 10**6,
 }
 

@@ -31,12 +31,9 @@ def test_what_is_no_queue_or_of_another_model_is_refused(explained, registration
     registrations.save(tmp_path / "registrations.npz")
     assert not is_queue(tmp_path / "registrations.npz")
     assert not is_queue(tmp_path / "lost.npz")
+    clouds = explained.scene.aligned, explained.scene.target
     with pytest.raises(InputError, match=r"registrations.npz: is not a queue; name another file with --queue"):
-        add_to_queue(
-            tmp_path / "registrations.npz", explained.scene.aligned, explained.scene.target, np.zeros((1, 4)), "a to b"
-        )
-    add_to_queue(tmp_path / "queued.npz", explained.scene.aligned, explained.scene.target, np.zeros((1, 4)), "a to b")
+        add_to_queue(tmp_path / "registrations.npz", *clouds, np.zeros((1, 4)), "a to b")
+    add_to_queue(tmp_path / "queued.npz", *clouds, np.zeros((1, 4)), "a to b")
     with pytest.raises(InputError, match=r"queued.npz: is a queue of another model"):
-        add_to_queue(
-            tmp_path / "queued.npz", explained.scene.aligned, explained.scene.target, np.zeros((1, 5)), "a to b"
-        )
+        add_to_queue(tmp_path / "queued.npz", *clouds, np.zeros((1, 5)), "a to b")

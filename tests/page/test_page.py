@@ -13,8 +13,6 @@ from gpca.process.processor import describe
 from tests.page.small_run import FIGURES, TABLES, Page, results, run_of
 from tests.page.test_comparison import HEAD, LINES
 
-# --- the HTML ---
-
 
 def test_every_link_leads_to_a_file_or_a_place_on_the_page(page, folder):
     assert page.stack == []
@@ -23,14 +21,8 @@ def test_every_link_leads_to_a_file_or_a_place_on_the_page(page, folder):
     assert [link for link in local if link.startswith("#") and link[1:] not in page.ids] == []
     assert [link for link in local if not link.startswith("#") and not (folder / link).is_file()] == []
     assert [source for source in page.sources if not (folder / source).is_file()] == []
-
-
-def test_nothing_is_loaded_from_elsewhere(page):
-    assert re.findall(r"(?:https?:)?//[\w-]+\.[\w.-]+", page.text) == []
-
-
-def test_ids_are_there_once(page):
     assert len(set(page.ids)) == len(page.ids)
+    assert re.findall(r"(?:https?:)?//[\w-]+\.[\w.-]+", page.text) == []  # nothing is loaded from elsewhere
 
 
 def test_every_table_and_figure_is_shown_with_its_caption_in_the_papers_order(page):
@@ -75,12 +67,9 @@ def test_the_comparison_comes_with_its_verdicts_counted_and_named(page):
         assert re.search(rf'<span class="verdict[^"]*">{verdict}</span>', page.text)
 
 
-def test_stand_ins_are_labeled_and_real_objects_are_not(page):
+def test_stand_ins_are_labeled_and_real_objects_are_not(page, copied):
     assert 'Bricks &lt;b&gt; <span class="badge">procedural stand-in</span>' in page.text
     assert "<li>Cones</li>" in page.text
-
-
-def test_a_run_on_real_objects_has_no_notice(copied):
     folder, _ = copied
     sources = {name: {"title": name, "stand_in": False} for name in ("bricks", "cones")}
     write_page(folder, run_of(folder, sources=sources))
@@ -92,9 +81,6 @@ def test_what_comes_from_files_cannot_become_markup(page):
     assert "Accuracy (%) of &lt;GP-CA&gt; &amp; co., by <code>gpca</code>" in page.text
     assert "alert(1)</script>" not in page.text.replace("&lt;", "<").split("<pre>")[0]
     assert "&lt;/script&gt;&lt;script&gt;alert(1)" in page.text
-
-
-def test_the_samples_are_plain_json(page):
     [text] = re.findall(r'<script type="application/json" id="samples">(.*)</script>', page.text)
     samples = json.loads(text)
     assert [sample["concept"] for sample in samples] == ["noise"] * 2 + ["pose"] * 2 + ["overlap"] * 2
@@ -155,9 +141,6 @@ def test_records_of_provenance_are_counted(tmp_path):
     assert device.endswith(", a GPU")
 
 
-# --- what is refused ---
-
-
 def test_an_incomplete_folder_names_all_that_is_missing_and_the_command(copied):
     folder, run = copied
     for name in ("tables/table4_mine.md", "figures/reliability.pdf", "predictions/bricks/gpca/seed0.csv"):
@@ -196,14 +179,8 @@ def test_a_fault_in_a_caption_is_named(copied, caption):
 
 def printed(*labels):
     rows = [[*([label, False] for label in row), ["97.7", True]] for row in labels]
-    heads = ["Dataset", "Explainer", "Reads"][: len(labels[0])]
-    return {
-        "caption": "",
-        "heads": [*heads, "Accuracy (%)"],
-        "label_columns": len(heads),
-        "rows": rows,
-        "footnotes": [],
-    }
+    heads = ["Dataset", "Explainer"][: len(labels[0])]
+    return {"heads": [*heads, "Accuracy (%)"], "label_columns": len(heads), "rows": rows}
 
 
 def test_the_dataset_of_many_rows_stands_above_them_once():

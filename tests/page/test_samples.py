@@ -101,7 +101,7 @@ def test_scores_and_deviations_are_those_of_the_predictions(samples, files):
             assert score["deviation"] == pytest.approx(np.sqrt(row[f"variance_{score['concept']}"]), abs=5.1e-4)
 
 
-def test_an_abstention_has_no_scores(registrations, files):
+def test_an_abstention_has_no_scores_and_predictions_of_other_samples_are_refused(files):
     rows = pd.read_csv(files["predictions"], dtype=str, keep_default_na=False)
     rows["abstained"], rows["concept_predicted"] = "True", ""
     rows[[f"score_{c}" for c in CONCEPTS]] = ""
@@ -109,6 +109,9 @@ def test_an_abstention_has_no_scores(registrations, files):
     shown = page_samples(files, SOURCE, LIMITS, REACH)
     assert {sample["predicted"] for sample in shown} == {""}
     assert {score["mean"] for sample in shown for score in sample["scores"]} == {None}
+    rows[rows["split"] == "train"].to_csv(files["predictions"], index=False)
+    with pytest.raises(InputError, match=r"seed0\.csv: lacks test sample \d+ of .*; regenerate both"):
+        page_samples(files, SOURCE, LIMITS, REACH)
 
 
 def test_the_words_say_what_was_done(registrations):
@@ -116,13 +119,6 @@ def test_the_words_say_what_was_done(registrations):
     assert words["noise"].startswith("σ = ")
     assert words["pose"].startswith("turned by ")
     assert words["overlap"].endswith(" % of the points cut off")
-
-
-def test_predictions_of_other_samples_are_refused(files):
-    rows = pd.read_csv(files["predictions"], dtype=str)
-    rows[rows["split"] == "train"].to_csv(files["predictions"], index=False)
-    with pytest.raises(InputError, match=r"seed0\.csv: lacks test sample \d+ of .*; regenerate both"):
-        page_samples(files, SOURCE, LIMITS, REACH)
 
 
 def test_the_page_says_how_far_off_icp_ends(samples, registrations):

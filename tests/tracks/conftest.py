@@ -14,6 +14,7 @@ from gpca.tracks.shipping import collect
 from gpca.tracks.track import TRACKS
 
 from ..config.configs import load
+from ..documents import block
 
 SOURCE, SEED = "four", 100
 
@@ -59,3 +60,11 @@ def published(shipped, tmp_path, monkeypatch):
     monkeypatch.setattr(module, "FOLDER", tmp_path / "published")
     shipped.save(tmp_path / "published/causes.npz")
     return Published.load(TRACKS["causes"])
+
+
+@pytest.fixture
+def method(tmp_path, monkeypatch, apart):
+    """The method of docs/outside.md, in a file of its own."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "my_method.py").write_text(block("my_method.py", page="docs/outside.md"))
+    return "my_method.py"

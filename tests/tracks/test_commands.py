@@ -10,16 +10,7 @@ from gpca.process import plugins
 from gpca.tracks import leaderboard
 from gpca.tracks.leaderboard import MARK
 
-from ..documents import block
 from .conftest import SOURCE
-
-
-@pytest.fixture
-def method(tmp_path, monkeypatch, apart):
-    """The method of docs/outside.md, in a file of its own."""
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "my_method.py").write_text(block("my_method.py", page="docs/outside.md"))
-    return "my_method.py"
 
 
 def test_a_method_in_a_file_stands_among_the_published_rows(method, published, run, tmp_path, capsys):

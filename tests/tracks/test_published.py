@@ -48,7 +48,7 @@ def test_the_file_is_read_as_it_was_written_and_the_same_contents_are_the_same_b
     assert (tmp_path / "first.npz").read_bytes() == (tmp_path / "second.npz").read_bytes()
 
 
-def test_a_file_that_is_missing_or_says_what_no_track_asks_is_refused(shipped, tmp_path):
+def test_a_file_that_is_missing_or_says_what_no_track_asks_is_refused(shipped, tmp_path, monkeypatch):
     with pytest.raises(InputError, match="no such file, in which the published rows are; restore it, or make it"):
         Published.load(TRACKS["causes"], tmp_path / "causes.npz")
     wrong = replace(shipped.methods[0], named=np.full(len(shipped.rows), 4))
@@ -57,10 +57,7 @@ def test_a_file_that_is_missing_or_says_what_no_track_asks_is_refused(shipped, t
         Published.load(TRACKS["causes"], tmp_path / "causes.npz")
     with pytest.raises(InputError, match="track 'clouds': unknown; choose one of causes, hard, frames, scans"):
         track_of("clouds")
-
-
-def test_a_package_without_its_repository_is_refused(monkeypatch, tmp_path):
-    monkeypatch.setattr(module, "DATA", tmp_path / "data")
+    monkeypatch.setattr(module, "DATA", tmp_path / "data")  # of a package without its repository
     with pytest.raises(InputError, match=r"track hard: needs the data and the published .* 'pip install -e'"):
         Published.load(TRACKS["hard"])
 

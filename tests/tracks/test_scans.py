@@ -32,7 +32,6 @@ from gpca.tracks.shipping import collect
 from gpca.tracks.track import TRACKS
 
 from ..config.configs import load
-from ..documents import block
 from ..steps.test_guarantee import write_measurements
 from .conftest import knowing_scores
 
@@ -89,13 +88,6 @@ def published(shipped, tmp_path, monkeypatch):
     monkeypatch.setattr(module, "FOLDER", tmp_path / "published")
     shipped.save(tmp_path / "published/scans.npz")
     return Published.load(TRACK)
-
-
-@pytest.fixture
-def method(tmp_path, monkeypatch, apart):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "my_method.py").write_text(block("my_method.py", page="docs/outside.md"))
-    return "my_method.py"
 
 
 @pytest.fixture
