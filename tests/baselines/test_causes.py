@@ -90,7 +90,10 @@ def test_what_is_untrained_says_what_the_re_enactment_says_and_a_committee_on_it
     assert np.array_equal(said.scores_N_C, again.scores_N_C)
 
 
-def test_one_label_is_nothing_to_learn(seen):
+def test_one_label_is_nothing_to_learn_but_for_an_alarm(seen):
+    explainer = explainer_entry("alarm_entropies", CAUSES).make("four", 100)
+    explainer.fit(seen.subset(np.flatnonzero(seen.concept != NOMINAL)))
+    assert (explainer.explain(seen).scores_N_C[:, 0] == 0).all()
     alike = seen.subset(np.flatnonzero(seen.concept == NOMINAL))
     for name in ("gpca_multilabel", "pair_forest", "concept_vectors"):
         with pytest.raises(InputError, match="fewer than two"):
@@ -151,12 +154,6 @@ def test_who_learns_tells_the_failed_from_the_nominal_and_names_no_cause(name, t
     assert alarm[failed].mean() > alarm[~failed].mean() + 0.3
     assert said.abstained_N.all() and said.scores_N_C.sum(axis=1) == pytest.approx(1)
     assert np.ptp(said.scores_N_C[:, 1:], axis=1).max() == 0
-
-
-def test_where_all_failed_that_is_the_answer_for_all(told):
-    explainer = explainer_entry("alarm_entropies", CAUSES).make("four", 100)
-    explainer.fit(told.subset(np.flatnonzero(told.concept != NOMINAL)))
-    assert (explainer.explain(told).scores_N_C[:, 0] == 0).all()
 
 
 @pytest.mark.parametrize("gate", ["gate_censi", "gate_brossard"])

@@ -54,12 +54,6 @@ def test_a_concept_absent_from_training_keeps_its_column(name, embedded):
     assert scores.sum(axis=1) == pytest.approx(1)
 
 
-def test_more_neighbors_than_training_samples_are_refused(embedded):
-    learner = learners.Nearest("tiny", 0, neighbours=len(embedded.rows("train")) + 1)
-    with pytest.raises(InputError, match="learner_nearest: 37 neighbors are too many for 36 training samples"):
-        learner.fit(embedded.subset(embedded.rows("train")))
-
-
 @pytest.mark.parametrize("name", EXPLAINERS)
 def test_scale_and_offset_of_the_embedding_do_not_matter_and_a_constant_one_gives_finite_scores(name, embedded):
     embeddings = (embedded.embedding, 50 + 1000 * embedded.embedding, np.ones((len(embedded), 12)))
@@ -100,8 +94,10 @@ def test_fewer_than_two_concepts_are_a_fault_and_a_missing_embedding_is_named(na
 
 
 @pytest.mark.parametrize("name", ["learner_linear_svm", "learner_rbf_svm"])
-def test_few_samples_of_a_concept_are_enough_for_an_svm_but_not_one(name, embedded):
+def test_few_samples_of_a_concept_are_enough_for_an_svm_but_not_one_nor_fewer_than_neighbors(name, embedded):
     train, few = embedded.rows("train"), []
+    with pytest.raises(InputError, match="learner_nearest: 37 neighbors are too many for 36 training samples"):
+        explained("learner_nearest", embedded, settings={"learner_nearest": {"neighbours": len(train) + 1}})
     for concept in CONCEPTS:
         few += train[embedded.concept[train] == concept][:3].tolist()
     assert np.isfinite(explained(name, embedded, np.array(few)).scores_N_C).all()
@@ -169,7 +165,9 @@ def test_an_ensemble_has_a_draw_per_member_and_dropout_one_per_pass():
     assert direct(Dropout("a", 0, passes=7, hidden=8), H[:5]).shape == (7, 5, 3)
 
 
-def test_laplace_draws_have_the_covariance_of_the_linearised_last_layer():
+def test_laplace_draws_have_the_covariance_of_the_linearised_last_layer_and_are_uncertain_far_away():
+    drawn = direct(LastLayerLaplace("a", 0, hidden=16), np.concatenate([H, 20 * H]))
+    assert drawn[:, 60:].std(axis=0).min() > drawn[:, :60].std(axis=0).mean()
     laplace = LastLayerLaplace("a", 0, draws=5000, hidden=6)
     drawn_M_N_C = direct(laplace, H[:4])
     covariance = (laplace._vectors * laplace._deviations**2) @ laplace._vectors.T
@@ -179,8 +177,3 @@ def test_laplace_draws_have_the_covariance_of_the_linearised_last_layer():
         expected = jacobian_C_P @ covariance @ jacobian_C_P.T
         assert np.cov(drawn_M_N_C[:, n].T) == pytest.approx(expected, rel=0.1, abs=0.05 * expected.max())
     assert drawn_M_N_C.mean(axis=0) == pytest.approx(features @ laplace._weights_F_C, abs=0.1)
-
-
-def test_laplace_is_less_certain_far_from_the_training_samples():
-    drawn = direct(LastLayerLaplace("a", 0, hidden=16), np.concatenate([H, 20 * H]))
-    assert drawn[:, 60:].std(axis=0).min() > drawn[:, :60].std(axis=0).mean()

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.stats import chi2
 
 from gpca.attribution.predictions import PREDICTION_COLUMNS
 from gpca.comparison.values import cluster_draws, folder_behind, folders_behind, measured_on, read_results, value_of_run
@@ -16,39 +17,35 @@ from gpca.evaluation.intervals import wilson_interval
 from .conftest import write
 from .made_up import ACCURACY, LABELS, TIME, compared, number, runtime, tidy
 
+CONCEPTS = ("noise", "pose", "overlap")
+TAKEN = replace(ACCURACY, metrics=("predicted_as_pose", "test_samples"), concept="overlap")
+
 
 def test_means_come_in_the_printed_unit_ratios_and_sources_are_taken_seed_by_seed():
     found = value_of_run(number(), {"metrics.csv": tidy([0.90, 0.92, 0.94])})
     assert (found.value, found.n) == (pytest.approx(92), 3)
     assert found.high - found.value == pytest.approx(4.30265 * 2 / np.sqrt(3), rel=1e-5)
     assert value_of_run(number(), {"metrics.csv": tidy([0.9, 0.99, 1.0])}).high == 100
-    rows = pd.concat(
-        [
-            tidy([20, 30], metric="predicted_as_pose", concept="overlap"),
-            tidy([100, 60], metric="test_samples", concept="overlap"),
-            tidy([1, 1], metric="test_samples"),
-        ]
-    )
-    counterpart = replace(ACCURACY, metrics=("predicted_as_pose", "test_samples"), concept="overlap")
-    assert value_of_run(number(counterpart=counterpart), {"metrics.csv": rows}).value == pytest.approx(35)
+    counts = {"predicted_as_pose": [20, 30], "test_samples": [100, 60]}
+    rows = [tidy(each, metric=metric, concept="overlap") for metric, each in counts.items()]
+    results = {"metrics.csv": pd.concat([*rows, tidy([1, 1], metric="test_samples")])}
+    assert value_of_run(number(counterpart=TAKEN), results).value == pytest.approx(35)
     rows = pd.concat([tidy([0.9, 0.9]), tidy([0.7, 0.5], source="linemod")])
     found = value_of_run(number(counterpart=replace(ACCURACY, sources=("ycb", "linemod"))), {"metrics.csv": rows})
-    assert found.value == pytest.approx(75)
-    assert found.n == 2
+    assert (found.value, found.n) == (pytest.approx(75), 2)
     assert value_of_run(number(counterpart=replace(ACCURACY, sources=("ycb", "cups"))), {"metrics.csv": rows}) is None
 
 
 def test_a_deviation_has_the_interval_of_its_chi_square():
-    from scipy.stats import chi2
-
-    values = np.array([0.80, 0.82, 0.84, 0.86, 0.88])
-    found = value_of_run(number(counterpart=replace(ACCURACY, statistic="deviation")), {"metrics.csv": tidy(values)})
+    values, deviation = (
+        np.array([0.80, 0.82, 0.84, 0.86, 0.88]),
+        number(counterpart=replace(ACCURACY, statistic="deviation")),
+    )
+    found = value_of_run(deviation, {"metrics.csv": tidy(values)})
     assert found.value == pytest.approx(100 * values.std(ddof=1))
     assert chi2.cdf(4 * (found.value / found.high) ** 2, 4) == pytest.approx(0.025)
     assert chi2.cdf(4 * (found.value / found.low) ** 2, 4) == pytest.approx(0.975)
-    assert (
-        value_of_run(number(counterpart=replace(ACCURACY, statistic="deviation")), {"metrics.csv": tidy([0.8])}) is None
-    )
+    assert value_of_run(deviation, {"metrics.csv": tidy([0.8])}) is None
 
 
 def test_labels_of_runs_that_missed_the_target_are_a_lower_bound():
@@ -88,10 +85,6 @@ def test_times_per_sample_name_the_processor_of_their_record(tmp_path):
     assert (row.verdict, row.hardware) == ("reproduced", "Some cores")
 
 
-CONCEPTS = ("noise", "pose", "overlap")
-TAKEN = replace(ACCURACY, metrics=("predicted_as_pose", "test_samples"), concept="overlap")
-
-
 def predictions(folder, right_of_object, seeds=5, sets=(), method="gpca_paper"):
     """Write, of every object, 20 samples of overlap in each seed, a share of them right and the rest called pose.
 
@@ -115,7 +108,6 @@ def predictions(folder, right_of_object, seeds=5, sets=(), method="gpca_paper"):
 
 
 def bounds_of(counterpart, files):
-    """Return the bounds of a share over clusters and seeds."""
     return cluster_draws([counterpart], files)[counterpart].bounds()
 
 

@@ -37,14 +37,11 @@ def twists(n=13, seed=0, scale=1.0):
     return np.random.default_rng(seed).normal(size=(n, 6)) * SETTINGS.deviation_6() * scale
 
 
-def test_equal_covariances_do_not_diverge():
+def test_equal_covariances_do_not_diverge_and_of_diagonal_ones_it_is_the_sum_over_the_axes():
     for seed in range(20):
         assert divergence(covariance(seed), covariance(seed), 1e-6) == pytest.approx(0, abs=1e-9)
     for nothing in (np.zeros((6, 6)), covariance(0, rank=2)):
         assert divergence(nothing, nothing, 1e-6) == pytest.approx(0, abs=1e-9)
-
-
-def test_of_diagonal_covariances_it_is_the_sum_over_the_axes():
     clean, other = np.array([1, 2, 3, 4, 5, 6.0]), np.array([2, 2, 1, 8, 5, 3.0])
     by_hand = 0.5 * sum(c / o - 1 - np.log(c / o) for c, o in zip(clean + 0.5, other + 0.5, strict=True))
     assert divergence(np.diag(clean), np.diag(other), 0.5) == pytest.approx(by_hand, rel=1e-12)
@@ -175,23 +172,17 @@ def test_the_residual_is_that_of_the_run_with_the_lowest_cost():
     assert result(made, source, target).icp_calls == 13
 
 
-def test_a_cloud_on_itself_converges_to_one_pose_and_has_a_finite_residual():
-    icp = BatchedICP(ON_ELLIPSOID, SETTINGS.icp)
-    made = run_from_starts(icp, ON_ELLIPSOID, np.eye(4), twists(scale=0.05))
-    result_ = result(made, ON_ELLIPSOID, ON_ELLIPSOID)
-    assert (made.fitness_n == 1).all()
-    assert result_.degenerate
-    assert result_.residual == pytest.approx(np.log(SMALLEST_RESIDUAL))
-    u = divergence(result_.covariance, covariance(0), SETTINGS.floor)
-    assert np.isfinite(result_.covariance).all() and np.isfinite(u)
-
-
-def test_a_target_out_of_reach_leaves_the_starts_spread_and_is_flagged():
-    target = ON_ELLIPSOID + np.array([30.0, 0.0, 0.0])
-    xi_n_6 = twists(50)
+@pytest.mark.parametrize(
+    ("away", "xi_n_6", "residual"),
+    [(0.0, twists(scale=0.05), np.log(SMALLEST_RESIDUAL)), (30.0, twists(50), np.log(30))],
+)
+def test_a_cloud_on_itself_ends_at_one_pose_and_one_out_of_reach_leaves_the_starts_spread(away, xi_n_6, residual):
+    target = ON_ELLIPSOID + np.array([away, 0.0, 0.0])
     made = run_from_starts(BatchedICP(target, SETTINGS.icp), ON_ELLIPSOID, np.eye(4), xi_n_6)
-    result_ = result(made, ON_ELLIPSOID, target)
-    assert result_.degenerate
-    assert np.allclose(result_.covariance, np.cov(xi_n_6.T), rtol=1e-9)
-    assert result_.residual == pytest.approx(np.log(30), abs=0.1)
-    assert np.isfinite(divergence(np.zeros((6, 6)), result_.covariance, SETTINGS.floor))
+    found = result(made, ON_ELLIPSOID, target)
+    assert found.degenerate
+    assert (made.fitness_n == (not away)).all()
+    assert np.allclose(found.covariance, np.cov(xi_n_6.T) if away else 0.0, rtol=1e-9)
+    assert found.residual == pytest.approx(residual, abs=0.1 if away else 1e-6)
+    assert np.isfinite(found.covariance).all()
+    assert np.isfinite(divergence(found.covariance, covariance(0), SETTINGS.floor))
