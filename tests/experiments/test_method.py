@@ -10,7 +10,7 @@ from gpca.causes.policy import NOTHING, QUEUE, RecoveryPolicy, Thresholds
 from gpca.declarations.plan import Run
 from gpca.errors import InputError
 from gpca.experiments.method import choose_samples, choose_view, decide, fig2_overview, fig3_concepts
-from gpca.experiments.registration_stages import Stages, severity_text, source_before_icp
+from gpca.experiments.registration_stages import Staged, severity_text, source_before_icp
 from gpca.io.arrays import save_arrays
 from gpca.objects.canonical import DRAWN
 from gpca.pairs.dataset import Registrations
@@ -171,7 +171,7 @@ def test_the_numbers_are_those_of_the_files_and_the_bytes_the_same_again(stage_f
 
     same_bytes(draw)
     written = words_of(draw())
-    stages = Stages.load(*stage_files)
+    stages = Staged.load(*stage_files)
     row = stages.choose("pose", stage_files[0])
     sample, of = stages.predictions.iloc[row], stages.registrations
     assert f"{sample['score_pose']:.2f}±0.12" in written
@@ -187,8 +187,8 @@ def test_the_numbers_are_those_of_the_files_and_the_bytes_the_same_again(stage_f
 
 
 def test_the_branch_follows_from_what_gpca_knows_and_not_from_the_true_error(stage_files, monkeypatch):
-    monkeypatch.setattr(Stages, "error", lambda self, row: 0.012)  # It did not fail, which GP-CA cannot know
-    stages = Stages.load(*stage_files)
+    monkeypatch.setattr(Staged, "error", lambda self, row: 0.012)  # It did not fail, which GP-CA cannot know
+    stages = Staged.load(*stage_files)
     row = stages.choose("pose", stage_files[0])
     policy = RecoveryPolicy(Thresholds(uncertain=1.0, dominant=0.4, improvement=0.3), TREATMENTS)
     assert decide(stages, row, policy).action == "reinitialize"
