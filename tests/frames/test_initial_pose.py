@@ -241,24 +241,11 @@ ROWS = {
 }
 
 
-@pytest.mark.parametrize("name", ROWS)
-def test_a_row_that_cannot_be(call, damaged, name):
-    change, words = ROWS[name]
-    refusal(call(change), damaged.parent, "results.csv", words, ";")
-
-
 HEADS = {
     "column missing": (HEAD.replace("score", "confidence"), "column 'score' is missing"),
     "column twice": (HEAD.replace("time", "t"), "column 't' appears twice"),
     "no head": ("1,0,1,1.0,1 0 0 0 1 0 0 0 1,0 0 700,-1", "column 'scene_id' is missing"),
 }
-
-
-@pytest.mark.parametrize("name", HEADS)
-def test_a_head_that_is_none(call, damaged, name):
-    head, words = HEADS[name]
-    refusal(call(head=head), damaged.parent, "results.csv", words, ";")
-
 
 FILES = {
     "empty": (b"", "is empty"),
@@ -270,10 +257,13 @@ FILES = {
 }
 
 
-@pytest.mark.parametrize("name", FILES)
-def test_a_file_that_is_no_results_file(call, damaged, name):
-    content, words = FILES[name]
-    refusal(call(content=content), damaged.parent, "results.csv", words, ";")
+@pytest.mark.parametrize(
+    ("part", "name"),
+    [(part, name) for part, of in (("change", ROWS), ("head", HEADS), ("content", FILES)) for name in of],
+)
+def test_a_results_file_that_cannot_be(call, damaged, part, name):
+    spoilt, words = {"change": ROWS, "head": HEADS, "content": FILES}[part][name]
+    refusal(call(**{part: spoilt}), damaged.parent, "results.csv", words, ";")
 
 
 def test_a_folder_in_place_of_results(call, damaged):

@@ -17,8 +17,15 @@ from tests.steps.by_words import main
 REGISTRATIONS = {"train": 9, "test": 6, "cloud_points": 128, "test_share": 0.4, "occluders": 1.0}
 
 
-def settings(**given):
-    return json.dumps(given)
+def drawn(folder, *words, **given):
+    """The status of the step ``scenes``, which draws two small ones into the folder."""
+    camera = {"width": 64, "height": 48, "focal_px": 60}
+    settings = json.dumps({"count": 2, "views": 1, "objects": [2, 2], "camera": camera} | given)
+    return main(["scenes", "--source", "virtual", "--settings", settings, "--out", str(folder / "drawn"), *words])
+
+
+def listed(folder):
+    return json.loads((folder / "models/models_info.json").read_text())
 
 
 @pytest.fixture
@@ -41,7 +48,7 @@ def test_a_dataset_becomes_registrations(read, capsys):
     assert set(instances.object_index) == set(range(5))
     sources = ("--instances", str(folder / "instances.npz"), "--objects", str(folder / "objects.npz"))
     outputs = [str(folder / name) for name in ("seed0.npz", "poses.csv", "timings.csv")]
-    step = ["frame_registrations", *sources, "--source", "tiny", "--seed", "0", "--settings", settings(**REGISTRATIONS)]
+    step = ["frame_registrations", *sources, "--source", "tiny", "--seed", "0", "--settings", json.dumps(REGISTRATIONS)]
     assert main([*step, "--registrations", outputs[0], "--poses", outputs[1], "--timings", outputs[2]]) == 0
     registrations, poses = Registrations.load(outputs[0]), pd.read_csv(outputs[1])
     assert (poses["sample"].to_numpy() == registrations.sample).all()
@@ -61,24 +68,17 @@ def test_scenes_are_drawn_by_a_command(tmp_path, monkeypatch):
     from .tiny import surfaces
 
     monkeypatch.setattr(procedural, "surfaces", lambda family: iter(surfaces()))
-    given = settings(
-        count=2, views=1, objects=[2, 2], camera={"width": 64, "height": 48, "focal_px": 60}, families=["ycb"]
-    )
-    assert main(["scenes", "--source", "tiny", "--settings", given, "--out", str(tmp_path / "drawn")]) == 0
+    assert drawn(tmp_path, families=["ycb"]) == 0
     assert len(list((tmp_path / "drawn/test/000000/mask_visib").iterdir())) == 2
 
 
 def test_scenes_are_drawn_of_the_models_of_datasets(scenes, tmp_path):
     """Encoders can be pretrained on them: every object that a frame shows, in the frame and the size that it has."""
-    camera = {"width": 64, "height": 48, "focal_px": 60}
     datasets = {name: {"location": str(scenes)} for name in ("tiny", "twin")}
-    given = settings(count=2, views=1, objects=[2, 2], camera=camera, datasets=datasets)
-    assert main(["scenes", "--source", "virtual", "--settings", given, "--out", str(tmp_path / "drawn")]) == 0
-    drawn, shown = (
-        json.loads((folder / "models/models_info.json").read_text()) for folder in (tmp_path / "drawn", scenes)
-    )
-    assert len(drawn) == len(shown)  # those of the twin are the same
-    assert [model["diameter"] for model in drawn.values()] == pytest.approx(
+    assert drawn(tmp_path, datasets=datasets) == 0
+    made, shown = (listed(folder) for folder in (tmp_path / "drawn", scenes))
+    assert len(made) == len(shown)  # those of the twin are the same
+    assert [model["diameter"] for model in made.values()] == pytest.approx(
         [model["diameter"] for model in shown.values()], rel=0.01
     )
     told = json.loads((tmp_path / "drawn/dataset_info.json").read_text())
@@ -96,17 +96,14 @@ def test_objects_that_are_tested_are_rendered_only_if_that_is_asked(scenes, tmp_
     splits = tmp_path / "scenes.csv"
     roles = {frame.scene: "evaluation" if frame.scene == tested else "development" for frame in dataset.frames()}
     splits.write_text("dataset,scene,role,fold\n" + "".join(f"set,{n},{role},0\n" for n, role in roles.items()))
-    camera = {"width": 64, "height": 48, "focal_px": 60}
     of_set = {"datasets": {"set": {"location": str(tmp_path / "set")}}, "rendered": "training"}
-    given = settings(count=2, views=1, objects=[2, 2], camera=camera, **of_set)
-    words = ["scenes", "--source", "virtual", "--settings", given, "--out", str(tmp_path / "drawn")]
-    assert main([*words, "--splits", str(splits)]) == 0
-    listed = json.loads((scenes / "models/models_info.json").read_text())
-    drawn = json.loads((tmp_path / "drawn/models/models_info.json").read_text())
-    untested_mm = [model["diameter"] for number, model in listed.items() if int(number) not in ids]
-    assert sorted(model["diameter"] for model in drawn.values()) == pytest.approx(sorted(untested_mm), rel=0.01)
+    assert drawn(tmp_path, "--splits", str(splits), **of_set) == 0
+    untested_mm = [model["diameter"] for number, model in listed(scenes).items() if int(number) not in ids]
+    assert sorted(model["diameter"] for model in listed(tmp_path / "drawn").values()) == pytest.approx(
+        sorted(untested_mm), rel=0.01
+    )
     shutil.rmtree(tmp_path / "drawn")
-    assert main(words) == 2  # without splits every scene may be tested
+    assert drawn(tmp_path, **of_set) == 2  # without splits every scene may be tested
     assert "no model of an object that is not tested can be rendered on a table" in capsys.readouterr().err
 
 
@@ -122,24 +119,19 @@ def test_models_that_cannot_stand_on_a_table_are_skipped(scenes, tmp_path, capsy
     told["2"]["diameter"] = 80.0  # of the cylinder's base
     described.write_text(json.dumps(told))
     datasets = {"tiny": {"location": str(tmp_path / "set")}}
-    camera = {"width": 64, "height": 48, "focal_px": 60}
-    given = settings(count=2, views=1, objects=[2, 2], camera=camera, datasets=datasets)
-    assert main(["scenes", "--source", "virtual", "--settings", given, "--out", str(tmp_path / "drawn")]) == 0
+    assert drawn(tmp_path, datasets=datasets) == 0
     told = capsys.readouterr().err
     assert "is a point cloud, but the virtual camera needs a mesh" in told
     assert "is flat and cannot be stood on a table" in told
-    drawn, shown = (
-        json.loads((folder / "models/models_info.json").read_text()) for folder in (tmp_path / "drawn", scenes)
-    )
-    assert len(drawn) == len(shown) - 2
+    made, shown = (listed(folder) for folder in (tmp_path / "drawn", scenes))
+    assert len(made) == len(shown) - 2
 
 
 def test_datasets_without_any_model_that_can_stand_are_refused(scenes, tmp_path, capsys):
     shutil.copytree(scenes, tmp_path / "set")
     for path in (tmp_path / "set/models").glob("*.ply"):
         trimesh.PointCloud(trimesh.load(path).sample(2000)).export(path)
-    given = settings(count=2, views=1, objects=[2, 2], datasets={"tiny": {"location": str(tmp_path / "set")}})
-    assert main(["scenes", "--source", "virtual", "--settings", given, "--out", str(tmp_path / "drawn")]) == 2
+    assert drawn(tmp_path, datasets={"tiny": {"location": str(tmp_path / "set")}}) == 2
     told = capsys.readouterr().err.splitlines()[-1]
     assert told == (
         "gpca scenes: real_world.datasets: no model of them can be rendered on a table; set real_world.virtual to "

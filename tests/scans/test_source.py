@@ -232,21 +232,6 @@ NPZ_FAULTS = [
 ]
 
 
-@pytest.mark.parametrize(("change", "message"), NPZ_FAULTS)
-def test_faults_of_npz(tmp_path, change, message):
-    write_npz(tmp_path / "floor.npz", change=change)
-    with pytest.raises(InputError, match=message):
-        list(npz_scenes(entry("npz"), tmp_path))
-
-
-def test_no_npz_and_no_archive(tmp_path):
-    with pytest.raises(InputError, match="the folder has no npz file; correct location"):
-        list(npz_scenes(entry("npz"), tmp_path))
-    (tmp_path / "floor.npz").write_text("not a zip")
-    with pytest.raises(InputError, match=r"floor.npz: is not a readable npz archive; fetch it again"):
-        list(npz_scenes(entry("npz"), tmp_path))
-
-
 def test_ply_folder(tmp_path):
     [read] = ply_scenes(entry("ply_folder", scenes="room"), write_folder(tmp_path / "floor"))
     assert (read.name, read.kind) == ("floor", "room")
@@ -270,21 +255,6 @@ PLY_FAULTS = [
 ]
 
 
-@pytest.mark.parametrize(("change", "message"), PLY_FAULTS)
-def test_faults_of_ply_folders(tmp_path, change, message):
-    poses = write_folder(tmp_path) / "poses.txt"
-    poses.write_text(change(poses.read_text()))
-    with pytest.raises(InputError, match=message):
-        list(ply_scenes(entry("ply_folder", scenes="room"), tmp_path))
-
-
-def test_a_ply_folder_says_what_it_is_and_has_poses(tmp_path):
-    with pytest.raises(InputError, match="Tiny: does not say what its scenes are; set scenes"):
-        list(ply_scenes(entry("ply_folder"), tmp_path))
-    with pytest.raises(InputError, match=r"poses.txt: no such file; give the poses of the scans"):
-        list(ply_scenes(entry("ply_folder", scenes="room"), tmp_path))
-
-
 @pytest.mark.parametrize("log", ["floor/gt.log", "floor-evaluation/gt.log"])
 def test_layout_of_3dmatch(tmp_path, log):
     [read] = benchmark_scenes(entry("threedmatch"), write_benchmark(tmp_path, log))
@@ -303,31 +273,50 @@ BENCHMARK_FAULTS = [
 ]
 
 
-@pytest.mark.parametrize(("change", "message"), BENCHMARK_FAULTS)
-def test_faults_of_the_benchmark(tmp_path, change, message):
-    log = write_benchmark(tmp_path) / "floor-evaluation/gt.log"
-    log.write_text(change(log.read_text()))
-    with pytest.raises(InputError, match=message):
-        list(benchmark_scenes(entry("threedmatch"), tmp_path))
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("0,1\n", "gt_overlap.log, line 1: has 2 numbers instead of target, source and overlap"),
-        ("0,1,1.5\n", "gt_overlap.log, line 1: the overlap 1.5 is no share"),
-        ("0,x,0.5\n", "gt_overlap.log, line 1: 'x' is not a whole number"),
-    ],
-)
-def test_faults_of_printed_overlaps(tmp_path, text, message):
-    write_benchmark(tmp_path, overlaps=text)
-    with pytest.raises(InputError, match=message):
-        list(benchmark_scenes(entry("threedmatch"), tmp_path))
-
-
 def test_a_benchmark_without_fragments_or_pairs_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"has no <scene>/cloud_bin_<number>.ply; correct location"):
         list(benchmark_scenes(entry("threedmatch"), tmp_path))
     (write_benchmark(tmp_path) / "floor-evaluation/gt.log").unlink()
     with pytest.raises(InputError, match=r"floor/gt.log: no such file; put it there, or into floor-evaluation"):
         list(benchmark_scenes(entry("threedmatch"), tmp_path))
+
+
+OVERLAP_FAULTS = [
+    (lambda text: "0,1\n", "gt_overlap.log, line 1: has 2 numbers instead of target, source and overlap"),
+    (lambda text: "0,1,1.5\n", "gt_overlap.log, line 1: the overlap 1.5 is no share"),
+    (lambda text: "0,x,0.5\n", "gt_overlap.log, line 1: 'x' is not a whole number"),
+]
+TEXTS = {
+    "poses.txt": (write_folder, ply_scenes, entry("ply_folder", scenes="room"), PLY_FAULTS),
+    "floor-evaluation/gt.log": (write_benchmark, benchmark_scenes, entry("threedmatch"), BENCHMARK_FAULTS),
+    "floor-evaluation/gt_overlap.log": (write_benchmark, benchmark_scenes, entry("threedmatch"), OVERLAP_FAULTS),
+}
+
+
+@pytest.mark.parametrize(("name", "change", "message"), [(name, *of) for name in TEXTS for of in TEXTS[name][-1]])
+def test_faults_of_text_beside_clouds(tmp_path, name, change, message):
+    write, scenes, settings, _ = TEXTS[name]
+    path = write(tmp_path) / name
+    path.write_text(change(path.read_text()))
+    with pytest.raises(InputError, match=message):
+        list(scenes(settings, tmp_path))
+
+
+@pytest.mark.parametrize(("change", "message"), NPZ_FAULTS)
+def test_faults_of_npz(tmp_path, change, message):
+    write_npz(tmp_path / "floor.npz", change=change)
+    with pytest.raises(InputError, match=message):
+        list(npz_scenes(entry("npz"), tmp_path))
+
+
+def test_folders_without_what_makes_a_scene(tmp_path):
+    for scenes, settings, message in (
+        (npz_scenes, entry("npz"), "the folder has no npz file; correct location"),
+        (ply_scenes, entry("ply_folder"), "Tiny: does not say what its scenes are; set scenes"),
+        (ply_scenes, entry("ply_folder", scenes="room"), r"poses.txt: no such file; give the poses of the scans"),
+    ):
+        with pytest.raises(InputError, match=message):
+            list(scenes(settings, tmp_path))
+    (tmp_path / "floor.npz").write_text("not a zip")
+    with pytest.raises(InputError, match=r"floor.npz: is not a readable npz archive; fetch it again"):
+        list(npz_scenes(entry("npz"), tmp_path))
