@@ -125,14 +125,12 @@ class Explanation(ExplainedRegistration):
 
     def as_dict(self) -> dict[str, object]:
         """Values for JSON."""
-        spread = self.spread and {
-            "rotation_deg": self.spread.rotation_deg,
-            "translation": self.spread.translation,
-            "covariance": self.spread.covariance_6_6.tolist(),
-            "estimator": self.spread.estimator,
-            "starts": self.spread.starts,
-        }
-        return super().as_dict() | {"diagnosis": self.diagnosis and self.diagnosis.as_dict(), "spread": spread}
+        values = super().as_dict() | {"diagnosis": self.diagnosis and self.diagnosis.as_dict()}
+        if self.spread:
+            names = ("rotation_deg", "translation", "estimator", "starts")
+            own = {name: getattr(self.spread, name) for name in names}
+            values["spread"] = own | {"covariance": self.spread.covariance_6_6.tolist()}
+        return values
 
     def html(self, names: Mapping[str, str] | None = None) -> str:
         """Return a page that needs no other file: both clouds in 3-D, causes, poses, counterfactuals."""

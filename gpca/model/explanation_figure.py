@@ -9,7 +9,7 @@ import numpy as np
 
 from gpca.causes.truth import BY_SIZE
 from gpca.model.explanation import Explanation
-from gpca.model.scene import Scene, taken_out
+from gpca.model.scene import taken_out
 from gpca.reporting.figures import style
 from gpca.reporting.figures.cloud_views import thinned, widest_views
 from gpca.rigid import transform
@@ -26,6 +26,10 @@ def draw_explanation(explanation: Explanation, png_path: str | Path, names: str 
 
     Raises ValueError for an explanation without a scene.
     """
+    from matplotlib import colormaps
+    from matplotlib.colors import ListedColormap
+    from scipy.spatial import cKDTree
+
     if (scene := explanation.scene) is None:
         raise ValueError("an explanation that came as one of many has no clouds to draw")
     diagnosis = explanation.diagnosis
@@ -38,8 +42,18 @@ def draw_explanation(explanation: Explanation, png_path: str | Path, names: str 
             views.append((f"another pose (probability {other.probability:.2f})", transform(other.T, scene.source)))
     panels = above.subplots(1, len(views), squeeze=False)[0]
     view = widest_views(scene.target)[0]
-    for panel, (title, source) in zip(panels, views, strict=True):
-        shown = _draw_clouds(panel, scene, source, view)
+    colors = ListedColormap(colormaps["viridis"](np.linspace(BRIGHTEST, 0, 256)))
+    look = {"cmap": colors, "vmin": 0, "vmax": scene.reach * scene.frame.diameter, "linewidths": 0}
+    target = thinned(scene.target, POINTS) @ view.T
+    for panel, (title, cloud) in zip(panels, views, strict=True):
+        source = thinned(cloud, POINTS)
+        order = np.argsort((source @ view.T)[:, 2], kind="stable")  # from back to front
+        far = cKDTree(scene.target).query(source)[0][order] * scene.frame.diameter
+        ahead = (source @ view.T)[order]
+        panel.scatter(target[:, 0], target[:, 1], s=1, c=style.LIGHT_GRAY, linewidths=0)
+        shown = panel.scatter(ahead[:, 0], ahead[:, 1], s=2, c=far, **look)
+        panel.set(aspect="equal")
+        panel.set_axis_off()
         panel.set_title(title)
     label = f"distance to the target ({explanation.unit})"
     bar = above.colorbar(shown, ax=panels, location="right", shrink=0.8, extend="max", label=label)
@@ -49,8 +63,8 @@ def draw_explanation(explanation: Explanation, png_path: str | Path, names: str 
     shares = diagnosis.causes if diagnosis else explanation.scores
     variances = diagnosis.variances if diagnosis else explanation.variances
     deviations = [float(np.sqrt(variances[name])) for name in shares]
-    colors = [style.CONCEPT_COLORS.get(name, style.LIGHT_GRAY) for name in shares]
-    bars = {"xerr": deviations, "color": colors, "height": 0.6, "error_kw": {"elinewidth": 0.8}}
+    bar_colors = [style.CONCEPT_COLORS.get(name, style.LIGHT_GRAY) for name in shares]
+    bars = {"xerr": deviations, "color": bar_colors, "height": 0.6, "error_kw": {"elinewidth": 0.8}}
     left.barh(np.arange(len(shares))[::-1], [*shares.values()], **bars)
     effects = diagnosis.reenacted.effects if diagnosis else {}
     labels = [f"{name}\n{effects[name]:+.2g} {explanation.unit}" if name in effects else name for name in shares]
@@ -76,27 +90,8 @@ def draw_explanation(explanation: Explanation, png_path: str | Path, names: str 
     lines += [f"warning: {warning}" for warning in explanation.warnings]
     wrapped = [part for line in lines for part in wrap(line, LETTERS, subsequent_indent="   ")]
     text = "\n".join(wrapped[:MOST_LINES] + ["…"] * (len(wrapped) > MOST_LINES))
-    look = {"va": "top", "ha": "left", "fontsize": style.SMALL_PT, "linespacing": 1.4, "in_layout": False}
+    text_look = {"va": "top", "ha": "left", "fontsize": style.SMALL_PT, "linespacing": 1.4, "in_layout": False}
     right.set_axis_off()
-    right.text(0, 1, text, transform=right.transAxes, **look)
+    right.text(0, 1, text, transform=right.transAxes, **text_look)
     style.write_title(figure, names)
     style.save_png(figure, png_path)
-
-
-def _draw_clouds(panel, scene: Scene, source: np.ndarray, view: np.ndarray):
-    """Draw the target in gray and the source by its distances, from back to front; return what has the colors."""
-    from matplotlib import colormaps
-    from matplotlib.colors import ListedColormap
-    from scipy.spatial import cKDTree
-
-    target, source = thinned(scene.target, POINTS), thinned(source, POINTS)
-    at, ahead = target @ view.T, source @ view.T
-    panel.scatter(at[:, 0], at[:, 1], s=1, c=style.LIGHT_GRAY, linewidths=0)
-    order = np.argsort(ahead[:, 2], kind="stable")
-    colors = ListedColormap(colormaps["viridis"](np.linspace(BRIGHTEST, 0, 256)))
-    look = {"cmap": colors, "vmin": 0, "vmax": scene.reach * scene.frame.diameter, "linewidths": 0}
-    far = cKDTree(scene.target).query(source)[0][order] * scene.frame.diameter
-    shown = panel.scatter(ahead[order, 0], ahead[order, 1], s=2, c=far, **look)
-    panel.set(aspect="equal")
-    panel.set_axis_off()
-    return shown

@@ -40,12 +40,8 @@ def page_samples(files: Mapping[str, str | Path], source: Mapping, limits: Limit
     """Return the samples of one source by `RULE`, as JSON values for the page's 3-D view.
 
     The ADD-S after ICP is in % of the diameter, the uncertainty in nats, with the 95th percentile of clean pairs.
-
-    Args:
-        files: ``registrations`` and ``predictions`` of one source and seed, optionally ``uncertainty``.
-        reach: correspondence distance of ICP, in diameters.
-
-    Raises InputError for an unusable file, or a sample without prediction.
+    `files` are ``registrations`` and ``predictions`` of one source and seed, optionally ``uncertainty``; `reach` is the
+    correspondence distance of ICP, in diameters.
     """
     registrations, predictions = Registrations.load(files["registrations"]), read_predictions(files["predictions"])
     u_S, clean = np.full(len(registrations), np.nan), np.nan
@@ -112,12 +108,7 @@ def cause_samples(files: Mapping[str, str | Path], source: Mapping, settings: Ca
     """Return the samples of one source by `CAUSES_RULE`, as JSON values for the page's 3-D view.
 
     In % of the diameter are the shown error, the limit of failures, the share φ of each concept, and the mean error
-    without each subset of the causes.
-
-    Args:
-        files: ``objects`` of the source, and ``causes`` of its first seed.
-
-    Raises InputError for an unusable file, or one of other settings.
+    without each subset of the causes. `files` are ``objects`` of the source, and ``causes`` of its first seed.
     """
     causes = Causes.load(files["causes"])
     rows = first_of_each_cause(causes)
@@ -152,11 +143,9 @@ def packed_registration(
 ) -> dict:
     """Return a registration for ``view.js``: in its initial, aligned and true pose.
 
-    Args:
-        reach: correspondence distance of ICP, in diameters.
-        observed_8: the observed cloud (P, 3) as aligned by ICP with each subset of the causes, in the order of
-            :data:`gpca.causes.truth.SUBSETS`; none without measured causes. A repeated registration is packed once,
-            and referred to by its number afterwards.
+    `observed_8` are the observed clouds (P, 3) as aligned by ICP with each subset of the causes, in the order of
+    :data:`gpca.causes.truth.SUBSETS`; none without measured causes. A repeated registration is packed once, and
+    referred to by its number afterwards.
     """
     target = thinned(registrations.target(row).astype(float), POINTS)
     T_centered = np.eye(4)

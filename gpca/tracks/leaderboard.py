@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
 FOLDER = PUBLISHED.parent  # of the submissions
-TEMPLATE = "leaderboard.html.jinja"
 OURS = {"authors": "this repository"}
 HEAD_COLUMNS = ("authors", "seconds", "hardware")  # from the heads of submissions
 MARK = "→ "  # before the title of a submitted method
@@ -171,17 +170,15 @@ def read_submissions(folder: Path) -> tuple[dict[str, list[Submission]], list[st
 
 def write_page(submissions: Mapping[str, Sequence[Submission]], path: Path) -> None:
     """Write the page of all published tracks."""
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+    from gpca.page.page import render
 
     boards = [
         board_of(Published.load(track), submissions.get(name, ()))
         for name, track in TRACKS.items()
         if (PUBLISHED / f"{name}.npz").is_file()
     ]
-    loader = FileSystemLoader(Path(__file__).parent)
-    environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
     with whole_file(path) as partial:
-        partial.write_text(environment.get_template(TEMPLATE).render(boards=boards), encoding="utf-8")
+        partial.write_text(render("leaderboard.html.jinja", boards=boards), encoding="utf-8")
 
 
 def board_of(published: Published, submissions: Sequence[Submission]) -> dict[str, Any]:

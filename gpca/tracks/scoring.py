@@ -102,7 +102,16 @@ def _measured(
 ) -> dict[str, tuple[Arrays, Arrays]]:
     """Return each method's measures (1 + B,) by name, and masks of the samples that each counts."""
     if published.track.name == HARD_TRACK:
-        return {name: _hard_measures(published, method, weights_B_N) for name, method in methods.items()}
+        concept_N, measured = published.rows.concept, {}
+        masks = {f"recall_{concept}": concept_N == concept for concept in CONCEPTS}
+        masks["accuracy"] = np.ones(len(concept_N), bool)
+        for name, method in methods.items():
+            right_N = concept_N == method.labels_named(CONCEPTS)
+            values = {each: weighted_mean(right_N[mask_N], weights_B_N[:, mask_N]) for each, mask_N in masks.items()}
+            entropy_N = Attribution.of_scores(CONCEPTS, method.scores, seconds=0.0).entropy_N
+            values["auroc_error"] = ranking(entropy_N, ~right_N, weights_B_N)["area"]
+            measured[name] = values, masks | {"auroc_error": masks["accuracy"]}
+        return measured
     judged = {}
     for name, method in methods.items():
         named_N = method.labels_named(LABELS)
@@ -119,17 +128,6 @@ def _measured(
         values = measures(samples, weights_B_N)
         measured[name] = values, {metric: counts_in(samples, metric) for metric in values}
     return measured
-
-
-def _hard_measures(published: Published, method: Method, weights_B_N: np.ndarray) -> tuple[Arrays, Arrays]:
-    concept_N = published.rows.concept
-    right_N = concept_N == method.labels_named(CONCEPTS)
-    masks = {f"recall_{concept}": concept_N == concept for concept in CONCEPTS}
-    masks["accuracy"] = masks["auroc_error"] = np.ones(len(right_N), bool)
-    shares = [name for name in masks if name != "auroc_error"]
-    values = {name: weighted_mean(right_N[masks[name]], weights_B_N[:, masks[name]]) for name in shares}
-    entropy_N = Attribution.of_scores(CONCEPTS, method.scores, seconds=0.0).entropy_N
-    return values | {"auroc_error": ranking(entropy_N, ~right_N, weights_B_N)["area"]}, masks
 
 
 def ceiling(published: Published) -> Judged:
