@@ -37,7 +37,7 @@ def main(arguments: list[str] | None = None) -> None:
     from gpca.causes.candidate import draw_candidate
     from gpca.causes.measuring import read_subjects
     from gpca.causes.settings import CauseSettings
-    from gpca.reenactment.enactment import NoiseScale, enact
+    from gpca.reenactment.enactment import NoiseScale, enact, observe, rebuild
     from gpca.reenactment.hypotheses import find_hypotheses
     from gpca.reenactment.mixture import Mixture
     from gpca.reenactment.settings import ReenactmentSettings
@@ -56,10 +56,11 @@ def main(arguments: list[str] | None = None) -> None:
         surface = ModelSurface(candidate.model)
         hypotheses = find_hypotheses(before, surface, np.eye(4)[None], ReenactmentSettings(), random)
         found = perf_counter()
-        xi_n_6 = random.normal(size=(truth.starts, 6)) * truth.deviation_6()
         scale = NoiseScale(surface, random)
         for hypothesis in hypotheses:
-            enact(before, hypothesis, surface, scale, xi_n_6, truth, random)
+            observation = observe(before, hypothesis, surface, scale, random)
+            rebuilt = rebuild(hypothesis.T, observation, surface, random)
+            enact(hypothesis, rebuilt, surface.errors, ("benchmark", number), truth)
         if number >= 0:
             search_s.append(found - started)
             enact_s.append(perf_counter() - found)

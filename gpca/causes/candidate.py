@@ -152,11 +152,14 @@ class Registrar:
         observed, model = self.candidate.observed(causes), self.candidate.reference(causes)
         started = perf_counter()
         if self.settings.moved == OBSERVED:
-            changing = self.candidate.changing_reference(causes)
-            poses_n, fitness_n, rmse_n = self._target(changing, model).register(observed, starts_n)
-        else:
-            alike = tuple(cause for cause in causes if cause != POSE)  # a pose error changes no cloud
-            poses_n, fitness_n, rmse_n = self._target(alike, observed).register(model, inverses(starts_n))
+            moving, target, alike = observed, model, self.candidate.changing_reference(causes)
+        else:  # a pose error changes no cloud
+            moving, target, alike = model, observed, tuple(cause for cause in causes if cause != POSE)
+            starts_n = inverses(starts_n)
+        if alike not in self._targets:
+            self._targets[alike] = BatchedICP(target, self.settings.icp)
+        poses_n, fitness_n, rmse_n = self._targets[alike].register(moving, starts_n)
+        if self.settings.moved != OBSERVED:
             poses_n = inverses(poses_n)
         seconds = perf_counter() - started
         if not np.isfinite(poses_n).all():
@@ -165,11 +168,6 @@ class Registrar:
             raise Unmeasurable("no correspondences")
         rmse_n = np.where(fitness_n > 0, rmse_n, self.settings.icp.correspondence_distance)
         return Runs(poses_n, fitness_n, rmse_n, len(poses_n), seconds)
-
-    def _target(self, causes: tuple[int, ...], points: np.ndarray) -> BatchedICP:
-        if causes not in self._targets:
-            self._targets[causes] = BatchedICP(points, self.settings.icp)
-        return self._targets[causes]
 
 
 @dataclass
@@ -230,9 +228,7 @@ def drawn_again(
 def replay(
     objects: ObjectClouds, causes: Causes, row: int, source: str, seed: int, settings: CauseSettings
 ) -> tuple[np.ndarray, list[np.ndarray]]:
-    """Return a sample's model and, under each subset of its causes, the cloud where ICP put it from the initial
-    pose.
-    """
+    """Return a sample's model and, under each subset of its causes, the cloud where ICP put it from the start."""
     candidate, _ = drawn_again(objects, causes, row, source, seed, settings)
     registrar = Registrar(candidate, settings)
     observed = []

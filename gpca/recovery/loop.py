@@ -45,25 +45,25 @@ class Reenactor:
     def believe(self, episode: Episode, actions: Taken = ()) -> Belief:
         """The hypotheses after these actions, which were taken."""
         if (key := (episode, actions)) not in self._beliefs:
-            self._beliefs[key] = believe(*self._held(episode, actions), self.settings, *self._how(episode, actions))
+            holding, model, axes = self._case(episode, actions)
+            self._beliefs[key] = believe(holding, model, self.settings, self.counterfactuals, axes)
         return self._beliefs[key]
 
     def reenact(self, episode: Episode, actions: Taken = ()) -> CauseEffects:
         """The counterfactuals of the registration after these actions, which were taken."""
         if (key := (episode, actions)) not in self._reenacted:
+            holding, model, axes = self._case(episode, actions)
             belief = self.believe(episode, actions)
-            self._reenacted[key] = reenact(belief, *self._held(episode, actions), *self._how(episode, actions))
+            self._reenacted[key] = reenact(belief, holding, model, self.counterfactuals, axes)
         return self._reenacted[key]
 
-    def _held(self, episode: Episode, actions: Taken) -> tuple[Holding, KnownModel]:
+    def _case(self, episode: Episode, actions: Taken) -> tuple[Holding, KnownModel, tuple]:
         model = episode.situation.model
         if model not in self._models:
             name = episode.situation.shelf.objects.names[model]
             self._models[model] = KnownModel.of(Robot(episode.situation), generator("known model", name))
-        return episode.outcomes[actions].holding, self._models[model]
-
-    def _how(self, episode: Episode, actions: Taken) -> tuple[CauseSettings, tuple]:
-        return self.counterfactuals, (*episode.situation.axes, "re-enactment", *actions)
+        axes = (*episode.situation.axes, "re-enactment", *actions)
+        return episode.outcomes[actions].holding, self._models[model], axes
 
 
 def calibrated_alarm(episodes: Iterable[Episode], reenactor: Reenactor, false_alarms: float) -> float:
@@ -114,13 +114,7 @@ class Loop:
         return pd.DataFrame([rows[n] for n in order]), pd.DataFrame([seconds[n] for n in order])
 
     def _step(
-        self,
-        episode: Episode,
-        name: str,
-        entry: PolicyEntry,
-        decide: Decide,
-        before: Taken,
-        history: Sequence[Answer],
+        self, episode: Episode, name: str, entry: PolicyEntry, decide: Decide, before: Taken, history: Sequence[Answer]
     ) -> tuple[dict, dict]:
         """Let one policy decide and act; return its row and its seconds."""
         reenacted = self.reenactor.reenact(episode, before) if entry.reenacts else None

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import permutations
 from typing import TYPE_CHECKING, Any
 
@@ -58,6 +59,9 @@ class Means:
     alarm: float | None = None
 
 
+MakePolicy = Callable[[Means], Decide]
+
+
 def follow_scores(means: Means) -> Decide:
     """Follow an explainer's scores and queue uncertain cases (:class:`gpca.causes.policy.RecoveryPolicy`)."""
     policy = means.policy
@@ -94,11 +98,6 @@ def weigh_chances(means: Means, alarmed: bool = False) -> Decide:
         return utility.decide(case.known_F, case.actions, alarmed)
 
     return decide
-
-
-def weigh_alarmed(means: Means) -> Decide:
-    """Maximize the expected utility, given that the pose is wrong: compares actions apart from detecting failures."""
-    return weigh_chances(means, alarmed=True)
 
 
 def act_at_random(means: Means) -> Decide:
@@ -152,9 +151,7 @@ def _reenactment_alarms(means: Means, case: Case) -> bool:
     return case.reenacted.belief.failure > means.alarm
 
 
-def gated(
-    make: Callable[[Means], Decide], alarms: Callable[[Means, Case], bool] = _gate_alarms
-) -> Callable[[Means], Decide]:
+def gated(make: MakePolicy, alarms: Callable[[Means, Case], bool] = _gate_alarms) -> MakePolicy:
     """Let a policy act only if there is an alarm at the start; a later decision means that the pose is still wrong."""
 
     def make_gated(means: Means) -> Decide:
@@ -164,13 +161,16 @@ def gated(
     return make_gated
 
 
+_alarmed = partial(gated, alarms=_reenactment_alarms)
+
+
 def follow_truth(means: Means) -> Decide:
     """Repeat the action that treats the true cause; do nothing without a cause."""
     treatments = means.policy.treatments
     return lambda case: Decision(treatments.get(case.cause, NOTHING), case.cause, "told the cause")
 
 
-def follow_sequence(order: Order, reason: str = "next of a fixed sequence") -> Callable[[Means], Decide]:
+def follow_sequence(order: Order, reason: str = "next of a fixed sequence") -> MakePolicy:
     """Take the actions of a sequence in turn, whatever is observed."""
     return lambda means: lambda case: Decision(order[len(case.actions) % len(order)], "", reason)
 
@@ -202,7 +202,7 @@ class PolicyEntry:
     """A registered policy."""
 
     title: str  # in tables
-    make: Callable[[Means], Decide]
+    make: MakePolicy
     explainer: str = ""  # its name (:mod:`gpca.explainers.registry`), or empty
     queues: bool = False  # leaves cases to a person, whose labels its explainer can learn
     learns: bool = False  # uses the chances learned on the rehearsals
@@ -214,6 +214,7 @@ class PolicyEntry:
     oracle: bool = False  # is given the cause
 
 
+weigh_alarmed = partial(weigh_chances, alarmed=True)  # compares actions apart from detecting failures
 _LEARNED: dict[str, Any] = {"explainer": "gpca", "learns": True}
 _GATED: dict[str, Any] = {"gated": True, "informed": False}
 _BY_REENACTMENT: dict[str, Any] = {"reenacts": True, "alarmed": True, "informed": False}
@@ -227,14 +228,9 @@ POLICIES = {
     "error_only": PolicyEntry("Error only, gated", gated(follow_rehearsed), rehearsed=True, **_GATED),
     "error_only_acting": PolicyEntry("Error only, alarmed", follow_rehearsed, rehearsed=True),
     "reenact": PolicyEntry("Re-enactment", follow_reenactment, reenacts=True),
-    "reenact_gated": PolicyEntry(
-        "Re-enactment, gated", gated(follow_reenactment, _reenactment_alarms), **_BY_REENACTMENT
-    ),
+    "reenact_gated": PolicyEntry("Re-enactment, gated", _alarmed(follow_reenactment), **_BY_REENACTMENT),
     "error_only_reenact": PolicyEntry(
-        "Error only, re-enactment's gate",
-        gated(follow_rehearsed, _reenactment_alarms),
-        rehearsed=True,
-        **_BY_REENACTMENT,
+        "Error only, re-enactment's gate", _alarmed(follow_rehearsed), rehearsed=True, **_BY_REENACTMENT
     ),
     "shap_removal": PolicyEntry("SHAP, remedies, residual", never_queue, explainer="shap_removal_residual"),
     "softmax_head": PolicyEntry("Softmax head", never_queue, explainer="softmax_head"),

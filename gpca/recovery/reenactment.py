@@ -7,20 +7,18 @@ pose's surface, and which surface no camera has seen.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from time import perf_counter
 
 import numpy as np
 from scipy.special import expit
 
-from gpca.causes.candidate import Counterfactuals, Registrar, Unmeasurable
 from gpca.causes.settings import CauseSettings
-from gpca.causes.truth import LARGEST_ERROR, SUBSETS, capped, shapley_values
+from gpca.causes.truth import capped, shapley_values
 from gpca.frames.shots import NEAR, Shot, fuse
 from gpca.objects.camera import MeshScene
 from gpca.recovery.actions import Holding, Robot
-from gpca.reenactment.enactment import NoiseScale, observe, rebuild, start_twists
+from gpca.reenactment.enactment import NoiseScale, enact, observe, rebuild
 from gpca.reenactment.hypotheses import Hypothesis, find_hypotheses, weights_of
 from gpca.reenactment.settings import SMALLEST_ERROR, STEEPNESS, ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface
@@ -145,20 +143,15 @@ def reenact(belief: Belief, holding: Holding, shape: KnownModel, truth: CauseSet
     Without noise or missing surface, the measurement is rebuilt (:func:`gpca.reenactment.enactment.rebuild`); without a
     pose error, the registration starts from the hypothesis.
     """
-    started = perf_counter()
-    random, xi_n_6 = generator(*axes, "clouds"), start_twists(axes, truth)
-    error_K_8 = np.full((len(belief.hypotheses), len(SUBSETS)), LARGEST_ERROR)
-    for error_8, hypothesis in zip(error_K_8, belief.hypotheses, strict=True):
+    started, random, error_K_8 = perf_counter(), generator(*axes, "clouds"), []
+    for hypothesis in belief.hypotheses:
         observation = observe(belief.observed, hypothesis, shape.surface, shape.scale, random)
         covered_M = seen_surface(holding, shape, hypothesis, observation.noise)
         if covered_M.mean() >= LEAST_COVERED:
             observation = replace(observation, covered=covered_M)
         candidate = rebuild(hypothesis.T, observation, shape.surface, random)
-        measured = Counterfactuals(Registrar(candidate, truth, misses=True), shape.surface.errors, xi_n_6, truth)
-        for subset in range(len(SUBSETS)):
-            with suppress(Unmeasurable):
-                error_8[subset] = measured.error(subset)
-    return CauseEffects(belief, error_K_8, belief.seconds + perf_counter() - started)
+        error_K_8.append(enact(hypothesis, candidate, shape.surface.errors, axes, truth, misses=True).error_8)
+    return CauseEffects(belief, np.array(error_K_8), belief.seconds + perf_counter() - started)
 
 
 def seen_surface(holding: Holding, shape: KnownModel, hypothesis: Hypothesis, noise: float) -> np.ndarray:

@@ -65,11 +65,6 @@ class Observation:
         """The share of the points that are outliers."""
         return float(self.is_outlier.mean())
 
-    @property
-    def missing(self) -> float:
-        """The share of the model that was not observed."""
-        return float(1 - self.covered.mean())
-
 
 def observe(
     observed: np.ndarray, hypothesis: Hypothesis, surface: ModelSurface, scale: NoiseScale, random: np.random.Generator
@@ -99,7 +94,7 @@ def rebuild(T: np.ndarray, observation: Observation, surface: ModelSurface, rand
     outliers become fresh points. Missing surface is filled with fresh points, as dense as the rest and as noisy. `T` is
     the hypothesis: it takes what was observed to the model.
     """
-    noise, missing = observation.noise, observation.missing
+    noise, missing = observation.noise, float(1 - observation.covered.mean())  # of the model
     quiet = noise <= QUIET and observation.outliers < FEW_OUTLIERS
     clean = observation.points
     covered, absent = np.flatnonzero(observation.covered), np.flatnonzero(~observation.covered)
@@ -159,44 +154,29 @@ def reenact(
     T_found_n = pair.T_runs @ inverse(pair.T_init)
     random = generator(*pair.axes, "hypotheses")
     hypotheses = find_hypotheses(before, surface, T_found_n, settings, random)
-    xi_n_6 = start_twists(pair.axes, truth)
-    scale = NoiseScale(surface, random)
-    return [enact(before, hypothesis, surface, scale, xi_n_6, truth, random) for hypothesis in hypotheses]
+    scale, enactments = NoiseScale(surface, random), []
+    for hypothesis in hypotheses:
+        observation = observe(before, hypothesis, surface, scale, random)
+        candidate = rebuild(hypothesis.T, observation, surface, random)
+        enactments.append(enact(hypothesis, candidate, surface.errors, pair.axes, truth))
+    return enactments
 
 
 def enact(
-    before: np.ndarray,
-    hypothesis: Hypothesis,
-    surface: ModelSurface,
-    scale: NoiseScale,
-    xi_n_6: np.ndarray,
-    truth: CauseSettings,
-    random: np.random.Generator,
-) -> Enactment:
-    """Register every subset of the causes from the same starts, as if a hypothesis were true."""
-    observation = observe(before, hypothesis, surface, scale, random)
-    candidate = rebuild(hypothesis.T, observation, surface, random)
-    return register(hypothesis, candidate, surface.errors, xi_n_6, truth)
-
-
-def register(
     hypothesis: Hypothesis,
     candidate: Candidate,
     errors: Callable[[np.ndarray], np.ndarray],
-    xi_n_6: np.ndarray,
+    axes: tuple,
     truth: CauseSettings,
     misses: bool = False,
 ) -> Enactment:
-    """Register every subset of a candidate's causes; what cannot be registered is as wrong as can be."""
+    """Register every subset of a candidate's causes, as if a hypothesis were true, from the same starts, which the axes
+    name; what cannot be registered is as wrong as can be."""
     started = perf_counter()
+    xi_n_6 = generator(*axes, "starts").normal(size=(truth.starts, 6)) * truth.deviation_6()
     measured = Counterfactuals(Registrar(candidate, truth, misses), errors, xi_n_6, truth)
     error_8, uncertainty_8 = np.full(len(SUBSETS), LARGEST_ERROR), np.zeros(len(SUBSETS))
     for subset in range(len(SUBSETS)):
         with suppress(Unmeasurable):
             error_8[subset], uncertainty_8[subset] = measured.error(subset), measured.uncertainty(subset)
     return Enactment(hypothesis, candidate, error_8, uncertainty_8, perf_counter() - started)
-
-
-def start_twists(axes: tuple, truth: CauseSettings) -> np.ndarray:
-    """Return the twists (n, 6) of the starts around the initial pose, the same for every subset and hypothesis."""
-    return generator(*axes, "starts").normal(size=(truth.starts, 6)) * truth.deviation_6()

@@ -27,7 +27,7 @@ from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.distances import ObservedPair
 from gpca.reenactment import hypotheses as search
 from gpca.reenactment.dataset import Reenactments, reenact_all
-from gpca.reenactment.enactment import Enactment, register, start_twists
+from gpca.reenactment.enactment import Enactment, enact
 from gpca.reenactment.hypotheses import Hypothesis
 from gpca.reenactment.mixture import LARGEST_WIDTH, Anchor, Mixture
 from gpca.reenactment.settings import ReenactmentSettings
@@ -117,40 +117,30 @@ def find_frame_hypotheses(
     few = before[np.sort(random.permutation(len(before))[: search.FITTED])]
     ends_n = search.search_ends(before, surface, view.pair.T_runs @ inverse(view.pair.T_init), random)
 
-    def fits(T_n: np.ndarray, observed: np.ndarray, pixels: int, rounds: int, apart: float) -> list[Hypothesis]:
-        found = [_fit(view, T, observed, pixels, rounds, settings) for T in T_n]
-        anchor = search.anchor_of(len(observed), settings)
-        found.append(_fit(view, np.eye(4), observed, pixels, rounds, settings, anchor))
+    def fit(T: np.ndarray, observed: np.ndarray, pixels: int, rounds: int, anchor: Anchor | None) -> Hypothesis:
+        """Return the pose that explains the observed points best, near another; each round looks at the side anew."""
+        for _ in range(rounds):
+            side, share = view.side(T, pixels)
+            if len(side) < FEWEST_POINTS:
+                return Hypothesis(T, np.zeros(len(observed)), 0.0, LARGEST_WIDTH, 0.0, IMPOSSIBLE)
+            spacing = float(np.median(cKDTree(side).query(side, 2)[0][:, 1]))
+            fits = Mixture(side, spacing / 2).fit(observed, T[None], ITERATIONS, anchor=anchor)
+            T = fits.T_n[0]
+        likelihood, outliers = float(fits.log_likelihood_n[0]), float(fits.outliers_n[0])
+        # What was measured of the side is the denser, the less of it was.
+        density = (1 - outliers) * np.log(max(share, search.LEAST_COVERED))
+        log_posterior = min(len(observed), search.INDEPENDENT) * (likelihood - density) + search.log_prior(T, settings)
+        log_posterior -= MISSING * (1 - share)
+        return Hypothesis(T, fits.inlier_n_N[0], likelihood, float(fits.width_n[0]), share, float(log_posterior))
+
+    def best(T_n: np.ndarray, observed: np.ndarray, pixels: int, rounds: int, apart: float) -> list[Hypothesis]:
+        begun = [*((T, None) for T in T_n), (np.eye(4), search.anchor_of(len(observed), settings))]
+        found = [fit(T, observed, pixels, rounds, anchor) for T, anchor in begun]
         return search.most_probable(found, surface, settings.hypotheses, apart)
 
-    first = search.not_negligible(fits(ends_n, few, COARSE, 1, search.SAME), OUT_OF_REACH)
+    first = search.not_negligible(best(ends_n, few, COARSE, 1, search.SAME), OUT_OF_REACH)
     T_n = np.stack([hypothesis.T for hypothesis in first])
-    return search.not_negligible(fits(T_n, before, FINE, ROUNDS, search.SAME / 2))
-
-
-def _fit(
-    view: FrameView,
-    T: np.ndarray,
-    observed: np.ndarray,
-    pixels: int,
-    rounds: int,
-    settings: ReenactmentSettings,
-    anchor: Anchor | None = None,
-) -> Hypothesis:
-    """Return the pose that explains the observed points best, near another; each round looks at the side anew."""
-    for _ in range(rounds):
-        side, share = view.side(T, pixels)
-        if len(side) < FEWEST_POINTS:
-            return Hypothesis(T, np.zeros(len(observed)), 0.0, LARGEST_WIDTH, 0.0, IMPOSSIBLE)
-        spacing = float(np.median(cKDTree(side).query(side, 2)[0][:, 1]))
-        fits = Mixture(side, spacing / 2).fit(observed, T[None], ITERATIONS, anchor=anchor)
-        T = fits.T_n[0]
-    likelihood, outliers = float(fits.log_likelihood_n[0]), float(fits.outliers_n[0])
-    # What was measured of the side is the denser, the less of it was.
-    density = (1 - outliers) * np.log(max(share, search.LEAST_COVERED))
-    log_posterior = min(len(observed), search.INDEPENDENT) * (likelihood - density) + search.log_prior(T, settings)
-    log_posterior -= MISSING * (1 - share)
-    return Hypothesis(T, fits.inlier_n_N[0], likelihood, float(fits.width_n[0]), share, float(log_posterior))
+    return search.not_negligible(best(T_n, before, FINE, ROUNDS, search.SAME / 2))
 
 
 def reenact_frames(
@@ -167,9 +157,8 @@ def reenact_frames(
     Of the instances it reads pixels, camera and what the dataset says of symmetries; of the causes, both clouds, the
     initial pose and what registrations found.
     """
-    registrations = causes.registrations
     of_object = instances.object_index[starts.instance] if len(starts) == len(causes) else np.array([])
-    if not np.array_equal(of_object, registrations.object_index):
+    if not np.array_equal(of_object, causes.registrations.object_index):
         fault = "are of other registrations than the causes"
         raise InputError("starts of frames", fault, "regenerate both from the same config")
     subjects = subjects_of(instances, starts.instance, objects)
@@ -180,14 +169,12 @@ def reenact_frames(
         seen, T_start = known[int(instances.object_index[i])], starts.T_camera_object_init[row]
         view = FrameView(pair, seen, instances.camera_3_3[i], instances.pixels_of(i), T_start)
         random = generator(*pair.axes, "hypotheses")
-        hypotheses = find_frame_hypotheses(view, settings, random)
-        xi_n_6, errors = start_twists(pair.axes, truth), seen.subject.errors
         enactments = []
-        for hypothesis in hypotheses:
+        for hypothesis in find_frame_hypotheses(view, settings, random):
             candidate = view.candidate(hypothesis.T, random)
             candidate.severity["outliers"] = float((hypothesis.inlier_N <= 0.5).mean())
             # As in the truth of frames, a run without any correspondence stays where it started.
-            enactments.append(register(hypothesis, candidate, errors, xi_n_6, truth, misses=True))
+            enactments.append(enact(hypothesis, candidate, seen.subject.errors, pair.axes, truth, misses=True))
         return enactments
 
-    return reenact_all(causes, *(registrations.axes or ("", None)), settings, truth, world)[0]
+    return reenact_all(causes, *(causes.registrations.axes or ("", None)), settings, truth, world)[0]

@@ -17,7 +17,7 @@ from gpca.pairs.distances import ObservedPair
 from gpca.pairs.perturbation import NOISE, OVERLAP, POSE
 from gpca.process.progress import progress
 from gpca.reenactment.dataset import verdict
-from gpca.reenactment.enactment import Enactment, NoiseScale, enact, reenact, register, start_twists
+from gpca.reenactment.enactment import Enactment, NoiseScale, enact, observe, rebuild, reenact
 from gpca.reenactment.hypotheses import hypothesis_at, weights_of
 from gpca.reenactment.settings import KNOWN, ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface
@@ -42,25 +42,21 @@ def verdicts(
     pair: ObservedPair, true: Candidate, settings: ReenactmentSettings, truth: CauseSettings
 ) -> dict[str, np.ndarray]:
     """Verdict (4,) of :func:`gpca.reenactment.dataset.verdict` on the pair that a candidate is, by what is known."""
-    surface, xi_n_6, T_start = ModelSurface(pair.model), start_twists(pair.axes, truth), true.start(true.present)
+    surface, T_start = ModelSurface(pair.model), true.start(true.present)
     estimated = reenact(pair, settings, truth, surface)
     random = generator(*pair.axes, "true pose")
     before, scale = transform(pair.T_init, pair.observed), NoiseScale(surface, random)
     hypothesis = hypothesis_at(inverse(T_start), before, surface, settings, random)
-    at_truth = [enact(before, hypothesis, surface, scale, xi_n_6, truth, random)]
+    candidate = rebuild(hypothesis.T, observe(before, hypothesis, surface, scale, random), surface, random)
+    at_truth = [enact(hypothesis, candidate, surface.errors, pair.axes, truth)]
 
     def errors(enactment: Enactment, clouds: Collection[int]) -> np.ndarray:
         """Return v̂ (8,) of a hypothesis with the truth about the clouds, as far as it is known."""
         if not clouds:
             return enactment.error_8
-        candidate = informed(
-            enactment.candidate,
-            enactment.hypothesis.T @ T_start,
-            true,
-            clouds,
-            generator(*pair.axes, "oracle", *clouds),
-        )
-        return register(enactment.hypothesis, candidate, surface.errors, xi_n_6, truth).error_8
+        told = generator(*pair.axes, "oracle", *clouds)
+        candidate = informed(enactment.candidate, enactment.hypothesis.T @ T_start, true, clouds, told)
+        return enact(enactment.hypothesis, candidate, surface.errors, pair.axes, truth).error_8
 
     by_name = {}
     for name, known in KNOWN.items():

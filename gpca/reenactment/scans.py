@@ -15,7 +15,7 @@ from gpca.causes.scans import OverlapErrors, ScanCandidate
 from gpca.causes.settings import FEWEST_POINTS, CauseSettings
 from gpca.pairs.distances import ObservedPair
 from gpca.reenactment.dataset import Reenactments, reenact_all
-from gpca.reenactment.enactment import QUIET, Enactment, NoiseScale, register, start_twists
+from gpca.reenactment.enactment import QUIET, Enactment, NoiseScale, enact
 from gpca.reenactment.hypotheses import Hypothesis, find_hypotheses
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface
@@ -61,12 +61,11 @@ def reenact_scan(
     if T_found_k is not None and len(T_found_k):
         found_n = np.concatenate([found_n, T_found_k])
     hypotheses = find_hypotheses(before, surface, found_n, settings, random)
-    scale, xi_n_6 = NoiseScale(surface, random), start_twists(pair.axes, truth)
-    enactments = []
+    scale, enactments = NoiseScale(surface, random), []
     for hypothesis in hypotheses:
         candidate = cropped(hypothesis, before, surface, scale)
         errors = OverlapErrors(candidate.clean[candidate.seen], error_factor)
-        enactments.append(register(hypothesis, candidate, errors, xi_n_6, truth, misses=True))
+        enactments.append(enact(hypothesis, candidate, errors, pair.axes, truth, misses=True))
     return enactments
 
 
