@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from itertools import permutations
 from math import inf
 
@@ -19,9 +20,9 @@ from gpca.evaluation.measures import ALL, intervals, read_all_metrics, source_me
 from gpca.experiments.confusions import draw_confusions_figure
 from gpca.explainers.gpca import GPCA_FORMS
 from gpca.explainers.registry import explainer_entry
-from gpca.reporting.sheet import Sheet, crossed, show
-from gpca.reporting.tables.builder import TableBuilder, over_clusters
-from gpca.reporting.tables.cells import cell_of_repeats, clustered_cell, rows_where
+from gpca.reporting.sheet import Row, Sheet, Show, crossed, show, where, with_label
+from gpca.reporting.tables.builder import over_clusters
+from gpca.reporting.tables.cells import cell_of_repeats
 from gpca.reporting.tables.table import EMPTY, Cell, Column
 from gpca.reporting.words import span
 
@@ -101,9 +102,9 @@ def _accuracies(rows: Frame, draws: Clustered) -> Iterator[tuple[str, str, Clust
 SECTION = "IV-B Concept attribution accuracy"
 LEAST_CAUSAL = 30  # causal samples of all seeds; the accuracy on fewer says nothing
 EXTENDED = {
-    "accuracy": Column("Accuracy (%)"),
-    "permuted_accuracy": Column("Relabeled (%)"),
-    "causal_accuracy": Column("Causal (%)"),
+    "accuracy": show("accuracy", "Accuracy (%)"),
+    "permuted_accuracy": show("permuted_accuracy", "Relabeled (%)"),
+    "causal_accuracy": show("causal_accuracy", "Causal (%)"),
     "causal_samples": Column("n causal", decimals=0, interval=False, limits=(0, inf)),
     "abstention_rate": Column("Abstained (%)", interval=False),
     "icp_calls": Column("ICP calls", decimals=0, interval=False, limits=(0, inf)),
@@ -188,37 +189,33 @@ def table2_per_concept(run: Run, intervals):
 )
 def table1_extended(run: Run, intervals, metrics):
     entries = {name: explainer_entry(name) for name in run.section("explainers")}
-    table = TableBuilder("table1_extended", {"source": "Dataset", "explainer": "Explainer", "reads": "Reads"})
-    for row in crossed(("source", run.source_titles), ("method", titles(run))):
-        measured = rows_where(metrics, **row.where, concept=ALL)
-        cells: dict[str, Cell | None] = {}
-        for metric in EXTENDED:
-            if metric in ("accuracy", "permuted_accuracy", "causal_accuracy"):
-                cell = clustered_cell(rows_where(intervals, **row.where), metric=metric, concept=ALL)
-                few = metric == "causal_accuracy" and cell is not None and cell.test_samples < LEAST_CAUSAL
-                cells[metric] = None if few else cell
-                continue
-            values_R = rows_where(measured, metric=metric)["value"].to_numpy()
+
+    def more(row: Row, _subset: Frame) -> dict[str, Cell | None]:
+        measured = where(metrics, {**row.where, "concept": ALL})
+        cells = {}
+        for metric in [metric for metric, column in EXTENDED.items() if not isinstance(column, Show)]:
             counted = "causal_samples" if metric == "causal_samples" else "test_samples"
-            samples = int(rows_where(measured, metric=counted)["value"].sum())
+            samples = int(where(measured, {"metric": counted})["value"].sum())
+            values_R = where(measured, {"metric": metric})["value"].to_numpy()
             cells[metric] = cell_of_repeats(values_R * (100 if metric == "abstention_rate" else 1), samples)
-        entry = entries[row.where["method"]]
-        table.add_row([*row.labels, (entry.sight, entry.sight)], cells, rival=not entry.oracle)
-    table.require_rows()
-    table.compare_down(["accuracy"], same=1)
-    filled = {metric for _, metric in table.cells}
+        return cells
+
+    rows = crossed(("source", run.source_titles), ("method", titles(run)))
+    rows = with_label(rows, lambda row: entries[row.where["method"]].sight)
+    rows = [replace(row, rival=not entries[row.where["method"]].oracle) for row in rows]
+    heads = {"source": "Dataset", "explainer": "Explainer", "reads": "Reads"}
+    enough = intervals[(intervals["metric"] != "causal_accuracy") | (intervals["samples"] >= LEAST_CAUSAL)]
+    sheet = Sheet("table1_extended", heads, rows, EXTENDED, enough, more=more)
+    filled = {metric for _, metric in sheet.cells}
     apart = ", oracles apart" if any(entry.oracle for entry in entries.values()) else ""
     notes = {"accuracy": f"Bold: best accuracy on the dataset{apart}. Abstained samples are wrong.", **NOTES}
-    return table.build(
-        caption="Single-concept attribution by every explainer" + run.stand_ins(),
-        column_head="metric",
-        columns={metric: column for metric, column in EXTENDED.items() if metric in filled},
-        footnotes=(
-            repeats(cell for (_, key), cell in table.cells.items() if key == "accuracy"),
-            "Reads: what an explainer sees of a registration; chance and the most frequent label see nothing.",
-            *(note for metric, note in notes.items() if metric in filled),
-        ),
+    footnotes = (
+        repeats(cell for (_, key), cell in sheet.cells.items() if key == "accuracy"),
+        "Reads: what an explainer sees of a registration; chance and the most frequent label see nothing.",
+        *(note for metric, note in notes.items() if metric in filled),
     )
+    caption = "Single-concept attribution by every explainer" + run.stand_ins()
+    return sheet.table(caption, "metric", footnotes, bold=["accuracy"], same=1)
 
 
 def titles(run: Run) -> dict[str, str]:

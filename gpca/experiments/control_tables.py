@@ -19,7 +19,7 @@ from gpca.explainers.gpca import GPCA_FORMS
 from gpca.explainers.registry import explainer_entry
 from gpca.io.csv_file import read_numbers
 from gpca.reporting.figures.style import SMALL_PT
-from gpca.reporting.sheet import Sheet, Show, crossed, show, with_label
+from gpca.reporting.sheet import Row, Sheet, Show, crossed, show, with_label
 from gpca.reporting.tables.builder import TableBuilder
 from gpca.reporting.tables.cells import cell_of_repeats, interval_cell, plain_cell, rows_where
 from gpca.reporting.tables.table import Cell, Column
@@ -294,31 +294,31 @@ def read_costs(files: Paths) -> Frame:
     **INTERVALS,
 )
 def table10_costs(run: Run, intervals, costs):
-    builder = TableBuilder("table10_costs", {"explainer": "Explainer"})
-    gains = {name: TITLES[name] for name in (PAPER, UNSEEN, TRANSFER)}
     pooled = POOLED if len(run.sources) > 1 else next(iter(run.sources))
-    for explainer, words in titles(run.config["controls"]["explainers"]).items():
-        cells: dict[str, Cell | None] = {}
-        for metric, factor in SECONDS.items():
-            seconds_R = rows_where(costs, method=explainer, metric=metric).groupby("seed")["value"].mean()
-            cells[metric] = cell_of_repeats((seconds_R * factor).to_numpy(), 0)
-        if cells["seconds"] is None:
-            continue
-        accuracy = rows_where(intervals, source=pooled, method=explainer, metric="accuracy", against="")
-        cells |= {row["table"]: interval_cell(row) for _, row in accuracy.iterrows() if row["table"] in gains}
-        builder.add_row([(explainer, words)], cells)
-    return builder.build(
-        caption="What explainers of the pair cost and gain" + run.stand_ins(),
-        column_head="metric",
-        columns={
-            "learning_seconds": Column("Learning (s)", interval=False, limits=(0, inf)),
-            "seconds": Column("One registration (ms)", interval=False, limits=(0, inf)),
-            **{name: Column(words) for name, words in gains.items()},
+    columns = {
+        "learning_seconds": Column("Learning (s)", interval=False, limits=(0, inf)),
+        "seconds": Column("One registration (ms)", interval=False, limits=(0, inf)),
+        **{
+            name: Show(TITLES[name], where={"source": pooled, "metric": "accuracy", "table": name})
+            for name in (PAPER, UNSEEN, TRANSFER)
         },
-        footnotes=(
-            "Learning: classifier, and encoder if it has its own, from the measured training samples of a source. One "
-            "registration: to measure, embed and explain it. Times are means over sources and seeds, on one core; "
-            "they differ from run to run.",
-            f"In brackets: {BOOTSTRAP}.",
-        ),
+    }
+
+    def seconds(row: Row, _subset: Frame) -> dict[str, Cell | None]:
+        cells = {}
+        for metric, factor in SECONDS.items():
+            seconds_R = rows_where(costs, **row.where, metric=metric).groupby("seed")["value"].mean()
+            cells[metric] = cell_of_repeats((seconds_R * factor).to_numpy(), 0)
+        return cells
+
+    explainers = titles(run.config["controls"]["explainers"])
+    timed = {name: words for name, words in explainers.items() if name in set(costs["method"])}
+    heads = {"explainer": "Explainer"}
+    sheet = Sheet("table10_costs", heads, crossed(("method", timed)), columns, intervals, more=seconds)
+    notes = (
+        "Learning: classifier, and encoder if it has its own, from the measured training samples of a source. One "
+        "registration: to measure, embed and explain it. Times are means over sources and seeds, on one core; "
+        "they differ from run to run.",
+        f"In brackets: {BOOTSTRAP}.",
     )
+    return sheet.table("What explainers of the pair cost and gain" + run.stand_ins(), "metric", notes, keep_empty=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from math import inf
+from dataclasses import replace
 from typing import Any
 
 from gpca.active_learning.curves import TABLE, collect_curves
@@ -14,11 +14,12 @@ from gpca.declarations.result import Frame, Paths, table
 from gpca.declarations.step import Step
 from gpca.errors import InputError, require_names
 from gpca.experiments.frames import encoder_title, title_of_frames
+from gpca.experiments.label_counts import COUNT, label_cells, quantity
 from gpca.frames.source import REAL_WORLD
 from gpca.pairs.perturbation import CONCEPTS
-from gpca.reporting.tables.builder import TableBuilder, mean_over
-from gpca.reporting.tables.cells import cell_of_repeats, rows_where
-from gpca.reporting.tables.table import Cell, Column, Table
+from gpca.reporting.sheet import Sheet, Show, crossed
+from gpca.reporting.tables.builder import mean_over
+from gpca.reporting.tables.table import Table
 
 TO_TARGET = ("labels_to_target", "epochs_to_target", "reached")  # metrics that differ by target accuracy
 ONE_TARGET = "epochs_at_target"  # left out, because there are several targets
@@ -93,10 +94,10 @@ def collect_labels(label_files: Paths, targets: Iterable[float]) -> list[Frame]:
 
 
 STRATEGIES = {"bald_kmeans": "BALD, to {} % (labels)", "random": "Random, to {} % (labels)"}
-ENDS = {  # column -> metric, strategy, and how it is shown
-    "start": ("start_accuracy", "random", Column("Start (%)", interval=False)),
-    "final": ("final_accuracy", "bald_kmeans", Column("BALD, all queries (%)")),
-    "all_labels": ("final_accuracy", ALL_LABELS, Column("All labels (%)")),
+ENDS = {  # columns beside the labels to the targets
+    "start": quantity("start_accuracy", "Start (%)", "random", interval=False),
+    "final": quantity("final_accuracy", "BALD, all queries (%)", "bald_kmeans"),
+    "all_labels": quantity("final_accuracy", "All labels (%)", ALL_LABELS),
 }
 
 
@@ -113,39 +114,33 @@ def table6_labels(run: Run, metrics: Frame) -> Table:
     """Labels that BALD and random choice need, by target, and accuracies: embeddings × strategies."""
     section, frames = run.config["frame_labels"], run.config["real_world"]
     percents = [in_percent(target) for target in section["targets"]]
-    labels = {f"{strategy}_{percent}": (strategy, percent) for percent in percents for strategy in STRATEGIES}
-    builder = TableBuilder("table6_labels", {"seen": "Seen by"})
-    encoders = {name: encoder_title(name, "none") for name in frames["backbones"]}
-    for name, title in {**encoders, PAIR: "Measurements of the pair"}.items():
-
-        def cell(metric: str, strategy: str, factor: float = 1, end: str = "", of: str = TABLE + name) -> Cell | None:
-            rows = rows_where(metrics, source=REAL_WORLD, table=of + end, method=strategy)
-            values_R = factor * rows_where(rows, metric=metric).groupby("seed")["value"].mean()
-            missed = bool(end) and bool((rows_where(rows, metric="reached")["value"] < 1).any())
-            return cell_of_repeats(values_R, frames["test"] * len(values_R), at_least=missed)
-
-        cells = {key: cell("labels_to_target", of, end=f"/{percent}") for key, (of, percent) in labels.items()}
-        cells |= {key: cell(metric, strategy, 100) for key, (metric, strategy, _) in ENDS.items()}
-        builder.add_row([(name, title)], cells)
+    columns = {
+        f"{strategy}_{percent}": Show(
+            title.format(percent),
+            where={"metric": "labels_to_target", "method": strategy, "target": percent},
+            **COUNT,
+        )
+        for percent in percents
+        for strategy, title in STRATEGIES.items()
+    } | {key: replace(column, where={**column.where, "target": ""}) for key, column in ENDS.items()}
+    curves = metrics[(metrics["source"] == REAL_WORLD) & metrics["table"].str.startswith(TABLE)]
+    parts = curves["table"].str.removeprefix(TABLE).str.split("/")
+    curves = curves.assign(seen=parts.str[0], target=parts.str[1].fillna(""))
+    seen = {name: encoder_title(name, "none") for name in frames["backbones"]} | {PAIR: "Measurements of the pair"}
+    cell = label_cells(frames["test"], {})
+    sheet = Sheet("table6_labels", {"seen": "Seen by"}, crossed(("seen", seen)), columns, curves, cell=cell)
     for percent in percents:
-        builder.compare_across([f"{strategy}_{percent}" for strategy in STRATEGIES])
+        sheet.compare_across([f"{strategy}_{percent}" for strategy in STRATEGIES])
     new = " or ".join(section["held_out"])
-    return builder.build(
-        caption=f"Labels until a GPC to which {new} is new is as accurate on {title_of_frames(run.config)}",
-        column_head="quantity",
-        columns={
-            key: Column(STRATEGIES[strategy].format(percent), decimals=0, limits=(0, inf), least_is_best=True)
-            for key, (strategy, percent) in labels.items()
-        }
-        | {key: column for key, (_, _, column) in ENDS.items()},
-        footnotes=(
-            f"{mean_over(builder.most_seeds(), frames['test'])}. Bold: the fewer labels of the two to a target, "
-            "whether or not their intervals overlap; neither where they are equal.",
-            f"Start: {section['initial']} labeled samples of the two known concepts. Pool: their other training "
-            f"samples, of {frames['train']} with those of the new concept, and as many of the new one as make up "
-            f"{100 * section['share']:g} % of it. The paper's classifier is fitted anew in each round, as in Table "
-            f"III, until all targets are reached, to {section['least']} labels at least and {section['labels']} "
-            "at most; '>': some runs did not reach the target. Encoders saw every concept.",
-            "All labels: of a classifier that learns the whole pool. DGCNN's row is compared with the paper's numbers.",
-        ),
+    notes = (
+        f"{mean_over(sheet.seeds, frames['test'])}. Bold: the fewer labels of the two to a target, "
+        "whether or not their intervals overlap; neither where they are equal.",
+        f"Start: {section['initial']} labeled samples of the two known concepts. Pool: their other training "
+        f"samples, of {frames['train']} with those of the new concept, and as many of the new one as make up "
+        f"{100 * section['share']:g} % of it. The paper's classifier is fitted anew in each round, as in Table "
+        f"III, until all targets are reached, to {section['least']} labels at least and {section['labels']} "
+        "at most; '>': some runs did not reach the target. Encoders saw every concept.",
+        "All labels: of a classifier that learns the whole pool. DGCNN's row is compared with the paper's numbers.",
     )
+    caption = f"Labels until a GPC to which {new} is new is as accurate on {title_of_frames(run.config)}"
+    return sheet.table(caption, "quantity", notes, keep_empty=True)

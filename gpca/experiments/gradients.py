@@ -18,8 +18,8 @@ from gpca.io.csv_file import read_numbers
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.figures.style import LIGHT_GRAY, SMALL_PT, blues, write_title
-from gpca.reporting.tables.builder import TableBuilder, crossed, mean_over
-from gpca.reporting.tables.cells import cell_of_repeats, rows_where
+from gpca.reporting.sheet import Row, Sheet, Show, crossed, mean_over_seeds, where
+from gpca.reporting.tables.builder import mean_over
 from gpca.reporting.tables.table import Cell, Column
 from gpca.reporting.words import plural
 from gpca.steps.gradients import DELETION_COLUMNS, RANDOM, GradientSettings
@@ -184,30 +184,24 @@ PALEST = -0.25  # rank at which the colors reach white; no point has it
     metrics="gradients.csv",
 )
 def saliency_deletion(run: Run, metrics):
-    rows_of_table = rows_where(metrics, table=SALIENCY)
-    sheet = TableBuilder("saliency_deletion", {"source": "Dataset", "order": "Deleted"})
     columns: dict[str, Column] = {}
     for percent in [f"{100 * share:g}" for share in run.config["gradients"]["deleted"]]:
         drop, limits = f"drop_{percent}", (-100, 100)
-        columns[drop] = Column(f"Fall without {percent} % (points)", limits=limits)
-        columns[f"excess_{percent}"] = Column(f"beyond random, {percent} %", limits=limits, beside=drop)
-        columns[f"changed_{percent}"] = Column(f"Named otherwise (%), {percent} %", interval=False)
-    for (source, order), labels in crossed(run.source_titles, ORDERS):
-        rows = rows_where(rows_of_table, source=source, method=order)
-        samples = int(rows_where(rows, metric="test_samples")["value"].sum())
-        cells = {name: cell_of_repeats(100 * rows_where(rows, metric=name)["value"], samples) for name in columns}
-        sheet.add_row(labels, cells)
-    return sheet.build(
-        caption="Fall of GP-CA's score without some of the points" + sheet.stand_in_clause(run.sources, partly=False),
-        column_head="quantity",
-        columns=columns,
-        footnotes=(
-            f"{mean_over(sheet.most_seeds(), run.config['gradients']['samples'])}; one draw of points of each sample.",
-            "Fall: of the score of the concept named on the whole draw, in hundredths; in brackets the excess over "
-            "random deletion. To the center: in the order of how much moving a point to the center changes the score "
-            "(Zheng et al. 2019). At random: mean of four orders.",
-        ),
+        excess, changed = f"excess_{percent}", f"changed_{percent}"
+        columns[drop] = Show(f"Fall without {percent} % (points)", where={"metric": drop}, limits=limits)
+        columns[excess] = Show(f"beyond random, {percent} %", where={"metric": excess}, limits=limits, beside=drop)
+        columns[changed] = Show(f"Named otherwise (%), {percent} %", where={"metric": changed}, interval=False)
+    rows = crossed(("source", run.source_titles), ("method", ORDERS))
+    heads, numbers_of_table = {"source": "Dataset", "order": "Deleted"}, where(metrics, {"table": SALIENCY})
+    sheet = Sheet("saliency_deletion", heads, rows, columns, numbers_of_table, cell=mean_over_seeds)
+    notes = (
+        f"{mean_over(sheet.seeds, run.config['gradients']['samples'])}; one draw of points of each sample.",
+        "Fall: of the score of the concept named on the whole draw, in hundredths; in brackets the excess over "
+        "random deletion. To the center: in the order of how much moving a point to the center changes the score "
+        "(Zheng et al. 2019). At random: mean of four orders.",
     )
+    caption = "Fall of GP-CA's score without some of the points" + sheet.stand_in_clause(run.sources, partly=False)
+    return sheet.table(caption, "quantity", notes, keep_empty=True)
 
 
 ORDERS = {
@@ -228,36 +222,28 @@ ORDERS = {
     metrics="gradients.csv",
 )
 def tcav(run: Run, metrics):
-    rows_of_table = rows_where(metrics, table=TCAV)
-    classes = list(dict.fromkeys(rows_of_table["concept"]))
-    sheet = TableBuilder("tcav", {"source": "Dataset", "tested": "Concept"})
+    tests = where(metrics, {"table": TCAV})
     columns: dict[str, Column] = {}
-    for name in classes:
-        columns[f"score_{name}"] = Column(f"Class {name} (%)", of_samples=False)
+    for name in dict.fromkeys(tests["concept"]):
+        of_class = {"metric": "score", "concept": name}
+        columns[f"score_{name}"] = Show(f"Class {name} (%)", where=of_class, of_samples=False)
         columns[f"significant_{name}"] = Column(f"seeds, {name}", decimals=0, interval=False)
-    columns["probe"] = Column("Probes right (%)")
-    tested_concepts = {name: name for name in dict.fromkeys(rows_of_table["method"])}
-    for (source, tested), labels in crossed(run.source_titles, tested_concepts):
-        rows = rows_where(rows_of_table, source=source, method=tested)
-        cells: dict[str, Cell | None] = {}
-        for name in classes:
-            values = rows_where(rows, concept=name).groupby("metric")["value"].apply(list)
-            cells[f"score_{name}"] = cell_of_repeats(100 * np.array(values.get("score", [])), 0)
-            if significant_R := values.get("significant", []):
-                cells[f"significant_{name}"] = Cell(sum(significant_R), 0.0, len(significant_R), 0)
-        probe_R = rows_where(rows, metric="probe").groupby("seed")["value"].mean()
-        cells["probe"] = cell_of_repeats(100 * probe_R, 0)
-        sheet.add_row(labels, cells)
+    columns["probe"] = Show("Probes right (%)", where={"metric": "probe"})
+
+    def significant(_row: Row, subset: Frame) -> dict[str, Cell]:
+        by_class = where(subset, {"metric": "significant"}).groupby("concept")["value"]
+        return {f"significant_{name}": Cell(float(each.sum()), 0.0, len(each), 0) for name, each in by_class}
+
+    rows = crossed(("source", run.source_titles), ("method", {name: name for name in tests["method"]}))
+    heads = {"source": "Dataset", "tested": "Concept"}
+    sheet = Sheet("tcav", heads, rows, columns, tests, more=significant, cell=mean_over_seeds)
     settings = run.config["gradients"]
-    return sheet.build(
-        caption="TCAV's scores for GP-CA" + sheet.stand_in_clause(run.sources, partly=False),
-        column_head="quantity",
-        columns=columns,
-        footnotes=(
-            f"Means over {plural(sheet.most_seeds(), 'seed')}; {settings['vectors']} probes for each concept.",
-            "Score: share of the test samples of the class whose log odds of it grow along the concept; about half "
-            "if there is no relation. Seeds: in how many of them it differs from the scores of random probes, at the "
-            f"level {settings['level']:g} over all tests of a seed (Bonferroni). Probes right: accuracy on training "
-            "samples that the probe did not learn, the mean of those with and without the concept.",
-        ),
+    notes = (
+        f"Means over {plural(sheet.seeds, 'seed')}; {settings['vectors']} probes for each concept.",
+        "Score: share of the test samples of the class whose log odds of it grow along the concept; about half "
+        "if there is no relation. Seeds: in how many of them it differs from the scores of random probes, at the "
+        f"level {settings['level']:g} over all tests of a seed (Bonferroni). Probes right: accuracy on training "
+        "samples that the probe did not learn, the mean of those with and without the concept.",
     )
+    caption = "TCAV's scores for GP-CA" + sheet.stand_in_clause(run.sources, partly=False)
+    return sheet.table(caption, "quantity", notes, keep_empty=True)

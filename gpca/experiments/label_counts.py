@@ -49,13 +49,13 @@ def label_cells(test: int, clusters: Clusters) -> Callable[[Frame, Show], Cell |
 
     Args:
         test: number of test samples of a seed.
-        clusters: numbers of clusters of these, which widen the interval of an accuracy.
+        clusters: numbers of clusters of these, which widen the interval of an accuracy, if there are any.
     """
 
     def cell(rows: Frame, column: Show) -> Cell | None:
         metric, chosen = column.where["metric"], where(rows, column.where)
         values_R = column.factor * chosen.groupby("seed")["value"].mean()
-        if metric in OVER_TEST_SAMPLES:
+        if clusters and metric in OVER_TEST_SAMPLES:
             counted = sum(
                 clusters[source, int(seed)] for source in chosen["source"].unique() for seed in values_R.index
             )

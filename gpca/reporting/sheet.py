@@ -59,14 +59,11 @@ def interval_of(rows: pd.DataFrame, column: Show) -> Cell | None:
     return interval_cell(chosen.iloc[0], factor=column.factor) if len(chosen) else None
 
 
-def means_over_seeds(test_samples: int = 0) -> Callable[[pd.DataFrame, Show], Cell | None]:
-    """How numbers by seed become cells: their mean of each seed, then that of all, of so many test samples each."""
-
-    def cell(rows: pd.DataFrame, column: Show) -> Cell | None:
-        values_R = column.factor * where(rows, column.where).groupby("seed")["value"].mean()
-        return cell_of_repeats(values_R.to_numpy(), test_samples * len(values_R))
-
-    return cell
+def mean_over_seeds(rows: pd.DataFrame, column: Show) -> Cell | None:
+    """Cell of numbers by seed: the mean of each seed's mean; of as many test samples as the rows count in all."""
+    values_R = column.factor * where(rows, column.where).groupby("seed")["value"].mean()
+    samples = int(where(rows, {"metric": "test_samples"})["value"].sum())
+    return cell_of_repeats(values_R.to_numpy(), samples)
 
 
 class Sheet(TableBuilder):
