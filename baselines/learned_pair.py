@@ -28,7 +28,7 @@ from gpca.settings import Count, PositiveShare
 if TYPE_CHECKING:
     import torch
 
-ENCODER = "pair_dgcnn"  # in :data:`gpca.encoders.dgcnn.PAIR_ENCODERS`
+ENCODER = "pair_dgcnn"
 NUMBERS: Columns = {"motion": EVERY, "starts": EVERY}  # that an encoder for causes reads beside the clouds
 
 
@@ -60,7 +60,7 @@ class LearnedPairGPCA(PairDescription, GPCA):
 
     def learn_encoder(self, registrations: Registrations) -> Callable[[Registrations], Registrations]:
         """Train the encoder with a head on all labeled pairs, and return a function that attaches its embeddings."""
-        from gpca.encoders.dgcnn import PAIR_ENCODERS
+        from gpca.encoders.dgcnn import PairDGCNN
         from gpca.encoders.registry import EncoderSettings
         from gpca.encoders.training import embed, train_encoder
 
@@ -74,7 +74,7 @@ class LearnedPairGPCA(PairDescription, GPCA):
         options: dict[str, Any] = {"motion": labeled.attached[motion].shape[1]}
         settings = EncoderSettings(ENCODER, self._draw_points, draws=2, options=options, **self._training)
         draw = partial(draw_pairs, self._prefix + "points", motion)
-        make = partial(PAIR_ENCODERS[ENCODER], **options)
+        make = partial(PairDGCNN, **options)
         all_rows = replace(labeled, split=np.full(len(labeled), "train"))
         model, _ = train_encoder(all_rows, *self._axes, settings, classes=self.labels, make=make, draw=draw)
 

@@ -98,7 +98,7 @@ def test_an_encoder(config, added_modules, registrations, monkeypatch):
 
 def test_an_acquisition_strategy(config, registrations, monkeypatch, tmp_path):
     from gpca.active_learning.curves import POOL_COLUMNS, collect_curves, write_curves
-    from gpca.active_learning.rounds import initial_gpc, make_task
+    from gpca.active_learning.rounds import initial_gpc, make_task, rounds
     from gpca.active_learning.settings import ActiveLearningSettings
     from gpca.classifier.settings import GPCSettings
     from gpca.declarations.plan import Run

@@ -17,24 +17,16 @@ TOLERANCE = 1e-10  # of a logit
 
 @dataclass
 class Node:
-    """A box of the samples below it.
-
-    Attributes:
-        low_D, high_D: corners of the box.
-        time: of the split; infinity for leaves.
-        counts_C: samples per class in a leaf; elsewhere, number of children with the class.
-        children: below and above the split; None for leaves.
-        x_N_D, label_N: samples of a leaf.
-    """
+    """A box of the samples below it."""
 
     low_D: np.ndarray
     high_D: np.ndarray
-    time: float
-    counts_C: np.ndarray
+    time: float  # of the split; infinity for leaves
+    counts_C: np.ndarray  # samples per class in a leaf; elsewhere, number of children with the class
     axis: int = -1
     place: float = 0.0
-    children: tuple[Node, Node] | None = None
-    x_N_D: np.ndarray = field(default_factory=lambda: np.empty((0, 0)))
+    children: tuple[Node, Node] | None = None  # below and above the split; None for leaves
+    x_N_D: np.ndarray = field(default_factory=lambda: np.empty((0, 0)))  # samples of a leaf
     label_N: np.ndarray = field(default_factory=lambda: np.empty(0, int))
 
 
@@ -43,8 +35,7 @@ class MondrianForest:
 
     A Mondrian tree splits a box at random times: the next split comes after a time drawn from an exponential
     distribution whose rate is the sum of the box's sides. A sample outside of a box may split off above it, as in a
-    tree grown on all samples at once, so that the order of arrival does not matter. Without samples, classes are
-    equally probable.
+    tree grown on all samples at once, so that the order of arrival does not matter.
     """
 
     def __init__(self, classes: int, random: np.random.Generator, trees: int) -> None:
@@ -62,8 +53,6 @@ class MondrianForest:
     def scores(self, x_N_D: np.ndarray) -> np.ndarray:
         """Return the class probabilities (N, C), averaged over the trees."""
         uniform_C = np.full(self._classes, 1 / self._classes)
-        if not self._roots:
-            return np.tile(uniform_C, (len(x_N_D), 1))
         total_N_C = np.zeros((len(x_N_D), self._classes))
         for root in self._roots:
             _descend(root, 0.0, uniform_C, x_N_D, np.ones(len(x_N_D)), np.arange(len(x_N_D)), total_N_C)
@@ -165,9 +154,7 @@ class BayesianLayer:
     curvature (Daxberger et al. 2021). A label changes the curvature by a matrix of rank C, so that the logits of its
     sample determine the new weights in C dimensions (extended Kalman filter of Bayesian continual learning).
 
-    Args:
-        width: F - 1; a constant is added to the features.
-        deviation: of a logit by the prior, where the features have unit variance.
+    A constant is added to the F - 1 features; where they have unit variance, `deviation` is a logit's by the prior.
     """
 
     def __init__(self, width: int, classes: int, deviation: float) -> None:

@@ -80,7 +80,6 @@ def wrong(rows: pd.DataFrame) -> np.ndarray:
 
 
 def scores_of(rows: pd.DataFrame) -> list[str]:
-    """Those of `SCORES` that the learner has."""
     return [score for score in SCORES if score in rows]
 
 

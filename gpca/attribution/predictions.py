@@ -34,7 +34,6 @@ def write_predictions(path: str | Path, registrations: Registrations, attributio
 
 
 def prediction_frame(registrations: Registrations, attribution: Attribution) -> pd.DataFrame:
-    """Return the columns of a prediction file."""
     import pandas as pd
 
     return pd.DataFrame(

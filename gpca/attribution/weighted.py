@@ -10,7 +10,6 @@ TINY = 1e-6  # sums of squares of ranks that are not all the same are larger tha
 
 
 def calibration_error(p_S_C: np.ndarray, target_S: np.ndarray, weights_B_S: np.ndarray) -> np.ndarray:
-    """Return the expected calibration error of the largest probability (B,)."""
     confidence_S, hit_S = p_S_C.max(axis=1), p_S_C.argmax(axis=1) == target_S
     bin_S = np.minimum((confidence_S * BINS).astype(int), BINS - 1)
     gaps_B = np.zeros(len(weights_B_S))

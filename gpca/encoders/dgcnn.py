@@ -88,9 +88,6 @@ class PairDGCNN(nn.Module):
         return torch.cat([self.dgcnn(joined_B_2_T_F.flatten(1, 2)), motion_B_M], dim=1)
 
 
-PAIR_ENCODERS = {"pair_dgcnn": PairDGCNN}
-
-
 class EdgeConv(nn.Module):
     """Linear map W (F_out, 2·F_in) on edges, batch norm over edges, LeakyReLU(0.2), maximum over the k neighbors."""
 

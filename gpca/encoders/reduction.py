@@ -28,7 +28,6 @@ class PCA:
     components: Count = 64
 
     def fit(self, z_train_N_d: np.ndarray, *axes: object) -> Transform:
-        """Return the projection on the components."""
         from sklearn.decomposition import PCA as SklearnPCA
 
         return SklearnPCA(self.components, svd_solver="full").fit(z_train_N_d).transform
@@ -70,7 +69,6 @@ class Autoencoder:
     epochs: Count = 100
 
     def fit(self, z_train_N_d: np.ndarray, *axes: object) -> Transform:
-        """Train the autoencoder and return its encoder."""
         import torch
         from torch import nn
 
@@ -106,8 +104,7 @@ REDUCTIONS = {"none": None, "pca": PCA, "umap": UMAP, "autoencoder": Autoencoder
 def reduce(name: str, h_train_N_d: np.ndarray, h_S_d: np.ndarray, settings: dict, *axes: object) -> np.ndarray:
     """Fit a reduction on training embeddings and apply it: (S, components), float32; ``none`` returns (S, d) unchanged.
 
-    The axes name the random numbers. An InputError rejects unknown reductions and settings, embeddings with NaN or
-    infinity, identical training embeddings, and more components or neighbors than these have rows or dimensions.
+    The axes name the random numbers. An InputError rejects what cannot be reduced.
     """
     reduction = make_reduction(name, settings)
     for h, role in ((h_train_N_d, "training embeddings"), (h_S_d, "embeddings")):
@@ -144,10 +141,9 @@ def make_reduction(name: str, settings: dict):
     require_known("reduction", name, REDUCTIONS)
     reduction = REDUCTIONS[name]
     names = [field.name for field in fields(reduction)] if reduction else []
-    for key in settings:
-        if key not in names:
-            remedy = f"its settings are {', '.join(names) or 'none'}"
-            raise InputError(f"reduction '{name}'", f"has no setting '{key}'", remedy)
+    if unknown := [key for key in settings if key not in names]:
+        remedy = f"its settings are {', '.join(names) or 'none'}"
+        raise InputError(f"reduction '{name}'", f"has no setting '{unknown[0]}'", remedy)
     return reduction(**settings) if reduction else None
 
 

@@ -29,7 +29,6 @@ def encoders() -> dict[str, str]:
 
 
 def encoder_module(settings: Mapping) -> str:
-    """Return the module of the encoder that has these settings."""
     return encoders()[settings["backbone"]].split(":")[0]
 
 

@@ -17,11 +17,7 @@ from gpca.numerals import LARGEST_NUMBER
 
 
 def read_tensors(path: str | Path) -> Any:
-    """Return the content of a file of torch.save, on the CPU.
-
-    Raises ValueError for a member with a wrong checksum, compressed or shared, and for a tensor that is larger than its
-    data in the file, or holds NaN, infinity or implausibly large numbers; torch raises exceptions of many kinds.
-    """
+    """Return the content of a file of torch.save, on the CPU; ValueError for what is implausible, torch has others."""
     with zipfile.ZipFile(path) as archive:
         members = archive.infolist()
         if any(info.compress_type != zipfile.ZIP_STORED or info.compress_size != info.file_size for info in members):

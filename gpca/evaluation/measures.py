@@ -166,7 +166,6 @@ def read_rows(path: str | Path) -> pd.DataFrame:
 
 
 def read_metrics(path: str | Path) -> pd.DataFrame:
-    """Read a file of values by seed."""
     return read_numbers(path, TIDY_COLUMNS, ("seed", "value")).astype({"seed": int})
 
 

@@ -32,26 +32,18 @@ def analytical_features(
 def compare(source_P_3: np.ndarray, target_Q_3: np.ndarray, drawn: np.ndarray, neighbors: int) -> list[float]:
     """Compare the local shape of the aligned source at the drawn points with that of the nearest target points.
 
-    Returns:
-        mean |cosine| between the normals; mean planarity and linearity of the source; mean differences of both from
-        the target's.
+    By mean |cosine| between the normals, mean planarity and linearity of the source, and their mean differences.
     """
     from scipy.spatial import cKDTree
 
     source_tree, target_tree = cKDTree(source_P_3), cKDTree(target_Q_3)
     query_D_3 = source_tree.data[drawn]
     _, nearest_D = target_tree.query(query_D_3)
-    normals_D_3, planarity_D, linearity_D = local_shape(source_tree, query_D_3, neighbors)
-    target_normals_D_3, target_planarity_D, target_linearity_D = local_shape(
-        target_tree, target_tree.data[nearest_D], neighbors
-    )
-    return [
-        np.abs(np.sum(normals_D_3 * target_normals_D_3, axis=1)).mean(),
-        planarity_D.mean(),
-        linearity_D.mean(),
-        (planarity_D - target_planarity_D).mean(),
-        (linearity_D - target_linearity_D).mean(),
-    ]
+    normals_D_3, *shape = local_shape(source_tree, query_D_3, neighbors)
+    target_normals_D_3, *target_shape = local_shape(target_tree, target_tree.data[nearest_D], neighbors)
+    agreement = np.abs(np.sum(normals_D_3 * target_normals_D_3, axis=1)).mean()
+    differences = [(own_D - other_D).mean() for own_D, other_D in zip(shape, target_shape, strict=True)]
+    return [agreement, *(own_D.mean() for own_D in shape), *differences]
 
 
 def local_shape(tree, query_D_3: np.ndarray, neighbors: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -12,6 +12,7 @@ from gpca.seeds import seed_of
 
 PAPERS_RANDOM_STATE = 42  # of the forest and of the linear SVM in Table V
 LEAF = -1  # in place of a leaf's feature
+PARTS = ("roots", "feature", "number", "right")  # arrays of :class:`BoostedQuestion`
 
 
 class ConceptClassifier:
@@ -105,21 +106,19 @@ class BoostedQuestion:
         """Return numbers and tensors for :meth:`from_state`."""
         import torch
 
-        arrays = {name: torch.from_numpy(getattr(self, name)) for name in ("roots", "feature", "number", "right")}
-        return {"baseline": self.baseline, **arrays}
+        return {"baseline": self.baseline} | {name: torch.from_numpy(getattr(self, name)) for name in PARTS}
 
     @classmethod
     def from_state(cls, state: dict) -> BoostedQuestion:
         """Return the trees of a :meth:`state`."""
-        arrays = {name: state[name].numpy() for name in ("roots", "feature", "number", "right")}
-        return cls(baseline=state["baseline"], **arrays)
+        return cls(state["baseline"], *(state[name].numpy() for name in PARTS))
 
 
 def require_trees(state: dict, features: int) -> None:
     """Raise a ValueError unless a :meth:`BoostedQuestion.state` holds terminating trees on this many features."""
     import torch
 
-    parts = roots, feature, number, right = [state[name] for name in ("roots", "feature", "number", "right")]
+    parts = roots, feature, number, right = [state[name] for name in PARTS]
     kinds = (torch.int32, torch.int16, torch.float64, torch.int32)
     if any(part.ndim != 1 or part.dtype != kind for part, kind in zip(parts, kinds, strict=True)):
         raise ValueError("its trees have parts of a different shape or type")

@@ -70,7 +70,7 @@ class Encoding(Protocol):
 
 
 class ScoringExplainer:
-    """Base of explainers that only give scores for their `labels`; it measures the time."""
+    """Base of explainers that give scores for their `labels`; it measures the time."""
 
     labels: tuple[str, ...] = CONCEPTS
 
@@ -83,8 +83,14 @@ class ScoringExplainer:
     def explain(self, registrations: Registrations) -> Attribution:
         """Score every registration."""
         started = perf_counter()
-        scores_N_C = self.scores(registrations)
-        return Attribution.of_scores(self.labels, scores_N_C, seconds=(perf_counter() - started) / len(registrations))
+        scores_N_C, variances_N_C, bald_N = self.summary(registrations)
+        more = {"variances_N_C": variances_N_C, "bald_N": bald_N}
+        seconds = (perf_counter() - started) / len(registrations)
+        return Attribution.of_scores(self.labels, scores_N_C, seconds=seconds, **more)
+
+    def summary(self, registrations: Registrations) -> tuple[np.ndarray, np.ndarray | None, np.ndarray | None]:
+        """Return scores and, if any, variances (N, C), and BALD (N,)."""
+        return self.scores(registrations), None, None
 
     def scores(self, registrations: Registrations) -> np.ndarray:
         """Return the scores (N, C)."""
@@ -117,21 +123,11 @@ class ClassifierExplainer(ScoringExplainer):
         raise NotImplementedError
 
 
-class DrawingExplainer:
-    """Base of explainers that draw from a posterior: scores with variances and BALD; it measures the time."""
-
-    labels: tuple[str, ...] = CONCEPTS
-
-    def explain(self, registrations: Registrations) -> Attribution:
-        """Draw for every registration and summarize (Eqs. 4 to 7)."""
-        started = perf_counter()
-        scores_N_C, variances_N_C, bald_N = self.summary(registrations)
-        more = {"variances_N_C": variances_N_C, "bald_N": bald_N}
-        seconds = (perf_counter() - started) / len(registrations)
-        return Attribution.of_scores(self.labels, scores_N_C, seconds=seconds, **more)
+class DrawingExplainer(ScoringExplainer):
+    """Base of explainers that draw from a posterior: scores with variances and BALD."""
 
     def summary(self, registrations: Registrations) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return scores and variances (N, C), and BALD (N,)."""
+        """Return scores and variances (N, C), and BALD (N,) (Eqs. 4 to 7)."""
         raise NotImplementedError
 
 
@@ -157,19 +153,17 @@ def attached(registrations: Registrations, name: str) -> np.ndarray:
 
 @dataclass(frozen=True)
 class ExplainerEntry:
-    """An explainer by name.
-
-    Attributes:
-        reads: what it needs attached: ``embeddings`` of the encoder, ``uncertainty/<design>`` outcomes of a design
-            (:mod:`gpca.uncertainty.designs`), or ``registrations``: nothing.
-        oracle: whether it knows the truth about what it explains: an upper bound, which its title has to say.
-    """
+    """An explainer by name."""
 
     title: str  # its name in tables
     make: Callable[..., ConceptExplainer]  # makes it from source, seed and the settings of the config
     sees: Sees  # all that its answer depends on, of :data:`PARTS`; may be empty
+    # What it needs attached: ``embeddings`` of the encoder, ``uncertainty/<design>`` outcomes of a design
+    # (:mod:`gpca.uncertainty.designs`), or ``registrations``: nothing.
     reads: str = BARE
-    oracle: bool = False
+    oracle: bool = (
+        False  # whether it knows the truth about what it explains: an upper bound, which its title has to say
+    )
     observed_only: bool = False  # of a design's outcomes it reads the first alone, that of the observed pair
 
     def __post_init__(self) -> None:

@@ -41,11 +41,8 @@ class NormalizedFeatures:
         """Learn the ranks."""
         from sklearn.preprocessing import QuantileTransformer
 
-        fitted = QuantileTransformer(
-            n_quantiles=min(QUANTILES, len(features_N_F)),
-            output_distribution="normal",
-            random_state=seed_of(*self._axes, "quantiles") % 2**32,
-        ).fit(features_N_F)
+        n, seed = min(QUANTILES, len(features_N_F)), seed_of(*self._axes, "quantiles") % 2**32
+        fitted = QuantileTransformer(n_quantiles=n, output_distribution="normal", random_state=seed).fit(features_N_F)
         self._quantiles_Q_F = fitted.quantiles_
         return self
 
@@ -136,10 +133,7 @@ class PairClassifier:
         return len(self._failure.learned_N_d)
 
     def state(self) -> dict[str, object]:
-        """Return tensors, numbers and names for :meth:`from_state`.
-
-        All four learned the same inputs, two thirds of all numbers: as one tensor, a file stores them once.
-        """
+        """Return tensors, numbers and names for :meth:`from_state`; the same inputs of all four as one tensor."""
         failure, *causes = (gpc.state() for gpc in (self._failure, *self._causes))
         for gpc, state in zip(self._causes, causes, strict=True):
             if np.array_equal(gpc.learned_N_d, self._failure.learned_N_d):

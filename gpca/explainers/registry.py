@@ -26,7 +26,6 @@ REGISTRIES: dict[str, Registry[ExplainerEntry]] = {
 
 
 def explainers(kind: str = CONCEPTS) -> dict[str, ExplainerEntry]:
-    """Return all explainers of a kind by name."""
     return REGISTRIES[kind].entries()
 
 
@@ -41,7 +40,6 @@ def require_settings(name: str, settings: Mapping[str, object], kind: str = CONC
 
 
 def explainer_module(name: str, kind: str = CONCEPTS) -> str:
-    """Return the module that lists the explainer."""
     return REGISTRIES[kind].module(name)
 
 

@@ -3,16 +3,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from gpca.active_learning.acquisition import (
-    EXPANSION,
-    STRATEGIES,
-    Pool,
-    balanced_kmeans,
-    bald_kmeans,
-    require_strategy,
-    select,
-    top,
-)
+from gpca.active_learning.acquisition import EXPANSION, STRATEGIES, Pool, balanced_kmeans, bald_kmeans, select, top
 from gpca.errors import InputError
 
 every_strategy = pytest.mark.parametrize("name", STRATEGIES)
@@ -42,47 +33,26 @@ def around(centers, each, seed=0):
 
 
 @every_strategy
-@pytest.mark.parametrize("batch", [1, 4, 39])
-def test_a_strategy_returns_as_many_different_rows_as_asked_for(name, batch):
-    rows = selected(name, make_pool(), batch)
-    assert len(set(rows)) == len(rows) == batch
-    assert set(rows) <= set(range(40))
-
-
-@every_strategy
-def test_the_same_generator_gives_the_same_rows(name):
-    assert selected(name, make_pool(), 4) == selected(name, make_pool(), 4)
-
-
-@every_strategy
-@pytest.mark.parametrize("n", [1, 4])
-def test_a_pool_no_larger_than_the_batch_is_taken_whole(name, n):
-    assert sorted(selected(name, make_pool(n), 4)) == list(range(n))
-
-
-def identical_samples(labeled):
-    return make_pool(
-        h_N_d=np.ones((40, 4)),
-        scores_N_C=np.full((40, 3), 1 / 3),
-        bald_N=np.zeros(40),
-        h_labeled_L_d=np.full((5, 4), labeled),
-    )
+@pytest.mark.parametrize(("n", "batch"), [(40, 1), (40, 4), (40, 39), (4, 4), (1, 4)])
+def test_a_strategy_returns_as_many_different_rows_as_asked_for_and_repeats_them(name, n, batch):
+    rows = selected(name, make_pool(n), batch)
+    assert len(set(rows)) == len(rows) == min(n, batch)
+    assert set(rows) <= set(range(n))
+    assert selected(name, make_pool(n), batch) == rows
 
 
 @every_strategy
 @pytest.mark.parametrize("labeled", [0.0, 1.0], ids=["labeled elsewhere", "labeled the same"])
 @pytest.mark.filterwarnings("ignore:Number of distinct clusters")
 def test_identical_samples_still_give_different_rows(name, labeled):
-    assert len(set(selected(name, identical_samples(labeled), 4))) == 4
+    of_labeled = {"h_labeled_L_d": np.full((5, 4), labeled)}
+    alike = {"h_N_d": np.ones((40, 4)), "scores_N_C": np.full((40, 3), 1 / 3), "bald_N": np.zeros(40)}
+    assert len(set(selected(name, make_pool(**of_labeled, **alike), 4))) == 4
 
 
 def test_an_unknown_strategy_is_named_with_the_known():
-    with pytest.raises(
-        InputError, match=r"strategy 'bold': unknown; choose one of random, random_stratified, entropy,"
-    ):
+    with pytest.raises(InputError, match=r"strategy 'bold': unknown; choose one of random, .*, bald_kmeans"):
         selected("bold", make_pool(), 4)
-    with pytest.raises(InputError, match="bald_kmeans"):
-        require_strategy("")
 
 
 @pytest.mark.parametrize("name", [name for name in STRATEGIES if not STRATEGIES[name].needs_scores])
@@ -144,13 +114,10 @@ def test_balanced_clusters_hold_as_many_samples_each_and_none_gains_by_an_exchan
 
 
 def test_a_crowd_of_uncertain_samples_gets_as_many_labels_as_it_has_shares_of_the_candidates():
-    crowd, outliers, certain = (
-        around([[0, 0]], 12),
-        around([[90, 0], [0, 90], [90, 90], [45, 45]], 1),
-        around([[9, 9]], 14),
-    )
+    outliers = around([[90, 0], [0, 90], [90, 90], [45, 45]], 1)
+    h = np.concatenate([around([[0, 0]], 12), outliers, around([[9, 9]], 14)])
     uncertain = np.arange(30) < 16
-    pool = make_pool(30, h_N_d=np.concatenate([crowd, outliers, certain]), bald_N=uncertain.astype(float))
+    pool = make_pool(30, h_N_d=h, bald_N=uncertain.astype(float))
     rows = np.array(selected("bald_kmeans", pool, 4))
     assert ((rows < 12).sum(), uncertain[rows].sum()) == (3, 4)
 
@@ -170,19 +137,14 @@ def test_bald_stochastic_draws_in_proportion_to_bald():
     assert [first[row] / 2000 for row in range(1, 5)] == pytest.approx([0.1, 0.2, 0.3, 0.4], abs=0.05)
 
 
-@pytest.mark.parametrize("batch", [3, 7, 12])
-def test_random_stratified_takes_as_many_of_each_class(batch):
-    truth = np.array(["noise"] * 30 + ["pose"] * 6 + ["overlap"] * 4)
+@pytest.mark.parametrize(
+    ("of_each", "batch", "expected"),
+    [((30, 6, 4), 3, [1, 1, 1]), ((30, 6, 4), 7, [2, 2, 3]), ((30, 6, 4), 12, [4, 4, 4]), ((30, 9, 1), 9, [1, 4, 4])],
+)
+def test_random_stratified_takes_as_many_of_each_class_or_all_of_a_rare_one(of_each, batch, expected):
+    truth = np.repeat(["noise", "pose", "overlap"], of_each)
     counts = Counter(truth[selected("random_stratified", make_pool(truth_N=truth), batch)])
-    assert sum(counts.values()) == batch
-    assert max(counts.values()) - min(counts.values()) <= 1
-    assert len(counts) == 3
-
-
-def test_random_stratified_takes_more_of_the_others_where_a_class_runs_out():
-    truth = np.array(["noise"] * 30 + ["pose"] * 9 + ["overlap"])
-    counts = Counter(truth[selected("random_stratified", make_pool(truth_N=truth), 9)])
-    assert counts == {"noise": 4, "pose": 4, "overlap": 1}
+    assert sorted(counts.values()) == expected
 
 
 def test_coreset_takes_the_point_farthest_from_all_labeled_then_from_that_too():

@@ -3,56 +3,38 @@ import math
 import pandas as pd
 import pytest
 
-from gpca.active_learning.curves import (
-    POOL_COLUMNS,
-    STREAM_COLUMNS,
-    area_under_curve,
-    collect_curves,
-    pool_metrics,
-    read_curves,
-    stream_metrics,
-    write_curves,
-)
+from gpca.active_learning import curves as module
+from gpca.active_learning.curves import POOL_COLUMNS, STREAM_COLUMNS, collect_curves, read_curves, write_curves
 from gpca.errors import InputError
 
 
-def pool_curve(*accuracies, batch=4):
+def pool_curve(*accuracies):
     return [
-        {
-            "labels": batch * n,
-            "new_labels": n,
-            "accuracy": a,
-            "accuracy_new": a / 2,
-            "epochs": 3 * (n > 0),
-            "select_s": 1.0,
-        }
+        {"labels": 4 * n, "new_labels": n, "accuracy": a, "accuracy_new": a / 2, "epochs": 3 * (n > 0), "select_s": 1.0}
         for n, a in enumerate(accuracies)
     ]
 
 
-def stream_curve(*accuracies_new, quiet=20):
+def stream_curve(*accuracies_new):
     return [
         {
-            "arrived": 10 * n, "present": int(10 * n >= quiet), "labels": n, "new_labels": n // 2,
+            "arrived": 10 * n, "present": int(n >= 2), "labels": n, "new_labels": n // 2,
             "running": math.nan if n == 0 else 0.8, "accuracy": 0.9, "accuracy_new": a,
         }
         for n, a in enumerate(accuracies_new)
     ]  # fmt: skip
 
 
-def frame(steps):
-    return pd.DataFrame(steps)
+def pool_metrics(*accuracies):
+    return module.pool_metrics(pd.DataFrame(pool_curve(*accuracies)), target=0.9)
 
 
 def test_labels_and_epochs_count_to_the_first_time_that_the_target_is_reached():
-    metrics = pool_metrics(frame(pool_curve(0.6, 0.7, 0.9, 0.8, 0.95)), target=0.9)
+    metrics = pool_metrics(0.6, 0.7, 0.9, 0.8, 0.95)
     assert (metrics["labels_to_target"], metrics["epochs_to_target"], metrics["reached"]) == (8, 6, 1)
     assert metrics["epochs_at_target"] == 3
     assert (metrics["start_accuracy"], metrics["final_accuracy"], metrics["final_accuracy_new"]) == (0.6, 0.95, 0.475)
-
-
-def test_a_target_that_is_missed_counts_with_all_labels_and_says_so():
-    metrics = pool_metrics(frame(pool_curve(0.6, 0.7, 0.8)), target=0.9)
+    metrics = pool_metrics(0.6, 0.7, 0.8)  # a target that is missed counts with all labels
     assert (metrics["labels_to_target"], metrics["epochs_to_target"], metrics["reached"]) == (8, 6, 0)
 
 
@@ -60,18 +42,20 @@ def test_a_target_that_is_missed_counts_with_all_labels_and_says_so():
     ("accuracies", "area"), [((0.5, 0.5, 0.5), 0.5), ((0.0, 1.0), 0.5), ((0.0, 1.0, 1.0), 0.75), ((0.7,), 0.7)]
 )
 def test_the_area_is_the_mean_accuracy_over_the_budget(accuracies, area):
-    assert area_under_curve(frame(pool_curve(*accuracies))) == pytest.approx(area)
+    assert pool_metrics(*accuracies)["area_under_curve"] == pytest.approx(area)
 
 
-def test_the_delay_counts_from_the_first_arrival_of_the_new_concept():
-    # Recognized at 10 already, by chance, before any of it was there.
-    metrics = stream_metrics(frame(stream_curve(0.0, 0.6, 0.1, 0.4, 0.5, 0.2)))
-    assert (metrics["delay"], metrics["recognised"], metrics["labels"]) == (20, 1, 5)
-
-
-def test_a_concept_that_is_never_recognized_has_the_rest_of_the_stream_as_its_delay():
-    metrics = stream_metrics(frame(stream_curve(0.0, 0.9, 0.1, 0.4)))
-    assert (metrics["delay"], metrics["recognised"]) == (10, 0)
+@pytest.mark.parametrize(
+    ("accuracies", "delay", "recognized"),
+    [
+        ((0.0, 0.6, 0.1, 0.4, 0.5, 0.2), 20, 1),  # recognized at 10 already, by chance, before any of it was there
+        ((0.0, 0.9, 0.1, 0.4), 10, 0),  # never: the rest of the stream
+    ],
+)
+def test_the_delay_counts_from_the_first_arrival_of_the_new_concept(accuracies, delay, recognized):
+    metrics = module.stream_metrics(pd.DataFrame(stream_curve(*accuracies)))
+    found = metrics["delay"], metrics["recognised"], metrics["labels"]
+    assert found == (delay, recognized, len(accuracies) - 1)
 
 
 @pytest.fixture
@@ -119,10 +103,7 @@ def test_curves_that_end_at_other_labels_have_no_gain(files):
         ("", r"seed3.csv: is empty"),
         ("setting,held_out,labels,accuracy\n", r"column 'accuracy_new' is missing"),
         ("setting,held_out,labels,accuracy,accuracy_new\n", r"has no rows"),
-        (
-            "setting,held_out,labels,accuracy,accuracy_new\na,b,0,x,1\n",
-            r"'accuracy' contains values that are not finite",
-        ),
+        ("setting,held_out,labels,accuracy,accuracy_new\na,b,0,x,1\n", r"'accuracy' contains values that are not fin"),
     ],
 )
 def test_a_damaged_file_is_named(files, text, message):

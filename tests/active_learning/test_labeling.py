@@ -38,17 +38,16 @@ def test_an_answer_is_on_the_disk_at_once_and_the_earlier_ones_stay(path):
     assert LabelFile(path, dict.fromkeys(KEYS)).labels == {KEYS[20]: "overlap", KEYS[21]: ""}
 
 
-@pytest.mark.parametrize("text", ["", "sample,split,concept\n", "\n"])
-def test_a_file_without_answers_is_a_start(path, text):
+HEAD = "sample,split,concept\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "labels"), [("", {}), (HEAD, {}), ("\n", {}), (HEAD + "3,train,pose\n3,train,pose\n", {KEYS[3]: "pose"})]
+)
+def test_a_file_without_answers_is_a_start_and_the_same_answer_twice_no_conflict(path, text, labels):
     path.parent.mkdir()
     path.write_text(text)
-    assert LabelFile(path, dict.fromkeys(KEYS)).labels == {}
-
-
-def test_the_same_answer_twice_is_no_conflict(path):
-    path.parent.mkdir()
-    path.write_text("sample,split,concept\n3,train,pose\n3,train,pose\n")
-    assert LabelFile(path, dict.fromkeys(KEYS)).labels == {KEYS[3]: "pose"}
+    assert LabelFile(path, dict.fromkeys(KEYS)).labels == labels
 
 
 @pytest.mark.parametrize(

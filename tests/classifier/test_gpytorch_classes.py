@@ -54,8 +54,7 @@ def test_another_seed_gives_other_numbers_by_far():
 
 def test_the_classes_are_gpytorchs_own():
     _, theirs = pair(iterations=1)
-    strategy = theirs._model.variational_strategy
-    of_one = theirs._model.strategy
+    strategy, of_one = theirs._model.variational_strategy, theirs._model.strategy
     assert isinstance(theirs._model, gpytorch.models.ApproximateGP)
     assert type(strategy) is gpytorch.variational.IndependentMultitaskVariationalStrategy
     assert type(of_one) is gpytorch.variational.VariationalStrategy
@@ -73,17 +72,13 @@ def test_on_the_way_it_is_what_fewer_iterations_make_it():
     assert done == 9
 
 
-def test_fitting_leaves_torchs_generator_where_it_was():
+def test_as_many_questions_as_classes_are_answered_one_by_one_and_torchs_generator_stays_where_it_was():
     before = torch.random.get_rng_state()
-    pair(iterations=2)
-    assert torch.equal(torch.random.get_rng_state(), before)
-
-
-@pytest.mark.parametrize("n", [1, 3, 7])
-def test_as_many_questions_as_classes_are_answered_one_by_one(n):
     ours, theirs = pair(iterations=5)
-    for own, other in zip(ours.posterior(H_TEST[:n]), theirs.posterior(H_TEST[:n]), strict=True):
-        assert np.abs(own - other).max() < LATENT
+    assert torch.equal(torch.random.get_rng_state(), before)
+    for n in (1, 3, 7):
+        for own, other in zip(ours.posterior(H_TEST[:n]), theirs.posterior(H_TEST[:n]), strict=True):
+            assert np.abs(own - other).max() < LATENT
 
 
 def test_as_many_samples_as_classes_are_refused():

@@ -35,13 +35,17 @@ def test_covariances_and_their_gradients_are_gpytorchs(name):
         assert torch.allclose(own, their, rtol=1e-3, atol=1e-4)
 
 
+def assert_variance_is_the_diagonal(kernel, n):
+    diagonal = cross_covariance(kernel, A[:n], A[:n]).diagonal(dim1=1, dim2=2)
+    assert variance(kernel, A[:n]).shape == (3, n)
+    assert torch.allclose(variance(kernel, A[:n]), diagonal, atol=1e-5)
+
+
 @pytest.mark.parametrize("name", COVARIANCES)
 @pytest.mark.parametrize("n", [3, 7])
 def test_the_variance_is_the_covariances_diagonal(name, n):
     kernel = unlike(name)
-    diagonal = cross_covariance(kernel, A[:n], A[:n]).diagonal(dim1=1, dim2=2)
-    assert variance(kernel, A[:n]).shape == (3, n)
-    assert torch.allclose(variance(kernel, A[:n]), diagonal, atol=1e-5)
+    assert_variance_is_the_diagonal(kernel, n)
 
 
 @pytest.mark.parametrize("n", [3, 7])  # as many inputs as latents, and more
@@ -51,9 +55,7 @@ def test_a_kernel_without_a_form_here_is_that_of_gpytorch(form, n, monkeypatch):
     kernel = make_covariance("new", 3, lengthscale=3.0)
     kernel.outputscale = torch.tensor([0.5, 1.0, 2.0])
     assert torch.allclose(cross_covariance(kernel, A, B), kernel(A, B).to_dense())
-    diagonal = cross_covariance(kernel, A[:n], A[:n]).diagonal(dim1=1, dim2=2)
-    assert variance(kernel, A[:n]).shape == (3, n)
-    assert torch.allclose(variance(kernel, A[:n]), diagonal, atol=1e-5)
+    assert_variance_is_the_diagonal(kernel, n)
 
 
 @pytest.mark.parametrize("name", COVARIANCES)
@@ -118,9 +120,8 @@ def test_the_divergence_is_torchs():
     root_C_M_M = model.root_C_M_M.tril()
     q = torch.distributions.MultivariateNormal(model.mean_C_M, root_C_M_M @ root_C_M_M.mT)
     prior = torch.distributions.MultivariateNormal(torch.zeros(9), torch.eye(9))
-    assert model.divergence().item() == pytest.approx(
-        torch.distributions.kl_divergence(q, prior).sum().item(), rel=1e-4
-    )
+    expected = torch.distributions.kl_divergence(q, prior).sum().item()
+    assert model.divergence().item() == pytest.approx(expected, rel=1e-4)
 
 
 def test_as_many_samples_as_latents_are_not_transposed():

@@ -35,10 +35,6 @@ def encoder(request):
     return encoder.eval()
 
 
-def test_these_are_all():
-    assert set(SMALL) == set(ENCODERS)
-
-
 @pytest.mark.parametrize(
     ("n", "backbone"),
     [(n, name) for n in (1, 20, 96) for name in SMALL if (n, name) != (1, "dgcnn")],  # a point alone has no neighbors
@@ -53,22 +49,32 @@ def test_a_cloud_of_any_size_becomes_one_embedding(backbone, n):
 
 @pytest.mark.parametrize("options", [{}, {"width": 16}])
 def test_the_settings_know_the_size_of_an_embedding(options):
+    assert set(SMALL) == set(ENCODERS)
     for backbone in ENCODERS:
         own = {"point_features": 24} if options and backbone == "dgcnn" else options
         assert OPTIONS[backbone](**own).embedding_size == make_encoder(backbone, own).embedding_size
 
 
-def test_pointnet_has_the_published_widths():
+POINTNET = [(64, 3), (64, 64), (64, 64), (128, 64), (1024, 128)]
+
+
+def shapes(*layers):
+    return [linear.weight.shape for layer in layers for linear in layer.linears]
+
+
+def test_pointnet_has_the_published_widths_with_and_without_tnets():
     encoder = make_encoder("pointnet", {})
-    shapes = [linear.weight.shape for linear in encoder.layers.linears]
-    assert shapes == [(64, 3), (64, 64), (64, 64), (128, 64), (1024, 128)]
-    assert encoder.embedding_size == 1024
+    assert shapes(encoder.layers) == POINTNET and encoder.embedding_size == 1024
+    encoder = make_encoder("pointnet_tnet", {})
+    assert shapes(encoder.first, encoder.last.layers) == POINTNET
+    for turn, inputs in ((encoder.turn_points, 3), (encoder.turn_features, 64)):
+        assert shapes(turn.points.layers, turn.whole) == [(64, inputs), (128, 64), (1024, 128), (512, 1024), (256, 512)]
+        assert turn.matrix.weight.shape == (inputs**2, 256)
 
 
 def test_pointnet2_has_the_published_widths_and_the_points_own_coordinates():
     encoder = make_encoder("pointnet2", {})
-    shapes = [linear.weight.shape for layers in (*encoder.levels, encoder.whole) for linear in layers.linears]
-    assert shapes == [
+    assert shapes(*encoder.levels, encoder.whole) == [
         (64, 3 + 3), (64, 64), (128, 64), (128, 3 + 128), (128, 128), (256, 128), (256, 3 + 256), (512, 256),
         (1024, 512),
     ]  # fmt: skip
@@ -77,8 +83,7 @@ def test_pointnet2_has_the_published_widths_and_the_points_own_coordinates():
 
 def test_pointnet2_as_published_sees_relative_coordinates_alone_and_the_published_sizes():
     encoder = make_encoder("pointnet2", {"centroids": 512, "as_published": True})
-    shapes = [linear.weight.shape for layers in (*encoder.levels, encoder.whole) for linear in layers.linears]
-    assert shapes[0] == (64, 3) and shapes[3] == (128, 3 + 128) and shapes[6] == (256, 3 + 256)
+    assert shapes(*encoder.levels, encoder.whole)[::3] == [(64, 3), (128, 3 + 128), (256, 3 + 256)]
     # 1.48 million with ModelNet40's head of 512, 256 and 40 units, and with biases before the batch norms.
     head = (1024 * 512 + 2 * 512) + (512 * 256 + 2 * 256) + (256 * 40 + 40)
     biases = 64 + 64 + 128 + 128 + 128 + 256 + 256 + 512 + 1024 + 512 + 256
@@ -116,17 +121,6 @@ def test_a_tnet_starts_at_the_identity_and_its_second_transform_is_held_near_a_r
     assert encoder.penalty is None
 
 
-def test_pointnet_with_tnets_has_the_published_widths():
-    encoder = make_encoder("pointnet_tnet", {})
-    for turn, inputs in ((encoder.turn_points, 3), (encoder.turn_features, 64)):
-        shapes = [linear.weight.shape for linear in (*turn.points.layers.linears, *turn.whole.linears, turn.matrix)]
-        assert shapes == [
-            (64, inputs), (128, 64), (1024, 128), (512, 1024), (256, 512), (inputs**2, 256),
-        ]  # fmt: skip
-    shapes = [linear.weight.shape for linear in (*encoder.first.linears, *encoder.last.layers.linears)]
-    assert shapes == [(64, 3), (64, 64), (64, 64), (128, 64), (1024, 128)]
-
-
 def test_the_training_minimizes_the_penalty_of_a_tnet(easy, monkeypatch):
     from gpca.encoders import pointnet
 
@@ -144,10 +138,6 @@ def test_pointnext_has_the_published_number_of_parameters():
     # 1.374 million with ModelNet40's head of 512, 256 and 40 units (official implementation).
     head = (512 * 512 + 2 * 512) + (512 * 256 + 2 * 256) + (256 * 40 + 40)
     assert round((parameter_count(encoder) + head) / 1e6, 3) == 1.374
-
-
-def test_parameters_are_counted_once_each():
-    assert parameter_count(torch.nn.Linear(3, 5)) == 20
 
 
 @pytest.mark.parametrize("change", [lambda p: p + 0.2, lambda p: 1.3 * p, lambda p: p.roll(1, dims=-1)])

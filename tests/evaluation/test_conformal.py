@@ -7,21 +7,8 @@ import pytest
 from scipy.stats import beta
 
 from gpca.errors import InputError
-from gpca.evaluation.conformal import (
-    ALARM,
-    CUMULATIVE,
-    GOOD,
-    NOT_SURE,
-    PROBABILITY,
-    FailureAlarm,
-    calibrate_alarm,
-    calibrate_sets,
-    confident_upper_bound,
-    highest_level,
-    nonconformity,
-    require_share,
-    upper_bound,
-)
+from gpca.evaluation import conformal
+from gpca.evaluation.conformal import ALARM, CUMULATIVE, GOOD, NOT_SURE, PROBABILITY, confident_upper_bound, upper_bound
 
 DRAWS = 4000
 
@@ -40,7 +27,7 @@ def test_too_few_samples_or_families_bound_nothing():
     assert upper_bound(np.arange(8.0), 0.9) == inf and upper_bound(np.arange(9.0), 0.9) == 8
     families = np.repeat(np.arange(8), 50)
     assert upper_bound(np.arange(400.0), 0.9, families) == inf and upper_bound(np.empty(0), 0.5) == inf
-    assert highest_level(families) == pytest.approx(8 / 9)
+    assert conformal.highest_level(families) == pytest.approx(8 / 9)
     assert confident_upper_bound(np.arange(58.0), 0.95, 0.95) == inf
     assert confident_upper_bound(np.arange(59.0), 0.95, 0.95) == 58
 
@@ -90,7 +77,7 @@ def test_the_confident_bound_holds_for_the_promised_share_of_draws():
 @pytest.mark.parametrize("share", [0, 1, -0.1, 1.5, np.nan])
 def test_a_share_has_to_lie_between_0_and_1(share):
     with pytest.raises(InputError, match=r"level: .* is not strictly between 0 and 1; give a share"):
-        require_share("level", share)
+        conformal.require_share("level", share)
 
 
 STATES = ("good", "poor", "lost")
@@ -110,10 +97,10 @@ def held(sets, scores, state):
 
 def test_nonconformity_by_hand():
     scores = np.array([[0.5, 0.3, 0.2], [0.4, 0.4, 0.2]])
-    assert nonconformity(scores, PROBABILITY) == pytest.approx(1 - scores)
-    assert nonconformity(scores, CUMULATIVE) == pytest.approx(np.array([[0.5, 0.8, 1.0], [0.8, 0.8, 1.0]]))
+    assert conformal.nonconformity(scores, PROBABILITY) == pytest.approx(1 - scores)
+    assert conformal.nonconformity(scores, CUMULATIVE) == pytest.approx(np.array([[0.5, 0.8, 1.0], [0.8, 0.8, 1.0]]))
     with pytest.raises(InputError, match="nonconformity 'rank': unknown; choose probability or cumulative"):
-        nonconformity(scores, "rank")
+        conformal.nonconformity(scores, "rank")
 
 
 @pytest.mark.parametrize("kind", [PROBABILITY, CUMULATIVE])
@@ -122,7 +109,7 @@ def test_sets_hold_the_true_state_as_often_as_promised(kind):
     shares = []
     for _ in range(300):
         scores, state = drawn(random, 200)
-        sets = calibrate_sets(scores[:100], state[:100], None, STATES, 0.9, kind)
+        sets = conformal.calibrate_sets(scores[:100], state[:100], None, STATES, 0.9, kind)
         shares.append(held(sets, scores[100:], state[100:]).mean())
     deviation = np.std(shares) / np.sqrt(300)
     assert 0.9 - 4 * deviation <= np.mean(shares) <= 0.9 + 1 / 101 + 0.03  # what is never empty covers a little more
@@ -134,7 +121,7 @@ def test_only_sets_by_state_hold_each_state_as_often_as_promised():
     tested, tested_state = drawn(random, 20000)
     share = {}
     for by_state in (False, True):
-        sets = calibrate_sets(scores, state, None, STATES, 0.9, by_state=by_state)
+        sets = conformal.calibrate_sets(scores, state, None, STATES, 0.9, by_state=by_state)
         inside = held(sets, tested, tested_state)
         share[by_state] = [inside[tested_state == name].mean() for name in STATES]
     assert min(share[False]) < 0.8
@@ -146,17 +133,15 @@ def test_the_hardest_state_is_in_every_set_where_too_few_were_given():
     scores, state = drawn(np.random.default_rng(2), 60)
     few = np.flatnonzero(state == "lost")[8:]
     kept = np.setdiff1d(np.arange(60), few)
-    sets = calibrate_sets(scores[kept], state[kept], None, STATES, 0.9, by_state=True)
+    sets = conformal.calibrate_sets(scores[kept], state[kept], None, STATES, 0.9, by_state=True)
     assert sets.limits[2] == np.inf and sets.of(scores)[:, 2].all()
 
 
 def test_no_set_is_empty():
     scores = np.array([[0.9, 0.05, 0.05]] * 30)
-    sets = calibrate_sets(scores, np.array(["good"] * 30), None, STATES, 0.9)
-    assert sets.of(np.array([[0.3, 0.4, 0.3], [0.9, 0.05, 0.05]])).tolist() == [
-        [False, True, False],
-        [True, False, False],
-    ]
+    sets = conformal.calibrate_sets(scores, np.array(["good"] * 30), None, STATES, 0.9)
+    asked = np.array([[0.3, 0.4, 0.3], [0.9, 0.05, 0.05]])
+    assert sets.of(asked).tolist() == [[False, True, False], [True, False, False]]
 
 
 @pytest.mark.parametrize(
@@ -170,7 +155,7 @@ def test_no_set_is_empty():
 )
 def test_faults_are_one_line(scores, state, level, message):
     with pytest.raises(InputError, match=message):
-        calibrate_sets(scores, np.array(state), None, STATES, level)
+        conformal.calibrate_sets(scores, np.array(state), None, STATES, level)
 
 
 def alarm_drawn(random, samples, shift):
@@ -181,14 +166,14 @@ def alarm_drawn(random, samples, shift):
 
 def test_thresholds_by_hand():
     good, failed = np.arange(0, 39.0), np.arange(20, 59.0)
-    alarm = calibrate_alarm(np.r_[good, failed], np.repeat([False, True], 39))
+    alarm = conformal.calibrate_alarm(np.r_[good, failed], np.repeat([False, True], 39))
     assert alarm.good_below == 21 and np.floor(alarm.failed_from) == 37  # the 2nd of 40 from the end of either
     called = alarm.of(np.array([20.9, 21, 37, 37.1]))
     assert called.tolist() == [GOOD, NOT_SURE, NOT_SURE, ALARM]
 
 
 def test_where_the_kinds_are_apart_one_threshold_keeps_both_risks():
-    alarm = calibrate_alarm(np.r_[np.linspace(0, 1, 40), np.linspace(3, 4, 40)], np.repeat([False, True], 40))
+    alarm = conformal.calibrate_alarm(np.r_[np.linspace(0, 1, 40), np.linspace(3, 4, 40)], np.repeat([False, True], 40))
     assert 1 < alarm.good_below == alarm.failed_from < 3
     assert NOT_SURE not in alarm.of(np.linspace(-1, 5, 100))
 
@@ -199,7 +184,7 @@ def test_both_risks_are_kept_on_average(shift):
     missed, false_alarms = [], []
     for _ in range(400):
         failure, failed = alarm_drawn(random, 400, shift)
-        alarm = calibrate_alarm(failure[:200], failed[:200])
+        alarm = conformal.calibrate_alarm(failure[:200], failed[:200])
         called, truth = alarm.of(failure[200:]), failed[200:]
         missed.append((called[truth] == GOOD).mean())
         false_alarms.append((called[~truth] == ALARM).mean())
@@ -214,18 +199,18 @@ def test_with_confidence_few_thresholds_break_a_promise():
     for _ in range(300):
         failure, failed = alarm_drawn(random, 300, 2.0)
         for confidence in broken:
-            called = calibrate_alarm(failure, failed, confidence=confidence).of(many)
+            called = conformal.calibrate_alarm(failure, failed, confidence=confidence).of(many)
             broken[confidence] += (called[many_failed] == GOOD).mean() > 0.05
     assert broken[0.9] <= 0.1 * 300 + 4 * np.sqrt(0.09 * 300) < broken[None]
 
 
 def test_from_too_few_samples_or_families_it_is_never_sure():
-    few = calibrate_alarm(np.arange(36.0), np.repeat([False, True], 18))
+    few = conformal.calibrate_alarm(np.arange(36.0), np.repeat([False, True], 18))
     assert (few.good_below, few.failed_from) == (-inf, inf)
     families = np.tile(np.arange(12), 20)
     scores, failed = np.linspace(0, 1, 240), np.repeat([False, True], 120)
-    assert set(calibrate_alarm(scores, failed, families).of(scores)) == {NOT_SURE}
-    assert set(calibrate_alarm(scores, failed, families, 0.1, 0.1).of(scores)) == {GOOD, ALARM}
+    assert set(conformal.calibrate_alarm(scores, failed, families).of(scores)) == {NOT_SURE}
+    assert set(conformal.calibrate_alarm(scores, failed, families, 0.1, 0.1).of(scores)) == {GOOD, ALARM}
 
 
 @pytest.mark.parametrize(
@@ -241,6 +226,6 @@ def test_from_too_few_samples_or_families_it_is_never_sure():
 def test_faults_are_one_line_alarm(changes, message):
     arguments = {"failure_N": np.arange(4.0), "failed_N": np.array([True, False, True, False])} | changes
     with pytest.raises(InputError, match=message):
-        calibrate_alarm(**arguments)
+        conformal.calibrate_alarm(**arguments)
     with pytest.raises(InputError, match="scores of failure"):
-        FailureAlarm(0.05, 0.05, 0, 1).of(np.array([[0.5]]))
+        conformal.FailureAlarm(0.05, 0.05, 0, 1).of(np.array([[0.5]]))

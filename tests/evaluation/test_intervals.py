@@ -4,18 +4,8 @@ import numpy as np
 import pytest
 
 from baselines import untrained
-from gpca.evaluation.intervals import (
-    REPEATS,
-    UNTRAINED,
-    best_of,
-    independent,
-    interval,
-    mean_interval,
-    pigeonhole_weights,
-    quantile_bounds,
-    weighted_mean,
-    wilson_interval,
-)
+from gpca.evaluation import intervals
+from gpca.evaluation.intervals import interval, mean_interval, quantile_bounds, wilson_interval
 from gpca.seeds import generator
 
 SEED = np.repeat([100, 101], 6)
@@ -23,7 +13,7 @@ OBJECT = np.tile(["cup", "can", "drill"], 4)
 
 
 def draws(*axes):
-    return pigeonhole_weights(generator(*axes), SEED, OBJECT)
+    return intervals.pigeonhole_weights(generator(*axes), SEED, OBJECT)
 
 
 def test_a_draw_of_objects_and_seeds_weighs_a_sample_by_both():
@@ -51,8 +41,8 @@ def test_bounds_are_the_quantiles_of_the_draws_that_have_a_value():
 
 def test_a_share_on_which_all_draws_agree_has_wilsons_interval_of_its_clusters():
     weights = draws("tiny")
-    assert independent(weights) == 2 * 3  # an object counts once in each seed, with two samples of each
-    assert independent(weights[:, OBJECT == "cup"]) == 2
+    assert intervals.independent(weights) == 2 * 3  # an object counts once in each seed, with two samples of each
+    assert intervals.independent(weights[:, OBJECT == "cup"]) == 2
     ones = np.ones(len(weights))
     assert bounds(ones) == (1, 1)
     assert bounds(ones, weights) == wilson_interval(6, 6)
@@ -112,18 +102,21 @@ RIGHT = {
     name: np.random.default_rng(seed).random(N) < share
     for seed, (name, share) in enumerate({"rule": 0.5, "chance": 0.3, "good": 0.8, "poor": 0.1}.items())
 }
-WEIGHTS = np.vstack([np.ones(N), pigeonhole_weights(np.random.default_rng(9), np.arange(N) // 3)])
-VALUES = {name: weighted_mean(right_N, WEIGHTS) for name, right_N in RIGHT.items()}
+WEIGHTS = np.vstack([np.ones(N), intervals.pigeonhole_weights(np.random.default_rng(9), np.arange(N) // 3)])
+VALUES = {name: intervals.weighted_mean(right_N, WEIGHTS) for name, right_N in RIGHT.items()}
 
 
 def test_the_best_untrained_one_is_beaten_by_a_paired_difference():
-    assert VALUES["good"].shape == (1 + REPEATS,)
+    assert VALUES["good"].shape == (1 + intervals.REPEATS,)
     assert VALUES["good"][0] == RIGHT["good"].mean()
     assert VALUES["good"][1:].std() > 0
-    assert UNTRAINED == tuple(untrained.EXPLAINERS) == tuple(untrained.CAUSE_EXPLAINERS)
-    assert best_of(VALUES, UNTRAINED) == "rule" and best_of(VALUES, UNTRAINED, least_is_best=True) == "chance"
+    assert intervals.UNTRAINED == tuple(untrained.EXPLAINERS) == tuple(untrained.CAUSE_EXPLAINERS)
+    assert (
+        intervals.best_of(VALUES, intervals.UNTRAINED) == "rule"
+        and intervals.best_of(VALUES, intervals.UNTRAINED, least_is_best=True) == "chance"
+    )
     value, low, high = interval(VALUES["good"] - VALUES["rule"], difference=True)
     assert 0 < low < value < high
     assert value == pytest.approx(RIGHT["good"].mean() - RIGHT["rule"].mean())
-    alone = {"good": VALUES["good"], "rule": np.full(1 + REPEATS, np.nan)}
-    assert best_of(alone, UNTRAINED) == ""
+    alone = {"good": VALUES["good"], "rule": np.full(1 + intervals.REPEATS, np.nan)}
+    assert intervals.best_of(alone, intervals.UNTRAINED) == ""

@@ -5,22 +5,16 @@ import pandas as pd
 import pytest
 
 from gpca.errors import InputError
+from gpca.evaluation import measures as m
 from gpca.evaluation.intervals import REPEATS, Clustered
 from gpca.evaluation.measures import (
-    AGAINST,
     ALL,
-    COLUMNS,
-    COUNT,
-    SHARE,
     TIDY_COLUMNS,
     Measure,
     compared,
     intervals,
     over_seeds,
     per_seed,
-    read_clustered,
-    read_rows,
-    read_samples,
     write_metrics,
 )
 
@@ -69,13 +63,13 @@ def test_values_by_seed_are_means_and_statistics_of_each_part(samples):
     assert value(rows, metric="test_samples", **about) == 12
     assert value(rows, metric="test_samples", method="gpca", seed=1, concept="a") == 4
     assert not ((rows["metric"] == "error") & (rows["concept"] == "a")).any() and "none" not in set(rows["concept"])
-    counted = per_seed(samples, parts, {"test_samples": COUNT, "right": Measure("right")})
+    counted = per_seed(samples, parts, {"test_samples": m.COUNT, "right": Measure("right")})
     assert counted["metric"].tolist()[:2] == ["test_samples", "right"]
 
 
 def test_over_all_seeds_a_value_is_that_of_the_samples_with_the_interval_of_its_kind(samples):
     rows, drawn = over_seeds(samples, parts, MEASURES, draws(samples)), draws(samples)
-    assert tuple(rows.columns) == COLUMNS
+    assert tuple(rows.columns) == m.COLUMNS
     of_gpca = (samples["method"] == "gpca").to_numpy()
     share = drawn.subset(of_gpca).share(samples["right"].to_numpy()[of_gpca])
     about = {"method": "gpca", "metric": "right", "concept": ALL}
@@ -92,7 +86,7 @@ def test_a_difference_is_a_row_with_what_it_is_measured_against(samples):
     values["gpca"][1:] += np.linspace(-0.2, 0.2, REPEATS)
     values["lost"] = np.full(1 + REPEATS, np.nan)
     against = {"rival": lambda method, names: names, "untrained": lambda method, names: ("chance",)}
-    records = compared(("t", "ycb"), "right", ALL, values, drawn, SHARE, against)
+    records = compared(("t", "ycb"), "right", ALL, values, drawn, m.SHARE, against)
     rows = intervals(records, "tiny").set_index(["method", "against"])
     assert "lost" not in set(rows.index.get_level_values("method"))
     assert rows.loc[("gpca", ""), "value"] == 0.5
@@ -107,22 +101,22 @@ def test_a_difference_is_a_row_with_what_it_is_measured_against(samples):
 
 def test_files_of_both_forms_are_read_back(samples, tmp_path):
     write_metrics(per_seed(samples, parts, MEASURES), tmp_path / "seeds.csv")
-    assert tuple(read_rows(tmp_path / "seeds.csv").columns) == TIDY_COLUMNS
+    assert tuple(m.read_rows(tmp_path / "seeds.csv").columns) == TIDY_COLUMNS
     write_metrics(over_seeds(samples, parts, MEASURES, draws(samples)), tmp_path / "intervals.csv")
-    assert read_rows(tmp_path / "intervals.csv")["against"].eq("").all()
+    assert m.read_rows(tmp_path / "intervals.csv")["against"].eq("").all()
     drawn = draws(samples).subset(np.arange(24))
     values = {name: np.full(1 + REPEATS, share) for name, share in {"a": 0.5, "b": 0.4}.items()}
     records = compared(("t", "s"), "m", ALL, values, drawn, against={"rival": lambda method, names: names})
     write_metrics(intervals(records, "tiny"), tmp_path / "against.csv")
-    rows = read_clustered(tmp_path / "against.csv")
-    assert rows[list(AGAINST)].to_numpy().tolist() == [["", ""], ["rival", "b"], ["", ""], ["rival", "a"]]
+    rows = m.read_clustered(tmp_path / "against.csv")
+    assert rows[list(m.AGAINST)].to_numpy().tolist() == [["", ""], ["rival", "b"], ["", ""], ["rival", "a"]]
 
 
 def test_samples_are_named_by_their_files(tmp_path):
     path = tmp_path / "methods/ycb/gicp/seed3.csv"
     path.parent.mkdir(parents=True)
     path.write_text("x\n1\n")
-    rows = read_samples([path], pd.read_csv)
+    rows = m.read_samples([path], pd.read_csv)
     assert rows.iloc[0].to_dict() == {"x": 1, "source": "ycb", "method": "gicp", "seed": 3}
     with pytest.raises(InputError, match="no files were given"):
-        read_samples([], pd.read_csv)
+        m.read_samples([], pd.read_csv)

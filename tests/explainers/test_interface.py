@@ -42,13 +42,9 @@ def own_baseline(tmp_path, monkeypatch):
         sys.modules.pop(f"baselines.{name}", None)
 
 
-def test_gpca_and_the_papers_setting_are_listed_and_read_embeddings():
-    for name in ("gpca", "gpca_paper"):
-        assert explainers()[name].reads == "embeddings"
-        assert not explainer_entry(name).oracle
-
-
 def test_every_entry_can_be_headed_and_fed():
+    for name in ("gpca", "gpca_paper"):
+        assert (explainer_entry(name).reads, explainer_entry(name).oracle) == ("embeddings", False)
     for name, entry in explainers().items():
         assert entry.title, name
         assert entry.reads in ("registrations", "embeddings") or entry.design in DESIGNS, name
@@ -72,14 +68,11 @@ def test_what_an_explainer_sees_is_a_tuple_of_known_parts(sees):
         ExplainerEntry("Mine", GPCA, sees)
 
 
-def test_an_unknown_explainer_is_refused_with_the_known_ones():
-    with pytest.raises(InputError, match=r"explainer 'shapley': unknown; choose one of .*gpca_paper, gpca"):
-        explainer_entry("shapley")
-
-
-def test_a_file_dropped_into_baselines_is_found(own_baseline):
+def test_a_file_dropped_into_baselines_is_found_and_an_unknown_explainer_refused_with_the_known_ones(own_baseline):
     assert explainer_entry(own_baseline).title == "Always noise"
     assert {"gpca", "gpca_paper", own_baseline} <= set(explainers())
+    with pytest.raises(InputError, match=r"explainer 'shapley': unknown; choose one of .*gpca_paper, gpca"):
+        explainer_entry("shapley")
 
 
 def test_gpca_names_the_concept(embedded):
@@ -101,9 +94,8 @@ def test_gpca_does_not_look_at_what_it_is_to_explain(embedded):
     expected = explainer.explain(embedded)
     for other in (shuffled, embedded.without_labels()):
         attribution = explainer.explain(other)
-        assert np.array_equal(attribution.scores_N_C, expected.scores_N_C)
-        assert np.array_equal(attribution.variances_N_C, expected.variances_N_C)
-        assert np.array_equal(attribution.bald_N, expected.bald_N)
+        for name in ("scores_N_C", "variances_N_C", "bald_N"):
+            assert np.array_equal(getattr(attribution, name), getattr(expected, name))
 
 
 SETTINGS = DescriptorSettings(starts=3, restarts=8)
