@@ -13,7 +13,7 @@ from gpca.classifier.settings import GPCArguments
 from gpca.errors import InputError
 from gpca.explainers.classifiers import known_concepts
 from gpca.explainers.gpca import GPCA
-from gpca.explainers.interface import DrawingExplainer, ExplainerEntry, ScoringExplainer, attached, of_causes
+from gpca.explainers.interface import DrawingExplainer, ExplainerEntry, ScoringExplainer, attached, for_causes
 from gpca.pairs.dataset import Registrations
 from gpca.settings import Positive
 
@@ -92,7 +92,7 @@ EXPLAINERS = {
     "gpca_gpytorch": _entry("GP-CA (gpytorch's classes)", GpytorchGPCA),
 }
 CAUSE_EXPLAINERS = {
-    "softmax_head": _entry("Softmax head (aligned source)", of_causes(SoftmaxHead)),
-    "concept_vectors": _entry("Concept activation vectors", of_causes(ConceptVectors)),
-    "gpca": _entry("GP-CA (aligned source)", of_causes(GPCA)),
+    "softmax_head": _entry("Softmax head (aligned source)", for_causes(SoftmaxHead)),
+    "concept_vectors": _entry("Concept activation vectors", for_causes(ConceptVectors)),
+    "gpca": _entry("GP-CA (aligned source)", for_causes(GPCA)),
 }

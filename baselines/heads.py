@@ -194,8 +194,8 @@ class LastLayerLaplace(HeadLearner):
             gradient_F_C = features_N_F.T @ (np.exp(log_p_N_C) - wanted_N_C) + precision * weights_F_C
             return -np.sum(wanted_N_C * log_p_N_C) + 0.5 * precision * flat @ flat, gradient_F_C.ravel()
 
-        found = minimize(loss, np.zeros(shape).ravel(), jac=True, method="L-BFGS-B")
-        self._weights_F_C = found.x.reshape(shape)
+        optimum = minimize(loss, np.zeros(shape).ravel(), jac=True, method="L-BFGS-B")
+        self._weights_F_C = optimum.x.reshape(shape)
         p_N_C = np.exp(log_softmax(features_N_F @ self._weights_F_C, axis=1))
         blocks = []  # of the curvature (C·F, C·F), classes first
         for p_N, one_hot_C in zip(p_N_C.T, np.eye(len(CONCEPTS)), strict=True):

@@ -12,7 +12,7 @@ import numpy as np
 
 from baselines.gates import GATES, NominalThreshold, motion_alarm
 from gpca.causes.dataset import LABELS
-from gpca.explainers.interface import ExplainerEntry, ScoringExplainer, of_causes
+from gpca.explainers.interface import ExplainerEntry, ScoringExplainer, for_causes
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS, HalfTurn
 from gpca.seeds import generator
@@ -86,8 +86,8 @@ EXPLAINERS = {
     "rule": ExplainerEntry("Rule of three lines", ThresholdRule, ("pair", "motion")),
 }
 CAUSE_EXPLAINERS = {
-    "chance": ExplainerEntry("Chance", of_causes(Chance), ()),
-    "most_frequent": ExplainerEntry("Most frequent label", of_causes(MostFrequent), ()),
+    "chance": ExplainerEntry("Chance", for_causes(Chance), ()),
+    "most_frequent": ExplainerEntry("Most frequent label", for_causes(MostFrequent), ()),
     "rule": ExplainerEntry(
         "Rule, nominal by the best gate", CauseRule, ("pair", "motion", "runs"), reads="descriptors"
     ),

@@ -52,7 +52,7 @@ class ChargedValues(ScoringExplainer):
         attribution = charged(super().explain(registrations), registrations, self._conditions)
         return replace(attribution, abstained_N=np.ptp(attribution.scores_N_C, axis=1) == 0)
 
-    def of_remedies(self, registrations: Registrations, worth: str) -> np.ndarray:
+    def remedy_values(self, registrations: Registrations, worth: str) -> np.ndarray:
         """Return the values (S, 3) by the drops of a worth; corner b of the first 8 has remedy i where b has bit i."""
         return self._values(-attached(registrations, worth)[:, :8])
 
@@ -74,11 +74,11 @@ class ScaledValues(ChargedValues):
         self._worth = worth
 
     def fit(self, registrations: Registrations) -> None:
-        values_N_3 = self.of_remedies(registrations, self._worth)
+        values_N_3 = self.remedy_values(registrations, self._worth)
         self._mean_3, self._deviation_3 = values_N_3.mean(axis=0), np.maximum(values_N_3.std(axis=0), 1e-9)
 
     def scores(self, registrations: Registrations) -> np.ndarray:
-        return (self.of_remedies(registrations, self._worth) - self._mean_3) / self._deviation_3
+        return (self.remedy_values(registrations, self._worth) - self._mean_3) / self._deviation_3
 
 
 class LearnedValues(ChargedValues, ClassifierExplainer):
@@ -91,7 +91,7 @@ class LearnedValues(ChargedValues, ClassifierExplainer):
         ClassifierExplainer.__init__(self, standardized_regression(inverse_regularisation))
 
     def features(self, registrations: Registrations) -> np.ndarray:
-        return np.hstack([self.of_remedies(registrations, worth) for worth in WORTHS])
+        return np.hstack([self.remedy_values(registrations, worth) for worth in WORTHS])
 
 
 class RemovalValues(ScoringExplainer):

@@ -138,8 +138,8 @@ def judge(
     for claim in claims:
         fields = {"claim": claim.name, **vars(claim)}
         if not claim.compared:
-            of_comparison = dict.fromkeys(("test", "unit", "margin", "ratio"))
-            records.append(fields | of_comparison | {"verdict": NOT_RUN, "claim_verdict": NOT_RUN})
+            uncompared = dict.fromkeys(("test", "unit", "margin", "ratio"))
+            records.append(fields | uncompared | {"verdict": NOT_RUN, "claim_verdict": NOT_RUN})
             continue
         rows, strict_verdicts = [], []
         strict = 1 - (1 - LEVEL) / len(claim.compared)

@@ -68,8 +68,8 @@ def claims(verdicts: pd.DataFrame, sources: Mapping[str, Mapping], titles: Mappi
             {"difference": Cell(row.value, row.high - row.value, int(row.n), 0, bounds=(row.low, row.high))},
         )
     # The components' times are of repeats.
-    of_seeds = verdicts[verdicts["n"].notna() & (verdicts["table"] != COMPONENTS)]
-    seeds = plural(span(of_seeds["n"]), "seed") if len(of_seeds) else "repeats"
+    by_seed = verdicts[verdicts["n"].notna() & (verdicts["table"] != COMPONENTS)]
+    seeds = plural(span(by_seed["n"]), "seed") if len(by_seed) else "repeats"
     not_run = verdicts[verdicts["claim_verdict"] == NOT_RUN].drop_duplicates("claim").itertuples()
     return table.build(
         caption="What the paper says in sentences, and whether the differences in this run support it",
@@ -95,7 +95,7 @@ def margins_in_words(verdicts: pd.DataFrame) -> list[str]:
     """Return a sentence on when the margins of the claims were set, and what was known by then."""
     once = verdicts.drop_duplicates("claim")
     phrases = []
-    for (day, seen), of_day in once[once["test"] != ""].groupby(["margin_set", "values_known"], sort=True):
+    for (day, seen), day_rows in once[once["test"] != ""].groupby(["margin_set", "values_known"], sort=True):
         before = "after the differences had been seen" if seen == "True" else "before the differences were looked at"
-        phrases.append(f"{len(of_day)} on {day}, {before}")
+        phrases.append(f"{len(day_rows)} on {day}, {before}")
     return [f"Margins were set for {'; '.join(phrases)}."] if phrases else []

@@ -141,8 +141,8 @@ def search(
     order = np.argsort(-np.round(share_G.ravel(), 9), kind="stable")
     best = []
     for index in order[:shown]:
-        places = zip(CHOICES, np.unravel_index(index, shape), strict=True)
-        best.append(({choice: grid[choice][int(i)] for choice, i in places}, float(share_G.ravel()[index])))
+        axes_at = zip(CHOICES, np.unravel_index(index, shape), strict=True)
+        best.append(({choice: grid[choice][int(i)] for choice, i in axes_at}, float(share_G.ravel()[index])))
     best_at = np.unravel_index(order[0], shape)
     close_K = [np.broadcast_to(close[index], shape)[best_at] for close, index in zip(closes, index_K, strict=True)]
     by_chance = {}
@@ -230,7 +230,7 @@ def judge(
     deals: int,
 ) -> tuple[list[tuple], list[Record]]:
     """A row of `VERDICT_COLUMNS` for each number, and the scores of the joint reading and of the protocol."""
-    of_run = comparison.set_index(["table", "row", "column"])[["reproduced", "at_least"]]
+    run_rows = comparison.set_index(["table", "row", "column"])[["reproduced", "at_least"]]
     counts = readings.groupby(["table", "row", "column"])["close"].agg(["size", "sum"])
     rows, joint_values, run_values = [], [], []
     for number in numbers:
@@ -240,13 +240,13 @@ def judge(
         if len(values) != 1:
             raise InputError("joint reading", f"has {len(values)} values of {' / '.join(number.key)}", "make it again")
         [value] = values
-        reproduced, at_least = of_run.loc[number.key]
+        reproduced, at_least = run_rows.loc[number.key]
         run_value = (float(reproduced or "nan"), at_least == "True")  # empty where the run has no such value
         upper = number.upper if number.upper > number.value else math.nan
         ours = (*run_value, is_close(number, *run_value, tolerance))
-        of_joint = (round(value[0], 6), value[1], is_close(number, *value, tolerance), measured["seed"].nunique())
+        theirs = (round(value[0], 6), value[1], is_close(number, *value, tolerance), measured["seed"].nunique())
         close = counts.loc[number.key].tolist() if number.key in counts.index else [0, 0]
-        rows.append((*number.key, number.unit, number.value, upper, *ours, *of_joint, *close))
+        rows.append((*number.key, number.unit, number.value, upper, *ours, *theirs, *close))
         joint_values.append(value)
         run_values.append(run_value)
     records = scores_of_values(numbers, joint_values, tolerances, deals, EVALUATED)

@@ -44,8 +44,8 @@ def comparison_markdown(comparison: pd.DataFrame, tolerances: Mapping[str, Toler
         parts += [f"## {_name(table)}", _table(rows, number_of)]
         parts.append("\n".join(f"{number}. {reason}" for reason, number in number_of.items()))
         shown = rows[rows["reproduced"].notna()]
-        places = {name: "; ".join(_distinct(shown[name])) for name in ("objects", "hardware")}
-        parts.append(" ".join(f"{name.capitalize()} here: {texts}." for name, texts in places.items() if texts))
+        seen_on = {name: "; ".join(_distinct(shown[name])) for name in ("objects", "hardware")}
+        parts.append(" ".join(f"{name.capitalize()} here: {texts}." for name, texts in seen_on.items() if texts))
     return "\n\n".join(part for part in parts if part) + "\n"
 
 

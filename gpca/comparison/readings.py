@@ -39,15 +39,19 @@ def judge_readings(
     import pandas as pd
 
     judged = comparison.set_index(NUMBER)[["reproduced", "verdict"]]
-    places: dict[tuple, dict[str, pd.DataFrame]] = defaultdict(dict)  # source, method and concept -> table -> rows
+    rows_by_place: dict[tuple, dict[str, pd.DataFrame]] = defaultdict(
+        dict
+    )  # source, method and concept -> table -> rows
     for (name, *place), rows in readings.groupby(["table", "source", "method", "concept"], sort=False):
-        places[tuple(place)][name] = rows
+        rows_by_place[tuple(place)][name] = rows
     records = []
     for number in numbers:
         if (counterpart := number.counterpart) is None:
             continue
         shared = (*number.key, number.unit, number.value, number.upper, *judged.loc[number.key])
-        for name, rows in places.get((*counterpart.sources, *counterpart.methods, counterpart.concept), {}).items():
+        for name, rows in rows_by_place.get(
+            (*counterpart.sources, *counterpart.methods, counterpart.concept), {}
+        ).items():
             there = replace(number, counterpart=replace(counterpart, file=READINGS, table=name))
             reproduced = value_of_run(there, {READINGS: rows})
             if reproduced is None:

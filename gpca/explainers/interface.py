@@ -97,7 +97,7 @@ class ScoringExplainer:
         raise NotImplementedError
 
 
-def of_causes(explainer: type) -> type:
+def for_causes(explainer: type) -> type:
     """Return the explainer with the labels of causes in place of the concepts."""
     from gpca.causes.dataset import LABELS
 

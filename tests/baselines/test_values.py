@@ -131,7 +131,7 @@ def test_equal_scores_name_no_concept_but_two_equal_largest_do_and_corners_are_t
     assert np.flatnonzero(attribution.abstained_N).tolist() == [4, 9]
     assert attribution.predicted_N[[4, 9, 11]].tolist() == ["", "", CONCEPTS[0]]
     eleven = np.arange(len(attached) * 11, dtype=float).reshape(-1, 11)
-    read = KnobValues(lambda worth: -worth, None, "tiny", 0).of_remedies
+    read = KnobValues(lambda worth: -worth, None, "tiny", 0).remedy_values
     assert np.array_equal(read(with_arrays(attached, uncertainty=eleven), "uncertainty"), eleven[:, :8])
 
 
