@@ -108,7 +108,7 @@ def frame_candidate(
     outline_m = outline(subject)
     if (view := clean_view(sighting, T_true, mesh, outline_m)) is None:
         raise Unmeasurable("its pixels show none of the mesh at the true pose")
-    sides_m = [rendered_side(mesh, sighting.camera_3_3, T, outline_m).points_m for T in (T_init, T_true)]
+    sides_m = [rendered_side(mesh, sighting.camera_3_3, T, outline_m)[0] for T in (T_init, T_true)]
     # The same numbers draw the points of both, so that another draw alone is no effect of the pose.
     order = random.random(max(map(len, sides_m)))
     at_init_m, at_truth_m = (side_m[np.argsort(order[: len(side_m)])[:points]] for side_m in sides_m)

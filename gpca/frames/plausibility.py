@@ -26,6 +26,7 @@ JUDGED_OBJECTS = 64
 # the limit above, and 2.0 to 2.7 times nearer when undone; correct data are no nearer in any other form.
 SHARED_NEARER = 1.5
 
+TO_OPENGL = np.diag([1.0, -1.0, -1.0, 1.0])
 Undo = tuple[Callable[[np.ndarray], np.ndarray] | None, float | tuple[float, float, float]]
 
 # Usual mistakes about a pose or a camera, and what undoes them: of T_camera_model, and the factor of the points.
@@ -35,10 +36,7 @@ FAULTS: dict[str, Undo] = {
     "is cam_t_m2c in micrometers? the format requires millimeters": (lambda T: scale_translation(T, 0.001), 1.0),
     "is cam_R_m2c listed by columns? the format requires rows": (lambda T: rigid_motion(T[:3, :3].T, T[:3, 3]), 1.0),
     "is the pose from camera to model? the format requires model to camera": (inverse, 1.0),
-    "are the camera axes OpenGL's? the format's y points down and z forward": (
-        lambda T: np.diag([1.0, -1.0, -1.0, 1.0]) @ T,
-        1.0,
-    ),
+    "are the camera axes OpenGL's? the format's y points down and z forward": (lambda T: TO_OPENGL @ T, 1.0),
     "is the image mirrored?": (None, (-1.0, 1.0, 1.0)),
 }
 for factor in (0.001, 0.01, 0.1, 0.25, 0.5, 2, 4, 10, 100, 1000):
@@ -91,12 +89,9 @@ def require_plausible(observed: MeasuredObject) -> None:
     undone = {reason: observed.distance(undo) for reason, undo in FAULTS.items()}
     # Relative to the cloud's size: a cloud that has shrunk to a point is near to anything.
     likeliest = min(undone, key=lambda reason: undone[reason] / observed.size(FAULTS[reason][1]))
-    raise InputError(
-        observed.subject,
-        f"half of its measured points lie {1e3 * distance * observed.diameter_m:.0f} mm or more from the model in the "
-        f"annotated pose, {distance:.2g} diameters",
-        likeliest if undone[likeliest] * NEARER < FARTHEST else "check its pose, mask, cam_K and depth_scale",
-    )
+    lie = f"lie {1e3 * distance * observed.diameter_m:.0f} mm or more from the model in the annotated pose"
+    remedy = likeliest if undone[likeliest] * NEARER < FARTHEST else "check its pose, mask, cam_K and depth_scale"
+    raise InputError(observed.subject, f"half of its measured points {lie}, {distance:.2g} diameters", remedy)
 
 
 def require_shared_form(dataset: str, observations: Sequence[MeasuredObject]) -> None:

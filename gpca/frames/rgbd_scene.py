@@ -154,9 +154,8 @@ def lay_table(
         flat_center_m = (flat_m.min(axis=0) + flat_m.max(axis=0)) / 2
         outline = MultiPoint(flat_m - flat_center_m).convex_hull
         azimuth = random.uniform(0, 2 * np.pi)
-        ways = (
-            distance_m * np.array([np.cos(azimuth), np.sin(azimuth)]) for distance_m in np.arange(0, TABLE_M, 0.005)
-        )
+        outward = np.array([np.cos(azimuth), np.sin(azimuth)])
+        ways = (distance_m * outward for distance_m in np.arange(0, TABLE_M, 0.005))
         free = (way for way in ways if all(translate(outline, *way).distance(o) >= settings.gap_m for o in outlines))
         if (at := next(free, None)) is None:
             fault = f"there is no room for {count} objects {settings.gap_m} m apart"

@@ -52,17 +52,6 @@ class CleanView:
     share: float  # of the whole visible side that was measured
 
 
-@dataclass(frozen=True)
-class Side:
-    """The side that an object turns to a camera."""
-
-    points_m: np.ndarray  # (V, 3) in the object's frame, one for each pixel
-    pixels: np.ndarray  # (V, 2) where the camera sees them, (u, v); also outside the image
-
-    def __len__(self) -> int:
-        return len(self.points_m)
-
-
 def clean_view(
     sighting: Sighting, T_camera_object: np.ndarray, mesh: MeshScene, surface_m: np.ndarray
 ) -> CleanView | None:
@@ -73,14 +62,14 @@ def clean_view(
     points_m = sighting.points_m
     met_m = met(mesh, points_m / points_m[:, 2:], T_camera_object)
     hit_N = np.isfinite(met_m).all(axis=1)
-    side = rendered_side(mesh, sighting.camera_3_3, T_camera_object, surface_m)
-    if not hit_N.any() or not len(side):
+    side_m, pixels = rendered_side(mesh, sighting.camera_3_3, T_camera_object, surface_m)
+    if not hit_N.any() or not len(side_m):
         return None
     measured_m = transform(inverse(T_camera_object), points_m)
     if not hit_N.all():
         met_m[~hit_N] = met_m[hit_N][cKDTree(met_m[hit_N]).query(measured_m[~hit_N])[1]]
-    seen_V = sighting.measured(side.pixels)
-    return CleanView(measured_m, met_m, side.points_m[~seen_V], float(seen_V.mean()))
+    seen_V = sighting.measured(pixels)
+    return CleanView(measured_m, met_m, side_m[~seen_V], float(seen_V.mean()))
 
 
 def rendered_side(
@@ -89,14 +78,15 @@ def rendered_side(
     T_camera_object: np.ndarray,
     surface_m: np.ndarray,
     most_pixels: int = MOST_PIXELS,
-) -> Side:
+) -> tuple[np.ndarray, np.ndarray]:
     """Return the side of an object that a camera would see at a pose with nothing in front, by about `most_pixels`.
 
-    It is empty where a part of the object would lie behind the camera.
+    It is points (V, 3) in the object's frame, and their pixels (V, 2), (u, v), also outside the image; none where a
+    part of the object would lie behind the camera.
     """
     shown = rotate(camera_3_3, transform(T_camera_object, surface_m))
     if shown[:, 2].min() <= 0:
-        return Side(np.empty((0, 3)), np.empty((0, 2), int))
+        return np.empty((0, 3)), np.empty((0, 2), int)
     at_2 = shown[:, :2] / shown[:, 2:]
     low_2, high_2 = np.floor(at_2.min(axis=0)).astype(int), np.ceil(at_2.max(axis=0)).astype(int)
     step = max(1, round(np.sqrt(np.prod((high_2 - low_2 + 1).astype(float)) / most_pixels)))
@@ -105,7 +95,7 @@ def rendered_side(
     rays_N_3 = rotate(np.linalg.inv(camera_3_3), np.column_stack([pixels, np.ones(len(pixels))]))
     side_m = met(mesh, rays_N_3, T_camera_object)
     hit_N = np.isfinite(side_m).all(axis=1)
-    return Side(side_m[hit_N], pixels[hit_N])
+    return side_m[hit_N], pixels[hit_N]
 
 
 def met(mesh: MeshScene, rays_N_3: np.ndarray, T_camera_object: np.ndarray) -> np.ndarray:
@@ -160,15 +150,15 @@ def median_depth(depth_n_H_W: np.ndarray) -> np.ndarray:
 
 
 def fuse(shots: Sequence[Shot], diameter_m: float, filtered: bool) -> np.ndarray:
-    """Return the object's points (P, 3) of all shots in the world, without statistical outliers where `filtered`."""
+    """Return the object's points (P, 3) of all shots in the world.
+
+    Where `filtered`, statistical outliers (Rusu et al. 2008) are removed by Open3D.
+    """
     points_m = np.concatenate([shot.object_points_m(diameter_m) for shot in shots])
-    return without_outliers(points_m) if filtered and len(points_m) > NEIGHBORS else points_m
-
-
-def without_outliers(points: np.ndarray) -> np.ndarray:
-    """Remove statistical outliers (Rusu et al. 2008), by Open3D."""
-    _, rows = open3d_cloud(points).remove_statistical_outlier(NEIGHBORS, OUTLIER_RATIO)
-    return points[np.asarray(rows)]
+    if filtered and len(points_m) > NEIGHBORS:
+        _, rows = open3d_cloud(points_m).remove_statistical_outlier(NEIGHBORS, OUTLIER_RATIO)
+        return points_m[np.asarray(rows)]
+    return points_m
 
 
 def agreement(
@@ -249,8 +239,7 @@ def expected_surface(
     if len(measured_m):
         seen_Q = cKDTree(measured_m).query(placed_m, distance_upper_bound=reach_m)[0] < reach_m
     around = occupy(np.concatenate([shot.other_points_m() for shot in shots]))
-    meshes = [(transform(T_world_object, vertices_m), faces), table(), *([around] if around else [])]
-    scene = MeshScene(meshes)
+    scene = MeshScene([(transform(T_world_object, vertices_m), faces), table(), *([around] if around else [])])
     shown_n_Q = []
     for T_world_camera in poses_n:
         view = scene.look(camera, T_world_camera)
@@ -261,6 +250,4 @@ def expected_surface(
 
 def best_viewpoint(seen_Q: np.ndarray, shown_n_Q: np.ndarray) -> int:
     """Return the viewpoint after which most of the surface was seen; of equals, the one that shows most by itself."""
-    together_n = (seen_Q | shown_n_Q).sum(axis=1)
-    alone_n = shown_n_Q.sum(axis=1)
-    return int(np.lexsort((-alone_n, -together_n))[0])
+    return int(np.lexsort((-shown_n_Q.sum(axis=1), -(seen_Q | shown_n_Q).sum(axis=1)))[0])

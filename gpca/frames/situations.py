@@ -15,7 +15,7 @@ from gpca.frames.rgbd_scene import Placed, SceneSettings, center, lay_table, res
 from gpca.frames.shots import Shot, median_depth
 from gpca.objects.bop import find_symmetries
 from gpca.objects.camera import TABLE_M, Camera, DepthNoise, MeshScene, direction, look_at, table
-from gpca.objects.canonical import ObjectClouds, canonical_cloud
+from gpca.objects.canonical import sample_objects
 from gpca.objects.surface import Surface
 from gpca.pairs.perturbation import Hidden, Severities, misplace
 from gpca.rigid import inverse, scale_translation, transform
@@ -54,11 +54,9 @@ class Shelf:
         self.surfaces = [center(surface) for surface in surfaces]
         self.resting = [stable_poses(surface) for surface in self.surfaces]
         self._hulls_m = [surface.vertices_m[ConvexHull(surface.vertices_m).vertices] for surface in self.surfaces]
-        clouds = [canonical_cloud(surface, source, points) for surface in self.surfaces]
-        names = tuple(surface.name for surface in self.surfaces)
-        diameters_m = np.array([diameter_m for *_, diameter_m in clouds])
-        self.objects = ObjectClouds(names, diameters_m, tuple((p, n) for p, n, _ in clouds))
-        self.symmetric = [bool(find_symmetries(p, d)) for p, _, d in clouds]
+        self.objects = sample_objects(self.surfaces, source, points)
+        clouds = zip(self.objects.clouds, self.objects.diameters_m, strict=True)
+        self.symmetric = [bool(find_symmetries(points_m, diameter_m)) for (points_m, _), diameter_m in clouds]
         self._settings = estimator or InitialPoseSettings()
         self._estimators: dict[int, GlobalRegistration] = {}
 
@@ -163,11 +161,9 @@ class Situations:
                 return disturbed, clean
         raise InputError(f"recovery: situation {axes}", f"has no room for cause '{cause}'", "widen recovery.hidden")
 
-    def misplaced(self, clean: Situation, number: int) -> Situation:
+    def misplaced(self, clean: Situation, number: int, random: np.random.Generator | None = None) -> Situation:
         """Return a variant of a situation without a cause, with its own pose error."""
-        return self._misplaced(clean, generator(*clean.axes, "misplaced", number))
-
-    def _misplaced(self, clean: Situation, random: np.random.Generator) -> Situation:
+        random = random or generator(*clean.axes, "misplaced", number)
         T_error = misplace(np.zeros((1, 3)), self._settings.severities, random).T_target_source_true
         return replace(clean, T_object_estimated=scale_translation(T_error, clean.diameter_m), cause="pose")
 
@@ -179,8 +175,7 @@ class Situations:
             self._tables[number] = lay_table(self._shelf.surfaces, scenes, source, number, self._shelf.resting)
         standing = list(self._tables[number])
         standing.insert(0, standing.pop(int(random.integers(len(standing)))))
-        azimuth = random.uniform(0, 2 * np.pi)
-        toward = direction(azimuth, np.deg2rad(random.uniform(*scenes.elevation_deg)))
+        toward = direction(random.uniform(0, 2 * np.pi), np.deg2rad(random.uniform(*scenes.elevation_deg)))
         center_m = standing[0].T_world_object[:3, 3]
         T_world_camera = look_at(center_m + random.uniform(*scenes.distance_m) * toward, center_m)
         drawn = (np.eye(4), scenes.camera, scenes.noise, "", number, axes)
@@ -202,7 +197,7 @@ class Situations:
             scale = settings.scenes.noise.scale * random.uniform(*settings.noise_scale)
             return replace(clean, noise=replace(clean.noise, scale=scale), cause=cause)
         if cause == "pose":
-            return self._misplaced(clean, random)
+            return self.misplaced(clean, 0, random)
         if cause != "overlap":
             raise InputError(f"cause '{cause}'", "unknown", "choose one of noise, pose, overlap")
         visible = clean.visible()

@@ -96,18 +96,18 @@ def _register_one(
     target_rows = random.permutation(len(objects.points(index)))[: registration.cloud_points]
     T_init_camera = inverse(instances.T_camera_object_init[i])
     points = transform(T_init_camera, instances.cloud_m(i)[rows].astype(np.float64)) / diameter_m
-    kept_P = None
+    kept_P, lost_to = None, HALF_SPACE if concept == "overlap" else ""
     if concept == "overlap" and random.random() < settings.occluders:
         share = random.uniform(*registration.severities.crop)
         kept_P = occlude(instances, i, instances.pixels_of(i)[rows], share, random)
     if kept_P is None:
         perturbed = PERTURBATIONS[concept](points, registration.severities, random)
     else:
-        perturbed = Perturbed(points[kept_P], severity={"crop": float(1 - kept_P.mean())})
+        perturbed, lost_to = Perturbed(points[kept_P], severity={"crop": float(1 - kept_P.mean())}), OCCLUDER
     T_object_init = inverse(instances.T_camera_object_true[i]) @ instances.T_camera_object_init[i]
     T_true = scale_translation(T_object_init, 1 / diameter_m) @ perturbed.T_target_source_true
     perturbed = replace(perturbed, T_target_source_true=T_true)
-    lost_to = "" if concept != "overlap" else HALF_SPACE if kept_P is None else OCCLUDER
+
     return align_pair(perturbed, objects, index, target_rows, registration.icp), lost_to
 
 
@@ -133,11 +133,10 @@ def occlude(
         mask[v, u] = True
         # Closed where single pixels were not measured.
         silhouette = binary_closing(np.pad(mask, 3), iterations=2)[3:-3, 3:-3]
-        angle = random.uniform(0, 2 * np.pi)
+        angle, size_2 = random.uniform(0, 2 * np.pi), np.array(silhouette.shape[::-1])
         direction = np.array([np.cos(angle), np.sin(angle)])
         reach = np.linalg.norm(np.ptp(pixels_P_2, axis=0)) + np.linalg.norm(silhouette.shape)
-        start = center - corner - np.array(silhouette.shape[::-1]) / 2
-        size_2 = np.array(silhouette.shape[::-1])
+        start = center - corner - size_2 / 2
         for distance_px in np.arange(reach, 0, -STEP_PX):
             at_P_2 = pixels_P_2 - np.rint(corner + start + distance_px * direction).astype(int)
             u, v = at_P_2.clip(0, size_2 - 1).T

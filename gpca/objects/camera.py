@@ -64,11 +64,9 @@ class MeshScene:
         corners_F_3_3 = np.concatenate([np.asarray(vertices_m, float)[faces] for vertices_m, faces in meshes])
         self._first_face = np.cumsum([0, *(len(faces) for _, faces in meshes)])
         self._normal_F_3, self._offset_F_m = planes(corners_F_3_3)
-        for vertices_m, faces in meshes:
-            self._scene.add_triangles(
-                self._tensor(np.ascontiguousarray(vertices_m, np.float32)),
-                self._tensor(np.ascontiguousarray(faces, np.uint32)),
-            )
+        for mesh in meshes:
+            arrays = (np.ascontiguousarray(of, kind) for of, kind in zip(mesh, (np.float32, np.uint32), strict=True))
+            self._scene.add_triangles(*map(self._tensor, arrays))
 
     def silhouette(self, camera: Camera, T_world_camera: np.ndarray) -> np.ndarray:
         """Return the pixels (H, W) that see something, as booleans."""
@@ -175,10 +173,8 @@ def look_at(eye_m: np.ndarray, target_m: np.ndarray) -> np.ndarray:
 
 def table() -> tuple[np.ndarray, np.ndarray]:
     """Return the table's top, a square at z = 0, as vertices and faces."""
-    half = TABLE_M / 2
-    return np.array([[-half, -half, 0], [half, -half, 0], [half, half, 0], [-half, half, 0]]), np.array(
-        [[0, 1, 2], [0, 2, 3]]
-    )
+    corners_4_3 = TABLE_M / 2 * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+    return corners_4_3, np.array([[0, 1, 2], [0, 2, 3]])
 
 
 def back_project(depth_m: np.ndarray, mask: np.ndarray, camera_3_3: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -224,7 +220,6 @@ def rendered_views(mesh: Surface, count: int) -> Iterator[Surface]:
         depth_m = VIEW_NOISE.measure(scene.look(VIEW_CAMERA, T_world_camera), generator(name, "view"))
         points_m, _ = back_project(depth_m, depth_m > 0, VIEW_CAMERA.matrix_3_3)
         if len(points_m) == 0:
-            raise InputError(
-                f"object '{mesh.name}'", f"is not seen from {VIEW_DISTANCE_M} m", "check unit in the config"
-            )
+            fault = f"is not seen from {VIEW_DISTANCE_M} m"
+            raise InputError(f"object '{mesh.name}'", fault, "check unit in the config")
         yield Surface(name, points_m, None)

@@ -102,8 +102,9 @@ def canonical_cloud(
     random = seeds.generator(source, surface.name, "surface")
     if surface.faces is None:
         if len(vertices_m) < FEWEST_CLOUD_POINTS:
-            fault = f"the cloud has {len(vertices_m)} point(s)"
-            raise InputError(subject, fault, f"give {FEWEST_CLOUD_POINTS} or more")
+            raise InputError(
+                subject, f"the cloud has {len(vertices_m)} point(s)", f"give {FEWEST_CLOUD_POINTS} or more"
+            )
         diameter_m = diameter(vertices_m, subject)
         require_size(diameter_m, subject, say)
         order = random.permutation(len(vertices_m))
@@ -217,8 +218,8 @@ class ObjectClouds:
 
         A file that names no source is accepted for any: users' own rules write such files.
         """
-        shapes = {"names": ("O",), "diameters_m": ("O",), "points_m": ("P", 3), "normals": ("P", 3), "offsets": ("E",)}
-        shapes |= {"families": ("O",), "folds": ("O",)}
+        shapes = dict.fromkeys(("names", "diameters_m", "families", "folds"), ("O",))
+        shapes |= {"points_m": ("P", 3), "normals": ("P", 3), "offsets": ("E",)}
         kinds = dict.fromkeys(shapes, REAL) | {"names": TEXT, "offsets": WHOLE, "families": TEXT, "folds": WHOLE}
         axes = None if source is None else (source, None)
         arrays = load_arrays(path, shapes, kinds, axes, optional=("source", "families", "folds"))
@@ -320,8 +321,7 @@ def read_scene_splits(path: str | Path, dataset: str) -> dict[int, Place]:
 
 
 def _places(path, names, clusters, roles, folds) -> dict[str, Place]:
-    places: dict[str, Place] = {}
-    by_cluster: dict[str, Place] = {}
+    places, by_cluster = dict[str, Place](), dict[str, Place]()
     for name, cluster, role, fold in zip(names, clusters, roles, folds, strict=True):
         if name in places:
             raise InputError(path, f"'{name}' occurs twice", "keep one of its rows")
@@ -339,9 +339,7 @@ def _places(path, names, clusters, roles, folds) -> dict[str, Place]:
 def unseen(fold_N: np.ndarray, seed: int) -> np.ndarray | None:
     """Return the rows (N,) of the fold that a seed leaves unseen, by turns; None for fewer than two folds."""
     folds = np.unique(fold_N[fold_N >= 0])
-    if len(folds) < 2:
-        return None
-    return fold_N == folds[seed % len(folds)]
+    return fold_N == folds[seed % len(folds)] if len(folds) >= 2 else None
 
 
 def drawn(cluster_N: np.ndarray, share: float, *axes: object) -> np.ndarray:

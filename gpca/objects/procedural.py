@@ -155,13 +155,8 @@ def _cup(cup: Cup) -> Shape:
     for number in range(cup.handles):
         ends = np.interp(cup.joints, heights, radii) - cup.wall / 2
         out = ends.mean() + cup.reach
-        path = [
-            (ends[0], 0, low),
-            (0.9 * out, 0, low),
-            (out, 0, (low + high) / 2),
-            (0.9 * out, 0, high),
-            (ends[1], 0, high),
-        ]
+        xs = (ends[0], 0.9 * out, out, 0.9 * out, ends[1])
+        path = [(x, 0, z) for x, z in zip(xs, (low, low, (low + high) / 2, high, high), strict=True)]
         solid += tube(path, cup.grip).rotate((0, 0, 360 * number / cup.handles))
     return Shape(solid - cavity)  # last, since handles reach into the wall
 

@@ -35,8 +35,7 @@ class Judges:
     """The judge of each object, made when it is first asked for; `subject` names the objects in a message."""
 
     def __init__(self, objects: ObjectClouds, subject: str) -> None:
-        self._objects, self._subject = objects, subject
-        self._made: dict[int, Judge] = {}
+        self._objects, self._subject, self._made = objects, subject, dict[int, Judge]()
 
     def of(self, registrations: Registrations, row: int) -> Judge:
         """Return the judge of a registration's object; InputError where the objects have another one in its place."""

@@ -82,9 +82,9 @@ class FrameView:
     def side(self, T: np.ndarray, most_pixels: int) -> tuple[np.ndarray, float]:
         """Return the points (V, 3), diameters, that the camera would see under a hypothesis, and the share measured."""
         T_camera_object, known = self.T_camera_object(T), self.known
-        side = rendered_side(known.mesh, self.camera_3_3, T_camera_object, known.outline_m, most_pixels)
-        seen = self.sighting.measured(side.pixels).mean() if len(side) else 0.0
-        return side.points_m / self.known.subject.diameter_m, float(seen)
+        side_m, pixels = rendered_side(known.mesh, self.camera_3_3, T_camera_object, known.outline_m, most_pixels)
+        seen = self.sighting.measured(pixels).mean() if len(side_m) else 0.0
+        return side_m / self.known.subject.diameter_m, float(seen)
 
     def candidate(self, T: np.ndarray, random: np.random.Generator) -> Candidate:
         """Return the pair as a candidate, were a hypothesis true; where no pixel shows the mesh, only its pose is

@@ -86,18 +86,6 @@ def near(points_N_3: np.ndarray, others_M_3: np.ndarray, distance: float) -> np.
     return np.isfinite(nearest_N)
 
 
-def overlap_of_voxels(
-    source_n_3: np.ndarray, target_m_3: np.ndarray, T_target_source: np.ndarray, scale: float
-) -> float:
-    """Return the share of the target's surface in [0, 1] that the source has as well, of clouds thinned to voxels.
-
-    It is the share of the target's points within `OVERLAP_M` of the source at the true pose; as the clouds are thinned,
-    the density near a sensor does not matter. The target's share is that published for 3DMatch and 3DLoMatch (Huang et
-    al. 2021). `scale` is that of :attr:`ScanPair.scale`.
-    """
-    return float(near(target_m_3, transform(T_target_source, source_n_3), OVERLAP_M * scale).mean())
-
-
 def voxels(points_N_3: np.ndarray, edge: float) -> np.ndarray:
     """Return the mean (n, 3) of the points in each cube of a grid, sorted by cube; InputError for too many cubes."""
     points_N_3 = np.asarray(points_N_3, np.float64)

@@ -12,7 +12,6 @@ from gpca.frames.shots import (
     fuse,
     median_depth,
     occupy,
-    without_outliers,
 )
 from gpca.objects.camera import Camera, MeshScene, look_at
 from gpca.rigid import transform
@@ -80,9 +79,12 @@ def test_the_median_ignores_what_was_not_measured():
 
 
 def test_outliers_go_and_the_surface_stays():
-    points = fuse([seen((0.6, 0, 0.2))], 2 * D, filtered=False)
-    stray = np.vstack([points, [[0, 0, 0.3], [0.3, 0.1, 0]]])
-    kept = without_outliers(stray)
+    shot = seen((0.6, 0, 0.2))
+    depth_m = shot.depth_m.copy()
+    v, u = np.argwhere(shot.mask)[:2].T
+    depth_m[v, u] -= 0.25
+    points = fuse([shot], 2 * D, filtered=False)
+    kept = fuse([Shot(shot.camera, shot.T_world_camera, depth_m, shot.mask)], 2 * D, filtered=True)
     assert np.linalg.norm(kept, axis=1).max() < 0.11
     assert len(kept) > 0.9 * len(points)
 
