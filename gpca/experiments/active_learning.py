@@ -21,8 +21,16 @@ from gpca.declarations.result import Figure, Frame, Paths, figure, numbers, tabl
 from gpca.declarations.step import Plan, Step
 from gpca.encoders.registry import EncoderChanges, require_draws
 from gpca.errors import require_names
-from gpca.experiments.label_counts import COUNT, Clusters, families, label_cells, quantity
-from gpca.experiments.label_curves import STYLES, draw_curves, mean_curves
+from gpca.experiments.label_curves import (
+    COUNT,
+    STYLES,
+    Clusters,
+    draw_curves,
+    families,
+    label_cells,
+    mean_curves,
+    quantity,
+)
 from gpca.pairs.perturbation import Concept
 from gpca.reporting.sheet import Row, Sheet, Show, crossed
 from gpca.reporting.tables.builder import cautious_over

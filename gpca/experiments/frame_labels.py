@@ -14,7 +14,7 @@ from gpca.declarations.result import Frame, Paths, table
 from gpca.declarations.step import Step
 from gpca.errors import InputError, require_names
 from gpca.experiments.frames import encoder_title, title_of_frames
-from gpca.experiments.label_counts import COUNT, label_cells, quantity
+from gpca.experiments.label_curves import COUNT, label_cells, quantity
 from gpca.frames.source import REAL_WORLD
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.sheet import Sheet, Show, crossed

@@ -1,46 +1,43 @@
-"""Learning curves: accuracy over labels, by source and encoder in panels; strategies or embeddings are lines."""
+"""Learning curves: accuracy over labels as lines of panels, and numbers of labels as cells of tables."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
+from math import inf
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from gpca.active_learning.curves import read_curves
+from gpca.active_learning.curves import CENSORED_BY, read_curves
+from gpca.causes.dataset import Causes
 from gpca.declarations.result import Figure, Frame, Paths
 from gpca.errors import InputError
 from gpca.evaluation.intervals import mean_interval
 from gpca.evaluation.measures import source_method_seed
+from gpca.pairs.dataset import Registrations
+from gpca.reporting.figures import style
 from gpca.reporting.figures.panels import fitting_columns, legend_below, panels
-from gpca.reporting.figures.style import (
-    BLACK,
-    BLUE,
-    GRAY,
-    GREEN,
-    ORANGE,
-    PURPLE,
-    SKY_BLUE,
-    SMALL_PT,
-    TEXT_WIDTH_IN,
-    VERMILION,
-    write_title,
-)
+from gpca.reporting.sheet import Show
+from gpca.reporting.tables.cells import cautious_cell, cell_of_repeats, where
+from gpca.reporting.tables.table import Cell
 from gpca.reporting.words import plural, span
+from gpca.seeds import seed_of_file
 
 MOST_LINES = 6  # in a panel; of more, none can be followed
 STYLES = {  # the paper's two strategies are thick, with their intervals; an unknown one has the style _OTHER
-    "bald_kmeans": (BLUE, "-", 1.8),
-    "random": (BLACK, "-", 1.8),
-    "random_stratified": (BLACK, ":", 0.9),
-    "bald": (BLUE, "--", 0.9),
-    "bald_stochastic": (SKY_BLUE, "-", 0.9),
-    "entropy": (VERMILION, "-.", 0.9),
-    "margin": (ORANGE, "-", 0.9),
-    "badge": (GREEN, "-", 0.9),
-    "coreset": (PURPLE, "-", 0.9),
-    "typiclust": (GREEN, "--", 0.9),
+    "bald_kmeans": (style.BLUE, "-", 1.8),
+    "random": (style.BLACK, "-", 1.8),
+    "random_stratified": (style.BLACK, ":", 0.9),
+    "bald": (style.BLUE, "--", 0.9),
+    "bald_stochastic": (style.SKY_BLUE, "-", 0.9),
+    "entropy": (style.VERMILION, "-.", 0.9),
+    "margin": (style.ORANGE, "-", 0.9),
+    "badge": (style.GREEN, "-", 0.9),
+    "coreset": (style.PURPLE, "-", 0.9),
+    "typiclust": (style.GREEN, "--", 0.9),
 }
-_OTHER = (GRAY, "-", 0.9)
+_OTHER = (style.GRAY, "-", 0.9)
 
 
 def draw_curves(
@@ -79,7 +76,7 @@ def draw_curves(
         down += [(name, [*always, *map(str, part)]) for part in np.array_split(others, groups)]
     aim = f"target ({100 * target:g} %)"
     ordered = [*(lines[line] for line in across), aim]
-    below = -(-len(ordered) // fitting_columns(ordered, TEXT_WIDTH_IN))
+    below = -(-len(ordered) // fitting_columns(ordered, style.TEXT_WIDTH_IN))
     height_in = 0.42 + 0.2 * below + (1.5 if len(down) < 4 else 1.25) * len(down)
     alike = len({curves[key]["labels"].iloc[-1] for key in shown}) == 1
     sharex = True if alike else "row"
@@ -87,7 +84,7 @@ def draw_curves(
     for row, (name, group) in enumerate(down):
         for column, source in enumerate(columns):
             panel = axes[row, column]
-            panel.axhline(100 * target, color=GRAY, linewidth=0.6, linestyle=(0, (4, 3)), label=aim)
+            panel.axhline(100 * target, color=style.GRAY, linewidth=0.6, linestyle=(0, (4, 3)), label=aim)
             for line in reversed(group):
                 if (source, name, line) in shown:
                     curve, (color, dashes, width) = curves[source, name, line], styles.get(line, _OTHER)
@@ -97,17 +94,17 @@ def draw_curves(
                         bounds = (curve[bound].clip(0, 100) for bound in ("low", "high"))
                         panel.fill_between(curve["labels"], *bounds, color=color, alpha=0.15, linewidth=0)
             if len(panel.get_lines()) == 1:
-                panel.text(0.5, 0.5, "no curve", transform=panel.transAxes, ha="center", va="center", color=GRAY)
+                panel.text(0.5, 0.5, "no curve", transform=panel.transAxes, ha="center", va="center", color=style.GRAY)
             panel.margins(x=0.01)
             if row == 0:
                 panel.set_title(sources[source])
             if row == len(down) - 1:
                 panel.set_xlabel("labels")
-        axes[row, 0].set_ylabel(f"accuracy (%)\n{rows[name]}", fontsize=SMALL_PT)
+        axes[row, 0].set_ylabel(f"accuracy (%)\n{rows[name]}", fontsize=style.SMALL_PT)
     handles = {line.get_label(): line for panel in axes.flat for line in panel.get_lines()}
     legend_below(figure, [handles[title] for title in ordered], ordered)
     seeds = {count for key in shown for count in curves[key]["seeds"]}
-    write_title(figure, f"Means over {plural(span(seeds), 'seed')}")
+    style.write_title(figure, f"Means over {plural(span(seeds), 'seed')}")
     return figure
 
 
@@ -141,3 +138,51 @@ def mean_curves(curve_files: Paths, held_out: Collection[str] | None = None) -> 
         ]
         means[key] = pd.DataFrame(rows, columns=["labels", "mean", "low", "high", "seeds"])
     return means
+
+
+COUNT: dict[str, Any] = {"decimals": 0, "limits": (0, inf), "least_is_best": True, "factor": 1}
+OVER_TEST_SAMPLES = ("final_accuracy", "final_accuracy_new", "area_under_curve")
+Clusters = Mapping[tuple[str, int], int]  # (source, seed) -> number of families of the test samples
+
+
+def families(files: Paths, load: Callable[[Path, tuple[str, int]], Registrations] = Registrations.load) -> Clusters:
+    """Number of families of the test samples in files named ``…/{source}/seed{seed}.npz``."""
+    counts = {}
+    for path in map(Path, files):
+        axes = path.parent.name, seed_of_file(path)
+        registrations = load(path, axes)
+        counts[axes] = len(np.unique(registrations.cluster[registrations.rows("test")]))
+    return counts
+
+
+def families_with_causes(files: Paths) -> Clusters:
+    """Number of families of the test samples of registrations with measured causes."""
+    return families(files, lambda path, axes: Causes.load(path, axes).registrations)
+
+
+def quantity(metric: str, title: str, method: str = "", concept: str = "", **options: Any) -> Show:
+    """Column of a metric of all rows, or of one strategy or one concept held out."""
+    wanted = {"metric": metric, "method": method, "concept": concept}
+    return Show(title, where={key: name for key, name in wanted.items() if name}, **options)
+
+
+def label_cells(test: int, clusters: Clusters) -> Callable[[Frame, Show], Cell | None]:
+    """How cells are made: means over the concepts held out that the rows have, then over the seeds.
+
+    Args:
+        test: number of test samples of a seed.
+        clusters: numbers of clusters of these, which widen the interval of an accuracy, if there are any.
+    """
+
+    def cell(rows: Frame, column: Show) -> Cell | None:
+        metric, chosen = column.where["metric"], where(rows, column.where)
+        values_R = column.factor * chosen.groupby("seed")["value"].mean()
+        if clusters and metric in OVER_TEST_SAMPLES:
+            counted = sum(
+                clusters[source, int(seed)] for source in chosen["source"].unique() for seed in values_R.index
+            )
+            return cautious_cell(values_R, test * len(values_R), counted)
+        done = where(rows, {**column.where, "metric": CENSORED_BY.get(metric)})["value"]
+        return cell_of_repeats(values_R, test * len(values_R), at_least=bool((done < 1).any()))
+
+    return cell

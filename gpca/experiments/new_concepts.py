@@ -17,8 +17,16 @@ from gpca.encoders.registry import encoder_module
 from gpca.evaluation.measures import ALL, read_all_metrics
 from gpca.experiments.active_learning import learning_settings
 from gpca.experiments.concept_attribution import PREDICTIONS, collect_intervals
-from gpca.experiments.label_counts import COUNT, Clusters, families, families_with_causes, label_cells, quantity
-from gpca.experiments.label_curves import draw_curves, mean_curves
+from gpca.experiments.label_curves import (
+    COUNT,
+    Clusters,
+    draw_curves,
+    families,
+    families_with_causes,
+    label_cells,
+    mean_curves,
+    quantity,
+)
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.figures.style import BLUE, GRAY, GREEN, SKY_BLUE, VERMILION
 from gpca.reporting.tables.builder import TableBuilder, cautious_over, crossed
@@ -89,17 +97,14 @@ LEARN = Step(
     settings=lambda plan, _wildcards: {
         "new_concepts": plan.config["new_concepts"],
         "active_learning": learning_settings(plan),
-        "encoder": plan.config["encoders"][plan.config["embedding"]["encoder"]],
+        "encoder": plan.encoder,
         "cause_encoder": plan.config["diagnosis"]["encoder"],
         "causes": plan.config["causes"],
         "descriptors": plan.config["diagnosis"]["descriptors"],
         "icp": plan.config["registrations"]["icp"],
     },
     params={"encoders_of": lambda plan, wildcards: [*_other_encoders(plan, wildcards)]},
-    modules=lambda plan: [
-        encoder_module(plan.config["encoders"][plan.config["embedding"]["encoder"]]),
-        encoder_module(plan.config["diagnosis"]["encoder"]),
-    ],
+    modules=lambda plan: [plan.encoder_module, encoder_module(plan.config["diagnosis"]["encoder"])],
     priority=6,
 )
 
@@ -112,10 +117,6 @@ def collect(run: Run, files: Paths) -> Frame:
 SECTION = "Beyond the paper: concepts that no encoder has seen"
 METRICS = (read_all_metrics, ("active_learning.csv", "new_concepts.csv"))
 CLUSTERS = (families, "registrations/{source}/seed{new_concept_seed}.npz")
-
-
-def _rows(run: Run, metrics: Frame) -> Frame:
-    return metrics[metrics["seed"].isin(seeds(run.config))]
 
 
 @table(
@@ -135,7 +136,7 @@ def table15_new_concepts(
     run: Run, metrics: Frame, without_labels: Frame, clusters: Clusters, cause_clusters: Clusters
 ) -> Table:
     learning, test = run.config["active_learning"], run.config["registrations"]["test"]
-    metrics = _rows(run, metrics)
+    metrics = metrics[metrics["seed"].isin(seeds(run.config))]
     labels = {f"labels_{c}": quantity("labels_to_target", f"Labels, {c}", PAPERS, c, **COUNT) for c in CONCEPTS}
     labels["labels_random"] = quantity("labels_to_target", "Labels, random choice", "random", **COUNT)
     accuracies = {"all_labels": quantity("final_accuracy", "Acc., pool labeled (%)", ALL_LABELS)}
@@ -210,7 +211,7 @@ def table15_new_concepts(
 )
 def table15_oracle(run: Run, metrics: Frame, clusters: Clusters) -> Table:
     learning, own, test = run.config["active_learning"], run.config["new_concepts"], run.config["registrations"]["test"]
-    metrics = _rows(run, metrics)
+    metrics = metrics[metrics["seed"].isin(seeds(run.config))]
     shares = [0, *(round(100 * share) for share in own["errors"])]
     labels = {f"labels_{share}": quantity("labels_to_target", f"Labels, {share} % wrong", **COUNT) for share in shares}
     accuracies = {f"accuracy_{share}": quantity("final_accuracy", f"Acc., {share} % wrong (%)") for share in shares}

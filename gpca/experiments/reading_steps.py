@@ -11,14 +11,7 @@ from gpca.experiments.active_learning import learning_settings
 from gpca.experiments.explained import explainer_settings
 from gpca.explainers.registry import explainer_module
 from gpca.frames.source import REAL_WORLD, VIRTUAL
-from gpca.steps.readings.groups import (
-    FRAME_ENCODER,
-    FRAME_INPUT,
-    FRAME_REPEATS,
-    FRAME_START,
-    GROUPS,
-    SEVERITIES_RETRAINED,
-)
+from gpca.steps.readings import groups
 
 
 def retrained_on(config: Mapping, severities: str) -> dict[str, Any]:
@@ -28,8 +21,8 @@ def retrained_on(config: Mapping, severities: str) -> dict[str, Any]:
 
 
 def _files(plan: Plan, name: str) -> dict[str, list[str]]:
-    config, group, readings = plan.config, GROUPS[name], plan.config["readings"]
-    if name == FRAME_INPUT:
+    config, group, readings = plan.config, groups.GROUPS[name], plan.config["readings"]
+    if name == groups.FRAME_INPUT:
         backbone, seeds = plan.names["clouded_backbone"], config["seeds"][: readings["frame_seeds"]]
         return {
             "registrations": [f"registrations/{REAL_WORLD}/seed{seed}.npz" for seed in seeds],
@@ -40,10 +33,10 @@ def _files(plan: Plan, name: str) -> dict[str, list[str]]:
                 for seed in seeds
             ],
         }
-    if name in (FRAME_ENCODER, FRAME_START):
+    if name in (groups.FRAME_ENCODER, groups.FRAME_START):
         backbones, published = plan.names["backbone"], plan.names["published"]
         methods_of = {REAL_WORLD: [*backbones, *published]}
-        if name == FRAME_START:
+        if name == groups.FRAME_START:
             methods_of = {REAL_WORLD: backbones, plan.names["estimated"]: plan.names["condition_backbone"]}
         return {
             "registrations": [f"registrations/{s}/seed{seed}.npz" for s in methods_of for seed in config["seeds"]],
@@ -56,7 +49,7 @@ def _files(plan: Plan, name: str) -> dict[str, list[str]]:
         }
     sources = [source for source in group.sources if source in plan.names["source"]]
     seeds, ranges = config["seeds"][: 1 if group.costly else readings["seeds"]], list[str]()
-    if name == SEVERITIES_RETRAINED:
+    if name == groups.SEVERITIES_RETRAINED:
         seeds, ranges = config["seeds"][: readings["encoders"]], readings["groups"][name]["range"]
     folder, section = ("learners", "learners") if name == "diagnostics" else ("predictions", "explainers")
     methods = [method for method in group.methods if method in config[section]]
@@ -83,7 +76,7 @@ def _sections(plan: Plan) -> dict[str, Any]:
         "sizes": {name: config["readings"][name] for name in ("seeds", "encoders", "samples")},
         "uncertainty": config["uncertainty"].get("additive", {}),
         "icp": config["registrations"]["icp"],
-        "encoder": config["encoders"][config["embedding"]["encoder"]],
+        "encoder": plan.encoder,
         "active_learning": learning_settings(plan),
         **{name: config["explainers"].get(name) or {} for name in ("gpca_paper", "gpca")},
         "gpca_matern": explainer_settings(config, config["learners"]).get("gpca_matern", {}),
@@ -92,21 +85,17 @@ def _sections(plan: Plan) -> dict[str, Any]:
 
 def _settings(plan: Plan, wildcards: Any) -> dict[str, Any]:
     group, sections = wildcards.whole_group, _sections(plan)
-    if group in (FRAME_ENCODER, FRAME_START):
+    if group in (groups.FRAME_ENCODER, groups.FRAME_START):
         frames = {"source": REAL_WORLD, "methods": plan.names["backbone"], "estimated": plan.names["estimated"]}
         published = plan.config["real_world"]["published"]
         sections = {"sizes": sections["sizes"], "frames": frames, "published": published}
     return {"choices": plan.config["readings"]["groups"][group], **sections}
 
 
-def _encoder_module(plan: Plan, name: str) -> str:
-    return encoder_module(plan.config["encoders"][name])
-
-
 def _modules(plan: Plan, wildcards: Any) -> list[str]:
-    group = GROUPS[wildcards.whole_group]
-    encoder = [plan.config["embedding"]["encoder"]] if wildcards.whole_group == "encoder_head" else []
-    return [group.code, *map(explainer_module, group.explainers), *(_encoder_module(plan, name) for name in encoder)]
+    group = groups.GROUPS[wildcards.whole_group]
+    encoder = [plan.encoder_module] if wildcards.whole_group == "encoder_head" else []
+    return [group.code, *map(explainer_module, group.explainers), *encoder]
 
 
 READ = Step(
@@ -135,21 +124,21 @@ REPEAT = Step(
             for reduction in plan.config["real_world"]["reductions"]
         ],
     },
-    outputs={"out": f"readings/{FRAME_REPEATS}/{{repeats}}/{{repeated_backbone}}.csv"},
+    outputs={"out": f"readings/{groups.FRAME_REPEATS}/{{repeats}}/{{repeated_backbone}}.csv"},
     settings=lambda plan, wildcards: {
-        "choices": plan.config["readings"]["groups"][FRAME_REPEATS] | {"repeats": [wildcards.repeats]},
+        "choices": plan.config["readings"]["groups"][groups.FRAME_REPEATS] | {"repeats": [wildcards.repeats]},
         **_sections(plan),
     },
-    params={"group": FRAME_REPEATS},
-    modules=lambda plan: [GROUPS[FRAME_REPEATS].code],
+    params={"group": groups.FRAME_REPEATS},
+    modules=lambda plan: [groups.GROUPS[groups.FRAME_REPEATS].code],
     priority=9,
     resources={"mem_mb": 4000, "runtime": 120},
 )
 JOIN = Step(
     name="join_repeats",
     run="gpca.steps.readings.files:join",
-    inputs={"paths": f"readings/{FRAME_REPEATS}/{{*repeats}}/{{*repeated_backbone}}.csv"},
-    outputs={"out": f"readings/{FRAME_REPEATS}.csv"},
+    inputs={"paths": f"readings/{groups.FRAME_REPEATS}/{{*repeats}}/{{*repeated_backbone}}.csv"},
+    outputs={"out": f"readings/{groups.FRAME_REPEATS}.csv"},
 )
 RETRAIN = Step(
     name="retrain",
@@ -160,9 +149,9 @@ RETRAIN = Step(
     settings=lambda plan, wildcards: {
         "shift": plan.config["shift"],
         "registrations": retrained_on(plan.config, wildcards.severities),
-        "encoder": plan.config["encoders"][plan.config["embedding"]["encoder"]],
+        "encoder": plan.encoder,
     },
-    modules=lambda plan: [_encoder_module(plan, plan.config["embedding"]["encoder"])],
+    modules=lambda plan: [plan.encoder_module],
     priority=10,
 )
 
@@ -198,7 +187,7 @@ def _other_cloud(
         return encoder | (changes(plan) or {}) | icp | {"reading": wildcards.cloud}
 
     def modules(plan: Plan) -> list[str]:
-        return [_encoder_module(plan, plan.names["clouded_backbone"])]
+        return [encoder_module(plan.config["encoders"][plan.names["clouded_backbone"]])]
 
     options.setdefault("params", {"source": REAL_WORLD})
     options.setdefault("priority", 11)

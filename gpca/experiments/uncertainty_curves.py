@@ -93,11 +93,6 @@ def coverage_risk(run: Run, learned: Mapping) -> Figure:
     learned=(read_learner_predictions, {"prediction_files": PREDICTIONS}),
 )
 def reliability(run: Run, learned: Mapping) -> Figure:
-    """Accuracy over confidence, in the bins of the calibration error, and the number of samples in each bin.
-
-    The samples are those like the training's, of all sources and seeds together. Bins of very few samples have no
-    point. The number in a title is the calibration error of them all.
-    """
     shown, columns = _shown(run, learned)
     samples = {}
     for learner, title in shown.items():

@@ -19,8 +19,7 @@ from gpca.experiments.active_learning import (
     table3_stream,
     titles,
 )
-from gpca.experiments.label_counts import families, families_with_causes
-from gpca.experiments.label_curves import MOST_LINES, STYLES, mean_curves
+from gpca.experiments.label_curves import MOST_LINES, STYLES, families, families_with_causes, mean_curves
 from gpca.reporting.figures.cloud_views import draw_query
 from tests.figures import words_of
 
