@@ -152,10 +152,6 @@ CURVES = {"curve_files": "active_learning/{source}/{pool_strategy}/seed{seed}.cs
     **INPUTS,
 )
 def table3_active_learning(run: Run, metrics: Frame, clusters: Clusters) -> Table:
-    """Labels to the target accuracy by BALD, also with k-means, and at random (Table III): sources × settings.
-
-    Settings with a rare new concept, which the paper's classifier learns, stand first.
-    """
     learning = run.config["active_learning"]
     shares = learning["rare"]["shares"] if learning["rare"] else ()
     settings = {rare_setting(share): f"all concepts; {100 * share:g} % of the pool new" for share in shares} | SETTINGS
@@ -218,7 +214,6 @@ def _table(run: Run, sheet: Sheet, caption: str, notes: Iterable[str], **compare
     **CURVES,
 )
 def active_learning_curves(run: Run, curve_files: Paths) -> Figure:
-    """Accuracy over labels, mean over the concepts held out, then over the seeds."""
     return _draw(run, curve_files, ROWS)
 
 
@@ -231,7 +226,6 @@ def active_learning_curves(run: Run, curve_files: Paths) -> Figure:
     **CURVES,
 )
 def active_learning_overlap(run: Run, curve_files: Paths) -> Figure:
-    """Accuracy over labels in the paper's experiment, in which overlap is new, and common in the pool or rare."""
     return _draw(run, curve_files, OVERLAP_ROWS, (PAPERS_HELD_OUT,))
 
 
@@ -250,7 +244,6 @@ def _draw(run: Run, files: Paths, rows: Mapping[str, str], held_out: Collection[
     **INPUTS,
 )
 def table3_extended(run: Run, metrics: Frame, clusters: Clusters) -> Table:
-    """Every strategy, encoder and concept held out, with means over the three where one column is for all."""
     learning = run.config["active_learning"]
     columns = {
         f"labels_{c}": quantity("labels_to_target", f"Labels, {c}", concept=c, **COUNT) for c in _concepts(metrics)
@@ -286,7 +279,6 @@ def table3_extended(run: Run, metrics: Frame, clusters: Clusters) -> Table:
     **INPUTS,
 )
 def table3_stream(run: Run, metrics: Frame, clusters: Clusters) -> Table:
-    """Labels that a stream asks for, arrivals until a new concept is recognized, accuracy: sources × learners."""
     learning = run.config["active_learning"]
     stream = learning["stream"]
     columns = {f"delay_{c}": quantity("delay", f"Delay, {c}", concept=c, **COUNT) for c in _concepts(metrics)} | {

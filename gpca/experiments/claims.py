@@ -37,7 +37,6 @@ def compared_sources(run: Run) -> dict[str, Mapping[str, Any]]:
     verdicts=(read_verdicts, "claims.csv"),
 )
 def claims(run: Run, verdicts):
-    """A row per comparison, below the sentence that it belongs to."""
     config = run.config
     called = policy_titles(config) | learner_titles(config) | titles(config["active_learning"]["strategies"])
     called |= run.titles(explainer_entry, config["explainers"])

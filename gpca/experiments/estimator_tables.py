@@ -52,10 +52,8 @@ def _cell(values: Frame, metric: str) -> Cell | None:
 
 
 def _count(values: Frame, metric: str) -> Cell | None:
-    if metric not in values.index:
-        return None
-    row = values.loc[metric]
-    return plain_cell(row["samples"], int(row["seeds"]), int(row["samples"]))
+    counted = _cell(values, metric)
+    return counted and plain_cell(float(counted.test_samples), counted.seeds, counted.test_samples)
 
 
 @table(
@@ -68,7 +66,6 @@ def _count(values: Frame, metric: str) -> Cell | None:
     **INTERVALS,
 )
 def table12_uncertainty(run: Run, intervals):
-    """How each estimator fits the reference of what it models, and the error: methods × states × estimators."""
     heads = {"method": "Registered by", "state": "State", "estimator": "Estimator", "models": "Models"}
     builder = TableBuilder("table12_uncertainty", heads)
     methods, entries = _methods(run), estimators.estimates(run.config, run.sources)
@@ -116,7 +113,6 @@ def table12_uncertainty(run: Run, intervals):
     **INTERVALS,
 )
 def table12_references(run: Run, intervals):
-    """Every estimator against every reference, and the references against each other, where ICP succeeded."""
     heads = {"method": "Registered by", "estimator": "Estimator", "models": "Models"}
     builder = TableBuilder("table12_references", heads)
     columns = {}
@@ -158,7 +154,6 @@ def table12_references(run: Run, intervals):
     seconds=(estimators.collect_estimate_seconds, "timings/{source}/estimator_{estimate}/seed{seed}.csv"),
 )
 def table12_failures(run: Run, intervals, seconds):
-    """How well each estimator's spread finds failed registrations, beside gates that need no estimator."""
     builder = TableBuilder("table12_failures", {"method": "Registered by", "estimator": "Estimator"})
     entries = estimators.estimates(run.config, run.sources)
     titles = {name: entry["title"] for name, entry in entries.items()} | estimators.GATES

@@ -226,12 +226,7 @@ MEASURED = {
     STATE: show(STATE, "State (%)"),
     "gain": show(STATE, tables.SHOWN["gain"].title, where={"against": "untrained"}, **tables.POINTS),
     "lead": show(STATE, tables.SHOWN["lead"].title, where={"against": "rival"}, **tables.POINTS),
-    **{key: tables.SHOWN[key] for key in ("regret", "tied_accuracy", "dominant_accuracy")},
-    **{
-        key: tables.SHOWN[key]
-        for key in ("false_alarm_rate", "auroc_failed", "average_precision", "spearman_attribution")
-    },
-    **{key: tables.SHOWN[key] for key in ("nominal_calibration", "icp_calls", "samples")},
+    **{key: each for key, each in tables.SHOWN.items() if key not in ("gain", "lead", "balanced_accuracy")},
 }
 
 
@@ -246,7 +241,6 @@ MEASURED = {
     intervals="frame_causes.csv",
 )
 def table9_frames(run: Run, intervals):
-    """How explainers that learned from simulated causes name those measured in frames, by kind of start."""
     explainers = cause_titles(run.config)
     costs, rows, counted = cause_costs(run.config, explainers) | tables.COSTS, [], []
     for kind, title in STARTS.items():
@@ -298,7 +292,6 @@ def table9_frames(run: Run, intervals):
     intervals="frame_causes.csv",
 )
 def table9_frame_counts(run: Run, intervals):
-    """How many registrations of each kind of start are nominal, borderline and failed, and by which cause."""
     rows = []
     for start in STARTS.items():
         stem = f"{REAL_WORLD}/{start[0]}/"

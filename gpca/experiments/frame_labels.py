@@ -111,7 +111,6 @@ ENDS = {  # columns beside the labels to the targets
     metrics="real_world.csv",
 )
 def table6_labels(run: Run, metrics: Frame) -> Table:
-    """Labels that BALD and random choice need, by target, and accuracies: embeddings × strategies."""
     section, frames = run.config["frame_labels"], run.config["real_world"]
     percents = [in_percent(target) for target in section["targets"]]
     columns = {

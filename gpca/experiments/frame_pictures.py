@@ -326,7 +326,6 @@ def mistakes_of(poses_csv: Paths, predictions_csv: Paths) -> Frame:
     prediction_files="predictions/{frames}/{unreduced}/seed{seed}.csv",
 )
 def draw_frame_reliability(run: Run, prediction_files: Paths) -> Figure:
-    """Accuracy over confidence on the test samples of depth frames, all seeds together."""
     methods = unreduced_methods(run.config["real_world"])
     parts: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {}
     for path in prediction_files:

@@ -48,7 +48,6 @@ NOT_SHARES = {  # of which there is one number for all samples
     **NUMBERS,
 )
 def table6_backbones(run: Run, intervals, metrics):
-    """Accuracy on depth frames by backbones × reductions, then of the classic features and of untrained explainers."""
     section, encoders = run.config["real_world"], run.config["encoders"]
     judged, published = (
         {name: frames.BACKBONES.get(name, name) for name in names}
@@ -130,7 +129,6 @@ def table6_backbones(run: Run, intervals, metrics):
     **NUMBERS,
 )
 def table6_seen_unseen(run: Run, intervals, metrics):
-    """Accuracy on depth frames, for seen and unseen objects and by dataset: initial poses × methods."""
     section = run.config["real_world"]
     poses = {REAL_WORLD: section["initial_pose"]}
     poses |= {f"{REAL_WORLD}_{name}": entry for name, entry in conditions_of(run.config).items()}

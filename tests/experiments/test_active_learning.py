@@ -169,31 +169,24 @@ def test_stand_ins_are_said_and_nothing_to_show_is_a_fault(metrics, make):
         made(make, metrics[:0])
 
 
-def test_the_families_of_test_samples_alone_are_counted(registrations, tmp_path):
-    path = tmp_path / "registrations/tiny/seed0.npz"
-    path.parent.mkdir(parents=True)
+def test_the_families_of_test_samples_alone_are_counted_and_a_file_of_another_seed_is_refused(registrations, tmp_path):
+    (tmp_path / "tiny").mkdir()
     in_test = registrations.split == "test"
     family_S = np.where(in_test, np.where(registrations.cluster == "brick", "box", "round"), "other")
-    dataclasses.replace(registrations, cluster=family_S, axes=("tiny", 0)).save(path)
-    assert families([path]) == {("tiny", 0): 2}
-
-
-def test_a_file_of_another_seed_is_refused(registrations, tmp_path):
-    path = tmp_path / "registrations/tiny/seed1.npz"
-    path.parent.mkdir(parents=True)
-    dataclasses.replace(registrations, axes=("tiny", 0)).save(path)
+    of_seed = dataclasses.replace(registrations, cluster=family_S, axes=("tiny", 0))
+    for seed in (0, 1):
+        of_seed.save(tmp_path / f"tiny/seed{seed}.npz")
+    assert families([tmp_path / "tiny/seed0.npz"]) == {("tiny", 0): 2}
     with pytest.raises(InputError, match="seed"):
-        families([path])
+        families([tmp_path / "tiny/seed1.npz"])
 
 
 def test_registrations_with_measured_causes_are_counted_alike(causes, tmp_path):
-    path = tmp_path / "causes/four/seed100.npz"
-    path.parent.mkdir(parents=True)
-    causes.save(path)
+    (tmp_path / "four").mkdir()
+    causes.save(tmp_path / "four/seed100.npz")
     registrations = causes.registrations
-    assert families_with_causes([path]) == {
-        ("four", 100): len(set(registrations.cluster[registrations.rows("test")].tolist()))
-    }
+    number = len(set(registrations.cluster[registrations.rows("test")].tolist()))
+    assert families_with_causes([tmp_path / "four/seed100.npz"]) == {("four", 100): number}
 
 
 CURVES = ("random", "bald_kmeans", "margin")

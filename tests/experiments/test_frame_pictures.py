@@ -97,23 +97,20 @@ def test_fig5_shows_a_test_sample_that_an_occluder_covers_and_that_is_named_righ
         choose_sample(samples[samples["concept_true"] != "overlap"], "predictions", pixels_I, 0.03)
 
 
+SHOWABLE = {"split": "test", "concept_true": "overlap", "concept_predicted": "overlap", "lost_to": OCCLUDER}
+
+
 def test_fig5_shows_an_object_that_is_large_in_its_image():
-    rows = {"split": "test", "concept_true": "overlap", "concept_predicted": "overlap", "lost_to": OCCLUDER}
-    errors = {"init_error": 0.01, "icp_error": 0.05}
-    samples = pd.DataFrame(
-        {**rows, **errors, "instance": range(5), "sample": range(5), "score_overlap": [0.9, 0.8, 0.7, 0.6, 0.5]}
-    )
-    pixels_I = np.array([100, 3, 200, 1, 300])
-    assert choose_sample(samples, "predictions", pixels_I, 0.03) == 2  # the median of 0, 2 and 4
+    known = {"init_error": 0.01, "icp_error": 0.05, "instance": range(5), "sample": range(5)}
+    samples = pd.DataFrame(SHOWABLE | known | {"score_overlap": [0.9, 0.8, 0.7, 0.6, 0.5]})
+    assert choose_sample(samples, "predictions", np.array([100, 3, 200, 1, 300]), 0.03) == 2  # the median of 0, 2 and 4
 
 
 def test_fig5_shows_a_registration_that_icp_made_wrong_where_there_is_one():
-    rows = {"split": "test", "concept_true": "overlap", "concept_predicted": "overlap", "lost_to": OCCLUDER}
     errors = {"init_error": [0.01, 0.05, 0.01], "icp_error": [0.02, 0.06, 0.07], "score_overlap": [0.7, 0.8, 0.9]}
-    samples = pd.DataFrame({**rows, "instance": range(3), "sample": range(3), **errors})
-    assert choose_sample(samples, "predictions", np.array([300, 200, 100]), 0.03) == 2
-    assert choose_sample(samples[:2], "predictions", np.array([300, 200]), 0.03) == 1
-    assert choose_sample(samples[:1], "predictions", np.array([300]), 0.03) == 0
+    samples = pd.DataFrame(SHOWABLE | {"instance": range(3), "sample": range(3)} | errors)
+    for shown, number in ((2, 3), (1, 2), (0, 1)):
+        assert choose_sample(samples[:number], "predictions", np.array([300, 200, 100][:number]), 0.03) == shown
 
 
 def test_what_is_covered_is_what_lies_not_between_the_points_that_were_kept():
