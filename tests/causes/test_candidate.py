@@ -26,7 +26,7 @@ def candidates(subjects):
     ]
 
 
-def test_counts_and_severities_are_within_their_ranges(candidates):
+def test_counts_and_severities_are_within_their_ranges_and_what_is_not_applied_is_small_but_there(candidates):
     for candidate in candidates:
         severity = candidate.severity
         for count in (len(candidate.model), len(candidate.kept)):
@@ -37,6 +37,12 @@ def test_counts_and_severities_are_within_their_ranges(candidates):
         assert np.deg2rad(10) <= severity["rotation_rad"] <= np.deg2rad(90)
         assert np.linalg.norm(candidate.T_init[:3, 3]) == pytest.approx(severity["translation"])
         assert len(candidate.kept) == round(len(candidate.clean) * (1 - severity["crop"]))
+        assert 0 < rotation_angle_rad(candidate.T_near) <= np.deg2rad(5)
+        assert 0 < np.linalg.norm(candidate.T_near[:3, 3]) <= 0.03
+        assert 0.95 <= len(candidate.seen) / len(candidate.clean) <= 1
+        assert set(candidate.kept) < set(candidate.seen)  # the same side is missing
+        assert np.array_equal(candidate.start((0, 2)), candidate.T_near)
+        assert np.array_equal(candidate.start((1,)), candidate.T_init)
     assert len({len(candidate.model) - len(candidate.kept) for candidate in candidates}) > 30  # drawn apart
 
 
@@ -49,16 +55,6 @@ def test_the_number_of_observed_points_tells_nothing_of_what_is_missing(subjects
     counts = [len(candidate.observed(tuple(np.flatnonzero(candidate.applied)))) for candidate in drawn]
     assert np.abs(np.subtract(counts[::2], counts[1::2])).max() <= 1  # the share is rounded twice
     assert all(128 <= count <= 1024 for count in counts)
-
-
-def test_what_is_not_applied_is_small_but_there(candidates):
-    for candidate in candidates:
-        assert 0 < rotation_angle_rad(candidate.T_near) <= np.deg2rad(5)
-        assert 0 < np.linalg.norm(candidate.T_near[:3, 3]) <= 0.03
-        assert 0.95 <= len(candidate.seen) / len(candidate.clean) <= 1
-        assert set(candidate.kept) < set(candidate.seen)  # the same side is missing
-        assert np.array_equal(candidate.start((0, 2)), candidate.T_near)
-        assert np.array_equal(candidate.start((1,)), candidate.T_init)
 
 
 def test_a_clean_surface_is_nearly_where_it_is_and_without_anything_small_exactly(subjects):
@@ -82,14 +78,6 @@ def test_a_clean_pair_drawn_again_is_as_large_and_starts_where_it_did(subjects):
     assert not np.isin(second.model, first.model).all()
 
 
-def test_model_and_observation_share_no_point_and_one_side_is_cut_off(candidates):
-    for candidate in candidates:
-        assert not set(map(tuple, candidate.model.tolist())) & set(map(tuple, candidate.clean.tolist()))
-        along = candidate.clean @ candidate.toward_hidden
-        lost = np.delete(along, candidate.kept)
-        assert along[candidate.kept].max() <= lost.min() + 2 * 5 * 0.003  # but for the least noise
-
-
 def test_each_cause_changes_what_it_should_and_nothing_else(candidates):
     candidate = candidates[0]
     clean, noisy, cropped = (candidate.observed(causes) for causes in ((), (0,), (2,)))
@@ -100,8 +88,12 @@ def test_each_cause_changes_what_it_should_and_nothing_else(candidates):
     assert np.array_equal(candidate.observed((0, 2)), candidate.noisy[candidate.kept])
 
 
-def test_noise_is_as_strong_as_it_says_and_outliers_are_few(candidates):
+def test_noise_is_as_strong_as_it_says_outliers_are_few_and_one_side_is_cut_off(candidates):
     for candidate in candidates:
+        assert not set(map(tuple, candidate.model.tolist())) & set(map(tuple, candidate.clean.tolist()))
+        along = candidate.clean @ candidate.toward_hidden
+        lost = np.delete(along, candidate.kept)
+        assert along[candidate.kept].max() <= lost.min() + 2 * 5 * 0.003  # but for the least noise
         offset = np.abs(candidate.noisy - candidate.clean)
         assert np.median(offset) == pytest.approx(0.6745 * candidate.severity["noise"], rel=0.5)
         assert np.abs(candidate.noisy).max() < 0.5 + 6 * candidate.severity["noise"]
@@ -109,8 +101,8 @@ def test_noise_is_as_strong_as_it_says_and_outliers_are_few(candidates):
 
 def test_severities_of_what_is_not_applied_are_small(subjects):
     for k in range(20):
-        drawn = draw_candidate(subjects[0].surface, np.array([False, True, False]), SETTINGS, np.random.default_rng(k))
-        severity = drawn.severity
+        applied = np.array([False, True, False])
+        severity = draw_candidate(subjects[0].surface, applied, SETTINGS, np.random.default_rng(k)).severity
         assert severity["rotation_rad"] >= np.deg2rad(10)
         assert (severity["noise"] <= 0.003, severity["crop"] <= 0.05, severity["outliers"]) == (True, True, 0)
 

@@ -31,11 +31,8 @@ def test_every_group_has_its_share(causes, split, states):
     assert (causes.registrations.concept == np.array(["noise", "pose", "overlap"])[causes.truth.phi.argmax(1)]).all()
 
 
-def test_a_cause_that_was_not_applied_has_no_part(causes):
+def test_a_cause_that_was_not_applied_has_no_part_and_training_and_testing_share_no_object(causes):
     assert (causes.truth.phi[~causes.applied] == 0).all()
-
-
-def test_training_and_testing_share_no_object(causes):
     shown = {split: set(causes.registrations.object_name[causes.rows(split)].tolist()) for split in ("train", "test")}
     assert not shown["train"] & shown["test"]
 

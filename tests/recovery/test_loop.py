@@ -19,10 +19,6 @@ from gpca.reenactment.settings import ReenactmentSettings
 from tests.failures import LOOP
 
 
-def reenactor():
-    return Reenactor(ReenactmentSettings(), CauseSettings(moved=OBSERVED))
-
-
 def blanked(episode):
     """The same episode without anything that only the truth tells."""
     situation, start = episode.situation, episode.outcomes[()]
@@ -33,17 +29,12 @@ def blanked(episode):
     return Episode(1, situation, replace(start, record=record, error=np.nan), LOOP.success)
 
 
-def test_no_truth_is_read(start):
-    episode = Episode(0, *start, LOOP.success)
-    seen, blind = (reenactor().reenact(e) for e in (episode, blanked(episode)))
+def test_no_truth_is_read_and_a_registration_is_re_enacted_once(start):
+    episode, once = Episode(0, *start, LOOP.success), Reenactor(ReenactmentSettings(), CauseSettings(moved=OBSERVED))
+    seen, blind = (once.reenact(e) for e in (episode, blanked(episode)))
     assert seen.belief.failure == blind.belief.failure
     assert np.array_equal(seen.phi_3, blind.phi_3)
-
-
-def test_a_registration_is_re_enacted_once(start):
-    episode, twice = Episode(0, *start, LOOP.success), reenactor()
-    assert twice.reenact(episode) is twice.reenact(episode)
-    assert twice.reenact(episode).belief is twice.believe(episode)
+    assert once.reenact(episode) is seen and seen.belief is once.believe(episode)
 
 
 class Believing:
@@ -116,9 +107,10 @@ def test_policies_share_what_an_action_gives_and_end_with_success_or_the_budget(
     assert (seconds.loc[rows["policy"] == "gpca", "explanation_seconds"] >= 0.5).all()
 
 
-def test_an_explainer_sees_each_registration_once(loop):
-    _, _, explain = loop(["gpca", "gpca_acting"])
+def test_an_explainer_sees_each_registration_once_and_no_policy_insists_on_what_did_not_help(loop):
+    rows, _, explain = loop(["gpca", "gpca_acting"])
     assert len(explain.asked) == len(set(explain.asked))
+    assert rows.loc[rows["policy"] == "gpca_acting", "action"].is_unique  # the stub's scores never fall
 
 
 def test_a_queued_case_ends_there(loop):
@@ -147,11 +139,6 @@ def test_policies_that_re_enact_are_given_it_and_its_seconds_count_for_each(loop
     assert (firsts["action"] == "reinitialize").all()
     assert (firsts["concept"] == "pose").all()
     assert (seconds["explanation_seconds"] >= 0.5).all()
-
-
-def test_a_policy_does_not_insist_on_what_did_not_help(loop):
-    rows, *_ = loop(["gpca_acting"])
-    assert rows["action"].is_unique  # the stub's scores never fall
 
 
 def test_every_explainer_of_a_policy_exists():

@@ -39,14 +39,11 @@ def test_after_an_action_the_fall_of_its_concept_counts_and_scores_need_no_uncer
     assert made("softmax_head")(case(scores=[[0.8, 0.1, 0.1]], bald=[np.nan])).action == "denoise"
 
 
-def test_the_learned_policy_decides_by_what_is_known_and_done():
+def test_the_learned_policy_decides_by_what_is_known_and_done_and_leaves_alone_what_seems_right_unless_alarmed():
     trials = [Trial(np.zeros(1), action, action == "new_view") for action in ACTIONS for _ in range(8)]
     utility = ExpectedUtility(Chances(trials, ACTIONS), dict.fromkeys(ACTIONS, 0.01))
     assert made("utility", utility=utility)(case(known=np.zeros(1))).action == "new_view"
     assert made("utility", utility=utility)(case(("new_view",), known=np.zeros(1))).action != "new_view"
-
-
-def test_the_learned_policy_leaves_alone_what_seems_right_unless_it_is_alarmed():
     trials = [Trial(np.zeros(1), NOTHING, True)] * 30 + [Trial(np.zeros(1), "denoise", True)] * 8
     utility = ExpectedUtility(Chances(trials, ACTIONS), dict.fromkeys(ACTIONS, 0.05))
     assert made("utility", utility=utility)(case(known=np.zeros(1))).action == NOTHING
@@ -114,17 +111,14 @@ def test_the_alarm_of_the_re_enactment_has_a_threshold(name, action):
     assert decide(case((action,), reenacted=quiet)).action not in (NOTHING, action)  # it is known to be wrong
 
 
-def test_the_error_alone_is_followed_by_the_rehearsed_order():
-    decide = made("error_only_acting", order=("new_view", "denoise", "reinitialize"))
-    assert [decide(case(taken)).action for taken in ((), ("new_view",))] == ["new_view", "denoise"]
-
-
 def test_a_sequence_takes_its_actions_in_turn_and_begins_anew():
     decide = made("sequence_new_view_denoise")
     taken = ()
     for _ in range(3):
         taken += (decide(case(taken)).action,)
     assert taken == ("new_view", "denoise", "new_view")
+    decide = made("error_only_acting", order=("new_view", "denoise", "reinitialize"))  # the rehearsed one
+    assert [decide(case(taken)).action for taken in ((), ("new_view",))] == ["new_view", "denoise"]
     fixed = {"sequence_new_view_denoise", "always_denoise"}
     assert {name for name in (*fixed, "random", "gpca") if is_fixed(name, ACTIONS)} == fixed
 
@@ -179,8 +173,6 @@ def test_the_order_that_recovers_failures_soonest_is_chosen():
     assert all(len(taken) <= 3 for taken in failures[0].asked)
     assert ("c", "b") not in failures[0].asked  # nothing is tried after success
     assert ("c", "b", "a") not in failures[2].asked  # nothing is left to compare
-
-
-def test_of_orders_that_are_as_soon_the_cheapest_is_chosen():
+    # Of orders that are as soon, the cheapest is chosen.
     assert best_order(("b", "a", "c"), COSTS, [helped_by("a", "b", "c")], 3)[0] == "a"
     assert best_order(("b", "a", "c"), COSTS, [helped_by()], 2) == ("a", "c", "b")

@@ -35,16 +35,13 @@ def rehearsal():
     return Rehearsal(episodes, {}, {episode.number: 0.1 * (1 + episode.number) for episode in episodes})
 
 
-def test_half_of_the_rehearsed_failures_are_above_the_threshold(rehearsal):
+def test_half_of_the_rehearsed_failures_are_above_the_threshold_unless_one_is_declared(rehearsal):
     policy = robot_policy(SECTION, rehearsal)
     assert policy.thresholds.uncertain == pytest.approx(0.2)
     assert policy.thresholds.attempts == 3
-
-
-def test_a_declared_threshold_stays_and_without_a_rehearsal_nothing_is_too_uncertain(rehearsal):
     declared = SECTION | {"thresholds": SECTION["thresholds"] | {"uncertain": 0.05}}
     assert robot_policy(declared, rehearsal).thresholds.uncertain == 0.05
-    assert robot_policy(SECTION, None).thresholds.uncertain == np.inf
+    assert robot_policy(SECTION, None).thresholds.uncertain == np.inf  # without a rehearsal
 
 
 def test_the_summary_says_how_often_each_explainer_is_right(rehearsal):
@@ -82,9 +79,6 @@ def test_the_error_falls_with_the_labels_that_are_learned(rows):
         assert curve["labels"].tolist() == list(range(0, 13, BATCH))
         assert curve["unsolved"].tolist() == [4, 0, 0, 0]  # without a label the cheapest action is taken
     assert len(rows) == (1 + DRAWS) * 4
-
-
-def test_no_learner_leaves_no_rows():
     assert error_by_labels({}, [], None, ()).empty
 
 
@@ -97,9 +91,6 @@ def test_seeds_are_pooled_at_the_numbers_that_all_have(rows, tmp_path):
     assert queues.loc[(DRAWN, 4), "failures"] == 8
     assert (queues["low"] <= queues["error"]).all()
     assert (queues["error"] <= queues["high"]).all()
-
-
-def test_a_file_without_rows_is_refused(rows, tmp_path):
-    write_csv(tmp_path / "queue_seed1.csv", pd.DataFrame(columns=rows.columns))
+    write_csv(paths[1], pd.DataFrame(columns=rows.columns))
     with pytest.raises(InputError, match="has no rows"):
-        read_queues([tmp_path / "queue_seed1.csv"])
+        read_queues(paths[1:])

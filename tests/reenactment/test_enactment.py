@@ -33,7 +33,7 @@ def test_noise_is_found_within_a_fifth(drill, model, scale, noise):
     points = observed(drill, noise)
     found = observe(points, hypothesis(np.ones(len(points))), model, scale, np.random.default_rng(0))
     assert found.noise == pytest.approx(noise, rel=0.2, abs=0.004)
-    assert (found.outliers, found.missing) == (0, 0)
+    assert found.outliers == 0 and found.covered.all()
 
 
 def test_outliers_neither_count_as_noise_nor_as_surface(drill, model, scale):
