@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from gpca.frames.bop import read_frames
+
 from ..hostile import refusal
 from ..steps.by_words import main
 from .damage import DEPTH, MASK, SCENE, TRUTH, edit, instances, save
@@ -80,22 +82,14 @@ def of_one(change):
     return lambda folder: edit(folder / TRUTH, lambda truth: change(truth["0"][1]))
 
 
-def of_all(change):
-    """Change the pose of every object."""
+def every(name, change):
+    """Change the pose of every object, or every camera."""
 
     def spoil(folder):
-        for path in folder.rglob("scene_gt.json"):
-            edit(path, lambda truth: [change(entry) for entries in truth.values() for entry in entries])
-
-    return spoil
-
-
-def with_camera(change):
-    """Change every camera."""
-
-    def spoil(folder):
-        for path in folder.rglob("scene_camera.json"):
-            edit(path, lambda cameras: [change(camera) for camera in cameras.values()])
+        for path in folder.rglob(f"scene_{name}.json"):
+            edit(
+                path, lambda of: [change(entry) for each in of.values() for entry in (each if name == "gt" else [each])]
+            )
 
     return spoil
 
@@ -153,21 +147,21 @@ def other_image(folder):
 
 METRES, CENTIMETRES = "is cam_t_m2c in meters? the format requires millimeters", "is cam_t_m2c in centimeters?"
 PLACES = {
-    "t in metres": (of_all(scaled(1e-3)), METRES),
-    "t in centimetres": (of_all(scaled(0.1)), CENTIMETRES),
+    "t in metres": (every("gt", scaled(1e-3)), METRES),
+    "t in centimetres": (every("gt", scaled(0.1)), CENTIMETRES),
     "one t in micrometres": (of_one(scaled(1e3)), "is cam_t_m2c in micrometers?"),
     "one t of zeros": (of_one(scaled(0)), "check its pose, mask, cam_K and depth_scale"),
-    "R by columns": (of_all(turned), "is cam_R_m2c listed by columns? the format requires rows"),
-    "OpenGL": (of_all(to_opengl), "camera axes OpenGL's?"),
-    "camera to model": (of_all(inverted), "is the pose from camera to model?"),
+    "R by columns": (every("gt", turned), "is cam_R_m2c listed by columns? the format requires rows"),
+    "OpenGL": (every("gt", to_opengl), "camera axes OpenGL's?"),
+    "camera to model": (every("gt", inverted), "is the pose from camera to model?"),
     "scale in metres": (
-        with_camera(depth_scale(1e-3)),
+        every("camera", depth_scale(1e-3)),
         "is depth_scale wrong? the depth fits when it is 1000 times as large",
     ),
-    "centre outside": (with_camera(outside), "check its pose, mask, cam_K"),
-    "a lens a tenth too long": (with_camera(focal_length(1.1)), "focal lengths are about 0.9 times as long"),
-    "30 mm beside": (of_all(beside), "above the limit of 3 % or 4 mm, whichever is more; check cam_R_m2c"),
-    "R left out": (of_all(untold), "every cam_R_m2c is the identity: fill in the rotations"),
+    "centre outside": (every("camera", outside), "check its pose, mask, cam_K"),
+    "a lens a tenth too long": (every("camera", focal_length(1.1)), "focal lengths are about 0.9 times as long"),
+    "30 mm beside": (every("gt", beside), "above the limit of 3 % or 4 mm, whichever is more; check cam_R_m2c"),
+    "R left out": (every("gt", untold), "every cam_R_m2c is the identity: fill in the rotations"),
     "images mirrored": (flip, "is the image mirrored?"),
     "another image": (other_image, ""),
 }
@@ -189,8 +183,6 @@ def test_the_dataset_itself_is_none_of_this(scenes, tmp_path):
 
 
 def test_float_depth_without_measurements_is_read(damaged, tmp_path):
-    from gpca.frames.bop import read_frames
-
     path = damaged.parent / DEPTH
     expected = np.asarray(Image.open(path))
     save(path.with_suffix(".tif"), np.where(expected == 0, np.nan, expected).astype(np.float32))
@@ -200,8 +192,6 @@ def test_float_depth_without_measurements_is_read(damaged, tmp_path):
 
 
 def test_a_mask_with_a_soft_rim_is_a_mask(damaged):
-    from gpca.frames.bop import read_frames
-
     path = damaged.parent / MASK
     mask = Image.open(path)
     mask.resize((40, 30), Image.Resampling.BILINEAR).resize(mask.size, Image.Resampling.BILINEAR).save(path)

@@ -134,10 +134,6 @@ def test_settings_of_scenes_that_cannot_be(tmp_path, name):
 
 
 def test_scenes_replace_scenes(scenes, tmp_path):
-    from gpca.frames.rgbd_scene import write_scenes
-
-    from .tiny import scene_settings, surfaces
-
     shutil.copytree(scenes, tmp_path / "tiny")
     write_scenes(surfaces(), "tiny", scene_settings(count=2, views=1), tmp_path / "tiny")
     assert len(list((tmp_path / "tiny").rglob("depth/*.png"))) == 2

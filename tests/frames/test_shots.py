@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+import trimesh
 
 from gpca.frames.shots import (
     VOXEL_M,
@@ -29,8 +30,6 @@ D = 0.2
 
 
 def ball(radius=0.1):
-    import trimesh
-
     mesh = trimesh.creation.icosphere(3, radius)
     return mesh.vertices, mesh.faces, mesh.vertex_normals
 
@@ -104,8 +103,6 @@ def test_the_true_pose_explains_the_shots_best():
 
 
 def test_surface_behind_something_measured_is_not_held_against_a_pose():
-    import trimesh
-
     vertices, _, normals = ball()
     wall = trimesh.creation.box((0.01, 0.3, 0.3))
     wall.apply_translation((0.25, 0.15, 0))  # hides one half
@@ -129,8 +126,6 @@ CENTRE = np.array([0.1, -0.05, 0.06])
 
 
 def box():
-    import trimesh
-
     mesh = trimesh.creation.box((0.08, 0.08, 0.10))
     points, faces = trimesh.sample.sample_surface(mesh, 400, seed=0)
     return mesh.vertices, mesh.faces, points, mesh.face_normals[faces]
@@ -205,8 +200,6 @@ def test_boxes_stand_where_points_are_and_the_table_is_left_out():
     assert (vertices.min(axis=0) <= point).all()
     assert (vertices.max(axis=0) >= point).all()
     assert np.ptp(vertices, axis=0) == pytest.approx(VOXEL_M)
-    import trimesh
-
     cube = trimesh.Trimesh(vertices, faces)
     assert cube.is_watertight
     assert cube.volume == pytest.approx(VOXEL_M**3, rel=1e-6)

@@ -144,10 +144,9 @@ def test_missing_and_empty_folder_and_unit(tmp_path):
 BALL = trimesh.creation.icosphere(2, radius=50)
 VERTICES = [" ".join(f"{x:.5f}" for x in vertex) for vertex in BALL.vertices]
 MESHES_FACES = ["3 " + " ".join(map(str, face)) for face in BALL.faces]
-MESHES_XYZ = "property float x\nproperty float y\nproperty float z\n"
 
 
-def ply(vertices=VERTICES, faces=MESHES_FACES, n_vertices=None, n_faces=None, properties=MESHES_XYZ):
+def ply(vertices=VERTICES, faces=MESHES_FACES, n_vertices=None, n_faces=None, properties=XYZ):
     head = f"ply\nformat ascii 1.0\nelement vertex {len(vertices) if n_vertices is None else n_vertices}\n{properties}"
     head += f"element face {len(faces) if n_faces is None else n_faces}\nproperty list uchar int vertex_indices\n"
     return "\n".join([f"{head}end_header", *vertices, *faces, ""])
@@ -220,12 +219,10 @@ MESHES = {
     "fewer_rows.ply": ply(n_faces=len(MESHES_FACES) + 5),
     "negative_count.ply": ply(n_vertices=-5),
     "huge_count.ply": ply(n_vertices=10**15),
-    "two_axes.ply": ply(
-        [row.rsplit(" ", 1)[0] for row in VERTICES], properties=MESHES_XYZ.replace("property float z\n", "")
-    ),
+    "two_axes.ply": ply([row.rsplit(" ", 1)[0] for row in VERTICES], properties=XYZ.replace("property float z\n", "")),
     "no_end.ply": ply()[:100],
-    "vertices_twice.ply": ply().replace("element face", f"element vertex {len(VERTICES)}\n{MESHES_XYZ}element face"),
-    "x_twice.ply": ply([f"{row} 1" for row in VERTICES], properties=f"{MESHES_XYZ}property float x\n"),
+    "vertices_twice.ply": ply().replace("element face", f"element vertex {len(VERTICES)}\n{XYZ}element face"),
+    "x_twice.ply": ply([f"{row} 1" for row in VERTICES], properties=f"{XYZ}property float x\n"),
     "middle_endian.ply": binary(lambda content, start: write(content, 0, content[:40].replace(b"little", b"middle"))),
     "no_format.ply": binary(lambda content, start: write(content, 4, b"comment")),
     "two_corners_binary.ply": cornered(2),
