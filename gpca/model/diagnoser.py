@@ -47,29 +47,17 @@ MISSED = 0.05  # largest probability that a failure is called good
 
 @dataclass(frozen=True)
 class Diagnoser:
-    """Classifiers on the features of a pair, and the settings with which these are measured.
+    """Classifiers on the features of a pair, and the settings with which these are measured."""
 
-    Attributes:
-        classifier: of failure and of the causes.
-        error_weights: (F + 1,) regression of ln error (diameters) on the normalized features, the constant last.
-        threshold: probability of failure from which a registration is called failed.
-        points: maximum number of points per cloud.
-        runs: spread of ICP over other starts.
-        moved: the cloud that ICP moves in a re-enactment.
-        reenactment: search for the true pose.
-        guarantee: sets of states and alarm; None in quick diagnoses.
-        held_out: measures of accuracy on unseen families of shapes.
-    """
-
-    classifier: PairClassifier
-    error_weights: np.ndarray
-    threshold: float
-    points: int
-    runs: UncertaintySettings
-    moved: Moved
-    reenactment: ReenactmentSettings
-    guarantee: Guarantee | None
-    held_out: Mapping[str, float]
+    classifier: PairClassifier  # of failure and of the causes
+    error_weights: np.ndarray  # (F + 1,) regression of ln error (diameters) on the normalized features, constant last
+    threshold: float  # probability of failure from which a registration is called failed
+    points: int  # maximum number of points per cloud
+    runs: UncertaintySettings  # spread of ICP over other starts
+    moved: Moved  # the cloud that ICP moves in a re-enactment
+    reenactment: ReenactmentSettings  # search for the true pose
+    guarantee: Guarantee | None  # sets of states and alarm; None in quick diagnoses
+    held_out: Mapping[str, float]  # measures of accuracy on unseen families of shapes
 
     def quick(self) -> Diagnoser:
         """Return a diagnoser with fewer points and hypotheses and therefore without a guarantee."""

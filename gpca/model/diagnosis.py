@@ -158,17 +158,13 @@ class Reenacted:
     """Counterfactuals of one registration under the hypotheses of its true pose.
 
     Lengths are in diameters, and poses in the target's canonical frame, until :meth:`outside` converts them.
-
-    Attributes:
-        noise, outliers, missing: standard deviation of the noise per axis, share of outliers, and share of the target
-            that was not observed, under the most probable hypothesis.
     """
 
     error: float  # v̂ with all causes, the mean over the hypotheses
     effects: dict[str, float]  # φ̂, the contribution of each cause to that error
-    noise: float
-    outliers: float
-    missing: float
+    noise: float  # standard deviation per axis, under the most probable hypothesis, as the next two
+    outliers: float  # share of the observed points
+    missing: float  # share of the target that was not observed
     poses: tuple[FittingPose, ...]  # the hypotheses, most probable first
 
     @classmethod

@@ -62,9 +62,7 @@ def test_poses_are_named_by_where_they_lie_from_the_result(drill):
     assert lines[1].startswith("pose 2    the object also fits turned by 90° about the target's z axis, ")
     assert lines[2] == "pose 3    the object also fits moved by 20 mm: probability 0.20"
     assert "turned by 52° about the axis (0.58, 0.58, 0.58) of the target's frame, 10 mm away" in lines[3]
-
-
-def test_where_the_likeliest_pose_is_another_the_text_says_so(drill):
+    # Where the likeliest pose is another, the text says so.
     [line] = said(drill, moved((180, 0, 0))).lines("m")[2:]
     assert line.startswith("pose 1    the object fits turned by 180° about the target's x axis, ")
     assert line.endswith("probability 1.00")

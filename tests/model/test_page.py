@@ -45,6 +45,11 @@ def test_a_page_is_one_small_file_that_asks_for_no_other(html):
     assert "scan &lt;1&gt;.ply" in html
 
 
+def test_a_notebook_shows_the_page_in_a_frame(explained):
+    shown = explained._repr_html_()
+    assert shown.startswith('<iframe srcdoc="&lt;!doctype html&gt;') and "<script" not in shown
+
+
 def test_a_page_says_what_the_text_says(html, explained):
     found = explained.diagnosis
     for words in (explained.reason, *explained.diagnosis.causes, found.guarantee.call, "What to do", "What if?"):
@@ -79,21 +84,12 @@ def test_with_a_right_start_on_clean_and_whole_surface_the_cloud_ends_on_the_tar
     assert np.median(cKDTree(explained.scene.target).query(points)[0]) < 0.06
 
 
-def test_the_counterfactuals_are_named_by_what_is_taken_out():
+def test_counterfactuals_are_named_by_what_is_taken_out_and_large_clouds_are_thinned():
     assert taken_out(ALL) == "As it was"
     assert taken_out(0) == "Clean points, right start, whole surface"
     assert len({taken_out(subset) for subset in range(8)}) == 8
-
-
-def test_large_clouds_are_thinned():
     points = np.random.default_rng(0).normal(size=(2 * MOST_POINTS, 3))
     assert len(unpacked(packed(points))) == MOST_POINTS
-
-
-def test_a_notebook_shows_the_page_in_a_frame(explained):
-    shown = explained._repr_html_()
-    assert shown.startswith('<iframe srcdoc="&lt;!doctype html&gt;')
-    assert "<script" not in shown
 
 
 def test_one_of_many_has_no_view_and_an_unknown_one_no_poses(explainer, pair):

@@ -152,17 +152,14 @@ def test_voxels_are_chosen_by_the_spacing_and_leave_few(scans):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (
-            {"voxel": 20.0},
-            "source: fills .* voxels of 20 m; give both in one unit, and voxels so small that",
-        ),
+        ({"voxel": 20.0}, "source: fills .* voxels of 20 m; give both in one unit, and voxels so small that"),
         ({"voxel": 1e-9}, "source: spans .* m, too much for voxels of 1e-09 m; leave out points that are far away"),
         ({"voxel": -1.0}, "voxel: -1 is no length"),
         ({"method": "nearest"}, "registration method 'nearest': unknown"),
         ({"unit": "feet"}, "unit 'feet'"),
         ({"T_target_source_init": 2 * np.eye(4)}, "initial pose: the pose is not a rigid transform"),
         (
-            {"source_points": np.zeros((99, 3)), "target_points": np.zeros((99, 3))},
+            dict.fromkeys(("source_points", "target_points"), np.zeros((99, 3))),
             "source: has all its points in one place",
         ),
     ],

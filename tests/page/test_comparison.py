@@ -40,12 +40,8 @@ def test_numbers_have_the_papers_digits_and_verdicts_a_tone(tmp_path):
 
 def test_verdicts_are_counted_from_the_best_to_the_worst(tmp_path):
     shown = page_comparison(written(tmp_path, HEAD + "".join(LINES) + LINES[0]))
-    assert shown["verdicts"] == [
-        ("reproduced", "good", 1),
-        ("close", "near", 2),
-        ("not reproduced", "bad", 1),
-        ("not run", "", 1),
-    ]
+    expected = [("reproduced", "good", 1), ("close", "near", 2), ("not reproduced", "bad", 1), ("not run", "", 1)]
+    assert shown["verdicts"] == expected
 
 
 def test_where_nothing_is_judged_the_verdicts_are_the_references(tmp_path):
@@ -79,10 +75,7 @@ def test_what_a_table_was_measured_on_is_said_once(tmp_path):
     assert (table_iii["objects"], table_iii["rows"][0]["objects"]) == ("YCB", "")
 
 
-def test_there_need_not_be_a_comparison(tmp_path):
+def test_there_need_not_be_a_comparison_but_one_of_another_form_is_refused(tmp_path):
     assert page_comparison(tmp_path / "comparison.csv") is None
-
-
-def test_a_file_of_another_form_is_refused(tmp_path):
     with pytest.raises(InputError, match="column 'decimals' is missing"):
         page_comparison(written(tmp_path, HEAD.replace("decimals", "digits") + LINES[0]))

@@ -77,12 +77,8 @@ def test_each_job_names_what_it_read_and_wrote(folder):
     assert entities[objects["object"]["@id"]]["name"] == "cup.ply"
     assert "secret" not in (folder / NAME).read_text()  # where data lies is nobody's business
     assert entities[drawn["instrument"]["@id"]]["name"] == "GP-CA Bench"
-    assert (
-        entities["objects/cup.npz"]["sha256"]
-        == json.loads((folder / "tables/table1.csv.provenance.json").read_text())["inputs_sha256"][
-            str(folder / "objects/cup.npz")
-        ]
-    )
+    record = json.loads((folder / "tables/table1.csv.provenance.json").read_text())
+    assert entities["objects/cup.npz"]["sha256"] == record["inputs_sha256"][str(folder / "objects/cup.npz")]
     assert entities["tables/table1.csv"]["encodingFormat"] == "text/csv"
     assert all("encodingFormat" in entity for entity in entities.values() if entity["@type"] == "File")
     assert entities[entities["./"]["license"]["@id"]]["name"] == "MIT"

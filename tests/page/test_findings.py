@@ -29,13 +29,8 @@ def write_metrics(path, rows, table="attribution", concept="all"):
 
 @pytest.fixture
 def folder(tmp_path):
-    accuracies = {
-        "gpca_paper": (0.97, 0.94),
-        "shap_additive": (0.30, 0.30),
-        "forest": (0.98, 0.99),
-        "shap_oracle": (1, 1),
-        "rule": (1, 0.99),
-    }
+    accuracies = {"gpca_paper": (0.97, 0.94), "shap_additive": (0.30, 0.30), "forest": (0.98, 0.99)}
+    accuracies |= {"shap_oracle": (1, 1), "rule": (1, 0.99)}
     rows = [
         (source, method, "accuracy", value)
         for method, of_sources in accuracies.items()
@@ -96,14 +91,11 @@ def test_findings_of_causes_and_of_recovery_stand_apart(folder):
         assert words in texts[2]
 
 
-def test_what_a_run_has_not_is_not_spoken_of(folder):
+def test_what_a_run_has_not_is_not_spoken_of_and_a_damaged_file_is_named(folder):
     assert findings_of(folder, TITLES, ()) == []
     for path in folder.glob("*.csv"):
         path.unlink()
     assert findings_of(folder, TITLES, RESULTS) == []
-
-
-def test_a_damaged_file_is_named(folder):
     (folder / "recovery.csv").write_text("table\n1\n")
     with pytest.raises(InputError, match=r"recovery\.csv: column"):
         findings_of(folder, TITLES, RESULTS)
