@@ -284,7 +284,7 @@ def embed(
     parts = []
     for rows in progress(batches, f"embeddings of {source}, seed {seed}"):
         axes = [(source, seed, "embedding", number) for number in range(settings.draws)]
-        draws = [model.encoder(_drawn(draw, settings, registrations, rows, *of_draw)) for of_draw in axes]
+        draws = [model.encoder(_drawn(draw, settings, registrations, rows, *names)) for names in axes]
         parts.append(torch.stack(draws).mean(dim=0))
     h_S_d = torch.cat(parts)
     return h_S_d.cpu().numpy(), model.head(h_S_d).cpu().numpy()

@@ -42,8 +42,8 @@ def compare(source_P_3: np.ndarray, target_Q_3: np.ndarray, drawn: np.ndarray, n
     normals_D_3, *shape = local_shape(source_tree, query_D_3, neighbors)
     target_normals_D_3, *target_shape = local_shape(target_tree, target_tree.data[nearest_D], neighbors)
     agreement = np.abs(np.sum(normals_D_3 * target_normals_D_3, axis=1)).mean()
-    differences = [(own_D - other_D).mean() for own_D, other_D in zip(shape, target_shape, strict=True)]
-    return [agreement, *(own_D.mean() for own_D in shape), *differences]
+    differences = [(source_D - target_D).mean() for source_D, target_D in zip(shape, target_shape, strict=True)]
+    return [agreement, *(source_D.mean() for source_D in shape), *differences]
 
 
 def local_shape(tree, query_D_3: np.ndarray, neighbors: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
