@@ -16,18 +16,8 @@ from pydantic import Field
 
 from gpca.alignment.methods.registry import method_module
 from gpca.attribution.predictions import read_predictions
+from gpca.causes import judged as answers
 from gpca.causes.dataset import LABELS, Causes
-from gpca.causes.judged import (
-    CEILING,
-    SHARES,
-    SMALLER_IS_BETTER,
-    Judged,
-    ceiling_of,
-    counted,
-    joined,
-    judged_by,
-    measure,
-)
 from gpca.causes.scans import KINDS
 from gpca.causes.settings import SCANS, ScanSamples
 from gpca.causes.truth import BORDERLINE, GEOMETRY
@@ -246,27 +236,27 @@ def read_scan_causes(path: str | Path) -> Frame:
     return read_numbers(path, COLUMNS, NUMBERS, optional=NUMBERS[4:]).assign(concept=ALL)
 
 
-def _read(causes_files, sample_files, prediction_files) -> tuple[Frame, dict[tuple[str, str], Judged]]:
+def _read(causes_files, sample_files, prediction_files) -> tuple[Frame, dict[tuple[str, str], answers.Judged]]:
     """A row for each registration, and the answers of each explainer, by where it learned and its name."""
     import pandas as pd
 
-    answers = {
+    predicted = {
         seed_of_file(path): read_predictions(path, labels=("scans", "learned", "explainer"))
         for path in prediction_files
     }
     seen: list[Frame] = []
-    judged: dict[tuple[str, str], list[Judged]] = {}
+    judged: dict[tuple[str, str], list[answers.Judged]] = {}
     for causes_file, sample_file in zip(causes_files, sample_files, strict=True):
         source, seed = Path(causes_file).parent.name, seed_of_file(causes_file)
         causes = Causes.load(causes_file, (source, seed))
         same = causes.registrations.arrays, "causes or the predictions", ("sample",)
         samples = read_csv(sample_file, SAMPLE_COLUMNS, others=ANY)[list(SAMPLE_COLUMNS)]
         require_same_samples(sample_file, samples, *same)
-        for key, rows in answers[seed].groupby(["learned", "explainer"], sort=False) if seed in answers else ():
+        for key, rows in predicted[seed].groupby(["learned", "explainer"], sort=False) if seed in predicted else ():
             rows = rows[rows["scans"] == source]
             require_same_samples(causes_file, rows, *same)
-            judged.setdefault(key, []).append(judged_by(rows, causes, seed))
-        judged.setdefault(("", CEILING), []).append(ceiling_of(causes, seed))
+            judged.setdefault(key, []).append(answers.judged_by(rows, causes, seed))
+        judged.setdefault(("", answers.CEILING), []).append(answers.ceiling_of(causes, seed))
         read = {name: number_column(sample_file, samples, name) for name in ("overlap", "times")}
         pair = [f"{source} {name}" for name in causes.registrations.object_name]
         seen.append(samples.assign(**read, scans=source, seed=seed, end=ends_of(causes.truth), pair=pair))
@@ -275,11 +265,11 @@ def _read(causes_files, sample_files, prediction_files) -> tuple[Frame, dict[tup
     if short := [key for key, parts in judged.items() if len(parts) != len(seen)]:
         fault = f"explainer '{short[0][1]}' has no predictions of some data set or seed"
         raise InputError("predictions of scans", fault, "regenerate them")
-    return pd.concat(seen, ignore_index=True), {key: joined(parts) for key, parts in judged.items()}
+    return pd.concat(seen, ignore_index=True), {key: answers.joined(parts) for key, parts in judged.items()}
 
 
 def _measures(
-    place: tuple[str, str, str], judged: dict[tuple[str, str], Judged], cluster_N: np.ndarray
+    place: tuple[str, str, str], judged: dict[tuple[str, str], answers.Judged], cluster_N: np.ndarray
 ) -> Iterator[tuple]:
     any_samples = next(iter(judged.values()))
     drawn_B_N = pigeonhole_weights(generator("scan cause intervals", *place), any_samples.seed, cluster_N)
@@ -292,19 +282,19 @@ def _measures(
         if not np.isfinite(value_B[0]):
             continue
         counted_N = counted_of_scans(any_samples, metric)
-        drawn_B_n = drawn_B_N[:, counted_N] if metric in (*SHARES, CAUSES) else None
+        drawn_B_n = drawn_B_N[:, counted_N] if metric in (*answers.SHARES, CAUSES) else None
         gates = [names[other] for other in judged if other[1].startswith(GATE) and other != key]
         lead = NO_LEAD
-        gate = best_of(of_metric, gates, metric in SMALLER_IS_BETTER)
-        if gate and key[1] != CEILING and metric != SAMPLES:
+        gate = best_of(of_metric, gates, metric in answers.SMALLER_IS_BETTER)
+        if gate and key[1] != answers.CEILING and metric != SAMPLES:
             lead = (gate, *interval(value_B - of_metric[gate], drawn_B_n, difference=True))
         counts = int(counted_N.sum()), len(set(cluster_N[counted_N])), len(set(any_samples.seed[counted_N].tolist()))
         yield (*place, *key, metric, *counts, *interval(value_B, drawn_B_n), *lead)
 
 
-def scan_measures(samples: Judged, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
+def scan_measures(samples: answers.Judged, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
     """Measures (B,) of a diagnosis, with those of scans alone, by weights of the samples (B, N)."""
-    measures = measure(samples, weights_B_N)
+    measures = answers.measure(samples, weights_B_N)
     measures[SAMPLES] = np.full(len(weights_B_N), float((samples.label != BORDERLINE).sum()))
     if samples.names_causes:  # mean over the causes with enough failures of the share whose cause has the largest score
         named_N, recalls = np.array(CONCEPTS)[samples.scores.argmax(axis=1)], []
@@ -317,9 +307,9 @@ def scan_measures(samples: Judged, weights_B_N: np.ndarray) -> dict[str, np.ndar
     return measures
 
 
-def _frequent(samples: Judged) -> list[str]:
+def _frequent(samples: answers.Judged) -> list[str]:
     return [concept for concept in CONCEPTS if (samples.label == concept).sum() >= FEWEST_OF_A_CAUSE]
 
 
-def counted_of_scans(samples: Judged, metric: str) -> np.ndarray:
-    return np.isin(samples.label, _frequent(samples)) if metric == CAUSES else counted(samples, metric)
+def counted_of_scans(samples: answers.Judged, metric: str) -> np.ndarray:
+    return np.isin(samples.label, _frequent(samples)) if metric == CAUSES else answers.counted(samples, metric)
