@@ -30,8 +30,8 @@ def concept_accuracy(
     """Return the accuracy over `ALL` samples, and over those of each concept that has some (its recall)."""
     right_S = (concept_true_S == concept_predicted_S) & ~abstained_S
     masks = {concept: concept_true_S == concept for concept in concepts}
-    of_concept = {concept: float(np.mean(right_S[mask])) for concept, mask in masks.items() if mask.any()}
-    return {ALL: float(np.mean(right_S)), **of_concept}
+    by_concept = {concept: float(np.mean(right_S[mask])) for concept, mask in masks.items() if mask.any()}
+    return {ALL: float(np.mean(right_S)), **by_concept}
 
 
 def confusion(
