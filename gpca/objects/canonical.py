@@ -218,7 +218,7 @@ class ObjectClouds:
 
         A file that names no source is accepted for any: users' own rules write such files.
         """
-        shapes = dict.fromkeys(("names", "diameters_m", "families", "folds"), ("O",))
+        shapes: dict[str, tuple[int | str, ...]] = dict.fromkeys(("names", "diameters_m", "families", "folds"), ("O",))
         shapes |= {"points_m": ("P", 3), "normals": ("P", 3), "offsets": ("E",)}
         kinds = dict.fromkeys(shapes, REAL) | {"names": TEXT, "offsets": WHOLE, "families": TEXT, "folds": WHOLE}
         axes = None if source is None else (source, None)

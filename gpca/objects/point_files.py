@@ -186,7 +186,8 @@ def _text(path: Path) -> np.ndarray:
         raise InputError(path, "has no points", COLUMNS_REMEDY)
     separator = next((sign for sign in SEPARATORS if sign in lines[0]), None)
     words = [word.strip().strip('"').lower() for word in lines[0].split(separator)]
-    names_columns, columns = not any(map(_is_number, words)), (0, 1, 2)
+    columns: tuple[int, ...] = (0, 1, 2)
+    names_columns = not any(map(_is_number, words))
     if names_columns:
         if not set(AXES) <= set(words):
             raise InputError(path, f"has the columns {', '.join(words[:8])}, not x, y, z", COLUMNS_REMEDY)

@@ -83,10 +83,18 @@ class ScannedScene:
         """Return a pair with its clouds."""
         source, target = self.scans[known.source], self.scans[known.target]
         return ScanPair(
-            *(source.points_N_3, target.points_N_3, self._relative(known)),
+            source.points_N_3,
+            target.points_N_3,
+            self._relative(known),
             float("nan") if known.overlap is None else known.overlap,
-            *(self.name, self.kind, self.size_m, known.source, known.target),
-            *(source.viewpoint_3, target.viewpoint_3, self.family),
+            self.name,
+            self.kind,
+            self.size_m,
+            known.source,
+            known.target,
+            source.viewpoint_3,
+            target.viewpoint_3,
+            self.family,
         )
 
     def _relative(self, pair: Known) -> np.ndarray:
