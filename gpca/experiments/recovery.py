@@ -118,7 +118,8 @@ def check(config: dict, left_out: LeftOut) -> None:
     thresholds = {name: section["thresholds"][name] for name in DECLARED}
     given = {name: value for name, value in thresholds.items() if value is not None}
     with_key("recovery.thresholds", lambda: Thresholds(**given))
-    with_key("recovery", lambda: SituationSettings(tuple(section["noise_scale"]), tuple(section["hidden"])))
+    ranges: dict[str, Any] = {name: tuple(section[name]) for name in ("noise_scale", "hidden")}
+    with_key("recovery", lambda: SituationSettings(**ranges))
 
 
 def policies_without(left_out: LeftOut) -> set[str]:
