@@ -250,9 +250,9 @@ class Explainer:
             return PoseSpread(runs.covariance(outcome.T_target_source), diameter, estimator, starts)
         target = thin(clouds.target, settings.icp_points, "spread", "target")
         pair = Pair(source, target, seed=seed_of("explanation", "estimate")).with_normals()
-        own = "gicp" if self.model.icp.method == "generalized" else self.model.icp.method  # the method of that name
+        equal = "gicp" if self.model.icp.method == "generalized" else self.model.icp.method  # the method that equals it
         estimate = make_estimator(estimator, {"starts": starts} if starts else {})
-        estimated = estimate(RegisteredPair(pair, outcome, method or own, settings.deviation_6()))
+        estimated = estimate(RegisteredPair(pair, outcome, method or equal, settings.deviation_6()))
         if estimated.covariance_6_6 is None:
             notes.append(f"{estimator} gives no covariance: {estimated.failure}")
             return None

@@ -53,7 +53,7 @@ class PoseSpread:
 
 @dataclass(frozen=True, kw_only=True)
 class ExplainedRegistration:
-    """What is said of any registration: its result, what to do next, and how it is shown."""
+    """What is reported of any registration: its result, what to do next, and how it is shown."""
 
     html: ClassVar[Callable[..., str]]
 
@@ -128,8 +128,8 @@ class Explanation(ExplainedRegistration):
         values = super().as_dict() | {"diagnosis": self.diagnosis and self.diagnosis.as_dict()}
         if self.spread:
             names = ("rotation_deg", "translation", "estimator", "starts")
-            own = {name: getattr(self.spread, name) for name in names}
-            values["spread"] = own | {"covariance": self.spread.covariance_6_6.tolist()}
+            numbers = {name: getattr(self.spread, name) for name in names}
+            values["spread"] = numbers | {"covariance": self.spread.covariance_6_6.tolist()}
         return values
 
     def html(self, names: Mapping[str, str] | None = None) -> str:
