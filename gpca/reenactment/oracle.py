@@ -54,8 +54,8 @@ def verdicts(
         """Return v̂ (8,) of a hypothesis with the truth about the clouds, as far as it is known."""
         if not clouds:
             return enactment.error_8
-        told = generator(*pair.axes, "oracle", *clouds)
-        candidate = informed(enactment.candidate, enactment.hypothesis.T @ T_start, true, clouds, told)
+        random = generator(*pair.axes, "oracle", *clouds)
+        candidate = informed(enactment.candidate, enactment.hypothesis.T @ T_start, true, clouds, random)
         return enact(enactment.hypothesis, candidate, surface.errors, pair.axes, truth).error_8
 
     by_name = {}
