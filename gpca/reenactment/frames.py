@@ -135,8 +135,8 @@ def find_frame_hypotheses(
 
     def best(T_n: np.ndarray, observed: np.ndarray, pixels: int, rounds: int, apart: float) -> list[Hypothesis]:
         begun = [*((T, None) for T in T_n), (np.eye(4), search.anchor_of(len(observed), settings))]
-        found = [fit(T, observed, pixels, rounds, anchor) for T, anchor in begun]
-        return search.most_probable(found, surface, settings.hypotheses, apart)
+        fitted = [fit(T, observed, pixels, rounds, anchor) for T, anchor in begun]
+        return search.most_probable(fitted, surface, settings.hypotheses, apart)
 
     first = search.not_negligible(best(ends_n, few, COARSE, 1, search.SAME), OUT_OF_REACH)
     T_n = np.stack([hypothesis.T for hypothesis in first])
