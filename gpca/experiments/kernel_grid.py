@@ -134,7 +134,7 @@ COLUMNS = {
     intervals="kernel_intervals.csv",
 )
 def table4_kernels(run: Run, intervals):
-    again = [(kernel + BY_GPYTORCH, *schedule) for kernel, *schedule in PRINTED]
+    again = [(kernel + BY_GPYTORCH, rate, iterations) for kernel, rate, iterations in PRINTED]
     rows = [Row(labels(setting), {"method": setting_name(*setting)}) for setting in (*PRINTED, *again)]
     columns = {name: show("accuracy", title, where={"source": name}) for name, title in titles(run).items()}
     sheet = Sheet("table4_kernels", HEADS, rows, columns, intervals)
@@ -245,7 +245,9 @@ def table4_grid(run: Run, grid, intervals):
     for (source, *setting), values_R in grid.groupby(["source", *SETTING])["elbo"]:
         row = {"source": source, "method": setting_name(*setting)}
         sheet.cells |= {
-            (i, "elbo"): cell_of_repeats(values_R, 0) for i, each in enumerate(sheet.rows) if each.where == row
+            (i, "elbo"): cell
+            for i, each in enumerate(sheet.rows)
+            if each.where == row and (cell := cell_of_repeats(values_R, 0))
         }
     notes = (
         f"{over(sheet)}. Bold: best accuracy and NLL of a dataset.",
