@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
-from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -14,12 +15,12 @@ from gpca.alignment.icp import ICPSettings
 from gpca.attribution.predictions import prediction_frame, read_timings, write_predictions, write_timings
 from gpca.causes.dataset import LABELS, Causes, labeled, observed_only
 from gpca.causes.descriptors import Descriptors, describe_all
-from gpca.causes.settings import DescriptorSettings
+from gpca.causes.settings import OBJECTS, DescriptorSettings
 from gpca.causes.truth import BORDERLINE
 from gpca.classifier.scores import Attribution
 from gpca.encoders.registry import EncoderSettings
 from gpca.errors import InputError
-from gpca.explainers.interface import BARE, REENACTED, ConceptExplainer, ExplainerEntry, icp_calls
+from gpca.explainers.interface import BARE, EMBEDDINGS, REENACTED, ExplainerEntry, icp_calls
 from gpca.explainers.registry import CAUSES, explainer_entry
 from gpca.io.csv_file import write_csv
 from gpca.jobs.job import Job
@@ -29,7 +30,8 @@ from gpca.reenactment.dataset import Reenactments, reenactment_features
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.seeds import seed_of_file
 
-EMBEDDED, DESCRIBED = "embeddings", "descriptors"  # `reads` of explainers; all but these and `REENACTED` need neither
+DESCRIBED = "descriptors"  # `reads` of explainers; all but these, `EMBEDDINGS` and `REENACTED` need nothing else
+FEWEST_LABELS = 2  # among the samples of scans that an explainer learns from
 
 
 def diagnose(job: Job) -> None:
@@ -38,16 +40,13 @@ def diagnose(job: Job) -> None:
     remedies = DescriptorSettings(**json.loads(job.remedies))
     reenactment = ReenactmentSettings(**json.loads(job.reenactment))
     files = ("causes", "read", "read_timings", "predictions", "timings")
-    for seed, causes_file, read, read_timing, predictions, timings in job.per_seed(*files):
-        explainer = entry.make(job.source, seed, **job.settings)
-        inputs = [causes_file, read, read_timing]
-        with record_provenance([predictions, timings], inputs, job.settings, seed=seed):
-            causes = Causes.load(causes_file, (job.source, seed))
-            registrations = with_what_it_reads(labeled(causes), entry, read)
-            seconds_S, icp_seconds_S = read_timings(read_timing, registrations)
-            attribution = explained(explainer, entry, registrations, causes, remedies, causes_file, reenactment)
+    for seed, path, read, read_timing, predictions, timings in job.per_seed(*files):
+        with record_provenance([predictions, timings], [path, read, read_timing], job.settings, seed=seed):
+            causes = Causes.load(path, (job.source, seed))
+            seconds_S, icp_seconds_S = read_timings(read_timing, causes.registrations)
+            attribution = explained(entry, job.settings, causes, path, read, remedies, reenactment)
             write_predictions(predictions, causes.registrations, attribution)
-            write_timings(timings, registrations, seconds_S + attribution.seconds_N, icp_seconds_S)
+            write_timings(timings, causes.registrations, seconds_S + attribution.seconds_N, icp_seconds_S)
 
 
 def diagnose_by_features(job: Job) -> None:
@@ -55,13 +54,11 @@ def diagnose_by_features(job: Job) -> None:
     remedies = DescriptorSettings(**job.section("descriptors"))
     own = {(path.parts[-2], seed_of_file(path)): path for path in job.predictions}
     with record_provenance(job.predictions, [*job.causes, *job.descriptors], job.settings):
-        for seed, causes_file, descriptors in job.per_seed("causes", "descriptors"):
-            causes = Causes.load(causes_file, (job.source, seed))
+        for seed, path, descriptors in job.per_seed("causes", "descriptors"):
+            causes = Causes.load(path, (job.source, seed))
             for name, settings in job.section("by_features").items():
                 entry = explainer_entry(name, CAUSES)
-                explainer = entry.make(job.source, seed, **(settings or {}))
-                registrations = with_what_it_reads(labeled(causes), entry, descriptors)
-                attribution = explained(explainer, entry, registrations, causes, remedies, causes_file)
+                attribution = explained(entry, settings or {}, causes, path, descriptors, remedies)
                 write_predictions(own[name, seed], causes.registrations, attribution)
 
 
@@ -72,14 +69,13 @@ def diagnose_frames(job: Job) -> None:
     """
     import pandas as pd
 
-    learned = {"causes": job.causes, DESCRIBED: job.descriptors, "encoders": job.encoders, EMBEDDED: job.embeddings}
+    learned = {"causes": job.causes, DESCRIBED: job.descriptors, "encoders": job.encoders, EMBEDDINGS: job.embeddings}
     learned |= {REENACTED: job.get("reenactments", [])}  # only where an explainer reads them
     enacted = job.get("frame_reenactments")
-    read = [job.frame_causes, *([enacted] if enacted else [])]
-    inputs = read + [path for paths in learned.values() for path in paths]
+    inputs = [job.frame_causes, *filter(None, [enacted]), *(path for paths in learned.values() for path in paths)]
     with record_provenance([job.predictions], inputs, job.settings, seed=job.seed):
         causes = Causes.load(job.frame_causes, (job.source, job.seed))
-        frames = FramesToExplain(job, causes, enacted, learned)
+        frames = frames_to_explain(job, causes, enacted, learned)
         predictions = []
         for name, settings in job.section("explainers").items():
             attribution = frames.attribution(name, settings or {})
@@ -88,18 +84,20 @@ def diagnose_frames(job: Job) -> None:
 
 
 def explained(
-    explainer: ConceptExplainer,
     entry: ExplainerEntry,
-    registrations: Registrations,
+    settings: dict[str, Any],
     causes: Causes,
-    remedies: DescriptorSettings,
     path: Path,
+    read: Path | None,
+    remedies: DescriptorSettings,
     reenactment: ReenactmentSettings | None = None,
 ) -> Attribution:
     """Let an explainer learn from the training rows and explain all, and count the runs of ICP that it needs.
 
-    The registrations have labels, and what it reads attached; `causes`, of the file `path`, are the same ones.
+    The causes are those of the file `path`, and `read` has what the explainer reads of them.
     """
+    explainer = entry.make(*(causes.registrations.axes or ()), **settings)
+    registrations = with_what_it_reads(labeled(causes), entry.reads, read)
     explainer.fit(registrations.subset(training_rows(registrations, path)))
     starts = causes.T_target_source_runs.shape[1]
     calls = icp_calls(entry.sees, starts, remedies, reenactment.calls(starts) if reenactment else 0)
@@ -113,12 +111,13 @@ def training_rows(registrations: Registrations, path: Path) -> np.ndarray:
     return rows
 
 
-def with_what_it_reads(registrations: Registrations, entry: ExplainerEntry, path: Path) -> Registrations:
-    if entry.reads == BARE:
+def with_what_it_reads(registrations: Registrations, reads: str, path: Path | None) -> Registrations:
+    """Attach what an explainer with these `reads` needs, from its file."""
+    if reads == BARE or path is None:
         return registrations
-    if entry.reads == "embeddings":
+    if reads == EMBEDDINGS:
         read = read_embedding(path, registrations, logits=True)
-    elif entry.reads == REENACTED:
+    elif reads == REENACTED:
         enacted = Reenactments.load(path, registrations)
         read = {"verdict": enacted.verdict, "reenactment": reenactment_features(enacted)}
     else:
@@ -126,101 +125,105 @@ def with_what_it_reads(registrations: Registrations, entry: ExplainerEntry, path
     return replace(registrations, attached={**registrations.attached, **read})
 
 
-class World(ABC):
+class World:
     """Registrations that explainers which learned from objects are asked about: in depth frames, or of scans.
 
-    Diagnosis of held-out objects is :func:`diagnose`: there one file has training and test rows. An implementation for
-    another world provides what its explainers read of its registrations but embeddings (:meth:`_read`), and from whom
-    an explainer learns (its method ``attribution``).
+    Diagnosis of held-out objects is :func:`diagnose`: there one file has training and test rows.
 
     Args:
         files: of all sources of objects, by what explainers read, and their encoders.
         registrations: those of this world, with labels.
         starts: runs of each from other starts.
+        read: gives the registrations with descriptors or re-enactments attached, by an explainer's `reads`.
+        fold_S: (S,) folds by which explainers learn from this world: from all but the one that they are asked about.
     """
 
-    def __init__(self, job: Job, files: dict[str, list[Path]], registrations: Registrations, starts: int) -> None:
+    def __init__(
+        self,
+        job: Job,
+        files: dict[str, list[Path]],
+        registrations: Registrations,
+        starts: int,
+        read: Callable[[str], Registrations],
+        fold_S: np.ndarray | None = None,
+    ) -> None:
         self._axes, self._files, self._registrations = (job.source, job.seed), files, registrations
+        self._read, self._fold_S = read, fold_S
         self._encoder = EncoderSettings(**job.section("encoder"))
-        self._descriptors = DescriptorSettings(**job.section("descriptors"))
+        descriptors = DescriptorSettings(**job.section("descriptors"))
         calls = ReenactmentSettings(**job.section("reenactment")).calls(starts)
-        self._calls = partial(icp_calls, starts=starts, descriptors=self._descriptors, reenactment=calls)
-        self._prepared: dict[tuple[str, bool], list[tuple[Registrations, Registrations]]] = {}
+        self._calls = partial(icp_calls, starts=starts, descriptors=descriptors, reenactment=calls)
+        self._prepared: dict[tuple[str, str], list[tuple[Registrations, Registrations]]] = {}
 
-    @abstractmethod
-    def _read(self, reads: str) -> Registrations:
-        """Return the registrations with their descriptors or re-enactments attached."""
+    def prepare(self, name: str, learned_from: str = OBJECTS) -> list[tuple[Registrations, Registrations]]:
+        """Return what an explainer learns from, and what it is asked about; the same twice if not objects.
 
-    def _sets(self, entry: ExplainerEntry, from_objects: bool = True) -> list[tuple[Registrations, Registrations]]:
-        """Return what an explainer learns from, and the registrations it is asked about; the same twice if not objects.
-
-        Descriptors and re-enactments of all sources are one set; embeddings are by an encoder for each source.
+        Descriptors and re-enactments of all sources are one set; embeddings are by an encoder for each source. What
+        they are made of is measured once for all explainers that read the same.
         """
-        reads = entry.reads if entry.reads in (EMBEDDED, REENACTED) else DESCRIBED
-        if (reads, from_objects) not in self._prepared:
-            entry = explainer_entry("gpca_pair", CAUSES) if reads == DESCRIBED else entry
-            learned = []
-            for path, read in zip(self._files["causes"], self._files[reads], strict=True) if from_objects else ():
-                registrations = with_what_it_reads(labeled(Causes.load(path)), entry, read)
-                learned.append(registrations.subset(training_rows(registrations, path)))
-            asked = self._embedded(learned) if reads == EMBEDDED else [self._read(reads)]
-            if reads != EMBEDDED and from_objects:
-                learned = [Registrations.joined(learned)]
-            self._prepared[reads, from_objects] = list(zip(learned or asked, asked, strict=True))
-        return self._prepared[reads, from_objects]
-
-    def _embedded(self, learned: list[Registrations]) -> list[Registrations]:
-        """Return the registrations with embeddings by the encoder of each source of objects."""
         from gpca.encoders.training import embed, load_model
 
-        observed, embedded = observed_only(self._registrations), []
-        axes = [part.axes for part in learned] or [None] * len(self._files["encoders"])
-        for weights, trained_on in zip(self._files["encoders"], axes, strict=True):
-            model = load_model(weights, self._encoder, LABELS, trained_on)
-            h_S_d, logits_S_C = embed(model, observed, *self._axes, self._encoder)
-            attached = {**self._registrations.attached, "embedding": h_S_d, "head_logits": logits_S_C}
-            embedded.append(replace(self._registrations, attached=attached))
-        return embedded
+        reads = explainer_entry(name, CAUSES).reads
+        reads = reads if reads in (EMBEDDINGS, REENACTED) else DESCRIBED
+        if (reads, learned_from) in self._prepared:
+            return self._prepared[reads, learned_from]
+        learned, asked = [], []
+        files = list(zip(self._files["causes"], self._files[reads], strict=True)) if learned_from == OBJECTS else []
+        for path, read in files:
+            registrations = with_what_it_reads(labeled(Causes.load(path)), reads, read)
+            learned.append(registrations.subset(training_rows(registrations, path)))
+        if reads == EMBEDDINGS:
+            axes = [part.axes for part in learned] or [None] * len(self._files["encoders"])
+            for weights, trained_on in zip(self._files["encoders"], axes, strict=True):
+                model = load_model(weights, self._encoder, LABELS, trained_on)
+                h_S_d, logits_S_C = embed(model, observed_only(self._registrations), *self._axes, self._encoder)
+                attached = {**self._registrations.attached, "embedding": h_S_d, "head_logits": logits_S_C}
+                asked.append(replace(self._registrations, attached=attached))
+        else:
+            learned, asked = [Registrations.joined(learned)] if learned else [], [self._read(reads)]
+        self._prepared[reads, learned_from] = list(zip(learned or asked, asked, strict=True))
+        return self._prepared[reads, learned_from]
 
-    def _mean(self, entry: ExplainerEntry, attributions: list[Attribution]) -> Attribution:
-        """Return the mean of the scores over all sets, with the runs of ICP that the explainer needs."""
+    def attribution(self, name: str, settings: dict, learned_from: str = OBJECTS) -> Attribution | None:
+        """Mean of the scores over all that the explainer reads; several are the encoders of embeddings.
+
+        None where it would have to learn from fewer than two classes.
+        """
+        entry, all_scores, all_abstained = explainer_entry(name, CAUSES), [], []
+        for training, asked in self.prepare(name, learned_from):
+            parts = [(np.arange(len(asked)), training)]
+            if training is asked:  # one fold is asked about, and the labeled rows of the others are learned from
+                labeled_S = asked.concept != BORDERLINE
+                of_folds = [self._fold_S == fold for fold in np.unique(self._fold_S)]
+                parts = [(np.flatnonzero(of_S), asked.subset(np.flatnonzero(labeled_S & ~of_S))) for of_S in of_folds]
+            answers = []
+            for rows, learned in parts:
+                if self._fold_S is not None and len(np.unique(learned.concept)) < FEWEST_LABELS:
+                    return None
+                explainer = entry.make(*self._axes, **settings)
+                explainer.fit(learned)
+                answers.append(explainer.explain(observed_only(asked.subset(rows))))
+            order = np.argsort(np.concatenate([rows for rows, _ in parts]))
+            all_scores.append(np.concatenate([answer.scores_N_C for answer in answers])[order])
+            all_abstained.append(np.concatenate([answer.abstained_N for answer in answers])[order])
         return Attribution.of_scores(
             LABELS,
-            np.mean([each.scores_N_C for each in attributions], axis=0),
+            np.mean(all_scores, axis=0),
             seconds=0.0,
             icp_calls=self._calls(entry.sees),
-            abstained_N=np.all([each.abstained_N for each in attributions], axis=0),
+            abstained_N=np.all(all_abstained, axis=0),
         )
 
 
-class FramesToExplain(World):
-    """Registrations of frames to be explained, and their re-enactments; see :class:`World`."""
+def frames_to_explain(job: Job, causes: Causes, enacted: Path | None, learned: dict[str, list[Path]]) -> World:
+    """Registrations of frames to be explained, and the file of their re-enactments."""
+    registrations = labeled(causes)
 
-    def __init__(self, job: Job, causes: Causes, enacted: Path | None, learned: dict[str, list[Path]]) -> None:
-        super().__init__(job, learned, labeled(causes), causes.T_target_source_runs.shape[1])
-        self._causes, self._enacted = causes, enacted
-        self._icp = ICPSettings(**job.section("icp"))
+    def read(reads: str) -> Registrations:
+        if reads == REENACTED:
+            return with_what_it_reads(registrations, reads, enacted)
+        descriptors, icp = DescriptorSettings(**job.section("descriptors")), ICPSettings(**job.section("icp"))
+        described, _, _ = describe_all(causes, job.source, job.seed, descriptors, icp)
+        return replace(registrations, attached={**registrations.attached, **described.groups})
 
-    def prepare(self, name: str) -> None:
-        """Measure what an explainer reads, once for all that read the same."""
-        self._sets(explainer_entry(name, CAUSES))
-
-    def attribution(self, name: str, settings: dict) -> Attribution:
-        """Return the mean of the scores over all that the explainer learns from."""
-        entry = explainer_entry(name, CAUSES)
-        attributions = []
-        for learned, frames in self._sets(entry):
-            explainer = entry.make(*self._axes, **settings)
-            explainer.fit(learned)
-            attributions.append(explainer.explain(observed_only(frames)))
-        return self._mean(entry, attributions)
-
-    def _read(self, reads: str) -> Registrations:
-        if reads == DESCRIBED:
-            described, _, _ = describe_all(self._causes, *self._axes, self._descriptors, self._icp)
-            read = described.groups
-        else:
-            assert self._enacted is not None
-            enacted = Reenactments.load(self._enacted, self._registrations)
-            read = {"verdict": enacted.verdict, "reenactment": reenactment_features(enacted)}
-        return replace(self._registrations, attached={**self._registrations.attached, **read})
+    return World(job, learned, registrations, causes.T_target_source_runs.shape[1], read)

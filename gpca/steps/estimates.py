@@ -49,7 +49,7 @@ LEVEL = 0.95  # of the region whose coverage is counted
 
 
 @dataclass(frozen=True)
-class Situations:
+class DrawnCauses:
     """Registrations of one source and seed with measured causes, and what it takes to draw them again.
 
     Attributes:
@@ -85,7 +85,7 @@ class EstimatedRow:
 class Registering:
     """Registers rows of the situations by one method."""
 
-    def __init__(self, situations: Situations, method: str, settings: EstimatorPairSettings) -> None:
+    def __init__(self, situations: DrawnCauses, method: str, settings: EstimatorPairSettings) -> None:
         self.situations, self.method, self._settings = situations, method, settings
         self._axes = (situations.source, situations.seed, "estimators", method)
         self._register = make_method(method)
@@ -159,9 +159,9 @@ def run(job: Job) -> None:
     objects = {source: ObjectClouds.load(path, source) for source, path in named.items()}
     judges = {source: Judges(of, f"objects of {source}") for source, of in objects.items()}
 
-    def situations(source: str, seed: int, path: Path) -> Situations:
+    def situations(source: str, seed: int, path: Path) -> DrawnCauses:
         causes = Causes.load(path, (source, seed))
-        return Situations(source, seed, causes, drawn_by, objects[source], judges[source])
+        return DrawnCauses(source, seed, causes, drawn_by, objects[source], judges[source])
 
     others, samples = (job.files("other_causes") if job.get("other") else []), job.get("samples", [])
     for i, (seed, path) in enumerate(job.per_seed("causes")):
@@ -179,8 +179,8 @@ def run(job: Job) -> None:
 
 
 def try_estimators(
-    situations: Situations,
-    other: Situations | None,
+    situations: DrawnCauses,
+    other: DrawnCauses | None,
     estimators: Mapping[str, Mapping],
     settings: EstimatorPairSettings,
 ) -> tuple[dict[str, pd.DataFrame], list[EstimatedRow]]:
@@ -238,7 +238,7 @@ def most_tested(settings: EstimatorPairSettings) -> str:
     return min(settings.methods, key=lambda method: (-settings.methods[method], method))
 
 
-def mild(situations: Situations, rows: np.ndarray) -> np.ndarray:
+def mild(situations: DrawnCauses, rows: np.ndarray) -> np.ndarray:
     """The half of the rows, in their order, whose strongest perturbation is weakest, in its range's maximum."""
     registrations, ranges = situations.causes.registrations, situations.drawn_by.severities
     strengths = [

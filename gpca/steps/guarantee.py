@@ -9,7 +9,7 @@ frames' causes.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,15 +17,13 @@ import numpy as np
 
 from gpca.attribution.predictions import read_predictions
 from gpca.causes.dataset import LABELS, Causes, labeled, observed_only
-from gpca.causes.descriptors import Descriptors
 from gpca.causes.truth import BORDERLINE
 from gpca.errors import InputError
-from gpca.explainers.interface import EMBEDDINGS
+from gpca.explainers.interface import EMBEDDINGS, REENACTED
 from gpca.explainers.registry import CAUSES, explainer_entry
 from gpca.frames.source import REAL_WORLD
 from gpca.guarantee.answers import SCORES, Scored
 from gpca.guarantee.guarantee import states_of
-from gpca.io.arrays import REGENERATE
 from gpca.io.container import REGENERATE_BOTH, require_same_samples
 from gpca.io.csv_file import ANY, read_csv
 from gpca.io.files import Axes
@@ -33,8 +31,8 @@ from gpca.jobs.job import Job
 from gpca.jobs.provenance import record_provenance
 from gpca.objects.canonical import BY_ICP
 from gpca.pairs.dataset import Registrations
-from gpca.reenactment.dataset import Reenactments, reenactment_features
 from gpca.seeds import generator, seed_of_file
+from gpca.steps.diagnosis import DESCRIBED, with_what_it_reads
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -42,25 +40,8 @@ if TYPE_CHECKING:
 FRAME_COLUMNS = ("sample", "instance", "truth")
 PARTS = 3  # of families that no file deals into folds
 SEVERITIES = ("severity_noise", "severity_rotation_rad", "severity_translation", "severity_crop")
-
-
-@dataclass(frozen=True)
-class Pool:
-    """N registrations of all sources and seeds.
-
-    Attributes:
-        registrations: with their labels, and all inputs of explainers attached.
-        samples: them as they are scored, without scores.
-        part: (N,) of the family; models are trained on one part each.
-    """
-
-    registrations: Registrations
-    samples: Scored
-    part: np.ndarray
-
-    def scored(self, rows: np.ndarray, model: str, seen_n: np.ndarray, scores_n_4: np.ndarray) -> Scored:
-        """Scores that a model gave n rows."""
-        return replace(self.samples.subset(rows), model=np.full(len(rows), model), seen=seen_n, scores=scores_n_4)
+# N registrations of all sources and seeds, with labels and all inputs of explainers; them as they are scored.
+Pool = tuple[Registrations, Scored]
 
 
 def read_pool(causes_files: Sequence[Path], descriptors: Sequence[Path], reenactments: Sequence[Path]) -> Pool:
@@ -68,20 +49,17 @@ def read_pool(causes_files: Sequence[Path], descriptors: Sequence[Path], reenact
     parts, columns = [], []
     for path, described, enacted in zip(causes_files, descriptors, reenactments, strict=True):
         causes = Causes.load(path)
-        source, seed = axes_of(causes.registrations, path)
         state = states_of(causes.truth)
         rows = np.flatnonzero(state != BORDERLINE)
-        registrations, again = labeled(causes), Reenactments.load(enacted, causes.registrations)
-        measured = {"verdict": again.verdict, "reenactment": reenactment_features(again)}
-        measured |= dict(Descriptors.load(described, causes.registrations).groups)
-        parts.append(replace(registrations, attached={**registrations.attached, **measured}).subset(rows))
+        registrations = with_what_it_reads(labeled(causes), DESCRIBED, described)
+        parts.append(with_what_it_reads(registrations, REENACTED, enacted).subset(rows))
         keys = _keys(parts[-1].split, parts[-1].sample)  # as in the files; joined samples are numbered anew
-        columns.append((np.full(len(rows), source), np.full(len(rows), seed), keys, state[rows]))
+        columns.append((*(np.full(len(rows), axis) for axis in axes_of(causes)), keys, state[rows]))
     registrations, count = Registrations.joined(parts), sum(map(len, parts))
     source_N, seed_N, sample_N, state_N = (np.concatenate(column) for column in zip(*columns, strict=True))
     # The largest severity of any cause, as a share of the most in any sample.
     each_N_4 = np.column_stack([getattr(registrations, name) for name in SEVERITIES])
-    samples = Scored(
+    return registrations, Scored(
         model=np.full(count, ""),
         source=source_N,
         seed=seed_N,
@@ -93,14 +71,11 @@ def read_pool(causes_files: Sequence[Path], descriptors: Sequence[Path], reenact
         weight=np.ones(count),
         scores=np.zeros((count, len(LABELS))),
     )
-    return Pool(registrations, samples, parts_of(registrations.cluster, registrations.fold))
 
 
-def axes_of(registrations: Registrations, path: Path) -> Axes:
-    """Source and seed that are stored in the file; InputError where they are not."""
-    if registrations.axes is None:
-        raise InputError(path, "does not say of which source and seed it is", REGENERATE)
-    return registrations.axes
+def axes_of(causes: Causes) -> Axes:
+    assert causes.registrations.axes is not None  # every file of registrations has them
+    return causes.registrations.axes
 
 
 def parts_of(family_N: np.ndarray, fold_N: np.ndarray) -> np.ndarray:
@@ -117,46 +92,48 @@ def run(job: Job) -> None:
     frames = list(zip(job.frame_causes, job.frame_samples, job.frame_predictions, strict=True))
     inputs = [*job.causes, *job.descriptors, *job.reenactments, *job.diagnoses, *sum(frames, ())]
     with record_provenance(job.scores, inputs, job.settings):
-        pool = read_pool(job.causes, job.descriptors, job.reenactments)
+        registrations, samples = read_pool(job.causes, job.descriptors, job.reenactments)
         for name, settings in job.section("explainers").items():
-            as_is = list(scored_as_is(pool, [path for path in job.diagnoses if path.parts[-2] == name]))
-            reads = explainer_entry(name, CAUSES).reads
-            parts = as_is if reads == EMBEDDINGS else list(scored_anew(pool, name, settings or {}))
+            as_is = list(scored_as_is(samples, [path for path in job.diagnoses if path.parts[-2] == name]))
+            parts = as_is
+            if explainer_entry(name, CAUSES).reads != EMBEDDINGS:
+                parts = list(scored_anew(registrations, samples, name, settings or {}))
             Scored.joined([*parts, *scored_on_frames(frames, name, as_is)]).save(outputs[name])
 
 
-def scored_anew(pool: Pool, name: str, settings: Mapping) -> Iterator[Scored]:
+def scored_anew(registrations: Registrations, samples: Scored, name: str, settings: Mapping) -> Iterator[Scored]:
     """Yield the scores of all samples by each model, which was trained on one part of the families.
 
     Models that all give the same scores are not trained at all; they are one model that has seen no sample.
     """
-    hidden, rows = observed_only(pool.registrations), np.arange(len(pool.part))
+    hidden, part_N = observed_only(registrations), parts_of(registrations.cluster, registrations.fold)
     scores: dict[int, np.ndarray] = {}
-    for part in np.unique(pool.part).tolist():
+    for part in np.unique(part_N).tolist():
         explainer = explainer_entry(name, CAUSES).make("guarantee", part, **settings)
-        explainer.fit(pool.registrations.subset(np.flatnonzero(pool.part == part)))
+        explainer.fit(registrations.subset(np.flatnonzero(part_N == part)))
         scores[part] = explainer.explain(hidden).scores_N_C
     first_N_4 = next(iter(scores.values()))
     if all(np.array_equal(scores_N_4, first_N_4) for scores_N_4 in scores.values()):
-        yield pool.scored(rows, "untrained", np.zeros(len(rows), bool), first_N_4)
+        yield replace(samples, model=np.full(len(samples), "untrained"), scores=first_N_4)
         return
     for part, scores_N_4 in scores.items():
-        yield pool.scored(rows, f"part {part}", pool.part == part, scores_N_4)
+        yield replace(samples, model=np.full(len(samples), f"part {part}"), seen=part_N == part, scores=scores_N_4)
 
 
-def scored_as_is(pool: Pool, prediction_files: Sequence[Path]) -> Iterator[Scored]:
+def scored_as_is(samples: Scored, prediction_files: Sequence[Path]) -> Iterator[Scored]:
     """Yield the scores that the models of each source and seed gave in the diagnosis.
 
     Models of one seed have one name: together they are one rule for a pair of any source.
     """
     for path in prediction_files:
-        source, seed = path.parts[-3], seed_of_file(path)
-        rows = np.flatnonzero((pool.samples.source == source) & (pool.samples.seed == seed))
-        predicted, keys = _predicted(read_predictions(path)), pool.samples.sample[rows].tolist()
+        seed = seed_of_file(path)
+        own = samples.subset((samples.source == path.parts[-3]) & (samples.seed == seed))
+        predicted, keys = _predicted(read_predictions(path)), own.sample.tolist()
         if missing := [key for key in keys if key not in predicted]:
             raise InputError(path, "lacks the {} sample {}".format(*missing[0].split()), "regenerate it")
         scores_n_4 = np.array([predicted[key] for key in keys]).reshape(-1, len(LABELS))
-        yield pool.scored(rows, f"seed {seed}", np.array([key.startswith("train") for key in keys]), scores_n_4)
+        seen_n = np.array([key.startswith("train") for key in keys])
+        yield replace(own, model=np.full(len(own), f"seed {seed}"), seen=seen_n, scores=scores_n_4)
 
 
 def scored_on_frames(frames: Sequence[tuple[Path, Path, Path]], name: str, as_is: Sequence[Scored]) -> Iterator[Scored]:
@@ -173,7 +150,7 @@ def scored_on_frames(frames: Sequence[tuple[Path, Path, Path]], name: str, as_is
         predictions = read_predictions(prediction_file, labels=("explainer",))
         predicted = _predicted(predictions[predictions["explainer"] == name])
         registrations, state = causes.registrations, states_of(causes.truth)
-        _, seed = axes_of(registrations, causes_file)
+        _, seed = axes_of(causes)
         numbers = registrations.sample.astype(str)
         require_same_samples(sample_file, samples, registrations.arrays, "causes of frames", ("sample",))
         if predicted and set(predicted) != {f"test {number}" for number in numbers}:

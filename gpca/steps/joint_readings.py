@@ -53,8 +53,8 @@ Value = tuple[str, str, str, str, float]  # part, method, metric, concept, value
 
 
 @dataclass(frozen=True)
-class Samples:
-    """Samples of a source and seed.
+class ReadingSamples:
+    """ReadingSamples of a source and seed.
 
     Attributes:
         sets: with embeddings by an encoder that learned from samples of the same severities.
@@ -112,7 +112,9 @@ def measure(job: Job) -> None:
     axes, settings = (job.source, job.seed), MeasureSettings.of_job(job)
     with record_provenance([job.out], [job.objects, job.sets], job.settings, seed=job.seed):
         objects = ObjectClouds.load(job.objects, job.source)
-        samples = Samples.load(objects, job.sets, axes, job.section("registrations"), job.section("sizes")["samples"])
+        samples = ReadingSamples.load(
+            objects, job.sets, axes, job.section("registrations"), job.section("sizes")["samples"]
+        )
         measured = values(samples, job.severities, job.section("choices"), settings)
         records = [(part, job.source, *named, job.seed, value) for part, *named, value in measured]
         write_metrics(tidy(records, "joint readings"), job.out)
@@ -158,13 +160,13 @@ def apply(job: Job) -> None:
         objects, records = ObjectClouds.load(job.objects, job.source), []
         for path in files:
             axes = (job.source, seed_of_file(path))
-            samples = Samples.load(objects, path, axes, registrations, pairs)
+            samples = ReadingSamples.load(objects, path, axes, registrations, pairs)
             measured = values(samples, severities, choices, settings)
             records += [(TABLE, job.source, *named, axes[1], value) for _, *named, value in measured]
         write_metrics(tidy(records, "joint reading"), job.out)
 
 
-def values(samples: Samples, severities: str, choices: Choices, settings: MeasureSettings) -> Iterator[Value]:
+def values(samples: ReadingSamples, severities: str, choices: Choices, settings: MeasureSettings) -> Iterator[Value]:
     """Yield the values under every combination of these choices that matters to a part, with these severities."""
     choices = dict(choices) | {SEVERITIES: [severities]}
     uncertainty, title = settings.uncertainty, f"knobs of {samples.axes[0]}, seed {samples.axes[1]}"
@@ -201,7 +203,7 @@ def values(samples: Samples, severities: str, choices: Choices, settings: Measur
             yield from _label_values(samples, joint, choices, settings)
 
 
-def _learner_values(samples: Samples, choices: Choices) -> Iterator[Value]:
+def _learner_values(samples: ReadingSamples, choices: Choices) -> Iterator[Value]:
     """Yield accuracies and diagnostics of the forest and the linear SVM, by the scale of their inputs."""
     for joint in _combinations(choices, (SEVERITIES, "inputs")):
         inputs = joint["inputs"]
@@ -246,7 +248,9 @@ def _diagnostics(
             yield part_name(part, joint | asked), method, metric, ALL, value
 
 
-def _label_values(samples: Samples, joint: Joint, choices: Choices, settings: MeasureSettings) -> Iterator[Value]:
+def _label_values(
+    samples: ReadingSamples, joint: Joint, choices: Choices, settings: MeasureSettings
+) -> Iterator[Value]:
     """Yield Table III's numbers, by the share of the new concept in the pool."""
     with_kernel = gpc_settings(settings, SCHEDULES[joint["kernel"]])
     for new_share in choices["new_share"]:

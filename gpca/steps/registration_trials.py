@@ -5,9 +5,10 @@ Local methods start twice: at the pair's initial pose, and at the pose of a glob
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Annotated
 
@@ -33,7 +34,6 @@ if TYPE_CHECKING:
 
 INITIAL, NO_START = "initial", "none"  # where a registration starts; else, the name of a global method
 SEVERITY_COLUMNS = tuple(f"severity_{name}" for name in SEVERITIES)
-Method = Callable[[Pair], Outcome]
 Points = Annotated[int, Bounds(minimum=64, maximum=65536)]
 
 
@@ -63,16 +63,12 @@ def run(job: Job) -> None:
     methods = job.by_name("methods", dict.fromkeys([*job.methods, *start]))
     objects = ObjectClouds.load(job.objects, job.source)
     for i, (seed, path) in enumerate(job.per_seed("registrations")):
-        of_seed = slice(i, None, len(job.seeds))
-        outputs = job.rows[of_seed], job.timings[of_seed]
-        inputs = [job.objects, path]
-        with record_provenance([*outputs[0], *outputs[1]], inputs, job.settings, seed=seed):
+        outputs = [files[i :: len(job.seeds)] for files in (job.rows, job.timings)]
+        with record_provenance([*outputs[0], *outputs[1]], [job.objects, path], job.settings, seed=seed):
             registrations = Registrations.load(path, (job.source, seed))
-            trials = try_methods(registrations, objects, job.source, seed, methods, settings)
-            for name, out, timings in zip(job.methods, *outputs, strict=True):
-                rows = trials[name]
-                write_csv(out, rows.drop(columns="seconds"))
-                write_csv(timings, rows[["sample", "start", "seconds"]])
+            write_trials(
+                try_methods(registrations, objects, job.source, seed, methods, settings), job.methods, *outputs
+            )
 
 
 def try_methods(
@@ -83,53 +79,34 @@ def try_methods(
     methods: Mapping[str, Mapping],
     settings: PairSettings,
 ) -> dict[str, pd.DataFrame]:
-    """Return for each method a row per pair and start, with the points that it had and the seconds that it took.
+    """Return for each method a row per pair and start, with the points that it had; see :func:`try_each`.
 
-    A method that fails has its reason in the row. Normals are estimated beforehand, as the same ones serve all methods
-    of one number of points; what a method loads or compiles at its first call is loaded before the first pair. Fewer
-    points of a cloud are among more of it.
+    The same normals serve all methods of one number of points. Fewer points of a cloud are among more of it.
     """
-    import pandas as pd
-
-    made = {name: make_method(name, entry) for name, entry in methods.items()}
-    start = settings.global_start
-    require_global(start)
-    if start not in made:
-        raise InputError("method_pairs.global_start", f"'{start}' is not among the methods", "add it or name another")
     rows = np.flatnonzero((registrations.split == "test") & (registrations.sample < settings.samples)).tolist()
     if not rows:  # threes of one object, which go round the objects
         raise InputError(f"registrations of {source}", "have no test samples", "raise registrations.test")
     of_objects = Judges(objects, f"objects of {source}")
-    judges = [of_objects.of(registrations, row) for row in rows]
+    judges = {row: of_objects.of(registrations, row) for row in rows}
     given = lru_cache(maxsize=4)(lambda *of: pair_to_register(registrations, of[0], source, seed, *of[1:]))
 
-    def pair_of(row: int, name: str) -> Pair:
+    def asked(row: int, name: str) -> tuple[Pair, dict]:
         points, neighbors = settings.points_of.get(name, settings.points), settings.neighbors_of.get(name, NEIGHBORS)
-        return given(row, points, neighbors)
-
-    for name, method in made.items():
-        method(pair_of(rows[0], name))
-    records: dict[str, list[dict]] = {name: [] for name in made}
-    for i, row in enumerate(progress(rows, f"registration methods on {source}, seed {seed}")):
-        T_true = registrations.T_target_source("true", row)
-        judge = judges[i]
-        known = {
+        pair = given(row, points, neighbors)
+        return pair, {
             "sample": registrations.sample[row],
             "object": registrations.object_name[row],
             "concept": registrations.concept[row],
-            **{name: getattr(registrations, name)[row] for name in SEVERITY_COLUMNS},
-            "symmetric": judge.symmetric,
+            **{column: getattr(registrations, column)[row] for column in SEVERITY_COLUMNS},
+            "symmetric": judges[row].symmetric,
+            "points": (len(pair.source) + len(pair.target)) / 2,
         }
-        coarse = timed(made[start], pair_of(row, start))
-        for name, method in made.items():
-            pair = pair_of(row, name)
-            known_of_pair = known | {"points": (len(pair.source) + len(pair.target)) / 2}
-            for started_at, outcome, seconds in attempts(name, method, pair, start, coarse):
-                errors = judge(outcome.T_target_source, T_true)
-                of_outcome = {key: getattr(outcome, key) for key in ("fitness", "inlier_rmse", "failure")}
-                row_of_trial = known_of_pair | {"start": started_at} | errors | of_outcome
-                records[name].append(row_of_trial | {"seconds": seconds})
-    return {name: pd.DataFrame(of_method) for name, of_method in records.items()}
+
+    def errors(row: int, T_target_source: np.ndarray) -> dict:
+        return judges[row](T_target_source, registrations.T_target_source("true", row))
+
+    title = f"registration methods on {source}, seed {seed}"
+    return try_each(methods, settings.global_start, "method_pairs", progress(rows, title), asked, errors)
 
 
 def pair_to_register(
@@ -147,26 +124,63 @@ def pair_to_register(
     ).with_normals(neighbors)
 
 
-def attempts(
-    name: str, method: Method, pair: Pair, start: str, coarse_and_seconds: tuple[Outcome, float]
-) -> Iterator[tuple[str, Outcome, float]]:
-    """Yield start, outcome and seconds of each run of a method; those of the global method `start` are known."""
-    coarse, coarse_seconds = coarse_and_seconds
-    if name == start:
-        yield NO_START, coarse, coarse_seconds
-    elif method_entry(name).is_global:
-        yield NO_START, *timed(method, pair)
-    else:
-        yield INITIAL, *timed(method, pair)
-        if coarse.converged:
-            outcome, seconds = timed(method, pair.started_at(coarse.T_target_source))
-            yield start, outcome, coarse_seconds + seconds
-        else:
-            yield start, replace(coarse, failure=f"{start}: {coarse.failure}"), coarse_seconds
+def try_each(
+    methods: Mapping[str, Mapping],
+    start: str,
+    section: str,
+    samples: Iterable[int],
+    asked: Callable[[int, str], tuple[Pair, dict]],
+    errors: Callable[[int, np.ndarray], dict],
+) -> dict[str, pd.DataFrame]:
+    """Rows of every sample by method: global methods run once, local ones again from the pose of the one named `start`.
+
+    A method that fails has its reason in the row. Each method is called once before the first sample, so that no time
+    includes what a method loads or compiles. Raises InputError for an unknown method or setting, a missing package, or
+    a start, the section's ``global_start``, that is none or not among the methods.
+
+    Args:
+        asked: a sample and a method -> what it is given, and the first columns of its rows.
+        errors: a sample and a pose T_target_source (4×4) -> its errors.
+    """
+    import pandas as pd
+
+    made = {name: make_method(name, entry) for name, entry in methods.items()}
+    require_global(start)
+    if start not in made:
+        raise InputError(f"{section}.global_start", f"'{start}' is not among the methods", "add it or name another")
+    records: dict[str, list[dict]] = {name: [] for name in made}
+    for i, sample in enumerate(samples):
+        for name, method in made.items() if i == 0 else ():
+            method(asked(sample, name)[0])
+        coarse, coarse_seconds = timed(made[start], asked(sample, start)[0])
+        for name, method in made.items():
+            pair, known = asked(sample, name)
+            if name == start:
+                attempts = [(NO_START, coarse, coarse_seconds)]
+            elif method_entry(name).is_global:
+                attempts = [(NO_START, *timed(method, pair))]
+            else:
+                second, seconds = replace(coarse, failure=f"{start}: {coarse.failure}"), 0.0
+                attempts = [(INITIAL, *timed(method, pair))]
+                if coarse.converged:
+                    second, seconds = timed(method, pair.started_at(coarse.T_target_source))
+                attempts.append((start, second, coarse_seconds + seconds))
+            for started_at, outcome, seconds in attempts:
+                of_outcome = {key: getattr(outcome, key) for key in ("fitness", "inlier_rmse", "failure")}
+                row = known | {"start": started_at} | errors(sample, outcome.T_target_source) | of_outcome
+                records[name].append(row | {"seconds": seconds})
+    return {name: pd.DataFrame(of_method) for name, of_method in records.items()}
 
 
-def timed(method: Method, pair: Pair) -> tuple[Outcome, float]:
+def timed(method: Callable[[Pair], Outcome], pair: Pair) -> tuple[Outcome, float]:
     """Return what a method makes of a pair, and the seconds that it took."""
     started = perf_counter()
     outcome = method(pair)
     return outcome, perf_counter() - started
+
+
+def write_trials(trials: Iterable[pd.DataFrame], outputs: list[Path], timings: list[Path]) -> None:
+    """Write rows of methods, and their seconds in files of their own."""
+    for rows, out, seconds in zip(trials, outputs, timings, strict=True):
+        write_csv(out, rows.drop(columns="seconds"))
+        write_csv(seconds, rows[["sample", "start", "seconds"]])

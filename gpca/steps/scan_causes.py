@@ -10,27 +10,22 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gpca.alignment.methods.registry import make_method
 from gpca.attribution.predictions import prediction_frame
-from gpca.causes.dataset import LABELS, Causes, labeled, observed_only
-from gpca.causes.descriptors import Descriptors, describe_all
+from gpca.causes.dataset import Causes, labeled
+from gpca.causes.descriptors import describe_all
 from gpca.causes.scans import GLOBAL, LADDER, ScanStart, measure_scans, motion_between
-from gpca.causes.settings import OBJECTS, OBSERVED, CauseSettings, DescriptorSettings, ScanSamples
-from gpca.causes.truth import BORDERLINE
-from gpca.classifier.scores import Attribution
+from gpca.causes.settings import OBSERVED, CauseSettings, DescriptorSettings, ScanSamples
 from gpca.errors import InputError
-from gpca.explainers.interface import REENACTED
-from gpca.explainers.registry import CAUSES, explainer_entry
+from gpca.explainers.interface import EMBEDDINGS, REENACTED
 from gpca.io.csv_file import write_csv
 from gpca.jobs.job import Job
 from gpca.jobs.provenance import record_provenance
 from gpca.pairs.dataset import Registrations
-from gpca.reenactment.dataset import Reenactments, reenactment_features
 from gpca.reenactment.scans import reenact_scans
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.rigid import scale_translation
@@ -38,14 +33,13 @@ from gpca.scans.pair import Rung, ScanPair, ScanSuccess, disturbed
 from gpca.scans.scene import ScanPairs
 from gpca.seeds import generator
 from gpca.settings import fields_of, read_settings
-from gpca.steps.diagnosis import DESCRIBED, EMBEDDED, World
+from gpca.steps.diagnosis import DESCRIBED, World, with_what_it_reads
 from gpca.steps.scan_trials import TrialSettings, pair_to_register
 from gpca.steps.scans import drawn_pairs
 
 if TYPE_CHECKING:
     import pandas as pd
 
-FEWEST_LABELS = 2  # among the samples that an explainer learns from
 GlobalMethod = Callable[[ScanPair], np.ndarray | None]  # returns T_target_source (4×4), meters; None where it fails
 
 
@@ -62,7 +56,9 @@ def measure(job: Job) -> None:
         icp = {name: getattr(own.icp, name) for name in ("correspondence_distance", "max_iterations")}
         truth = CauseSettings.from_dict(job.section("causes") | {"moved": OBSERVED}, icp)
         trials = read_settings(TrialSettings, fields_of(section, TrialSettings))
-        methods = global_methods(trials, job.section("methods"), *axes) if own.global_start else {}
+        methods = {}
+        if own.global_start:
+            methods[trials.global_start] = global_method(trials, job.section("methods"), *axes)
         starts = starts_of(pairs, *axes, own, trials.ladder, methods)
         success = read_settings(ScanSuccess, section.get("success") or {})
         causes, samples = measure_scans(pairs, starts, *axes, truth, success, own.points)
@@ -78,18 +74,15 @@ def measure(job: Job) -> None:
         reenact_scans(causes, samples["error_factor"].to_numpy(), reenactment, truth, T_found_S).save(job.reenactments)
 
 
-def global_methods(
-    settings: TrialSettings, methods: Mapping[str, Mapping | None], *axes: object
-) -> dict[str, GlobalMethod]:
+def global_method(settings: TrialSettings, methods: Mapping[str, Mapping | None], *axes: object) -> GlobalMethod:
     """The global method at whose pose local ones start, as Table XVII runs it, given settings by name."""
-    name = settings.global_start
-    align = make_method(name, methods.get(name))
+    align = make_method(settings.global_start, methods.get(settings.global_start))
 
     def register(pair: ScanPair) -> np.ndarray | None:
         outcome = align(pair_to_register(pair, settings.ladder[0], settings, *axes))
         return scale_translation(outcome.T_target_source, pair.scale) if outcome.converged else None
 
-    return {name: register}
+    return register
 
 
 def starts_of(
@@ -122,24 +115,40 @@ def starts_of(
 
 
 def diagnose(job: Job) -> None:
-    """Ask every explainer about the registrations of all data sets of scans."""
+    """Ask every explainer about the registrations of all data sets of scans, given the files of all sources of objects.
+
+    The column ``scans`` of the predictions has the data set.
+    """
     import pandas as pd
 
     scans = [job.scan_causes, job.scan_descriptors, job.scan_reenactments]
     # Files of each source; re-enactments only where an explainer reads them.
-    training = {name: job.get(name, []) for name in ("causes", DESCRIBED, REENACTED, "encoders", EMBEDDED)}
+    training = {name: job.get(name, []) for name in ("causes", DESCRIBED, REENACTED, "encoders", EMBEDDINGS)}
     inputs = [path for files in (*scans, *training.values()) for path in files]
     with record_provenance([job.predictions], inputs, job.settings, seed=job.seed):
-        explained = ScansToExplain(job, training)
+        own, parts = [], []
+        for path, described, enacted in zip(*scans, strict=True):
+            causes = Causes.load(path)
+            own.append(causes.registrations)
+            registrations = with_what_it_reads(labeled(causes), DESCRIBED, described)
+            parts.append(with_what_it_reads(registrations, REENACTED, enacted))
+        whole = Registrations.joined(parts)
+        sample_S, concept_S = (np.concatenate([getattr(each, name) for each in own]) for name in ("sample", "concept"))
+        shown = replace(whole, sample=sample_S, concept=concept_S)
+        data_set_S = np.repeat([path.parent.name for path in job.scan_causes], [len(each) for each in own])
+        labels_alone = replace(whole, attached={"causes": whole.attached["causes"]})
+        fold_S = folds_of(whole.cluster, read_settings(ScanSamples, job.section("samples")).folds)
+        world = World(job, training, labels_alone, job.section("causes")["starts"], lambda _: whole, fold_S)
         frames: list[pd.DataFrame] = []
         for name, learned_from in job.section("explainers").items():
             for learned in learned_from:
-                attribution = explained.attribution(name, learned, job.section("settings").get(name) or {})
+                attribution = world.attribution(name, job.section("settings").get(name) or {}, learned)
                 if attribution is None:
                     fault = "is left out: what it would learn from has fewer than two labels"
                     print(f"explainer '{name}', learned from {learned}, {fault}", file=sys.stderr)
                     continue
-                frames.append(explained.predictions(attribution).assign(learned=learned, explainer=name))
+                said = prediction_frame(shown, attribution)
+                frames.append(said.assign(scans=data_set_S, learned=learned, explainer=name))
         if not frames:
             remedy = "raise scan_causes.pairs, or let an explainer learn from objects"
             raise InputError("predictions of scans", "no explainer has anything to learn from", remedy)
@@ -150,70 +159,3 @@ def folds_of(cluster_S: np.ndarray, most: int) -> np.ndarray:
     """Fold (S,) of each row; clusters are divided into folds, `most` at most."""
     clusters, number_S = np.unique(cluster_S, return_inverse=True)
     return number_S % min(most, len(clusters))
-
-
-class ScansToExplain(World):
-    """Registrations of scans to be explained, given the files of all sources of objects, by what explainers read.
-
-    See :class:`gpca.steps.diagnosis.World`.
-    """
-
-    def __init__(self, job: Job, training: dict[str, list[Path]]) -> None:
-        self._names, self._own, parts = [path.parent.name for path in job.scan_causes], [], []
-        for paths in zip(job.scan_causes, job.scan_descriptors, job.scan_reenactments, strict=True):
-            causes = Causes.load(paths[0])
-            enacted, with_labels = Reenactments.load(paths[2], causes.registrations), labeled(causes)
-            read = dict(Descriptors.load(paths[1], causes.registrations).groups)
-            read |= {"verdict": enacted.verdict, "reenactment": reenactment_features(enacted)}
-            self._own.append(causes.registrations)
-            parts.append(replace(with_labels, attached={**with_labels.attached, **read}))
-        self._all_read = Registrations.joined(parts)
-        labels_alone = replace(self._all_read, attached={"causes": self._all_read.attached["causes"]})
-        super().__init__(job, training, labels_alone, job.section("causes")["starts"])
-        self._fold_S = folds_of(labels_alone.cluster, read_settings(ScanSamples, job.section("samples")).folds)
-
-    def predictions(self, attribution: Attribution) -> pd.DataFrame:
-        """Rows of a prediction file, the data set of each in column ``scans``."""
-        import pandas as pd
-
-        frames, first = [], 0
-        for name, own in zip(self._names, self._own, strict=True):
-            rows = slice(first, first := first + len(own))
-            of_own = Attribution.of_scores(
-                LABELS,
-                attribution.scores_N_C[rows],
-                seconds=0.0,
-                icp_calls=attribution.icp_calls_N[rows],
-                abstained_N=attribution.abstained_N[rows],
-            )
-            frames.append(prediction_frame(own, of_own).assign(scans=name))
-        return pd.concat(frames)
-
-    def attribution(self, name: str, learned: str, settings: dict) -> Attribution | None:
-        """Mean of the scores over all that the explainer reads; several are the encoders of embeddings.
-
-        None where it would have to learn from fewer than two classes.
-        """
-        entry = explainer_entry(name, CAUSES)
-        attributions: list[Attribution] = []
-        for training_set, asked in self._sets(entry, learned == OBJECTS):
-            parts = [(np.arange(len(asked)), training_set)]
-            if training_set is asked:  # one fold is asked about, and the labeled rows of the others are learned from
-                labeled_S = asked.concept != BORDERLINE
-                of_folds = (self._fold_S == fold for fold in np.unique(self._fold_S))
-                parts = [(np.flatnonzero(of_S), asked.subset(np.flatnonzero(labeled_S & ~of_S))) for of_S in of_folds]
-            answers = []
-            for rows, training in parts:
-                if len(np.unique(training.concept)) < FEWEST_LABELS:
-                    return None
-                explainer = entry.make(*self._axes, **settings)
-                explainer.fit(training)
-                answers.append((rows, explainer.explain(observed_only(asked.subset(rows)))))
-            order = np.argsort(np.concatenate([rows for rows, _ in answers]))
-            scores_N_4 = np.concatenate([answer.scores_N_C for _, answer in answers])[order]
-            abstained_N = np.concatenate([answer.abstained_N for _, answer in answers])[order]
-            attributions.append(Attribution.of_scores(LABELS, scores_N_4, seconds=0.0, abstained_N=abstained_N))
-        return self._mean(entry, attributions)
-
-    def _read(self, reads: str) -> Registrations:
-        return self._all_read

@@ -7,14 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
 from gpca.alignment.methods.interface import Pair
-from gpca.alignment.methods.registry import make_method, require_global
-from gpca.errors import InputError
-from gpca.io.csv_file import write_csv
 from gpca.jobs.job import Job
 from gpca.jobs.provenance import record_provenance
 from gpca.process.environment import open3d_cloud, require_open3d
@@ -24,7 +22,7 @@ from gpca.scans.pair import Rung, ScanPair, disturbed, overlap_rmse, rungs_of, v
 from gpca.scans.scene import ScanPairs
 from gpca.seeds import generator, seed_of
 from gpca.settings import Bounds, Distinct, fields_of, read_settings
-from gpca.steps.registration_trials import attempts, timed
+from gpca.steps.registration_trials import try_each, write_trials
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -56,44 +54,26 @@ def run(job: Job) -> None:
     with record_provenance([*job.rows, *job.timings], [job.scans], job.settings, seed=job.seed):
         pairs = ScanPairs.load(job.scans, (job.source, job.seed))
         trials = try_methods(pairs, job.source, job.seed, methods, settings)
-        for rows, out, timings in zip(trials.values(), job.rows, job.timings, strict=True):
-            write_csv(out, rows.drop(columns="seconds"))
-            write_csv(timings, rows[["sample", "start", "seconds"]])
+        write_trials(trials.values(), job.rows, job.timings)
 
 
 def try_methods(
     pairs: ScanPairs, name: str, seed: int, methods: Mapping[str, Mapping], settings: TrialSettings
 ) -> dict[str, pd.DataFrame]:
-    """Rows of pairs and starts of the data set `name` with the seconds of each trial, by method.
-
-    The global start is among the methods, which are given with their settings. Normals are estimated beforehand. Each
-    method is called once before the first pair, so that no trial includes what a method loads or compiles. Raises
-    InputError for an unknown method or setting, a missing package, or a global start that is none or not among them.
-    """
-    import pandas as pd
-
-    made = {method: make_method(method, entry) for method, entry in methods.items()}
-    require_global(start := settings.global_start)
-    if start not in made:
-        raise InputError("scans.global_start", f"'{start}' is not among the methods", "add it or name another")
-    records: dict[str, list[dict]] = {method: [] for method in made}
+    """Rows of pairs and starts of the data set `name`, by method; see :func:`try_each`."""
     rungs = rungs_of(len(pairs), settings.ladder, name, seed)
-    for k, pair in enumerate(progress(pairs, f"registration of scans of {name}, seed {seed}")):
-        rung = rungs[k]
-        given = pair_to_register(pair, rung, settings, name, seed)
-        if k == 0:
-            for method in made.values():
-                method(given)
-        keys = {"sample": k, "pair": pair.name, "cluster": pair.cluster, "kind": pair.kind, "size_m": pair.size_m}
-        keys |= {"overlap": pair.overlap, "rung": rung.name}
-        coarse = timed(made[start], given)
-        for method_name, align in made.items():
-            for started_at, outcome, seconds in attempts(method_name, align, given, start, coarse):
-                T_target_source = scale_translation(outcome.T_target_source, pair.scale)
-                row = keys | {"start": started_at} | errors_of(pair, T_target_source)
-                row |= {key: getattr(outcome, key) for key in ("fitness", "inlier_rmse", "failure")}
-                records[method_name].append(row | {"seconds": seconds})
-    return {method: pd.DataFrame(rows) for method, rows in records.items()}
+    pair_of = lru_cache(maxsize=1)(pairs.__getitem__)
+    given = lru_cache(maxsize=1)(lambda k: pair_to_register(pair_of(k), rungs[k], settings, name, seed))
+
+    def asked(k: int, _method: str) -> tuple[Pair, dict]:
+        of_pair = {key: getattr(pair_of(k), key) for key in ("cluster", "kind", "size_m", "overlap")}
+        return given(k), {"sample": k, "pair": pair_of(k).name, **of_pair, "rung": rungs[k].name}
+
+    def errors(k: int, T_target_source: np.ndarray) -> dict:
+        return errors_of(pair_of(k), scale_translation(T_target_source, pair_of(k).scale))
+
+    order = progress(range(len(pairs)), f"registration of scans of {name}, seed {seed}")
+    return try_each(methods, settings.global_start, "scans", order, asked, errors)
 
 
 def pair_to_register(pair: ScanPair, rung: Rung, settings: TrialSettings, *axes: object) -> Pair:

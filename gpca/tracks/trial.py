@@ -12,13 +12,13 @@ import numpy as np
 
 from gpca.alignment.icp import ICPSettings
 from gpca.attribution.predictions import read_predictions
-from gpca.causes.dataset import Causes, labeled
+from gpca.causes.dataset import Causes
 from gpca.causes.settings import OBJECTS, DescriptorSettings
 from gpca.classifier.scores import Attribution
 from gpca.encoders.registry import EncoderSettings
 from gpca.errors import InputError
 from gpca.experiments.scan_causes import diagnosis_settings
-from gpca.explainers.interface import BARE, REENACTED, ExplainerEntry
+from gpca.explainers.interface import BARE, EMBEDDINGS, REENACTED, ExplainerEntry
 from gpca.explainers.registry import explainer_entry, make_rivals, require_settings
 from gpca.frames.source import REAL_WORLD
 from gpca.jobs.job import Job
@@ -27,14 +27,18 @@ from gpca.reenactment.settings import ReenactmentSettings
 from gpca.settings import read_settings
 from gpca.steps.control_samples import HARD, ControlSettings
 from gpca.steps.controls import ControlRun
-from gpca.steps.diagnosis import DESCRIBED, EMBEDDED, FramesToExplain, explained, with_what_it_reads
+from gpca.steps.diagnosis import DESCRIBED, explained, frames_to_explain
 from gpca.steps.scan_causes import diagnose as diagnose_scans
 from gpca.tracks.published import NOTHING_NAMED, Method
 from gpca.tracks.samples import TrackSamples
 from gpca.tracks.track import CAUSES_TRACK, FRAMES_TRACK, SCANS_TRACK
 from gpca.uncertainty.settings import UncertaintySettings
 
-FOLDERS = {REENACTED: "reenactments", EMBEDDED: "cause_embeddings", DESCRIBED: "descriptors"}  # by an explainer's reads
+FOLDERS = {
+    REENACTED: "reenactments",
+    EMBEDDINGS: "cause_embeddings",
+    DESCRIBED: "descriptors",
+}  # by an explainer's reads
 
 
 class PartPredictions(NamedTuple):
@@ -99,14 +103,12 @@ def _causes(trial: MethodTrial, source: str, seed: int) -> PartPredictions:
     samples, entry = trial.samples, trial.entry
     [path] = samples.files([samples.track.file(source, seed)])
     causes, diagnosis = Causes.load(path, (source, seed)), samples.config["diagnosis"]
-    registrations = labeled(causes)
+    read = None
     if entry.reads != BARE:
         [read] = samples.files([f"{FOLDERS.get(entry.reads, 'descriptors')}/{source}/seed{seed}.npz"])
-        registrations = with_what_it_reads(registrations, entry, read)
     descriptors = DescriptorSettings(**diagnosis["descriptors"])
     reenactment = read_settings(ReenactmentSettings, diagnosis["reenactment"])
-    explainer = entry.make(source, seed, **trial.settings)
-    attribution = explained(explainer, entry, registrations, causes, descriptors, path, reenactment)
+    attribution = explained(entry, trial.settings, causes, path, read, descriptors, reenactment)
     return PartPredictions.of(attribution, float(attribution.seconds_N.mean()), causes.rows("test"))
 
 
@@ -115,7 +117,7 @@ def _hard(trial: MethodTrial, source: str, seed: int) -> PartPredictions:
     [path] = samples.files([samples.track.file(source, seed)])
     hard = Registrations.load(path, (source, seed))
     embeddings: dict[str, np.ndarray] = {}
-    if trial.entry.reads == EMBEDDED:
+    if trial.entry.reads == EMBEDDINGS:
         [read] = samples.files([f"control_embeddings/{HARD}/{source}/seed{seed}.npz"])
         embeddings = read_embedding(read, hard, logits=True)
     controls = {key: value for key, value in config["controls"].items() if key not in ("explainers", "hard")}
@@ -143,14 +145,14 @@ def _frames(trial: MethodTrial, source: str, seed: int) -> PartPredictions:
     samples, config, reads = trial.samples, trial.samples.config, trial.entry.reads
     [path] = samples.files([samples.track.file(source, seed)])
     folders, enacted = {"causes": "causes", "descriptors": "descriptors"}, None
-    if reads == EMBEDDED:
-        folders |= {"encoders": "cause_encoders", EMBEDDED: FOLDERS[EMBEDDED]}
+    if reads == EMBEDDINGS:
+        folders |= {"encoders": "cause_encoders", EMBEDDINGS: FOLDERS[EMBEDDINGS]}
     if reads == REENACTED:
         folders |= {REENACTED: FOLDERS[REENACTED]}
         [enacted] = samples.files([f"reenactments/{REAL_WORLD}/seed{seed}.npz"])
     job = Job(source=source, seed=seed, settings={**config["diagnosis"], "icp": config["registrations"]["icp"]})
     causes = Causes.load(path, (source, seed))
-    frames = FramesToExplain(job, causes, enacted, _training_files(samples, folders, seed))
+    frames = frames_to_explain(job, causes, enacted, _training_files(samples, folders, seed))
     frames.prepare(trial.name)
     started = perf_counter()
     attribution = frames.attribution(trial.name, trial.settings)
@@ -161,7 +163,7 @@ def _scans(trial: MethodTrial) -> list[PartPredictions]:
     """Return those for each data set; the data sets of a seed are learned and explained together, by a run's step."""
     samples, reads, parts = trial.samples, trial.entry.reads, trial.samples.parts()
     settings = diagnosis_settings(samples.config, {trial.name: [trial.training]}, {trial.name: trial.settings})
-    folders = {"encoders": "cause_encoders"} if reads == EMBEDDED else {}
+    folders = {"encoders": "cause_encoders"} if reads == EMBEDDINGS else {}
     if trial.training == OBJECTS:
         kind = reads if reads in FOLDERS else DESCRIBED
         folders |= {"causes": "causes", kind: FOLDERS[kind]}

@@ -11,7 +11,7 @@ from gpca.errors import InputError
 from gpca.pairs.judge import Judges
 from gpca.rigid import exp, inverse, transform
 from gpca.steps.estimates import (
-    Situations,
+    DrawnCauses,
     compared,
     mahalanobis,
     mild,
@@ -43,7 +43,7 @@ def causes(four):
 
 @pytest.fixture(scope="module")
 def situations(causes, four):
-    return Situations("four", SEED, causes, CauseSettings(**FEW_CAUSES), four, Judges(four, "objects of four"))
+    return DrawnCauses("four", SEED, causes, CauseSettings(**FEW_CAUSES), four, Judges(four, "objects of four"))
 
 
 @pytest.fixture(scope="module")

@@ -133,7 +133,7 @@ def test_files_of_other_samples_or_kinds_are_one_line(files):
 
 
 def test_predictions_and_frames_of_other_samples_are_one_line(files, tmp_path):
-    pool = read_pool(files["causes"], files["descriptors"], files["reenactments"])
+    _, pool = read_pool(files["causes"], files["descriptors"], files["reenactments"])
     short = tmp_path / "cups" / "gpca" / "seed100.csv"
     short.parent.mkdir(parents=True)
     short.write_text("".join(files["diagnoses"][0].read_text().splitlines(keepends=True)[:3]))
@@ -156,7 +156,7 @@ def test_families_of_one_fold_are_one_part_wherever_they_are_and_others_are_deal
 
 
 def test_the_pool_has_no_borderline_sample(files, causes):
-    pool = read_pool(files["causes"], files["descriptors"], files["reenactments"])
-    assert BORDERLINE not in pool.samples.state and set(pool.registrations.concept) <= set(LABELS)
-    assert (pool.samples.severity > 0).all() and (pool.samples.severity <= 1).all()
-    assert {"verdict", "reenactment", *GROUPS} <= set(pool.registrations.attached)
+    registrations, samples = read_pool(files["causes"], files["descriptors"], files["reenactments"])
+    assert BORDERLINE not in samples.state and set(registrations.concept) <= set(LABELS)
+    assert (samples.severity > 0).all() and (samples.severity <= 1).all()
+    assert {"verdict", "reenactment", *GROUPS} <= set(registrations.attached)

@@ -16,8 +16,8 @@ from gpca.jobs.job import Job
 from gpca.reenactment.dataset import Reenactments
 from gpca.scans.pair import Rung
 from gpca.scans.scene import ScanPairs
-from gpca.steps import scan_causes
-from gpca.steps.scan_causes import diagnose, folds_of, global_methods, measure, starts_of
+from gpca.steps import diagnosis as diagnoses
+from gpca.steps.scan_causes import diagnose, folds_of, global_method, measure, starts_of
 from gpca.steps.scan_trials import TrialSettings
 from tests.scans.corner import corner_pair
 from tests.steps.test_guarantee import write_measurements
@@ -95,8 +95,7 @@ def test_what_is_measured_described_and_re_enacted_is_of_the_same_samples(tmp_pa
 
 def test_the_global_method_starts_where_it_ends_and_not_where_it_fails(pairs):
     settings = TrialSettings(points=200, global_start="fgr")
-    [(name, register)] = global_methods(settings, {"fgr": {}}, *AXES).items()
-    assert name == "fgr" and register(pairs[2]).shape == (4, 4)
+    assert global_method(settings, {"fgr": {}}, *AXES)(pairs[2]).shape == (4, 4)
 
 
 EXPLAINERS = {"chance": ["scans"], "pair_forest": ["objects", "scans"], "gate_rmse": ["scans"], "reenact": ["scans"]}
@@ -161,8 +160,8 @@ def test_nothing_is_learned_from_the_scene_that_is_asked_about(diagnosis, monkey
             asked.append(len(registrations))
             return entry.make("scans", 100).explain(registrations)
 
-    entry = scan_causes.explainer_entry("chance", scan_causes.CAUSES)
-    monkeypatch.setattr(scan_causes, "explainer_entry", lambda *_: replace(entry, make=Spy))
+    entry = diagnoses.explainer_entry("chance", diagnoses.CAUSES)
+    monkeypatch.setattr(diagnoses, "explainer_entry", lambda *_: replace(entry, make=Spy))
     one = Job(**{**vars(diagnosis), "settings": SETTINGS | {"explainers": {"chance": ["scans"]}}})
     diagnose(one)
     assert len(asked) == 3
