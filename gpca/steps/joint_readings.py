@@ -54,7 +54,7 @@ Value = tuple[str, str, str, str, float]  # part, method, metric, concept, value
 
 @dataclass(frozen=True)
 class ReadingSamples:
-    """ReadingSamples of a source and seed.
+    """Samples of a source and seed.
 
     Attributes:
         sets: with embeddings by an encoder that learned from samples of the same severities.
@@ -67,11 +67,12 @@ class ReadingSamples:
     axes: tuple[str, int]
 
     @classmethod
-    def load(cls, objects: ObjectClouds, sets: Path, axes: tuple[str, int], registrations: dict, pairs: int):
+    def load(cls, job: Job, sets: Path, seed: int, registrations: dict) -> ReadingSamples:
         """Read the sets, and make some of their pairs anew, by settings that have the severities of the sets."""
-        settings = RegistrationSettings.from_dict(registrations)
-        few = replace(settings, train=0, test=min(pairs, settings.test))
-        return cls(ShiftedSets.load(sets, axes), make_registrations(objects, *axes, few)[0], axes)
+        settings, axes = RegistrationSettings.from_dict(registrations), (job.source, seed)
+        few = replace(settings, train=0, test=min(job.section("sizes")["samples"], settings.test))
+        pairs, _ = make_registrations(ObjectClouds.load(job.objects, job.source), *axes, few)
+        return cls(ShiftedSets.load(sets, axes), pairs, axes)
 
     def train_and_test(self) -> list[Registrations]:
         """The training samples, and the test samples like them, with their embeddings."""
@@ -109,13 +110,9 @@ class MeasureSettings:
 
 def measure(job: Job) -> None:
     """Values on development samples of some severities under every combination of the other choices."""
-    axes, settings = (job.source, job.seed), MeasureSettings.of_job(job)
     with record_provenance([job.out], [job.objects, job.sets], job.settings, seed=job.seed):
-        objects = ObjectClouds.load(job.objects, job.source)
-        samples = ReadingSamples.load(
-            objects, job.sets, axes, job.section("registrations"), job.section("sizes")["samples"]
-        )
-        measured = values(samples, job.severities, job.section("choices"), settings)
+        samples = ReadingSamples.load(job, job.sets, job.seed, job.section("registrations"))
+        measured = values(samples, job.severities, job.section("choices"), MeasureSettings.of_job(job))
         records = [(part, job.source, *named, job.seed, value) for part, *named, value in measured]
         write_metrics(tidy(records, "joint readings"), job.out)
 
@@ -153,16 +150,14 @@ def apply(job: Job) -> None:
         if not files:
             fault = f"needs encoders of {severities} perturbations"
             raise InputError("joint reading", fault, "raise readings.encoders")
-    settings, pairs = MeasureSettings.of_job(job), job.section("sizes")["samples"]
     registrations = job.section("registrations") | job.section("severities").get(severities, {})
     choices = {name: [value] for name, value in joint.items()}
     with record_provenance([job.out], [job.choice, job.objects, *files], job.settings):
-        objects, records = ObjectClouds.load(job.objects, job.source), []
+        records = []
         for path in files:
-            axes = (job.source, seed_of_file(path))
-            samples = ReadingSamples.load(objects, path, axes, registrations, pairs)
-            measured = values(samples, severities, choices, settings)
-            records += [(TABLE, job.source, *named, axes[1], value) for _, *named, value in measured]
+            samples = ReadingSamples.load(job, path, seed_of_file(path), registrations)
+            measured = values(samples, severities, choices, MeasureSettings.of_job(job))
+            records += [(TABLE, job.source, *named, seed_of_file(path), value) for _, *named, value in measured]
         write_metrics(tidy(records, "joint reading"), job.out)
 
 

@@ -160,19 +160,16 @@ def attribute(job: Job) -> None:
             axes = (job.get("files_of", job.source), job.get("files_seed", seed))
             registrations = Registrations.load(read["registrations"], axes)
             earlier = dict(zip(EARLIER, read_timings(read["input_timings"], registrations), strict=True))
+            if entry.reads == "embeddings":
+                earlier |= read_embedding(read["embeddings"], registrations, logits=True)
+            registrations = replace(registrations, attached=earlier)
             if entry.design:
                 outcomes = Outcomes.load(read["uncertainty"], axes)
                 conditions = outcomes.uncertainty.shape[1]
                 if entry.design in CONDITIONS and conditions != len(CONDITIONS[entry.design]):
                     fault = f"{conditions} conditions are not those of design '{entry.design}'"
                     raise InputError(read["uncertainty"], fault, REGENERATE)
-                seconds = read_seconds(read["uncertainty_timings"], outcomes)
-                registrations = outcomes.attach_to(replace(registrations, attached=earlier), *seconds)
-            elif entry.reads == "embeddings":
-                earlier |= read_embedding(read["embeddings"], registrations, logits=True)
-                registrations = replace(registrations, attached=earlier)
-            else:
-                registrations = replace(registrations, attached=earlier)
+                registrations = outcomes.attach_to(registrations, *read_seconds(read["uncertainty_timings"], outcomes))
             observed = registrations if entry.oracle else registrations.without_labels()
             started = perf_counter()
             if isinstance(explainer, Describing):  # once, for training and for explanation

@@ -14,44 +14,33 @@ from gpca.jobs.job import Job, as_process, call
 from gpca.process.code_files import ROOT
 from gpca.process.processor import THREAD_VARIABLES
 
-SHARED = {  # module of gpca.steps -> the steps that it has, functions of their names
-    "pairs": "objects registrations uncertainty train embed reduce attribute",
-    "causes": "causes describe reenact train_on_causes model",
-    "frames": "scenes instances frame_registrations frame_causes reenact_frames",
-    "scans": "draw_scans",
+STEPS = {  # module of gpca.steps -> the steps that it has, functions of their names; or name=function
+    "active_learning": "active_learning=learn_actively without=embed_without",
+    "causes": "causes describe reenact train_on_causes model oracles",
+    "control_samples": "train_control=train",
+    "controls": "controls=explain",
     "diagnosis": "diagnose diagnose_by_features diagnose_frames",
-    "shift": "shift",
+    "frames": "scenes instances frame_registrations frame_causes reenact_frames",
+    "joint_readings": "measure_joint=measure choose_joint=choose apply_joint=apply",
+    "learning_curve": "learning_curve=learn_from_more learning_samples",
+    "pairs": "objects registrations uncertainty train embed reduce attribute",
+    "readings.files": "readings=run join_repeats=join",
+    "readings.severities": "retrain",
+    "scan_causes": "scan_causes=measure diagnose_scans=diagnose",
+    "scans": "draw_scans",
+    "shift": "shift learners=fit_learners",
 }
-MODULES = {f: f"gpca.steps.{module}:{f}" for module, functions in SHARED.items() for f in functions.split()} | {
-    "active_learning": "gpca.steps.active_learning:learn_actively",
-    "without": "gpca.steps.active_learning:embed_without",
-    "controls": "gpca.steps.controls:explain",
-    "train_control": "gpca.steps.control_samples:train",
+MODULES = {  # modules with a function ``run``
+    **{name: f"gpca.steps.{name}" for name in ("exchange", "frame_labels", "gradients", "guarantee", "kernel_grid")},
+    **{name: f"gpca.steps.{name}" for name in ("live_shap", "new_concepts", "runtime")},
     "estimate": "gpca.steps.estimates",
-    "frame_labels": "gpca.steps.frame_labels",
-    "gradients": "gpca.steps.gradients",
-    "guarantee": "gpca.steps.guarantee",
-    "kernel_grid": "gpca.steps.kernel_grid",
-    "learning_curve": "gpca.steps.learning_curve:learn_from_more",
-    "learning_samples": "gpca.steps.learning_curve:learning_samples",
-    "live_shap": "gpca.steps.live_shap",
-    "new_concepts": "gpca.steps.new_concepts",
-    "learners": "gpca.steps.shift:fit_learners",
-    "oracles": "gpca.steps.causes:oracles",
     "recover": "gpca.steps.recovery",
     "register_methods": "gpca.steps.registration_trials",
-    "runtime": "gpca.steps.runtime",
     "register_scans": "gpca.steps.scan_trials",
-    "scan_causes": "gpca.steps.scan_causes:measure",
-    "diagnose_scans": "gpca.steps.scan_causes:diagnose",
-    "readings": "gpca.steps.readings.files:run",
-    "join_repeats": "gpca.steps.readings.files:join",
-    "retrain": "gpca.steps.readings.severities:retrain",
-    "measure_joint": "gpca.steps.joint_readings:measure",
-    "choose_joint": "gpca.steps.joint_readings:choose",
-    "apply_joint": "gpca.steps.joint_readings:apply",
-    "exchange": "gpca.steps.exchange",
 }
+for module, steps in STEPS.items():
+    for step in steps.split():
+        MODULES[step.partition("=")[0]] = f"gpca.steps.{module}:{step.rpartition('=')[2]}"
 LISTS = {  # which names of a step are lists, and not of one seed, file or name
     "active_learning": "strategies out",
     "without": "concepts",
@@ -88,22 +77,11 @@ LISTS = {  # which names of a step are lists, and not of one seed, file or name
     "uncertainty": "seeds registrations outcomes tables timings",
 }
 NUMBERS = {"seed", "seeds", "files_seed", "surface_points", "threads"}
-TEXTS = {
-    *("source", "explainer", "control", "design", "reduction", "group", "title", "name", "files_of", "encoder_of"),
-    *(
-        "registrations_of",
-        "retrained",
-        "others",
-        "strategies",
-        "concepts",
-        "estimators",
-        "estimates",
-        "backbones",
-        "learners",
-    ),
-    *("remedies", "reenactment", "other", "methods", "encoders_of", "data_dir", "chunk", "severities"),
-    "place",
-}
+TEXTS = (
+    "source explainer control design reduction group title name files_of encoder_of registrations_of retrained others "
+    "strategies concepts estimators estimates backbones learners remedies reenactment other methods encoders_of "
+    "data_dir chunk severities place"
+)
 SWITCHES = {"stand_in"}
 CODE = "import sys; from tests.steps.by_words import main; sys.exit(main(sys.argv[1:]))"
 
@@ -149,6 +127,6 @@ def _value(step: str, name: str, texts: list[str]) -> object:
         return True
     if name == "settings":
         return json.loads(texts[0])
-    read = int if name in NUMBERS else str if name in TEXTS else Path
+    read = int if name in NUMBERS else str if name in TEXTS.split() else Path
     values = [read(text) for text in texts]
     return values if name in LISTS.get(step, "").split() else values[0]

@@ -4,6 +4,7 @@ import json
 
 from gpca.reenactment.settings import KNOWN
 
+FEW = {"iterations": 5, "inducing": 6, "draws": 20}  # of a classifier
 ENCODER = {"draw_points": 64, "draws": 2, "epochs": 2, "batch_size": 12, "options": {"k": 8, "point_features": 16}}
 POLICY = {
     "thresholds": {"uncertain": None, "queued_share": 0.1, "dominant": 0.4, "improvement": 0.1},
@@ -12,27 +13,23 @@ POLICY = {
 }
 LEARNING = {
     "held_out": ["noise", "overlap"], "initial": 6, "labels": 4, "batch": 2, "target": 0.9,
-    "gpc": {"iterations": 5, "inducing": 6, "draws": 20},
-    "rare": {
-        "shares": [0.2], "labels": 2, "least": 1, "batch": 2, "gpc": {"iterations": 5, "inducing": 6, "draws": 20},
-    },
+    "gpc": FEW,
+    "rare": {"shares": [0.2], "labels": 2, "least": 1, "batch": 2, "gpc": FEW},
     "stream": {"arrivals": 8, "quiet": 2, "budget": 0.5, "every": 2},
 }  # fmt: skip
 SHIFT = {
     "samples": 6, "severities": {"noise": [0.03, 0.05], "crop": [0.6, 0.7]}, "held_out_share": 0.5, "train": 9,
     "encoder": {"epochs": 1, "draws": 1}, "neighbours": 3, "shape_points": 16,
 }  # fmt: skip
-CURVE = {
-    "further": 12,
-    "sizes": [20],
-    "orders": 1,
-    "classifier": {"learning_rate": 0.1, "iterations": 5, "inducing": 6, "draws": 20},
-}
+CURVE = {"further": 12, "sizes": [20], "orders": 1, "classifier": FEW | {"learning_rate": 0.1}}
+DESCRIBED = {"starts": 1, "restarts": 2, "icp_points": 64}
+ICP = {"max_iterations": 30}
 CAUSES = {  # of two symmetric objects with few points: only pose errors make them fail
     "train": 12, "test": 6, "points": [64, 128], "limits": {"nominal": 0.05, "failed": 0.06},
     "shares": {"nominal": 0.5, "borderline": 0.1, "noise": 0, "pose": 0.4, "overlap": 0}, "several": [0, 0],
     "severities": {"noise": [0.01, 0.05]}, "clean_pairs": 20, "candidates": 50,
 }  # fmt: skip
+REENACTED = {"reenactment": {"hypotheses": 2}, "causes": CAUSES, "icp": ICP}
 CONTROLS = {"controls": ["density", "shuffled", "transfer"], "draw_points": [32, 64]}
 ESTIMATES = ("reference_starts", "reference_data", "reference_all", "brossard", "cello", "cello_mild")
 COMMON = {"--source": "tiny"}
@@ -46,26 +43,20 @@ STEP_OPTIONS = {
         "--registrations": "registrations.npz", "--timings": "icp.csv",
     },
     "causes": COMMON | {
-        "--settings": CAUSES | {"icp": {"max_iterations": 30}}, "--seed": 0, "--objects": "objects.npz",
+        "--settings": CAUSES | {"icp": ICP}, "--seed": 0, "--objects": "objects.npz",
         "--causes": "causes.npz", "--candidates": "candidates.csv", "--timings": "causes_timings.csv",
     },
     "describe": COMMON | {
-        "--settings": {"starts": 1, "restarts": 2, "icp_points": 64, "icp": {"max_iterations": 30}}, "--seed": 0,
+        "--settings": DESCRIBED | {"icp": ICP}, "--seed": 0,
         "--causes": "causes.npz", "--causes-timings": "causes_timings.csv", "--descriptors": "descriptors.npz",
         "--timings": "descriptors.csv",
     },
     "reenact": COMMON | {
-        "--settings": {
-            "reenactment": {"hypotheses": 2}, "causes": CAUSES, "icp": {"max_iterations": 30},
-        },
-        "--seed": 0, "--causes": "causes.npz", "--causes-timings": "causes_timings.csv",
+        "--settings": REENACTED, "--seed": 0, "--causes": "causes.npz", "--causes-timings": "causes_timings.csv",
         "--reenactments": "reenactments.npz", "--timings": "reenactments_seconds.csv",
     },
     "oracles": COMMON | {
-        "--settings": {
-            "reenactment": {"hypotheses": 2}, "causes": CAUSES, "icp": {"max_iterations": 30},
-        },
-        "--seed": 0, "--objects": "objects.npz", "--causes": "causes.npz",
+        "--settings": REENACTED, "--seed": 0, "--objects": "objects.npz", "--causes": "causes.npz",
         "--predictions": [f"oracles/{name}/seed0.csv" for name in KNOWN],
     },
     "estimate": COMMON | {
@@ -75,7 +66,7 @@ STEP_OPTIONS = {
                 "start_rotation_deg": 10.0, "start_translation": 0.05, "floor": 1e-6,
             },
             "success": {"error": 0.03},
-            "estimators": {"brossard": {}, "cello": {"steps": 2}}, "causes": CAUSES, "icp": {"max_iterations": 30},
+            "estimators": {"brossard": {}, "cello": {"steps": 2}}, "causes": CAUSES, "icp": ICP,
         },
         "--seeds": 0, "--estimators": ["brossard", "cello"], "--estimates": list(ESTIMATES),
         "--objects": "objects.npz", "--causes": "causes.npz",
@@ -90,19 +81,19 @@ STEP_OPTIONS = {
     "diagnose_by_features": COMMON | {
         "--settings": {
             "by_features": {"trees_on_pair": {"trees": 5}, "trees_on_runs": {"trees": 5}},
-            "descriptors": {"starts": 1, "restarts": 2, "icp_points": 64},
+            "descriptors": DESCRIBED,
         },
         "--seeds": 0, "--causes": "causes.npz", "--descriptors": "descriptors.npz",
         "--predictions": ["by/trees_on_pair/seed0.csv", "by/trees_on_runs/seed0.csv"],
     },
     "diagnose": COMMON | {
-        "--settings": {"iterations": 5, "inducing": 6, "draws": 20}, "--explainer": "gpca_pair", "--seeds": 0,
-        "--remedies": {"starts": 1, "restarts": 2, "icp_points": 64}, "--reenactment": {"hypotheses": 2},
+        "--settings": FEW, "--explainer": "gpca_pair", "--seeds": 0,
+        "--remedies": DESCRIBED, "--reenactment": {"hypotheses": 2},
         "--causes": "causes.npz", "--read": "descriptors.npz", "--read-timings": "descriptors.csv",
         "--predictions": "diagnosis.csv", "--timings": "diagnosis_timings.csv",
     },
     "learning_samples": COMMON | {
-        "--settings": {"learning_curve": CURVE, "causes": CAUSES, "icp": {"max_iterations": 30}}, "--seed": 0,
+        "--settings": {"learning_curve": CURVE, "causes": CAUSES, "icp": ICP}, "--seed": 0,
         "--chunk": 0, "--objects": "objects.npz", "--samples": "learning_samples.npz",
     },
     "learning_curve": COMMON | {
@@ -153,7 +144,7 @@ STEP_OPTIONS = {
     "controls": COMMON | {
         "--settings": {"controls": CONTROLS, "encoder": ENCODER, "uncertainty": {"starts": 13, "icp_points": 40},
                        "icp": {"max_iterations": 20},
-                       "explainers": {"gpca": {"iterations": 5, "inducing": 6, "draws": 20}, "residuals_logistic": {}}},
+                       "explainers": {"gpca": FEW, "residuals_logistic": {}}},
         "--seed": 0, "--objects": "objects.npz", "--registrations": "registrations.npz", "--encoder": "weights.pt",
         "--embeddings": "embeddings.npz", "--retrained": "density", "--retrained-embeddings": "control.npz",
         "--others": "other", "--other-registrations": "other.npz", "--predictions": "controls.csv",
@@ -165,7 +156,7 @@ STEP_OPTIONS = {
                          "estimators": ["censi", "cello"], "estimated_train": 9, "estimated_test": 3},
             "estimators": {"cello": {"steps": 2}}, "encoder": ENCODER,
             "uncertainty": {"starts": 13, "icp_points": 40},
-            "explainers": {"gpca": {"iterations": 5, "inducing": 6, "draws": 20}, "shap_additive": {},
+            "explainers": {"gpca": FEW, "shap_additive": {},
                            "residuals_logistic": {}},
         },
         "--seeds": 0, "--objects": "objects.npz", "--registrations": "registrations.npz", "--encoders": "weights.pt",
@@ -181,13 +172,13 @@ STEP_OPTIONS = {
         "--outcomes": "uncertainty.npz", "--tables": "uncertainty.csv", "--timings": "uncertainty_timings.csv",
     },
     "attribute": COMMON | {
-        "--settings": {"iterations": 5, "inducing": 6, "draws": 20}, "--explainer": "gpca", "--seeds": 0,
+        "--settings": FEW, "--explainer": "gpca", "--seeds": 0,
         "--registrations": "registrations.npz", "--embeddings": "embeddings.npz", "--input-timings": "dgcnn.csv",
         "--predictions": "predictions.csv", "--timings": "gpca.csv",
     },
     "gradients": COMMON | {
         "--settings": {"gradients": {"samples": 3, "deleted": [0.25], "vectors": 2}, "encoder": ENCODER,
-                       "gpc": {"iterations": 5, "inducing": 6, "draws": 20}},
+                       "gpc": FEW},
         "--seeds": 0, "--registrations": "registrations.npz", "--encoders": "weights.pt",
         "--embeddings": "embeddings.npz", "--deletions": "deletions.csv", "--maps": "maps.npz", "--tcav": "tcav.csv",
     },
@@ -209,8 +200,8 @@ STEP_OPTIONS = {
             },
             "active_learning": LEARNING | {"held_out": ["overlap"], "initial": 4},
             "encoder": ENCODER, "cause_encoder": ENCODER,
-            "causes": CAUSES, "descriptors": {"starts": 1, "restarts": 2, "icp_points": 64},
-            "icp": {"max_iterations": 30},
+            "causes": CAUSES, "descriptors": DESCRIBED,
+            "icp": ICP,
         },
         "--seed": 0, "--registrations": "registrations.npz", "--encoders": "other.pt",
         "--encoders-of": "other_source", "--objects": "objects.npz", "--causes": "causes.npz",
@@ -238,19 +229,19 @@ STEP_OPTIONS = {
         "--out": "shifted.npz",
     },
     "learners": COMMON | {
-        "--settings": {"gpca": {"iterations": 5, "inducing": 6, "draws": 20}, "learner_nearest": {}}, "--seeds": 0,
+        "--settings": {"gpca": FEW, "learner_nearest": {}}, "--seeds": 0,
         "--learners": ["gpca", "learner_nearest"], "--sets": "shifted.npz", "--out": ["learnt.csv", "nearest.csv"],
     },
     "label": {
-        "registrations.npz": [], "--settings": {"iterations": 5, "inducing": 6, "draws": 20}, "--initial": 6,
+        "registrations.npz": [], "--settings": FEW, "--initial": 6,
         "--embeddings": "embeddings.npz", "--labels": "labels.csv", "--answers": "answers.txt",
         "--predictions": "labelled.csv",
     },
     "model": COMMON | {
-        "--settings": {"encoder": ENCODER, "gpc": {"iterations": 5, "inducing": 6, "draws": 20},
+        "--settings": {"encoder": ENCODER, "gpc": FEW,
                        "registrations": {"cloud_points": 128}, "recovery": POLICY, "causes": CAUSES,
                        "reenactment": {"hypotheses": 2},
-                       "model": {"classifier": {"iterations": 5, "inducing": 6, "draws": 20}}},
+                       "model": {"classifier": FEW}},
         "--title": "Tiny", "--stand-in": [], "--seed": 0, "--registrations": "registrations.npz",
         "--encoder": "weights.pt", "--embeddings": "embeddings.npz", "--causes": "causes.npz",
         "--reenactments": "reenactments.npz", "--out": "model.pt",
