@@ -266,6 +266,13 @@ def load_model(
 
 
 @torch.inference_mode()
+def embedding_by(
+    model: Classifier, seed: int, settings: EncoderSettings
+) -> Callable[[Registrations, str], tuple[np.ndarray, np.ndarray]]:
+    """The function that embeds registrations, given the name of their source, by a trained encoder."""
+    return lambda registrations, source: embed(model, registrations, source, seed, settings)
+
+
 def embed(
     model: Classifier,
     registrations: Registrations,

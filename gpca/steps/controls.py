@@ -17,7 +17,7 @@ from gpca.alignment.icp import ICPSettings
 from gpca.attribution.predictions import prediction_frame
 from gpca.classifier.scores import Attribution
 from gpca.encoders.registry import EncoderSettings
-from gpca.encoders.training import embed, load_model
+from gpca.encoders.training import embedding_by, load_model
 from gpca.explainers.gpca import GPCA_FORMS
 from gpca.explainers.interface import BARE, Describing, Encoding
 from gpca.explainers.registry import Embed, Rival, described_for, make_rivals
@@ -53,7 +53,6 @@ def explain(job: Job) -> None:
     with record_provenance([job.predictions, job.samples, job.timings], inputs, job.settings, seed=job.seed):
         registrations = Registrations.load(job.registrations, axes)
         hard = next((Registrations.load(path, axes) for path in job.get("hard", [])), None)
-        model = load_model(job.encoder, encoder, axes=axes)
         embeddings = {PAPER: read_embedding(job.embeddings, registrations, logits=True)}
         for control, path in retrained.items():
             if control == HARD and hard:
@@ -67,7 +66,7 @@ def explain(job: Job) -> None:
             encoder.backbone,
             UncertaintySettings(**runs, icp=icp),
             rivals,
-            lambda asked, source: embed(model, asked, source, job.seed, encoder),
+            embedding_by(load_model(job.encoder, encoder, axes=axes), job.seed, encoder),
             embeddings,
             hard,
         )

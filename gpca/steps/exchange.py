@@ -66,7 +66,7 @@ class ExchangeSettings:
 
 
 def run(job: Job) -> None:
-    from gpca.encoders.training import embed, load_model
+    from gpca.encoders.training import embedding_by, load_model
 
     settings = read_settings(ExchangeSettings, job.section("exchange"))
     encoder = EncoderSettings(**job.section("encoder"))
@@ -76,11 +76,7 @@ def run(job: Job) -> None:
     for seed, registrations_path, weights, out in job.per_seed("registrations", "encoders", "out"):
         rivals = make_rivals(job.section("explainers"), job.source, seed)
         with record_provenance([out], [job.objects, registrations_path, weights], job.settings, seed=seed):
-            model = load_model(weights, encoder, axes=(job.source, seed))
-
-            def embedded(registrations: Registrations, source: str, model: Any = model, seed: int = seed) -> tuple:
-                return embed(model, registrations, source, seed, encoder)
-
+            embedded = embedding_by(load_model(weights, encoder, axes=(job.source, seed)), seed, encoder)
             sections = settings, methods, estimators, UncertaintySettings(**uncertainty)
             exchange = Exchange(job.source, seed, *sections, rivals, embedded)
             judges = Judges(objects, f"objects of {job.source}")

@@ -10,11 +10,7 @@ import numpy as np
 
 from gpca.active_learning.curves import POOL_COLUMNS, write_curves
 from gpca.active_learning.rounds import Embedded, NewConceptTrial, run_trial
-from gpca.active_learning.settings import (
-    FROM_OTHERS,
-    ActiveLearningSettings,
-    NewConceptSettings,
-)
+from gpca.active_learning.settings import FROM_OTHERS, ActiveLearningSettings, NewConceptSettings
 from gpca.alignment.icp import ICPSettings
 from gpca.causes.dataset import LABELS, Causes, labels_of
 from gpca.causes.descriptors import Descriptors, describe_all

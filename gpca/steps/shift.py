@@ -16,7 +16,7 @@ from gpca.attribution.predictions import prediction_frame
 from gpca.encoders.registry import EncoderSettings
 from gpca.explainers.analytical_features import analytical_features
 from gpca.explainers.interface import ConceptExplainer
-from gpca.explainers.registry import explainer_entry
+from gpca.explainers.registry import Embed, explainer_entry
 from gpca.io.csv_file import write_csv
 from gpca.jobs.job import Job
 from gpca.jobs.provenance import record_provenance
@@ -30,7 +30,6 @@ from gpca.settings import Bounds, Count, OpenShare
 if TYPE_CHECKING:
     import pandas as pd
 
-    from gpca.encoders.training import Classifier
 
 PRINCIPAL_COMPONENTS = 16  # of embeddings, for their distances
 
@@ -69,7 +68,7 @@ class ShiftSettings:
 
 
 def shift(job: Job) -> None:
-    from gpca.encoders.training import load_model
+    from gpca.encoders.training import embedding_by, load_model
 
     settings = ShiftSettings.from_dicts(**job.settings)
     encoder_settings = EncoderSettings(**job.section("encoder"))
@@ -83,8 +82,8 @@ def shift(job: Job) -> None:
             registrations = Registrations.load(path, axes)
             registrations = replace(registrations, attached=read_embedding(embeddings, registrations))
             other = Registrations.load(other_path) if other_path else None
-            model = load_model(weights, encoder_settings, axes=axes)
-            make_sets(objects, registrations, other, model, encoder_settings, *axes, settings).save(out, axes)
+            embed_own = embedding_by(load_model(weights, encoder_settings, axes=axes), seed, encoder_settings)
+            make_sets(objects, registrations, other, embed_own, *axes, settings).save(out, axes)
 
 
 def fit_learners(job: Job) -> None:
@@ -122,8 +121,7 @@ def make_sets(
     objects: ObjectClouds,
     registrations: Registrations,
     other: Registrations | None,
-    encoder: Classifier,
-    encoder_settings: EncoderSettings,
+    embed_own: Embed,
     source: str,
     seed: int,
     settings: ShiftSettings,
@@ -136,10 +134,11 @@ def make_sets(
     Args:
         registrations: of the source, with the encoder's embeddings attached.
         other: registrations of another source, whose test samples are the set ``source``; None leaves that set out.
+        embed_own: embeds registrations, whose source has that name, by the source's encoder.
     """
     from gpca.encoders.training import embed, train_encoder
 
-    measured = [sets_of_encoder(objects, registrations, other, encoder, encoder_settings, source, seed, settings)]
+    measured = [sets_of_encoder(objects, registrations, other, embed_own, source, seed, settings)]
     held_out_S = unseen(registrations.fold, seed)
     if held_out_S is None:
         held_out_S = drawn(registrations.cluster, settings.held_out_share, source, seed, "held-out objects")
@@ -166,21 +165,18 @@ def sets_of_encoder(
     objects: ObjectClouds,
     registrations: Registrations,
     other: Registrations | None,
-    encoder: Classifier,
-    encoder_settings: EncoderSettings,
+    embed_own: Embed,
     source: str,
     seed: int,
     settings: ShiftSettings,
 ) -> ShiftedSets:
     """The sets of the source's encoder; arguments as of :func:`make_sets`."""
-    from gpca.encoders.training import embed
-
     beyond, _ = make_registrations(objects, f"{source} severity", seed, settings.beyond)
     parts = {"in_distribution": registrations, "severity": beyond}
     if other is not None:
         parts["source"] = other.subset(other.rows("test")[: settings.samples])
     for name in list(parts)[1:]:
-        h_S_d, _ = embed(encoder, parts[name], f"{source} {name}", seed, encoder_settings)
+        h_S_d, _ = embed_own(parts[name], f"{source} {name}")
         parts[name] = replace(parts[name], attached={"embedding": h_S_d})
     return _measured(parts, source, seed, settings)
 

@@ -143,11 +143,8 @@ def test_a_class_grows_along_its_own_concept_and_significantly_so(found, concept
     assert row["probe"] > 0.8
 
 
-def test_a_class_falls_along_the_others(found):
+def test_every_concept_is_tested_for_every_class_and_one_object_too_and_a_class_falls_along_the_others(found):
     assert found["noise", "pose"]["score"] < 0.2
-
-
-def test_every_concept_is_tested_for_every_class_and_one_object_too(found):
     assert set(found) == {(tested, concept) for tested in (*CONCEPTS, ONE_OBJECT) for concept in CONCEPTS}
 
 

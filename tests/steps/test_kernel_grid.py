@@ -153,7 +153,3 @@ def test_every_setting_and_measure_of_every_seed_becomes_a_row(tmp_path):
     ]
     write_metrics(metrics, tmp_path / "kernels.csv")
     assert read_metrics(tmp_path / "kernels.csv")["value"].sum() == pytest.approx(metrics["value"].sum())
-
-
-def test_a_setting_has_one_name():
-    assert setting_name("polynomial", 0.001, 200) == "polynomial-0.001-200"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gpca.encoders.registry import EncoderSettings
-from gpca.encoders.training import embed, train_encoder
+from gpca.encoders.training import embedding_by, train_encoder
 from gpca.errors import InputError
 from gpca.explainers.gpca import GPCA
 from gpca.explainers.registry import explainer_entry
@@ -41,14 +41,14 @@ TRAIN = RANDOM.normal(size=(60, 5))
 @pytest.fixture(scope="module")
 def embedded(registrations):
     model, _ = train_encoder(registrations, "tiny", 0, EncoderSettings(**ENCODER))
-    h_S_d, _ = embed(model, registrations, "tiny", 0, EncoderSettings(**ENCODER))
-    return model, replace(registrations, attached={"embedding": h_S_d})
+    embed_own = embedding_by(model, 0, EncoderSettings(**ENCODER))
+    return embed_own, replace(registrations, attached={"embedding": embed_own(registrations, "tiny")[0]})
 
 
 @pytest.fixture(scope="module")
 def shifted(objects, embedded):
-    model, registrations = embedded
-    return make_sets(objects, registrations, registrations, model, EncoderSettings(**ENCODER), "tiny", 0, SETTINGS)
+    embed_own, registrations = embedded
+    return make_sets(objects, registrations, registrations, embed_own, "tiny", 0, SETTINGS)
 
 
 def test_settings_join_what_the_sections_say():
@@ -88,8 +88,8 @@ def test_distances_are_finite_zero_for_training_samples_and_larger_for_larger_se
 
 
 def test_without_another_source_that_set_is_left_out_and_the_others_are_the_same(shifted, objects, embedded):
-    model, registrations = embedded
-    alone = make_sets(objects, registrations, None, model, EncoderSettings(**ENCODER), "tiny", 0, SETTINGS)
+    embed_own, registrations = embedded
+    alone = make_sets(objects, registrations, None, embed_own, "tiny", 0, SETTINGS)
     kept = shifted.set != "source"
     assert set(alone.set) == set(shifted.set[kept])
     for name, array in alone.arrays.items():
@@ -97,18 +97,18 @@ def test_without_another_source_that_set_is_left_out_and_the_others_are_the_same
 
 
 def test_of_a_single_object_none_is_held_out_and_those_sets_are_left_out(objects, embedded):
-    model, registrations = embedded
+    embed_own, registrations = embedded
     alone = replace(registrations, cluster=np.full(len(registrations), "cup"))
-    sets = make_sets(objects, alone, None, model, EncoderSettings(**ENCODER), "tiny", 0, SETTINGS)
+    sets = make_sets(objects, alone, None, embed_own, "tiny", 0, SETTINGS)
     assert set(sets.set) == {"in_distribution", "severity"}
 
 
 def test_no_view_of_an_object_that_is_held_out_is_trained_on(objects, embedded):
-    model, registrations = embedded
+    embed_own, registrations = embedded
     views = {name: f"mug_{i // 2}_1_{i}" for i, name in enumerate(np.unique(registrations.object_name).tolist())}
     names = np.array([views[name] for name in registrations.object_name.tolist()])
     viewed = replace(registrations, object_name=names, cluster=np.array([name[:5] for name in names.tolist()]))
-    sets = make_sets(objects, viewed, None, model, EncoderSettings(**ENCODER), "tiny", 0, SETTINGS)
+    sets = make_sets(objects, viewed, None, embed_own, "tiny", 0, SETTINGS)
     seen, unseen = ({name[:5] for name in sets.object_name[sets.set == part]} for part in ("seen_objects", "objects"))
     assert unseen
     assert not seen & unseen

@@ -26,18 +26,27 @@ sys.exit(main(sys.argv[1:]))
 """
 
 
+LONGER = settings("train", epochs=5)
+
+
+@pytest.fixture(scope="module")
+def unbroken(made, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("unbroken")
+    files = {"--weights": folder / "weights.pt", "--curve": folder / "curve.csv"}
+    assert main(arguments("train", LONGER | files | {"--registrations": made / "registrations.npz"})) == 0
+    return folder
+
+
 @pytest.mark.parametrize("stop", ["os.kill(os.getpid(), signal.SIGINT)", "Deleted()"], ids=["raised", "swallowed"])
-def test_ctrl_c_stops_a_training_that_then_continues_to_the_same_bytes(folder, stop):
-    longer = settings("train", epochs=5)
-    assert main(arguments("train", longer | {"--weights": "unbroken.pt", "--curve": "unbroken.csv"})) == 0
+def test_ctrl_c_stops_a_training_that_then_continues_to_the_same_bytes(folder, unbroken, stop):
     before = (folder / "weights.pt").read_bytes()
-    done = run_apart(arguments("train", longer), folder, STOPPED_IN_EPOCH_3.format(stop=stop))
+    done = run_apart(arguments("train", LONGER), folder, STOPPED_IN_EPOCH_3.format(stop=stop))
     assert done.returncode == 130, done.stderr
     assert done.stderr.splitlines()[-1] == "gpca train: stopped; repeat the command to continue"
     assert ("Exception ignored in" in done.stderr) == (stop == "Deleted()")
     assert (folder / "weights.pt").read_bytes() == before
     assert (folder / "weights.checkpoint").exists()
-    assert main(arguments("train", longer)) == 0
+    assert main(arguments("train", LONGER)) == 0
     assert not (folder / "weights.checkpoint").exists()
-    for made, unbroken in (("weights.pt", "unbroken.pt"), ("curve.csv", "unbroken.csv")):
-        assert (folder / made).read_bytes() == (folder / unbroken).read_bytes()
+    for name in ("weights.pt", "curve.csv"):
+        assert (folder / name).read_bytes() == (unbroken / name).read_bytes()

@@ -51,10 +51,7 @@ def pool(run_files: RunFiles, readings: Sequence[Reading]) -> Iterator[Row]:
             if (begun := started[start]) is None:
                 continue
             # BALD has the protocol's budget, several times what the paper prints; random choice has the whole pool.
-            budgets = {
-                "bald_kmeans": (reading["batch"], settings.labels),
-                "random": (RANDOM_BATCH, len(begun[0].pool)),
-            }
+            budgets = {"bald_kmeans": (reading["batch"], settings.labels), "random": (RANDOM_BATCH, len(begun[0].pool))}
             for strategy, (batch, labels) in budgets.items():
                 if (key := (*start, strategy, batch)) not in labeled:
                     budget = replace(settings, batch=batch, labels=labels)

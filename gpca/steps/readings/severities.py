@@ -71,7 +71,7 @@ def retrain(job: Job) -> None:
     An encoder learns from them as that of the protocol does.
     """
     from gpca.encoders.registry import EncoderSettings
-    from gpca.encoders.training import embed, train_encoder
+    from gpca.encoders.training import embedding_by, train_encoder
     from gpca.steps.shift import ShiftSettings, sets_of_encoder
 
     axes = (job.source, job.seed)
@@ -82,7 +82,7 @@ def retrain(job: Job) -> None:
         objects = ObjectClouds.load(job.objects, job.source)
         samples, _ = make_registrations(objects, *axes, RegistrationSettings.from_dict(parts["registrations"]))
         model, _ = train_encoder(samples, *axes, encoder_settings, checkpoint)
-        samples = replace(samples, attached={"embedding": embed(model, samples, *axes, encoder_settings)[0]})
-        sets = sets_of_encoder(objects, samples, None, model, encoder_settings, *axes, settings)
-        sets.save(job.out, axes)
+        embed_own = embedding_by(model, job.seed, encoder_settings)
+        samples = replace(samples, attached={"embedding": embed_own(samples, job.source)[0]})
+        sets_of_encoder(objects, samples, None, embed_own, *axes, settings).save(job.out, axes)
         checkpoint.unlink(missing_ok=True)

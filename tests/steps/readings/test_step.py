@@ -53,13 +53,7 @@ def test_the_jobs_of_a_group_are_joined_in_their_order(registrations_npz, tmp_pa
     )
 
 
-@pytest.mark.parametrize(
-    ("path", "message"),
-    [
-        ("lost/tiny/seed0.npz", "no such file"),
-        ("lost.npz", "is not named"),
-    ],
-)
+@pytest.mark.parametrize(("path", "message"), [("lost/tiny/seed0.npz", "no such file"), ("lost.npz", "is not named")])
 def test_a_fault_ends_in_one_line_and_writes_nothing(registrations_npz, tmp_path, capsys, path, message):
     assert main(words(path)) == 2
     [line] = capsys.readouterr().err.splitlines()
