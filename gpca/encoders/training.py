@@ -265,7 +265,6 @@ def load_model(
     return model.eval()
 
 
-@torch.inference_mode()
 def embedding_by(
     model: Classifier, seed: int, settings: EncoderSettings
 ) -> Callable[[Registrations, str], tuple[np.ndarray, np.ndarray]]:
@@ -273,6 +272,7 @@ def embedding_by(
     return lambda registrations, source: embed(model, registrations, source, seed, settings)
 
 
+@torch.inference_mode()
 def embed(
     model: Classifier,
     registrations: Registrations,

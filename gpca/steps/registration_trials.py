@@ -66,9 +66,8 @@ def run(job: Job) -> None:
         outputs = [files[i :: len(job.seeds)] for files in (job.rows, job.timings)]
         with record_provenance([*outputs[0], *outputs[1]], [job.objects, path], job.settings, seed=seed):
             registrations = Registrations.load(path, (job.source, seed))
-            write_trials(
-                try_methods(registrations, objects, job.source, seed, methods, settings), job.methods, *outputs
-            )
+            trials = try_methods(registrations, objects, job.source, seed, methods, settings)
+            write_trials([trials[name] for name in job.methods], *outputs)
 
 
 def try_methods(
