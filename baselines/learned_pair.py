@@ -87,7 +87,7 @@ class LearnedPairGPCA(PairDescription, GPCA):
 
     def motion(self, registrations: Registrations) -> np.ndarray:
         """Return the encoder's numbers of the motion of ICP (N, M), the last of the relations."""
-        from gpca.pairs.description import FIT, MOTION
+        from gpca.pairs.distances import FIT, MOTION
 
         return self.features(registrations)[:, -(MOTION if self._motion else FIT) :]
 

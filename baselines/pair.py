@@ -1,7 +1,7 @@
 """Explainers that see the pair, both clouds and perhaps the motion of ICP, instead of the aligned source alone.
 
 `gpca_pair` is the paper's classifier on relations that do not depend on the object
-(:func:`gpca.pairs.description.relations`). `gpca_pair_clouds` does not read how far ICP moved the cloud, which gives
+(:func:`gpca.pairs.distances.relations`). `gpca_pair_clouds` does not read how far ICP moved the cloud, which gives
 pose errors away in the paper's protocol. `pair_forest` is the plainest form of the same idea; `density` is a control.
 """
 
@@ -26,20 +26,20 @@ WITHOUT = "without ICP's motion"  # in titles
 
 
 class PairDescription:
-    """Base of these explainers: each reads one group of :data:`gpca.pairs.description.WIDTHS` of every pair."""
+    """Base of these explainers: each reads one group of :data:`gpca.pairs.distances.WIDTHS` of every pair."""
 
     def __init__(self, source: str, seed: int, group: str, points: int, motion: bool = True) -> None:
         self._axes, self._group, self._motion, self._points = (source, seed), group, motion, points
         self._prefix = f"pair_{source}_{seed}_{points}_"
 
     def describe(self, registrations: Registrations) -> Registrations:
-        from gpca.pairs.description import describe_registrations
+        from gpca.pairs.distances import describe_registrations
 
         describe = partial(describe_registrations, registrations, *self._axes, points=self._points)
         return measured(registrations, self._prefix, describe)
 
     def features(self, registrations: Registrations) -> np.ndarray:
-        from gpca.pairs.description import MOVED
+        from gpca.pairs.distances import MOVED
 
         features_N_F = self.describe(registrations).attached[self._prefix + self._group]
         return features_N_F if self._motion else np.delete(features_N_F, MOVED, axis=1)

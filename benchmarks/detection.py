@@ -54,7 +54,7 @@ def on_frames(explainer, options: argparse.Namespace) -> dict[str, float]:
 
     from gpca.causes.descriptors import describe_motion
     from gpca.causes.settings import MOTION
-    from gpca.objects.canonical_frame import CanonicalFrame
+    from gpca.objects.canonical import CanonicalFrame
     from gpca.pairs.dataset import Registrations
     from gpca.process.progress import progress
     from gpca.rigid import inverse, transform

@@ -192,7 +192,7 @@ class PlainComposition:
         import torch
 
         from gpca.alignment.icp import ICP
-        from gpca.objects.canonical_frame import CanonicalFrame
+        from gpca.objects.canonical import CanonicalFrame
         from gpca.rigid import transform
 
         frame = CanonicalFrame.of(target)

@@ -3,7 +3,7 @@
 __version__ = "0.3.0"  # the one place: pyproject.toml reads it here, and CITATION.cff is held to it by a test
 
 _EXPORTS = {
-    "CanonicalFrame": "gpca.objects.canonical_frame",
+    "CanonicalFrame": "gpca.objects.canonical",
     "Explainer": "gpca.model.explainer",
     "Explanation": "gpca.model.explanation",
     "explain_scans": "gpca.model.scan_explainer",

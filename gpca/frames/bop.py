@@ -19,9 +19,9 @@ from gpca.errors import InputError, refusing
 from gpca.io.files import read_image
 from gpca.io.structured_text import finite_numbers, read_json
 from gpca.numerals import whole
+from gpca.objects.bop import listed_objects
 from gpca.objects.camera import back_project
-from gpca.objects.mesh_folder import meters_per
-from gpca.objects.surface import Surface, evenly
+from gpca.objects.surface import Surface, evenly, meters_per
 from gpca.rigid import require_rotation, rigid_motion
 
 REMEDY = "the folder may be half unpacked: unpack the dataset again"
@@ -138,10 +138,7 @@ class Frame:
 
 
 def read_frames(folders: Iterable[Path], split: str = "test") -> list[Frame]:
-    """Return the frames of a dataset in order of scene and image; InputError for a faulty or incomplete file.
-
-    `folders` are the dataset's, or those that its archives were unpacked in; `split` begins the subfolder's name.
-    """
+    """Return the frames below ``{split}*`` of a dataset's folders, in order of scene and image."""
     folders = list(folders)
     scene_files = [path for folder in folders for path in folder.glob(f"**/{split}*/*/scene_gt.json")]
     if not scene_files:
@@ -176,10 +173,7 @@ def read_frames(folders: Iterable[Path], split: str = "test") -> list[Frame]:
 
 
 def measured_points(frame: Frame, annotation: Annotation, depth_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the points (P, 3) that were measured within an object's mask, and their pixels (P, 2).
-
-    InputError for mask and depth of different sizes, TooFewPoints for fewer than `FEWEST_POINTS`.
-    """
+    """Return the points (P, 3) measured within an object's mask, and their pixels (P, 2); TooFewPoints for few."""
     mask = frame.mask(annotation)
     if mask.shape != depth_m.shape:
         sizes = " but depth is ".join("×".join(map(str, shape[::-1])) for shape in (mask.shape, depth_m.shape))
@@ -192,10 +186,7 @@ def measured_points(frame: Frame, annotation: Annotation, depth_m: np.ndarray) -
 def without_background(
     points: np.ndarray, pixels: np.ndarray, annotation: Annotation, diameter_m: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the points within a diameter of their median, and their pixels: a mask's rim shows some background.
-
-    TooFewPoints where fewer than `FEWEST_POINTS` remain.
-    """
+    """Return the points within a diameter of their median, and their pixels: a mask's rim shows some background."""
     near = np.linalg.norm(points - np.median(points, axis=0), axis=1) <= diameter_m
     _require_points(points[near], annotation)
     return points[near], pixels[near]
@@ -223,17 +214,14 @@ def _needed_image(folder: Path, stem: str) -> Path:
 
 
 def from_entry(entry: dict, folder: Path) -> Iterator[Surface]:
-    """Yield some views of each object, spread over its frames; those with too few points are named on stderr.
-
-    Keys of the entry are `objects` (ids, default all) and `views_per_instance` (default 6).
-    """
+    """Yield `views_per_instance` (default 6) views of the `objects` (ids, default all), spread over their frames."""
     if meters_per(entry.get("unit") or "mm") != meters_per("mm"):
         raise InputError(f"unit '{entry['unit']}'", "is not that of BOP frames", "leave unit out")
     shown: dict[int, list] = {}
     for frame in read_frames([folder]):
         for place, annotation in enumerate(frame.annotations):
             shown.setdefault(annotation.object_id, []).append((frame, place))
-    wanted = sorted(entry.get("objects") or shown)
+    wanted = listed_objects(entry) or sorted(shown)
     if missing := [number for number in wanted if number not in shown]:
         raise InputError(folder, f"no frame shows object {missing[0]}", "check objects in the config")
     for number in wanted:

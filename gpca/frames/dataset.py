@@ -68,8 +68,8 @@ class Dataset:
             frame.place: [float(np.linalg.norm(annotation.T_camera_model[:3, 3])) for annotation in frame.annotations]
             for frame in read_frames(self.folders, self.split)
         }
-        known = bop.read_models_info(self.models_folder() / "models_info.json").keys()
-        return {path.stem: read_bop_results(path, distances_m, known) for path in self.results}
+        ids = bop.read_models_info(self.models_folder() / "models_info.json").keys()
+        return {path.stem: read_bop_results(path, distances_m, ids) for path in self.results}
 
     def models_folder(self) -> Path:
         """Return the folder of its models."""
@@ -95,21 +95,14 @@ class CenteredModel:
         return np.asarray(self.surface.vertices_m).tobytes()
 
 
-def read_models(dataset: Dataset, frames: Iterable[Frame]) -> dict[int, CenteredModel]:
-    """Return the models of the objects in the frames, by id; InputError where a model is missing or faulty."""
-    ids = sorted({annotation.object_id for frame in frames for annotation in frame.annotations})
-    if not ids:
-        raise InputError(
-            dataset.name, "its scene_gt.json files list no object in any frame", "check split, or fetch it again"
-        )
-    return models_of_ids(dataset, ids)
-
-
-def models_of_ids(dataset: Dataset, ids: Iterable[int] | None = None) -> dict[int, CenteredModel]:
-    """Return the models of these objects of a dataset, or of all, by id; InputError as in :func:`read_models`."""
+def read_models(dataset: Dataset, frames: Iterable[Frame] | None = None) -> dict[int, CenteredModel]:
+    """Return the models of the objects in the frames, or of all, by id; InputError for a missing or faulty one."""
     folder = dataset.models_folder()
     info = bop.read_models_info(folder / "models_info.json")
-    ids = sorted(info if ids is None else ids)
+    shown = {annotation.object_id for frame in frames or () for annotation in frame.annotations}
+    if not (ids := sorted(info if frames is None else shown)):
+        fault = "its scene_gt.json files list no object in any frame"
+        raise InputError(dataset.name, fault, "check split, or fetch it again")
     if unknown := [number for number in ids if not (folder / f"obj_{number:06d}.ply").is_file()]:
         raise InputError(f"{dataset.name}: object {unknown[0]}", f"has no model in {folder}", "fetch the models again")
     models = {}
@@ -122,17 +115,13 @@ def models_of_ids(dataset: Dataset, ids: Iterable[int] | None = None) -> dict[in
 
 
 def with_shared_models(models_of: Mapping[str, dict[int, CenteredModel]]) -> dict[str, dict[int, CenteredModel]]:
-    """Return the models of all datasets, each named as in the first dataset that has the same shape.
-
-    LINEMOD-Occlusion shows objects of LINEMOD: an object that training saw in one is not unseen in the other.
-    """
+    """Return all models, each named as in the first dataset with its shape: LINEMOD-Occlusion shows LINEMOD's."""
     first: dict[bytes, str] = {}
-    shared: dict[str, dict[int, CenteredModel]] = {name: {} for name in models_of}
-    for name, models in models_of.items():
-        for number, model in models.items():
-            known = first.setdefault(model.shape, model.surface.name)
-            shared[name][number] = replace(model, surface=replace(model.surface, name=known))
-    return shared
+
+    def named_as_first(model: CenteredModel) -> CenteredModel:
+        return replace(model, surface=replace(model.surface, name=first.setdefault(model.shape, model.surface.name)))
+
+    return {name: {n: named_as_first(model) for n, model in models.items()} for name, models in models_of.items()}
 
 
 def distinct_surfaces(models_of: Mapping[str, dict[int, CenteredModel]]) -> list[Surface]:
@@ -152,26 +141,21 @@ def datasets_of(
     splits: Path | None = None,
     role: str = EVALUATION,
 ) -> dict[str, Dataset]:
-    """Return the datasets of the config by name, or in their place the rendered scenes, of which all frames are read.
-
-    `splits` is the file of scenes, `role` that of the frames (:mod:`gpca.objects.canonical`). InputError where neither
-    datasets nor scenes are given.
-    """
+    """Return the config's datasets by name, or the rendered `scenes` in their place, of which all frames are read."""
     if scenes:
         return {"scenes": Dataset("scenes", (scenes,), most_frames=None)}
     entries = resolve_datasets(datasets, data_dir)
     if not entries:
         raise InputError("real_world.datasets", "is empty", "name a dataset, or the folder of the step scenes")
-    found = {}
+    read = {}
     for name, entry in entries.items():
         options = {key: entry[key] for key in ("unit", "split", "most_frames") if key in entry}
         options |= {key: Path(entry[key]) if entry.get(key) else None for key in ("models", "errors")}
-        places = read_scene_splits(splits, name) if splits else {}
-        results = tuple(map(Path, entry["results"]))
-        found[name] = Dataset(
-            name, tuple(folders(entry, downloads)), places=places, role=role, results=results, **options
+        options |= {"places": read_scene_splits(splits, name) if splits else {}, "role": role}
+        read[name] = Dataset(
+            name, tuple(folders(entry, downloads)), results=tuple(map(Path, entry["results"])), **options
         )
-    return found
+    return read
 
 
 def models_of(datasets: Mapping[str, Dataset]) -> dict[str, dict[int, CenteredModel]]:
@@ -181,7 +165,7 @@ def models_of(datasets: Mapping[str, Dataset]) -> dict[str, dict[int, CenteredMo
 
 def untested_surfaces(datasets: Mapping[str, Dataset]) -> list[Surface]:
     """Return the models, shared ones once, of objects that no frame of a test fold shows."""
-    models = with_shared_models({name: models_of_ids(dataset) for name, dataset in datasets.items()})
+    models = with_shared_models({name: read_models(dataset) for name, dataset in datasets.items()})
     tested = {
         models[name][annotation.object_id].shape
         for name, dataset in datasets.items()
@@ -206,10 +190,7 @@ def files_behind(datasets: Mapping[str, dict] | None, data_dir: str | None, scen
 def meshes_of(
     models: Mapping[str, dict[int, CenteredModel]], objects: ObjectClouds, shown: Iterable[int]
 ) -> dict[int, MeshScene]:
-    """Return the mesh of each object `shown`, in its frame, by its number in `objects`; InputError where one lacks.
-
-    `models` are those of every dataset, as :func:`with_shared_models` returns them.
-    """
+    """Return the mesh of each object `shown`, in its frame, by its number in `objects`; InputError where one lacks."""
     surfaces = {surface.name: surface for surface in distinct_surfaces(models)}
     meshes = {}
     for index in sorted(set(shown)):

@@ -36,12 +36,11 @@ FARTHEST_MM = 1e4  # no estimator is off by more
 
 
 def read_bop_results(
-    path: str | Path, distances_m: Mapping[tuple[int, int], Sequence[float]], known: Collection[int]
+    path: str | Path, distances_m: Mapping[tuple[int, int], Sequence[float]], ids: Collection[int]
 ) -> PosesByObject:
     """Return the poses ``T_camera_model`` of a BOP results file by (scene, image, object id), the highest score first.
 
-    `distances_m` are those of the annotated objects of each (scene, image) from the camera; `known` are the ids of the
-    dataset's objects. InputError for a damaged file, an unknown image or object, or translations in another unit.
+    `distances_m` of the annotated objects from the camera, by (scene, image), reveal translations in another unit.
     """
     rows = read_csv(path, RESULT_COLUMNS, others=ANY, remedy=REMEDY)
     scored_poses: dict[tuple[int, int, int], list[tuple[float, np.ndarray]]] = {}
@@ -54,14 +53,14 @@ def read_bop_results(
         scene, image, number = key
         if (scene, image) not in distances_m:
             raise InputError(subject, f"the dataset has no image {image} of scene {scene}", "check results or split")
-        if number not in known:
+        if number not in ids:
             raise InputError(subject, f"the dataset has no object {number}", "check results, or fetch the models again")
         entries = {}
         for column, count in (("score", 1), ("R", 9), ("t", 3)):
             with refusing(subject, f"{column} contains values that are not finite numbers: {{}}", REMEDY):
                 entries[column] = np.array([decimal(text) for text in row[column].replace(",", " ").split()])
-            if (found := len(entries[column])) != count:
-                raise InputError(subject, f"{column} has {found} entries, not {count}", "separate them by spaces")
+            if (given := len(entries[column])) != count:
+                raise InputError(subject, f"{column} has {given} entries, not {count}", "separate them by spaces")
             if not (abs(entries[column]) < 1e100).all():  # no norm of these overflows
                 raise InputError(subject, f"{column} contains a number that is out of bounds", REMEDY)
         pose = rigid_motion(entries["R"].reshape(3, 3), entries["t"] / 1000)
@@ -91,11 +90,9 @@ def _require_unit(subject: object, ratio: float, most: float) -> None:
 def estimates_of(
     poses_by_estimator: Mapping[str, PosesByObject], place: tuple[int, int, int], alone: bool, seen: Mapping
 ) -> list[tuple[str, np.ndarray]]:
-    """Return the name of each estimator of a dataset that found an object, and its pose ``T_camera_model``.
+    """Return name and pose ``T_camera_model`` of each estimator that found an object (scene, image, id) of a dataset.
 
-    The `place` is (scene, image, object id). Where the object is not `alone`, an estimate farther than a diameter from
-    the measured points belongs to another one of this id. `seen` has ``points_m`` (P, 3), ``pixels`` (P, 2),
-    ``camera_3_3`` and ``diameter_m``.
+    Where it is not `alone`, an estimate farther than a diameter from the points that were `seen` is another one's.
     """
     estimates = []
     for name in sorted(poses_by_estimator):
@@ -112,10 +109,7 @@ def estimates_of(
 
 @dataclass
 class EstimatorErrors:
-    """Errors ``T_true_estimated`` (m) by dataset and object id; objects without any draw from those of others.
-
-    `symmetric` objects lend theirs to no other, as they contain turns by a symmetry.
-    """
+    """Errors ``T_true_estimated`` (m) by dataset and object id; `symmetric` ones, which contain turns, are not lent."""
 
     symmetric: Collection[tuple[str, int]]
     by_object: dict[tuple[str, int], list[np.ndarray]] = field(default_factory=dict)
@@ -126,8 +120,8 @@ class EstimatorErrors:
     ) -> EstimatorErrors:
         """Return the errors in the file of each dataset that has one, of the objects with these ids."""
         errors = cls(symmetric)
-        for name, (path, known) in files.items():
-            for number, T_error in read_pose_errors(path, known) if path else ():
+        for name, (path, ids) in files.items():
+            for number, T_error in read_pose_errors(path, ids) if path else ():
                 errors.add((name, number), T_error)
         return errors
 
@@ -145,15 +139,11 @@ class EstimatorErrors:
         return errors[int(random.integers(len(errors)))]
 
 
-def read_pose_errors(path: Path, known: Collection[int]) -> list[tuple[int, np.ndarray]]:
-    """Return id and error of each row of a CSV: `obj_id`, rotation vector `rx,ry,rz` (rad), shift `tx,ty,tz` (mm).
-
-    Rows of objects that are not `known` are skipped. InputError for a damaged file, or an impossible motion.
-    """
+def read_pose_errors(path: Path, listed: Collection[int]) -> list[tuple[int, np.ndarray]]:
+    """Return each row of a CSV with a listed `obj_id`: rotation vector `rx,ry,rz` (rad), shift `tx,ty,tz` (mm)."""
     rows = read_csv(path, ERROR_COLUMNS, others=ANY)
-    ids, turns_N_3, shifts_N_3 = np.split(
-        np.stack([numbers(path, rows, name) for name in ERROR_COLUMNS], axis=1), (1, 4), axis=1
-    )
+    values_N_7 = np.stack([numbers(path, rows, name) for name in ERROR_COLUMNS], axis=1)
+    ids, turns_N_3, shifts_N_3 = np.split(values_N_7, (1, 4), axis=1)
     if (ids != np.round(ids)).any() or (ids < 0).any():
         raise InputError(path, "column 'obj_id' contains values that are not whole numbers", "regenerate it")
     if np.linalg.norm(turns_N_3, axis=1).max() > np.pi + 1e-3:
@@ -161,7 +151,7 @@ def read_pose_errors(path: Path, known: Collection[int]) -> list[tuple[int, np.n
     if np.linalg.norm(shifts_N_3, axis=1).max() > FARTHEST_MM:
         raise InputError(path, "contains an error of more than 10 m", "give translations in millimeters")
     motions = rigid_motion(Rotation.from_rotvec(turns_N_3).as_matrix(), shifts_N_3 / 1000)
-    return [(int(number), T) for number, T in zip(ids[:, 0], motions, strict=True) if int(number) in known]
+    return [(int(number), T) for number, T in zip(ids[:, 0], motions, strict=True) if int(number) in listed]
 
 
 Form = Literal["results", "true_pose", "global_registration"]
@@ -205,10 +195,7 @@ class GlobalRegistration:
         self._model = self._features(open3d_cloud(points_m, normals))
 
     def register(self, points_m: np.ndarray, seed: int) -> np.ndarray:
-        """Return ``T_camera_object`` of the measured points (P, 3) in the camera's frame.
-
-        The same seed gives the same pose where Open3D runs on one thread (``OMP_NUM_THREADS=1``).
-        """
+        """Return ``T_camera_object`` of points (P, 3) in the camera's frame, repeatable where Open3D has one thread."""
         o3d = self._o3d
         registration = o3d.pipelines.registration
         cloud = open3d_cloud(points_m)

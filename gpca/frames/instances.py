@@ -70,8 +70,7 @@ class Instances(Container):
     def split(self, source: str, seed: int, test_share: float) -> dict[str, np.ndarray]:
         """Return the rows of ``train`` and ``test``, by whole scenes: frames of one scene reveal each other.
 
-        The seed's fold is tested. Of scenes without a fold, a share of the rows is tested, by an order drawn with the
-        seed: at least one scene, never all. InputError where all frames are of one scene.
+        The seed's fold is tested. Of scenes without one, about a share of the rows is: at least a scene, and never all.
         """
         by_fold = unseen(self.fold, seed)
         is_test = np.zeros(len(self), bool) if by_fold is None else by_fold
@@ -87,10 +86,7 @@ class Instances(Container):
 
 
 def points_on_model(instances: Instances, objects: ObjectClouds, most_points: int | None = None) -> np.ndarray:
-    """Return the median distance (I,) in meters from each instance's points to its model under the true pose.
-
-    With `most_points`, about this many points of each instance are used, for speed.
-    """
+    """Return the median distance (I,) in meters of about `most_points` of each instance from its model."""
     trees = {index: cKDTree(objects.points(index)) for index in np.unique(instances.object_index)}
     medians_m = []
     for i, index in enumerate(instances.object_index):
@@ -118,15 +114,7 @@ def read_instances(
     objects: ObjectClouds,
     settings: initial_pose.InitialPoseSettings,
 ) -> Instances:
-    """Return every object of the frames with enough measured points, with its true and its initial pose.
-
-    Objects with too few points are left out and named on stderr. InputError for faulty files, an object that was
-    measured away from its pose, or nothing left.
-
-    Args:
-        datasets: name -> dataset, its frames, the models of their objects.
-        objects: the canonical clouds of all these models, by their surfaces' names.
-    """
+    """Return each object with enough measured points, by dataset: the dataset, its frames, its models by id."""
     if settings.form == "results" and not any(of.results or of.errors for of, _, _ in datasets.values()):
         raise InputError(f"dataset {next(iter(datasets))}", "has no results file", "set results or choose another pose")
     left_out: list[str] = []
@@ -134,12 +122,10 @@ def read_instances(
     for dataset, frames, models in datasets.values():
         index = {number: objects.names.index(model.surface.name) for number, model in models.items()}
         trees = {number: cKDTree(objects.points(i)) for number, i in index.items()}
-        symmetric = {}
+        symmetric = {number: bool(models[number].listed_symmetries) for number in index}
         for number, i in index.items():
-            listed = models[number].listed_symmetries
-            symmetric[number] = bool(
-                find_symmetries(objects.points(i), objects.diameters_m[i]) if listed is None else listed
-            )
+            if models[number].listed_symmetries is None:
+                symmetric[number] = bool(find_symmetries(objects.points(i), objects.diameters_m[i]))
         observations = []
         for frame in progress(frames, f"frames of {dataset.name}"):
             depth_m = frame.depth_m()
@@ -178,9 +164,7 @@ def read_instances(
     poses = _poses_from_results(datasets, seen) if settings.form == "results" else _poses(seen, objects, settings)
     for reason in left_out:
         print(f"skipped: {reason}", file=sys.stderr)
-    columns: dict[str, Any] = {
-        name: np.array([of.row[name] for of in seen]) for name in seen[0].row if name not in PARTS
-    }
+    columns = {name: np.array([of.row[name] for of in seen]) for name in seen[0].row if name not in PARTS}
     columns |= {name: np.concatenate([of.row[name] for of in seen]) for name in PARTS}
     columns["offsets"] = np.cumsum([0, *(len(of.row["points_m"]) for of in seen)], dtype=np.int64)
     init_from, T_camera_object_init = zip(*poses, strict=True)

@@ -95,10 +95,7 @@ def require_plausible(observed: MeasuredObject) -> None:
 
 
 def require_shared_form(dataset: str, observations: Sequence[MeasuredObject]) -> None:
-    """Raise an InputError where all poses of a dataset are off, or where one mistake explains them far better.
-
-    The median over some of the observations counts, so that single bad masks do not matter.
-    """
+    """Refuse a dataset whose median object is off, or far better in another form; single bad masks do not matter."""
     judged = observations[:: max(1, -(-len(observations) // JUDGED_OBJECTS))]
     if not judged:
         return

@@ -26,11 +26,7 @@ FLAT = 1e-9  # volume of the convex hull in diameters cubed; that of a sheet of 
 
 
 def stable_poses(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
-    """Return the poses (n, 4, 4) in which an object rests on the plane z = 0, and their probabilities (n,).
-
-    Its density is uniform. The center of mass of an open surface may come out anywhere; outside of the convex hull, the
-    center of the hull is used. InputError for a surface without volume.
-    """
+    """Return the poses (n, 4, 4) in which a solid of uniform density rests on z = 0, and their probabilities (n,)."""
     import trimesh
     from trimesh.util import diagonal_dot
 
@@ -39,7 +35,7 @@ def stable_poses(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
         hull, center_m = mesh.convex_hull, mesh.center_mass
     if hull.volume < FLAT * diameter(surface.vertices_m, surface.name) ** 3:
         raise InputError(f"object '{surface.name}'", "is flat and cannot be stood on a table", "leave it out")
-    # Whether the center is inside, by the test that trimesh repeats until it is passed.
+    # That of an open surface may be anywhere. By the test that trimesh repeats until it is passed, is it inside?
     if not np.all(diagonal_dot(center_m - hull.triangles_center, hull.face_normals) < 0):
         center_m = hull.center_mass
     return trimesh.poses.compute_stable_poses(mesh, center_mass=center_m, sigma=0.0, threshold=0.0)
@@ -96,11 +92,9 @@ class Placed:
 
 
 def write_scenes(surfaces: Iterable[Surface], source: str, settings: SceneSettings, folder: str | Path) -> None:
-    """Write models and frames in the layout of BOP: models/, test/{scene}/ with depth, rgb, mask, mask_visib, poses.
+    """Write models/ and test/{scene}/ in the layout of BOP; random numbers are named by source, scene and view."""
+    import trimesh
 
-    Random numbers are named by source, scene and view. InputError where the folder holds something other than scenes,
-    or the table is too small.
-    """
     folder = Path(folder)
     if folder.exists() and not folder.is_dir():
         raise InputError(folder, "is not a folder", "choose another name")
@@ -109,7 +103,21 @@ def write_scenes(surfaces: Iterable[Surface], source: str, settings: SceneSettin
     surfaces = [center(surface) for surface in surfaces]
     resting = [stable_poses(surface) for surface in surfaces]
     with whole_folder(folder) as partial:
-        _write_models(surfaces, source, partial / "models")
+        (partial / "models").mkdir()
+        info = {}
+        for number, surface in enumerate(surfaces, start=1):
+            mesh = trimesh.Trimesh(1e3 * surface.vertices_m, surface.faces, process=False)
+            mesh.export(partial / f"models/obj_{number:06d}.ply")
+            low, high = mesh.bounds
+            cloud_m, _, diameter_m = canonical_cloud(surface, source, 4096)
+            info[number] = {
+                "name": surface.name,
+                "diameter": 1e3 * diameter(surface.vertices_m, surface.name),
+                **{f"min_{axis}": value for axis, value in zip("xyz", low.tolist(), strict=True)},
+                **{f"size_{axis}": value for axis, value in zip("xyz", (high - low).tolist(), strict=True)},
+                **find_symmetries(cloud_m, diameter_m),
+            }
+        _write_json(partial / "models/models_info.json", info)
         drawn = {"scenes" if name == "count" else name: value for name, value in asdict(settings).items()}
         title = f"{source}, procedural stand-in" if settings.families else source
         _write_json(partial / DESCRIPTION, {"title": title, **drawn})
@@ -135,10 +143,9 @@ def lay_table(
     scene: int,
     resting: Sequence[tuple[np.ndarray, np.ndarray]],
 ) -> list[Placed]:
-    """Stand different objects on the table z = 0, each in a stable pose, close together but not touching.
+    """Stand objects on the table z = 0, each in a stable pose drawn by its probability, close but not touching.
 
-    Each pose is drawn by its probability and turned at random; the object comes from a random direction as near to the
-    middle as its convex outline allows. `resting` are the :func:`stable_poses` of each surface.
+    An object comes from a random direction as near to the middle as its convex outline allows.
     """
     from shapely import MultiPoint
     from shapely.affinity import translate
@@ -172,27 +179,9 @@ def center(surface: Surface) -> Surface:
     return Surface(surface.name, surface.vertices_m - center_m, surface.faces)
 
 
-def _write_models(surfaces: list[Surface], source: str, folder: Path) -> None:
-    import trimesh
-
-    folder.mkdir(parents=True)
-    info = {}
-    for number, surface in enumerate(surfaces, start=1):
-        mesh = trimesh.Trimesh(1e3 * surface.vertices_m, surface.faces, process=False)
-        mesh.export(folder / f"obj_{number:06d}.ply")
-        low, high = mesh.bounds
-        cloud_m, _, diameter_m = canonical_cloud(surface, source, 4096)
-        info[number] = {
-            "name": surface.name,
-            "diameter": 1e3 * diameter(surface.vertices_m, surface.name),
-            **{f"min_{axis}": value for axis, value in zip("xyz", low.tolist(), strict=True)},
-            **{f"size_{axis}": value for axis, value in zip("xyz", (high - low).tolist(), strict=True)},
-            **find_symmetries(cloud_m, diameter_m),
-        }
-    _write_json(folder / "models_info.json", info)
-
-
 def _write_scene(folder: Path, surfaces, standing: list[Placed], views, settings: SceneSettings, axes: tuple) -> None:
+    from PIL import Image
+
     placed = [(p.T_world_object, surfaces[p.model]) for p in standing]
     meshes = [(transform(T_world_object, surface.vertices_m), surface.triangles) for T_world_object, surface in placed]
     scene = MeshScene([*meshes, table()])
@@ -207,13 +196,15 @@ def _write_scene(folder: Path, surfaces, standing: list[Placed], views, settings
         view = scene.look(settings.camera, T_world_camera)
         depth_m = settings.noise.measure(view, generator(*axes, "depth", image))
         depth_units = np.rint(1e3 * depth_m / DEPTH_SCALE).clip(0, 65535).astype(np.uint16)
-        write_png(folder / f"depth/{image:06d}.png", depth_units)
-        write_png(folder / f"rgb/{image:06d}.png", shade(view, colors_M_3, T_world_camera))
+        Image.fromarray(depth_units).save(folder / f"depth/{image:06d}.png")
+        Image.fromarray(shade(view, colors_M_3, T_world_camera)).save(folder / f"rgb/{image:06d}.png")
         truth_json[image], info_json[image] = [], []
         for n, object_ in enumerate(standing):
             whole, visible = alone[n].silhouette(settings.camera, T_world_camera), view.mesh == n
             for kind, mask in (("mask", whole), ("mask_visib", visible)):
-                write_png(folder / f"{kind}/{image:06d}_{n:06d}.png", np.where(mask, 255, 0).astype(np.uint8))
+                Image.fromarray(np.where(mask, 255, 0).astype(np.uint8)).save(
+                    folder / f"{kind}/{image:06d}_{n:06d}.png"
+                )
             T_camera_object = inverse(T_world_camera) @ object_.T_world_object
             truth_json[image].append({"obj_id": object_.model + 1, **_pose(T_camera_object, "m2c")})
             info_json[image].append(
@@ -247,13 +238,6 @@ def model_color(model: int, count: int) -> tuple[float, float, float]:
     from colorsys import hsv_to_rgb
 
     return hsv_to_rgb(model * 0.618034 % 1, 0.55 if model % 2 else 0.75, 0.85)
-
-
-def write_png(path: Path, pixels: np.ndarray) -> None:
-    """Write pixels, (H, W) uint8 or uint16 or (H, W, 3) uint8, as a PNG."""
-    from PIL import Image
-
-    Image.fromarray(pixels).save(path)
 
 
 def _write_json(path: Path, content: dict) -> None:

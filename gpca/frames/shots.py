@@ -16,15 +16,10 @@ from gpca.rigid import inverse, rotate, transform
 
 @dataclass(frozen=True)
 class Sighting:
-    """Measurements of an object in a depth frame, without the truth.
+    """Measurements of an object in a depth frame, without the truth."""
 
-    Attributes:
-        points_m: (N, 3) measured points in the camera's frame, all or some.
-        pixels: (P, 2) all pixels at which the object was measured, (u, v).
-    """
-
-    points_m: np.ndarray
-    pixels: np.ndarray
+    points_m: np.ndarray  # (N, 3) in the camera's frame, all or some
+    pixels: np.ndarray  # (P, 2) all at which the object was measured, (u, v)
     camera_3_3: np.ndarray
 
     def measured(self, pixels_V_2: np.ndarray) -> np.ndarray:
@@ -55,10 +50,7 @@ class CleanView:
 def clean_view(
     sighting: Sighting, T_camera_object: np.ndarray, mesh: MeshScene, surface_m: np.ndarray
 ) -> CleanView | None:
-    """Return a sighting beside a perfect sensor's view at a pose; None where no ray of its pixels meets the mesh.
-
-    `surface_m` (Q, 3) are points on the mesh, which bound its place in the image.
-    """
+    """Return a sighting beside a perfect view, found by points (Q, 3) on the mesh; None where no ray meets it."""
     points_m = sighting.points_m
     met_m = met(mesh, points_m / points_m[:, 2:], T_camera_object)
     hit_N = np.isfinite(met_m).all(axis=1)
@@ -79,10 +71,9 @@ def rendered_side(
     surface_m: np.ndarray,
     most_pixels: int = MOST_PIXELS,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the side of an object that a camera would see at a pose with nothing in front, by about `most_pixels`.
+    """Return the points (V, 3) of an object that a camera would see with nothing in front, and their pixels (V, 2).
 
-    It is points (V, 3) in the object's frame, and their pixels (V, 2), (u, v), also outside the image; none where a
-    part of the object would lie behind the camera.
+    About `most_pixels`, also outside the image; none where a part of the object would lie behind the camera.
     """
     shown = rotate(camera_3_3, transform(T_camera_object, surface_m))
     if shown[:, 2].min() <= 0:
@@ -150,10 +141,7 @@ def median_depth(depth_n_H_W: np.ndarray) -> np.ndarray:
 
 
 def fuse(shots: Sequence[Shot], diameter_m: float, filtered: bool) -> np.ndarray:
-    """Return the object's points (P, 3) of all shots in the world.
-
-    Where `filtered`, statistical outliers (Rusu et al. 2008) are removed by Open3D.
-    """
+    """Return the object's points (P, 3) of all shots, in the world; `filtered` without outliers (Rusu et al. 2008)."""
     points_m = np.concatenate([shot.object_points_m(diameter_m) for shot in shots])
     if filtered and len(points_m) > NEIGHBORS:
         _, rows = open3d_cloud(points_m).remove_statistical_outlier(NEIGHBORS, OUTLIER_RATIO)
@@ -227,10 +215,9 @@ def expected_surface(
     poses_n: np.ndarray,
     camera: Camera,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return which of the model's points (Q, 3) were measured (Q,), and which each viewpoint would show (n, Q).
+    """Return which points (Q, 3) of the model were measured (Q,), and which each viewpoint would show (n, Q).
 
-    The model is ray-cast at the estimated pose, over the table and among boxes where something else was measured.
-    Unseen space counts as free. The `camera` is that of the viewpoints; few pixels suffice.
+    The model is ray-cast at its pose among boxes where something else was measured; unseen space counts as free.
     """
     placed_m = transform(T_world_object, points_m)
     reach_m = NEAR * diameter_m

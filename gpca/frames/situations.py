@@ -119,10 +119,7 @@ class Situation:
         return Shot(self.camera, T_world_camera, depth_m, view.mesh == 0)
 
     def estimate(self, shot: Shot, points_m: np.ndarray, *axes: object) -> np.ndarray:
-        """Return ``T_world_object`` by the pose estimator, from the object's points (P, 3) of a shot, in the world.
-
-        An estimate far from the measured points is moved to their middle.
-        """
+        """Return the estimated ``T_world_object`` from points (P, 3) in the world, moved to them where it is far."""
         in_camera_m = transform(inverse(shot.T_world_camera), points_m)
         seed = seed_of(*self.axes, "estimate", *axes)
         T_camera_object = self.shelf.estimator(self.model).register(in_camera_m, seed)
@@ -149,10 +146,7 @@ class Situations:
         self._tables: dict[int, list[Placed]] = {}
 
     def draw(self, cause: str, *axes: object) -> tuple[Situation, Situation]:
-        """Return a situation with the cause, and the same one without it.
-
-        InputError where none of `REDRAWS` draws has the object in sight, or an occluder that hides the wanted share.
-        """
+        """Return a situation with the cause, and the same one without it; InputError where there is no room for it."""
         for redraw in range(REDRAWS):
             axes_now = (*self._part, *axes, redraw)
             random = generator(*axes_now)

@@ -14,11 +14,7 @@ ONE_ENCODER = f"{REAL_WORLD}_one_encoder"  # the same, where seeds are those of 
 
 
 def resolve_datasets(datasets: Mapping[str, dict] | None, data_dir: str | None) -> dict[str, dict]:
-    """Return the resolved entries of the config's section ``real_world.datasets``; reads no data.
-
-    Entries marked ``optional`` are left out where no folder has them: they are not downloaded. InputError as in
-    :func:`gpca.objects.source.resolve`, and for a missing results file.
-    """
+    """Return the resolved ``real_world.datasets``, without optional ones that no folder has; reads no data."""
     resolved = {}
     for name, entry in (datasets or {}).items():
         if entry.get("optional") and not any(path.is_dir() for path in places_of(entry["location"], data_dir)):

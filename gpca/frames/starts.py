@@ -48,10 +48,9 @@ def all_starts(
     models: Mapping[str, Mapping[int, CenteredModel]],
     rungs: Sequence[tuple[float, float]],
 ) -> Starts:
-    """Return every start of every instance, by kind; InputError for a faulty file of results or errors.
+    """Return every start of every instance, by kind; `rungs` are turns in degrees and shifts in diameters.
 
-    Where no dataset has results, an initial pose that global registration found counts as an estimate. `datasets` and
-    `models` are those that the instances were read from; `rungs` are turns in degrees and shifts in diameters.
+    Where no dataset has results, an initial pose that global registration found counts as an estimate.
     """
     numbers = {
         (name, objects.names.index(model.surface.name)): number

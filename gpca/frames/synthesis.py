@@ -43,16 +43,11 @@ class FrameSettings:
 def make_frame_registrations(
     instances: Instances, objects: ObjectClouds, source: str, seed: int, settings: FrameSettings
 ) -> tuple[Registrations, np.ndarray, pd.DataFrame]:
-    """Perturb the clouds of instances about their initial poses, align them by ICP and label them.
+    """Return aligned pairs of instances, perturbed about their initial poses, the seconds (S,) of ICP, a row for each.
 
-    Samples 3t, 3t + 1 and 3t + 2 of a split show one instance under the three concepts in random order; the instances
-    of the split take turns, so that objects are as unequally frequent as in the frames. The source frame is the
-    object's at the initial pose, so that ICP starts at the identity. Errors of the initial pose and of the depth are in
-    every sample, whatever its label.
-
-    Returned are the registrations, the seconds (S,) of ICP, and a row per sample: its instance, whether any training
-    sample shows its object, and the errors of the initial and the aligned pose, ADD-S for symmetric objects and ADD
-    elsewhere, relative to the diameter.
+    Samples 3t, 3t + 1 and 3t + 2 of a split show one instance under the three concepts in random order; instances take
+    turns, so that objects are as unequally frequent as in the frames. The source frame is the object's at the initial
+    pose, so ICP starts at the identity. Each row has the errors of both poses, ADD-S or ADD relative to the diameter.
     """
     import pandas as pd
 
@@ -114,11 +109,9 @@ def _register_one(
 def occlude(
     instances: Instances, i: int, pixels_P_2: np.ndarray, share: float, random: np.random.Generator
 ) -> np.ndarray | None:
-    """Return which of the pixels (P, 2) stay visible (P,) when an occluder covers about the given share of them.
+    """Return which pixels (P,) stay visible when an occluder covers about this share of them, or None where none does.
 
-    Occluders are the visible silhouettes of the dataset's other objects at their own size, tried in random order. One
-    comes in from a random direction until it covers the share. None where no silhouette covers that share to within
-    `TOLERANCE`.
+    Silhouettes of the dataset's other objects, in random order and at their size, come in from a random direction.
     """
     from scipy.ndimage import binary_closing
 

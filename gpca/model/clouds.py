@@ -18,8 +18,14 @@ from gpca.errors import InputError
 from gpca.io.files import require_file
 from gpca.numerals import decimal
 from gpca.objects import mesh_folder, point_files
-from gpca.objects.canonical import bounding_center, canonical_cloud, normals_towards_camera
-from gpca.objects.canonical_frame import CanonicalFrame, require_cloud_points, thin
+from gpca.objects.canonical import (
+    CanonicalFrame,
+    bounding_center,
+    canonical_cloud,
+    normals_towards_camera,
+    require_cloud_points,
+    thin,
+)
 from gpca.objects.surface import AS_ARGUMENT, AS_OPTION, as_points
 from gpca.rigid import require_rigid, transform
 from gpca.seeds import generator

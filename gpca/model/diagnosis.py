@@ -13,7 +13,7 @@ from gpca.causes.truth import ALL, FAILED, NOMINAL, shapley_values
 from gpca.evaluation.conformal import ALARM, GOOD
 from gpca.guarantee.guarantee import SEVERAL, Guarantee
 from gpca.objects.bop import symmetric_turn
-from gpca.objects.canonical_frame import CanonicalFrame
+from gpca.objects.canonical import CanonicalFrame
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reenactment.enactment import Enactment
 from gpca.reenactment.hypotheses import SAME

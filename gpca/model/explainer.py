@@ -30,7 +30,7 @@ from gpca.model.explanation import Explanation, PoseSpread
 from gpca.model.file import Model
 from gpca.model.location import model_path
 from gpca.model.scene import Scene
-from gpca.objects.canonical_frame import CanonicalFrame, thin
+from gpca.objects.canonical import CanonicalFrame, thin
 from gpca.objects.surface import as_points
 from gpca.rigid import inverse, transform
 from gpca.seeds import generator, seed_of

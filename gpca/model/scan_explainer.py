@@ -26,10 +26,8 @@ from gpca.model.diagnosis import CHECK, Reenacted
 from gpca.model.explanation import NOT_SURE, ScanExplanation
 from gpca.model.scan_registration import Scans, in_voxels, voxel_size
 from gpca.model.scene import Scene
-from gpca.objects.canonical import diameter
-from gpca.objects.canonical_frame import CanonicalFrame, require_cloud_points
-from gpca.objects.mesh_folder import meters_per
-from gpca.objects.surface import as_points
+from gpca.objects.canonical import CanonicalFrame, diameter, require_cloud_points
+from gpca.objects.surface import as_points, meters_per
 from gpca.pairs.distances import ObservedPair
 from gpca.reenactment.enactment import Enactment
 from gpca.reenactment.hypotheses import INDEPENDENT, weights_of

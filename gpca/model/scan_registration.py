@@ -15,7 +15,7 @@ from gpca.alignment.icp import ICPSettings, clipped_cost
 from gpca.alignment.methods.interface import Outcome, Pair
 from gpca.alignment.methods.registry import make_method
 from gpca.errors import InputError
-from gpca.objects.canonical_frame import thin
+from gpca.objects.canonical import thin
 from gpca.pairs.distances import ObservedPair
 from gpca.rigid import exp, inverse, scale_translation, transform
 from gpca.scans.pair import MOST_CELLS, voxels

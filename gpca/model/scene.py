@@ -13,7 +13,7 @@ import numpy as np
 from gpca.causes.candidate import Registrar, Unmeasurable
 from gpca.causes.settings import CauseSettings
 from gpca.causes.truth import BY_SIZE, SUBSETS
-from gpca.objects.canonical_frame import CanonicalFrame
+from gpca.objects.canonical import CanonicalFrame
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reenactment.enactment import Enactment
 from gpca.reenactment.hypotheses import weights_of

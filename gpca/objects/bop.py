@@ -18,22 +18,29 @@ from gpca.io.files import require_file
 from gpca.io.structured_text import finite_numbers, read_json
 from gpca.numerals import whole
 from gpca.objects.canonical import diameter
-from gpca.objects.mesh_folder import meters_per, read_surface
-from gpca.objects.surface import Surface
+from gpca.objects.mesh_folder import read_surface
+from gpca.objects.surface import Surface, meters_per
+from gpca.rigid import rigid_motion
 
 DIAMETER_TOLERANCE = 0.05
 
 
 def from_entry(entry: dict, folder: Path) -> Iterator[Surface]:
     """Return surfaces of a configured source: keys `objects` (ids, default all) and `unit` (default mm)."""
-    models = models_folder(folder)
-    ids = list(entry.get("objects") or ())
+    models, ids = models_folder(folder), listed_objects(entry)
     if not ids:
         for path in models.glob("obj_[0-9]*.ply"):
             with refusing(path, "is not named obj_{number}.ply", "name it like obj_000001.ply"):
                 ids.append(whole(path.stem.removeprefix("obj_")))
     info = read_models_info(models / "models_info.json")
     return read_models(models, entry.get("unit") or "mm", sorted(ids), info)
+
+
+def listed_objects(entry: Mapping[str, Any]) -> list[int]:
+    """Return the ids of the objects that an entry names; none where it leaves the key out and thus means all."""
+    if (ids := entry.get("objects")) == []:
+        raise InputError("objects", "is an empty list", "name the objects, or leave it out for all")
+    return sorted(ids or ())
 
 
 def read_models(models: Path, unit: str, ids: Sequence[int], info: Mapping[int, dict]) -> Iterator[Surface]:
@@ -46,17 +53,15 @@ def read_models(models: Path, unit: str, ids: Sequence[int], info: Mapping[int, 
         surface = read_surface(path, meters_per(unit))
         measured_mm = 1e3 * diameter(surface.vertices_m, path)
         if abs(measured_mm - listed_mm) > DIAMETER_TOLERANCE * listed_mm:
-            fault = (
-                f"its diameter is {measured_mm:.4g} mm in unit {unit}, but models_info.json lists {listed_mm:.4g} mm"
-            )
+            fault = f"its diameter is {measured_mm:.4g} mm in unit {unit}, but models_info.json lists"
             remedy = "check unit in the config (BOP models are in mm), or fetch the models again"
-            raise InputError(path, fault, remedy)
+            raise InputError(path, f"{fault} {listed_mm:.4g} mm", remedy)
         yield surface
 
 
 def require_entry(entry: dict, folder: Path) -> None:
     """Raise an InputError unless the folder has a model of each object that the entry names; reads no model."""
-    if ids := entry.get("objects"):
+    if ids := listed_objects(entry):
         require_models(models_folder(folder), ids)
 
 
@@ -105,20 +110,13 @@ CONTINUOUS_DEG = (25.0, 50.0, 75.0)  # none is a symmetry of a square or hexagon
 
 
 def read_symmetries(models_info: dict[int, dict], object_id: int) -> dict | None:
-    """Return ``symmetries_discrete`` and ``symmetries_continuous`` of an object of :func:`read_models_info`.
-
-    An object without symmetries has no entries; None means that the file lists no symmetry of any object.
-    """
+    """Return an object's listed symmetries, perhaps none; None where the file lists no symmetry of any object."""
     lists = {n: {k: v for k, v in entry.items() if k.startswith("symmetries_")} for n, entry in models_info.items()}
     return lists.get(object_id, {}) if any(lists.values()) else None
 
 
 def require_symmetries(listed: Mapping[str, Any], subject: str) -> None:
-    """Raise an InputError that names `subject` unless every listed symmetry is a rigid transform.
-
-    ``symmetries_discrete`` are matrices of 16 numbers, row by row; ``symmetries_continuous`` have an ``axis`` and an
-    ``offset`` of 3 numbers each, in millimeters.
-    """
+    """Raise an InputError unless listed symmetries are rigid: 4×4, row by row, or an axis and an offset in mm."""
     for key in ("symmetries_discrete", "symmetries_continuous"):
         if not isinstance(listed.get(key, []), list):
             raise InputError(f"{subject}, {key}", "is not a list", "list the symmetries, or leave the key out")
@@ -137,13 +135,11 @@ def require_symmetries(listed: Mapping[str, Any], subject: str) -> None:
 
 
 def find_symmetries(points_N_3: np.ndarray, diameter: float) -> dict[str, list]:
-    """Return the rotations about the axes of the bounding box that leave the shape unchanged, as BOP writes them.
+    """Return the turns about the axes of the bounding box that leave the shape unchanged, as BOP writes them.
 
-    A rotation is a symmetry where the mean distance from a turned point to its nearest neighbor exceeds the spacing of
-    the points by at most `TOLERANCE` diameters. On their scans, this finds the two symmetric objects of LINEMOD. Shape
-    alone counts: a printed can is symmetric, since registration does not see the print. The cloud shows the whole
-    surface, centered on its bounding box. Only keys with entries are returned: ``symmetries_discrete``, 4×4 matrices
-    row by row, and ``symmetries_continuous``, axes with offsets.
+    After one, the mean distance from a point to its nearest neighbor exceeds the spacing of the points by at most
+    `TOLERANCE` diameters. On their scans, this finds the two symmetric objects of LINEMOD. Shape alone counts: a
+    printed can is symmetric. The cloud is whole and centered. Only keys with entries are returned.
     """
     from scipy.spatial import cKDTree
     from scipy.spatial.transform import Rotation
@@ -164,11 +160,10 @@ def find_symmetries(points_N_3: np.ndarray, diameter: float) -> dict[str, list]:
             continue
         for angle in DISCRETE_DEG:
             if fits(axis, angle):
-                T = np.eye(4)
-                T[:3, :3] = Rotation.from_rotvec(np.deg2rad(angle) * axis).as_matrix()
-                discrete.append(T.round(9).ravel().tolist())
-    found: dict[str, list] = {"symmetries_discrete": discrete, "symmetries_continuous": continuous}
-    return {key: entries for key, entries in found.items() if entries}
+                R = Rotation.from_rotvec(np.deg2rad(angle) * axis).as_matrix()
+                discrete.append(rigid_motion(R).round(9).ravel().tolist())
+    symmetries: dict[str, list] = {"symmetries_discrete": discrete, "symmetries_continuous": continuous}
+    return {key: entries for key, entries in symmetries.items() if entries}
 
 
 def angle_up_to_symmetry(R_3_3: np.ndarray, symmetries: Mapping[str, list]) -> float:
@@ -210,9 +205,9 @@ def _generated(symmetries: Mapping[str, list]) -> np.ndarray:
     """Return the group (K, 3, 3) that the discrete symmetries generate, the identity first."""
     listed = [np.reshape(T, (4, 4))[:3, :3] for T in symmetries.get("symmetries_discrete", [])]
     group = [np.eye(3)]
-    for known in group:  # which grows meanwhile
+    for turn in group:  # which grows meanwhile
         for R in listed:
-            product = R @ known
+            product = R @ turn
             if not any(np.allclose(product, other, atol=1e-6) for other in group):
                 group.append(product)
     return np.array(group)

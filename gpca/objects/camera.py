@@ -147,10 +147,7 @@ class DepthNoise:
 
 
 def shade(view: View, colors_M_3: np.ndarray, T_world_camera: np.ndarray) -> np.ndarray:
-    """Return an image (H, W, 3) uint8 of colored meshes under a lamp above and ambient light; gray where nothing is.
-
-    Lambert's law; colors are in [0, 1].
-    """
+    """Return Lambert's image (H, W, 3) uint8 of meshes with colors in [0, 1] under a lamp; gray where nothing is."""
     lamp_world = np.array([0.3, -0.2, 1.0]) / np.linalg.norm([0.3, -0.2, 1.0])
     lamp_camera = T_world_camera[:3, :3].T @ lamp_world
     light = 0.45 + 0.55 * np.clip(view.normals @ lamp_camera, 0, 1)
@@ -178,10 +175,7 @@ def table() -> tuple[np.ndarray, np.ndarray]:
 
 
 def back_project(depth_m: np.ndarray, mask: np.ndarray, camera_3_3: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the measured points (P, 3) of a mask in the camera's frame, meters, and their pixels (P, 2) as (u, v).
-
-    Pixel centers have whole coordinates: x = (u - c_x) z / f_x.
-    """
+    """Return a mask's measured points (P, 3) in the camera's frame, meters, and their pixels (P, 2) as (u, v)."""
     v, u = np.nonzero(mask & (depth_m > 0))
     z = depth_m[v, u].astype(np.float64)
     (fx, skew, cx), (_, fy, cy), _ = camera_3_3
@@ -203,10 +197,9 @@ def from_entry(entry: dict, folder: Path) -> Iterator[Surface]:
 
 
 def rendered_views(mesh: Surface, count: int) -> Iterator[Surface]:
-    """Yield views of a mesh whose z axis points up, as clouds in the camera's frame, in meters.
+    """Yield views ``obj_000007_1_0`` (mesh, elevation, number) of a mesh with z up, in the camera's frame, meters.
 
     As in the UW RGB-D Object Dataset (Lai et al. 2011), the camera is 30, 45 and 60 degrees above a turntable in turn.
-    Views are named ``obj_000007_1_0`` by mesh, elevation and number.
     """
     if mesh.faces is None:
         raise InputError(f"object '{mesh.name}'", "is a cloud, of which there are no views", "use kind: mesh_folder")

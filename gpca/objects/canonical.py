@@ -27,13 +27,14 @@ from gpca.errors import InputError
 from gpca.io.arrays import REAL, REGENERATE, TEXT, WHOLE, load_arrays, save_arrays
 from gpca.io.csv_file import read_csv
 from gpca.io.files import is_name
-from gpca.objects.surface import IN_CONFIG, Surface, instance_of
+from gpca.objects.surface import IN_CONFIG, Surface, instance_of, meters_per
 from gpca.process.environment import open3d_cloud, require_open3d
 from gpca.seeds import generator
 
 FEWEST_CLOUD_POINTS = 64
 SMALLEST_DIAMETER_M, LARGEST_DIAMETER_M = 1e-3, 10.0
 NORMAL_NEIGHBORS = 30
+MEASURED_POINTS = 10_000  # at most, that determine the frame: all points of a cloud may lie on its hull
 # A cloud spans nearly its object's diameter. Few points miss some of it, but never nine tenths.
 SMALLEST_EXTENT = 0.1  # diameters
 UNIT_TOLERANCE = 1e-3  # of the length of a normal, a hundred times what float32 rounds
@@ -65,10 +66,7 @@ def require_points(points: np.ndarray, subject: object) -> None:
 
 
 def diameter(points: np.ndarray, subject: object) -> float:
-    """Return the largest distance between two of the (P, 3) points, in their unit (the diameter of the BOP benchmark).
-
-    Only vertices of the convex hull are compared, of few points all. InputError for NaN, or points on one line.
-    """
+    """Return the largest distance between two of the points (P, 3), as BOP has it; InputError for points on a line."""
     from scipy.spatial import ConvexHull
     from scipy.spatial.distance import cdist, pdist
 
@@ -89,12 +87,10 @@ def diameter(points: np.ndarray, subject: object) -> float:
 def canonical_cloud(
     surface: Surface, source: str, n_points: int = 16384, say: str = IN_CONFIG
 ) -> tuple[np.ndarray, np.ndarray, float]:
-    """Sample a surface uniformly, center it on its bounding box, and measure its diameter (m): points, unit normals, m.
+    """Return points and unit normals (P, 3) float32 of a surface, centered on its bounding box, and its diameter (m).
 
-    A mesh gives `n_points` area-uniform samples with the normals of their triangles. A point cloud keeps all its
-    points, in random order; missing normals are estimated and turned toward the camera at the origin. Arrays are
-    (P, 3) float32. The names of surface and source seed the sampling; `say` is how the user sets the unit. InputError
-    for NaN, no area, too few points, or a diameter that no declared unit would give.
+    A mesh gives `n_points` area-uniform samples. A cloud keeps all its points, in random order; missing normals are
+    estimated and turned toward the camera at the origin. `say` is how the user sets the unit.
     """
     subject = f"{source}: object '{surface.name}'"
     vertices_m = np.asarray(surface.vertices_m, dtype=np.float64)
@@ -161,14 +157,53 @@ def normals_towards_camera(points_m: np.ndarray) -> np.ndarray:
     return np.asarray(cloud.normals)
 
 
+@dataclass(frozen=True)
+class CanonicalFrame:
+    """The origin, the center of the axis-aligned bounding box, and the unit, the diameter."""
+
+    center_3: np.ndarray
+    diameter: float
+
+    @classmethod
+    def of(
+        cls, points: np.ndarray, unit: str = "m", subject: object = "target", say: str = IN_CONFIG
+    ) -> CanonicalFrame:
+        """Measure the points (N, 3) of a target; `subject` names it, and `say` is how the user sets the unit."""
+        require_cloud_points(points, subject)
+        points = thin(points, MEASURED_POINTS, "frame")
+        size = diameter(points, subject)
+        require_size(size * meters_per(unit), subject, say)
+        return cls((points.min(axis=0) + points.max(axis=0)) / 2, size)
+
+    def coordinates(self, points: np.ndarray) -> np.ndarray:
+        """Return points (N, 3) in this frame."""
+        return (points - self.center_3) / self.diameter
+
+    def pose_outside(self, T_b_a: np.ndarray) -> np.ndarray:
+        """Return a motion (4, 4) of this frame in the original frame and unit."""
+        outside = T_b_a.copy()
+        outside[:3, 3] = self.diameter * T_b_a[:3, 3] + self.center_3 - T_b_a[:3, :3] @ self.center_3
+        return outside
+
+
+def require_cloud_points(points: np.ndarray, subject: object) -> None:
+    """Raise an InputError unless the points are (N, 3), finite, and enough for the encoders."""
+    require_points(points, subject)
+    if len(points) < FEWEST_CLOUD_POINTS:
+        raise InputError(subject, f"has {len(points)} points", f"give {FEWEST_CLOUD_POINTS} or more")
+
+
+def thin(points: np.ndarray, most: int, *axes: object) -> np.ndarray:
+    """Return the points (N, 3), or `most` of them drawn at random; the axes name the seed."""
+    if len(points) <= most:
+        return points
+    return points[generator("thinned", *axes).choice(len(points), most, replace=False, shuffle=False)]
+
+
 def write_objects(
     surfaces: Iterable[Surface], source: str, path: str | Path, n_points: int = 16384, splits: Path | None = None
 ) -> None:
-    """Write the canonical clouds of a source to an objects npz (read it with :class:`ObjectClouds`).
-
-    Families and folds are those of the file `splits`, if given. InputError for no object, two of one name, or a fault
-    in one of them; nothing is written then.
-    """
+    """Write the canonical clouds of a source, whole or not at all; `splits` is a file of families and folds."""
     places = read_object_splits(splits, source) if splits else {}
 
     def is_used(surface: Surface) -> bool:
@@ -214,10 +249,7 @@ class ObjectClouds:
 
     @classmethod
     def load(cls, path: str | Path, source: str | None = None) -> ObjectClouds:
-        """Read an objects npz; InputError when it is missing, damaged, inconsistent or of another source.
-
-        A file that names no source is accepted for any: users' own rules write such files.
-        """
+        """Read an objects npz, of this source unless it names none: users' own rules write such files."""
         shapes: dict[str, tuple[int | str, ...]] = dict.fromkeys(("names", "diameters_m", "families", "folds"), ("O",))
         shapes |= {"points_m": ("P", 3), "normals": ("P", 3), "offsets": ("E",)}
         kinds = dict.fromkeys(shapes, REAL) | {"names": TEXT, "offsets": WHOLE, "families": TEXT, "folds": WHOLE}

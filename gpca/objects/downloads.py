@@ -30,11 +30,9 @@ _TWO_IN_ONE_PLACE = (FileExistsError, IsADirectoryError, NotADirectoryError)  # 
 
 
 def fetch(url: str, sha256: str | None, folder: str | Path, location: str | None = None) -> Path:
-    """Return the file of `url`, from the cache `folder` or downloaded to it, under the host and path of the URL.
+    """Return the file of `url`, from the cache `folder` or downloaded to it; without a `sha256`, its sum is printed.
 
-    Without an expected `sha256`, the actual one is printed so that it can be pinned. `location` is that of the same
-    data below data_dir; the message names it when the network fails. InputError for no network, an error answer, an
-    interrupted transfer, or another checksum: the download is removed then, but a file that was in the cache stays.
+    A faulty download is removed, but a file that was in the cache stays. `location` is that of the data below data_dir.
     """
     path = cached_path(url, folder)
     if path.is_file():
@@ -101,11 +99,9 @@ class Member:
 
 @contextmanager
 def open_archive(path: str | Path, largest_bytes: int = LARGEST_UNPACKED_BYTES) -> Iterator[list[Member]]:
-    """Yield the regular files of an archive, readable within the context.
+    """Yield the regular files of an archive; InputError for damage, links, devices, ways out of it, or too many bytes.
 
-    InputError for a damaged archive, or more than `largest_bytes` unpacked; for a member that is a link, a device or
-    encrypted, or whose path leaves the archive's folder. The filters of the standard library let links pass, and strip
-    a leading slash in silence.
+    The filters of the standard library let links pass, and strip a leading slash in silence.
     """
     path = Path(path)
     require_file(path, "no such file", "check url or files in the config", math.inf)
@@ -151,10 +147,7 @@ def _entries(archive: zipfile.ZipFile | tarfile.TarFile) -> Iterator[tuple[str, 
 
 
 def unpack(path: str | Path, folder: str | Path, largest_bytes: int = LARGEST_UNPACKED_BYTES) -> Path:
-    """Unpack an archive into a folder, whole or not at all, unless it is there, and return the folder.
-
-    InputError as in :func:`open_archive`, and for too little space on the disk.
-    """
+    """Unpack an archive into a folder, whole or not at all, unless it is there, and return the folder."""
     folder = Path(folder)
     if folder.is_dir():
         return folder

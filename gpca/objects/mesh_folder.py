@@ -17,10 +17,9 @@ from gpca.errors import InputError, refusing
 from gpca.io.files import require_file
 from gpca.numerals import decimal
 from gpca.objects.canonical import require_points
-from gpca.objects.surface import Surface
+from gpca.objects.surface import Surface, meters_per
 
 SUFFIXES = (".ply", ".obj", ".stl", ".off")
-METERS_PER_UNIT = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 
 
 def from_entry(entry: dict, folder: Path) -> Iterator[Surface]:
@@ -29,27 +28,17 @@ def from_entry(entry: dict, folder: Path) -> Iterator[Surface]:
     return (read_surface(path, scale) for path in files_in(folder, entry.get("files"), SUFFIXES))
 
 
-def meters_per(unit: str | None) -> float:
-    """Return the meters in one `unit`; InputError for a unit other than m, cm, mm."""
-    if unit not in METERS_PER_UNIT:
-        raise InputError(f"unit '{unit}'", "is not a known unit of length", "set unit: m, cm or mm")
-    return METERS_PER_UNIT[unit]
-
-
 def files_in(folder: str | Path, patterns: Sequence[str] | None, suffixes: Sequence[str]) -> list[Path]:
-    """Return the files of a folder, sorted: the matches of the patterns, or all with one of the suffixes.
-
-    InputError for no such folder, an empty one, a pattern without a match, a match of another format.
-    """
+    """Return the files of a folder, sorted: the matches of the patterns, or all with one of the suffixes."""
     folder, formats = Path(folder), ", ".join(suffixes)
     if not folder.is_dir():
         raise InputError(folder, "no such folder", "check location and data_dir in the config")
     matches = {pattern: {path for path in folder.glob(pattern) if path.is_file()} for pattern in patterns or ()}
     if none := [pattern for pattern, files in matches.items() if not files]:
         raise InputError(folder / none[0], "no file matches", "check files in the config")
-    found = sorted(folder.iterdir() if patterns is None else set().union(*matches.values()))
-    files = [path for path in found if path.name.lower().endswith(tuple(suffixes))]
-    if patterns is not None and (others := [path for path in found if path not in files]):
+    paths = sorted(folder.iterdir() if patterns is None else set().union(*matches.values()))
+    files = [path for path in paths if path.name.lower().endswith(tuple(suffixes))]
+    if patterns is not None and (others := [path for path in paths if path not in files]):
         raise InputError(others[0], "has an unsupported format", f"let files match {formats} only")
     if not files:
         raise InputError(folder, f"the folder has none of {formats}", "check location, or set files")
@@ -57,11 +46,7 @@ def files_in(folder: str | Path, patterns: Sequence[str] | None, suffixes: Seque
 
 
 def read_surface(path: Path, scale: float) -> Surface:
-    """Read one file, vertices times `scale`. Points without faces are a cloud, which only PLY may hold.
-
-    InputError for a file that is unreadable, truncated or longer than it declares, without points or faces, with NaN,
-    or with a face that refers to no vertex.
-    """
+    """Read one file, vertices times `scale`. Points without faces are a cloud, which only PLY may hold."""
     remedy, suffix = "fetch or export it again", path.suffix.lower()
     require_file(path, "no such file", remedy)
     # A malformed file makes the parsers raise nearly anything.
@@ -256,12 +241,9 @@ def _check_stl(file: IO[bytes]) -> None:
 
 
 # They check that a text file holds what it declares; of a binary PLY, only the header. ValueError where it does not.
-CHECKS: dict[str, Callable[[IO[bytes]], None]] = {
-    ".ply": _check_ply,
-    ".off": _check_off,
-    ".obj": _check_obj,
-    ".stl": _check_stl,
-}
+CHECKS: dict[str, Callable[[IO[bytes]], None]] = dict(
+    zip(SUFFIXES, (_check_ply, _check_obj, _check_stl, _check_off), strict=True)
+)
 
 
 def _lines(file: IO[bytes]) -> Iterator[bytes]:

@@ -26,8 +26,8 @@ from gpca.io.files import require_file, require_memory
 from gpca.numerals import whole
 from gpca.objects.canonical import require_points
 from gpca.objects.downloads import open_archive
-from gpca.objects.mesh_folder import LARGEST_TEXT_BYTES, files_in, meters_per
-from gpca.objects.surface import Surface, evenly, instance_of, view_order
+from gpca.objects.mesh_folder import LARGEST_TEXT_BYTES, files_in
+from gpca.objects.surface import Surface, evenly, instance_of, meters_per, view_order
 
 SCALARS = {"f4", "f8", *(f"{sign}{size}" for sign in "iu" for size in (1, 2, 4, 8))}
 AXES = ("x", "y", "z")
@@ -36,8 +36,7 @@ AXES = ("x", "y", "z")
 def parse_pcd(content: bytes, subject: object) -> np.ndarray:
     """Return the points (P, 3) float64 of a PCD file's content, in the file's unit; `subject` names it in messages.
 
-    An organized cloud (HEIGHT > 1) marks missing depth by NaN, and those points are left out; elsewhere NaN is a fault.
-    InputError for a wrong header, another amount of data than it says, or no points.
+    An organized cloud (HEIGHT > 1) marks missing depth by NaN, which is left out; elsewhere NaN is a fault.
     """
     try:
         points = _parse_pcd(content)
@@ -109,10 +108,7 @@ def _parse_pcd(content: bytes) -> np.ndarray:
 
 
 def _lzf_decompress(data: bytes, size: int) -> bytearray:
-    """Undo LZF: runs of literal bytes, and copies of up to 264 earlier bytes that may overlap what they write.
-
-    Stops after more than `size` bytes.
-    """
+    """Undo LZF: literals, and copies of up to 264 earlier bytes that may overlap; stops after `size` bytes."""
     out, i = bytearray(), 0
     while i < len(data) and len(out) <= size:
         length, offset = data[i] >> 5, (data[i] & 31) << 8
@@ -175,10 +171,7 @@ def _numpy_file(path: Path) -> np.ndarray:
 
 
 def _text(path: Path) -> np.ndarray:
-    """Read columns separated by spaces, commas, semicolons or tabs; lines that begin with # or // are comments.
-
-    They are the first three columns, or those that a header names x, y and z; a number alone in the first line counts.
-    """
+    """Read the first three columns, or those that a header names x, y and z; # or // begin comments."""
     require_file(path, "no such file", COLUMNS_REMEDY, LARGEST_TEXT_BYTES)
     lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
     lines = [line for line in lines if line.strip() and not line.lstrip().startswith(("#", "//"))]
@@ -239,10 +232,7 @@ INSTALL = {"laspy": "pip install 'laspy[lazrs]'", "pye57": "pip install pye57"}
 
 
 def read_scanner_file(path: Path) -> np.ndarray:
-    """Return the points (P, 3) float64 of a file of `PACKAGES`, all scans of an E57 file joined in its frame.
-
-    InputError for a missing package (the line says how to install it), or a file that it cannot read.
-    """
+    """Return the points (P, 3) float64 of a file of `PACKAGES`, all scans of an E57 file joined in its frame."""
     require_file(path, "no such file", "give a LAS, LAZ or E57 file")
     name = PACKAGES[path.suffix.lower()]
     try:
@@ -254,11 +244,13 @@ def read_scanner_file(path: Path) -> np.ndarray:
             return np.asarray(module.read(path).xyz, np.float64)
         with closing(module.E57(str(path))) as file:
             scans = [file.read_scan(number, ignore_missing_fields=True) for number in range(file.scan_count)]
-        axes = [[scan[f"cartesian{axis}"] for axis in "XYZ"] for scan in scans]
-        return np.concatenate([np.stack(xyz, axis=1) for xyz in axes]).astype(np.float64)
+        clouds = [np.stack([scan[f"cartesian{axis}"] for axis in "XYZ"], axis=1) for scan in scans]
     except Exception as fault:  # of many kinds, some from C++
         remedy = INSTALL[name] if "LazBackend" in str(fault) else "export it again, or as PLY"
         raise InputError(path, f"cannot be read ({fault})", remedy) from fault
+    if not clouds:
+        raise InputError(path, "holds no scan", "export it again, or as PLY")
+    return np.concatenate(clouds).astype(np.float64)
 
 
 SUFFIXES = (".pcd", ".tar", ".tar.gz", ".tgz")
@@ -266,11 +258,7 @@ READS_ARCHIVES = True  # only a few of the 600 views in a tar are read, so nothi
 
 
 def from_entry(entry: dict, place: Path) -> Iterator[Surface]:
-    """Yield views of each instance in PCD files and tars of them, spread evenly in the order of sequence and frame.
-
-    Keys of the entry are `files`, `unit` (default m) and `views_per_instance` (default 6): the most of one tar, or of
-    the single files. InputError for a damaged file, or a tar without PCD.
-    """
+    """Yield `views_per_instance` (default 6) views of each instance of a tar, or of the PCD files, spread evenly."""
     paths = [place] if place.is_file() else files_in(place, entry.get("files"), SUFFIXES)
     scale, most = meters_per(entry.get("unit", "m")), entry.get("views_per_instance", 6)
     single = [path for path in paths if path.suffix.lower() == ".pcd"]

@@ -109,21 +109,15 @@ def union(*solids: Manifold) -> Manifold:
 
 
 class Cup(NamedTuple):
-    """Dimensions of a cup in millimeters.
+    """Dimensions of a cup in millimeters."""
 
-    Attributes:
-        profile: (outer radius, height) from the foot (height 0) to the rim.
-        joints: heights of the lower and the upper joint of each handle.
-        reach, grip: of the handle's middle line from the wall, and half its thickness.
-    """
-
-    profile: tuple[tuple[float, float], ...]
+    profile: tuple[tuple[float, float], ...]  # (outer radius, height) from the foot (height 0) to the rim
     wall: float = 4
     floor: float = 5
     handles: int = 1
-    joints: tuple[float, float] = (20, 75)
-    reach: float = 30
-    grip: float = 4.5
+    joints: tuple[float, float] = (20, 75)  # heights of the lower and the upper joint of each handle
+    reach: float = 30  # of the handle's middle line from the wall
+    grip: float = 4.5  # half its thickness
 
 
 CUPS = {

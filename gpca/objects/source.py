@@ -40,13 +40,10 @@ RESTORE = "restore it: git checkout -- data"
 
 
 def resolve(entry: dict, data_dir: str | None) -> dict:
-    """Decide where a source's data comes from, without reading any, so that it is quick when a workflow loads.
+    """Return an entry with an `origin`: "procedural", "local" (then with an absolute `location`) or "download".
 
-    Data under `data_dir` comes first, then the repository's own, then the entry's `url` or `urls`. A `location` counts
-    if it exists; without one, each pattern of `files` must match. The returned entry has an `origin`, "procedural",
-    "local" or "download", and, when local, the absolute `location`; a download keeps the declared one, for messages.
-
-    InputError for an unknown kind, missing data, checksums that do not match the urls, and what the kind refuses.
+    No data is read. Data under `data_dir` comes first, then the repository's own, then the entry's `url` or `urls`. A
+    `location` counts if it exists; without one, each pattern of `files` must match.
     """
     subject = f"source '{entry.get('title', entry.get('kind'))}'"
     if data_dir is not None and not require_place(data_dir).is_dir():
@@ -149,10 +146,7 @@ def places_of(place: str, data_dir: str | None) -> list[Path]:
 
 
 def require_place(place: str | Path) -> Path:
-    """Return a place of data as a path, with the user's home in place of ``~``: for each path that a user names.
-
-    InputError for an unknown home, a circle of links, or a folder of devices, whose files may never end.
-    """
+    """Return a path that a user names, ``~`` resolved; InputError for circular links and folders of devices."""
     try:
         path = Path(place).expanduser()
     except RuntimeError as fault:

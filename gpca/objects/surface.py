@@ -48,15 +48,23 @@ def view_order(name: str) -> tuple[str, int, int]:
 
 
 IN_CONFIG, AS_OPTION, AS_ARGUMENT = "set unit: {}", "give --unit {}", "pass unit='{}'"
+METERS_PER_UNIT = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
+
+
+def meters_per(unit: str | None) -> float:
+    """Return the meters in one `unit`; InputError for a unit other than m, cm, mm."""
+    if unit not in METERS_PER_UNIT:
+        raise InputError(f"unit '{unit}'", "is not a known unit of length", "set unit: m, cm or mm")
+    return METERS_PER_UNIT[unit]
 
 
 REMEDY = "give an (N, 3) array or a point cloud of Open3D"
 
 
 def as_points(cloud: Any, role: str) -> np.ndarray:
-    """Return the points (N, 3) float64 of an array, a list, a tensor on any device, or a cloud of Open3D, old or new.
+    """Return the points (N, 3) float64 of an array, a list, a tensor, or a cloud of Open3D, old or new, of this role.
 
-    Open3D is not imported: its clouds are recognized by ``points`` or ``point.positions``. `role` names the cloud.
+    Open3D is not imported: its clouds are recognized by ``points`` or ``point.positions``.
     """
     values = cloud
     if not isinstance(cloud, np.ndarray):

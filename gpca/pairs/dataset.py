@@ -32,16 +32,7 @@ RIGID_TOLERANCE = 1e-2  # of a rotation's products with itself; datasets round t
 
 @dataclass(frozen=True)
 class Registrations(Container):
-    """S registrations. Lengths are relative to the object's diameter unless the name ends in ``_m``.
-
-    Attributes:
-        cluster, fold: samples that are alike: a family of shapes or a scene (:mod:`gpca.objects.canonical`).
-        severity_noise, severity_rotation_rad, severity_translation, severity_crop: as drawn, 0 where not applied.
-        T_target_source_true, T_target_source_init, T_target_source_icp: translations in meters.
-        points: the ICP-aligned source clouds in the target's frame, one after another; see :meth:`cloud`.
-        target_points: the clean target clouds in the same frame; see :meth:`target`.
-        attached: arrays (S, …) from other files, for explainers that read them: ``embedding``, ``head_logits``, …
-    """
+    """S registrations. Lengths are relative to the object's diameter unless the name ends in ``_m``."""
 
     names_axes: ClassVar[bool] = True
 
@@ -51,22 +42,23 @@ class Registrations(Container):
     object_index: np.ndarray = array("S", WHOLE, least=0)
     object_name: np.ndarray = array("S", TEXT)
     diameter_m: np.ndarray = array("S", least=SMALLEST_DIAMETER_M, most=LARGEST_DIAMETER_M)
-    cluster: np.ndarray = array("S", TEXT)
+    cluster: np.ndarray = array("S", TEXT)  # of samples that are alike (:mod:`gpca.objects.canonical`)
     fold: np.ndarray = array("S", WHOLE)
-    severity_noise: np.ndarray = array("S", least=0)
+    severity_noise: np.ndarray = array("S", least=0)  # each as drawn, 0 where not applied
     severity_rotation_rad: np.ndarray = array("S", least=0)
     severity_translation: np.ndarray = array("S", least=0)
     severity_crop: np.ndarray = array("S", least=0)
-    T_target_source_true: np.ndarray = array("S 4 4")
+    T_target_source_true: np.ndarray = array("S 4 4")  # translations in meters
     T_target_source_init: np.ndarray = array("S 4 4")
     T_target_source_icp: np.ndarray = array("S 4 4")
     fitness: np.ndarray = array("S", least=0, most=1)
     inlier_rmse: np.ndarray = array("S", least=0)
+    # ICP-aligned source clouds, and clean targets in the same frame, one after another: :meth:`cloud`, :meth:`target`
     points: np.ndarray = array("P 3", offsets="offsets", fewest=3, least=-FARTHEST, most=FARTHEST)
     offsets: np.ndarray = array("S+1", WHOLE)
     target_points: np.ndarray = array("Q 3", offsets="target_offsets", fewest=3, least=-FARTHEST, most=FARTHEST)
     target_offsets: np.ndarray = array("S+1", WHOLE)
-    attached: Mapping[str, np.ndarray] = field(default_factory=dict)
+    attached: Mapping[str, np.ndarray] = field(default_factory=dict)  # (S, …) of other files: ``embedding``, …
 
     def cloud(self, i: int) -> np.ndarray:
         """Return the aligned source cloud (P, 3) of row i."""

@@ -111,10 +111,9 @@ READINGS: tuple[str, ...] = get_args(Reading)
 
 
 def read_as(reading: str, registrations: Registrations, icp: ICPSettings) -> Registrations:
-    """Return the registrations with the clouds that the encoder sees: the paper leaves open which it means.
+    """Return the registrations with the clouds that the encoder sees, which the paper leaves open.
 
-    ``aligned`` is the observed cloud as ICP left it, ``observed`` at the initial pose, before ICP; ``reversed`` is
-    aligned by ICP from the model to it. Raises InputError for another reading.
+    ``aligned`` is the observed cloud after ICP, ``observed`` before it, ``reversed`` aligned by ICP from the model.
     """
     if reading == "aligned":
         return registrations

@@ -150,10 +150,7 @@ class ScanSuccess:
 
 
 def overlap_rmse(pair: ScanPair, T_target_source: np.ndarray) -> float:
-    """Return the root mean square distance (m) of the common points of the source from their true places.
-
-    All points count where fewer than three are common (:attr:`ScanPair.source_common_N`).
-    """
+    """Return the RMSE (m) of the source's common points, or of all if fewer than three, from their true places."""
     common_N = pair.source_common_N
     points_n_3 = pair.source_N_3[common_N] if common_N.sum() >= FEWEST_COMMON else pair.source_N_3
     moved_n_3 = transform(T_target_source, points_n_3) - transform(pair.T_target_source, points_n_3)

@@ -121,11 +121,7 @@ def stratum_of(overlap: float, edges: Sequence[float]) -> str | None:
 
 
 def choose_pairs(scenes: Iterable[ScannedScene], edges: Sequence[float], most: int, *axes: object) -> list[ScanPair]:
-    """Return up to `most` pairs of each scene and stratum of overlap, stratum by stratum, scene by scene.
-
-    Scenes are read one after another, and only the chosen clouds are kept. The axes name the random numbers; a scene's
-    draw does not depend on the other scenes.
-    """
+    """Return up to `most` pairs of each stratum and scene, drawn by the axes and by no other scene."""
     chosen: dict[str, list[ScanPair]] = {stratum_name(*ends): [] for ends in pairwise(edges)}
     for scene in scenes:
         by_stratum: dict[str, list] = {name: [] for name in chosen}

@@ -23,8 +23,9 @@ from gpca.io.files import require_file
 from gpca.numerals import decimal, whole
 from gpca.objects.canonical import require_points
 from gpca.objects.entry import Place, Text, Unit
-from gpca.objects.mesh_folder import meters_per, read_surface
+from gpca.objects.mesh_folder import read_surface
 from gpca.objects.source import places_of
+from gpca.objects.surface import meters_per
 from gpca.rigid import require_rigid, scale_translation
 from gpca.scans.pair import Kind
 from gpca.scans.scene import Known, Scan, ScannedScene
@@ -249,10 +250,7 @@ def entry_of(settings: Mapping[str, Any]) -> ScanEntry:
 
 
 def place_of(entry: ScanEntry, data_dir: str | None) -> Path | None:
-    """Return the file or folder of a data set, in `data_dir` or the repository's data.
-
-    None for a virtual one, or an optional one that is missing; InputError for any other that is missing.
-    """
+    """Return the file or folder of a data set; None for a virtual one, or an optional one that is missing."""
     if entry.kind == "virtual":
         return None
     places = places_of(entry.location or "", data_dir)
@@ -280,10 +278,7 @@ READERS: dict[str, Callable[[ScanEntry, Path], Iterator[ScannedScene]]] = {
 
 
 def scenes_of(entry: ScanEntry, place: Path | None, role: str, most_points: int) -> Iterator[ScannedScene]:
-    """Yield the scenes of a data set that the `role` of the run sees, one by one.
-
-    Larger scans are thinned to `most_points`, drawn at random. InputError for no scenes of the role, or faulty files.
-    """
+    """Yield the scenes that the `role` of a run sees, their scans thinned at random to `most_points`."""
     if entry.kind == "virtual":
         from gpca.scans import virtual  # loads trimesh, which nothing needs that plans a run
 

@@ -142,10 +142,7 @@ def _furniture(at_2: np.ndarray, extent_3: np.ndarray, random: np.random.Generat
 
 
 def _turned(vertices_V_3: np.ndarray, wall: int) -> np.ndarray:
-    """Return vertices turned about z by as many right angles, so that what stood at the wall of largest y stands there.
-
-    Its coordinates are exchanged, not multiplied: a quarter turn takes (x, y) to (-y, x).
-    """
+    """Return vertices after quarter turns about z, by exchanged coordinates: (x, y) becomes (-y, x)."""
     x, y, z = vertices_V_3.T
     for _ in range(wall):
         x, y = -y, x

@@ -21,7 +21,7 @@ from gpca.explainers.pair_classifier import NormalizedFeatures
 from gpca.jobs.job import Job
 from gpca.jobs.provenance import record_provenance
 from gpca.pairs.dataset import Registrations, load_embeddings
-from gpca.pairs.description import describe_registrations
+from gpca.pairs.distances import describe_registrations
 from gpca.process.progress import progress
 from gpca.settings import fields_of, read_settings
 

@@ -24,7 +24,7 @@ from gpca.jobs.job import Job
 from gpca.jobs.provenance import record_provenance
 from gpca.objects.canonical import ObjectClouds
 from gpca.pairs.dataset import Registrations, read_embedding
-from gpca.pairs.description import describe_registrations
+from gpca.pairs.distances import describe_registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.progress import progress
 from gpca.settings import read_settings

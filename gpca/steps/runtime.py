@@ -26,8 +26,7 @@ from gpca.jobs.job import Job
 from gpca.jobs.provenance import record_provenance
 from gpca.model.explainer import Explainer
 from gpca.model.file import Model
-from gpca.objects.canonical import FEWEST_CLOUD_POINTS
-from gpca.objects.canonical_frame import CanonicalFrame
+from gpca.objects.canonical import FEWEST_CLOUD_POINTS, CanonicalFrame
 from gpca.pairs.dataset import Registrations, read_embedding
 from gpca.process.processor import cpu_name
 from gpca.process.progress import progress

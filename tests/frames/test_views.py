@@ -43,6 +43,8 @@ def test_views_are_few_and_of_the_objects_that_are_wanted(scenes):
     assert evenly([1, 2, 3, 4], 2) == [1, 3] and evenly([1, 2], 9) == [1, 2]
     with pytest.raises(InputError, match="no frame shows object 77; check objects"):
         list(bop.from_entry({"objects": [77]}, scenes))
+    with pytest.raises(InputError, match="objects: is an empty list; name the objects"):
+        list(bop.from_entry({"objects": []}, scenes))
     with pytest.raises(InputError, match="unit 'm': is not that of BOP frames"):
         list(bop.from_entry({"unit": "m"}, scenes))
 

@@ -8,7 +8,7 @@ import pytest
 
 from gpca.causes.truth import ALL, shapley_values
 from gpca.model.diagnosis import Reenacted, axis_in_words
-from gpca.objects.canonical_frame import CanonicalFrame
+from gpca.objects.canonical import CanonicalFrame
 from gpca.reenactment.enactment import Enactment
 from gpca.reenactment.hypotheses import Hypothesis
 from gpca.reenactment.surface import ModelSurface

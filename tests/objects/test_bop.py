@@ -13,6 +13,7 @@ from gpca.objects.bop import (
     find_symmetries,
     from_entry,
     read_symmetries,
+    require_entry,
     symmetric_turn,
 )
 from gpca.objects.canonical import canonical_cloud
@@ -52,6 +53,9 @@ def test_listed_objects_only(folder):
     assert [surface.name for surface in found] == ["obj_000001", "obj_000010"]
     with pytest.raises(InputError, match=r"obj_000003\.ply: no such model"):
         list(from_entry({"objects": [1, 3]}, folder))
+    for read in (from_entry, require_entry):
+        with pytest.raises(InputError, match="objects: is an empty list; name the objects, or leave it out for all"):
+            read({"objects": []}, folder)
 
 
 def test_unit_is_checked_against_the_listed_diameter(folder):

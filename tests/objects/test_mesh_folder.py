@@ -8,7 +8,8 @@ import pytest
 import trimesh
 
 from gpca.errors import InputError
-from gpca.objects.mesh_folder import SUFFIXES, files_in, from_entry, meters_per, read_surface
+from gpca.objects.mesh_folder import SUFFIXES, files_in, from_entry, read_surface
+from gpca.objects.surface import meters_per
 
 from ..hostile import refusal
 

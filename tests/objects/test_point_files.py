@@ -222,6 +222,10 @@ def test_points_come_from_the_package_of_the_format(tmp_path, monkeypatch, name,
     (tmp_path / name).write_bytes(b"scan")
     monkeypatch.setitem(sys.modules, package, module)
     np.testing.assert_array_equal(read_scanner_file(tmp_path / name), SCANNER_FILES_POINTS)
+    monkeypatch.setattr(E57, "scan_count", 0)
+    if package == "pye57":
+        with pytest.raises(InputError, match=r"scan\.e57: holds no scan"):
+            read_scanner_file(tmp_path / name)
 
 
 @pytest.mark.parametrize(("name", "package"), [("scan.laz", "laspy"), ("scan.e57", "pye57")])

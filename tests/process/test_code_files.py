@@ -116,7 +116,7 @@ STEPS = {  # module -> files that it depends on, and some that it does not
         {"gpca/explainers/interface.py", "gpca/active_learning/stream.py"},
     ),
     "gpca.steps.frame_labels": (
-        {"gpca/active_learning/retraining.py", "gpca/pairs/description.py"},
+        {"gpca/active_learning/retraining.py", "gpca/pairs/distances.py"},
         {"gpca/explainers/interface.py", "gpca/active_learning/stream.py", "gpca/frames/synthesis.py"},
     ),
     "gpca.steps.pairs:uncertainty": (

@@ -95,7 +95,7 @@ def test_an_explainer_cannot_see_what_was_perturbed(six):
 
 
 def test_what_is_measured_of_a_registration_is_measured_once_for_all_controls(six, monkeypatch):
-    import gpca.pairs.description as registered
+    import gpca.pairs.distances as registered
 
     measured = []
     describe = registered.describe_registrations
