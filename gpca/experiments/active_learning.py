@@ -72,16 +72,13 @@ def check(config: dict, _left_out: LeftOut) -> None:
     require_draws("active_learning.without", encoder, points, "registrations.cloud_points")
 
 
-def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
-    """The strategies, and those of them that choose from a pool."""
-    chosen = list(config["active_learning"]["strategies"])
-    return {"strategy": chosen, "pool_strategy": [name for name in chosen if name not in STREAMS]}
-
-
 EXPERIMENT = Experiment(
     name=NAME,
     sections={"active_learning": Section},
-    names=names,
+    names=lambda config, sources: {
+        "strategy": list(config[NAME]["strategies"]),
+        "pool_strategy": [name for name in config[NAME]["strategies"] if name not in STREAMS],
+    },
     check=check,
     switches={"active_learning.strategies": Names("strategy", titles)},
 )
@@ -166,8 +163,7 @@ def table3_active_learning(run: Run, metrics: Frame, clusters: Clusters) -> Tabl
         "epochs_bald_kmeans": quantity("epochs_at_target", "Epochs", "bald_kmeans", **COUNT),
     }
     rows = crossed(("source", run.source_titles), ("setting", settings))
-    of_papers = metrics[metrics["concept"] == PAPERS_HELD_OUT]
-    sheet = _sheet(run, "table3_active_learning", ("source", "setting"), rows, columns, of_papers, clusters)
+    inputs = metrics[metrics["concept"] == PAPERS_HELD_OUT], clusters
     other = "Other rows: " if shares else ""
     notes = [
         *_rare_note(learning),
@@ -176,27 +172,32 @@ def table3_active_learning(run: Run, metrics: Frame, clusters: Clusters) -> Tabl
         "Epochs: passes of the retraining that reached the target. Acc.: after all labels.",
     ]
     caption = f"Labels until a GPC that knew noise and pose reaches {learning['target']:.0%} on all concepts"
-    return _table(run, sheet, caption, notes, bold_across=labels)
+    heads = "source", "setting"
+    return _table(run, "table3_active_learning", heads, rows, columns, inputs, caption, notes, bold_across=labels)
 
 
+FINAL = {
+    "final_accuracy": quantity("final_accuracy", "Accuracy (%)"),
+    "final_accuracy_new": quantity("final_accuracy_new", "New (%)"),
+}
 HEADS = {"source": "Dataset", "setting": "Encoder saw", "strategy": "Strategy"}
 
 
-def _sheet(
+def _table(
     run: Run,
     name: str,
     heads: Iterable[str],
     rows: list[Row],
     columns: Mapping[str, Show],
-    metrics: Frame,
-    clusters: Clusters,
-) -> Sheet:
+    inputs: tuple[Frame, Clusters],
+    caption: str,
+    notes: Iterable[str],
+    **compared: Any,
+) -> Table:
+    metrics, clusters = inputs
     metrics = metrics.assign(setting=metrics["table"].str.removeprefix(TABLE))
     cell = label_cells(run.config["registrations"]["test"], clusters)
-    return Sheet(name, {head: HEADS[head] for head in heads}, rows, columns, metrics, cell=cell)
-
-
-def _table(run: Run, sheet: Sheet, caption: str, notes: Iterable[str], **compared: Any) -> Table:
+    sheet = Sheet(name, {head: HEADS[head] for head in heads}, rows, columns, metrics, cell=cell)
     over = f"{cautious_over(sheet.most_seeds(), run.config['registrations']['test'])}."
     caption += run.stand_ins(partly=False)
     return sheet.table(caption, "quantity", (over, *notes), keep_empty=True, **compared)
@@ -246,11 +247,11 @@ def _draw(run: Run, files: Paths, rows: Mapping[str, str], held_out: Collection[
 def table3_extended(run: Run, metrics: Frame, clusters: Clusters) -> Table:
     learning = run.config["active_learning"]
     columns = {
-        f"labels_{c}": quantity("labels_to_target", f"Labels, {c}", concept=c, **COUNT) for c in _concepts(metrics)
+        f"labels_{c}": quantity("labels_to_target", f"Labels, {c}", concept=c, **COUNT)
+        for c in metrics["concept"].unique()
     } | {
         "reached": quantity("reached", "Reached (%)", decimals=0, interval=False),
-        "final_accuracy": quantity("final_accuracy", "Accuracy (%)"),
-        "final_accuracy_new": quantity("final_accuracy_new", "New (%)"),
+        **FINAL,
         "area_under_curve": quantity("area_under_curve", "Area (%)"),
         "area_gain": quantity("area_gain", "Gain (%)", limits=(-100, 100)),
     }
@@ -259,7 +260,6 @@ def table3_extended(run: Run, metrics: Frame, clusters: Clusters) -> Table:
         replace(row, rival=not require_strategy(row.where["method"]).oracle)
         for row in crossed(("source", run.source_titles), ("setting", SETTINGS), ("method", pool))
     ]
-    sheet = _sheet(run, "table3_extended", HEADS, rows, columns, metrics, clusters)
     notes = [
         _protocol(run),
         "Labels: until the target, by the concept held out. Reached: share of the runs that reached it. Accuracy: "
@@ -268,7 +268,8 @@ def table3_extended(run: Run, metrics: Frame, clusters: Clusters) -> Table:
         "concepts held out, then over the seeds.",
     ]
     caption = f"Active learning of a held-out concept by every strategy, to {learning['target']:.0%}"
-    return _table(run, sheet, caption, notes, bold=[key for key in columns if key != "reached"], same=2)
+    bold, inputs = [key for key in columns if key != "reached"], (metrics, clusters)
+    return _table(run, "table3_extended", HEADS, rows, columns, inputs, caption, notes, bold=bold, same=2)
 
 
 @table(
@@ -281,17 +282,16 @@ def table3_extended(run: Run, metrics: Frame, clusters: Clusters) -> Table:
 def table3_stream(run: Run, metrics: Frame, clusters: Clusters) -> Table:
     learning = run.config["active_learning"]
     stream = learning["stream"]
-    columns = {f"delay_{c}": quantity("delay", f"Delay, {c}", concept=c, **COUNT) for c in _concepts(metrics)} | {
+    concepts = metrics["concept"].unique()
+    columns = {f"delay_{c}": quantity("delay", f"Delay, {c}", concept=c, **COUNT) for c in concepts} | {
         "labels": quantity("labels", "Labels", interval=False, **COUNT),
         "new_labels": quantity("new_labels", "Labels of the new", interval=False, **COUNT),
         "running_accuracy": quantity("running_accuracy", "Running (%)"),
-        "final_accuracy": quantity("final_accuracy", "Accuracy (%)"),
-        "final_accuracy_new": quantity("final_accuracy_new", "New (%)"),
+        **FINAL,
     }
     streams = {name: title for name, title in titles(learning["strategies"]).items() if name in STREAMS}
     rows = crossed(("source", run.source_titles), ("method", streams))
-    pretrained = metrics[metrics["table"] == f"{TABLE}pretrained"]
-    sheet = _sheet(run, "table3_stream", ("source", "strategy"), rows, columns, pretrained, clusters)
+    heads, inputs = ("source", "strategy"), (metrics[metrics["table"] == f"{TABLE}pretrained"], clusters)
     notes = [
         f"{stream['arrivals']} samples arrive one by one; the first {stream['quiet']} are of the two known "
         f"concepts ({learning['initial']} labeled samples at the start); a third of the others is new. A label "
@@ -303,11 +303,8 @@ def table3_stream(run: Run, metrics: Frame, clusters: Clusters) -> Table:
         "means over the concepts held out, then over the seeds.",
     ]
     bold = [key for key in columns if "labels" not in key]
-    return _table(run, sheet, "A new concept in a stream of registrations", notes, bold=bold, same=1)
-
-
-def _concepts(metrics: Frame) -> list[str]:
-    return list(dict.fromkeys(metrics["concept"]))
+    caption = "A new concept in a stream of registrations"
+    return _table(run, "table3_stream", heads, rows, columns, inputs, caption, notes, bold=bold, same=1)
 
 
 def _protocol(run: Run) -> str:

@@ -33,6 +33,7 @@ CAPTION_IN = 0.17
 TRUTH = "measured share φ"
 ROW_IN = 0.19
 CLEAR = 0.6  # share of the largest φ in the sum of all from which a cause is clear
+WORDS = {subset: " + ".join(CONCEPTS[i] for i in SUBSETS[subset]) or "none" for subset in BY_SIZE} | {ALL: "all three"}
 GAP = 0.5  # of a row, between the measured shares and the scores, which are none
 
 
@@ -61,12 +62,10 @@ def draw_causes_example(
     figure = use_style().figure(figsize=(TEXT_WIDTH_IN, height_in), layout="constrained")
     left, right = figure.subfigures(1, 2, width_ratios=(PANELS_IN, TEXT_WIDTH_IN - PANELS_IN))
     view = widest_views(model)[0]
-    everything = np.concatenate([model @ view.T, *(cloud @ view.T for cloud in observed_8)])
-    corners = np.quantile(everything, (0.001, 0.999), axis=0)
-    for panel, subset in zip(left.subplots(4, 2).flat, BY_SIZE, strict=True):
-        draw_clouds(panel, model @ view.T, observed_8[subset] @ view.T, size=0.9, corners=corners)
-        words = "all three" if subset == ALL else " + ".join(CONCEPTS[i] for i in SUBSETS[subset]) or "none"
-        write_below(panel, f"{words}: {100 * causes.truth.error[row, subset]:.1f} %", fontsize=SMALL_PT)
+    clouds = {
+        f"{words}: {100 * causes.truth.error[row, subset]:.1f} %": observed_8[subset] for subset, words in WORDS.items()
+    }
+    _draw_clouds(left.subplots(4, 2), model, clouds, view, size=0.9, cut=0.001)
     table, spare = right.subplots(2, 1, height_ratios=(rows_in, max(height_in - HEAD_IN - rows_in, 0.01)))
     spare.set_axis_off()
     _draw_scores(table, names, scores_R_4, verdicts)
@@ -101,20 +100,20 @@ def _scores(causes: Causes, row: int, files: Paths, explainers: Mapping[str, str
     registrations, truth = causes.registrations, causes.truth
     phi = np.maximum(truth.phi[row], 0)
     tied = np.array(CONCEPTS)[truth.tied[row]]
-    by_name, verdict_of = {}, {}
+    answers: dict[str, tuple[list[float], str]] = {}
     for path in files:
         _, name, _ = source_method_seed(path)
         rows = read_predictions(path)
-        of_sample = (rows["split"] == registrations.split[row]) & (rows["sample"] == str(registrations.sample[row]))
-        prediction = rows[of_sample].iloc[0]
+        chosen = (rows["split"] == registrations.split[row]) & (rows["sample"] == str(registrations.sample[row]))
+        prediction = rows[chosen].iloc[0]
         if not prediction["abstained"]:
-            by_name[name] = [prediction[f"score_{label}"] for label in LABELS]
             named = prediction["concept_predicted"]
-            verdict_of[name] = "right" if named == truth.dominant[row] else "tie" if named in tied else "wrong"
-    named = [name for name in explainers if name in by_name]
-    shares = [0.0, *(phi / max(phi.sum(), 1e-9))]
-    scores_R_4 = np.array([shares, *(by_name[name] for name in named)], float)
-    return [TRUTH, *(explainers[name] for name in named)], scores_R_4, ["", *(verdict_of[name] for name in named)]
+            verdict = "right" if named == truth.dominant[row] else "tie" if named in tied else "wrong"
+            answers[name] = [prediction[f"score_{label}"] for label in LABELS], verdict
+    titles = [title for name, title in explainers.items() if name in answers]
+    shown = [answers[name] for name in explainers if name in answers]
+    scores_R_4 = np.array([[0.0, *(phi / max(phi.sum(), 1e-9))], *(scores for scores, _ in shown)], float)
+    return [TRUTH, *titles], scores_R_4, ["", *(verdict for _, verdict in shown)]
 
 
 def _draw_scores(panel, names: list[str], scores_R_4: np.ndarray, verdicts: Sequence[str]) -> None:
@@ -191,13 +190,17 @@ def draw_reenactment(
         f"{k + 1}: {100 * weight:.0f} %": transform(enactment.hypothesis.T, before)
         for k, (enactment, weight) in enumerate(zip(again, weight_K, strict=True))
     }
-    _draw_row(above, "Hypotheses of the true pose, and how probable each is", pair.model, placed, view)
     rebuilt = again[0].candidate
     clouds = {
         name: rebuilt.observed(tuple(cause for cause in present if rebuilt.applied[cause]))
         for name, present in CLOUDS.items()
     }
-    _draw_row(between, "Clouds rebuilt under hypothesis 1", pair.model, clouds, view)
+    for part, words, shown in (
+        (above, "Hypotheses of the true pose, and how probable each is", placed),
+        (between, "Clouds rebuilt under hypothesis 1", clouds),
+    ):
+        part.suptitle(words, x=0.005, ha="left", fontsize=SMALL_PT)
+        _draw_clouds(part.subplots(1, PER_ROW), pair.model, shown, view, size=0.6, cut=0.005)
     _draw_errors(below.subplots(), causes.truth.error[row], errors_K_8, weight_K)
     below.suptitle("Mean error over the starts, with these causes", x=0.005, ha="left", fontsize=SMALL_PT)
     write_title(figure, f"{title}: {object_in_words(causes.registrations.object_name[row], dataset)}")
@@ -205,16 +208,16 @@ def draw_reenactment(
     return figure
 
 
-def _draw_row(figure, words: str, model: np.ndarray, clouds: Mapping[str, np.ndarray], view: np.ndarray) -> None:
-    """Draw clouds over the model, each with its name below; all have one scale, and what lies far off is cut."""
-    figure.suptitle(words, x=0.005, ha="left", fontsize=SMALL_PT)
+def _draw_clouds(
+    panels: np.ndarray, model: np.ndarray, clouds: Mapping[str, np.ndarray], view: np.ndarray, size: float, cut: float
+) -> None:
+    """Draw clouds over the model, each with its name below; all have one scale, and a share far off is cut."""
     seen = {name: cloud @ view.T for name, cloud in clouds.items()}
-    everything = np.concatenate([model @ view.T, *seen.values()])
-    corners = np.quantile(everything, (0.005, 0.995), axis=0)
-    for panel, name in zip(figure.subplots(1, PER_ROW).flat, [*seen, *[""] * PER_ROW], strict=False):
+    corners = np.quantile(np.concatenate([model @ view.T, *seen.values()]), (cut, 1 - cut), axis=0)
+    for panel, name in zip(panels.flat, [*seen, *[""] * (panels.size - len(seen))], strict=True):
         panel.set_axis_off()
         if name:
-            draw_clouds(panel, model @ view.T, seen[name], size=0.6, corners=corners)
+            draw_clouds(panel, model @ view.T, seen[name], size=size, corners=corners)
             write_below(panel, name, fontsize=SMALL_PT)
 
 
@@ -230,8 +233,7 @@ def _draw_errors(panel, true_8: np.ndarray, error_K_8: np.ndarray, weight_K: np.
         area = LEAST_AREA + (MOST_AREA - LEAST_AREA) * weight
         look = {"s": area, "color": color, "marker": marker, "linewidths": 0, "zorder": 3}
         panel.scatter(100 * error_8[subsets], place_8 + spread[k], label=f"re-enacted, {k + 1}", **look)
-    words = {subset: " + ".join(CONCEPTS[i] for i in SUBSETS[subset]) or "none" for subset in subsets}
-    panel.set_yticks(place_8, list((words | {ALL: "all three"}).values()))
+    panel.set_yticks(place_8, list(WORDS.values()))
     panel.invert_yaxis()
     panel.set_xlim(left=0)
     panel.xaxis.set_major_locator(MaxNLocator("auto", prune="upper"))  # else the last number may reach over the edge

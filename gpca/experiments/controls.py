@@ -33,14 +33,10 @@ USUAL, RIVAL, NO_TRAINING = "usual", "rival", "untrained"  # kinds of difference
 
 @dataclass(frozen=True, kw_only=True)
 class Section(samples.ControlSettings):
-    """The controls, and the explainers under them, with settings beyond those that they have elsewhere.
-
-    Attributes:
-        hard: how the hard samples are drawn: as the causes, with these changes.
-    """
+    """The controls, and the explainers under them, with settings beyond those that they have elsewhere."""
 
     explainers: ByName
-    hard: Annotated[dict, changes_of(CauseSettings, without=NOT_OF_CAUSES)]
+    hard: Annotated[dict, changes_of(CauseSettings, without=NOT_OF_CAUSES)]  # from how the causes are drawn
 
 
 def check(config: dict, _left_out: LeftOut) -> None:

@@ -215,9 +215,7 @@ def compared_samples(
 ) -> list[tuple]:
     """Rows of :func:`gpca.evaluation.measures.compared`; the ``samples`` are those that a measure depends on.
 
-    Args:
-        samples_of: explainer -> the same N samples beside its predictions.
-        measured: returns the measures of samples by weights of these.
+    All explainers have the same samples; `measured` returns the measures of samples by weights of these.
     """
     samples = next(iter(samples_of.values()))
     values = {explainer: measured(each, draws.weights) for explainer, each in samples_of.items()}

@@ -162,15 +162,8 @@ def draw_ellipses(
 ) -> list[str]:
     """Draw one registration in the plane in which the results of other starts and data spread most.
 
-    Returns the estimators whose ellipses are far wider than the results and are therefore left out.
-
-    Args:
-        panel: the matplotlib axes.
-        samples: the references' results.
-        place: the row in the samples of the registration and of that reference.
-        estimates: estimator -> its row about the registration, None where it has none.
-        block: the numbers of a twist that are drawn, rotation or translation.
-        factor: their factor to the panel's unit.
+    `block` are the numbers of a twist that are drawn, times `factor`. Returns the estimators whose ellipses are far
+    wider than the results and are therefore left out.
     """
     twists_n_3 = factor * samples.twists_of(place)[:, block]
     values_3, axes_3_3 = np.linalg.eigh(np.cov(twists_n_3, rowvar=False))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from itertools import product
 from math import inf
 from typing import Any
 
@@ -10,7 +12,7 @@ from gpca.declarations.plan import Run
 from gpca.declarations.result import Frame, table
 from gpca.evaluation.intervals import REPEATS
 from gpca.experiments import estimators
-from gpca.reporting.tables.builder import TableBuilder, crossed
+from gpca.reporting.sheet import Row, Sheet, crossed, with_label
 from gpca.reporting.tables.cells import interval_cell, plain_cell, rows_where
 from gpca.reporting.tables.table import Cell, Column
 from gpca.reporting.words import plural
@@ -41,14 +43,9 @@ def _methods(run: Run) -> dict[str, str]:
     return run.titles(method_entry, run.config["estimator_pairs"]["methods"])
 
 
-def _values(intervals: Frame, method: str, state: str, name: str) -> Frame:
-    return rows_where(intervals, method=method, state=state, estimator=name).set_index("metric")
-
-
 def _cell(values: Frame, metric: str) -> Cell | None:
-    if metric not in values.index:
-        return None
-    return interval_cell(values.loc[metric], factor=100 if metric.startswith("coverage") else 1)
+    rows = rows_where(values, metric=metric)
+    return interval_cell(rows.iloc[0], factor=100 if metric.startswith("coverage") else 1) if len(rows) else None
 
 
 def _count(values: Frame, metric: str) -> Cell | None:
@@ -67,42 +64,42 @@ def _count(values: Frame, metric: str) -> Cell | None:
 )
 def table12_uncertainty(run: Run, intervals):
     heads = {"method": "Registered by", "state": "State", "estimator": "Estimator", "models": "Models"}
-    builder = TableBuilder("table12_uncertainty", heads)
     methods, entries = _methods(run), estimators.estimates(run.config, run.sources)
-    for (method, state), labels in crossed(methods, {estimators.SUCCEEDED: "Succeeded", estimators.FAILED: "Failed"}):
-        for name, entry in entries.items():
-            models = entry["models"]
-            values = _values(intervals, method, state, name)
-            cells = {metric: _cell(values, f"{metric}_{REFERENCE_OF[models]}") for metric in BY_MODEL}
-            cells |= {metric: _cell(values, metric) for metric in BY_TRUTH}
-            cells["samples"] = _count(values, f"coverage_{estimators.TRUTH}")
-            builder.add_row([*labels, (name, entry["title"]), (models, models)], cells)
-    builder.compare_down(("kl_rotation", "kl_translation"), same=2)
-    refused = []
-    for method, title in methods.items():
-        for name, entry in entries.items():
-            if set(rows_where(intervals, method=method, estimator=name)["metric"]) == {"no_estimate"}:
-                refused.append(f"{entry['title']}, of {title}")
-    return builder.build(
-        caption="What estimators say of the covariance of a pose, by what they model" + run.stand_ins(),
-        column_head="metric",
-        columns={"samples": Column("n", 0, **RATIO), **BY_MODEL, **BY_TRUTH},
-        footnotes=(
-            f"n: registrations with an estimate, of all datasets and {plural(builder.most_seeds(), 'seed')}. In "
-            f"brackets: the 95 % interval of a bootstrap over families of objects and seeds ({REPEATS} draws); of a "
-            "divergence it is left out where it is wider than the value, and the CSV holds it. Failed: an error of "
-            f"{100 * run.config['success']['error']:g} % of the diameter or more.",
-            f"Each estimator is judged by {run.config['estimator_pairs']['repeats']} further registrations, between "
-            "which varies what it models: other starts; other data, which is the surface sampled again with other "
-            "noise and other outliers; or both, also for one that models the error. A posterior is judged by other "
-            "data, as a right one is about as wide as the results of these.",
-            "KL: from the covariance of those results. NNE, NEES / 6 and coverage: of those results about their mean. "
-            "The first two are near 1 and the coverage is 95 % if the covariance is theirs; above 1, or below 95 %, an "
-            "estimator is overconfident. KL, NNE and NEES are trimmed means (10 to 90 %). True pose: these of the "
-            "error, which also has what moves all runs alike. Bold: least divergence of a method and state.",
-            *([f"Left out, as they refuse every registration: {'; '.join(refused)}."] if refused else []),
-        ),
+    titles = {name: entry["title"] for name, entry in entries.items()}
+    states = {estimators.SUCCEEDED: "Succeeded", estimators.FAILED: "Failed"}
+    rows = crossed(("method", methods), ("state", states), ("estimator", titles))
+    rows = with_label(rows, lambda row: entries[row.where["estimator"]]["models"])
+    columns = {"samples": Column("n", 0, **RATIO), **BY_MODEL, **BY_TRUTH}
+
+    def cells(row: Row, subset: Frame) -> dict[str, Cell | None]:
+        reference = REFERENCE_OF[entries[row.where["estimator"]]["models"]]
+        by_reference = {metric: _cell(subset, f"{metric}_{reference}") for metric in BY_MODEL}
+        samples = {"samples": _count(subset, f"coverage_{estimators.TRUTH}")}
+        return by_reference | {metric: _cell(subset, metric) for metric in BY_TRUTH} | samples
+
+    sheet = Sheet("table12_uncertainty", heads, rows, columns, intervals, more=cells)
+    refused = [
+        f"{title}, of {methods[method]}"
+        for method, (name, title) in product(methods, titles.items())
+        if set(rows_where(intervals, method=method, estimator=name)["metric"]) == {"no_estimate"}
+    ]
+    notes = (
+        f"n: registrations with an estimate, of all datasets and {plural(sheet.seeds, 'seed')}. In "
+        f"brackets: the 95 % interval of a bootstrap over families of objects and seeds ({REPEATS} draws); of a "
+        "divergence it is left out where it is wider than the value, and the CSV holds it. Failed: an error of "
+        f"{100 * run.config['success']['error']:g} % of the diameter or more.",
+        f"Each estimator is judged by {run.config['estimator_pairs']['repeats']} further registrations, between "
+        "which varies what it models: other starts; other data, which is the surface sampled again with other "
+        "noise and other outliers; or both, also for one that models the error. A posterior is judged by other "
+        "data, as a right one is about as wide as the results of these.",
+        "KL: from the covariance of those results. NNE, NEES / 6 and coverage: of those results about their mean. "
+        "The first two are near 1 and the coverage is 95 % if the covariance is theirs; above 1, or below 95 %, an "
+        "estimator is overconfident. KL, NNE and NEES are trimmed means (10 to 90 %). True pose: these of the "
+        "error, which also has what moves all runs alike. Bold: least divergence of a method and state.",
+        *([f"Left out, as they refuse every registration: {'; '.join(refused)}."] if refused else []),
     )
+    caption = "What estimators say of the covariance of a pose, by what they model" + run.stand_ins()
+    return sheet.table(caption, "metric", notes, bold=("kl_rotation", "kl_translation"), same=2, keep_empty=True)
 
 
 @table(
@@ -114,7 +111,6 @@ def table12_uncertainty(run: Run, intervals):
 )
 def table12_references(run: Run, intervals):
     heads = {"method": "Registered by", "estimator": "Estimator", "models": "Models"}
-    builder = TableBuilder("table12_references", heads)
     columns = {}
     for kind in KINDS:
         columns[f"kl_rotation_{kind}"] = Column(f"{REFERENCES[kind]}: KL, rotation", 1, interval=False, **KL)
@@ -124,24 +120,32 @@ def table12_references(run: Run, intervals):
         f"reference_{kind}": {"title": f"Reference: {title.lower()}", "models": "–"}
         for kind, title in REFERENCES.items()
     }
-    for method, title in _methods(run).items():
-        for name, entry in (references | estimators.estimates(run.config, run.sources)).items():
-            values = _values(intervals, method, estimators.SUCCEEDED, name)
-            own = name.replace("reference_", "kl_rotation_")  # of a reference from itself
-            cells = {metric: _cell(values, metric) for metric in columns if metric != own}
-            labels = [(method, title), (name, entry["title"]), (entry["models"], entry["models"])]
-            builder.add_row(labels, cells, rival=name not in references)
-    builder.compare_down([metric for metric in columns if metric.startswith("kl_")], same=1)
-    return builder.build(
-        caption="Estimators against every kind of reference, registrations that succeeded" + run.stand_ins(),
-        column_head="metric",
-        columns=columns,
-        footnotes=(
-            f"Each reference: {run.config['estimator_pairs']['repeats']} registrations of the same situation, with "
-            "other starts, other data, or both. KL in nats, coverage and intervals are as in Table XII. Bold: least "
-            "divergence of a method, the references apart. The references' own rows say how much of the error each "
-            "kind of repetition sees.",
-        ),
+    entries = references | estimators.estimates(run.config, run.sources)
+    titles = {name: entry["title"] for name, entry in entries.items()}
+    rows = crossed(("method", _methods(run)), ("estimator", titles))
+    rows = with_label(rows, lambda row: entries[row.where["estimator"]]["models"])
+    rows = [replace(row, rival=row.where["estimator"] not in references) for row in rows]
+
+    def cells(row: Row, subset: Frame) -> dict[str, Cell | None]:
+        from_itself = row.where["estimator"].replace("reference_", "kl_rotation_")
+        return {metric: _cell(subset, metric) for metric in columns if metric != from_itself}
+
+    succeeded = rows_where(intervals, state=estimators.SUCCEEDED)
+    sheet = Sheet("table12_references", heads, rows, columns, succeeded, more=cells)
+    notes = (
+        f"Each reference: {run.config['estimator_pairs']['repeats']} registrations of the same situation, with "
+        "other starts, other data, or both. KL in nats, coverage and intervals are as in Table XII. Bold: least "
+        "divergence of a method, the references apart. The references' own rows say how much of the error each "
+        "kind of repetition sees.",
+    )
+    caption = "Estimators against every kind of reference, registrations that succeeded" + run.stand_ins()
+    return sheet.table(
+        caption,
+        "metric",
+        notes,
+        bold=[metric for metric in columns if metric.startswith("kl_")],
+        same=1,
+        keep_empty=True,
     )
 
 
@@ -154,47 +158,47 @@ def table12_references(run: Run, intervals):
     seconds=(estimators.collect_estimate_seconds, "timings/{source}/estimator_{estimate}/seed{seed}.csv"),
 )
 def table12_failures(run: Run, intervals, seconds):
-    builder = TableBuilder("table12_failures", {"method": "Registered by", "estimator": "Estimator"})
     entries = estimators.estimates(run.config, run.sources)
     titles = {name: entry["title"] for name, entry in entries.items()} | estimators.GATES
-    for method, method_title in _methods(run).items():
-        counted = rows_where(intervals, method=method, metric="no_estimate").groupby("state")["samples"].max()
-        counts = ", ".join(
-            f"{int(counted.get(state, 0))} {state}" for state in (estimators.SUCCEEDED, estimators.FAILED)
-        )
-        for name, title in titles.items():
-            values = _values(intervals, method, estimators.BOTH, name)
-            cells = {metric: _cell(values, metric) for metric in ("auroc_failed", "spearman_error")}
-            if "auroc_failed" in values.index:
-                row = values.loc["auroc_failed"]
-                cells["lead"] = interval_cell(row, "difference", ("difference_low", "difference_high"), 1)
-                cells["samples"] = _count(values, "auroc_failed")
-                of_states = rows_where(intervals, method=method, estimator=name, metric="no_estimate")
-                if total := int(of_states["samples"].sum()):
-                    refused = sum(of_states["value"] * of_states["samples"])
-                    cells["no_estimate"] = plain_cell(100 * refused / total, int(of_states["seeds"].iloc[0]), total)
-            of_name = rows_where(seconds, estimator=name, method=method)["seconds"]
-            if len(of_name) and cells.get("samples"):
-                cells["milliseconds"] = plain_cell(1e3 * of_name.iloc[0], 1, len(of_name))
-            builder.add_row([(method, f"{method_title}: {counts}"), (name, title)], cells)
-    builder.compare_down(("auroc_failed", "spearman_error"), same=1)
-    return builder.build(
-        caption="Whether the predicted spread of a pose finds failed registrations" + run.stand_ins(),
-        column_head="metric",
-        columns={
-            "samples": Column("n", 0, **RATIO),
-            "auroc_failed": Column("AUROC of failed", 3, limits=(0, 1)),
-            "lead": Column("Lead over the best gate", 3, limits=(-1, 1)),
-            "spearman_error": Column("Spearman with the error", 2, interval=False, limits=(-1, 1)),
-            "no_estimate": Column("None (%)", interval=False),
-            "milliseconds": Column("ms", **RATIO),
-        },
-        footnotes=(
-            "Spread: root mean square distance by which the points of the object would move. Lead: AUROC minus that of "
-            "the best other gate (inlier RMSE, fitness, spread of Monte-Carlo's starts) on the same registrations and "
-            "the same draws; an estimator tells more than a gate where the interval is above 0. Intervals as in Table "
-            "XII. Spearman: of the spread and the error. Bold: best of a method.",
-            "None: refused, or failed for a reason that the files name. ms: of one estimate, with descriptors, without "
-            "learning; the one column that differs from run to run.",
-        ),
+    methods = {}
+    for method, title in _methods(run).items():
+        counts = rows_where(intervals, method=method, metric="no_estimate").groupby("state")["samples"].max()
+        states = [f"{int(counts.get(state, 0))} {state}" for state in (estimators.SUCCEEDED, estimators.FAILED)]
+        methods[method] = f"{title}: {', '.join(states)}"
+
+    def cells(row: Row, subset: Frame) -> dict[str, Cell | None]:
+        both, counted = rows_where(subset, state=estimators.BOTH), rows_where(subset, metric="no_estimate")
+        cells = {metric: _cell(both, metric) for metric in ("auroc_failed", "spearman_error")}
+        areas, spent = rows_where(both, metric="auroc_failed"), rows_where(seconds, **row.where)["seconds"]
+        if not len(areas):
+            return cells
+        cells["lead"] = interval_cell(areas.iloc[0], "difference", ("difference_low", "difference_high"), 1)
+        cells["samples"] = _count(both, "auroc_failed")
+        if total := int(counted["samples"].sum()):
+            refused = sum(counted["value"] * counted["samples"])
+            cells["no_estimate"] = plain_cell(100 * refused / total, int(counted["seeds"].iloc[0]), total)
+        if len(spent):
+            cells["milliseconds"] = plain_cell(1e3 * spent.iloc[0], 1, len(spent))
+        return cells
+
+    columns = {
+        "samples": Column("n", 0, **RATIO),
+        "auroc_failed": Column("AUROC of failed", 3, limits=(0, 1)),
+        "lead": Column("Lead over the best gate", 3, limits=(-1, 1)),
+        "spearman_error": Column("Spearman with the error", 2, interval=False, limits=(-1, 1)),
+        "no_estimate": Column("None (%)", interval=False),
+        "milliseconds": Column("ms", **RATIO),
+    }
+    heads = {"method": "Registered by", "estimator": "Estimator"}
+    rows = crossed(("method", methods), ("estimator", titles))
+    sheet = Sheet("table12_failures", heads, rows, columns, intervals, more=cells)
+    notes = (
+        "Spread: root mean square distance by which the points of the object would move. Lead: AUROC minus that of "
+        "the best other gate (inlier RMSE, fitness, spread of Monte-Carlo's starts) on the same registrations and "
+        "the same draws; an estimator tells more than a gate where the interval is above 0. Intervals as in Table "
+        "XII. Spearman: of the spread and the error. Bold: best of a method.",
+        "None: refused, or failed for a reason that the files name. ms: of one estimate, with descriptors, without "
+        "learning; the one column that differs from run to run.",
     )
+    caption = "Whether the predicted spread of a pose finds failed registrations" + run.stand_ins()
+    return sheet.table(caption, "metric", notes, bold=("auroc_failed", "spearman_error"), same=1, keep_empty=True)

@@ -15,11 +15,10 @@ from gpca.declarations.plan import Run
 from gpca.declarations.result import Frame, Paths, Series, numbers
 from gpca.declarations.step import Plan, Step, Wildcards
 from gpca.errors import InputError, with_key
-from gpca.evaluation.intervals import interval, pigeonhole_weights
+from gpca.evaluation.intervals import Clustered, interval
 from gpca.evaluation.measures import source_method_seed, tidy
 from gpca.io import csv_file
 from gpca.process.plugins import is_outside
-from gpca.seeds import generator
 from gpca.settings import part_of
 from gpca.uncertainty.estimates import (
     KINDS,
@@ -170,46 +169,48 @@ def collect_intervals(_run: Run, files: Paths) -> Frame:
     """
     import pandas as pd
 
-    parts: dict[str, list[Frame]] = {}
-    for (source, estimator, seed), rows in read_estimate_files(files).items():
-        parts.setdefault(estimator, []).append(rows.assign(source=source, seed=seed))
-    pooled = {estimator: pd.concat(own, ignore_index=True) for estimator, own in parts.items()}
+    together = pd.concat(
+        [
+            rows.assign(source=source, estimator=estimator, seed=seed)
+            for (source, estimator, seed), rows in read_estimate_files(files).items()
+        ],
+        ignore_index=True,
+    )
     records: list[tuple] = []
-    for method in pooled[REFERENCES[0]]["method"].unique():
-        of_method = {name: own[own["method"] == method].reset_index(drop=True) for name, own in pooled.items()}
-        records += _of_method(method, {name: own for name, own in of_method.items() if len(own)})
+    for method, trials in together.groupby("method", sort=False):
+        by_estimator = trials.groupby("estimator", sort=False)
+        records += _compare(str(method), {str(name): rows.reset_index(drop=True) for name, rows in by_estimator})
     return pd.DataFrame(records, columns=list(COLUMNS))
 
 
-def _of_method(method: str, rows_of: Mapping[str, Frame]) -> list[tuple]:
+def _compare(method: str, rows_of: Mapping[str, Frame]) -> list[tuple]:
     """Records of one method; all estimators have the same registrations in the same order."""
     known = next(iter(rows_of.values()))
     cluster_N = (known["source"] + "/" + known["cluster"]).to_numpy()
-    drawn_B_N = pigeonhole_weights(generator("estimator intervals", method), known["seed"].to_numpy(), cluster_N)
-    weights_B_N = np.vstack([np.ones(len(known)), drawn_B_N])
-    found = known["fitness"] > 0  # without correspondences, a gate's score is the largest
+    draws = Clustered.drawn(known["seed"], cluster_N, "estimator intervals", method)
+    matched = known["fitness"] > 0  # without correspondences, a gate's score is the largest
     scores = {"gate_rmse": known["inlier_rmse"], "gate_fitness": -known["fitness"]}
-    gates = {name: known.assign(failure="", spread=score.where(found, np.inf)) for name, score in scores.items()}
+    gates = {name: known.assign(failure="", spread=score.where(matched, np.inf)) for name, score in scores.items()}
     rivals = gates | ({SPREAD_GATE: rows_of[SPREAD_GATE]} if SPREAD_GATE in rows_of else {})
     records = []
     for state, chosen_N in of_state(known).items():
         for name, rows in {**rows_of, **gates}.items():
             has_N = chosen_N & (rows["failure"] == "").to_numpy()
-            for metric, value_B in measure(rows, weights_B_N * chosen_N).items():
-                of_state_alone = (state == BOTH) == (metric in OF_BOTH) and (name not in GATES or metric in OF_BOTH)
-                if metric == "test_samples" or not of_state_alone or not np.isfinite(value_B[0]):
+            for metric, value_B in measure(rows, draws.weights * chosen_N).items():
+                has_state = (state == BOTH) == (metric in OF_BOTH) and (name not in GATES or metric in OF_BOTH)
+                if metric == "test_samples" or not has_state or not np.isfinite(value_B[0]):
                     continue
                 lead = ("", np.nan, np.nan, np.nan)
                 if metric == "auroc_failed":
                     areas = {}
-                    for gate, of_gate in rivals.items():
-                        score_N = of_gate["spread"].fillna(np.inf).to_numpy()
-                        areas[gate] = ranking(score_N, known["failed"].to_numpy(), weights_B_N * has_N)["area"]
+                    for gate, scored in rivals.items():
+                        score_N = scored["spread"].fillna(np.inf).to_numpy()
+                        areas[gate] = ranking(score_N, known["failed"].to_numpy(), draws.weights * has_N)["area"]
                     best = max((gate for gate in areas if gate != name), key=lambda gate: areas[gate][0])
                     lead = best, *interval(value_B - areas[best])
                 enough = len(set(cluster_N[has_N])) >= FEWEST_FAMILIES
-                own_n = drawn_B_N[:, has_N] if metric.startswith("coverage_") else None
-                estimate = interval(value_B, own_n) if enough else (value_B[0], np.nan, np.nan)
+                drawn_B_n = draws.weights[1:, has_N] if metric.startswith("coverage_") else None
+                estimate = interval(value_B, drawn_B_n) if enough else (value_B[0], np.nan, np.nan)
                 counted = int((chosen_N if metric == "no_estimate" else has_N).sum())
                 records.append((method, state, name, metric, counted, known["seed"].nunique(), *estimate, *lead))
     return records

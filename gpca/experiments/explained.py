@@ -12,8 +12,7 @@ from gpca.explainers.registry import explainer_entry, require_settings
 def require_explained(config: Mapping[str, Any], key: str) -> Iterator[tuple[str, str]]:
     """Check that every explainer at a key exists and takes its settings, which add to those that it has elsewhere.
 
-    Yields:
-        the key of each in the config, and its name.
+    Yields the key of each in the config, and its name.
     """
     section: Any = config
     for part in key.split("."):

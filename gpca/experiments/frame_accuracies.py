@@ -75,9 +75,6 @@ def parts_by_file(
 
     ``attribution`` is all of them, ``seen`` those of objects that a training sample shows, ``unseen`` the others,
     ``dataset/{name}`` those of one dataset's frames. A part without any row is left out.
-
-    Raises:
-        InputError: files of other names, files that do not belong together, what their readers refuse.
     """
     poses = {(Path(path).parts[-2], Path(path).stem): path for path in pose_files}
     for path in prediction_files:

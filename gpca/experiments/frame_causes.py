@@ -71,14 +71,6 @@ def _inside(plan: Plan) -> list[str]:
     return [name for name in plan.config["diagnosis"]["explainers"] if name not in plan.names["outside_explainer"]]
 
 
-def _encoder_and(plan: Plan, explainers: Iterable[str]) -> list[str]:
-    """Modules of the encoder and of explainers."""
-    return [
-        encoder_module(plan.config["diagnosis"]["encoder"]),
-        *(explainer_module(each, CAUSES) for each in explainers),
-    ]
-
-
 def _if_enacted(plan: Plan, files: str) -> str | list[str]:
     """Files of re-enactments, where an explainer of causes reads any."""
     read = [explainer_entry(name, CAUSES).reads for name in plan.config["diagnosis"]["explainers"]]
@@ -100,7 +92,10 @@ DIAGNOSE_FRAMES = Step(
     outputs={"predictions": "frame_diagnoses/seed{seed}.csv"},
     settings=lambda plan, wildcards: _asked(plan, _inside(plan)),
     params={"source": REAL_WORLD},
-    modules=lambda plan: _encoder_and(plan, _inside(plan)),
+    modules=lambda plan: [
+        encoder_module(plan.config["diagnosis"]["encoder"]),
+        *(explainer_module(name, CAUSES) for name in _inside(plan)),
+    ],
 )
 # Explainers from outside have jobs of their own, so that an edit of one leaves the others as they are.
 DIAGNOSE_FRAMES_OUTSIDE = replace(
@@ -108,7 +103,7 @@ DIAGNOSE_FRAMES_OUTSIDE = replace(
     name="diagnose_frames_outside",
     outputs={"predictions": "frame_diagnoses/{outside_explainer}/seed{seed}.csv"},
     settings=lambda plan, wildcards: _asked(plan, [wildcards.outside_explainer]),
-    modules=lambda plan: _encoder_and(plan, ()),
+    modules=lambda plan: [encoder_module(plan.config["diagnosis"]["encoder"])],
     modules_of_job=lambda plan, wildcards: [explainer_module(wildcards.outside_explainer, CAUSES)],
 )
 
@@ -132,14 +127,7 @@ def collect(
     An instance counts once in a measure, however many starts and seeds it has, and intervals are over scenes, since
     frames of one scene are alike. Beside the measures stands the number of `SAMPLES`. Counts, of `COUNTED`, are of
     starts, and also those of each dataset, ``real_rgbd/{kind}/{dataset}``. Scenes whose truth was made by ICP are
-    counted as `PSEUDO` and measure nothing.
-
-    Args:
-        causes_files, sample_files, prediction_files: one of each seed, in the same order, named ``…/seed{seed}.…``.
-        outside_files: predictions of explainers from outside, each of one seed and named so too.
-
-    Raises:
-        InputError: files that cannot be read, or are of different samples.
+    counted as `PSEUDO` and measure nothing. Files of causes, samples and predictions are in the same order of seeds.
     """
     import pandas as pd
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import replace
-from typing import Any
 
 from gpca.active_learning.curves import TABLE, collect_curves
 from gpca.active_learning.settings import ALL_LABELS, PAIR, FrameLabelSettings
@@ -44,19 +43,15 @@ def check(config: dict, left_out: LeftOut) -> None:
         raise InputError("config key frame_labels.initial", fault, "lower it or raise real_world.train")
 
 
-def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
-    """The seeds, and the backbones that the depth frames have."""
-    section = config["frame_labels"]
-    return {
-        "frame_label_seed": list(config["seeds"])[: section["seeds"]],
-        "frame_label_backbone": [name for name in config["real_world"]["backbones"] if name in section["backbones"]],
-    }
-
-
 EXPERIMENT = Experiment(
     name="frame_labels",
     sections={"frame_labels": FrameLabelSettings},
-    names=names,
+    names=lambda config, sources: {
+        "frame_label_seed": list(config["seeds"])[: config["frame_labels"]["seeds"]],
+        "frame_label_backbone": [
+            name for name in config["real_world"]["backbones"] if name in config["frame_labels"]["backbones"]
+        ],
+    },
     check=check,
     lists={"frame_labels.backbones": "encoders"},
 )

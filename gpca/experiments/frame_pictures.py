@@ -326,22 +326,19 @@ def mistakes_of(poses_csv: Paths, predictions_csv: Paths) -> Frame:
     prediction_files="predictions/{frames}/{unreduced}/seed{seed}.csv",
 )
 def draw_frame_reliability(run: Run, prediction_files: Paths) -> Figure:
-    methods = unreduced_methods(run.config["real_world"])
-    parts: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {}
+    import pandas as pd
+
+    parts: dict[str, list[Frame]] = {}
     for path in prediction_files:
-        rows = read_predictions(path)
-        rows = rows[(rows["split"] == "test") & ~rows["abstained"]]
-        scores_N_C = rows[[f"score_{concept}" for concept in concepts_of(rows)]].to_numpy(float)
-        hit_N = (rows["concept_predicted"] == rows["concept_true"]).to_numpy()
-        parts.setdefault(source_method_seed(path)[1], []).append((scores_N_C.max(axis=1), hit_N))
-    samples: dict[str, tuple[np.ndarray, np.ndarray]] = {
-        title: (
-            np.concatenate([score for score, _ in parts[method]]),
-            np.concatenate([hit for _, hit in parts[method]]),
-        )
-        for method, title in methods.items()
-        if method in parts
-    }
+        parts.setdefault(source_method_seed(path)[1], []).append(read_predictions(path))
+    samples = {}
+    for method, title in unreduced_methods(run.config["real_world"]).items():
+        if method in parts:
+            rows = pd.concat(parts[method])
+            rows = rows[(rows["split"] == "test") & ~rows["abstained"]]
+            scores_N_C = rows[[f"score_{concept}" for concept in concepts_of(rows)]].to_numpy(float)
+            right_N = (rows["concept_predicted"] == rows["concept_true"]).to_numpy()
+            samples[title] = scores_N_C.max(axis=1), right_N
     if not samples:
         raise InputError("predictions on depth frames", "cover none of these methods", "run them first")
     return reliability_figure(samples, title_of_frames(run.config), BINS, least=1 / 3)

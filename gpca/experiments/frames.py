@@ -69,10 +69,6 @@ def unreduced_methods(frames: Mapping) -> dict[str, str]:
 
 
 def read_together(path: str | Path) -> Frame:
-    """Rows of ``real_world.csv`` that Table VI shows: all test samples of the frames, by seed.
-
-    Raises:
-        InputError: as :func:`gpca.evaluation.measures.read_metrics` raises it.
-    """
+    """Rows of ``real_world.csv`` that Table VI shows: all test samples of the frames, by seed."""
     metrics = read_metrics(path)
     return metrics[(metrics["table"] == TOGETHER) & (metrics["source"] == REAL_WORLD)]
