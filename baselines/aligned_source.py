@@ -13,7 +13,7 @@ from gpca.classifier.settings import GPCArguments
 from gpca.errors import InputError
 from gpca.explainers.classifiers import known_concepts
 from gpca.explainers.gpca import GPCA
-from gpca.explainers.interface import DrawingExplainer, ExplainerEntry, ScoringExplainer, attached, for_causes
+from gpca.explainers.interface import ExplainerEntry, ScoringExplainer, attached, for_causes
 from gpca.pairs.dataset import Registrations
 from gpca.settings import Positive
 
@@ -69,7 +69,7 @@ class SoftmaxHead(ScoringExplainer):
         return softmax(attached(registrations, "head_logits"), axis=1)
 
 
-class GpytorchGPCA(DrawingExplainer):
+class GpytorchGPCA(GPCA):
     """GP-CA in gpytorch's own classes, a check: it agrees with ``gpca_paper`` within rounding."""
 
     def __init__(self, source: str, seed: int, **settings: GPCArguments) -> None:
@@ -77,12 +77,6 @@ class GpytorchGPCA(DrawingExplainer):
         from gpca.classifier.settings import GPCSettings
 
         self._gpc = GpytorchGPC(self.labels, GPCSettings(**settings), source, seed)
-
-    def fit(self, registrations: Registrations) -> None:
-        self._gpc.fit(registrations.embedding, registrations.concept)
-
-    def summary(self, registrations: Registrations) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        return self._gpc.attribute(registrations.embedding)
 
 
 _entry = partial(ExplainerEntry, sees=("source",), reads="embeddings")

@@ -92,8 +92,8 @@ def collect(prediction_files: Iterable[str | Path], causal_files: Iterable[str |
             shown = test[is_causal[keys].to_numpy()]
             metrics["causal_samples"] = {ALL: len(shown)}
             metrics |= {"causal_accuracy": concept_accuracy(*_judged(shown), ())} if len(shown) else {}
-        for metric, of_concept in metrics.items():
-            records += [("attribution", source, method, metric, c, seed, float(v)) for c, v in of_concept.items()]
+        for metric, values in metrics.items():
+            records += [("attribution", source, method, metric, c, seed, float(v)) for c, v in values.items()]
     return tidy(records, "predictions")
 
 
@@ -111,8 +111,7 @@ def attribution_metrics(test: pd.DataFrame, concepts: list[str]) -> dict[str, di
         "icp_calls": {ALL: test["icp_calls"].mean()},
     }
     for predicted, column in zip((*concepts, ABSTAINED), counts.T, strict=True):
-        of_concept = dict(zip(concepts, column, strict=True))
-        metrics[PREDICTED_AS + predicted] = {concept: of_concept[concept] for concept in samples}
+        metrics[PREDICTED_AS + predicted] = {c: n for c, n in zip(concepts, column, strict=True) if c in samples}
     return metrics
 
 

@@ -69,9 +69,9 @@ def rank_correlation(one_S: np.ndarray, other_S: np.ndarray, weights_B_S: np.nda
 def _groups(confidence_S: np.ndarray, wrong_S: np.ndarray, weights_B_S: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return how many samples of each confidence a draw has, and how many of them are wrong (B, G), surest first."""
     order, starts = _order(-np.asarray(confidence_S, float))
-    counts = (weights_B_S[:, order] * of[order] for of in (np.ones(len(order)), np.asarray(wrong_S, float)))
-    count_B_G, wrong_B_G = (np.add.reduceat(of_order, starts, axis=1) for of_order in counts)
-    return count_B_G, wrong_B_G
+    ordered_B_S = weights_B_S[:, order]
+    wrong_B_S = ordered_B_S * np.asarray(wrong_S, float)[order]
+    return np.add.reduceat(ordered_B_S, starts, axis=1), np.add.reduceat(wrong_B_S, starts, axis=1)
 
 
 def _order(values_S: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

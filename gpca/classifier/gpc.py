@@ -121,8 +121,8 @@ class GPC:
     def grow(self, name: str) -> None:
         """Add a class whose covariance is the geometric mean of the others', and refit the posterior."""
         if not name or name in self.classes:
-            known = f"the known ones are {', '.join(self.classes)}"
-            raise InputError(f"concept '{name}'", "is empty or already known", known)
+            remedy = f"the known ones are {', '.join(self.classes)}"
+            raise InputError(f"concept '{name}'", "is empty or already known", remedy)
         self.classes = (*self.classes, name)
         self._set_prior(self._prior.grow())
 

@@ -10,28 +10,19 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Attribution:
-    """The attribution of N registrations to C concepts.
-
-    Attributes:
-        scores_N_C: score ŝ_c of each concept (Eq. 4).
-        variances_N_C: epistemic variance v_c (Eq. 5); NaN where an explainer has none, as is BALD.
-        bald_N: BALD in nats (Eq. 7).
-        abstained_N: whether the explainer declines to name a concept.
-        icp_calls_N: ICP runs beyond the observed registration.
-        seconds_N, icp_seconds_N: time of the explanation, and the part of it inside ICP.
-    """
+    """The attribution of N registrations to C concepts; variances and BALD are NaN where an explainer has none."""
 
     concepts: tuple[str, ...]
-    scores_N_C: np.ndarray
-    variances_N_C: np.ndarray
-    bald_N: np.ndarray
-    abstained_N: np.ndarray
-    icp_calls_N: np.ndarray
-    seconds_N: np.ndarray
-    icp_seconds_N: np.ndarray
+    scores_N_C: np.ndarray  # score ŝ_c of each concept (Eq. 4)
+    variances_N_C: np.ndarray  # epistemic variance v_c (Eq. 5)
+    bald_N: np.ndarray  # nats (Eq. 7)
+    abstained_N: np.ndarray  # whether the explainer declines to name a concept
+    icp_calls_N: np.ndarray  # ICP runs beyond the observed registration
+    seconds_N: np.ndarray  # time of the explanation
+    icp_seconds_N: np.ndarray  # the part of it inside ICP
 
     @classmethod
-    def of_scores(
+    def scored(
         cls,
         concepts: tuple[str, ...],
         scores_N_C: np.ndarray,

@@ -214,12 +214,12 @@ def best_device() -> torch.device:
 
 
 def _fingerprints(registrations: Registrations, weights: Mapping[str, torch.Tensor]) -> tuple[str, str]:
-    of_samples, of_weights = hashlib.sha256(registrations.points.tobytes()), hashlib.sha256()
+    samples, parts = hashlib.sha256(registrations.points.tobytes()), hashlib.sha256()
     for column in (registrations.offsets, registrations.concept, registrations.split, registrations.sample):
-        of_samples.update(repr(column.tolist()).encode())
+        samples.update(repr(column.tolist()).encode())
     for name, tensor in weights.items():
-        of_weights.update(name.encode() + tensor.numpy().tobytes())
-    return of_samples.hexdigest(), of_weights.hexdigest()
+        parts.update(name.encode() + tensor.numpy().tobytes())
+    return samples.hexdigest(), parts.hexdigest()
 
 
 def _resume(checkpoint: Path | None, identity: str, state: dict) -> list[dict]:

@@ -133,16 +133,16 @@ def compared(
     drawn_B_N = draws.weights[1:] if limits is SHARE else None
     rows = []
     for method, value_B in values.items():
-        own = (*keys, method, metric, part)
+        names = (*keys, method, metric, part)
         value, *bounds = interval(value_B, drawn_B_N)
         if limits is not SHARE:
             bounds = np.clip(bounds, *limits).tolist()
-        rows.append((*own, "", "", *draws.counts, value, *bounds))
+        rows.append((*names, "", "", *draws.counts, value, *bounds))
         for kind, rivals in (against or {}).items():
             others = sorted(other for other in rivals(method, values) if other != method)
             if other := best_of(values, others, least_is_best):
                 apart = interval(value_B - values[other], drawn_B_N, difference=True)
-                rows.append((*own, kind, other, *draws.counts, *apart))
+                rows.append((*names, kind, other, *draws.counts, *apart))
     return rows
 
 

@@ -86,7 +86,7 @@ class ScoringExplainer:
         scores_N_C, variances_N_C, bald_N = self.summary(registrations)
         more = {"variances_N_C": variances_N_C, "bald_N": bald_N}
         seconds = (perf_counter() - started) / len(registrations)
-        return Attribution.of_scores(self.labels, scores_N_C, seconds=seconds, **more)
+        return Attribution.scored(self.labels, scores_N_C, seconds=seconds, **more)
 
     def summary(self, registrations: Registrations) -> tuple[np.ndarray, np.ndarray | None, np.ndarray | None]:
         """Return scores and, if any, variances (N, C), and BALD (N,)."""

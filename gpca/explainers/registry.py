@@ -6,13 +6,13 @@ A file lists its explainers of concepts as ``EXPLAINERS`` and those of causes as
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from gpca.errors import InputError
-from gpca.explainers.interface import ConceptExplainer, Describing, ExplainerEntry
+from gpca.explainers.interface import Describing, ExplainerEntry
 from gpca.pairs.dataset import Registrations
 from gpca.process.registry import Registry
 from gpca.settings import require_arguments
@@ -43,28 +43,19 @@ def explainer_module(name: str, kind: str = CONCEPTS) -> str:
     return REGISTRIES[kind].module(name)
 
 
-@dataclass(frozen=True)
-class Rival:
-    """One explainer."""
-
-    make: Callable[[], ConceptExplainer]  # returns a new one at every call
-    reads: str
-    observed_only: bool = False
-
-
-def make_rivals(explainers: Mapping[str, Mapping], source: str, seed: int) -> dict[str, Rival]:
-    """Explainers of a section of the config, name -> settings."""
+def make_rivals(explainers: Mapping[str, Mapping], source: str, seed: int) -> dict[str, ExplainerEntry]:
+    """Explainers of a section of the config, name -> settings, which are made without further arguments."""
     if not explainers:
         raise InputError("setting explainers", "is empty", "name at least one")
     rivals = {}
     for name, settings in explainers.items():
         require_settings(name, settings)
         entry = explainer_entry(name)
-        rivals[name] = Rival(partial(entry.make, source, seed, **settings), entry.reads, entry.observed_only)
+        rivals[name] = replace(entry, make=partial(entry.make, source, seed, **settings))
     return rivals
 
 
-def described_for(rivals: Mapping[str, Rival], registrations: Registrations) -> Registrations:
+def described_for(rivals: Mapping[str, ExplainerEntry], registrations: Registrations) -> Registrations:
     """Registrations with the explainers' measurements attached, made once for all training sets."""
     for rival in rivals.values():
         explainer = rival.make()

@@ -40,9 +40,9 @@ def code_files(*modules: str) -> list[str]:
         files.update(_file_of(module).parent.glob(BESIDE[module]))
     working = Path.cwd().resolve()  # as ROOT is
     seen = ROOT.relative_to(working) if ROOT.is_relative_to(working) else ROOT
-    places = {ROOT: seen, working: Path()}  # where files are -> what their names begin with
-    inside = {file: next((place for place in places if file.is_relative_to(place)), None) for file in files}
-    return sorted(str(places[place] / file.relative_to(place) if place else file) for file, place in inside.items())
+    prefixes = {ROOT: seen, working: Path()}  # where files are -> what their names begin with
+    inside = {file: next((folder for folder in prefixes if file.is_relative_to(folder)), None) for file in files}
+    return sorted(str(prefixes[at] / file.relative_to(at) if at else file) for file, at in inside.items())
 
 
 _HOLD_STATEMENTS = (ast.stmt, ast.excepthandler, ast.match_case)  # imports are statements, not expressions

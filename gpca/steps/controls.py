@@ -19,8 +19,8 @@ from gpca.classifier.scores import Attribution
 from gpca.encoders.registry import EncoderSettings
 from gpca.encoders.training import embedding_by, load_model
 from gpca.explainers.gpca import GPCA_FORMS
-from gpca.explainers.interface import BARE, Describing, Encoding
-from gpca.explainers.registry import Embed, Rival, described_for, make_rivals
+from gpca.explainers.interface import BARE, Describing, Encoding, ExplainerEntry
+from gpca.explainers.registry import Embed, described_for, make_rivals
 from gpca.io.csv_file import write_csv
 from gpca.jobs.job import Job
 from gpca.jobs.provenance import record_provenance
@@ -125,7 +125,7 @@ class ControlRun:
     settings: samples.ControlSettings
     backbone: str
     uncertainty: UncertaintySettings
-    rivals: Mapping[str, Rival]
+    rivals: Mapping[str, ExplainerEntry]
     embed: Embed
     embeddings: Mapping[str, Mapping[str, np.ndarray]] = field(default_factory=dict)
     hard: Registrations | None = None
@@ -239,7 +239,7 @@ class ControlRun:
         control: str,
         learned: Registrations,
         tests: Mapping[tuple[str, str], Registrations],
-        rivals: Mapping[str, Rival],
+        rivals: Mapping[str, ExplainerEntry],
     ) -> Iterator[pd.DataFrame]:
         """Yield each explainer's predictions for the test samples after it has learned from the training samples.
 

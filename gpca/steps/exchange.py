@@ -13,7 +13,8 @@ from gpca.attribution.predictions import prediction_frame
 from gpca.classifier.scores import Attribution
 from gpca.encoders.registry import EncoderSettings
 from gpca.errors import InputError
-from gpca.explainers.registry import Embed, Rival, described_for, explainer_entry, make_rivals
+from gpca.explainers.interface import ExplainerEntry
+from gpca.explainers.registry import Embed, described_for, explainer_entry, make_rivals
 from gpca.io.csv_file import write_csv
 from gpca.io.files import SPLITS
 from gpca.jobs.job import Job
@@ -110,7 +111,7 @@ class Exchange:
     methods: Mapping[str, Mapping]
     estimators: Mapping[str, Mapping]
     uncertainty: UncertaintySettings
-    rivals: Mapping[str, Rival]
+    rivals: Mapping[str, ExplainerEntry]
     embed: Embed
 
     def run(self, registrations: Registrations, judges: Judges) -> pd.DataFrame:
@@ -128,7 +129,7 @@ class Exchange:
             frames += self._by_estimators(registrations, by_estimator, judges)
         return pd.concat(frames, ignore_index=True)
 
-    def _by_methods(self, registrations: Registrations, rivals: Mapping[str, Rival]) -> Iterator[pd.DataFrame]:
+    def _by_methods(self, registrations: Registrations, rivals: Mapping[str, ExplainerEntry]) -> Iterator[pd.DataFrame]:
         splits = {"train": self.settings.train, "test": self.settings.test}
         rows = np.concatenate([first(registrations, *split) for split in splits.items()])
         axes = self.source, self.seed, self.settings.points
@@ -148,7 +149,7 @@ class Exchange:
                     yield labeled(frame, labels, failure_S[tested.rows("test")])
 
     def _by_estimators(
-        self, registrations: Registrations, rivals: Mapping[str, Rival], judges: Judges
+        self, registrations: Registrations, rivals: Mapping[str, ExplainerEntry], judges: Judges
     ) -> Iterator[pd.DataFrame]:
         train_rows = first(registrations, "train", 2 * self.settings.estimated_train)
         half = len(train_rows) // 2 // len(CONCEPTS) * len(CONCEPTS)  # threes of one object stay together
@@ -182,7 +183,7 @@ class Exchange:
                         test_estimates.attach_to(test.without_labels(), estimated, conditions, floor)
                     )
                     scores_S_C[estimated], abstained_S[estimated] = attributed.scores_N_C, attributed.abstained_N
-                attribution = Attribution.of_scores(CONCEPTS, scores_S_C, seconds=0.0, abstained_N=abstained_S)
+                attribution = Attribution.scored(CONCEPTS, scores_S_C, seconds=0.0, abstained_N=abstained_S)
                 yield labeled(prediction_frame(test, attribution), (ESTIMATOR, estimator, estimator, name), failure_S)
 
 

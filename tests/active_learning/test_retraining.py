@@ -62,11 +62,13 @@ def test_a_warm_start_goes_on_from_the_classifier_before_and_leaves_it_as_it_was
     assert np.array_equal(before.scores(task.test.h), scores)
 
 
-def test_rounds_are_small_up_to_the_least_labels_and_end_with_the_budget(of_rounds):
+def test_rounds_are_small_up_to_the_least_labels_and_end_with_the_budget(cold, of_rounds):
     assert [step["labels"] for step in of_rounds.steps] == [0, 4, 8, 10, 12]
     assert [step["epochs"] for step in of_rounds.steps] == [0, 12, 12, 12, 12]
     assert len(set(of_rounds.queried)) == 12
     assert of_rounds.labels_to(1.01) == of_rounds.queried
+    learned = learn(cold, "random", ROUNDS, [0.1], "tiny", 0)  # reached at the start, which costs no label
+    assert (learned.labels_to(0.1), learned.steps[-1]["labels"]) == ([], ROUNDS.least)
 
 
 def test_the_labels_of_the_round_that_reaches_the_target_are_counted_one_by_one(cold, of_rounds):
@@ -110,12 +112,6 @@ def test_every_target_has_a_step_and_the_round_is_looked_through_once(task, monk
     learned = learn(Counted(task, QUICK, "tiny", 0), "random", ROUNDS, [0.6, 0.8], "tiny", 0)
     assert [step["labels"] for step in learned.steps] == [0, 1, 3, 4, 8]
     assert fits == [0, 4, 1, 2, 3, 8]
-
-
-def test_a_target_that_is_reached_at_the_start_costs_no_label(cold):
-    learned = learn(cold, "random", ROUNDS, [0.1], "tiny", 0)
-    assert learned.labels_to(0.1) == []
-    assert learned.steps[-1]["labels"] == ROUNDS.least
 
 
 def test_bald_is_told_the_classifier_of_each_round(task, cold, monkeypatch):

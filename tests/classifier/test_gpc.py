@@ -94,9 +94,11 @@ def test_shuffled_labels_give_chance():
     assert 0.25 < np.mean(accuracies[1:]) < 0.42
 
 
-def test_a_seed_repeats_every_byte_and_another_does_not(gpc):
+def test_a_seed_repeats_every_byte_another_does_not_and_torchs_generator_stays(gpc):
     torch.rand(3)  # a draw of someone else's
+    before = torch.random.get_rng_state()
     again, other = fitted(H, LABELS), fitted(H, LABELS, seed=1)
+    assert torch.equal(torch.random.get_rng_state(), before)
     results = zip(*(classifier.attribute(H_TEST) for classifier in (gpc, again, other)), strict=True)
     for expected, of_same_seed, of_other_seed in results:
         assert expected.tobytes() == of_same_seed.tobytes() != of_other_seed.tobytes()
@@ -121,12 +123,6 @@ def test_the_bound_rises_with_the_fit():
         bounds.append(gpc.elbo())
     assert bounds == sorted(bounds)
     assert bounds[-1] < 0
-
-
-def test_fitting_leaves_torchs_generator_where_it_was():
-    before = torch.random.get_rng_state()
-    fitted(H[:6], LABELS[:6])
-    assert torch.equal(torch.random.get_rng_state(), before)
 
 
 def test_repeated_and_few_points_can_be_fitted():

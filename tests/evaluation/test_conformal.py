@@ -17,7 +17,7 @@ DRAWS = 4000
 def test_the_bound_is_the_value_of_the_rank_that_split_conformal_prediction_names(samples, level):
     values = np.random.default_rng(0).permutation(samples).astype(float)
     rank = ceil(round((samples + 1) * level, 9))
-    assert upper_bound(values, level) == rank - 1
+    assert upper_bound(values, level) == upper_bound(values, level, np.arange(samples)) == rank - 1  # families of one
     # NumPy's quantile of type 1, at the level that is corrected for the finite sample, as MAPIE takes it
     corrected = min(1.0, (samples + 1) * level / samples)
     assert upper_bound(values, level) == np.quantile(values, corrected - 1e-12, method="inverted_cdf")
@@ -38,11 +38,6 @@ def test_the_bound_holds_exactly_as_often_as_promised():
     held = np.mean([row[-1] <= upper_bound(row[:-1], 0.9) for row in drawn])
     # Of 40 exchangeable values the last is among the 36 smallest in 36 of 40 orders.
     assert held == pytest.approx(0.9, abs=4 * np.sqrt(0.09 / DRAWS))
-
-
-def test_families_of_one_sample_each_are_samples():
-    values = np.random.default_rng(2).random(30)
-    assert upper_bound(values, 0.9, np.arange(30)) == upper_bound(values, 0.9)
 
 
 def of_families(random, families, samples):
@@ -129,15 +124,12 @@ def test_only_sets_by_state_hold_each_state_as_often_as_promised():
     assert set(np.isfinite(sets.limits)) == {True}
 
 
-def test_the_hardest_state_is_in_every_set_where_too_few_were_given():
+def test_the_hardest_state_is_in_every_set_where_too_few_were_given_and_no_set_is_empty():
     scores, state = drawn(np.random.default_rng(2), 60)
     few = np.flatnonzero(state == "lost")[8:]
     kept = np.setdiff1d(np.arange(60), few)
     sets = conformal.calibrate_sets(scores[kept], state[kept], None, STATES, 0.9, by_state=True)
     assert sets.limits[2] == np.inf and sets.of(scores)[:, 2].all()
-
-
-def test_no_set_is_empty():
     scores = np.array([[0.9, 0.05, 0.05]] * 30)
     sets = conformal.calibrate_sets(scores, np.array(["good"] * 30), None, STATES, 0.9)
     asked = np.array([[0.3, 0.4, 0.3], [0.9, 0.05, 0.05]])
@@ -170,9 +162,7 @@ def test_thresholds_by_hand():
     assert alarm.good_below == 21 and np.floor(alarm.failed_from) == 37  # the 2nd of 40 from the end of either
     called = alarm.of(np.array([20.9, 21, 37, 37.1]))
     assert called.tolist() == [GOOD, NOT_SURE, NOT_SURE, ALARM]
-
-
-def test_where_the_kinds_are_apart_one_threshold_keeps_both_risks():
+    # Where the kinds are apart, one threshold keeps both risks.
     alarm = conformal.calibrate_alarm(np.r_[np.linspace(0, 1, 40), np.linspace(3, 4, 40)], np.repeat([False, True], 40))
     assert 1 < alarm.good_below == alarm.failed_from < 3
     assert NOT_SURE not in alarm.of(np.linspace(-1, 5, 100))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gpca.classifier.scores import Attribution
-from gpca.explainers.registry import Rival
+from gpca.explainers.interface import ExplainerEntry
 from gpca.objects.surface import instance_of
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.steps.control_samples import ControlSettings
@@ -26,7 +26,7 @@ class Nearest:
         apart = np.abs(registrations.embedding[:, None] - self.h[None]).sum(axis=2)
         named = self.concept[apart.argmin(axis=1)]
         scores = np.array([[name == each for each in CONCEPTS] for name in named], float)
-        return Attribution.of_scores(CONCEPTS, scores * 0.8 + 0.1, seconds=0.0)
+        return Attribution.scored(CONCEPTS, scores * 0.8 + 0.1, seconds=0.0)
 
 
 class Head(Nearest):
@@ -38,7 +38,7 @@ class Head(Nearest):
         pass
 
     def explain(self, registrations):
-        return Attribution.of_scores(CONCEPTS, registrations.attached["head_logits"], seconds=0.0)
+        return Attribution.scored(CONCEPTS, registrations.attached["head_logits"], seconds=0.0)
 
 
 @pytest.fixture(scope="session")
@@ -60,6 +60,11 @@ def attached(registrations):
     return {"embedding": h, "head_logits": logits}
 
 
+def rival(make, reads, **more):
+    """An explainer that is made without arguments."""
+    return ExplainerEntry("", make, (), reads, **more)
+
+
 def experiment(registrations, *controls, embeddings=(), rivals=None):
     settings = ControlSettings(controls=controls, draw_points=(32, 64))
     return ControlRun(
@@ -68,7 +73,7 @@ def experiment(registrations, *controls, embeddings=(), rivals=None):
         settings=settings,
         backbone="dgcnn",
         uncertainty=UncertaintySettings(starts=13, icp_points=32),
-        rivals=rivals or {"nearest": Rival(Nearest, "embeddings"), "head": Rival(Head, "embeddings")},
+        rivals=rivals or {"nearest": rival(Nearest, "embeddings"), "head": rival(Head, "embeddings")},
         embed=seen,
         embeddings={"paper": attached(registrations), **dict(embeddings)},
     )

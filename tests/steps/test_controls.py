@@ -8,11 +8,10 @@ import pytest
 from baselines.pair import PairGPCA
 from baselines.residuals import residuals_logistic
 from gpca.encoders.registry import EncoderSettings
-from gpca.explainers.registry import Rival
 from gpca.steps.control_samples import TRAININGS, ControlSettings, encode, of_unseen_objects, shows_known_object
 from gpca.steps.controls import ASKED
 
-from .six_objects import Head, Nearest, attached, experiment, seen
+from .six_objects import Head, Nearest, attached, experiment, rival, seen
 
 
 def share_right(rows, **wanted):
@@ -74,7 +73,7 @@ def test_shuffled_labels_are_learned_in_parts_and_every_test_sample_is_asked_abo
             learned.append(registrations.sample.tolist())
             super().fit(registrations)
 
-    found = experiment(six, "shuffled", rivals={"counting": Rival(Counting, "embeddings")}).run(six, {})
+    found = experiment(six, "shuffled", rivals={"counting": rival(Counting, "embeddings")}).run(six, {})
     assert [len(samples) for samples in learned] == [36, 12, 12, 12]
     assert sorted(sample for samples in learned[1:] for sample in samples) == learned[0]
     assert sorted(found["sample"][found["control"] == "shuffled"]) == list(range(18))
@@ -91,7 +90,7 @@ def test_an_explainer_cannot_see_what_was_perturbed(six):
             return seen_by.explain(registrations)
 
     seen_by = Head()
-    experiment(six, "label_noise_30", rivals={"spy": Rival(Spy, "embeddings")}).run(six, {})
+    experiment(six, "label_noise_30", rivals={"spy": rival(Spy, "embeddings")}).run(six, {})
 
 
 def test_what_is_measured_of_a_registration_is_measured_once_for_all_controls(six, monkeypatch):
@@ -103,10 +102,10 @@ def test_what_is_measured_of_a_registration_is_measured_once_for_all_controls(si
         registered, "describe_registrations", lambda r, *a, **k: measured.append(len(r)) or describe(r, *a, **k)
     )
     rivals = {
-        "pair": Rival(
+        "pair": rival(
             partial(PairGPCA, True, "tiny", 100, points=32, iterations=2, inducing=4, draws=10), "registrations"
         ),
-        "residuals": Rival(partial(residuals_logistic, "tiny", 100), "uncertainty/removal"),
+        "residuals": rival(partial(residuals_logistic, "tiny", 100), "uncertainty/removal"),
     }
     found = experiment(six, "label_noise_30", "shuffled", rivals=rivals).run(six, {})
     assert measured == [len(six), ASKED]  # a few again, to take the time
@@ -132,7 +131,7 @@ def test_an_encoder_of_an_explainer_is_trained_once_for_all_labels_and_anew_for_
     made = experiment(
         *(six, "density", "unseen_objects", "reversed", "label_noise_30", "shuffled", "transfer"),
         embeddings={"density": attached(six), "unseen_objects": attached(of_unseen)},
-        rivals={"own": Rival(WithEncoder, "registrations")},
+        rivals={"own": rival(WithEncoder, "registrations")},
     )
     found = made.run(six, {"other": six})
     of_paper, of_density, of_known = WithEncoder.learned
@@ -147,7 +146,7 @@ def test_encoders_that_are_trained_otherwise_are_asked_about_known_and_unseen_ob
     of_unseen = of_unseen_objects(six, 3, "tiny", 100)
     good = attached(of_unseen)
     embeddings = {"unseen_objects": good, "random_draws": good | {"embedding": 0 * good["embedding"]}}
-    made = experiment(six, "unseen_objects", embeddings=embeddings, rivals={"gpca": Rival(Nearest, "embeddings")})
+    made = experiment(six, "unseen_objects", embeddings=embeddings, rivals={"gpca": rival(Nearest, "embeddings")})
     found = replace(made, settings=replace(made.settings, encoders=TRAININGS)).run(six, {})
     assert found.groupby("explainer")["control"].unique().map(set).to_dict() == {
         "gpca": {"paper", "unseen_objects", "seen_objects"},

@@ -12,7 +12,6 @@ from gpca.alignment.methods import registry
 from gpca.alignment.methods.interface import FailedRegistration, MethodEntry
 from gpca.classifier.scores import Attribution
 from gpca.errors import InputError
-from gpca.explainers.registry import Rival
 from gpca.pairs.judge import Judges
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.rigid import exp, transform
@@ -25,12 +24,14 @@ from gpca.uncertainty.estimators.interface import EstimatorEntry, FailedEstimate
 from gpca.uncertainty.estimators.substitute import OBSERVED, KnobbedRegistrar
 from gpca.uncertainty.settings import UncertaintySettings
 
+from .six_objects import rival
+
 UNCERTAINTY = UncertaintySettings(starts=13, icp_points=64)
 SETTINGS = ExchangeSettings(train=9, test=3, points=64, estimated_train=9, estimated_test=3)
 RIVALS = {
-    "shap_additive": Rival(partial(shap_over_knobs, "tiny", 100), "uncertainty/additive"),
-    "sa_local_additive": Rival(partial(sa_local_additive, "tiny", 100), "uncertainty/additive"),
-    "residuals_logistic": Rival(partial(residuals_logistic, "tiny", 100), "uncertainty/removal", observed_only=True),
+    "shap_additive": rival(partial(shap_over_knobs, "tiny", 100), "uncertainty/additive"),
+    "sa_local_additive": rival(partial(sa_local_additive, "tiny", 100), "uncertainty/additive"),
+    "residuals_logistic": rival(partial(residuals_logistic, "tiny", 100), "uncertainty/removal", observed_only=True),
 }
 
 
@@ -42,7 +43,7 @@ class Nearest:
 
     def explain(self, registrations):
         named = self.concept[np.abs(registrations.embedding[:, None] - self.h[None]).sum(axis=2).argmin(axis=1)]
-        return Attribution.of_scores(
+        return Attribution.scored(
             CONCEPTS, np.array([[name == c for c in CONCEPTS] for name in named], float), seconds=0
         )
 
@@ -153,7 +154,7 @@ def test_each_method_is_learned_from_and_asked_about_and_a_failed_registration_c
 
     entries = {"point_to_point": registry.method_entry("point_to_point"), "blind": MethodEntry("Blind", fails)}
     monkeypatch.setattr(registry.REGISTRY, "by_module", lambda: {"m": entries})
-    rows = exchange(methods=tuple(entries), rivals={"nearest": Rival(Nearest, "embeddings")}).run(registrations, judges)
+    rows = exchange(methods=tuple(entries), rivals={"nearest": rival(Nearest, "embeddings")}).run(registrations, judges)
     assert rows.groupby(["learnt_from", "asked_of"]).size().to_dict() == {(a, b): 3 for a in entries for b in entries}
     assert set(rows.loc[rows["asked_of"] == "blind", "failure"]) == {"no match"}
     assert not rows["abstained"].any() and (rows["split"] == "test").all()
