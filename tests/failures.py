@@ -27,7 +27,7 @@ def start(situations):
     """A bad initial pose of the bracket, which no rotation leaves as it is, and the first registration from it."""
     for number in range(60):
         disturbed, _ = situations["failures"].draw("pose", "pose", number)
-        outcome = register_first(disturbed, LOOP.cloud_points, LOOP.icp)
+        outcome = register_first(disturbed, LOOP)
         if outcome is not None and outcome.error > CLEAR:
             return disturbed, outcome
     raise AssertionError("no failure")

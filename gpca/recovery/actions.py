@@ -161,13 +161,11 @@ def denoise(holding: Holding, robot: Robot, random: np.random.Generator, frames:
 
 def best_start(holding: Holding, robot: Robot, poses: Sequence[np.ndarray | None]) -> Holding:
     """Start from the pose with the best agreement with the shots: one of these, or the current estimate."""
-    d = robot.diameter_m
-    cloud_m = _thinned(fuse(holding.shots, d, holding.filtered), CLOUD_POINTS)
+    cloud_m = fuse(holding.shots, robot.diameter_m, holding.filtered)
     if not len(cloud_m):
         return holding
-    model_m, normals = _thinned(robot.points_m, MODEL_POINTS).astype(np.float64), _thinned(robot.normals, MODEL_POINTS)
     candidates = [holding.T_world_object, *(pose for pose in poses if pose is not None)]
-    shares = [sum(agreement(holding.shots, cloud_m, model_m, normals, T, d)[:2]) for T in candidates]
+    shares = [sum(shares[:2]) for shares in _agreements(holding, robot, cloud_m, candidates)]
     return replace(holding, T_world_object_init=candidates[int(np.argmax(shares))])
 
 
@@ -198,15 +196,14 @@ def observe(holding: Holding, record: dict, robot: Robot, random: np.random.Gene
     observed, model = LocalPlanes.of(cloud), LocalPlanes.of(target)
     to_model_N, to_observed_M = model.tree.query(cloud)[0], observed.tree.query(target)[0]
     cloud_m = fuse(holding.shots, d, holding.filtered)
-    model_m, normals = (_thinned(each, MODEL_POINTS).astype(np.float64) for each in (robot.points_m, robot.normals))
-    shots_m = (holding.shots, _thinned(cloud_m, CLOUD_POINTS), model_m, normals)
-    shares = agreement(*shots_m, holding.T_world_object, d)
     T_moved = inverse(holding.T_world_object_init) @ holding.T_world_object
     rivals = (0.0, 0.0, 0.0)
-    if poses := search(holding, robot, random, PROBED):
+    poses = search(holding, robot, random, PROBED)
+    shares, *others = _agreements(holding, robot, cloud_m, [holding.T_world_object, *poses])
+    if poses:
         points_m = _thinned(robot.points_m, CLOUD_POINTS)
         distances = [adds_error(points_m, T, holding.T_world_object) / d for T in poses]
-        explained = [sum(agreement(*shots_m, T, d)[:2]) for T in poses]
+        explained = [sum(each[:2]) for each in others]
         best = int(np.argmax(explained))
         elsewhere = float(np.mean([distance > ELSEWHERE for distance in distances]))
         rivals = explained[best] - sum(shares[:2]), distances[best], elsewhere
@@ -221,6 +218,14 @@ def observe(holding: Holding, record: dict, robot: Robot, random: np.random.Gene
             *rivals,
         ]
     )
+
+
+def _agreements(
+    holding: Holding, robot: Robot, cloud_m: np.ndarray, poses: Sequence[np.ndarray]
+) -> list[tuple[float, float, float]]:
+    points_m = _thinned(cloud_m, CLOUD_POINTS)
+    model_m, normals = (_thinned(each, MODEL_POINTS).astype(np.float64) for each in (robot.points_m, robot.normals))
+    return [agreement(holding.shots, points_m, model_m, normals, T, robot.diameter_m) for T in poses]
 
 
 def _thinned(points: np.ndarray, count: int) -> np.ndarray:

@@ -12,7 +12,6 @@ from time import perf_counter
 
 import numpy as np
 
-from gpca.alignment.icp import ICPSettings
 from gpca.alignment.pose_error import JUDGED_POINTS, pose_error
 from gpca.errors import InputError
 from gpca.frames.shots import fuse
@@ -39,7 +38,7 @@ class Attempt:
     seconds: float  # of ICP and of the action before it, without the camera
 
 
-def register_first(situation: Situation, points: int, icp: ICPSettings) -> Attempt | None:
+def register_first(situation: Situation, settings: LoopSettings) -> Attempt | None:
     """Estimate the pose from the first shot and register; None where it shows too little of the object."""
     robot = Robot(situation)
     shot = robot.shoot(situation.T_world_camera, 1)
@@ -48,37 +47,37 @@ def register_first(situation: Situation, points: int, icp: ICPSettings) -> Attem
     if T_init is None:
         return None
     seconds = perf_counter() - started
-    outcome = register_held(situation, Holding((shot,), T_init, T_init), points, icp)
+    outcome = register_held(situation, Holding((shot,), T_init, T_init), settings)
     return outcome and replace(outcome, seconds=seconds + outcome.seconds)
 
 
-def register_misplaced(situation: Situation, clean: Attempt, points: int, icp: ICPSettings) -> Attempt:
+def register_misplaced(situation: Situation, clean: Attempt, settings: LoopSettings) -> Attempt:
     """Register the measurement made without a pose error, from the estimate that has the situation's error."""
     T_init = clean.holding.T_world_object_init @ situation.T_object_estimated
-    attempt = register_held(situation, Holding(clean.holding.shots, T_init, T_init), points, icp)
+    attempt = register_held(situation, Holding(clean.holding.shots, T_init, T_init), settings)
     assert attempt is not None  # the same points were registered before
     return attempt
 
 
 def register_after(
-    situation: Situation, before: Attempt, action: Action, actions: tuple[str, ...], points: int, icp: ICPSettings
+    situation: Situation, before: Attempt, action: Action, actions: tuple[str, ...], settings: LoopSettings
 ) -> Attempt:
     """Take one action, named last of all that were taken, which name the random numbers, and register anew."""
     robot = Robot(situation, actions)
     started = perf_counter()
     holding = action(before.holding, robot, generator(*situation.axes, "action", *actions))
     seconds = perf_counter() - started - robot.camera_seconds
-    outcome = register_held(situation, holding, points, icp, actions)
+    outcome = register_held(situation, holding, settings, actions)
     if outcome is None:  # filtering left too little: the robot keeps what it had
         return replace(before, seconds=seconds)
     return replace(outcome, seconds=seconds + outcome.seconds)
 
 
 def register_held(
-    situation: Situation, holding: Holding, points: int, icp: ICPSettings, actions: tuple[str, ...] = ()
+    situation: Situation, holding: Holding, settings: LoopSettings, actions: tuple[str, ...] = ()
 ) -> Attempt | None:
     """Align the object's fused points to its model by ICP, from the initial pose."""
-    started = perf_counter()
+    started, points = perf_counter(), settings.cloud_points
     objects, model, d = situation.shelf.objects, situation.model, situation.diameter_m
     cloud_m = fuse(holding.shots, d, holding.filtered)
     if len(cloud_m) < FEWEST_POINTS:
@@ -89,7 +88,7 @@ def register_held(
     T_init, T_true = holding.T_world_object_init, situation.T_world_object
     T_target_source_true = scale_translation(inverse(T_true) @ T_init, 1 / d)
     perturbed = Perturbed(transform(inverse(T_init), source_m) / d, T_target_source_true)
-    record = align_pair(perturbed, objects, model, target_rows, icp)
+    record = align_pair(perturbed, objects, model, target_rows, settings.icp)
     T_world_object = T_init @ inverse(record["T_target_source_icp"])
     error = pose_error(objects.points(model)[:JUDGED_POINTS], T_world_object, T_true, situation.shelf.symmetric[model])
     ended, record = replace(holding, T_world_object=T_world_object), record | {"concept": situation.cause}
@@ -137,8 +136,7 @@ class Episode:
         """The outcome after these actions, of which all but the last were taken."""
         if actions not in self.outcomes:
             before, action = self.outcomes[actions[:-1]], known[actions[-1]]
-            outcome = register_after(self.situation, before, action, actions, settings.cloud_points, settings.icp)
-            self.outcomes[actions] = outcome
+            self.outcomes[actions] = register_after(self.situation, before, action, actions, settings)
         return self.outcomes[actions]
 
 
@@ -184,23 +182,22 @@ def _try_situation(
     A pose error changes nothing but ICP's start, so several are tried on one measurement and estimate. Returns the
     failure by the cause, and a good registration, each None where there is none; how many were made.
     """
-    points, icp, success = settings.cloud_points, settings.icp, settings.success
     disturbed, clean = situations.draw(cause, cause, number)
     start: Attempt | None = None
     if cause != POSE:
-        start = register_first(disturbed, points, icp)
+        start = register_first(disturbed, settings)
         if start is None:
             return None, None, 1
-        if is_right(start, success):
+        if is_right(start, settings.success):
             return None, (disturbed, start), 1
-    without = register_first(clean, points, icp)
-    if without is None or not is_right(without, success):
+    without = register_first(clean, settings)
+    if without is None or not is_right(without, settings.success):
         return None, None, 1
     if start is not None:
         return (disturbed, start), (clean, without), 1
     for tried in range(1, misplaced + 1):
         situation = situations.misplaced(clean, tried)
-        attempt = register_misplaced(situation, without, points, icp)
-        if not is_right(attempt, success):
+        attempt = register_misplaced(situation, without, settings)
+        if not is_right(attempt, settings.success):
             return (situation, attempt), (clean, without), tried
     return None, (situation, attempt), misplaced

@@ -157,7 +157,7 @@ def register_situations(
             cause = CONCEPTS[number % len(CONCEPTS)]
             for redraw in range(REDRAWS):
                 situation, _ = situations[split].draw(cause, cause, number, redraw)
-                start = register_first(situation, settings.cloud_points, settings.icp)
+                start = register_first(situation, settings)
                 if start is not None:
                     break
             else:

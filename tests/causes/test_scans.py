@@ -6,18 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
+import gpca.causes.scans as module
 from gpca.causes.candidate import Registrar
-from gpca.causes.scans import (
-    GLOBAL,
-    LADDER,
-    DrawnScans,
-    OverlapErrors,
-    ScanStart,
-    measure_scans,
-    motion_between,
-    sensor_noise_m,
-    unit_of,
-)
 from gpca.causes.settings import OBSERVED, CauseSettings
 from gpca.causes.truth import ALL, FAILED, GEOMETRY, NONE
 from gpca.errors import InputError
@@ -31,7 +21,7 @@ POINTS = 192
 
 
 def measured(pair, *starts):
-    return measure_scans([pair], starts, "corner", 100, SETTINGS, SUCCESS, POINTS)
+    return module.measure_scans([pair], starts, "corner", 100, SETTINGS, SUCCESS, POINTS)
 
 
 @pytest.mark.parametrize(
@@ -40,7 +30,7 @@ def measured(pair, *starts):
 )
 def test_what_was_done_to_a_pair_is_its_cause(shared, start, times, cause):
     pair = corner_pair(shared)
-    causes, table = measured(pair, ScanStart(0, LADDER, "rung", start_off(pair, *start), times))
+    causes, table = measured(pair, module.ScanStart(0, module.LADDER, "rung", start_off(pair, *start), times))
     assert table["dominant"].tolist() == [cause]
     phi = dict(zip(("noise", "pose", "overlap"), causes.truth.phi[0], strict=True))
     assert phi[cause] > SETTINGS.limits.cause
@@ -50,17 +40,19 @@ def test_what_was_done_to_a_pair_is_its_cause(shared, start, times, cause):
 
 def test_no_natural_registration_fails_by_noise():
     pair = corner_pair(0.5)
-    causes, table = measured(pair, ScanStart(0, GLOBAL, "method", start_off(pair, 20, 0.3)))
+    causes, table = measured(pair, module.ScanStart(0, module.GLOBAL, "method", start_off(pair, 20, 0.3)))
     assert causes.truth.phi[0, 0] == 0 and not causes.applied[0, 0]
     assert table["noise"].tolist() == [0] and table["sensor_noise"][0] > 0
     assert table["crop"][0] == pytest.approx(1 - pair.overlap)
     assert table["rotation_rad"][0] == pytest.approx(np.deg2rad(20))
-    assert table["translation"][0] == pytest.approx(0.3 / unit_of(pair), abs=0.03)  # of the points that are drawn
+    assert table["translation"][0] == pytest.approx(
+        0.3 / module.unit_of(pair), abs=0.03
+    )  # of the points that are drawn
 
 
 def test_nothing_is_wrong_with_what_both_see_started_at_the_truth():
     pair = corner_pair(1.0)
-    start = ScanStart(0, LADDER, "rung", pair.T_target_source)
+    start = module.ScanStart(0, module.LADDER, "rung", pair.T_target_source)
     causes, _ = measured(pair, start)
     assert causes.truth.error[0, ALL] < SETTINGS.limits.nominal
     again, _ = measured(pair, start)
@@ -70,19 +62,19 @@ def test_nothing_is_wrong_with_what_both_see_started_at_the_truth():
 
 def test_an_error_is_the_rmse_over_the_true_overlap_in_units_of_the_limit():
     pair = corner_pair(0.5)
-    scans = DrawnScans.of(pair, POINTS, SUCCESS.room_m, SETTINGS.limits.failed, np.random.default_rng(100))
+    scans = module.DrawnScans.of(pair, POINTS, SUCCESS.room_m, SETTINGS.limits.failed, np.random.default_rng(100))
     T_start = start_off(pair, 5, 0.1)
-    T_observed_model = np.linalg.inv(motion_between(scans.pair, scans.pair.T_target_source, T_start))[None]
+    T_observed_model = np.linalg.inv(module.motion_between(scans.pair, scans.pair.T_target_source, T_start))[None]
     expected = SETTINGS.limits.failed * overlap_rmse(pair, T_start) / SUCCESS.room_m
     assert scans.errors(T_observed_model)[0] == pytest.approx(expected, rel=0.1)  # of some of the points
     shifted = np.eye(4)[None].copy()
     shifted[0, 0, 3] = 0.2
-    assert OverlapErrors(np.zeros((1, 3)), 0.5)(shifted) == pytest.approx([0.1])
+    assert module.OverlapErrors(np.zeros((1, 3)), 0.5)(shifted) == pytest.approx([0.1])
 
 
 def test_the_target_that_icp_is_given_is_cropped_and_noisy_only_where_the_causes_say_so():
     pair = corner_pair(0.3)
-    scans = DrawnScans.of(pair, POINTS, 0.2, 0.03, np.random.default_rng(100))
+    scans = module.DrawnScans.of(pair, POINTS, 0.2, 0.03, np.random.default_rng(100))
     candidate = scans.candidate(pair.T_target_source, 2.0, np.random.default_rng(100))
     noise, pose, overlap = range(3)
     assert candidate.reference((pose, overlap)) is candidate.model
@@ -96,8 +88,8 @@ def test_the_target_that_icp_is_given_is_cropped_and_noisy_only_where_the_causes
 
 
 def test_the_sensor_noise_is_that_across_the_surface_of_one_scan():
-    assert sensor_noise_m(corner_pair(1.0, noise_m=0.01)) == pytest.approx(0.01, rel=0.25)
-    assert sensor_noise_m(corner_pair(1.0, noise_m=0.002)) < 0.006  # rough planes count too
+    assert module.sensor_noise_m(corner_pair(1.0, noise_m=0.01)) == pytest.approx(0.01, rel=0.25)
+    assert module.sensor_noise_m(corner_pair(1.0, noise_m=0.002)) < 0.006  # rough planes count too
 
 
 def test_lengths_of_an_object_are_relative_to_its_size():
@@ -110,7 +102,7 @@ def test_lengths_of_an_object_are_relative_to_its_size():
         kind="object",
         size_m=0.3,
     )
-    of = [DrawnScans.of(pair, POINTS, 1.0, 1.0, np.random.default_rng(100)) for pair in (room, small)]
+    of = [module.DrawnScans.of(pair, POINTS, 1.0, 1.0, np.random.default_rng(100)) for pair in (room, small)]
     assert of[1].source == pytest.approx(of[0].source)
     assert np.array_equal(of[1].source_common, of[0].source_common)
 
@@ -120,27 +112,27 @@ def test_pairs_that_share_too_little_are_left_out_and_named(capsys):
     apart = pair.T_target_source.copy()
     apart[:3, 3] += 20
     with pytest.raises(InputError, match="no registration of the scans can be measured"):
-        measured(replace(pair, T_target_source=apart), ScanStart(0, LADDER, "rung", pair.T_target_source))
+        measured(replace(pair, T_target_source=apart), module.ScanStart(0, module.LADDER, "rung", pair.T_target_source))
     assert "pair corner/target/source is skipped: too few of its points lie on surface" in capsys.readouterr().err
 
 
 def test_what_finds_no_correspondence_failed_by_its_pose():
     pair = corner_pair(1.0)
     away = rigid_motion(np.eye(3), [30.0, 0, 0]) @ pair.T_target_source
-    _, table = measured(pair, ScanStart(0, LADDER, "far", away))
+    _, table = measured(pair, module.ScanStart(0, module.LADDER, "far", away))
     assert table[["missed", "state", "dominant"]].to_numpy().tolist() == [[True, FAILED, "pose"]]
 
 
 def test_a_ball_holds_no_pose():
     pair = corner_pair(1.0, ball=True)
-    _, table = measured(pair, ScanStart(0, LADDER, "rung", start_off(pair, 1, 0.01)))
+    _, table = measured(pair, module.ScanStart(0, module.LADDER, "rung", start_off(pair, 1, 0.01)))
     assert table["error_clean"][0] > SETTINGS.limits.nominal and table["dominant"].tolist() == [GEOMETRY]
 
 
 def test_the_registrations_know_where_the_source_truly_lies():
     pair = corner_pair(1.0)
-    causes, _ = measured(pair, ScanStart(0, LADDER, "rung", start_off(pair, 40, 0.5)))
-    registrations, unit_m = causes.registrations, unit_of(pair)
+    causes, _ = measured(pair, module.ScanStart(0, module.LADDER, "rung", start_off(pair, 40, 0.5)))
+    registrations, unit_m = causes.registrations, module.unit_of(pair)
     middle = (pair.target_M_3.min(axis=0) + pair.target_M_3.max(axis=0)) / 2
     placed = transform(registrations.T_target_source("true", 0), registrations.source(0)) * unit_m + middle
     assert cKDTree(transform(pair.T_target_source, pair.source_N_3)).query(placed)[0].max() < 1e-4

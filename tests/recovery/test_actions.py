@@ -14,20 +14,18 @@ from tests.failures import LOOP
 
 from ..documents import block
 
-ICP = LOOP.icp
-
 
 def test_a_broader_search_finds_what_explains_the_shots(start):
     situation, outcome = start
     found = ACTIONS["reinitialize"](outcome.holding, Robot(situation), np.random.default_rng(0), starts=48)
-    assert register_held(situation, found, LOOP.cloud_points, ICP).error < outcome.error
+    assert register_held(situation, found, LOOP).error < outcome.error
     assert found.shots is outcome.holding.shots
 
 
 def test_a_new_view_is_fused_with_the_old_one_and_shows_more(start):
     situation, outcome = start
     d = situation.diameter_m
-    result = register_after(situation, outcome, ACTIONS["new_view"], ("new_view",), 4000, ICP)
+    result = register_after(situation, outcome, ACTIONS["new_view"], ("new_view",), replace(LOOP, cloud_points=4000))
     first_shot, new = result.holding.shots
     assert first_shot is outcome.holding.shots[0]
     turned = rotation_angle_rad(inverse(first_shot.T_world_camera) @ new.T_world_camera)
@@ -38,11 +36,11 @@ def test_a_new_view_is_fused_with_the_old_one_and_shows_more(start):
 
 def test_denoising_takes_more_frames_each_time_and_keeps_doing_so(start):
     situation, outcome = start
-    once = register_after(situation, outcome, ACTIONS["denoise"], ("denoise",), LOOP.cloud_points, ICP)
-    twice = register_after(situation, once, ACTIONS["denoise"], ("denoise", "denoise"), LOOP.cloud_points, ICP)
+    once = register_after(situation, outcome, ACTIONS["denoise"], ("denoise",), LOOP)
+    twice = register_after(situation, once, ACTIONS["denoise"], ("denoise", "denoise"), LOOP)
     assert (once.holding.frames, twice.holding.frames) == (10, 20)
     assert once.holding.filtered
-    looked = register_after(situation, once, ACTIONS["new_view"], ("denoise", "new_view"), LOOP.cloud_points, ICP)
+    looked = register_after(situation, once, ACTIONS["new_view"], ("denoise", "new_view"), LOOP)
     assert looked.holding.frames == 10
 
 
@@ -50,7 +48,7 @@ def test_the_action_of_the_documentation_sees_the_object_from_closer(start):
     situation, outcome = start
     added = dict(vars(actions)) | {"ACTIONS": dict(ACTIONS)}
     exec(block("gpca/recovery/actions.py"), added)
-    result = register_after(situation, outcome, added["ACTIONS"]["closer"], ("closer",), LOOP.cloud_points, ICP)
+    result = register_after(situation, outcome, added["ACTIONS"]["closer"], ("closer",), LOOP)
     away, near = result.holding.shots
     assert away is outcome.holding.shots[0]
     assert near.mask.sum() > 1.5 * away.mask.sum()

@@ -79,7 +79,7 @@ def test_it_reads_what_the_robot_holds_and_the_model_alone(start):
 def test_seen_surface_faces_a_camera_and_grows_with_another_view(start, known):
     situation, outcome = start
     action = ACTIONS["new_view"]
-    twice = register_after(situation, outcome, action, ("new_view",), LOOP.cloud_points, LOOP.icp).holding
+    twice = register_after(situation, outcome, action, ("new_view",), LOOP).holding
     shares = []
     for holding in (outcome.holding, twice):
         T_true = scale_translation(
