@@ -181,11 +181,10 @@ def displace(T_camera_object: np.ndarray, diameter_m: float, settings: InitialPo
 
 
 class GlobalRegistration:
-    """FPFH features and RANSAC (Rusu et al. 2009; Zhou et al. 2018) through Open3D, the best of several runs.
+    """FPFH features and RANSAC (Rusu et al. 2009; Zhou et al. 2018) of Open3D, a stand-in for a pose estimator.
 
-    After point-to-plane ICP, a run is scored by the share of measured points on the model plus the share of the model's
-    points facing the camera that were measured: many poses explain the points, but few also explain what should be
-    seen. It needs no truth; a stand-in for a pose estimator. The model is its canonical points (Q, 3) and normals.
+    Of several runs, refined by point-to-plane ICP, the best has the largest sum of two shares: of measured points on the
+    model, and of the model's points facing the camera that were measured. Many poses explain the points alone.
     """
 
     def __init__(self, points_m: np.ndarray, normals: np.ndarray, diameter_m: float, settings: InitialPoseSettings):

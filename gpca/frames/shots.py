@@ -159,10 +159,8 @@ def agreement(
 ) -> tuple[float, float, float]:
     """Return how well a pose explains the shots, and how much of the model is hidden, as shares in [0, 1].
 
-    First: the share of the measured points (P, 3) on the model (Q, 3); alone, it is high for many poses of a partial
-    view. Second: the share of the model's visible surface that was measured where it should be; visible is what faces
-    the camera and is not behind something else that was measured. Third: the share of the surface facing the camera
-    that is behind something else. Needs no truth.
+    They are the measured points (P, 3) on the model (Q, 3), high for many poses of a partial view; the visible surface
+    that was measured where it should be; and the surface facing the camera that is behind something measured.
     """
     placed_m = transform(T_world_object, model_m)
     facing_out = rotate(T_world_object, normals)

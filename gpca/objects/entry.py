@@ -59,10 +59,7 @@ def dataset_of(entry: Mapping) -> str:
 
 
 def stand_in_clause(entries: Iterable[Mapping], partly: bool = True) -> str:
-    """Return the clause that ends a caption when a source is a stand-in, or an empty string.
-
-    The clause says "partly" for a mixture, unless `partly` is false.
-    """
+    """Return the clause that ends a caption when a source is a stand-in, if `partly` with "partly" for a mixture."""
     stand_ins = [bool(entry["stand_in"]) for entry in entries]
     if not any(stand_ins):
         return ""

@@ -129,9 +129,8 @@ class MatchedPair:
 def describe_distances(pair: ObservedPair, matched: MatchedPair | None = None) -> tuple[np.ndarray, np.ndarray]:
     """Return the 52 distances of the pair, and 45 further numbers of its local planes.
 
-    The second are quantiles of the model's distance from the observed cloud's planes, of |cosine| between the normals
-    of partners, and of the model's thickness; the median spacings and extents of both; and the logarithms of their
-    numbers of points.
+    These are quantiles of the model's distance from the observed cloud's planes, of |cosine| between partners' normals,
+    and of the model's thickness; both median spacings and extents; and logarithms of the numbers of points.
     """
     matched = matched or MatchedPair.of(pair)
     observed, model = matched.observed, matched.model
@@ -245,12 +244,10 @@ def describe_registrations(registrations: Registrations, *axes: object, points: 
 def relations(pair: ObservedPair, distances: np.ndarray, planes: np.ndarray) -> np.ndarray:
     """Return 35 numbers that compare the clouds with what the model alone would give.
 
-    An object's own shape sets how far its points lie apart and how thick its local planes are. Logarithms of quantiles,
-    relative to these, are alike for all objects: of the distances both ways to the model's spacing, of the distances
-    from the planes both ways to the model's median thickness, of the observed thickness to the model's; then the
-    quantiles of |cosine| between normals, and the motion: angle (radians), length and displacement (diameters),
-    fitness, and the inlier RMSE relative to the spacing. The distances and planes are those of
-    :func:`gpca.pairs.distances.describe_distances`.
+    An object's own shape sets how far its points lie apart and how thick its local planes are; relative to these,
+    logarithms of quantiles are alike for all objects: of the distances both ways, of those from the planes both ways,
+    of the observed thickness. Then |cosine| between normals, and the motion: angle (radians), length and displacement
+    (diameters), fitness, and the inlier RMSE relative to the spacing.
     """
     to_model, to_observed, from_plane, thickness = distances.reshape(4, QUANTILES)[:, COARSE]
     from_observed_plane, cosine, model_thickness = planes[: 3 * QUANTILES].reshape(3, QUANTILES)[:, COARSE]

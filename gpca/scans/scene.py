@@ -64,10 +64,9 @@ class ScannedScene:
         return float(np.linalg.norm(np.ptp(np.stack(corners), axis=0)))
 
     def known(self) -> Iterator[Known]:
-        """Yield every pair with its pose and its overlap, published or measured.
+        """Yield every pair with its pose and its overlap, published or measured as for 3DMatch (Huang et al. 2021).
 
-        Measured is the share of the target's points within `OVERLAP_M` of the source at the true pose, as published for
-        3DMatch and 3DLoMatch (Huang et al. 2021); clouds are thinned to voxels, so density near a sensor has no effect.
+        This is the share of the target's points within `OVERLAP_M` of the source, of clouds thinned to voxels.
         """
         scale, thin = self.size_m / ROOM_M, dict[str, np.ndarray]()
         for pair in self.printed or (Known(*names) for names in combinations(self.scans, 2)):
@@ -82,19 +81,10 @@ class ScannedScene:
     def pair(self, known: Known) -> ScanPair:
         """Return a pair with its clouds."""
         source, target = self.scans[known.source], self.scans[known.target]
+        overlap = float("nan") if known.overlap is None else known.overlap
         return ScanPair(
-            source.points_N_3,
-            target.points_N_3,
-            self._relative(known),
-            float("nan") if known.overlap is None else known.overlap,
-            self.name,
-            self.kind,
-            self.size_m,
-            known.source,
-            known.target,
-            source.viewpoint_3,
-            target.viewpoint_3,
-            self.family,
+            *(source.points_N_3, target.points_N_3, self._relative(known), overlap, self.name, self.kind, self.size_m),
+            *(known.source, known.target, source.viewpoint_3, target.viewpoint_3, self.family),
         )
 
     def _relative(self, pair: Known) -> np.ndarray:

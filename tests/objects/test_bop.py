@@ -213,13 +213,8 @@ INFOS = [
         '{"1": {"diameter": NaN}}',
         '{"1": {"diameter": -100}}',
     ),
-    *(
-        '{"1": {"diameter": 0.1}}',
-        '{"2": {"diameter": 100}}',
-        '{"0_1": {"diameter": 131}}',
-        '{"1": {"diameter": "1_31"}}',
-    ),
-    *('{"one": {"diameter": 1}}', '{"1": {"diameter": 100}, "01": {"diameter": 100}}'),
+    *('{"1": {"diameter": 0.1}}', '{"2": {"diameter": 100}}', '{"0_1": {"diameter": 131}}'),
+    *('{"1": {"diameter": "1_31"}}', '{"one": {"diameter": 1}}', '{"1": {"diameter": 100}, "01": {"diameter": 100}}'),
 ]
 
 

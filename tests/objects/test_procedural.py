@@ -21,45 +21,10 @@ from gpca.objects.procedural import (
     union,
 )
 
-LINEMOD_MM = {  # extents x, y, z and diameter in models_info.json of BOP's lm
-    "ape": (75.869, 77.599, 91.769, 102.099),
-    "benchvise": (215.670, 121.856, 219.410, 247.506),
-    "camera": (136.659, 143.030, 100.497, 172.492),
-    "can": (100.792, 181.796, 193.734, 201.404),
-    "cat": (67.011, 127.633, 117.457, 154.546),
-    "driller": (229.476, 75.471, 208.002, 261.472),
-    "duck": (104.429, 77.408, 85.697, 108.999),
-    "eggbox": (150.185, 107.075, 69.241, 164.628),
-    "glue": (36.721, 77.866, 172.816, 175.889),
-    "holepuncher": (100.888, 108.497, 90.800, 145.543),
-    "iron": (258.226, 118.482, 141.132, 278.078),
-    "lamp": (203.146, 117.753, 213.116, 282.601),
-    "phone": (93.918, 147.433, 184.747, 212.358),
-}
-# Extents of the google_16k scans in their tightest upright box, handles along x, and diameters where they tell more.
-YCB_MM = {
-    "002_master_chef_can": (102, 102, 140, None),
-    "003_cracker_box": (72, 164, 213, None),
-    "004_sugar_box": (48, 93, 176, None),
-    "005_tomato_soup_can": (68, 68, 102, None),
-    "006_mustard_bottle": (96, 58, 191, 197),
-    "007_tuna_fish_can": (85, 85, 33.5, None),
-    "008_pudding_box": (113, 90, 39, None),
-    "009_gelatin_box": (73, 89, 30, None),
-    "010_potted_meat_can": (101.5, 57, 83.5, None),
-    "011_banana": (69, 198, 37, 198),
-    "019_pitcher_base": (189, 133, 242, None),
-    "021_bleach_cleanser": (102, 68, 251, None),
-    "024_bowl": (161, 161, 55, None),
-    "025_mug": (117, 93, 81, 125),
-    "035_power_drill": (184, 187, 57, 226),
-    "036_wood_block": (90, 90, 206, None),
-    "037_scissors": (88, 198, 15.7, 204),
-    "040_large_marker": (19, 121, 19, None),
-    "051_large_clamp": (165, 121, 39, 175),
-    "052_extra_large_clamp": (202, 165, 36, 217),
-    "061_foam_brick": (52, 78, 51, None),
-}
+SHAPES = {family: FAMILIES[family]() for family in ("linemod", "ycb")}
+# Of the google_16k scans, where they tell more than the extents.
+YCB_DIAMETERS_MM = {"006_mustard_bottle": 197, "011_banana": 198, "025_mug": 125, "035_power_drill": 226}
+YCB_DIAMETERS_MM |= {"037_scissors": 204, "051_large_clamp": 175, "052_extra_large_clamp": 217}
 
 
 @pytest.fixture(scope="module")
@@ -107,23 +72,24 @@ def test_building_twice_gives_identical_meshes(built, family):
         assert np.array_equal(first.faces, second.faces), first.name
 
 
-@pytest.mark.parametrize("name", LINEMOD_MM)
-def test_linemod_has_the_published_diameters_and_about_the_published_extents(meshes, name):
-    *extents_mm, published_mm = LINEMOD_MM[name]
-    assert diameter_mm(meshes[name]) == pytest.approx(published_mm, rel=0.01)
-    assert 1000 * meshes[name].extents == pytest.approx(np.array(extents_mm), rel=0.11)
+def test_linemod_has_the_published_diameters_and_about_the_published_extents(meshes):
+    for name, shape in SHAPES["linemod"].items():
+        assert diameter_mm(meshes[name]) == pytest.approx(shape.diameter_mm, rel=0.01), name
+        assert 1000 * meshes[name].extents == pytest.approx(np.array(shape.extents_mm), rel=0.11), name
 
 
-@pytest.mark.parametrize("name", YCB_MM)
-def test_ycb_has_the_extents_and_diameters_of_the_scans(meshes, name):
-    *extents_mm, scan_mm = YCB_MM[name]
-    np.testing.assert_allclose(meshes[name].extents * 1000, extents_mm, rtol=0.05)
-    assert diameter_mm(meshes[name]) == pytest.approx(scan_mm or diameter_mm(meshes[name]), rel=0.05)
+def test_ycb_has_the_extents_and_diameters_of_the_scans(meshes):
+    for name, shape in SHAPES["ycb"].items():
+        if shape.extents_mm is not None:
+            np.testing.assert_allclose(meshes[name].extents * 1000, shape.extents_mm, rtol=0.05, err_msg=name)
+    for name, scan_mm in YCB_DIAMETERS_MM.items():
+        assert diameter_mm(meshes[name]) == pytest.approx(scan_mm, rel=0.05), name
 
 
 def test_names_are_those_of_the_benchmarks_in_order(built):
-    assert [surface.name for surface in built["linemod"]] == list(LINEMOD_MM)
-    assert [surface.name for surface in built["ycb"]] == sorted(YCB_MM)
+    assert [len(built[family]) for family in SHAPES] == [13, 21]
+    for family, shapes in SHAPES.items():
+        assert [surface.name for surface in built[family]] == sorted(shapes)
 
 
 @pytest.mark.parametrize("name", ["024_bowl", "025_mug"])

@@ -14,6 +14,7 @@ from gpca.pairs.distances import (
     WIDTHS,
     LocalPlanes,
     MatchedPair,
+    ObservedPair,
     _entropies,
     describe_distances,
     describe_entropy,
@@ -57,8 +58,6 @@ def test_a_shift_along_a_plane_leaves_the_distance_from_it():
     planes = LocalPlanes.of(grid)
     assert np.abs(planes.normals) == pytest.approx(np.tile([0, 0, 1], (400, 1)), abs=1e-6)
     assert planes.thickness == pytest.approx(0, abs=1e-7)
-    from gpca.pairs.distances import ObservedPair
-
     flat = ObservedPair(grid, grid, np.eye(4), np.eye(4)[None], np.ones(1), np.zeros(1), ())
     along, across = groups(moved(flat, [0.02, 0, 0])), groups(moved(flat, [0, 0, 0.02]))
     assert along[2, MIDDLE] == pytest.approx(0, abs=1e-9) and along[0, MIDDLE] == pytest.approx(0.02)

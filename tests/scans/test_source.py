@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from gpca.errors import InputError
-from gpca.rigid import scale_translation
+from gpca.rigid import scale_translation, transform
 from gpca.scans.pair import near
 from gpca.scans.scene import ScanPairs
 from gpca.scans.source import (
@@ -77,15 +77,9 @@ def test_virtual_scans_of_one_scene_show_one_surface():
         assert (scans.source_viewpoint_3 == 0).all()
         moved = scans.source_N_3[scans.source_common_N]
         assert len(moved) > 300 and np.isfinite(moved).all()
-        with_truth = near(transformed(scans), scans.target_M_3, near_m).mean()
+        with_truth = near(transform(scans.T_target_source, scans.source_N_3), scans.target_M_3, near_m).mean()
         assert with_truth > first.overlap - 0.15
     assert 0.1 < compound("object_7", 2).size_m < 0.5
-
-
-def transformed(scans):
-    from gpca.rigid import transform
-
-    return transform(scans.T_target_source, scans.source_N_3)
 
 
 def test_virtual_scenes_are_drawn_by_their_names():
