@@ -95,7 +95,7 @@ def metrics():
     )
 
 
-def test_table3_shows_the_papers_experiment_alone(metrics):
+def test_table3_shows_the_papers_experiment_alone_its_conditions_and_lower_bounds(metrics):
     markdown = made(table3_active_learning, metrics).markdown()
     assert "| Dataset | Encoder saw | Labels, BALD + k-means | Labels, BALD | Labels, random |" in markdown
     rows = [line for line in markdown.splitlines() if line.startswith("| YCB")]
@@ -106,6 +106,13 @@ def test_table3_shows_the_papers_experiment_alone(metrics):
     assert f"| YCB | all concepts | **16 ± 10** | – | > 48 | {AT_96} |" in markdown
     assert "| YCB | the known concepts only | – | – | > 60 |" in markdown
     assert "LINEMOD" not in markdown
+    judged = ("(rbf, rate 0.01, 100 passes)", "at least 60 (then 10 a round), at most 550 or the whole pool")
+    for words in ("120 labeled samples", "680 training samples", "4 labels a round, 60 in all", *judged):
+        assert words in markdown
+    assert "Mean over 3 seeds, 200 test samples each" in markdown
+    records = made(table3_active_learning, metrics).records()
+    assert ("ycb", "pretrained", "labels_random", 48.0, "", "", 3, 600, True) in records
+    assert ("ycb", "pretrained", "labels_bald_kmeans", 16.0, 6.063449, 25.936551, 3, 600, False) in records
 
 
 def test_accuracies_have_the_farther_bounds_of_those_over_seeds_and_families(metrics):
@@ -119,24 +126,10 @@ def test_accuracies_have_the_farther_bounds_of_those_over_seeds_and_families(met
     assert wider.cells[2, "labels_bald_kmeans"] == table.cells[2, "labels_bald_kmeans"]  # no share of samples
 
 
-def test_table3_states_its_conditions(metrics):
-    markdown = made(table3_active_learning, metrics).markdown()
-    judged = ("(rbf, rate 0.01, 100 passes)", "at least 60 (then 10 a round), at most 550 or the whole pool")
-    for words in ("120 labeled samples", "680 training samples", "4 labels a round, 60 in all", *judged):
-        assert words in markdown
-    assert "Mean over 3 seeds, 200 test samples each" in markdown
-
-
 def test_without_a_rare_concept_nothing_is_said_of_it(metrics):
     table = made(table3_active_learning, metrics, rare=None)
     assert not [note for note in table.footnotes if "percent of the pool" in note or "Other rows" in note]
     assert [label for _, (label, _) in table.rows] == ["pretrained", "unseen"]
-
-
-def test_the_csv_marks_lower_bounds(metrics):
-    records = made(table3_active_learning, metrics).records()
-    assert ("ycb", "pretrained", "labels_random", 48.0, "", "", 3, 600, True) in records
-    assert ("ycb", "pretrained", "labels_bald_kmeans", 16.0, 6.063449, 25.936551, 3, 600, False) in records
 
 
 def test_extended_averages_over_the_concepts_held_out_and_leaves_the_oracle_out_of_the_comparison(metrics):
@@ -225,16 +218,13 @@ def curve_files(tmp_path):
     return paths
 
 
-def test_curves_are_means_over_concepts_and_intervals_over_seeds(curve_files):
+def test_curves_are_means_over_concepts_with_intervals_over_the_seeds_that_all_have_the_labels(curve_files):
     curve = mean_curves(curve_files)["ycb", "random", "pretrained"]
     assert curve["labels"].tolist() == [0, 4, 8, 12]
     assert curve["mean"].tolist() == pytest.approx([56, 66, 76, 86])
     # Two seeds 2 points apart: s = √2, t_1 = 12.706.
     assert (curve["high"] - curve["mean"]).tolist() == pytest.approx([12.706] * 4, abs=1e-3)
     assert curve["seeds"].tolist() == [2] * 4
-
-
-def test_labels_that_not_every_seed_was_looked_at_are_left_out(curve_files):
     key = ("ycb", "random", "pretrained")
     [path] = [file for file in curve_files if file.parts[-3:] == ("ycb", "random", "seed1.csv")]
     step = {"new_labels": 1, "accuracy": 0.9, "accuracy_new": 0.9, "epochs": 1}
@@ -243,10 +233,12 @@ def test_labels_that_not_every_seed_was_looked_at_are_left_out(curve_files):
     assert mean_curves(curve_files)[key]["labels"].tolist() == [0, 4, 8]
 
 
-def test_the_target_is_named_and_the_seeds_are_counted(curve_files):
+def test_the_target_is_named_the_seeds_are_counted_and_other_sources_draw_nothing(curve_files):
     figure = drawn(curve_files)
     assert [text.get_text() for text in figure.legends[0].get_texts()] == [*titles(CURVES).values(), "target (90 %)"]
     assert [text.get_text() for text in figure.texts] == ["Means over 2 seeds"]
+    with pytest.raises(InputError, match="has no curve of these sources and strategies"):
+        drawn(curve_files, {"cups": REAL["ycb"]})
 
 
 def test_no_two_strategies_look_alike():
@@ -256,11 +248,6 @@ def test_no_two_strategies_look_alike():
 
 def test_the_figure_is_the_same_bytes_each_time(curve_files, same_bytes):
     same_bytes(lambda: drawn(curve_files))
-
-
-def test_without_a_curve_of_these_sources_nothing_is_drawn(curve_files):
-    with pytest.raises(InputError, match="has no curve of these sources and strategies"):
-        drawn(curve_files, {"cups": REAL["ycb"]})
 
 
 def test_a_query_is_drawn_with_few_or_many_points(tmp_path):
@@ -288,13 +275,10 @@ def test_a_panel_has_at_most_six_lines_and_the_papers_strategies_are_in_each(tmp
     assert set().union(*lines_of) == set(titles(names).values())
 
 
-def test_the_mean_is_over_the_concepts_asked_for(rare_files):
+def test_the_papers_experiment_is_one_concept_with_the_rare_pool_below(rare_files):
     key = ("ycb", "random", "pretrained")
     assert mean_curves(rare_files)[key]["mean"].tolist()[-1] == pytest.approx(80)
     assert mean_curves(rare_files, ["overlap"])[key]["mean"].tolist()[-1] == pytest.approx(90)
-
-
-def test_the_papers_experiment_has_the_rare_pool_below(rare_files):
     strategies = ("bald_kmeans", "random")
     words = words_of(drawn(rare_files, {"ycb": REAL["ycb"]}, strategies, active_learning_overlap))
     assert {"YCB", *titles(strategies).values()} <= set(words)

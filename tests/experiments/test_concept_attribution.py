@@ -58,7 +58,7 @@ def collected(files, tmp_path):
     return read_clustered(tmp_path / "intervals.csv").set_index(["metric", "concept"])
 
 
-def test_values_are_those_of_the_metrics(files, collected):
+def test_values_are_those_of_the_metrics_with_intervals_over_families_and_seeds(files, collected):
     metrics = collect(*files).groupby(["metric", "concept"])["value"].mean()
     assert set(collected.index) == {
         *(("accuracy", concept) for concept in ("all", *CONCEPTS)),
@@ -68,9 +68,6 @@ def test_values_are_those_of_the_metrics(files, collected):
     for key in collected.index:
         assert collected.loc[key, "value"] == pytest.approx(metrics[key])
     assert collected.loc[("causal_accuracy", "all"), "samples"] == 24
-
-
-def test_intervals_are_over_families_and_seeds(collected):
     row = collected.loc["accuracy", "all"]
     assert (row["seeds"], row["clusters"], row["samples"]) == (2, 4, 48)
     assert row["high"] - row["low"] > 1.5 * np.ptp(wilson_interval(30, 48))  # far more than of independent samples
@@ -143,15 +140,12 @@ def test_table1_has_the_papers_explainers_with_predictions_in_its_order(metrics)
     assert made(table1_single_baselines, pd.concat([metrics, oracle])).markdown() == markdown
 
 
-def test_table1_says_who_explains_fewer_samples(metrics):
+def test_table1_says_who_explains_fewer_samples_and_table2_has_only_gpca(metrics):
     both = pd.concat([metrics, tidy({("ycb", "shap_additive", "all"): 0.33}, test_samples=60)])
     both = both[(both["source"] == "ycb") | (both["method"] == "gpca")]
     footnotes = made(table1_single_baselines, both).footnotes
     assert "60 to 200 test samples each" in footnotes[0]
     assert footnotes[1] == f"Test samples explained: 200 by {GPCA}; 60 by SHAP."
-
-
-def test_table2_has_concepts_as_columns_and_only_gpca_as_rows(metrics):
     markdown = made(table2_per_concept, metrics).markdown()
     assert "| Dataset | Explainer | Noise | Pose | All |" in markdown
     assert f"| LINEMOD | {GPCA} | **99.7 (96.7 to 100.0)** | 92.0 (89.0 to 94.0) | 97.0 (94.0 to 99.0) |" in markdown
@@ -168,19 +162,16 @@ def test_stand_ins_are_said_in_title_and_row(metrics):
         assert "| YCB |" in mixed.markdown()
 
 
-def test_one_seed_has_an_interval_over_families():
+def test_one_seed_has_an_interval_over_families_and_different_numbers_are_named():
     table = made(table1_single_baselines, tidy({("ycb", "gpca", "all"): 0.5}, seeds=1))
     assert "| YCB | 50.0 (47.0 to 52.0) |" in table.markdown()
     assert "Over 1 seed, 200 test samples each" in table.markdown()
     assert table.records()[1] == ("ycb", "gpca", 50.0, 47.0, 52.0, 1, 200, False)
-
-
-def test_different_numbers_of_seeds_are_told():
     both = [tidy({(source, "gpca", "all"): 0.5}, seeds=seeds) for source, seeds in (("ycb", 2), ("linemod", 3))]
     assert "Over 2 to 3 seeds, 200 test" in made(table1_single_baselines, pd.concat(both)).markdown()
 
 
-def test_csv_is_machine_readable_and_bounds_stay_possible(metrics, tmp_path):
+def test_csv_and_page_have_the_numbers_and_words_of_the_table(metrics, tmp_path):
     made(table1_single_baselines, metrics).write(tmp_path / "t")
     with (tmp_path / "t.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
@@ -190,9 +181,6 @@ def test_csv_is_machine_readable_and_bounds_stay_possible(metrics, tmp_path):
     assert (gpca["n_seeds"], gpca["n_test"]) == ("3", "600")
     assert len(rows) == 3
     assert (tmp_path / "t.md").read_text(encoding="utf-8").startswith("**Mean accuracy")
-
-
-def test_the_page_is_given_the_words_of_the_table(metrics, tmp_path):
     table = made(table1_single_baselines, metrics)
     table.write(tmp_path / "t")
     printed = json.loads((tmp_path / "t.json").read_text(encoding="utf-8"))
@@ -204,16 +192,13 @@ def test_the_page_is_given_the_words_of_the_table(metrics, tmp_path):
     assert f"| {bold} |" in table.markdown()
 
 
-def test_ties_at_the_printed_precision_are_all_bold():
+def test_ties_at_the_printed_precision_are_all_bold_unless_most_of_a_large_group_share_them():
     cells = {(0, "a"): Cell(99.96, 0, 3, 1), (0, "b"): Cell(100.0, 0, 3, 1), (0, "c"): Cell(98, 0, 3, 1)}
     columns = {name: Column(name.upper()) for name in "abc"}
     table = Table("t", "T", {"source": "S"}, ((("x", "X"),),), "column", columns, cells)
     assert replace(table, compared=(list(cells),)).best() == {(0, "a"), (0, "b")}
     assert replace(table, compared=([(0, "b"), (0, "c")],)).best() == {(0, "b")}
     assert replace(table, compared=([(0, "c")], [(1, "a")], [(0, "a"), (1, "a")])).best() == set()
-
-
-def test_a_best_that_most_of_a_large_group_share_is_not_bold():
     cells = {(row, "a"): Cell(0.0 if row < 7 else 1.0, 0, 3, 1) for row in range(12)}
     columns = {"a": Column("A", least_is_best=True)}
     rows = tuple((("x", str(row)),) for row in range(12))
@@ -234,7 +219,7 @@ def test_latex_needs_no_letters_that_it_lacks_and_has_minus_signs():
     )
 
 
-def test_latex_is_balanced_and_escaped(metrics):
+def test_latex_is_balanced_escaped_and_as_wide_as_it_must_be(metrics):
     sources = {"linemod": {"title": r"A_1 & 50 % ~ \x {b}", "stand_in": False}}
     latex = made(table1_single_baselines, metrics, sources=sources).latex()
     title = r"A\_1 \& 50 \% \textasciitilde{} \textbackslash{}x \{b\}"
@@ -248,9 +233,6 @@ def test_latex_is_balanced_and_escaped(metrics):
     assert latex.isascii()
     rows = [line for line in latex.splitlines() if line.endswith(r"\\")]
     assert {line.replace(r"\&", "").count("&") for line in rows} == {2}
-
-
-def test_latex_spans_both_columns_only_where_it_must(metrics):
     assert r"\begin{table}[t]" in made(table1_single_baselines, metrics, explainers=["gpca"]).latex()
     assert r"\begin{table*}[t]" in made(table1_single_baselines, metrics, sources=STAND_INS).latex()
 
@@ -313,23 +295,24 @@ def test_extended_has_a_row_per_explainer_and_a_unit_per_column(everything):
     assert "the one column that differs from run to run" in table.markdown()
 
 
-def test_extended_says_nothing_of_few_causal_samples(everything):
+def test_extended_leaves_out_few_causal_samples_and_what_was_not_measured(everything):
     intervals, metrics = everything
     few = intervals.assign(samples=29)
     assert (1, "causal_accuracy") in made(table1_extended, intervals, metrics).cells
     assert (1, "causal_accuracy") not in made(table1_extended, few, metrics).cells
+    parts = (part[~part["metric"].str.startswith(("causal", "seconds"))] for part in everything)
+    markdown = made(table1_extended, *parts).markdown()
+    assert "Causal" not in markdown
+    assert "Seconds" not in markdown
 
 
-def test_extended_sets_the_best_rival_in_bold_and_never_an_oracle(everything):
+def test_extended_sets_the_best_rival_in_bold_never_an_oracle_and_has_a_line_per_number(everything):
     table = made(table1_extended, *everything)
     assert table.best() == {(1, "accuracy")}
     assert [labels[1][1] for labels in table.rows if labels[0][0] == "ycb"] == [GPCA, "SHAP", "SHAP (oracle)"]
     assert "oracles apart" in table.markdown()
     rivals = [name for name in EXPLAINERS if "oracle" not in name]
     assert "oracle" not in made(table1_extended, *everything, explainers=rivals).markdown()
-
-
-def test_extended_csv_is_one_line_per_number(everything):
     records = made(table1_extended, *everything).records()
     heads = ("metric", "mean", "ci_low", "ci_high", "n_seeds", "n_test", "at_least")
     assert records[0] == ("source", "explainer", "reads", *heads)
@@ -338,13 +321,6 @@ def test_extended_csv_is_one_line_per_number(everything):
     assert ("ycb", "shap_additive", "further runs", "causal_accuracy", 50.0, 47.0, 52.0, 3, 63, False) in records
     assert ("ycb", "shap_additive", "further runs", "accuracy", 35.0, 32.0, 37.0, 3, 180, False) in records
     assert ("ycb", "gpca", "aligned source", "icp_calls", 0.0, 0.0, 0.0, 3, 600, False) in records
-
-
-def test_extended_leaves_out_what_was_not_measured(everything):
-    parts = (part[~part["metric"].str.startswith(("causal", "seconds"))] for part in everything)
-    markdown = made(table1_extended, *parts).markdown()
-    assert "Causal" not in markdown
-    assert "Seconds" not in markdown
 
 
 def test_a_table_that_may_be_wider_than_the_text_is_scaled_down_in_latex(everything):

@@ -58,16 +58,12 @@ def axes_of(draw, *arguments):
     return axes
 
 
-def test_a_matrix_shows_the_share_of_each_true_concept():
+def test_a_matrix_shows_the_share_of_each_true_concept_and_bars_those_of_all():
     confusion = pooled_confusions(tidy(records("ycb", "shap", COUNTS)))["ycb", "shap"]
     shown = [text.get_text() for text in axes_of(confusions_figure.draw_matrix, confusion, True).texts]
     assert shown == ["80", "10", "0", "30", "50", "20", "0", "0", "100"]
     without_overlap = axes_of(confusions_figure.draw_matrix, confusion.loc[["noise", "pose"]], True)
     assert [text.get_text() for text in without_overlap.texts] == shown[:6]
-
-
-def test_bars_are_the_shares_of_all_samples_and_dashes_the_truth():
-    confusion = pooled_confusions(tidy(records("ycb", "shap", COUNTS)))["ycb", "shap"]
     axes = axes_of(confusions_figure.draw_bars, confusion, True)
     assert [bar.get_height() for bar in axes.patches] == pytest.approx([11 / 30, 6 / 30, 12 / 30, 1 / 30])
     [dashes] = axes.collections
@@ -84,9 +80,10 @@ def test_where_none_abstains_there_is_no_bar_and_no_word_for_it():
         assert not [text for text in figure.texts if "abstained" in text.get_text()]
 
 
-def test_letters_tell_concepts_apart():
+def test_letters_tell_concepts_apart_and_nominal_is_ok():
     assert letters(["noise", "pose", "overlap"]) == ["N", "P", "O"]
     assert letters(["pose", "position", "noise"]) == ["Pose", "Posi", "Nois"]
+    assert letters(["nominal", "noise", "pose", "overlap"]) == ["OK", "N", "P", "O"]
 
 
 def test_the_same_metrics_give_the_same_bytes(metrics, same_bytes):
@@ -113,7 +110,3 @@ def test_nothing_overlaps_and_all_stays_on_the_page(metrics):
 def test_metrics_without_these_confusions_are_refused(metrics):
     with pytest.raises(InputError, match="are of none of these explainers and sources"):
         draw_confusions_figure(metrics, SOURCES, {"other": "Other"})
-
-
-def test_nominal_is_ok_and_the_others_keep_their_letter():
-    assert letters(["nominal", "noise", "pose", "overlap"]) == ["OK", "N", "P", "O"]

@@ -58,7 +58,7 @@ def intervals():
     return pd.DataFrame(rows, columns=COLUMNS)
 
 
-def test_a_cell_is_the_accuracy_and_in_brackets_the_change(intervals):
+def test_a_cell_is_the_accuracy_and_in_brackets_the_change_and_the_csv_holds_both(intervals):
     table = table10_controls(run("unseen_objects", "shuffled", "transfer"), intervals)
     text = table.markdown()
     assert (
@@ -73,27 +73,21 @@ def test_a_cell_is_the_accuracy_and_in_brackets_the_change(intervals):
     assert "change" not in text.splitlines()[2]
     assert text.splitlines()[2].count("|") == text.splitlines()[3].count("|")
     assert table.latex().count(r"\textbf{Paper's protocol (\%)}") == 1
-
-
-def test_an_auroc_says_how_many_answers_it_had_to_find(intervals):
-    text = table10_controls(run("unseen_objects"), intervals).markdown()
-    assert "| 0.88 (24 of 200) |" in text  # 12 % of 200 are wrong
-    assert "wrong" not in text.splitlines()[2]
-
-
-def test_the_note_says_which_controls_have_fewer_seeds(intervals):
-    note = table10_controls(run("unseen_objects", "shuffled"), intervals).footnotes[0]
-    assert note.startswith("Over 3 seeds (Shuffled labels: 1 seed). In brackets")
-    alike = intervals.assign(seeds=2)
-    assert table10_controls(run("shuffled"), alike).footnotes[0].startswith("Over 2 seeds. In")
-
-
-def test_the_csv_holds_both_with_their_bounds(intervals):
     table = table10_controls(run("unseen_objects"), intervals)
     found = {(*record[:2], record[3]): record[4:7] for record in table.records()}
     assert found["ycb", "good", "unseen_objects"] == pytest.approx((88, 84, 90))
     assert found["ycb", "good", "unseen_objects_change"] == pytest.approx((-10, -13, -9))
     assert ("ycb", "good", "transfer") not in found  # it was not run
+
+
+def test_an_auroc_says_how_many_answers_it_had_to_find_and_the_note_which_controls_have_fewer_seeds(intervals):
+    text = table10_controls(run("unseen_objects"), intervals).markdown()
+    assert "| 0.88 (24 of 200) |" in text  # 12 % of 200 are wrong
+    assert "wrong" not in text.splitlines()[2]
+    note = table10_controls(run("unseen_objects", "shuffled"), intervals).footnotes[0]
+    assert note.startswith("Over 3 seeds (Shuffled labels: 1 seed). In brackets")
+    alike = intervals.assign(seeds=2)
+    assert table10_controls(run("shuffled"), alike).footnotes[0].startswith("Over 2 seeds. In")
 
 
 def test_what_an_explainer_adds_stands_beside_under_two_controls(intervals):
@@ -144,15 +138,11 @@ def encoded():
     return pd.DataFrame(rows, columns=COLUMNS)
 
 
-def test_an_encoder_trained_otherwise_stands_below_the_papers_with_what_it_gains(encoded):
+def test_an_encoder_trained_otherwise_stands_below_the_papers_on_the_same_seeds(encoded):
     text = table10_encoders(ENCODERS, encoded).markdown()
     assert "| All together | GP-CA, 3 seeds | 98.0 | – | 75.0 |" in text
     assert "| All together | GP-CA, draws of random size, 1 seed | – | – | 79.0 (+6.0; 4.0 to 8.0) |" in text
     assert "head of two layers" not in text and "on the pair" not in text
-
-
-def test_it_is_compared_with_the_papers_encoder_on_the_same_seeds(encoded):
-    text = table10_encoders(ENCODERS, encoded).markdown()
     assert "| All together | GP-CA, 1 seed | – | – | 73.0 |" in text  # 79 that are 6 more
     alike = table10_encoders(ENCODERS, encoded.assign(seeds=1))
     assert [labels[1][0] for labels in alike.rows[:2]] == ["paper", "random_draws"]

@@ -37,7 +37,7 @@ def values(rows, **wanted):
     return rows["value"].tolist()
 
 
-def test_who_is_right_has_full_marks_and_who_says_the_same_has_those_of_chance(causes, tmp_path):
+def test_who_is_right_has_full_marks_and_the_confusion_counts_every_labeled_sample(causes, tmp_path):
     rows = by_seed(*write_run(tmp_path, causes))
     assert values(rows, method="right", metric="balanced_accuracy") == [1.0]
     assert values(rows, method="right", metric="auroc_failed") == [1.0]
@@ -47,6 +47,9 @@ def test_who_is_right_has_full_marks_and_who_says_the_same_has_those_of_chance(c
     assert set(present) <= set(LABELS)
     assert values(rows, method="always_pose", metric="balanced_accuracy") == [1 / len(LABELS)]
     assert values(rows, method=CEILING, metric="auroc_failed")[0] > 0.8
+    labeled = (labels_of(causes.truth)[causes.rows("test")] != BORDERLINE).sum()
+    named = rows[(rows["method"] == "always_pose") & rows["metric"].str.startswith("predicted_as_")]
+    assert named["value"].sum() == labeled == sum(values(named, metric="predicted_as_pose"))
 
 
 def test_what_the_ceiling_names_nominal_has_its_score_of_it(causes):
@@ -54,13 +57,6 @@ def test_what_the_ceiling_names_nominal_has_its_score_of_it(causes):
     assert ((ceiling.named == NOMINAL) == (ceiling.nominal == 1)).all()
     assert (ceiling.nominal[ceiling.named != NOMINAL] == 0).all()
     assert ceiling.nominal + ceiling.scores.sum(axis=1) == pytest.approx(1)
-
-
-def test_the_confusion_counts_every_sample_that_has_a_label(causes, tmp_path):
-    rows = by_seed(*write_run(tmp_path, causes))
-    labeled = (labels_of(causes.truth)[causes.rows("test")] != BORDERLINE).sum()
-    named = rows[(rows["method"] == "always_pose") & rows["metric"].str.startswith("predicted_as_")]
-    assert named["value"].sum() == labeled == sum(values(named, metric="predicted_as_pose"))
 
 
 def test_all_sources_together_are_one_more_where_there_are_several(causes, tmp_path):

@@ -104,8 +104,5 @@ def test_an_estimator_that_refuses_all_has_no_row_and_is_named(intervals):
     censi, plane = estimator_entry("censi").title, method_entry("point_to_plane").title
     assert f"Left out, as they refuse every registration: {censi}, of {plane}." in table.markdown()
     assert "Left out" not in table12_uncertainty(RUN, intervals).markdown()
-
-
-def test_nothing_to_show_is_one_line(intervals):
     with pytest.raises(InputError, match="has nothing to show"):
         table12_uncertainty(RUN, intervals[intervals["method"] == "none"])

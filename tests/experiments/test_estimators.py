@@ -62,7 +62,7 @@ def file(tmp_path):
     return written
 
 
-def test_every_metric_by_hand(file):
+def test_every_metric_by_hand_and_the_covariance_survives_the_file(file):
     metrics = {name: value[0] for name, value in measure(read_estimates(file(rows())), ones()).items()}
     expected = {"no_estimate": 0, "test_samples": 20, "auroc_failed": 1, "spearman_error": 1}
     expected |= {f"nne_{TRUTH}": 2, f"nees_{TRUTH}": 2, f"coverage_{TRUTH}": 1}
@@ -70,6 +70,9 @@ def test_every_metric_by_hand(file):
         expected |= {f"kl_rotation_{kind}": 2 + k, f"kl_translation_{kind}": 3 + k, f"nne_{kind}": 3}
         expected |= {f"nees_{kind}": 1 + k, f"coverage_{kind}": 0.9 - 0.1 * k}
     assert metrics == pytest.approx(expected)
+    found = read_estimates(file(rows()))
+    assert covariance_of(found.iloc[0]) == pytest.approx(SIGMA, abs=1e-12)
+    assert found["failed"].tolist() == [False] * 10 + [True] * 10
 
 
 def test_means_leave_out_a_tenth_at_either_end_by_weight():
@@ -109,7 +112,7 @@ def test_what_has_no_estimate_is_counted_and_left_out_of_the_rest(file):
     assert {name: value[0] for name, value in none.items()} == {"no_estimate": 1, "test_samples": 20}
 
 
-def test_failed_and_other_registrations_stand_apart(file):
+def test_failed_and_other_registrations_stand_apart_and_what_is_not_defined_has_no_row(file):
     wrong = rows(mahalanobis=np.where(np.arange(20) < 10, 1.0, 100.0))
     tidy = estimators.collect_estimates(RUN, [file(wrong)]).set_index(["metric", "concept"])["value"]
     assert tidy[f"coverage_{TRUTH}", "point_to_point/succeeded"] == 1
@@ -118,9 +121,6 @@ def test_failed_and_other_registrations_stand_apart(file):
     assert tidy["auroc_failed", "point_to_point/both"] == 1
     assert ("auroc_failed", "point_to_point/failed") not in tidy.index
     assert (f"coverage_{TRUTH}", "point_to_point/both") not in tidy.index
-
-
-def test_what_is_not_defined_has_no_row(file):
     tidy = estimators.collect_estimates(RUN, [file(rows(failed=False))])
     assert "auroc_failed" not in set(tidy["metric"])
     assert set(tidy["source"]) | set(tidy["method"]) == {"ycb", "brossard"}
@@ -168,15 +168,12 @@ def test_an_area_is_compared_with_the_best_gate_on_the_same_draws(file):
     assert set(found[found["estimator"] == "gate_rmse"]["metric"]) == {"auroc_failed", "spearman_error"}
 
 
-def test_a_registration_without_correspondences_scores_worst_at_every_gate(file):
+def test_a_registration_without_correspondences_scores_worst_and_few_families_have_no_interval(file):
     lost = rows(fitness=np.where(np.arange(20) == 19, 0.0, 0.9), inlier_rmse=np.where(np.arange(20) == 19, 0.0, 0.01))
     of = estimators.collect_intervals(RUN, [file(lost, f"ycb/{REFERENCES[0]}/seed0.csv")]).set_index(
         ["estimator", "metric"]
     )
     assert of.loc[("gate_rmse", "auroc_failed"), "value"] == pytest.approx(0.55)
-
-
-def test_few_families_have_no_interval(file):
     found = intervals_of(file, brossard=rows(cluster="cups"), **{REFERENCES[0]: rows(cluster="cups")})
     assert found["low"].isna().all()
 
@@ -186,12 +183,6 @@ def test_seconds_are_medians_over_all_files(file):
     other = pd.DataFrame({"sample": [0, 1], "method": "point_to_point", "seconds": [0.3, 0.4]})
     files = [file(first, "ycb/estimator_brossard/seed3.csv"), file(other, "ycb/estimator_brossard/seed4.csv")]
     assert collect_estimate_seconds(files).to_numpy().tolist() == [["brossard", "point_to_point", 0.3]]
-
-
-def test_a_covariance_survives_the_file(file):
-    found = read_estimates(file(rows()))
-    assert covariance_of(found.iloc[0]) == pytest.approx(SIGMA, abs=1e-12)
-    assert found["failed"].tolist() == [False] * 10 + [True] * 10
 
 
 @pytest.mark.parametrize(

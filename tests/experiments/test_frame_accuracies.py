@@ -100,7 +100,7 @@ def found(files, tmp_path):
     return read_clustered(tmp_path / "intervals.csv").set_index(["table", "method", "metric", "concept"])
 
 
-def test_values_are_those_of_the_metrics(files, found):
+def test_values_are_those_of_the_metrics_over_scenes_and_differences_are_paired(files, found):
     metrics = collect(RUN, *files)
     metrics = metrics[(metrics["metric"] == "accuracy")].groupby(["table", "method", "metric", "concept"])["value"]
     accuracies = found.xs("accuracy", level="metric", drop_level=False)
@@ -108,24 +108,18 @@ def test_values_are_those_of_the_metrics(files, found):
         assert accuracies.loc[key, "value"] == pytest.approx(metrics.mean()[key])
     tables = {table for table, *_ in found.index}
     assert tables == {"attribution", "seen", "unseen", "dataset/lm", "dataset/of_0", "dataset/of_1"}
-
-
-def test_clusters_are_scenes(found):
     row = found.loc["attribution", "dgcnn-none", "accuracy", "all"]
     assert (row["seeds"], row["clusters"], row["samples"]) == (2, 4, 24)
     assert row["low"] < row["value"] < row["high"]
     seldom = found.loc["dataset/of_1", "dgcnn-none", "accuracy", "all"]
     assert (seldom["seeds"], seldom["clusters"], seldom["samples"]) == (1, 1, 3)
     assert (seldom["value"], seldom["low"], seldom["high"]) == pytest.approx((1, *wilson_interval(1, 1)))
-
-
-def test_differences_are_paired_with_the_first_method(found):
     row = found.loc["attribution", "pointnet-none", "difference", "all"]
     assert row["value"] == pytest.approx(-2 / 12) and row["low"] < row["value"] < row["high"] <= 0
     assert ("attribution", "dgcnn-none", "difference", "all") not in found.index
 
 
-def test_a_method_of_fewer_seeds_is_compared_in_these(files):
+def test_a_method_of_fewer_seeds_is_compared_in_these_and_faults_are_one_line(files):
     said, poses = files
     first_alone = collect_intervals(RUN, said[:2], poses[:1])
     fewer = collect_intervals(RUN, [path for path in said if path != said[3]], poses)
@@ -134,9 +128,6 @@ def test_a_method_of_fewer_seeds_is_compared_in_these(files):
         told = rows[(rows[list(of)] == list(of.values())).all(axis=1)].set_index("metric")
         assert told.loc["difference", "value"] == pytest.approx(-2 / 12)
         assert told["seeds"].tolist() == [1, 1]
-
-
-def test_faults_are_one_line(files):
     said, poses = files
     with pytest.raises(InputError, match="no files were given"):
         collect_intervals(RUN, [], poses)

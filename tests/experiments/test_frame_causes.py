@@ -51,7 +51,7 @@ def intervals(monkeypatch):
     return pd.DataFrame(rows, columns=[*KEYS, *AGAINST, *NUMBERS])
 
 
-def test_kinds_of_starts_stand_apart_and_few_failures_make_no_best(intervals):
+def test_kinds_of_starts_stand_apart_with_their_failures_and_few_make_no_best(intervals):
     text = table9_frames(RUN, intervals).markdown()
     assert (
         "| Estimated in the image (29 failed, too few) | Good | pair | 80.0 (70.0 to 85.0) | 20.0 (15.0 to 30.0) |"
@@ -61,25 +61,18 @@ def test_kinds_of_starts_stand_apart_and_few_failures_make_no_best(intervals):
     assert "Truth from other starts (counterfactual access) | truth | 95.0 (85.0 to 100.0) | – |" in text
     assert "below 30 failures nothing is concluded" in text
     assert "icbin" not in text
-
-
-def test_the_failures_are_counted_below_by_cause(intervals):
-    text = table9_frames(RUN, intervals).markdown()
     assert "Ladder of errors: 90 starts of 30 instances in 3 scenes; 20 nominal, 29 borderline, 1 off without" in text
     assert (
         "40 failed: 6 mostly by noise, 30 mostly by pose, 4 mostly by overlap. One constant answer names 75 %" in text
     )
 
 
-def test_counts_are_of_kinds_and_datasets_and_truth_by_icp_is_apart(intervals):
+def test_counts_are_of_kinds_and_datasets_and_without_any_there_is_no_table(intervals):
     text = table9_frame_counts(RUN, intervals).markdown()
     assert "| Ladder of errors | All | 90 | 30 | 3 | 20 | 29 | 40 | 6 | 30 | 4 | 1 | 5 |" in text
     assert "| Ladder of errors | YCB-Video | 90 |" in text
     assert "| Truth made by ICP | All | 7 |" in text
     assert "| Carried over" not in text
-
-
-def test_no_counts_make_no_table(intervals):
     other = intervals.assign(source="ycb")
     for build in (lambda: table9_frames(RUN, other), lambda: table9_frame_counts(RUN, other)):
         with pytest.raises(InputError, match="has nothing to show"):

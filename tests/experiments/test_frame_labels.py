@@ -111,8 +111,5 @@ def test_a_row_is_what_the_samples_are_seen_by():
     assert "Bold: the fewer labels" in markdown
     for words in ("Start: 10 labeled samples", "5 % of it", "to 60 labels at least and 300 at most"):
         assert words in markdown
-
-
-def test_metrics_without_learning_curves_are_refused():
     with pytest.raises(InputError, match="has nothing to show"):
         table6_labels(RUN, metrics().query("table == 'attribution'"))

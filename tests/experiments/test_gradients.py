@@ -54,9 +54,6 @@ def test_the_fall_is_that_of_the_score_and_its_excess_against_random(metrics):
     assert value(metrics, method="random", metric="excess_25") == []
     assert value(metrics, method="random", metric="test_samples") == [2, 2]
     assert value(metrics, table="tcav", method="noise", concept="pose", metric="score") == [0.25, 0.25]
-
-
-def test_the_tables_show_them(metrics):
     text = saliency_deletion(RUN, metrics).markdown()
     assert "| Tiny | Most salient first | 30.0 (+25.0) | 50.0 |" in text
     text = tcav(RUN, metrics).markdown()
