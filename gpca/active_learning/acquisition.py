@@ -15,6 +15,7 @@ from gpca.errors import require_known
 from gpca.process.plugins import joined_outside, module_outside
 
 EXPANSION = 4  # K: BALD with k-means clusters the B·K most uncertain samples
+MOST_STEPS = 100  # of k-means
 
 
 @dataclass(frozen=True)
@@ -106,9 +107,7 @@ def bald_kmeans(pool: Pool, batch: int, random: np.random.Generator) -> np.ndarr
     return candidates[sorted(nearest)]
 
 
-def balanced_kmeans(
-    h_n_d: np.ndarray, clusters: int, random: np.random.Generator, most: int = 100
-) -> tuple[np.ndarray, np.ndarray]:
+def balanced_kmeans(h_n_d: np.ndarray, clusters: int, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     """Clusters (n,) of equally many samples each at the least cost (Malinen and Fränti 2014), and centroids (B, d)."""
     from scipy.optimize import linear_sum_assignment
     from scipy.spatial.distance import cdist
@@ -118,7 +117,7 @@ def balanced_kmeans(
     centers_B_d, _ = kmeans_plusplus(h_n_d, clusters, random_state=int(random.integers(2**31)))
     slot_n = np.arange(len(h_n_d)) % clusters  # cluster of each slot
     cluster_n = np.full(len(h_n_d), -1)
-    for _ in range(most):
+    for _ in range(MOST_STEPS):
         _, assigned_n = linear_sum_assignment(cdist(h_n_d, centers_B_d, "sqeuclidean")[:, slot_n])
         before_n, cluster_n = cluster_n, slot_n[assigned_n]
         if np.array_equal(before_n, cluster_n):

@@ -66,7 +66,7 @@ def make_covariance(name: str, n_classes: int, lengthscale: float) -> gpytorch.k
 
 
 def cross_covariance(covariance: gpytorch.kernels.ScaleKernel, a_A_d: Tensor, b_B_d: Tensor) -> Tensor:
-    """Return k_c(a, b), (C, A, B); gpytorch, slower, computes kernels that have no form here."""
+    """Return k_c(a, b), (C, A, B), of one of `COVARIANCES`."""
     base = covariance.base_kernel
     scale_C_1_1 = covariance.outputscale[:, None, None]
     if isinstance(base, ScaledPolynomial):
@@ -77,9 +77,7 @@ def cross_covariance(covariance: gpytorch.kernels.ScaleKernel, a_A_d: Tensor, b_
         # The root of zero has an infinite derivative, so the squares stay above it.
         scaled_C_A_B = square_root(squared_A_B.clamp_min(1e-15)) * (math.sqrt(3) / base.lengthscale)
         return scale_C_1_1 * (1 + scaled_C_A_B) * torch.exp(-scaled_C_A_B)
-    if isinstance(base, gpytorch.kernels.RBFKernel):
-        return scale_C_1_1 * torch.exp(squared_A_B * (-0.5 / base.lengthscale.square()))
-    return covariance(a_A_d, b_B_d).to_dense()
+    return scale_C_1_1 * torch.exp(squared_A_B * (-0.5 / base.lengthscale.square()))
 
 
 def variance(covariance: gpytorch.kernels.ScaleKernel, a_A_d: Tensor) -> Tensor:
@@ -88,10 +86,7 @@ def variance(covariance: gpytorch.kernels.ScaleKernel, a_A_d: Tensor) -> Tensor:
     scale_C_1 = covariance.outputscale[:, None]
     if isinstance(base, ScaledPolynomial):
         return scale_C_1 * (a_A_d.square().mean(dim=1) + base.offset).square()
-    if base.is_stationary:
-        return scale_C_1.expand(-1, len(a_A_d))
-    # Not with diag=True: if C equals A, gpytorch takes the variances (C, A) for a covariance (A, A).
-    return covariance(a_A_d).diagonal(dim1=-1, dim2=-2)
+    return scale_C_1.expand(-1, len(a_A_d))
 
 
 def squared_distances(a_A_d: Tensor, b_B_d: Tensor) -> Tensor:

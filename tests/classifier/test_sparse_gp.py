@@ -1,7 +1,6 @@
 import math
 from itertools import islice
 
-import gpytorch
 import pytest
 import torch
 
@@ -35,27 +34,13 @@ def test_covariances_and_their_gradients_are_gpytorchs(name):
         assert torch.allclose(own, their, rtol=1e-3, atol=1e-4)
 
 
-def assert_variance_is_the_diagonal(kernel, n):
+@pytest.mark.parametrize("name", COVARIANCES)
+@pytest.mark.parametrize("n", [3, 7])  # as many inputs as latents, and more
+def test_the_variance_is_the_covariances_diagonal(name, n):
+    kernel = unlike(name)
     diagonal = cross_covariance(kernel, A[:n], A[:n]).diagonal(dim1=1, dim2=2)
     assert variance(kernel, A[:n]).shape == (3, n)
     assert torch.allclose(variance(kernel, A[:n]), diagonal, atol=1e-5)
-
-
-@pytest.mark.parametrize("name", COVARIANCES)
-@pytest.mark.parametrize("n", [3, 7])
-def test_the_variance_is_the_covariances_diagonal(name, n):
-    kernel = unlike(name)
-    assert_variance_is_the_diagonal(kernel, n)
-
-
-@pytest.mark.parametrize("n", [3, 7])  # as many inputs as latents, and more
-@pytest.mark.parametrize("form", [gpytorch.kernels.RQKernel, gpytorch.kernels.LinearKernel])
-def test_a_kernel_without_a_form_here_is_that_of_gpytorch(form, n, monkeypatch):
-    monkeypatch.setitem(COVARIANCES, "new", form)
-    kernel = make_covariance("new", 3, lengthscale=3.0)
-    kernel.outputscale = torch.tensor([0.5, 1.0, 2.0])
-    assert torch.allclose(cross_covariance(kernel, A, B), kernel(A, B).to_dense())
-    assert_variance_is_the_diagonal(kernel, n)
 
 
 @pytest.mark.parametrize("name", COVARIANCES)
