@@ -8,15 +8,17 @@ import re
 from argparse import ArgumentParser, Namespace
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
+from string import Template
 from tempfile import TemporaryDirectory
 from textwrap import fill
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from gpca.causes.judged import CEILING, RECALL
 from gpca.errors import InputError
 from gpca.evaluation.measures import POOLED, read_clustered
 from gpca.io.files import require_outputs, whole_file
 from gpca.io.structured_text import load_own_yaml, read_json
+from gpca.jobs.provenance import record_path
 from gpca.model.file import VERSION, Model
 from gpca.objects.canonical import LARGEST_DIAMETER_M, SMALLEST_DIAMETER_M, ObjectClouds
 from gpca.pairs.perturbation import CONCEPTS
@@ -49,6 +51,8 @@ MEASURES = {
 }
 LARGEST_BYTES = 8 * 10**6  # of the model file in every installation
 LICENSES = Path(__file__).with_name("licenses.yaml")
+CARD = Path(__file__).with_name("card.md")  # template
+UNBROKEN: Any = {"break_long_words": False, "break_on_hyphens": False}
 REMEDY = "ship a model from the folder of the run that made it"
 _TRAINING_FILE = re.compile(r"/(model_causes|registrations)/([^/]+)/seed\d+\.npz$")  # among the inputs of a model
 
@@ -58,7 +62,7 @@ class License(NamedTuple):
 
     dataset: str
     license: str
-    known: str
+    read_in: str
 
 
 class Source(NamedTuple):
@@ -75,7 +79,7 @@ def _sources(model: Path, record: Mapping, title: str) -> Iterator[Source]:
     """Yield the training objects of a model, read from ``objects/`` of its run, in the order of the record."""
     files = [match.groups() for path in record["inputs_sha256"] if (match := _TRAINING_FILE.search(f"/{path}"))]
     if not files:
-        raise InputError(_record_path(model), "lists nothing that a model learns from", REMEDY)
+        raise InputError(record_path(model), "lists nothing that a model learns from", REMEDY)
     for kind, name in files:
         objects = model.parent / f"objects/{name}.npz"
         made = _provenance(objects)
@@ -104,22 +108,18 @@ def licenses_of(origin: str, objects: Path) -> list[License]:
     return licenses
 
 
-def _record_path(path: Path) -> Path:
-    return path.with_name(path.name + ".provenance.json")
-
-
 def _provenance(path: Path) -> dict:
-    record = read_json(_record_path(path), "a provenance record", REMEDY)
+    record = read_json(record_path(path), "a provenance record", REMEDY)
     for name in ("inputs_sha256", "settings", "code"):
         if not isinstance(record.get(name), dict):
-            raise InputError(_record_path(path), f"lacks '{name}'", REMEDY)
+            raise InputError(record_path(path), f"lacks '{name}'", REMEDY)
     return record
 
 
 def card(
     name: str, content: bytes, model: Model, record: Mapping, sources: Sequence[Source], scores: pd.DataFrame
 ) -> str:
-    """Return the card in Markdown; equal inputs give equal text."""
+    """Return the card in Markdown, the template with its fields; equal inputs give equal text."""
     diagnoser, code = model.diagnoser, record["code"]
     try:
         limits = _limits(model, record["settings"])
@@ -138,40 +138,39 @@ def card(
     for source in sources:
         for license in source.licenses:
             used.setdefault(license, []).append(source.title)
+    licenses = [(*license, "; ".join(dict.fromkeys(titles))) for license, titles in used.items()]
     held_out = [diagnoser.held_out[measure] for measure in HELD_OUT]
-    paragraphs = [
-        f"# Model card of {name}",
-        "The model that `gpca explain` uses unless another is named or found. It says whether a registration of two "
-        f"point clouds is right and, if it is not, which of the causes {', '.join(CONCEPTS)} made it fail. "
-        "`python -m gpca ship` wrote this page; docs/explain.md says how to use the model.",
-        "## File",
-        _table(["", ""], file.items()),
-        "## Training data",
-        f"The diagnosis was trained on {diagnoser.classifier.samples} registrations whose causes were measured by "
-        "counterfactuals (docs/causes.md). Their source clouds were sampled from the objects' surfaces and perturbed. "
-        f"GP-CA as in the paper, which is printed beside it, was trained on {len(model.gpc.learned_N_d)} "
-        "registrations, each perturbed in one way.",
-        _table(["objects", "number", "train"], training),
-        "## Data and licenses",
-        "The file holds weights, descriptors and embeddings that were computed from these data, but none of their "
-        "points or images. The data stay under their own licenses; this page takes no position on whether these extend "
-        'to a trained model. "Seen" means read in the stated place, "from memory" means not confirmed.',
-        _table(
-            ["dataset", "license", "source of this information", "part of"],
-            [(*license, "; ".join(dict.fromkeys(titles))) for license, titles in used.items()],
+    changes = sorted(record["settings"].get("model", {}).get("causes", {}).items())
+    fields = limits | {
+        "name": name,
+        "concepts": ", ".join(CONCEPTS),
+        "percent": "\u00a0%",
+        "samples": diagnoser.classifier.samples,
+        "learned": len(model.gpc.learned_N_d),
+        "recall": f"{100 * RECALL:g}",
+        "file": _table(["", ""], file.items()),
+        "training": _table(["objects", "number", "train"], training),
+        "licenses": _table(["dataset", "license", "source of this information", "part of"], licenses),
+        "held_out": _table(
+            [*HELD_OUT.values()], [[f"{value:.0f}" if value >= 2 else f"{value:.3f}" for value in held_out]]
         ),
-        "## Scores",
-        "The training registrations were judged by classifiers like those in the file that had learned other families "
-        "of shapes. The classifiers in the file learned them all, so nothing is left to test these on.",
-        _table([*HELD_OUT.values()], [[f"{value:.0f}" if value >= 2 else f"{value:.3f}" for value in held_out]]),
-        *_scores(record, sources, scores),
-        "## Limits",
-        "\n".join(_wrapped(f"- {line}", "  ") for line in limits),
-    ]
-    return "\n\n".join(text if text[0] in "|-#" else _wrapped(text) for text in paragraphs) + "\n"
+        "changes": "\n".join(f"- `{key}: {json.dumps(value, sort_keys=True)}`" for key, value in changes) or "- none",
+        "scores": _scores(sources, scores),
+    }
+    paragraphs = []
+    for paragraph in CARD.read_text(encoding="utf-8").strip().split("\n\n"):
+        text = Template(paragraph).substitute(fields)
+        if paragraph[0] not in "$#":  # neither a table or a list in one field, nor a heading
+            items = re.split(r"\n(?=- )", text)
+            indent = "  " if paragraph[0] == "-" else ""
+            text = "\n".join(
+                fill(" ".join(item.split("\n  ")), 120, subsequent_indent=indent, **UNBROKEN) for item in items
+            )
+        paragraphs.append(text)
+    return "\n\n".join(paragraphs) + "\n"
 
 
-def _scores(record: Mapping, sources: Sequence[Source], scores: pd.DataFrame) -> list[str]:
+def _scores(sources: Sequence[Source], scores: pd.DataFrame) -> str:
     titles = {source.name: source.title for source in sources if source.diagnosed} | {POOLED: "all together"}
     rows, committees = [], 0
     for source, title in titles.items():
@@ -185,50 +184,30 @@ def _scores(record: Mapping, sources: Sequence[Source], scores: pd.DataFrame) ->
                 rows.append((title, words, *(each.get(name, "–") for name in MEASURES), f"{counts} ({seeds:.0f})"))
     if not committees:
         raise InputError("cause_intervals.csv", f"has no scores of {COMMITTEE}", "switch it on in diagnosis.explainers")
-    changes = record["settings"].get("model", {}).get("causes", {})
-    return [
-        "These are the scores of other explainers in the run that made this model, on objects held out of their "
-        "training, with 95\u00a0% intervals over objects and seeds. The scored registrations were drawn as the section "
-        "`causes` of the config says; the training registrations of the model were drawn with these changes:",
-        "\n".join(f"- `{name}: {json.dumps(value, sort_keys=True)}`" for name, value in sorted(changes.items()))
-        or "- none",
-        _table(["objects", "explainer", *MEASURES.values(), "samples (seeds)"], rows),
-        "False alarms: the share of nominal registrations that are called failed at the threshold that finds "
-        f"{100 * RECALL:g}\u00a0% of the failed ones. The truth, measured again from other starts, is the most that "
-        "can be expected. docs/causes.md defines every measure.",
-    ]
+    return _table(["objects", "explainer", *MEASURES.values(), "samples (seeds)"], rows)
 
 
-def _limits(model: Model, settings: Mapping) -> list[str]:
+def _limits(model: Model, settings: Mapping) -> dict[str, object]:
     causes, guarantee = settings["causes"] | settings["model"].get("causes", {}), model.diagnoser.guarantee
     assert guarantee is not None  # a model file holds one
     sets, alarm = guarantee.state_sets, guarantee.failure_alarm
-    severities = ", ".join(f"{name} {low:g} to {high:g}" for name, (low, high) in causes["severities"].items())
-    familiar = ", ".join(f"{name} {low:.2f} to {high:.2f}" for name, (low, high) in model.familiar.ranges.items())
-    fewest, most = causes["points"]
-    counted = f"{guarantee.families} families, family by family" if guarantee.families else "single registrations"
-    return [
-        f"Failed means an error above {causes['limits']['failed']:g} of the diameter. Your task may need "
-        "another limit.",
-        f"The diagnosis was trained on {severities} (lengths in diameters; crop and outliers in shares of the points), "
-        f"on clouds of {fewest} to {most} points, and on results of ICP `{model.icp.method}`. Outside these ranges it "
-        "extrapolates.",
-        f"The threshold of {model.diagnoser.threshold:.3f} was chosen on families of shapes held out of a first "
-        f"classifier's training, so that at most {100 * settings['model']['false_alarms']:g}\u00a0% of their nominal "
-        "registrations are called failed.",
-        f"A set of states holds the true one with a probability of {sets.level:g}, calibrated on {counted}; the alarm "
-        f"calls at most {100 * alarm.missed:g}\u00a0% of failures good and {100 * alarm.false_alarms:g}\u00a0% of good "
-        f"ones failed, calibrated on {guarantee.samples} single registrations. Both hold for objects that are to these "
-        "as these are to one another, and for pairs without a warning.",
-        f"It knows only the causes {', '.join(CONCEPTS)}. It attributes whatever else is wrong, such as the wrong "
-        "object or a sensor's bias, to one of them.",
-        f"It warns of clouds outside the geometry that GP-CA was trained on: {familiar} (docs/explain.md).",
-        f"It explains rigid objects of {SMALLEST_DIAMETER_M:g} to {LARGEST_DIAMETER_M:g} m. It is not a safety device.",
-    ]
-
-
-def _wrapped(text: str, indent: str = "") -> str:
-    return fill(text, 120, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
+    return {
+        "failed": f"{causes['limits']['failed']:g}",
+        "severities": ", ".join(f"{name} {low:g} to {high:g}" for name, (low, high) in causes["severities"].items()),
+        "fewest": causes["points"][0],
+        "most": causes["points"][1],
+        "icp": model.icp.method,
+        "threshold": f"{model.diagnoser.threshold:.3f}",
+        "called_failed": f"{100 * settings['model']['false_alarms']:g}",
+        "level": f"{sets.level:g}",
+        "counted": f"{guarantee.families} families, family by family" if guarantee.families else "single registrations",
+        "missed": f"{100 * alarm.missed:g}",
+        "false_alarms": f"{100 * alarm.false_alarms:g}",
+        "calibrated": guarantee.samples,
+        "familiar": ", ".join(f"{name} {low:.2f} to {high:.2f}" for name, (low, high) in model.familiar.ranges.items()),
+        "smallest": f"{SMALLEST_DIAMETER_M:g}",
+        "largest": f"{LARGEST_DIAMETER_M:g}",
+    }
 
 
 def _table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:

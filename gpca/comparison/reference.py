@@ -7,7 +7,6 @@ deviation √(d / n), which bounds the allowed difference (docs/comparison.md).
 
 from __future__ import annotations
 
-import json
 import math
 from collections import defaultdict
 from collections.abc import Mapping
@@ -22,6 +21,7 @@ from gpca.errors import InputError
 from gpca.evaluation.intervals import mean_interval
 from gpca.evaluation.measures import KEYS, TIDY_COLUMNS
 from gpca.io.csv_file import ANY, finite_number, read_csv
+from gpca.jobs.provenance import read_record
 from gpca.settings import Keys, NotNegative, Share
 
 VERDICTS = IDENTICAL, ROUNDING, DIFFERENT, MISSING = "identical", "rounding", "different", "missing"
@@ -110,7 +110,7 @@ def check_reference(run: Path, reference: Path, allowance: Allowance) -> list[Fi
         verdict, detail = _compared(file, means_run, means_reference, allowance)
         # Other settings explain differing values. The record names the whole config, so equal values stay identical.
         # A section that the reference's record lacks is newer than the reference.
-        here, there = (_provenance(folder / file).get("config_sha256") or {} for folder in (run, reference))
+        here, there = (read_record(folder / file).get("config_sha256") or {} for folder in (run, reference))
         changed = sorted(name for name, of in there.items() if here and here.get(name) != of)
         if changed and verdict != IDENTICAL:
             verdict, detail = DIFFERENT, f"{detail}; config differs in {', '.join(changed)}"
@@ -142,15 +142,9 @@ def _compared(file: str, here: Mapping[tuple, Mean], there: Mapping[tuple, Mean]
 
 def device_of(folder: Path, file: str) -> str:
     """Return the processor that made a file, and the instruction level of its libraries."""
-    device = _provenance(folder / file).get("device", {})
+    device = read_record(folder / file).get("device", {})
     named = [device.get("name"), *(f"{name} {device[name]}" for name in ("family", "model") if device.get(name))]
     return ", ".join(filter(None, [*named, device.get("instructions")])) or "on an unrecorded processor"
-
-
-def _provenance(path: Path) -> dict:
-    """Return a file's provenance record, empty where there is none."""
-    record = path.with_name(f"{path.name}.provenance.json")
-    return json.loads(record.read_text(encoding="utf-8")) if record.is_file() else {}
 
 
 def read_means(path: Path, samples_of_source: Mapping[str, int] = MappingProxyType({})) -> dict[tuple[str, ...], Mean]:

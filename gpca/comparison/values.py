@@ -7,7 +7,6 @@ a run keeps for shares of samples only.
 
 from __future__ import annotations
 
-import json
 import math
 from collections import defaultdict
 from collections.abc import Iterable, Mapping
@@ -24,6 +23,7 @@ from gpca.comparison.published import UNITS, Counterpart, Number
 from gpca.evaluation.intervals import LEVEL, Clustered, interval, mean_interval, student_factor, weighted_mean
 from gpca.evaluation.measures import ALL, read_metrics, source_method_seed
 from gpca.evaluation.runtime_file import read_runtime
+from gpca.jobs.provenance import read_record
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -63,8 +63,8 @@ def read_results(paths: Iterable[str | Path]) -> dict[str, pd.DataFrame]:
 
 def measured_on(paths: Iterable[str | Path]) -> str:
     """Return the processor that made ``timings.csv``, by its provenance record; empty without one."""
-    records = [Path(f"{path}.provenance.json") for path in paths if Path(path).name == "timings.csv"]
-    return next((json.loads(path.read_text("utf-8"))["device"]["name"] for path in records if path.is_file()), "")
+    records = (read_record(Path(path)) for path in paths if Path(path).name == "timings.csv")
+    return next((record["device"]["name"] for record in records if record), "")
 
 
 def value_of_run(

@@ -16,12 +16,14 @@ from contextlib import contextmanager, suppress
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import Any
 
 from gpca.io.files import require_outputs, sha256_of_file, whole_file
 from gpca.process.code_files import ROOT
 from gpca.process.processor import describe
 
 LIBRARIES = ("numpy", "scipy", "torch", "gpytorch", "open3d-cpu", "scikit-learn", "numba", "trimesh", "snakemake")
+RECORD = ".provenance.json"  # end of the name of a record
 CONFIG_VARIABLE = "GPCA_CONFIG_SHA256"  # hash of each section, JSON, for jobs
 
 
@@ -63,8 +65,18 @@ def record_provenance(
         "libraries": versions,
     }
     for output in map(Path, outputs):
-        with whole_file(output.with_name(output.name + ".provenance.json")) as partial:
+        with whole_file(record_path(output)) as partial:
             partial.write_text(json.dumps(record, indent=1, sort_keys=True) + "\n", encoding="utf-8")
+
+
+def record_path(path: Path) -> Path:
+    return path.with_name(path.name + RECORD)
+
+
+def read_record(path: Path) -> dict[str, Any]:
+    """Return the provenance record of a file, empty where there is none."""
+    record = record_path(path)
+    return json.loads(record.read_text(encoding="utf-8")) if record.is_file() else {}
 
 
 def sha256_of_settings(settings: object) -> str:

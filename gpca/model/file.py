@@ -133,53 +133,54 @@ class Model:
             raise InputError(path, f"is a model with missing or damaged parts ({fault})", REMEDY) from fault
 
 
+def _require(holds: object, fault: str) -> None:
+    if not holds:
+        raise ValueError(fault)
+
+
+def _require_count(name: str, count: object, least: int, most: int) -> None:
+    _require(type(count) is int and least <= count <= most, f"{name}: {count!r} is not a number from {least} to {most}")
+
+
 def _require_possible(content: Mapping, settings: EncoderSettings) -> None:
     """Raise a ValueError that names any impossible content of a model file with these encoder settings."""
     read_settings(EncoderSettings, vars(settings))
     read_settings(GPCSettings, content["gpc"]["settings"])
     read_settings(ICPSettings, content["icp"])
-    if set(ranges := content["familiar"]) != set(MEASURES):
-        raise ValueError(f"ranges of {', '.join(map(repr, ranges))}, not {', '.join(MEASURES)}")
+    ranges = content["familiar"]
+    _require(set(ranges) == set(MEASURES), f"ranges of {', '.join(map(repr, ranges))}, not {', '.join(MEASURES)}")
     for name, (low, high) in ranges.items():
-        if not (type(low) is type(high) is float and 0 <= low <= high):
-            raise ValueError(f"range of {name}: {low!r} to {high!r} is not a range")
+        is_range = type(low) is type(high) is float and 0 <= low <= high
+        _require(is_range, f"range of {name}: {low!r} to {high!r} is not a range")
     _require_diagnoser(content["diagnoser"])
-    counts = {
-        "draws of the classifier": (content["gpc"]["settings"]["draws"], 2, MOST_DRAWS),
-        "points": (content["points"], FEWEST_CLOUD_POINTS, MOST_CLOUD_POINTS),
-        "iterations of ICP": (content["icp"]["max_iterations"], 1, MOST_ITERATIONS),
-        "draws of the encoder": (settings.draws, 1, MOST_ENCODED_POINTS // settings.draw_points),
-        "attempts": (content["thresholds"]["attempts"], 1, MOST_ITERATIONS),
-    }
-    _require_counts(counts)
-    for name, value in settings.options.items():  # a user's backbone has options of its own
-        if isinstance(value, int | float) and not 0 <= value <= MOST_NEIGHBORS:
-            raise ValueError(f"option {name}: {value!r} is not from 0 to {MOST_NEIGHBORS}")
-    if not isinstance(content["title"], str) or not content["title"].isprintable():
-        raise ValueError("its title is not a line of text")
+    _require_count("draws of the classifier", content["gpc"]["settings"]["draws"], 2, MOST_DRAWS)
+    _require_count("points", content["points"], FEWEST_CLOUD_POINTS, MOST_CLOUD_POINTS)
+    _require_count("iterations of ICP", content["icp"]["max_iterations"], 1, MOST_ITERATIONS)
+    _require_count("draws of the encoder", settings.draws, 1, MOST_ENCODED_POINTS // settings.draw_points)
+    _require_count("attempts", content["thresholds"]["attempts"], 1, MOST_ITERATIONS)
+    for name, value in settings.options.items():  # a user's backbone may have further options
+        within = not isinstance(value, int | float) or 0 <= value <= MOST_NEIGHBORS
+        _require(within, f"option {name}: {value!r} is not from 0 to {MOST_NEIGHBORS}")
+    _require(_is_line(content["title"]), "its title is not a line of text")
     titles = content.get("learned_from", [])
-    if not isinstance(titles, list) or not all(isinstance(title, str) and title.isprintable() for title in titles):
-        raise ValueError("learned_from is not a list of lines of text")
-    if set(treatments := content["treatments"]) != set(CONCEPTS):
-        raise ValueError(f"treatments: of {str([*treatments])[:80]}, not of {', '.join(CONCEPTS)}")
+    _require(isinstance(titles, list) and all(map(_is_line, titles)), "learned_from is not a list of lines of text")
+    treatments = content["treatments"]
+    fault = f"treatments: of {str([*treatments])[:80]}, not of {', '.join(CONCEPTS)}"
+    _require(set(treatments) == set(CONCEPTS), fault)
     for action in treatments.values():  # of any robot: other actions than the paper's are allowed
         is_name = isinstance(action, str) and re.fullmatch(r"[a-z][a-z0-9_]{0,39}", action)
-        if not is_name or action in (NOTHING, QUEUE):
-            raise ValueError(f"treatments: {str(action)[:40]!r} is no name of an action")
-    if len(set(treatments.values())) < len(treatments):
-        raise ValueError("treatments: one action treats two concepts")
-    if type(content["stand_in"]) is not bool:
-        raise ValueError("stand_in is neither true nor false")
+        fault = f"treatments: {str(action)[:40]!r} is no name of an action"
+        _require(is_name and action not in (NOTHING, QUEUE), fault)
+    _require(len(set(treatments.values())) == len(treatments), "treatments: one action treats two concepts")
+    _require(type(content["stand_in"]) is bool, "stand_in is neither true nor false")
     with torch.device("meta"):  # the options may ask for more than the memory
         encoder = make_encoder(settings.backbone, settings.options)
     require_like(content["encoder"], encoder.state_dict(), "encoder")
     _require_classifier(content["gpc"], CONCEPTS, encoder.embedding_size)
 
 
-def _require_counts(counts: Mapping[str, tuple[object, int, int]]) -> None:
-    for name, (count, least, most) in counts.items():
-        if type(count) is not int or not least <= count <= most:
-            raise ValueError(f"{name}: {count!r} is not a number from {least} to {most}")
+def _is_line(text: object) -> bool:
+    return isinstance(text, str) and text.isprintable()
 
 
 def _require_diagnoser(state: Mapping) -> None:
@@ -187,64 +188,61 @@ def _require_diagnoser(state: Mapping) -> None:
     read_settings(ICPSettings, state["icp"])
     settings = read_settings(ReenactmentSettings, state["reenactment"])
     for name, allowed in (("reads", (READS,)), ("moved", get_args(Moved))):
-        if state[name] not in allowed:
-            raise ValueError(f"{name}: {str(state[name])[:40]!r} is not one of {', '.join(allowed)}")
+        _require(state[name] in allowed, f"{name}: {str(state[name])[:40]!r} is not one of {', '.join(allowed)}")
     classifier, starts = state["classifier"], state["runs"]["starts"]
-    counts = {
-        "points of a description": (state["points"], FEWEST_CLOUD_POINTS, MOST_CLOUD_POINTS),
-        "starts": (starts, FEWEST_STARTS, MOST_RUNS),
-        "iterations of ICP": (state["icp"]["max_iterations"], 1, MOST_ITERATIONS),
-        "classifiers of causes": (len(classifier["causes"]), len(CONCEPTS), len(CONCEPTS)),
-        "re-enactments": (settings.calls(starts), 1, MOST_RUNS),
-    }
-    _require_counts(counts)
-    quantiles, weights, threshold = classifier["quantiles"], state["error_weights"], state["threshold"]
-    if quantiles.ndim != 2 or len(quantiles) < 2 or quantiles.shape[1] != FEATURE_COUNT:
-        raise ValueError(f"'quantiles' has shape {tuple(quantiles.shape)}, not {FEATURE_COUNT} descriptors")
-    if (quantiles.diff(dim=0) < 0).any():
-        raise ValueError("'quantiles' decrease")
-    if tuple(weights.shape) != (FEATURE_COUNT + 1,):
-        raise ValueError(f"'error_weights' has shape {tuple(weights.shape)}, not {(FEATURE_COUNT + 1,)}")
-    if type(threshold) is not float or not 0 <= threshold <= 2:
-        raise ValueError(f"threshold: {threshold!r} is not a probability")
+    _require_count("points of a description", state["points"], FEWEST_CLOUD_POINTS, MOST_CLOUD_POINTS)
+    _require_count("starts", starts, FEWEST_STARTS, MOST_RUNS)
+    _require_count("iterations of ICP", state["icp"]["max_iterations"], 1, MOST_ITERATIONS)
+    _require_count("classifiers of causes", len(classifier["causes"]), len(CONCEPTS), len(CONCEPTS))
+    _require_count("re-enactments", settings.calls(starts), 1, MOST_RUNS)
+    quantiles, threshold = classifier["quantiles"], state["threshold"]
+    sized = quantiles.ndim == 2 and len(quantiles) > 1 and quantiles.shape[1] == FEATURE_COUNT
+    _require(sized, f"'quantiles' has shape {tuple(quantiles.shape)}, not {FEATURE_COUNT} descriptors")
+    _require(not (quantiles.diff(dim=0) < 0).any(), "'quantiles' decrease")
+    _require_shape("error_weights", state["error_weights"], (FEATURE_COUNT + 1,))
+    _require(type(threshold) is float and 0 <= threshold <= 2, f"threshold: {threshold!r} is not a probability")
     causes = [(cause, (ABSENT, PRESENT)) for cause in classifier["causes"]]
     for gpc, classes in [(classifier["failure"], (NOMINAL, FAILED)), *causes]:
-        _require_counts({"draws of a classifier": (gpc["settings"]["draws"], 2, MOST_DRAWS)})
+        _require_count("draws of a classifier", gpc["settings"]["draws"], 2, MOST_DRAWS)
         read_settings(GPCSettings, gpc["settings"])
         _require_classifier(gpc, classes, FEATURE_COUNT)
-    _require_counts({"questions of trees": (len(classifier["trees"]), 1 + len(CONCEPTS), 1 + len(CONCEPTS))})
+    _require_count("questions of trees", len(classifier["trees"]), 1 + len(CONCEPTS), 1 + len(CONCEPTS))
     for question in classifier["trees"]:
         require_trees(question, FEATURE_COUNT)
     sets = Guarantee.from_dict(state["guarantee"]).state_sets
-    if sets.states != STATES or not 0 < sets.level < 1 or sets.nonconformity not in get_args(Nonconformity):
-        raise ValueError("its guarantee is of different states, or of none")
+    same = sets.states == STATES and 0 < sets.level < 1 and sets.nonconformity in get_args(Nonconformity)
+    _require(same, "its guarantee is of different states, or of none")
     for name, value in state["held_out"].items():
-        if type(name) is not str or not name.isidentifier() or type(value) is not float or not 0 <= value < MOST_DRAWS:
-            raise ValueError(f"held_out: {str(name)[:40]!r} is not the name of a measure with a value")
+        is_measure = type(name) is str and name.isidentifier() and type(value) is float and 0 <= value < MOST_DRAWS
+        _require(is_measure, f"held_out: {str(name)[:40]!r} is not the name of a measure with a value")
+
+
+def _require_shape(name: str, tensor: torch.Tensor, shape: tuple[int, ...]) -> None:
+    _require(tuple(tensor.shape) == shape, f"'{name}' has shape {tuple(tensor.shape)}, not {shape}")
 
 
 def _require_classifier(state: Mapping, classes: tuple[str, ...], d: int) -> None:
-    if tuple(state["classes"]) != classes:  # their order is that of the scores
-        raise ValueError(f"its classes are {str(state['classes'])[:80]}, not {', '.join(classes)}")
+    fault = f"its classes are {str(state['classes'])[:80]}, not {', '.join(classes)}"
+    _require(tuple(state["classes"]) == classes, fault)  # their order is that of the scores
     n_classes, m, n = len(classes), len(state["inducing"]), len(state["labelled"])
     shapes = {"scaler_mean": (d,), "scaler_scale": (d,), "inducing": (m, d), "labelled": (n, d), "targets": (n,)}
-    shapes |= {"mean": (n_classes, m), "covariance": (n_classes, m, m)}
-    for name, shape in shapes.items():
-        if tuple(state[name].shape) != shape:
-            raise ValueError(f"'{name}' has shape {tuple(state[name].shape)}, not {shape}")
-        if name != "targets" and not state[name].is_floating_point():
-            raise ValueError(f"'{name}' does not hold real numbers")
-    if not all(isinstance(axis, str | int) for axis in state["axes"]) or isinstance(state["axes"], str):
-        raise ValueError("the names of its seed are neither texts nor numbers")
+    for name, shape in (shapes | {"mean": (n_classes, m), "covariance": (n_classes, m, m)}).items():
+        _require_shape(name, state[name], shape)
+        _require(name == "targets" or state[name].is_floating_point(), f"'{name}' does not hold real numbers")
+    axes = state["axes"]
+    named = not isinstance(axes, str) and all(isinstance(axis, str | int) for axis in axes)
+    _require(named, "the names of its seed are neither texts nor numbers")
     kernel = make_covariance(state["settings"]["kernel"], n_classes, lengthscale=1.0).state_dict()
     require_like(state["kernel"], kernel, "kernel")
-    if not all(torch.equal(state["kernel"][name], kernel[name]) for name in kernel if name.endswith("_bound")):
-        raise ValueError("its kernel has different bounds")
-    if not (state["scaler_scale"] > 0).all():
-        raise ValueError("'scaler_scale' contains values that are not above 0")
+    bounds = [name for name in kernel if name.endswith("_bound")]
+    _require(
+        all(torch.equal(state["kernel"][name], kernel[name]) for name in bounds), "its kernel has different bounds"
+    )
+    _require((state["scaler_scale"] > 0).all(), "'scaler_scale' contains values that are not above 0")
     covariance = state["covariance"].double()
-    # Cholesky reads one triangle alone.
-    if (covariance - covariance.mT).abs().max() > ASYMMETRY or torch.linalg.cholesky_ex(covariance).info.any():
-        raise ValueError("'covariance' is not symmetric and positive definite")
-    if state["targets"].is_floating_point() or not ((state["targets"] >= 0) & (state["targets"] < n_classes)).all():
-        raise ValueError("'targets' names a missing concept")
+    symmetric = not (covariance - covariance.mT).abs().max() > ASYMMETRY  # Cholesky reads one triangle alone
+    positive = symmetric and not torch.linalg.cholesky_ex(covariance).info.any()
+    _require(positive, "'covariance' is not symmetric and positive definite")
+    targets = state["targets"]
+    possible = not targets.is_floating_point() and ((targets >= 0) & (targets < n_classes)).all()
+    _require(possible, "'targets' names a missing concept")

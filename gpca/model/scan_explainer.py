@@ -151,8 +151,8 @@ def _enacted(scans: Scans, pair: ObservedPair) -> list[Enactment]:
 
 def failure_of(scans: Scans, enactments: Sequence[Enactment], T_found: np.ndarray) -> float:
     """Return the probability of an error above the limit, over the surface that is common at each hypothesis."""
-    found = scans.outcome(T_found)
-    if not found.fitness > 0:
+    at_result = scans.outcome(T_found)
+    if not at_result.fitness > 0:
         return 1.0
     errors = [0.0]
     for enactment in enactments:
@@ -165,7 +165,7 @@ def failure_of(scans: Scans, enactments: Sequence[Enactment], T_found: np.ndarra
     weight_k = np.exp(posterior_k - posterior_k.max())
     log_error_k = np.log(np.maximum(np.array(errors), LEAST) / LIMIT)
     by_poses = (weight_k * expit(STEEPNESS * log_error_k)).sum() / weight_k.sum()
-    by_fit = expit(CLOSE_STEEPNESS * np.log(max(found.inlier_rmse / scans.voxel, LEAST) / CLOSE))
+    by_fit = expit(CLOSE_STEEPNESS * np.log(max(at_result.inlier_rmse / scans.voxel, LEAST) / CLOSE))
     return float(by_poses + by_fit) / 2
 
 

@@ -86,8 +86,8 @@ class Scans:
         normals_N_3, normals_M_3 = self._normals
         seed = seed_of("scans", method) if seed is None else seed
         pair = Pair(self.source / unit, self.target / unit, np.eye(4), normals_N_3, normals_M_3, seed)
-        found = make_method(method)(pair)
-        return self.outcome(scale_translation(found.T_target_source, unit), found.failure)
+        outcome = make_method(method)(pair)
+        return self.outcome(scale_translation(outcome.T_target_source, unit), outcome.failure)
 
     def refined(self, T_k: np.ndarray) -> np.ndarray:
         """Refine poses (k, 4, 4) by the finest ICP on all voxels."""

@@ -13,9 +13,9 @@ from typing import Any
 
 from gpca.errors import InputError
 from gpca.io.files import whole_file
+from gpca.jobs.provenance import RECORD
 
 NAME = "ro-crate-metadata.json"
-RECORD = ".provenance.json"
 SPECIFICATION = "https://w3id.org/ro/crate/1.1"
 PROFILE = "https://w3id.org/ro/wfrun/process/0.5"
 CONTEXT = (f"{SPECIFICATION}/context", "https://w3id.org/ro/terms/workflow-run/context")

@@ -14,7 +14,7 @@ from gpca.alignment.icp import ICPSettings
 from gpca.causes.settings import CauseSettings
 from gpca.errors import InputError
 from gpca.io.files import whole_file
-from gpca.jobs.provenance import sha256_of_settings
+from gpca.jobs.provenance import read_record, sha256_of_settings
 from gpca.model.scene import ASSETS
 from gpca.page.comparison import page_comparison
 from gpca.page.findings import Titles, findings_of
@@ -124,10 +124,8 @@ def read_provenance(files: Iterable[Path]) -> dict[str, dict[str, int]]:
     """Return the recorded values of each kind of fact about the files, with the number of files of each value."""
     facts: dict[str, Counter] = {}
     for path in files:
-        record_path = path.with_name(path.name + ".provenance.json")
         values = {"Code": "not recorded"}
-        if record_path.is_file():
-            record = json.loads(record_path.read_text(encoding="utf-8"))
+        if record := read_record(path):
             sections, device = record["config_sha256"], record["device"]
             commit = record["code"]["commit"] or "outside a git checkout"
             kind = f"{device['vendor']}, family {device['family']}, model {device['model']}, {device['instructions']}"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import re
 from collections import Counter
@@ -13,6 +12,7 @@ from typing import NamedTuple
 
 from gpca.errors import InputError
 from gpca.io.files import whole_file
+from gpca.jobs.provenance import read_record
 from gpca.page.comparison import number_of, page_comparison
 from gpca.page.page import read_provenance, render
 
@@ -185,9 +185,8 @@ def _recorded(folder: Path) -> tuple[dict[str, dict[str, int]], dict[str, frozen
     """Return the recorded facts of a run, hashes of the config's sections, and numbers compared with the paper's."""
     files = sorted([*folder.glob("tables/*.csv"), *folder.glob("*.csv")])
     hashes: dict[str, frozenset[str]] = {}
-    for record in (path.with_name(f"{path.name}.provenance.json") for path in files):
-        sections = json.loads(record.read_text(encoding="utf-8"))["config_sha256"] if record.is_file() else None
-        for section, digest in (sections or {}).items():
+    for path in files:
+        for section, digest in (read_record(path).get("config_sha256") or {}).items():
             hashes[section] = hashes.get(section, frozenset()) | {digest}
     compared = page_comparison(folder / "comparison.csv")
     rows = [row for table in (compared["tables"] if compared else ()) for row in table["rows"]]

@@ -13,13 +13,14 @@ from gpca.errors import InputError, require_known
 from gpca.io.files import SPLITS
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
+from gpca.tracks.published import NOTHING_NAMED, label_numbers
 from gpca.tracks.samples import TrackSamples
 from gpca.tracks.track import HARD_TRACK, track_of
 
 if TYPE_CHECKING:
     import pandas as pd
 
-NO_LABEL = -1  # of borderline samples, which no measure counts
+NO_LABEL = NOTHING_NAMED  # of borderline samples, which no measure counts
 
 
 @dataclass(frozen=True)
@@ -90,12 +91,11 @@ class TrackData:
         """Return a torch dataset of (source (points, 3), target (points, 3), label number), float32.
 
         Clouds are in random order, so their first points are a random subset; smaller clouds repeat points. Borderline
-        samples have the label `NO_LABEL`.
+        samples have the label `NO_LABEL`, -1.
         """
         import torch
 
-        numbers = {label: number for number, label in enumerate(self.labels)}
-        label = torch.tensor([numbers.get(label, NO_LABEL) for label in self.label.tolist()])
+        label = torch.tensor(label_numbers(self.label.tolist(), self.labels).tolist())
         clouds = [
             torch.from_numpy(np.stack([np.resize(cloud, (points, 3)) for cloud in each]))
             for each in (self.sources, self.targets)

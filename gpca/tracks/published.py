@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,6 +21,9 @@ from gpca.io.files import whole_file
 from gpca.objects.source import DATA
 from gpca.process.code_files import ROOT
 from gpca.tracks.track import Track
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 FOLDER = ROOT / "results/leaderboard/published"
 NO_CALLS = -1  # unknown number of ICP calls
@@ -78,6 +81,18 @@ class Method:
     def labels_named(self, labels: tuple[str, ...]) -> np.ndarray:
         """Return the predicted labels (N,), empty for none."""
         return np.array([*labels, ""])[self.named]
+
+
+def label_numbers(label_N: Iterable[str], labels: Sequence[str]) -> np.ndarray:
+    """Return the number of each label (N,), or `NOTHING_NAMED`."""
+    numbers = {label: number for number, label in enumerate(labels)}
+    return np.array([numbers.get(label, NOTHING_NAMED) for label in label_N])
+
+
+def predicted(rows: pd.DataFrame, labels: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the scores (N, C) of rows of a prediction file, and the numbers (N,) of the predicted labels."""
+    named_N = np.where(rows["abstained"], "", rows["concept_predicted"].to_numpy(str))
+    return rows[[f"score_{label}" for label in labels]].to_numpy(float), label_numbers(named_N, labels)
 
 
 @dataclass(frozen=True)

@@ -173,7 +173,7 @@ def recipe_of(file: str, config: Mapping[str, Any]) -> Recipe:
     data = {name: config[name] for name in ("data_dir", "downloads")}
     icp = {"icp": config["registrations"]["icp"]}
     frames = config["real_world"]
-    of_frames = {"datasets": frames["datasets"], "role": config["splits"]["role"]}
+    frame_settings = {"datasets": frames["datasets"], "role": config["splits"]["role"]}
     if kind in ("objects", "instances"):
         source = rest[0]
         given = {"source": source, **data, "surface_points": config["objects"]["surface_points"]}
@@ -181,13 +181,13 @@ def recipe_of(file: str, config: Mapping[str, Any]) -> Recipe:
             given |= {"settings": config["sources"][source]}
             outputs = {"out": f"objects/{source}.npz"}
             return Recipe("gpca.steps.pairs:objects", given, _splits("objects", config), outputs)
-        given |= {"settings": of_frames | {"initial_pose": frames["initial_pose"]}}
+        given |= {"settings": frame_settings | {"initial_pose": frames["initial_pose"]}}
         outputs = {name: f"{name}/{source}.npz" for name in ("instances", "objects")}
         return Recipe("gpca.steps.frames:instances", given, _splits("scenes", config), outputs)
     seed = int(rest[-1].removeprefix("seed"))
     diagnosis, causes, controls = config["diagnosis"], config["causes"], config["controls"]
     if kind in ("frame_causes", "frame_starts") or (kind == "reenactments" and rest[0] == REAL_WORLD):
-        settings = of_frames | {"causes": causes} | icp
+        settings = frame_settings | {"causes": causes} | icp
         inputs = _splits("scenes", config) | {name: f"{name}/{REAL_WORLD}.npz" for name in ("instances", "objects")}
         outputs = {"frame_causes": f"frame_causes/seed{seed}.npz", "starts": f"frame_starts/seed{seed}.npz"}
         if kind == "reenactments":

@@ -19,9 +19,10 @@ from gpca.experiments.scan_causes import SAMPLE_COLUMNS as SCAN_COLUMNS
 from gpca.explainers.registry import explainer_entry
 from gpca.io.container import require_same_samples
 from gpca.io.csv_file import ANY, numbers, read_csv
+from gpca.jobs.provenance import read_record
 from gpca.objects.canonical import BY_ICP
 from gpca.steps.control_samples import HARD
-from gpca.tracks.published import LIMITS, NO_CALLS, NOTHING_NAMED, Method, Published, Rows, sha256_of_arrays
+from gpca.tracks.published import LIMITS, NO_CALLS, Method, Published, Rows, predicted, sha256_of_arrays
 from gpca.tracks.samples import recipe_of
 from gpca.tracks.track import DEFAULT, FRAMES_TRACK, HARD_TRACK, SCANS_TRACK, Track
 
@@ -36,7 +37,7 @@ def collect(track: Track, run: Path, config: Mapping[str, Any]) -> Published:
     """Return what is shipped with a track, from the folder of a run and its config."""
     parts = [part for part in track.parts(config) if not track.may_lack(part[0]) or (run / track.file(*part)).is_file()]
     for part in parts if track.run != DEFAULT else ():  # otherwise nobody could make the samples again
-        settings = _provenance(run / track.file(*part)).get("settings")
+        settings = read_record(run / track.file(*part)).get("settings")
         expected = recipe_of(track.file(*part), config).given["settings"]
         if settings is not None and settings != json.loads(json.dumps(expected)):
             fault = f"was not made with the config of run {config['run']}"
@@ -58,7 +59,7 @@ def collect(track: Track, run: Path, config: Mapping[str, Any]) -> Published:
     optional += [f"{folder}/{source}/seed{seed}.npz" for folder, source, seed in folders]
     files = [track.file(*part) for part in parts] + [file for file in optional if (run / file).is_file()]
     limits = {name: getattr(tested[parts[0]].truth, name) for name in LIMITS}
-    code = _provenance(run / track.file(*parts[0])).get("code")
+    code = read_record(run / track.file(*parts[0])).get("code")
     commit = code.get("commit") or "" if isinstance(code, dict) else ""
     hashes = {file: sha256_of_arrays(run / file) for file in files}
     return Published(track, _rows(track, run, tested), limits, tuple(methods), hashes, commit)
@@ -129,10 +130,7 @@ def _method(key: Key, track: Track, config: Mapping[str, Any], parts: list[pd.Da
     import pandas as pd
 
     rows = pd.concat(parts)
-    scores_N_C = rows[[f"score_{label}" for label in track.labels]].to_numpy(float)
-    numbers_of = {label: number for number, label in enumerate(track.labels)}
-    named = np.where(rows["abstained"], "", rows["concept_predicted"].to_numpy(str))
-    named_N = np.array([numbers_of.get(label, NOTHING_NAMED) for label in named])
+    scores_N_C, named_N = predicted(rows, track.labels)
     name, training = key
     entry = explainer_entry(name, track.kind)
     costs = cause_costs(config, [*config["diagnosis"]["explainers"], *config["diagnosis"]["by_features"]])
@@ -141,12 +139,3 @@ def _method(key: Key, track: Track, config: Mapping[str, Any], parts: list[pd.Da
         calls = round(rows["icp_calls"].mean())
     name, title = (track.with_training(text, training) for text in (name, entry.title))
     return Method(name, title, entry.sight, int(calls), np.nan_to_num(scores_N_C), named_N)
-
-
-def _provenance(path: Path) -> dict[str, Any]:
-    """Return the provenance record of a file of the run, empty where there is none."""
-    try:
-        record = json.loads(path.with_name(path.name + ".provenance.json").read_text("utf-8"))
-    except (OSError, ValueError):
-        return {}
-    return record if isinstance(record, dict) else {}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter
@@ -29,31 +29,31 @@ from gpca.steps.control_samples import HARD, ControlSettings
 from gpca.steps.controls import ControlRun
 from gpca.steps.diagnosis import DESCRIBED, explained, frames_to_explain
 from gpca.steps.scan_causes import diagnose as diagnose_scans
-from gpca.tracks.published import NOTHING_NAMED, Method
+from gpca.tracks.published import NOTHING_NAMED, Method, label_numbers, predicted
 from gpca.tracks.samples import TrackSamples
 from gpca.tracks.track import CAUSES_TRACK, FRAMES_TRACK, SCANS_TRACK
 from gpca.uncertainty.settings import UncertaintySettings
 
-FOLDERS = {
-    REENACTED: "reenactments",
-    EMBEDDINGS: "cause_embeddings",
-    DESCRIBED: "descriptors",
-}  # by an explainer's reads
+# By an explainer's reads.
+FOLDERS = {REENACTED: "reenactments", EMBEDDINGS: "cause_embeddings", DESCRIBED: "descriptors"}
 
 
 class PartPredictions(NamedTuple):
     """A method's predictions for the n test samples of a part."""
 
     scores: np.ndarray  # (n, C)
-    named: np.ndarray  # (n,) labels, empty for none
+    named: np.ndarray  # (n,) numbers of the predicted labels
     calls: float  # mean runs of ICP beyond the explained one
     seconds: float  # of explaining, per registration; for depth frames and scans with learning
 
     @classmethod
-    def of(cls, attribution: Attribution, seconds: float, rows: slice | np.ndarray = slice(None)) -> PartPredictions:
+    def of(
+        cls, attribution: Attribution, labels: Sequence[str], seconds: float, rows: slice | np.ndarray = slice(None)
+    ) -> PartPredictions:
         """Return those in rows of an attribution."""
         calls = float(attribution.icp_calls_N[rows].mean())
-        return cls(attribution.scores_N_C[rows], attribution.predicted_N[rows], calls, seconds)
+        named = label_numbers(attribution.predicted_N[rows], labels)
+        return cls(attribution.scores_N_C[rows], named, calls, seconds)
 
 
 class MethodTrial(NamedTuple):
@@ -84,15 +84,13 @@ def try_method(
     else:
         explain = {CAUSES_TRACK: _causes, FRAMES_TRACK: _frames}.get(track.name, _hard)
         answers = [explain(trial, source, seed) for source, seed, _ in parts]
-    numbers = {label: number for number, label in enumerate(track.labels)}
-    scores_N_C, named_N = np.full((len(rows), len(numbers)), np.nan), np.full(len(rows), NOTHING_NAMED)
+    scores_N_C, named_N = np.full((len(rows), len(track.labels)), np.nan), np.full(len(rows), NOTHING_NAMED)
     for (_, _, part_rows), answer in zip(parts, answers, strict=True):
         if answer.scores.shape != (len(part_rows), len(track.labels)) or not np.isfinite(answer.scores).all():
             fault = f"gives scores of shape {answer.scores.shape}, or such as are no finite numbers"
             remedy = f"give one of {', '.join(track.labels)} for each of the {len(part_rows)} registrations"
             raise InputError(f"explainer '{name}'", fault, remedy)
-        scores_N_C[part_rows] = answer.scores
-        named_N[part_rows] = [numbers.get(label, NOTHING_NAMED) for label in answer.named]
+        scores_N_C[part_rows], named_N[part_rows] = answer.scores, answer.named
     calls = round(float(np.mean([answer.calls for answer in answers])))
     seconds = float(np.mean([answer.seconds for answer in answers]))
     name, title = (track.with_training(text, training) for text in (name, entry.title))
@@ -109,7 +107,9 @@ def _causes(trial: MethodTrial, source: str, seed: int) -> PartPredictions:
     descriptors = DescriptorSettings(**diagnosis["descriptors"])
     reenactment = read_settings(ReenactmentSettings, diagnosis["reenactment"])
     attribution = explained(entry, trial.settings, causes, path, read, descriptors, reenactment)
-    return PartPredictions.of(attribution, float(attribution.seconds_N.mean()), causes.rows("test"))
+    return PartPredictions.of(
+        attribution, samples.track.labels, float(attribution.seconds_N.mean()), causes.rows("test")
+    )
 
 
 def _hard(trial: MethodTrial, source: str, seed: int) -> PartPredictions:
@@ -134,7 +134,7 @@ def _hard(trial: MethodTrial, source: str, seed: int) -> PartPredictions:
         hard=hard,
     )
     attribution, seconds = run.explain_hard(trial.name)
-    return PartPredictions.of(attribution, seconds)
+    return PartPredictions.of(attribution, samples.track.labels, seconds)
 
 
 def _never(_registrations: Registrations, _source: str) -> tuple[np.ndarray, np.ndarray]:
@@ -156,7 +156,7 @@ def _frames(trial: MethodTrial, source: str, seed: int) -> PartPredictions:
     frames.prepare(trial.name)
     started = perf_counter()
     attribution = frames.attribution(trial.name, trial.settings)
-    return PartPredictions.of(attribution, (perf_counter() - started) / len(causes))
+    return PartPredictions.of(attribution, samples.track.labels, (perf_counter() - started) / len(causes))
 
 
 def _scans(trial: MethodTrial) -> list[PartPredictions]:
@@ -167,7 +167,7 @@ def _scans(trial: MethodTrial) -> list[PartPredictions]:
     if trial.training == OBJECTS:
         kind = reads if reads in FOLDERS else DESCRIBED
         folders |= {"causes": "causes", kind: FOLDERS[kind]}
-    predicted = {}
+    by_seed = {}
     for seed in dict.fromkeys(seed for _, seed, _ in parts):
         sets = [source for source, of, _ in parts if of == seed]
         kinds = ("scan_causes", "scan_descriptors", "scan_reenactments")
@@ -180,14 +180,13 @@ def _scans(trial: MethodTrial) -> list[PartPredictions]:
             diagnose_scans(job)
             seconds = perf_counter() - started
             rows = read_predictions(path, labels=samples.track.labeled_by)
-        predicted[seed] = rows, seconds / len(rows)
+        by_seed[seed] = rows, seconds / len(rows)
     answers = []
     for source, seed, _ in parts:
-        rows, seconds = predicted[seed]
+        rows, seconds = by_seed[seed]
         rows = rows[rows["scans"] == source]
-        scores_n_4 = rows[[f"score_{label}" for label in samples.track.labels]].to_numpy(float)
-        named_n = np.where(rows["abstained"], "", rows["concept_predicted"].to_numpy(str))
-        answers.append(PartPredictions(scores_n_4, named_n, float(rows["icp_calls"].mean()), seconds))
+        calls = float(rows["icp_calls"].mean())
+        answers.append(PartPredictions(*predicted(rows, samples.track.labels), calls, seconds))
     return answers
 
 

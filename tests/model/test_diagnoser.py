@@ -12,14 +12,7 @@ from gpca.causes.truth import ALL
 from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
 from gpca.explainers.pair_classifier import Judgment, PairClassifier
-from gpca.model.diagnoser import (
-    Diagnoser,
-    TrainingSet,
-    fit_error,
-    judged_unseen,
-    learn,
-    threshold_of,
-)
+from gpca.model.diagnoser import Diagnoser, TrainingSet, fit_error, judged_unseen, learn, threshold_of
 from gpca.model.diagnosis import Diagnosis, Reenacted, state_probabilities
 from gpca.model.file import FEATURE_COUNT
 from gpca.reenactment.dataset import FEATURES, Reenactments, reenactment_features

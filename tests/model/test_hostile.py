@@ -208,8 +208,7 @@ FILES = {
     "code": lambda path: torch.save(print, path),
     "an old pickle": lambda path: torch.save({"format": "GP-CA model"}, path, _use_new_zipfile_serialization=False),
     "a compressed bomb": lambda path: members(
-        path,
-        lambda name, content: [(name, bytes(600 << 20) if is_data(name) else content, zipfile.ZIP_DEFLATED)],
+        path, lambda name, content: [(name, bytes(600 << 20) if is_data(name) else content, zipfile.ZIP_DEFLATED)]
     ),
     "a member that is gone": lambda path: members(
         path, lambda name, content: [] if is_data(name) else [(name, content, zipfile.ZIP_STORED)]
@@ -319,12 +318,7 @@ def test_points_that_cannot_be_explained_are_refused(name, role, folder):
     refusal(["explain", *files, *EXPLAIN[3:]], folder, name)
 
 
-POSES = {
-    "empty": "",
-    "words": "one " * 16,
-    "mirrored": "-1 0 0 0  0 1 0 0  0 0 1 0  0 0 0 1",
-    "giant": "0 " * 10**6,
-}
+POSES = {"empty": "", "words": "one " * 16, "mirrored": "-1 0 0 0  0 1 0 0  0 0 1 0  0 0 0 1", "giant": "0 " * 10**6}
 
 
 @pytest.mark.parametrize("fault", POSES)
