@@ -31,20 +31,16 @@ def test_the_python_of_a_page_runs(page, model, registrations, tmp_path, monkeyp
     assert set(capsys.readouterr().out.split()) & {"nominal", "failed", "noise", "pose", "overlap"}
 
 
-def test_the_python_of_the_page_of_registration_methods_runs(registrations, capsys):
-    run_example("registration", registrations)
-    assert capsys.readouterr().out.startswith("True ")
+@pytest.mark.parametrize(("page", "start"), [("registration", "True "), ("estimators", "[[")])
+def test_the_python_of_the_pages_of_methods_and_estimators_runs(page, start, registrations, capsys):
+    run_example(page, registrations)
+    assert capsys.readouterr().out.startswith(start)
 
 
 def test_the_python_of_the_page_of_guarantees_runs(registrations):
     scores = np.random.default_rng(0).dirichlet(np.ones(4), size=200)
-    given = {
-        "scores_N_4": scores,
-        "state_N": np.resize(STATES, 200),
-        "family_N": np.arange(200) % 20,
-        "new_M_4": scores,
-    }
-    names = run_example("guarantee", registrations, **given)
+    given = {"scores_N_4": scores, "new_M_4": scores, "family_N": np.arange(200) % 20}
+    names = run_example("guarantee", registrations, state_N=np.resize(STATES, 200), **given)
     assert names["same"] == names["guarantee"] and names["inside_M_5"].shape == (200, 5)
     assert set(names["called_M"]) <= set(OUTCOMES)
 
@@ -58,8 +54,3 @@ def test_the_tutorial_runs_to_its_end_and_warns_of_the_foreign_scale(model, tmp_
     assert told == ["noise", "pose", "overlap", "both"]
     assert "T_target_source, in m" in said
     assert "warning: the source is 2" in said
-
-
-def test_the_python_of_the_page_of_estimators_runs(registrations, capsys):
-    run_example("estimators", registrations)
-    assert capsys.readouterr().out.startswith("[[")

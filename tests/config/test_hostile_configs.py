@@ -63,25 +63,18 @@ TEXTS = {
 }
 
 
-@pytest.mark.parametrize("name", TEXTS)
-def test_a_text_that_is_no_sound_config(tmp_path, name):
-    text, *words = TEXTS[name]
-    (tmp_path / "mine.yaml").write_text(text)
-    refusal(["check-config", "mine.yaml"], tmp_path, "mine.yaml", *words)
-
-
-ENCODINGS = {
+BYTES = {
     "Latin-1": ('figures: {source: "café"}'.encode("latin-1"), "UTF-8"),
     "UTF-16": ("seeds: [0]".encode("utf-16"), "UTF-8"),
-    "binary": (bytes(range(256)), "UTF-8"),
+    "all bytes": (bytes(range(256)), "UTF-8"),
     "surrogates": (b'{"run": "\\ud800"}', "run", "control character"),
 }
 
 
-@pytest.mark.parametrize("name", ENCODINGS)
-def test_bytes_that_are_no_text(tmp_path, name):
-    content, *words = ENCODINGS[name]
-    (tmp_path / "mine.yaml").write_bytes(content)
+@pytest.mark.parametrize("name", TEXTS | BYTES)
+def test_what_is_no_sound_config(tmp_path, name):
+    content, *words = (TEXTS | BYTES)[name]
+    (tmp_path / "mine.yaml").write_bytes(content.encode() if isinstance(content, str) else content)
     refusal(["check-config", "mine.yaml"], tmp_path, "mine.yaml", *words)
 
 

@@ -33,6 +33,7 @@ def test_no_command_takes_a_number_without_bounds():
     kinds = {(command, action.dest): action.type for command in COMMANDS for action in options(command)}
     assert [name for name, kind in kinds.items() if kind in (int, float)] == []
     assert NUMBERS
+    assert [whole_number(-2, 2)(text) for text in ("-2", "2")] == [-2, 2]
 
 
 @pytest.mark.parametrize(("command", "option"), NUMBERS)
@@ -43,10 +44,6 @@ def test_every_number_of_every_command_is_refused_where_it_cannot_be(tmp_path, c
 @pytest.mark.parametrize("text", [*BAD, "0", "257"])
 def test_threads_that_cannot_be(tmp_path, text):
     refusal(["explain", "--threads", text], tmp_path, "argument --threads", "--help")
-
-
-def test_both_ends_are_allowed():
-    assert [whole_number(-2, 2)(text) for text in ("-2", "2")] == [-2, 2]
 
 
 @pytest.mark.parametrize("text", [*(text for text in BAD if text != "1.5"), "0"])
@@ -92,14 +89,11 @@ def test_names_the_package_of_a_known_library(library, debian):
     assert "dnf install" in hint
 
 
-def test_names_an_unknown_library_by_itself():
+def test_names_an_unknown_library_by_itself_and_nothing_where_none_is_missing():
+    assert system_library_hint("No module named 'open3d'") is None
     hint = system_library_hint("/opt/x/libtbb.so.12: cannot open shared object file: No such file or directory")
     assert "libtbb.so.12" in hint
     assert "apt-get" not in hint
-
-
-def test_no_hint_where_no_library_is_missing():
-    assert system_library_hint("No module named 'open3d'") is None
 
 
 def test_open3d_imports_here():

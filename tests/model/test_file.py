@@ -25,9 +25,8 @@ def test_a_loaded_model_says_the_same(model, path):
     cloud = torch.rand(1, 64, 3)
     with torch.inference_mode():
         assert torch.equal(loaded.encoder(cloud), model.encoder(cloud))
-    for expected, actual in zip(
-        model.gpc.attribute(embeddings(model)), loaded.gpc.attribute(embeddings(model)), strict=True
-    ):
+    h = embeddings(model)
+    for expected, actual in zip(model.gpc.attribute(h), loaded.gpc.attribute(h), strict=True):
         np.testing.assert_array_equal(actual, expected)
     for name in ("encoder_settings", "icp", "cloud_points", "policy", "title", "stand_in", "familiar"):
         assert getattr(loaded, name) == getattr(model, name)
@@ -115,16 +114,13 @@ def test_the_best_model_of_the_workflow_is_taken(tmp_path, none_shipped):
     assert model_path(results=tmp_path) == tmp_path / "shipped.pt"
 
 
-def test_results_are_those_below_the_working_directory(tmp_path, none_shipped, monkeypatch):
+def test_a_named_model_comes_before_those_below_the_working_directory(tmp_path, none_shipped, monkeypatch):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(InputError, match=f"none in {tmp_path}/results; "):
         model_path()
     (tmp_path / "results/mine").mkdir(parents=True)
     (tmp_path / "results/mine/model.pt").touch()
     assert model_path().resolve() == tmp_path / "results/mine/model.pt"
-
-
-def test_a_named_model_comes_first(tmp_path, monkeypatch):
     monkeypatch.setenv(VARIABLE, str(tmp_path / "lost.pt"))
     with pytest.raises(InputError, match=f"{VARIABLE}=.*lost.pt: no such model"):
         model_path(results=tmp_path)
