@@ -59,7 +59,7 @@ def files(tmp_path):
     return paths
 
 
-def test_the_column_table_is_the_control_and_concept_the_source_of_a_transfer(files):
+def test_the_column_table_is_the_control_and_clusters_are_families_of_the_source(files):
     rows = collect(RUN, files).set_index(["table", "source", "method", "metric", "concept", "seed"])["value"]
     assert rows["density", "a", "gpca", "accuracy", "all", 100] == pytest.approx(0.7)
     assert rows["transfer", "b", "gpca", "accuracy", "a", 101] == pytest.approx(0.5)
@@ -68,6 +68,7 @@ def test_the_column_table_is_the_control_and_concept_the_source_of_a_transfer(fi
     assert ("paper", "a", "head", "auroc_error", "all", 100) not in rows.index  # nothing is wrong
     assert ("transfer", "b", "head", "auroc_error_bald", "a", 100) not in rows.index
     assert rows["transfer", "b", "head", "test_samples", "a", 100] == 30
+    assert set(read_controls(files)["cluster"]) == {f"{source}/part_{n}" for source in "ab" for n in range(5)}
 
 
 def test_a_change_is_that_of_the_same_draws_of_objects_and_seeds(files, tmp_path):
@@ -133,10 +134,6 @@ def test_seconds_are_tidy_by_source_and_explainer(tmp_path):
         ("a", "gpca_pair", "learning_seconds", 100): 2.5,
         ("a", "gpca_pair", "seconds", 100): 0.01,
     }
-
-
-def test_intervals_are_over_clusters(files):
-    assert set(read_controls(files)["cluster"]) == {f"{source}/part_{n}" for source in "ab" for n in range(5)}
 
 
 def severity_files(folder, paths, **changed):

@@ -121,13 +121,10 @@ def test_an_ellipse_is_drawn_whole_or_named_where_it_is_far_wider(times, whole):
     plt.close(figure)
 
 
-def test_an_ellipse_holds_what_it_says():
+def test_an_ellipse_holds_what_it_says_and_a_right_covariance_lies_on_the_diagonal():
     sigma = np.array([[2.0, 0.6], [0.6, 0.5]])
     outline = ellipse(sigma)
     distance = np.einsum("ni,ij,nj->n", outline, np.linalg.inv(sigma), outline)
     assert distance == pytest.approx(np.full(len(outline), chi2.ppf(0.95, 2)))
-
-
-def test_a_right_covariance_lies_on_the_diagonal():
     squares = np.random.default_rng(0).chisquare(6, size=20_000)
     assert coverages(squares) == pytest.approx(LEVELS, abs=0.015)

@@ -100,13 +100,10 @@ def test_fig5_shows_a_test_sample_that_an_occluder_covers_and_that_is_named_righ
 SHOWABLE = {"split": "test", "concept_true": "overlap", "concept_predicted": "overlap", "lost_to": OCCLUDER}
 
 
-def test_fig5_shows_an_object_that_is_large_in_its_image():
+def test_fig5_shows_an_object_that_is_large_in_its_image_and_that_icp_made_wrong():
     known = {"init_error": 0.01, "icp_error": 0.05, "instance": range(5), "sample": range(5)}
     samples = pd.DataFrame(SHOWABLE | known | {"score_overlap": [0.9, 0.8, 0.7, 0.6, 0.5]})
     assert choose_sample(samples, "predictions", np.array([100, 3, 200, 1, 300]), 0.03) == 2  # the median of 0, 2 and 4
-
-
-def test_fig5_shows_a_registration_that_icp_made_wrong_where_there_is_one():
     errors = {"init_error": [0.01, 0.05, 0.01], "icp_error": [0.02, 0.06, 0.07], "score_overlap": [0.7, 0.8, 0.9]}
     samples = pd.DataFrame(SHOWABLE | {"instance": range(3), "sample": range(3)} | errors)
     for shown, number in ((2, 3), (1, 2), (0, 1)):
@@ -137,14 +134,11 @@ def test_a_picture_is_drawn_and_drawing_again_changes_no_byte(picture, results, 
     assert same_bytes(draw[picture]).std() > 5
 
 
-def test_files_of_other_samples_are_refused(results, tmp_path):
+def test_files_of_other_samples_and_metrics_of_other_methods_are_refused(results, tmp_path):
     poses = pd.read_csv(results / "poses.csv", dtype=str, keep_default_na=False)
     write_csv(tmp_path / "poses.csv", poses[::-1])
     with pytest.raises(InputError, match="its samples differ from"):
         read_samples(tmp_path / "poses.csv", results / "real_rgbd/dgcnn-none/seed0.csv")
-
-
-def test_metrics_of_other_methods_are_refused(results):
     with pytest.raises(InputError, match="has no confusion of these backbones"):
         draw_real_world_confusions(run_of("pointnet"), read_together(results / "metrics.csv"))
 

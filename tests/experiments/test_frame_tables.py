@@ -101,11 +101,13 @@ def test_the_note_says_what_encoders_were_pretrained_on():
     assert "rendered of models of objects that no tested frame shows, and GPC" in unseen.footnotes[0]
 
 
-def test_untrained_explainers_stand_below_and_trained_ones_have_a_table_of_their_own():
+def test_untrained_explainers_stand_below_and_a_backbone_without_a_title_has_its_name():
     values = VALUES | {"chance": (0.3, 0.3, 0.4), "gpca_pair": (0.9, 0.9, 0.9)}
     table = make(values, explainers={"chance": {}, "gpca_pair": {}})
     assert [row[0][0] for row in table.rows][-2:] == ["analytical_gpc", "chance"]
     assert table.best() == make().best()
+    values = {"mine-none": (0.8, 0.8, 0.8), "pointnet-none": (0.6, 0.7, 0.65)}
+    assert "| To mine (points) |" in make(values, backbones=["mine", "pointnet"], reductions=["none"]).markdown()
 
 
 def test_encoders_as_published_stand_below_the_judged_ones_and_are_never_the_best():
@@ -120,11 +122,6 @@ def test_encoders_as_published_stand_below_the_judged_ones_and_are_never_the_bes
     assert "readings of" not in " ".join(make(values).footnotes)
     fewer = make(values | {"dgcnn_1024-none": (0.9, 0.9), "dgcnn_1024-pca": (0.9, 0.8)}, **published)
     assert "DGCNN of 1024 features, over the first 2 seeds: readings of" in " ".join(fewer.footnotes)
-
-
-def test_a_backbone_without_a_title_has_its_name():
-    values = {"mine-none": (0.8, 0.8, 0.8), "pointnet-none": (0.6, 0.7, 0.65)}
-    assert "| To mine (points) |" in make(values, backbones=["mine", "pointnet"], reductions=["none"]).markdown()
 
 
 def seen(values):
