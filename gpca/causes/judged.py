@@ -231,7 +231,7 @@ def measure(samples: Judged, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
     ranks = [rankdata(of, axis=1) if len(of) else of for of in (scores_F_3, phi_F_3)]
     spearman_F = _cosines(*(ranks_F_3 - ranks_F_3.mean(axis=1, keepdims=True) for ranks_F_3 in ranks))
     return measures | {
-        **of_decisions(samples, weights_B_N),
+        **decision_measures(samples, weights_B_N),
         "tied_accuracy": weighted_mean(samples.tied[rows_N, first_N][failed_N], weights_B_F),
         "balanced_accuracy": np.mean(recalls, axis=0),
         "dominant_accuracy": weighted_mean((np.array(CONCEPTS)[first_N] == samples.label)[failed_N], weights_B_F),
@@ -247,7 +247,7 @@ def counted(samples: Judged, metric: str) -> np.ndarray:
     return MEASURES[metric].counted(samples) if metric in MEASURES else _labeled(samples)  # type: ignore[misc]
 
 
-def of_decisions(samples: Judged, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
+def decision_measures(samples: Judged, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:
     """Return regret and named_right, which judge what is named alone, whatever the other scores are."""
     labeled_N, failed_N = _labeled(samples), _failed(samples)
     gain_N_3, named_N_3 = gains(samples), samples.named[:, None] == np.array(CONCEPTS)
@@ -269,7 +269,7 @@ def _state_accuracy(state_N: np.ndarray, called_failed_N: np.ndarray, weights_B_
     nominal_N = state_N == NOMINAL
     failed_N = ~nominal_N & (state_N != BORDERLINE)
     groups = ((nominal_N, ~called_failed_N), (failed_N, called_failed_N))
-    return np.mean([weighted_mean(right_N[of_N], weights_B_N[:, of_N]) for of_N, right_N in groups], axis=0)
+    return np.mean([weighted_mean(right_N[group_N], weights_B_N[:, group_N]) for group_N, right_N in groups], axis=0)
 
 
 def ranking(score_N: np.ndarray, true_N: np.ndarray, weights_B_N: np.ndarray) -> dict[str, np.ndarray]:

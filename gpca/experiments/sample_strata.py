@@ -6,7 +6,7 @@ from math import inf
 
 import numpy as np
 
-from gpca.causes.judged import CEILING, Judged, of_decisions, read_judged
+from gpca.causes.judged import CEILING, Judged, decision_measures, read_judged
 from gpca.causes.truth import ALL, BORDERLINE, FAILED, NOMINAL
 from gpca.declarations.plan import Run
 from gpca.declarations.result import Frame, Paths, numbers, table
@@ -63,7 +63,7 @@ def collect_strata(run: Run, prediction_files: Paths, causes_files: Paths) -> Fr
         if mask_N.any() and naming:
             inside = {explainer: each.subset(mask_N) for explainer, each in naming.items()}
             part = f"{kind}_{stratum}"
-            rows += diagnosis.compared_samples(source, inside, draws.subset(mask_N), of_decisions, DECISIONS, part)
+            rows += diagnosis.compared_samples(source, inside, draws.subset(mask_N), decision_measures, DECISIONS, part)
     return intervals(rows, "diagnoses")
 
 

@@ -151,5 +151,5 @@ def learn_explainers(
         attach[name], explain[name] = embedded if reads_embeddings else remedied, partial(timed, name)
         learned = train if reads_embeddings else train.subset(np.arange(len(train))[:most_remedied])
         fitted[name].fit(attach[name](learned))
-    calibration = {name: of_name(held_out.without_labels()) for name, of_name in explain.items()}
+    calibration = {name: explain_one(held_out.without_labels()) for name, explain_one in explain.items()}
     return LoopExplainers(explain, fitted, attach, calibration, held_out.concept)

@@ -127,15 +127,15 @@ class Episode:
             self._observed[actions] = observe(attempt.holding, attempt.record, Robot(self.situation), random)
         return self._observed[actions]
 
-    def solved_by(self, actions: tuple[str, ...], known: Mapping[str, Action], settings: LoopSettings) -> bool:
+    def solved_by(self, actions: tuple[str, ...], by_name: Mapping[str, Action], settings: LoopSettings) -> bool:
         """Whether the pose is right after these actions, of which all but the last were taken."""
-        self.take(actions, known, settings)
+        self.take(actions, by_name, settings)
         return self.is_right(actions)
 
-    def take(self, actions: tuple[str, ...], known: Mapping[str, Action], settings: LoopSettings) -> Attempt:
+    def take(self, actions: tuple[str, ...], by_name: Mapping[str, Action], settings: LoopSettings) -> Attempt:
         """The outcome after these actions, of which all but the last were taken."""
         if actions not in self.outcomes:
-            before, action = self.outcomes[actions[:-1]], known[actions[-1]]
+            before, action = self.outcomes[actions[:-1]], by_name[actions[-1]]
             self.outcomes[actions] = register_after(self.situation, before, action, actions, settings)
         return self.outcomes[actions]
 

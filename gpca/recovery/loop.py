@@ -22,7 +22,7 @@ from gpca.recovery.chances import alarm_threshold
 from gpca.recovery.episodes import Episode
 from gpca.recovery.policies import Case, Decide, Means, PolicyEntry, policy_entry
 from gpca.recovery.reenactment import Belief, CauseEffects, KnownModel, believe, reenact
-from gpca.recovery.rehearsal import known
+from gpca.recovery.rehearsal import policy_inputs
 from gpca.recovery.settings import LoopSettings
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.seeds import generator
@@ -125,7 +125,7 @@ class Loop:
                 scores_T_C=np.array([answer.scores_C for answer in history]) if history else None,
                 bald_T=np.array([answer.bald for answer in history]) if history else None,
                 observed_F=episode.observe(()) if entry.gated else None,
-                known_F=known(episode.observe(before), history[-1]) if entry.learns else None,
+                known_F=policy_inputs(episode.observe(before), history[-1]) if entry.learns else None,
                 cause=episode.situation.cause if entry.oracle and episode.failed else "",
                 random=generator(*self.axes, "policy", episode.number),
                 reenacted=reenacted,

@@ -43,7 +43,7 @@ class Rehearsal:
         return [episode for episode in self.episodes if episode.failed]
 
 
-def known(observed_F: np.ndarray, answer: Answer) -> np.ndarray:
+def policy_inputs(observed_F: np.ndarray, answer: Answer) -> np.ndarray:
     """All that a policy may weigh: the robot's observations; scores, variances and BALD of an explainer."""
     return np.concatenate([observed_F, np.nan_to_num([*answer.scores_C, *answer.variances_C, answer.bald])])
 
@@ -68,7 +68,7 @@ def rehearse(
     answers.ask(CaseKey(explainer, episode.number, sequence[:-1]) for episode, sequence in taken)
 
     def state(episode: Episode, sequence: tuple[str, ...]) -> np.ndarray:
-        return known(episode.observe(sequence), answers.history(explainer, episode.number, sequence)[-1])
+        return policy_inputs(episode.observe(sequence), answers.history(explainer, episode.number, sequence)[-1])
 
     trials = {e.number: [Trial(state(e, ()), NOTHING, not e.failed)] for e in episodes}
     for episode, sequence in taken:
@@ -81,13 +81,13 @@ def rehearsed_order(
     failures: Sequence[Episode], actions: Mapping[str, Action], costs: Mapping[str, float], settings: LoopSettings
 ) -> Order:
     """The order of all actions that recovers these failures soonest, see :func:`best_order`."""
-    solved = [partial(episode.solved_by, known=actions, settings=settings) for episode in failures]
+    solved = [partial(episode.solved_by, by_name=actions, settings=settings) for episode in failures]
     return best_order(tuple(actions), costs, solved, settings.budget)
 
 
 def rehearsed_gate(episodes: Mapping[str, Sequence[Episode]], false_alarms: float) -> FailureGate:
     """The gate that learned the first registrations of these episodes, by the part that their tables are of."""
-    together = [(part, episode) for part, of_part in episodes.items() for episode in of_part]
+    together = [(part, episode) for part, group in episodes.items() for episode in group]
     observed_N_F = np.array([episode.observe(()) for _, episode in together])
     failed_N = np.array([episode.failed for _, episode in together])
     return learn_gate(observed_N_F, failed_N, [(part, e.situation.table) for part, e in together], false_alarms)
@@ -195,7 +195,7 @@ def learners_of(
             learners[name] = partial(ClassifierLearner, fitted, queue, others, treatments)
         elif means.utility is not None:
             answers = answers_of(explainers.explain[entry.explainer](starts[1].without_labels()))
-            known_N_F = [known(e.observe(()), answer) for e, answer in zip(judged, answers, strict=True)]
+            known_N_F = [policy_inputs(e.observe(()), answer) for e, answer in zip(judged, answers, strict=True)]
             trials = [rehearsal.trials[episode.number] for episode in queued]
             learners[name] = partial(ChancesLearner, trials, known_N_F, means.utility.costs)
     return learners
@@ -218,7 +218,7 @@ def error_by_labels(
             learner, left = make(), generator(*axes, "queue", draw).permutation(queued)
             for labels in range(0, queued + 1, BATCH):
                 chosen = learner.choose()
-                unsolved = sum(not of[action] for of, action in zip(solved, chosen, strict=True))
+                unsolved = sum(not helped[action] for helped, action in zip(solved, chosen, strict=True))
                 rows.append((name, order, draw, labels, len(solved), unsolved))
                 if order == DOUBTED:
                     left = left[np.argsort(-learner.doubts()[left], kind="stable")]

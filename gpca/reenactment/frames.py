@@ -43,11 +43,7 @@ class KnownObject:
 
     def __init__(self, subject: Subject, mesh: MeshScene) -> None:
         self.subject, self.mesh, self.outline_m = subject, mesh, outline(subject)
-
-    @cached_property
-    def surface(self) -> ModelSurface:
-        """Points of the whole surface, in diameters."""
-        return ModelSurface(self.subject.surface[:SURFACE_POINTS])
+        self.surface = ModelSurface(subject.surface[:SURFACE_POINTS])  # in diameters
 
 
 @dataclass(frozen=True)
@@ -157,8 +153,8 @@ def reenact_frames(
     Of the instances it reads pixels, camera and what the dataset says of symmetries; of the causes, both clouds, the
     initial pose and what registrations found.
     """
-    of_object = instances.object_index[starts.instance] if len(starts) == len(causes) else np.array([])
-    if not np.array_equal(of_object, causes.registrations.object_index):
+    object_S = instances.object_index[starts.instance] if len(starts) == len(causes) else np.array([])
+    if not np.array_equal(object_S, causes.registrations.object_index):
         fault = "are of other registrations than the causes"
         raise InputError("starts of frames", fault, "regenerate both from the same config")
     subjects = subjects_of(instances, starts.instance, objects)

@@ -6,7 +6,7 @@ from scipy.stats import spearmanr
 from sklearn.metrics import average_precision_score, balanced_accuracy_score, roc_auc_score
 
 from gpca.causes.dataset import LABELS
-from gpca.causes.judged import MEASURES, RECALL, SampleTruth, ceiling_of, counted, measure, of_decisions
+from gpca.causes.judged import MEASURES, RECALL, SampleTruth, ceiling_of, counted, decision_measures, measure
 from gpca.causes.truth import BORDERLINE, FAILED, NOMINAL, Truth
 from tests.judged import random_judged
 
@@ -92,13 +92,13 @@ def failure(judged):
     [("pose", 0.0, 1), ("noise", 0.5, 0), ("overlap", 0.85, 0), (NOMINAL, 0.75, 0), ("", 0.75, 0)],
 )
 def test_regret_is_what_the_named_cause_leaves_of_what_the_best_one_takes_away(failure, named, regret, right):
-    found = of_decisions(replace(failure, named=np.array([named])), np.ones((1, 1)))
+    found = decision_measures(replace(failure, named=np.array([named])), np.ones((1, 1)))
     assert found["regret"] == pytest.approx(regret) and found["named_right"] == right
 
 
 def test_where_no_removal_helps_doing_nothing_has_no_regret(failure):
     worse = replace(failure, error=np.where(np.arange(8) == 7, 0.1, 0.3)[None], named=np.array([NOMINAL]))
-    assert of_decisions(worse, np.ones((1, 1)))["regret"] == 0
+    assert decision_measures(worse, np.ones((1, 1)))["regret"] == 0
 
 
 def test_the_registration_that_is_shown_is_judged_by_its_own_state(judged):

@@ -86,9 +86,7 @@ def test_they_stay_where_that_kind_is_asked_for(subjects, capsys):
     wrong = [replace(subject, errors=lambda T_n: T_n[:, 0, 0] * 0 + 0.1) for subject in subjects]
     asked = replace(SETTINGS, shares=Shares(nominal=0.1, geometry=0.2))
     assert measure_clean_pairs(wrong, "four", 100, asked)[0] == wrong
-    with pytest.raises(
-        InputError,
-        match=r"nearly all clean pairs of every object have an error of at least 2 % .*; raise causes.limits.nomi",
-    ):
+    message = r"nearly all clean pairs of every object have an error of at least 2 % .*; raise causes.limits.nomi"
+    with pytest.raises(InputError, match=message):
         measure_clean_pairs(wrong, "four", 100, SETTINGS)
     assert len(capsys.readouterr().err.splitlines()) == len(wrong)

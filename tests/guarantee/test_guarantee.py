@@ -18,11 +18,8 @@ def drawn(random, samples):
     scores = np.exp(2 * np.eye(len(STATES))[number_N] + random.normal(size=(samples, len(STATES))))
     state_N = np.array(STATES, dtype=object)[number_N]
     state_N[:: samples // 10] = BORDERLINE
-    return (
-        scores / scores.sum(axis=1, keepdims=True),
-        state_N.astype(str),
-        random.integers(12, size=samples).astype(str),
-    )
+    family_N = random.integers(12, size=samples).astype(str)
+    return scores / scores.sum(axis=1, keepdims=True), state_N.astype(str), family_N
 
 
 def test_states_are_labels_but_for_several_causes():

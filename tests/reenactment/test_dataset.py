@@ -36,9 +36,8 @@ def test_every_row_has_finite_numbers_probabilities_that_add_up_and_seconds(some
 
 def test_a_re_enactment_does_not_depend_on_the_truth_or_on_other_rows(some, enacted):
     two = some.subset(np.array([3, 1]))
-    again, _, _ = reenact_all(
-        replace(two, registrations=two.registrations.without_labels()), "four", 100, SETTINGS, CauseSettings()
-    )
+    hidden = replace(two, registrations=two.registrations.without_labels())
+    again, _, _ = reenact_all(hidden, "four", 100, SETTINGS, CauseSettings())
     for name in NUMBERS:
         assert np.array_equal(getattr(again, name), getattr(enacted[0], name)[[3, 1]])
 

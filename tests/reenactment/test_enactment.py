@@ -56,8 +56,12 @@ def rebuilt(candidate, model, *causes):
     random = np.random.default_rng(0)
     observed = candidate.observed(causes)
     inlier_N = np.where(np.abs(model.residuals(observed)[0]) < 0.2, 1.0, 0.0)
-    hypothesis = Hypothesis(np.eye(4), inlier_N, 0.0, 0.02, 1.0, 0.0)
-    return rebuild(np.eye(4), observe(observed, hypothesis, model, NoiseScale(model, random), random), model, random)
+    return rebuilt_from(observed, inlier_N, model, random)
+
+
+def rebuilt_from(observed, inlier_N, model, random):
+    found = observe(observed, hypothesis(inlier_N), model, NoiseScale(model, random), random)
+    return rebuild(np.eye(4), found, model, random)
 
 
 def test_what_was_observed_stays_as_it_is(drill, model):
@@ -86,10 +90,8 @@ def test_missing_surface_is_filled_as_densely_as_the_rest(drill, model):
 
 
 def test_a_clean_cloud_is_not_touched(drill, model):
-    random, observed = np.random.default_rng(0), drill[400:900]
-    hypothesis = Hypothesis(np.eye(4), np.ones(500), 0.0, 0.02, 1.0, 0.0)
-    quiet = observe(observed, hypothesis, model, NoiseScale(model, random), random)
-    found = rebuild(np.eye(4), quiet, model, random)
+    observed = drill[400:900]
+    found = rebuilt_from(observed, np.ones(500), model, np.random.default_rng(0))
     assert found.applied.tolist() == [False, True, False]
     assert np.array_equal(found.clean, observed) and np.array_equal(found.noisy, observed)
 
