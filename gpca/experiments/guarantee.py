@@ -182,12 +182,9 @@ COLUMNS_OF_SHIFT = {
     SECTION,
     "Table XIX: a guarantee for what is stated about causes",
     """A set that holds the true state, which is nominal, one cause, or several, as often as is guaranteed; and an alarm
-    that reports good, failed or not sure, and seldom errs either way. Explainers are trained on some families of
-    shapes, calibrated on others, and tested on a family that is among neither.
-
-    A guarantee holds where the interval does not lie wholly on the wrong side of it. Samples of a family are alike, and
-    families differ, so a guarantee by sample may break for a new family; that by family cannot, if families are
-    exchangeable, but with few families the sets are larger.""",
+    that reports good, failed or not sure, and seldom errs. Explainers are trained on some families of shapes,
+    calibrated on others, and tested on a family that is among neither. A guarantee by sample may break there; that by
+    family cannot, if families are exchangeable, but its sets are larger.""",
     **INPUT,
 )
 def table19_guarantee(run: Run, measured):
@@ -237,16 +234,14 @@ def table19_shift(run: Run, measured):
         rows += [Row([condition, source, explainer], {**entries, "source": source[0]}) for source in sources.items()]
     heads = {"calibrated_on": "Calibrated on", "source": "Tested on", "explainer": "Explainer"}
     sheet = Sheet("table19_shift", heads, rows, COLUMNS_OF_SHIFT, _with_counts(measured))
-    limits = (f"{100 * run.config[NAME][name]:g}" for name in ("level", "missed", "false_alarms"))
-    level, missed, false_alarms = limits
+    level, missed, false_alarms = (f"{100 * run.config[NAME][name]:g}" for name in ("level", "missed", "false_alarms"))
     return sheet.table(
         "Guarantees for causes on single datasets, and where calibrated and tested samples differ"
         + (STAND_INS if run.stand_ins() else ""),
         "metric",
         [
             f"The limits are those of Table XIX, by sample: {level} % coverage, at most {missed} % missed failures and "
-            f"{false_alarms} % false alarms. They are guaranteed for new families of all datasets together. Nothing "
-            "guarantees them here: the numbers show what is left.",
+            f"{false_alarms} % false alarms. Nothing guarantees them here: the numbers show what is left.",
             "Each state: limits for each state by itself. Severity: the largest of the severities of noise, rotation, "
             "translation and crop, as shares of the largest in any sample; nominal and failed samples are halved "
             "separately. All starts of an instance in depth frames have the weight of one sample, intervals are over "

@@ -168,11 +168,11 @@ def judge_joint(run: Run, values: Paths, comparison: Path, readings: Path, devel
     import pandas as pd
 
     tolerances = {unit: Tolerance(**given) for unit, given in run.config["comparison"]["tolerances"].items()}
-    of_joint = read_all_metrics(values)
-    asked = joint.numbers_asked(read_published(), of_joint["source"].unique())
-    of_run = read_csv(comparison, ("table", "row", "column", "reproduced", "at_least"), others=ANY)
+    measured = read_all_metrics(values)
+    asked = joint.numbers_asked(read_published(), measured["source"].unique())
+    judged = read_csv(comparison, ("table", "row", "column", "reproduced", "at_least"), others=ANY)
     deals = run.config["joint_reading"]["deals"]
-    rows, records = joint.judge(asked, of_joint, of_run, read_judged(readings), tolerances, deals)
+    rows, records = joint.judge(asked, measured, judged, read_judged(readings), tolerances, deals)
     scores = [(table, EVALUATION, method, metric, "all", 0, float(value)) for table, method, metric, value in records]
     return (
         pd.DataFrame(rows, columns=list(joint.VERDICT_COLUMNS)),
@@ -192,8 +192,7 @@ KNOBS = {"low": "knobs at the lower ends", "middle": "knobs at the middles", "hi
     "What the paper leaves unstated",
     "Table XVI: one reading of all tables",
     """The choices that the paper leaves open and that touch several tables, searched together: the reading with the
-    largest share of printed means that come close, found on other objects and seeds and then run once. It says
-    what one consistent protocol reproduces. Nobody knows whether it is what the paper did.""",
+    largest share of printed means that come close, found on other objects and seeds and then run once.""",
     verdicts=(joint.read_verdicts, "joint_verdicts.csv"),
     scores="joint_scores.csv",
     choice=(joint.read_choices, "joint_choice/choice.csv"),

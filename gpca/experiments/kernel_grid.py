@@ -22,6 +22,7 @@ from gpca.reporting.figures.style import BLACK, BLUE, COLUMN_WIDTH_IN, GRAY, ORA
 from gpca.reporting.sheet import Row, Sheet, show
 from gpca.reporting.tables.builder import interval_over
 from gpca.reporting.tables.cells import cell_of_repeats
+from gpca.reporting.tables.table import Cell
 from gpca.settings import Distinct
 from gpca.steps.kernel_grid import BY_GPYTORCH, GRID_COLUMNS, MEASURES, PRINTED, SETTING, KernelGrid
 
@@ -47,10 +48,7 @@ def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
 
 
 EXPERIMENT = Experiment(
-    name="kernel_grid",
-    sections={"kernel_grid": Section},
-    names=names,
-    lists={"kernel_grid.sources": "sources"},
+    name="kernel_grid", sections={"kernel_grid": Section}, names=names, lists={"kernel_grid.sources": "sources"}
 )
 
 FIT = Step(
@@ -60,10 +58,7 @@ FIT = Step(
         "registrations": "registrations/{source}/seed{*seed}.npz",
         "embeddings": "embeddings/{source}/{embedding}/seed{*seed}.npz",
     },
-    outputs={
-        "out": "kernels/{source}/seed{*seed}.csv",
-        "predictions": "kernel_predictions/{source}/seed{*seed}.csv",
-    },
+    outputs={"out": "kernels/{source}/seed{*seed}.csv", "predictions": "kernel_predictions/{source}/seed{*seed}.csv"},
     settings=lambda plan, wildcards: plan.config["kernel_grid"],
     where={"source": "kernel_source"},
     priority=4,
@@ -146,12 +141,9 @@ def table4_kernels(run: Run, intervals):
 @figure(
     SECTION,
     "Accuracy and confidence over iterations",
-    """Accuracy and mean confidence of the Gaussian process classifier over its iterations. Matérn's lines are wide so
-    that they show below those of RBF where both coincide.
-
-    Circles are the rows of Table IV, filled symbols of the same color the accuracies that the paper prints for
-    them. These stand to the right of their number of iterations, since equal ones would hide one another. The paper
-    prints no confidence.""",
+    """Accuracy and mean confidence of the Gaussian process classifier over its iterations. Matérn's lines are wide, to
+    show below RBF's. Circles are the rows of Table IV; filled symbols, drawn to the right, are the accuracies that the
+    paper prints for them. It prints no confidence.""",
     grid=(read_grids, GRID_FILES),
 )
 def kernel_learning_curves(run: Run, grid) -> Figure:
@@ -241,14 +233,12 @@ def table4_grid(run: Run, grid, intervals):
         for source, title in titles(run).items()
         for setting in settings
     ]
-    sheet = Sheet("table4_grid", {"source": "Dataset", **HEADS}, rows, COLUMNS, intervals)
-    for (source, *setting), values_R in grid.groupby(["source", *SETTING])["elbo"]:
-        row = {"source": source, "method": setting_name(*setting)}
-        sheet.cells |= {
-            (i, "elbo"): cell
-            for i, each in enumerate(sheet.rows)
-            if each.where == row and (cell := cell_of_repeats(values_R, 0))
-        }
+    elbos = {(source, setting_name(*each)): of["elbo"] for (source, *each), of in grid.groupby(["source", *SETTING])}
+
+    def more(row: Row, _subset: Frame) -> dict[str, Cell | None]:
+        return {"elbo": cell_of_repeats(elbos.get((row.where["source"], row.where["method"]), ()), 0)}
+
+    sheet = Sheet("table4_grid", {"source": "Dataset", **HEADS}, rows, COLUMNS, intervals, more=more)
     notes = (
         f"{over(sheet)}. Bold: best accuracy and NLL of a dataset.",
         "Confidence: mean of the largest score. ECE: its gap to the accuracy over 15 equally wide bins, mean of "

@@ -48,10 +48,7 @@ def draw_curves(
     styles: Mapping[str, tuple],
     target: float,
 ) -> Figure:
-    """Draw curves as lines of panels; rows share an axis of labels where they have as many of them.
-
-    A row of more than `MOST_LINES` lines is drawn as several, and lines with an interval are in each. The title has
-    the number of seeds.
+    """Draw curves as lines of panels; a row of more than `MOST_LINES` becomes several, each with the thick lines.
 
     Args:
         curves: of :func:`mean_curves`, by source, row and line.
@@ -111,12 +108,8 @@ def draw_curves(
 def mean_curves(curve_files: Paths, held_out: Collection[str] | None = None) -> dict[tuple[str, str, str], Frame]:
     """Curves of accuracy in % by source, strategy and setting: labels, mean, low, high, number of seeds.
 
-    The mean is over the concepts held out, then over the seeds, as are the intervals; of one seed they are NaN. Numbers
-    of labels at which some seed has no accuracy are left out.
-
-    Args:
-        curve_files: named `…/{source}/{strategy}/seed{seed}.csv`, as :mod:`gpca.active_learning.curves` says.
-        held_out: concepts over which the mean is; all by default.
+    The mean is over the concepts held out (all by default), then over the seeds, as are the intervals; of one seed they
+    are NaN. Numbers of labels at which some seed has no accuracy are left out.
     """
     import pandas as pd
 

@@ -99,12 +99,9 @@ def collect(_run: Run, files: Paths) -> Frame:
     "Beyond the paper: what made a registration fail",
     "What an observer may reach: learning from more samples",
     """Balanced accuracy and regret on the test samples of Table IX, for learners of more and more registrations of the
-    training objects. Besides the runs from other starts, they read what needs no further registration: distances, local
-    planes, the motion of ICP and where the runs end. The band is the range over orders of the samples.
-
-    Where a curve is flat, more samples of these objects do not help. The dashed line is the truth measured again
-    from other starts; it knows the true pose and the clean clouds, which no observer does, so it is no bound that
-    could be reached.""",
+    training objects. Besides the runs from other starts, they read what needs no further registration. The band is the
+    range over orders of the samples. The dashed line is the truth measured again from other starts; it knows the true
+    pose and the clean clouds, so it is no bound that an observer could reach.""",
     after="table9_shown",
     curves=(read_curves, FILES),
 )

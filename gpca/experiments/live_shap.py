@@ -13,21 +13,21 @@ from gpca.declarations.result import Frame, Paths, numbers, table
 from gpca.declarations.step import Step
 from gpca.evaluation.measures import read_all_metrics
 from gpca.explainers.registry import explainer_module
-from gpca.reporting.tables.builder import TableBuilder, crossed
-from gpca.reporting.tables.cells import cell_of_repeats, rows_where
-from gpca.reporting.tables.table import Column, Table
+from gpca.reporting.sheet import Sheet, crossed, mean_over_seeds, show
+from gpca.reporting.tables.table import Table
 from gpca.reporting.words import plural
 from gpca.settings import Bounds, Count
 from gpca.steps.live_shap import LOOKUP
 
 PLAIN: dict[str, Any] = {"interval": False, "limits": (0, inf)}
-MEASURES = {  # column, and factor to its unit
-    "largest_value": (Column("Largest value (nats)", decimals=3, **PLAIN), 1),
-    "largest_difference": (Column("Largest difference (10⁻⁹ nats)", decimals=3, **PLAIN), 1e9),
-    "named_alike": (Column("Named alike (%)", interval=False), 100),
-    "live_icp_calls": (Column("ICP calls, live", decimals=0, **PLAIN), 1),
-    "icp_calls": (Column("ICP calls, table", decimals=0, **PLAIN), 1),
-    "test_samples": (Column("n", decimals=0, **PLAIN), 1),
+COUNT = PLAIN | {"decimals": 0, "factor": 1}
+COLUMNS = {
+    "largest_value": show("largest_value", "Largest value (nats)", decimals=3, factor=1, **PLAIN),
+    "largest_difference": show("largest_difference", "Largest difference (10⁻⁹ nats)", decimals=3, factor=1e9, **PLAIN),
+    "named_alike": show("named_alike", "Named alike (%)", interval=False),
+    "live_icp_calls": show("live_icp_calls", "ICP calls, live", **COUNT),
+    "icp_calls": show("icp_calls", "ICP calls, table", **COUNT),
+    "test_samples": show("test_samples", "n", **COUNT),
 }
 
 
@@ -85,23 +85,12 @@ def collect(run: Run, paths: Paths) -> Frame:
     metrics="live_shap.csv",
 )
 def live_shap(run: Run, metrics: Frame) -> Table:
-    sheet = TableBuilder("live_shap", {"source": "Dataset"})
-    for (source,), labels in crossed(run.source_titles):
-        rows = rows_where(metrics, source=source)
-        samples = int(rows_where(rows, metric="test_samples")["value"].sum())
-        cells = {
-            name: cell_of_repeats(rows_where(rows, metric=name)["value"].to_numpy() * factor, samples)
-            for name, (_, factor) in MEASURES.items()
-        }
-        sheet.add_row(labels, cells)
-    return sheet.build(
-        caption="shap's KernelExplainer on a function that registers, and on a table of its outcomes"
-        + sheet.stand_in_clause(run.sources),
-        column_head="measure",
-        columns={name: column for name, (column, _) in MEASURES.items()},
-        footnotes=(
-            f"Means over {plural(sheet.most_seeds(), 'seed')}; n: its samples.",
-            "Largest value, largest difference: of the Shapley values of a seed's samples. ICP calls: runs for one "
-            "sample; live, those of the reference are counted too.",
-        ),
+    rows = crossed(("source", run.source_titles))
+    sheet = Sheet("live_shap", {"source": "Dataset"}, rows, COLUMNS, metrics, cell=mean_over_seeds)
+    caption = "shap's KernelExplainer on a function that registers, and on a table of its outcomes"
+    notes = (
+        f"Means over {plural(sheet.seeds, 'seed')}; n: its samples.",
+        "Largest value, largest difference: of the Shapley values of a seed's samples. ICP calls: runs for one "
+        "sample; live, those of the reference are counted too.",
     )
+    return sheet.table(caption + sheet.stand_in_clause(run.sources), "measure", notes, keep_empty=True)

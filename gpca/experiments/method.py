@@ -42,12 +42,9 @@ THRESHOLD: dict[str, Any] = {"color": style.BLACK, "linestyle": (0, (3, 2)), "li
     where it is uncertain. The error, the resulting state, and the uncertainty u by Monte-Carlo ICP are printed
     below the aligned clouds, beside the value of u below which 95 % of the unperturbed pairs lie.
 
-    What follows is decided by what GP-CA knows: nothing is done where u is below that value; a person is asked where
-    BALD is above its threshold or no score reaches theirs (dashed); else the dominant concept is acted on. The
-    threshold of BALD is what the config declares, or what its share of the test samples exceeds.
-
-    The sample shown has the median score among the test samples with a pose error that failed, are more uncertain
-    than that, and are named correctly.""",
+    Nothing is done where u is below that value; a person is asked where BALD is above its threshold or no score reaches
+    theirs (dashed); else the dominant concept is acted on. The sample shown has the median score among the test samples
+    with a pose error that failed, are more uncertain than that, and are named correctly.""",
     paper=True,
     **FILES,
 )
@@ -110,10 +107,7 @@ def fig2_overview(run: Run, registrations: Path, embeddings: Path, predictions: 
 
 
 def decide(stages: Staged, row: int, policy: RecoveryPolicy) -> Decision:
-    """Decision on a row from what GP-CA knows, never from the true error of its pose.
-
-    Nothing is done where the uncertainty u is below that of 95 % of the clean pairs; else the policy decides.
-    """
+    """Decision on a row from what GP-CA knows: nothing where u is that of a clean pair, else the policy's."""
     if stages.u_S[row] <= stages.u_clean:
         return Decision(NOTHING, "", f"u {stages.u_S[row]:.1f} is that of a clean pair")
     sample = stages.predictions.iloc[row]
@@ -124,10 +118,8 @@ def decide(stages: Staged, row: int, policy: RecoveryPolicy) -> Decision:
     SECTION,
     "Figure 3: the three concepts",
     """After Figure 3 of the paper: one object's clean target (orange) and its perturbed source before ICP (blue), for
-    noise, pose error and partial overlap.
-
-    The object shown is the one whose test samples come nearest to the medium severity of all three. Every training
-    and test sample has one such perturbation, and its name is the label that explainers have to find.""",
+    noise, pose error and partial overlap. Every sample has one such perturbation, and its name is the label that
+    explainers have to find. The object shown is the one whose test samples come nearest to medium severities.""",
     paper=True,
     objects_file="objects/{shown_source}.npz",
     registrations_file=FILES["registrations"],
@@ -157,11 +149,7 @@ def fig3_concepts(run: Run, objects_file: Path, registrations_file: Path) -> Fig
 
 
 def choose_samples(registrations: Registrations, path: str | Path) -> dict[str, int]:
-    """Row of the test sample of one object that is nearest to the medium severity, for each concept.
-
-    Severities are compared by their ranks within the test samples of the concept, so that no unit or range matters.
-    The object is the one whose farthest sample is nearest.
-    """
+    """Row of the test sample nearest to the middle rank of severity, for each concept, of one object."""
     from scipy.stats import rankdata
 
     distance_S = np.full(len(registrations), np.inf)  # of ranks from the middle rank; infinite: is not shown
@@ -185,9 +173,7 @@ def choose_samples(registrations: Registrations, path: str | Path) -> dict[str, 
 def choose_view(target: np.ndarray, sources: dict[str, np.ndarray]) -> np.ndarray:
     """Rotation (3, 3) to a view's right, up and towards-the-viewer axes, with z up in the world.
 
-    It keeps the 8 of 24 directions around the object that show it widest (a mug with its handle at the side), and
-    picks the one of them that shows best how pose error and cut shift the centroid: the product of the visible shares
-    is largest there.
+    Of the directions that show the object widest, it is that in which pose error and cut shift the centroid most.
     """
     shifts = [sources[concept].mean(axis=0) - target.mean(axis=0) for concept in ("pose", "overlap")]
     return max(widest_views(target), key=lambda view: np.prod([np.linalg.norm(view[:2] @ shift) for shift in shifts]))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from itertools import product
 from typing import Any
 
 from gpca.active_learning.curves import TABLE, collect_curves
@@ -15,21 +16,14 @@ from gpca.declarations.result import Figure, Frame, Paths, figure, numbers, tabl
 from gpca.declarations.step import Plan, Step
 from gpca.encoders.registry import encoder_module
 from gpca.evaluation.measures import ALL, read_all_metrics
+from gpca.experiments import label_curves as labeled
 from gpca.experiments.active_learning import learning_settings
 from gpca.experiments.concept_attribution import PREDICTIONS, collect_intervals
-from gpca.experiments.label_curves import (
-    COUNT,
-    Clusters,
-    draw_curves,
-    families,
-    families_with_causes,
-    label_cells,
-    mean_curves,
-    quantity,
-)
+from gpca.experiments.label_curves import COUNT, Clusters, quantity
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.figures.style import BLUE, GRAY, GREEN, SKY_BLUE, VERMILION
-from gpca.reporting.tables.builder import TableBuilder, cautious_over, crossed
+from gpca.reporting.sheet import Row, Sheet, Show, crossed
+from gpca.reporting.tables.builder import cautious_over
 from gpca.reporting.tables.cells import cell_of_repeats, clustered_cell, plain_cell, rows_where
 from gpca.reporting.tables.table import Cell, Column, Table
 from gpca.reporting.words import plural
@@ -44,6 +38,8 @@ SEEN = {
 NO_LABELS = {"chance": "no labels: chance", "rule": "no labels: rule of three lines"}
 NEW_CAUSES = (NOMINAL, GEOMETRY)
 PAPERS, WITHIN = "bald_kmeans", 20  # labels that a new concept may cost
+FIRST = "pretrained"  # the paper's own row, which competes with none
+HEADS = {"source": "Dataset", "seen": "Encoder learned from"}
 
 
 def seeds(config: Mapping[str, Any]) -> list[int]:
@@ -116,7 +112,7 @@ def collect(run: Run, files: Paths) -> Frame:
 
 SECTION = "Beyond the paper: concepts that no encoder has seen"
 METRICS = (read_all_metrics, ("active_learning.csv", "new_concepts.csv"))
-CLUSTERS = (families, "registrations/{source}/seed{new_concept_seed}.npz")
+CLUSTERS = (labeled.families, "registrations/{source}/seed{new_concept_seed}.npz")
 
 
 @table(
@@ -130,7 +126,7 @@ CLUSTERS = (families, "registrations/{source}/seed{new_concept_seed}.npz")
     metrics=METRICS,
     without_labels=(collect_intervals, PREDICTIONS.replace("{seed}", "{new_concept_seed}")),
     clusters=CLUSTERS,
-    cause_clusters=(families_with_causes, "causes/{source}/seed{new_concept_seed}.npz"),
+    cause_clusters=(labeled.families_with_causes, "causes/{source}/seed{new_concept_seed}.npz"),
 )
 def table15_new_concepts(
     run: Run, metrics: Frame, without_labels: Frame, clusters: Clusters, cause_clusters: Clusters
@@ -149,55 +145,56 @@ def table15_new_concepts(
         with_causes[f"{cause}_all"] = quantity(
             "final_accuracy", f"{title}, pool labeled (%)", ALL_LABELS, cause, interval=False
         )
-    builder = TableBuilder("table15_new_concepts", {"source": "Dataset", "seen": "Encoder learned from"})
-    for (source, setting), titles in crossed(run.source_titles, SEEN):
-        selected = rows_where(metrics, source=source, table=TABLE + setting)
-        rows = selected[selected["concept"].isin(CONCEPTS)]
-        cells = {key: label_cells(test, clusters)(rows, column) for key, column in (labels | accuracies).items()}
-        of_papers = rows_where(rows, method=PAPERS)
-        wide = of_papers.pivot_table(index=["seed", "concept"], columns="metric", values="value")
-        if {"labels_to_target", "reached"} <= set(wide):
-            done = (wide["labels_to_target"] <= WITHIN) & (wide["reached"] == 1)
-            shares = 100 * done.groupby(level="seed").mean()
-            cells["within"] = cell_of_repeats(shares, test * len(shares))
-        cells |= {
-            key: label_cells(tests[column.where["concept"]], cause_clusters)(selected, column)
-            for key, column in with_causes.items()
-        }
-        builder.add_row(titles, cells, rival=setting != "pretrained")
-    for (source, explainer), titles in crossed(run.source_titles, NO_LABELS):
-        accuracy = clustered_cell(without_labels, source=source, method=explainer, metric="accuracy", concept=ALL)
+
+    def cell(rows: Frame, column: Show) -> Cell | None:
+        if (cause := column.where.get("concept")) in NEW_CAUSES:
+            return labeled.label_cells(tests[cause], cause_clusters)(rows, column)
+        return labeled.label_cells(test, clusters)(rows[rows["concept"].isin(CONCEPTS)], column)
+
+    def share_within(_row: Row, rows: Frame) -> dict[str, Cell | None]:
+        rows = rows_where(rows[rows["concept"].isin(CONCEPTS)], method=PAPERS)
+        wide = rows.pivot_table(index=["seed", "concept"], columns="metric", values="value")
+        if not {"labels_to_target", "reached"} <= set(wide):
+            return {}
+        done = (wide["labels_to_target"] <= WITHIN) & (wide["reached"] == 1)
+        shares = 100 * done.groupby(level="seed").mean()
+        return {"within": cell_of_repeats(shares, test * len(shares))}
+
+    rows = [
+        Row([source, seen], {"source": source[0], "table": TABLE + seen[0]}, rival=seen[0] != FIRST)
+        for source, seen in product(run.source_titles.items(), SEEN.items())
+    ]
+    columns = labels | {"within": within} | accuracies | with_causes
+    sheet = Sheet("table15_new_concepts", HEADS, rows, columns, metrics, more=share_within, cell=cell)
+    for row in crossed(("source", run.source_titles), ("method", NO_LABELS)):
+        accuracy = clustered_cell(without_labels, metric="accuracy", concept=ALL, **row.where)
         cells = {"all_labels": accuracy}  # as of the whole pool, and 0 labels where it is enough
         if accuracy and accuracy.mean >= 100 * learning["target"]:
             cells |= dict.fromkeys(labels, plain_cell(0, accuracy.seeds, accuracy.test_samples))
-        builder.add_row(titles, cells, rival=False)
-    builder.compare_down([*labels, "within", *NEW_CAUSES], same=1)
+        sheet.add_row(row.labels, cells, rival=False)
     fewer = {}  # datasets with fewer seeds of Geometry than of the rest
-    for (row, key), cell in builder.cells.items():
-        if key == GEOMETRY and cell.seeds < builder.most_seeds():
-            fewer[builder.labels[row][0][1]] = f"{builder.labels[row][0][1]}: {plural(cell.seeds, 'seed')}"
-    of_fewer = f" ({', '.join(fewer.values())})" if fewer else ""
-    columns = labels | {"within": within} | accuracies | with_causes
-    return builder.build(
-        caption=f"Labels until a new concept is known, to {learning['target']:.0%}, by what the encoder saw before"
-        + run.stand_ins(partly=False),
-        column_head="quantity",
-        columns={key: column for key, column in columns.items() if any(shown == key for _, shown in builder.cells)},
-        footnotes=(
-            f"{cautious_over(builder.span_of_seeds(), test)}. A dash stands for what was not run. Bold: "
-            "best of a dataset, the first row apart.",
-            _protocol(learning),
-            "Labels: by BALD with k-means, for each concept as the new one, and by random choice, mean over the three. "
-            f"Within {WITHIN} labels: share of the runs that reached the target with so few. Pool labeled: accuracy "
-            "when the whole pool is labeled, mean over the three.",
-            "No labels: the accuracy that needs none, with the interval of a bootstrap over families and seeds, and 0 "
-            "labels where it reaches the target.",
-            "Nominal, Geometry: the new concept in registrations with measured causes, of objects that no method saw; "
-            "accuracy over all causes after all queries by BALD, and with the whole pool labeled. No encoder saw "
-            f"Geometry. Test samples of a seed: {tests[NOMINAL]}, with Geometry up to {tests[GEOMETRY]}, if any of its "
-            f"registrations fails by that{of_fewer}.",
-        ),
+    for (row, key), shown in sheet.cells.items():
+        if key == GEOMETRY and shown.seeds < sheet.seeds:
+            title = sheet.labels[row][0][1]
+            fewer[title] = f"{title}: {plural(shown.seeds, 'seed')}"
+    seeds_of_fewer = f" ({', '.join(fewer.values())})" if fewer else ""
+    caption = f"Labels until a new concept is known, to {learning['target']:.0%}, by what the encoder saw before"
+    notes = (
+        f"{cautious_over(sheet.span_of_seeds(), test)}. A dash stands for what was not run. Bold: "
+        "best of a dataset, the first row apart.",
+        _protocol(learning),
+        "Labels: by BALD with k-means, for each concept as the new one, and by random choice, mean over the three. "
+        f"Within {WITHIN} labels: share of the runs that reached the target with so few. Pool labeled: accuracy "
+        "when the whole pool is labeled, mean over the three.",
+        "No labels: the accuracy that needs none, with the interval of a bootstrap over families and seeds, and 0 "
+        "labels where it reaches the target.",
+        "Nominal, Geometry: the new concept in registrations with measured causes, of objects that no method saw; "
+        "accuracy over all causes after all queries by BALD, and with the whole pool labeled. No encoder saw "
+        f"Geometry. Test samples of a seed: {tests[NOMINAL]}, with Geometry up to {tests[GEOMETRY]}, if any of its "
+        f"registrations fails by that{seeds_of_fewer}.",
     )
+    bold = [*labels, "within", *NEW_CAUSES]
+    return sheet.table(caption + run.stand_ins(partly=False), "quantity", notes, bold=bold, same=1)
 
 
 @table(
@@ -210,39 +207,34 @@ def table15_new_concepts(
     clusters=CLUSTERS,
 )
 def table15_oracle(run: Run, metrics: Frame, clusters: Clusters) -> Table:
-    learning, own, test = run.config["active_learning"], run.config["new_concepts"], run.config["registrations"]["test"]
-    metrics = metrics[metrics["seed"].isin(seeds(run.config))]
-    shares = [0, *(round(100 * share) for share in own["errors"])]
-    labels = {f"labels_{share}": quantity("labels_to_target", f"Labels, {share} % wrong", **COUNT) for share in shares}
-    accuracies = {f"accuracy_{share}": quantity("final_accuracy", f"Acc., {share} % wrong (%)") for share in shares}
-    builder = TableBuilder(
-        "table15_oracle", {"source": "Dataset", "seen": "Encoder learned from", "strategy": "Strategy"}
-    )
-    seen = {setting: words for setting, words in SEEN.items() if setting in own["erring"]}
-    strategies = {PAPERS: "BALD + k-means", "random": "Random"}
-    for (source, setting, strategy), titles in crossed(run.source_titles, seen, strategies):
-        cells: dict[str, Cell | None] = {}
+    learning, section = run.config["active_learning"], run.config["new_concepts"]
+    metrics = metrics[metrics["seed"].isin(seeds(run.config)) & metrics["concept"].isin(CONCEPTS)]
+    shares, columns = [0, *(round(100 * share) for share in section["errors"])], {}
+    for name, metric, title, look in (
+        ("labels", "labels_to_target", "Labels, {} % wrong", COUNT),
+        ("accuracy", "final_accuracy", "Acc., {} % wrong (%)", {}),
+    ):
         for share in shares:
-            name = TABLE + (f"{setting}_errors_{share}" if share else setting)
-            cell_rows = rows_where(metrics, source=source, table=name, method=strategy)
-            cell_rows = cell_rows[cell_rows["concept"].isin(CONCEPTS)]
-            for key, column in ((f"labels_{share}", labels), (f"accuracy_{share}", accuracies)):
-                cells[key] = label_cells(test, clusters)(cell_rows, column[key])
-        builder.add_row(titles, cells)
-    builder.compare_down([*labels, *accuracies], same=2)
-    return builder.build(
-        caption=f"Labels until a new concept is known, to {learning['target']:.0%}, from an oracle that errs"
-        + run.stand_ins(partly=False),
-        column_head="quantity",
-        columns=labels | accuracies,
-        footnotes=(
-            f"{cautious_over(builder.most_seeds(), test)}.",
-            _protocol(learning),
-            "Means over noise, pose and overlap as the new concept, then over the seeds. A wrong answer names one of "
-            "the other two concepts; an oracle that errs more repeats the errors of one that errs less. The labels at "
-            "the start are right.",
-        ),
+            wanted = {"metric": metric, "errors": str(share) if share else ""}
+            columns[f"{name}_{share}"] = Show(title.format(share), where=wanted, **look)
+    setting = metrics["table"].str.removeprefix(TABLE).str.partition("_errors_")
+    seen = {name: words for name, words in SEEN.items() if name in section["erring"]}
+    strategies = {PAPERS: "BALD + k-means", "random": "Random"}
+    rows = crossed(("source", run.source_titles), ("seen", seen), ("method", strategies))
+    test = run.config["registrations"]["test"]
+    measured = metrics.assign(seen=setting[0], errors=setting[2])
+    cell = labeled.label_cells(test, clusters)
+    sheet = Sheet("table15_oracle", HEADS | {"strategy": "Strategy"}, rows, columns, measured, cell=cell)
+    caption = f"Labels until a new concept is known, to {learning['target']:.0%}, from an oracle that errs"
+    notes = (
+        f"{cautious_over(sheet.seeds, test)}.",
+        _protocol(learning),
+        "Means over noise, pose and overlap as the new concept, then over the seeds. A wrong answer names one of "
+        "the other two concepts; an oracle that errs more repeats the errors of one that errs less. The labels at "
+        "the start are right.",
     )
+    stand_ins = run.stand_ins(partly=False)
+    return sheet.table(caption + stand_ins, "quantity", notes, bold=columns, same=2, keep_empty=True)
 
 
 FIGURE_ROWS = {"concepts": CONCEPTS, "nominal": ("nominal",), "geometry": ("geometry",)}
@@ -261,7 +253,7 @@ def read_curves_by_concepts(files: Paths) -> dict[tuple[str, str, str], Frame]:
     return {
         (source, row, setting): curve
         for row, concepts in FIGURE_ROWS.items()
-        for (source, strategy, setting), curve in mean_curves(files, concepts).items()
+        for (source, strategy, setting), curve in labeled.mean_curves(files, concepts).items()
         if strategy == PAPERS
     }
 
@@ -270,11 +262,8 @@ def read_curves_by_concepts(files: Paths) -> dict[tuple[str, str, str], Frame]:
     SECTION,
     "Learning curves without leakage",
     """Accuracy over the number of labels chosen by BALD with k-means, by what the encoder learned from: the mean over
-    the seeds, and in the first row over three concepts. The sooner a curve crosses the target line, the fewer
-    labels the new concept costs.
-
-    Bands are 95 % intervals over the seeds. Only the two thick curves have them, the encoder that knows the other
-    concepts alone and the measurements of the pair; a thick curve without a band is of one seed.""",
+    the seeds, and in the first row over three concepts. Bands are 95 % intervals over the seeds, of the two thick
+    curves alone; one without a band is of one seed.""",
     only={"pool_strategy": (PAPERS,)},
     curves=(
         read_curves_by_concepts,
@@ -286,7 +275,7 @@ def read_curves_by_concepts(files: Paths) -> dict[tuple[str, str, str], Frame]:
 )
 def new_concept_curves(run: Run, curves: Mapping[tuple[str, str, str], Frame]) -> Figure:
     target = run.config["active_learning"]["target"]
-    return draw_curves(curves, run.source_titles, FIGURE_TITLES, SEEN, STYLES, target)
+    return labeled.draw_curves(curves, run.source_titles, FIGURE_TITLES, SEEN, STYLES, target)
 
 
 def tests_with_causes(run: Run) -> dict[str, int]:

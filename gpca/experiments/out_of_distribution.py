@@ -122,9 +122,9 @@ def collect(run: Run, prediction_files: Paths, set_files: Paths) -> tuple[Frame,
     import pandas as pd
 
     by_seed, records = [], []
-    of_learner: dict[tuple[str, str], list] = {}
+    answers: dict[tuple[str, str], list] = {}
     for (source, learner, seed), rows in predicted.read_learner_predictions(prediction_files, set_files).items():
-        of_learner.setdefault((source, learner), []).append(rows.assign(seed=seed))
+        answers.setdefault((source, learner), []).append(rows.assign(seed=seed))
         for name, subset in predicted.sets_of(rows).items():
             values = correlations(subset)
             if "+" not in name:
@@ -132,7 +132,7 @@ def collect(run: Run, prediction_files: Paths, set_files: Paths) -> tuple[Frame,
             if name == "in_distribution":
                 values |= bootstrap_bounds(subset, source, seed)
             by_seed += [(TABLE + name, source, learner, metric, ALL, seed, float(v)) for metric, v in values.items()]
-    for (source, learner), parts in of_learner.items():
+    for (source, learner), parts in answers.items():
         for name, subset in predicted.sets_of(pd.concat(parts, ignore_index=True)).items():
             samples = Clustered.drawn(subset["seed"], clusters_of(subset), "learner intervals", source, name)
             score_S, wrong_S = subset["max_score"].to_numpy(float), predicted.wrong(subset)
@@ -230,8 +230,7 @@ def _show(metric: str, title: str, name: str = "in_distribution", source: str = 
     SECTION,
     "Table V: learners and the worth of their uncertainty",
     """Table V of the paper: accuracy of classifiers on the same embeddings, and what their uncertainty is worth: its
-    rank correlation with the distance to the training samples (ρ), the area under the risk-coverage curve (AURC,
-    the paper's AUC; lower is better) and the calibration error (ECE, lower is better).""",
+    correlation with the distance to the training samples, risk over coverage and calibration.""",
     paper=True,
     **INTERVALS,
 )

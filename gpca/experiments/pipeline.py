@@ -14,15 +14,9 @@ from gpca.declarations.plan import Run
 from gpca.declarations.result import Figure, Frame, figure
 from gpca.errors import InputError
 from gpca.evaluation.measures import source_method_seed
+from gpca.experiments import registration_stages as drawing
 from gpca.experiments.frames import encoder_title
 from gpca.experiments.label_curves import STYLES, mean_curves
-from gpca.experiments.registration_stages import (
-    FILES,
-    Staged,
-    draw_embedding,
-    draw_scores_with_numbers,
-    title_of_sample,
-)
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.figures import style
 from gpca.reporting.figures.cloud_views import draw_clouds, thinned
@@ -40,32 +34,23 @@ THUMBNAILS = 6  # number of clouds of the pool that are drawn
     "III Gaussian process concept attribution",
     "Figure 4: pipeline",
     """After Figure 4 of the paper: what happens to one registration (online inference), and how a batch of labels is
-    chosen and learned (active learning). The error, the resulting state, and the uncertainty u are printed below
-    the aligned clouds, beside the value of u below which 95 % of the unperturbed pairs lie.
-
-    The test sample above is chosen as in Figure 2: one that lacks overlap if such a registration failed, otherwise
-    one with a pose error. Below is the first round of the run in which overlap is new; its pool is the training
-    samples without a label.""",
+    chosen and learned (active learning). The sample above and its words are chosen as in Figure 2: one that lacks
+    overlap if such a registration failed, otherwise one with a pose error. Below is the first round of the run in which
+    overlap is new; its pool is the training samples without a label.""",
     paper=True,
     only={"pool_strategy": tuple(TITLES)},
-    **FILES,
+    **drawing.FILES,
     curve_files="active_learning/{shown_source}/{pool_strategy}/seed{seed}.csv",
 )
 def fig4_pipeline(
-    run: Run,
-    registrations: Path,
-    embeddings: Path,
-    predictions: Path,
-    uncertainties: Path,
-    curve_files: Sequence[Path],
+    run: Run, registrations: Path, embeddings: Path, predictions: Path, uncertainties: Path, curve_files: Sequence[Path]
 ) -> Figure:
-    stages = Staged.load(registrations, embeddings, predictions, uncertainties, run.config["causes"]["limits"])
+    stages = drawing.Staged.load(registrations, embeddings, predictions, uncertainties, run.config["causes"]["limits"])
     row = stages.choose(ORDER[0], registrations, *ORDER[1:])
     new, curves = _curves(curve_files)
     source, _, seed = source_method_seed(curve_files[0])
-    labeling = first_round(
-        stages, new, ActiveLearningSettings.from_dict(dict(run.config["active_learning"])), source, seed
-    )
+    settings = ActiveLearningSettings.from_dict(dict(run.config["active_learning"]))
+    labeling = first_round(stages, new, settings, source, seed)
     canvas = Canvas(style.TEXT_WIDTH_IN, 3.5)
     canvas.box(0.03, 1.9, 7.1, 1.4, color=style.LIGHT_GRAY)
     canvas.box(0.03, 0.03, 7.1, 1.6, color=style.LIGHT_GRAY)
@@ -75,7 +60,7 @@ def fig4_pipeline(
     canvas.text(6.36, 1.765, "uncertain cases", ha="right", va="center")
     canvas.arrow((0.9, 1.63), (0.9, 1.74), (4.62, 1.74), (4.62, 2.0))
     canvas.text(2.76, 1.775, "retrained classifier", va="bottom")
-    style.write_title(canvas.figure, title_of_sample(run, stages.predictions["object"][row]))
+    style.write_title(canvas.figure, drawing.title_of_sample(run, stages.predictions["object"][row]))
     canvas.dot(6.15, 3.4, style.TARGET_COLOR, r"target $\mathcal{Q}$", gap_in=0.05)
     canvas.dot(6.63, 3.4, style.SOURCE_COLOR, r"source $\mathcal{P}$", gap_in=0.05)
     return canvas.figure
@@ -83,29 +68,20 @@ def fig4_pipeline(
 
 @dataclass(frozen=True)
 class Round:
-    """The first round of labels, with the pool's N training samples.
+    """The first round of labels, with the pool's N training samples."""
 
-    Attributes:
-        rows_N: rows of the pool.
-        labeled: rows of the samples that were labeled at the start, none of the new concept.
-        map_S_2: principal components of all embeddings, fitted to the standardized ones of the training samples.
-        bald_N: BALD of the pool in nats, by the classifier that knows all concepts but the new one.
-        candidates, chosen: indices into `rows_N` of the B·K largest BALD, and of the B of them that k-means keeps.
-    """
-
-    rows_N: np.ndarray
-    labeled: np.ndarray
-    map_S_2: np.ndarray
-    bald_N: np.ndarray
-    candidates: np.ndarray
-    chosen: np.ndarray
+    rows_N: np.ndarray  # of the pool
+    labeled: np.ndarray  # rows that were labeled at the start, none of the new concept
+    map_S_2: np.ndarray  # principal components of all embeddings, fitted to the standardized ones of the training
+    bald_N: np.ndarray  # of the pool in nats, by the classifier that knows all concepts but the new one
+    candidates: np.ndarray  # indices into `rows_N` of the B·K largest BALD
+    chosen: np.ndarray  # and of the B of them that k-means keeps
 
 
-def first_round(stages: Staged, held_out: str, settings: ActiveLearningSettings, source: str, seed: int) -> Round:
-    """Fit the classifier that does not know a concept yet, and let the paper's strategy choose from the pool.
-
-    Start, pool and classifier are those of the run's learning curves with this source and seed.
-    """
+def first_round(
+    stages: drawing.Staged, held_out: str, settings: ActiveLearningSettings, source: str, seed: int
+) -> Round:
+    """Fit the classifier that does not know a concept yet, as learning curves do, and choose from the pool."""
     from sklearn.decomposition import PCA
     from sklearn.preprocessing import StandardScaler
 
@@ -138,10 +114,9 @@ def _curves(files: Sequence[Path]) -> tuple[str, dict[str, Frame]]:
     raise InputError("active learning", f"has no curve of {' or '.join(TITLES)}", "run one of these strategies")
 
 
-def _draw_inference(canvas: Canvas, stages: Staged, row: int, encoder: str, labeling: Round) -> None:
+def _draw_inference(canvas: Canvas, stages: drawing.Staged, row: int, encoder: str, labeling: Round) -> None:
     sample = stages.predictions.iloc[row]
-    middle_in = 2.66
-    captions_in = 2.17
+    middle_in, captions_in = 2.66, 2.17
     canvas.text(0.1, 3.27, "Online inference", ha="left", va="top", fontweight="bold")
     seen = stages.seen(row)
     corners = np.concatenate([np.concatenate(pair) for pair in seen.values()])
@@ -156,7 +131,7 @@ def _draw_inference(canvas: Canvas, stages: Staged, row: int, encoder: str, labe
     canvas.text(3.05, middle_in, f"{encoder}\n$f_\\theta$", va="center")
     canvas.text(3.05, captions_in, "frozen", va="top")
     canvas.arrow((3.3, middle_in), (3.46, middle_in))
-    draw_embedding(canvas.panel(3.48, 2.3, 0.36, 0.72), stages.h_S_d[row])
+    drawing.draw_embedding(canvas.panel(3.48, 2.3, 0.36, 0.72), stages.h_S_d[row])
     canvas.text(3.66, captions_in, rf"$\mathbf{{h}} \in \mathbb{{R}}^{{{stages.h_S_d.shape[1]}}}$", va="top")
     canvas.arrow((3.86, middle_in), (4.02, middle_in))
     canvas.box(4.02, 2.0, 1.2, 1.22, color=style.BLUE)
@@ -171,17 +146,14 @@ def _draw_inference(canvas: Canvas, stages: Staged, row: int, encoder: str, labe
     panel.set_axis_off()
     canvas.text(4.62, 2.03, "★ this sample", va="bottom")
     canvas.arrow((5.22, middle_in), (5.58, middle_in))
-    draw_scores_with_numbers(canvas.panel(5.96, 2.42, 0.62, 0.62), sample)
-    canvas.text(
-        6.36, captions_in, rf"$\hat{{s}}_c \pm \sqrt{{v_c}}$;  $\hat{{c}}$ = {sample['concept_predicted']}", va="top"
-    )
+    drawing.draw_scores_with_numbers(canvas.panel(5.96, 2.42, 0.62, 0.62), sample)
+    words = rf"$\hat{{s}}_c \pm \sqrt{{v_c}}$;  $\hat{{c}}$ = {sample['concept_predicted']}"
+    canvas.text(6.36, captions_in, words, va="top")
 
 
-def _draw_active_learning(canvas: Canvas, stages: Staged, labeling: Round, new: str, curves: Mapping) -> None:
+def _draw_active_learning(canvas: Canvas, stages: drawing.Staged, labeling: Round, new: str, curves: Mapping) -> None:
     """Draw pool, score, diversify, annotate, retrain from right to left: the way back of the loop."""
-    heads_in = 1.58
-    captions_in = 0.08
-    middle_in = 0.86
+    heads_in, captions_in, middle_in = 1.58, 0.08, 0.86
     canvas.text(0.1, heads_in, "Active learning", ha="left", va="top", fontweight="bold")
 
     canvas.text(6.4, heads_in, r"Unlabeled pool $\mathcal{D}_U$", va="top")
@@ -200,12 +172,10 @@ def _draw_active_learning(canvas: Canvas, stages: Staged, labeling: Round, new: 
     panel.scatter(*points_N_2[order].T, s=9, c=bald_N[order], cmap=style.blues(), edgecolors=style.GRAY, linewidths=0.3)
     panel.scatter(*points_N_2[labeling.candidates].T, s=26, facecolors="none", edgecolors=style.BLACK, linewidths=0.7)
     panel.set_axis_off()
-    canvas.text(
-        5.04,
-        captions_in,
-        f"{bald_N.min():.2f} to {bald_N.max():.2f} nats; $B K$ = {len(labeling.candidates)}\nringed; ×: labeled before",
-        va="bottom",
+    words = (
+        f"{bald_N.min():.2f} to {bald_N.max():.2f} nats; $B K$ = {len(labeling.candidates)}\nringed; ×: labeled before"
     )
+    canvas.text(5.04, captions_in, words, va="bottom")
     canvas.arrow((4.46, middle_in), (4.24, middle_in))
 
     canvas.text(3.66, heads_in, "Diversify: $k$-means", va="top")
@@ -230,9 +200,8 @@ def _draw_active_learning(canvas: Canvas, stages: Staged, labeling: Round, new: 
     for name in reversed(TITLES):
         if name in curves:
             color, line, width = STYLES[name]
-            panel.plot(
-                curves[name]["labels"], curves[name]["mean"], line, color=color, linewidth=width, label=TITLES[name]
-            )
+            look = {"color": color, "linewidth": width, "label": TITLES[name]}
+            panel.plot(curves[name]["labels"], curves[name]["mean"], line, **look)
     low, high = panel.get_ylim()
     panel.set_ylim(bottom=low - 0.5 * (high - low))  # room for the legend
     panel.locator_params(axis="x", nbins=4, integer=True)
@@ -242,6 +211,6 @@ def _draw_active_learning(canvas: Canvas, stages: Staged, labeling: Round, new: 
     panel.legend(loc="lower right", borderaxespad=0, handlelength=1.2, borderpad=0.1, labelspacing=0.2)
 
 
-def _draw_thumbnail(axes, stages: Staged, row: int) -> None:
+def _draw_thumbnail(axes, stages: drawing.Staged, row: int) -> None:
     target_Q_3, source_P_3 = stages.seen(row)["icp"]
     draw_clouds(axes, target_Q_3[::3], source_P_3[::3], size=0.4)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from gpca.declarations.step import Files, Plan, Step
+from gpca.declarations.step import Plan, Step
 from gpca.encoders.registry import encoder_module
 from gpca.experiments.active_learning import learning_settings
 from gpca.experiments.explained import explainer_settings
@@ -160,49 +160,34 @@ def _pretrained_on(plan: Plan) -> list[str]:
     return [*plan.names["source"], *([VIRTUAL] if plan.config["real_world"]["virtual"] else [])]
 
 
-def _pretraining_files(plan: Plan, _wildcards: Any) -> list[str]:
-    return [f"registrations/{source}/seed{{first_seed}}.npz" for source in _pretrained_on(plan)]
+def _other_cloud(**declared: Any) -> Step:
+    """A step of the encoder of other clouds, whose settings have the changes of its pretraining, or of its training."""
 
-
-def _start(plan: Plan, _wildcards: Any) -> str | list[str]:
-    """Weights that the training on frames starts from, if any are pretrained."""
-    return "other_clouds/pretrained/{clouded_backbone}/{cloud}.pt" if plan.config["real_world"]["pretraining"] else []
-
-
-def _training(plan: Plan) -> Mapping | None:
-    return (plan.config["real_world"]["training"] or {}).get(plan.names["clouded_backbone"])
-
-
-def _other_cloud(
-    name: str,
-    run: str,
-    inputs: Mapping[str, Files],
-    outputs: Mapping[str, str],
-    changes: Callable[[Plan], Mapping | None] = _training,
-    **options: Any,
-) -> Step:
     def settings(plan: Plan, wildcards: Any) -> dict[str, Any]:
-        encoder = plan.config["encoders"][plan.names["clouded_backbone"]]
+        backbone, frames = plan.names["clouded_backbone"], plan.config["real_world"]
+        pretrains = declared["name"].startswith("pretrain")
+        changes = frames["pretraining"] if pretrains else (frames["training"] or {}).get(backbone)
         icp = {"icp": plan.config["registrations"]["icp"]}
-        return encoder | (changes(plan) or {}) | icp | {"reading": wildcards.cloud}
+        return plan.config["encoders"][backbone] | (changes or {}) | icp | {"reading": wildcards.cloud}
 
     def modules(plan: Plan) -> list[str]:
         return [encoder_module(plan.config["encoders"][plan.names["clouded_backbone"]])]
 
-    options.setdefault("params", {"source": REAL_WORLD})
-    options.setdefault("priority", 11)
-    return Step(name=name, run=run, inputs=inputs, outputs=outputs, settings=settings, modules=modules, **options)
+    return Step(**{"params": {"source": REAL_WORLD}, "priority": 11} | declared, settings=settings, modules=modules)
 
 
 PRETRAIN = _other_cloud(
-    "pretrain_on_other_cloud",
-    "gpca.steps.pairs:train",
-    {"registrations": _pretraining_files},
-    {
+    name="pretrain_on_other_cloud",
+    run="gpca.steps.pairs:train",
+    inputs={
+        "registrations": lambda plan, wildcards: [
+            f"registrations/{source}/seed{{first_seed}}.npz" for source in _pretrained_on(plan)
+        ]
+    },
+    outputs={
         "weights": "other_clouds/pretrained/{clouded_backbone}/{cloud}.pt",
         "curve": "other_clouds/pretrained/{clouded_backbone}/{cloud}.csv",
     },
-    changes=lambda plan: plan.config["real_world"]["pretraining"],
     params={
         "source": "pretraining",
         "seed": lambda plan, wildcards: plan.config["seeds"][0],
@@ -212,27 +197,29 @@ PRETRAIN = _other_cloud(
     resources={"mem_mb": 3000, "runtime": 180},
 )
 TRAIN = _other_cloud(
-    "train_on_other_cloud",
-    "gpca.steps.pairs:train",
-    {
-        "start": _start,
+    name="train_on_other_cloud",
+    run="gpca.steps.pairs:train",
+    inputs={
+        "start": lambda plan, wildcards: (
+            PRETRAIN.outputs["weights"] if plan.config["real_world"]["pretraining"] else []
+        ),
         "registrations": "registrations/{frames}/seed{seed}.npz",
         "poses": "poses/{frames}/seed{seed}.csv",
     },
-    {
+    outputs={
         "weights": "other_clouds/{frames}/{clouded_backbone}/{cloud}/seed{seed}.pt",
         "curve": "other_clouds/{frames}/{clouded_backbone}/{cloud}/seed{seed}.csv",
     },
 )
 EMBED = _other_cloud(
-    "embed_other_cloud",
-    "gpca.steps.pairs:embed",
-    {
+    name="embed_other_cloud",
+    run="gpca.steps.pairs:embed",
+    inputs={
         "registrations": "registrations/{frames}/seed{seed}.npz",
         "registration_timings": "timings/{frames}/icp/seed{seed}.csv",
         "encoder": "other_clouds/{frames}/{clouded_backbone}/{cloud}/seed{seed}.pt",
     },
-    {
+    outputs={
         "embeddings": "other_clouds/{frames}/{clouded_backbone}/{cloud}/seed{seed}.npz",
         "timings": "timings/{frames}/{clouded_backbone}_{cloud}/seed{seed}.csv",
     },

@@ -9,8 +9,6 @@ WORDS = {  # field of a group's choices -> what its values are called
         "divergence": "KL divergence",
         "divergence_reversed": "reversed KL divergence",
         "log_determinant": "log determinant",
-        "trace": "trace",
-        "residual": "residual",
         "inlier_rmse": "inlier RMSE",
         "inlier_rmse_of_one": "inlier RMSE of one run",
     },
@@ -93,10 +91,7 @@ NUMBERS = {  # field -> the words around a number
 
 
 def reading(group: str, name: str) -> str:
-    """A reading as words: ``RBF, 100 iterations`` for ``rbf/100`` of the group ``kernel``.
-
-    Unknown values stay as they are.
-    """
+    """A reading as words: ``RBF, 100 iterations`` for ``rbf/100`` of ``kernel``; unknown values stay as they are."""
     values, choices = name.split("/"), list(GROUPS[group].choices) if group in GROUPS else []
     return ", ".join(map(value, choices, values) if len(choices) == len(values) else values)
 

@@ -13,13 +13,7 @@ from gpca.declarations.experiment import EXPLAINERS, Experiment, LeftOut, Names
 from gpca.encoders.reduction import make_reduction, require_room
 from gpca.encoders.registry import OPTIONS, EncoderSettings
 from gpca.errors import InputError, require_names, with_key
-from gpca.experiments.frames import (
-    CLASSIC,
-    pretraining_of,
-    published_backbones,
-    reduced_backbones,
-    unreduced_methods,
-)
+from gpca.experiments import frames as frame_rows
 from gpca.explainers.registry import require_settings
 from gpca.frames.initial_pose import InitialPoseSettings
 from gpca.frames.rgbd_scene import SceneSettings
@@ -130,10 +124,7 @@ def check(config: dict, left_out: LeftOut) -> None:
 
 
 def _check_training(config: dict) -> None:
-    """Check that the encoders take what they are trained with on frames, and that embeddings have enough components.
-
-    The length of an embedding is known of the suite's own backbones only.
-    """
+    """Check that encoders take their training on frames, and that the suite's own have room for all components."""
     section, encoders = config["real_world"], config["encoders"]
     for needed, why in (("datasets", "it renders their models"), ("pretraining", "only this uses it")):
         if section["virtual"] and not section[needed]:
@@ -141,7 +132,8 @@ def _check_training(config: dict) -> None:
             raise InputError("config key real_world.virtual", fault, f"set {needed}, or virtual to null")
     shown = (*section["backbones"], *section["published"].values())
     for name in shown:
-        changes = {"pretraining": pretraining_of(section, name), "training": (section["training"] or {}).get(name, {})}
+        training = (section["training"] or {}).get(name, {})
+        changes = {"pretraining": frame_rows.pretraining_of(section, name), "training": training}
         for part, settings in changes.items():
             with_key(f"real_world.{part}", lambda whole: EncoderSettings(**whole), encoders[name] | settings)
     for name in section["reductions"]:
@@ -154,13 +146,13 @@ def _check_training(config: dict) -> None:
 
 def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
     frames, seeds = config["real_world"], list(config["seeds"])
-    backbones, published = reduced_backbones(frames), published_backbones(frames)
+    backbones, published = frame_rows.reduced_backbones(frames), frame_rows.published_backbones(frames)
     published_seeds = seeds[: frames.get("published_seeds")]
     conditions = [f"{REAL_WORLD}_{name}" for name in conditions_of(config)]
     condition_backbones = [
         f"{name}-{reduction}" for name in frames["condition_backbones"] for reduction in frames["condition_reductions"]
     ]
-    classic = [name for name in CLASSIC if name in config["explainers"]]
+    classic = [name for name in frame_rows.CLASSIC if name in config["explainers"]]
     others = list(frames["explainers"])
     methods_of = {REAL_WORLD: [*backbones, *published, *classic, *others]}
     methods_of |= {condition: [*condition_backbones, *others] for condition in conditions}
@@ -173,7 +165,7 @@ def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
         "classic": classic,
         "frame_explainer": others,
         "compared_backbone": list(frames["backbones"])[1:],
-        "unreduced": list(unreduced_methods(frames)),
+        "unreduced": list(frame_rows.unreduced_methods(frames)),
         "condition": conditions,
         "posed_frames": [REAL_WORLD, *conditions],
         "condition_backbone": condition_backbones,

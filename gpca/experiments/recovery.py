@@ -213,9 +213,8 @@ def mean_seconds(files: Paths) -> dict[str, float]:
     SECTION,
     "Table VIII: recovery by policy",
     """The share of failed registrations that each policy repairs with the same number of actions, and the share of good
-    registrations that it acts on: GP-CA's policies against fixed sequences of actions, a policy that knows only
-    that the pose is wrong, random ones and the oracle, on the same failures. The objects are on rendered tables,
-    seen by the virtual depth camera. The paper shows recovery only in a video.""",
+    ones that it acts on: GP-CA's policies against fixed sequences of actions, one that knows only that the pose is
+    wrong, random ones and the oracle. The objects are on rendered tables. The paper shows recovery only in a video.""",
     after="fig6_mitigation",
     metrics="recovery.csv",
     intervals="recovery_intervals.csv",
@@ -232,15 +231,14 @@ def table8_recovery(
     first, last = "recovered_within_1", f"recovered_within_{budget}"
     plain: dict[str, Any] = {"decimals": 0, "interval": False}
     apart: dict[str, Any] = {"interval": False, "limits": (0, inf)}
+    difference: dict[str, Any] = {"limits": (-100, 100)}
     columns = {
         **within,
         "acted_nominal": show("acted_nominal", "Acts on good (%)", decimals=0, least_is_best=True),
         **{
-            f"recovered_within_{k}_{against}": show(
-                f"recovered_within_{k}", f"{k}: to {words} (points)", where={"against": against}, limits=(-100, 100)
-            )
+            f"{metric}_{against}": show(metric, f"{k}: to {words} (points)", where={"against": against}, **difference)
             for against, words in AGAINST.items()
-            for k in (1, budget)
+            for k, metric in ((1, first), (budget, last))
         },
         **{f"{last}_{cause}": show(last, f"{cause.capitalize()} (%)", cause, **plain) for cause in CONCEPTS},
         "queued": show("queued", "Queued (%)", **plain),
@@ -260,8 +258,7 @@ def table8_recovery(
     notes = (
         f"{failures} failures over {plural(seeds, 'seed')}: {failure_counts(metrics)}. A failure is a pose off by "
         f"{100 * run.config['success']['error']:g} % of the diameter or more (ADD; ADD-S for symmetric objects) that "
-        "is not off without "
-        f"its cause. {over_clusters(seeds, clusters='rendered tables')}. Bold: best of a column.",
+        f"is not off without its cause. {over_clusters(seeds, clusters='rendered tables')}. Bold: best of a column.",
         f"Acts on good: of {good} registrations on the same tables whose pose is right, those that the policy "
         "would change. Policies that know that a pose is wrong change all; the oracle knows of these too.",
         f"To best sequence, to error only: paired differences of the shares within 1 and within {budget} actions, "
@@ -286,7 +283,7 @@ def failure_counts(metrics: Frame) -> str:
     rows = metrics[metrics["method"] == metrics["method"].iloc[0]]
     parts = []
     for cause in CONCEPTS:
-        of_cause = rows[rows["concept"] == cause]
-        failures, tries = (of_cause[of_cause["metric"] == m]["value"].sum() for m in ("episodes", "tries"))
+        values = rows[rows["concept"] == cause].groupby("metric")["value"].sum()
+        failures, tries = (values.get(name, 0.0) for name in ("episodes", "tries"))
         parts.append(f"{failures:.0f} by {cause} among {tries:.0f} registrations")
     return ", ".join(parts)

@@ -80,9 +80,8 @@ def recovery_rates(run: Run, metrics: Frame) -> Figure:
         panel.grid(axis="x")
         panel.set_axisbelow(True)
         panel.tick_params(axis="y", length=0)
-        panel.legend(
-            loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, handletextpad=0.2, columnspacing=1.0, borderpad=0
-        )
+        spacing = {"handletextpad": 0.2, "columnspacing": 1.0, "borderpad": 0}
+        panel.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, **spacing)
     _, episodes = pool_share(metrics, shown[0], "recovered_within_1") or (nan, 0)
     style.write_title(drawing, f"{tables_title(run)}: {episodes} failures; right: within {budget} actions, by cause")
     return drawing
@@ -90,8 +89,7 @@ def recovery_rates(run: Run, metrics: Frame) -> Figure:
 
 def _draw(axes, metrics, shown, metric: str, concept: str, offset: float, look: Mapping[str, str]) -> None:
     """Rates of one kind, a little above or below the middle of each policy's row, with their intervals."""
-    found = ((row, pool_share(metrics, name, metric, concept)) for row, name in enumerate(shown))
-    rates = {row: rate for row, rate in found if rate}
+    rates = {row: r for row, name in enumerate(shown) if (r := pool_share(metrics, name, metric, concept))}
     for row, (share, trials) in rates.items():
         low, high = wilson_interval(share * trials, trials)
         axes.plot([100 * low, 100 * high], [row + offset] * 2, color=look["color"], linewidth=0.8)
@@ -103,9 +101,8 @@ def _draw(axes, metrics, shown, metric: str, concept: str, offset: float, look: 
     SECTION,
     "Recovery by the error that is allowed",
     """The share of failures that each policy recovers within one, two and more actions, over the error below which a
-    pose is right, of the failures that are failures by that limit too (their number is below). The dotted line is
-    the run's own limit. A policy that stopped there might have gone on by a narrower limit, so that shares to the
-    left of the line are lower bounds.""",
+    pose is right, of the failures by that limit. The dotted line is the run's own limit; a policy that stopped there
+    might have gone on by a narrower one, so shares to its left are lower bounds.""",
     **METRICS,
 )
 def recovery_thresholds(run: Run, metrics: Frame) -> Figure:
@@ -125,8 +122,7 @@ def recovery_thresholds(run: Run, metrics: Frame) -> Figure:
         panel.minorticks_off()
         panel.set(title=f"within {plural(k, 'action')}", ylim=(-2, 102), xlabel="error allowed (% of the diameter)")
     drawn[0].set_ylabel("recovered (%)")
-    handles, labels = drawn[0].get_legend_handles_labels()
-    legend_below(drawing, handles, labels, 3)
+    legend_below(drawing, *drawn[0].get_legend_handles_labels(), 3)
     counts = [pool_share(metrics, next(iter(shown)), at("recovered_within_1", limit)) for limit in curve]
     of = ", ".join(f"{count[1]} at {100 * limit:g} %" for limit, count in zip(curve, counts, strict=True) if count)
     style.write_title(drawing, f"{tables_title(run)}: failures: {of}")
@@ -137,9 +133,8 @@ def recovery_thresholds(run: Run, metrics: Frame) -> Figure:
     SECTION,
     "What policies cost",
     """The mean loss per registration, where a wrong pose that stays costs 1, each action what the config says times the
-    factor, and an action on a good pose the config's `needless` besides; on the left one registration in two has
-    failed, on the right one in ten. Policies act as they do at the config's own costs, factor 1. A sequence without
-    a gate acts on everything; a queued case counts as not recovered.""",
+    factor, and an action on a good pose the config's `needless` besides. Policies act as they do at the config's own
+    costs, factor 1. A sequence without a gate acts on everything; a queued case counts as not recovered.""",
     **METRICS,
 )
 def recovery_costs(run: Run, metrics: Frame) -> Figure:
@@ -160,8 +155,7 @@ def recovery_costs(run: Run, metrics: Frame) -> Figure:
         panel.set_xticks([0.3, 1, 3], ["0.3", "1", "3"])
         panel.minorticks_off()
     drawn[0].set_ylabel("loss per registration")
-    handles, labels = drawn[0].get_legend_handles_labels()
-    legend_below(drawing, handles, labels, 3)
+    legend_below(drawing, *drawn[0].get_legend_handles_labels(), 3)
     style.write_title(drawing, tables_title(run))
     return drawing
 
@@ -177,8 +171,7 @@ def losses(
         share[0] if (share := pool_share(metrics, policy, name)) else 0.0
         for name in (f"recovered_within_{budget}", "cost", "acted_nominal", "cost_nominal")
     )
-    of_failures = 1 - recovered + factor_F * cost
-    return failed * of_failures + (1 - failed) * (acted * needless + factor_F * cost_nominal)
+    return failed * (1 - recovered + factor_F * cost) + (1 - failed) * (acted * needless + factor_F * cost_nominal)
 
 
 def _shown(metrics: Frame, policies: Mapping[str, str], looks: Mapping[str, Look], budget: int) -> dict[str, Look]:

@@ -53,21 +53,14 @@ SHAPES: dict[str, tuple[int | str, ...]] = {
     SECTION,
     "Figure 1: a failure and its recovery",
     """After Figure 1 of the paper: a registration that failed because the object is hidden, GP-CA's scores, the
-    viewpoints to choose from, and the registration in the one chosen. Outlines show where the object is (yellow,
-    dashed where it is hidden) and where ICP put the model (orange). The viewpoints are shown from above; the
-    darker, the larger the share of the model's surface that was expected to have been seen after it.
-
-    Of the failures of the first seed that lack overlap and that a new view solved by GP-CA's policy, the one with
-    the median score. The tables are rendered and the objects' colors made up.""",
+    viewpoints to choose from, seen from above, and the registration in the one chosen. Of the failures of the first
+    seed that lack overlap and that a new view solved by GP-CA's policy, it is the one with the median score. The tables
+    are rendered and the objects' colors made up.""",
     paper=True,
     example_npz="recovery/example_seed{first_seed}.npz",
 )
 def fig1_recovery_example(run: Run, example_npz: str | Path) -> Figure:
-    """(a) The first view, (b) the concept scores, (c) the viewpoints to choose from, (d) the new view.
-
-    Both views show the outlines of the object, where it is and where ICP put it: between them lies the misfit. A pose
-    is solved if its error is below the config's `success.error`.
-    """
+    """(a) The first view, (b) the concept scores, (c) the viewpoints to choose from, (d) the new view."""
     from matplotlib.lines import Line2D
     from matplotlib.patheffects import withStroke
 
@@ -158,10 +151,7 @@ def _zenith_deg(towards: np.ndarray) -> np.ndarray:
     policy_json="recovery/policy_seed{first_seed}.json",
 )
 def fig6_mitigation(run: Run, policy_json: str | Path) -> Figure:
-    """The inputs of one policy, its branches in the order of the tests, and the ways back.
-
-    An action leads to new scores; a queued case leads to a label and to a classifier that has learned it.
-    """
+    """The inputs of one policy, its branches in the order of the tests, and the ways back."""
     policy = json.loads(Path(policy_json).read_text(encoding="utf-8"))
     limits, treatments = policy["thresholds"], policy["treatments"]
     canvas = Canvas(style.TEXT_WIDTH_IN, 2.62)

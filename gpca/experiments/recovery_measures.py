@@ -52,9 +52,9 @@ def collect(run: Run, files: Paths) -> Frame:
     records = []
     for path in files:
         rows = read_recovery(path)
-        for policy, of_policy in rows.groupby("policy", sort=False):
+        for policy, episodes in rows.groupby("policy", sort=False):
             for cause in (ALL, *CONCEPTS):
-                subset = of_policy if cause == ALL else of_policy[of_policy["cause"] == cause]
+                subset = episodes if cause == ALL else episodes[episodes["cause"] == cause]
                 if not subset["failed"].any():
                     continue
                 values = policy_metrics(subset, treatments, costs, budget)
@@ -67,10 +67,7 @@ def collect(run: Run, files: Paths) -> Frame:
 def policy_metrics(
     rows: Frame, treatments: Mapping[str, str], costs: Mapping[str, float], budget: int
 ) -> dict[str, float]:
-    """Measures of one policy on the failures among the rows, and how often it acts on the others.
-
-    Treatments are actions by concept, costs by action, in right poses; the budget is of actions per failure.
-    """
+    """Measures of one policy on the failures among the rows, and how often it acts on the others."""
 
     def mean_cost(rows: Frame, registrations: int) -> float:
         return float(rows["action"].map(costs).sum() / registrations)
@@ -98,11 +95,7 @@ def policy_metrics(
 
 
 def metrics_at(rows: Frame, budget: int, curve: Iterable[float]) -> dict[str, float]:
-    """Shares recovered by other limits of a right pose, each of the failures that are failures by it too.
-
-    A policy that stopped at a pose that is right by the run's own limit would have stopped there, or before, by a wider
-    one; by a narrower one it might have gone on, so that its share is a lower bound.
-    """
+    """Shares recovered by other limits of a right pose, of the failures by each; lower bounds by narrower ones."""
     rows = rows[rows["failed"]]
     first = rows[rows["step"] == 1]
     values: dict[str, float] = {}
@@ -124,11 +117,7 @@ def at(metric: str, limit: float) -> str:
 
 
 def pool_share(metrics: Frame, policy: str, metric: str, concept: str = ALL) -> tuple[float, int] | None:
-    """Share over the failures of all seeds, and their number; None where the metrics hold none.
-
-    A wrong first action is a share of the failures that were acted on at all, an action on what did not fail one of
-    those registrations, and a share by another limit one of the failures by that limit.
-    """
+    """Share over the failures of all seeds, or what `WEIGHTS` names, and their number; None where there is none."""
     limit = metric.partition(AT)[2]
     weight = f"failures{AT}{limit}" if limit else WEIGHTS.get(metric, "episodes")
     rows = metrics[(metrics["method"] == policy) & (metrics["concept"] == concept)]
@@ -141,10 +130,7 @@ def pool_share(metrics: Frame, policy: str, metric: str, concept: str = ALL) -> 
 
 @numbers("recovery_intervals.csv", files=FILES)
 def collect_intervals(run: Run, files: Paths) -> Frame:
-    """Shares of failures, of all and by cause, and ``acted_nominal`` of the good registrations, over all seeds.
-
-    A cluster is a rendered table of a seed; the draws are the same for all policies.
-    """
+    """Shares of failures, by cause too, and ``acted_nominal`` of good ones; a cluster is a seed's rendered table."""
     import pandas as pd
 
     def over_all(cases: Frame, causes: Sequence[str], measures: Mapping[str, Measure]) -> Frame:
@@ -174,9 +160,8 @@ def collect_intervals(run: Run, files: Paths) -> Frame:
 def collect_differences(run: Run, files: Paths) -> Frame:
     """Paired differences of the shares that policies recover: `against` the best ``sequence``, or ``error`` only.
 
-    The first is the best fixed sequence, repeats of one action included, by the same number of actions on the same
-    failures, in hindsight; the second the order that was best on the rehearsals: gated for a policy that has to
-    recognize failures itself.
+    The first is the best fixed one on the same failures, in hindsight; the second the best order of the rehearsals,
+    gated for a policy that has to recognize failures itself.
     """
     recovery = run.config["recovery"]
     actions = list(recovery["actions"])
@@ -207,11 +192,7 @@ def steps_taken(failures: Frame) -> Series:
 
 
 def read_queues(files: Paths) -> Frame:
-    """``policy, order, labels, failures, error, low, high``: shares of the failures of all seeds.
-
-    Only numbers of labels that every seed has are kept. Of random orders it is the mean; the bounds are Wilson's, as if
-    each failure were judged once.
-    """
+    """``policy, order, labels, failures, error, low, high``: shares of the failures at labels that every seed has."""
     import pandas as pd
 
     parts = []

@@ -81,13 +81,10 @@ def in_words(name: str) -> str:
 @figure(
     SECTION,
     "One failed registration, re-enacted by an observer",
-    """Above, the observed cloud where each hypothesis of the true pose puts it in the model, with the probability of
-    the hypothesis. In the middle, the clouds that the first hypothesis rebuilds: without noise, with the surface that
-    is missing, and with both. Below, the mean error of registrations with each subset of the causes: measured, with the
-    truth (bars), and re-enacted under each hypothesis (marks, the larger the more probable).
-
-    Shown is the failed test sample with several causes and several hypotheses whose margin, by which its largest φ
-    exceeds the next one, is the median.""",
+    """Above, the observed cloud where each hypothesis of the true pose puts it in the model, with its probability. In
+    the middle, the clouds that the first hypothesis rebuilds. Below, the mean error of registrations with each subset
+    of the causes: measured, with the truth (bars), and re-enacted under each hypothesis (marks, the larger the more
+    probable). Shown is the failed test sample of median margin with several causes and several hypotheses.""",
     after="causes_example",
     causes_npz="causes/{shown_source}/seed{first_seed}.npz",
     reenactments_npz="reenactments/{shown_source}/seed{first_seed}.npz",

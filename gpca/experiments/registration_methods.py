@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from functools import partial
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -17,18 +18,9 @@ from gpca.declarations.plan import Run
 from gpca.declarations.result import Frame, Paths, numbers, table
 from gpca.declarations.step import Plan, Step
 from gpca.errors import InputError, require_names, with_key
+from gpca.evaluation import measures as evaluated
 from gpca.evaluation.intervals import Clustered
-from gpca.evaluation.measures import (
-    ALL,
-    COUNT,
-    POOLED,
-    Measure,
-    Parts,
-    over_seeds,
-    per_seed,
-    read_samples,
-    source_method_seed,
-)
+from gpca.evaluation.measures import ALL, Measure
 from gpca.io.csv_file import numbers as number_column
 from gpca.io.csv_file import read_csv
 from gpca.objects.canonical import ObjectClouds
@@ -122,18 +114,18 @@ def trials(files: Paths, objects: Paths) -> Frame:
         families[Path(path).stem] = {name: clouds.family(i) for i, name in enumerate(clouds.names)}
 
     def read(path: Path) -> Frame:
-        rows, (source, method, _) = read_trials(path), source_method_seed(path)
+        rows, (source, method, _) = read_trials(path), evaluated.source_method_seed(path)
         family_N = rows["object"].map(families.get(source, {}))
         if family_N.isna().any():
             fault = f"object '{rows['object'][family_N.isna()].iloc[0]}' is none of objects/{source}.npz"
             raise InputError(path, fault, "regenerate both from the same config")
         return rows.assign(row=[row_name(method, start) for start in rows["start"]], cluster=f"{source}/" + family_N)
 
-    rows = read_samples(files, read)
+    rows = evaluated.read_samples(files, read)
     return rows.assign(table=NAME, method=rows["row"])
 
 
-def parts(rows: Frame, severities: Mapping[str, Iterable[float]]) -> Parts:
+def parts(rows: Frame, severities: Mapping[str, Iterable[float]]) -> evaluated.Parts:
     """Masks of all rows, of each cause, and of each third of its severities."""
     masks = {ALL: np.ones(len(rows), bool)}
     for concept in CONCEPTS:
@@ -169,7 +161,7 @@ def measures(success: SuccessSettings) -> dict[str, Measure]:
         "add": Measure("add_relative", (0, inf)),
         "rotation_deg": Measure("rotation_error_rad", (0, 180), factor=180 / np.pi),
         "translation": Measure("translation_error", (0, inf)),
-        "test_samples": COUNT,
+        "test_samples": evaluated.COUNT,
         **{success_within(limit): within(limit, ALL) for limit in success.curve},
         "points": Measure("points", (0, inf), only=(ALL,)),
     }
@@ -190,10 +182,8 @@ def collect(run: Run, files: Paths, objects: Paths) -> tuple[Frame, Frame]:
     order = ("failed", *map(success_within, success.curve), "add", "rotation_deg", "translation")
     by_cause |= {name: replace(measured[name], only=(ALL,)) for name in order}
     draws = Clustered.drawn(rows["seed"], rows["cluster"], "registration intervals")
-    return (
-        per_seed(rows, lambda subset: parts(subset, severities), measured),
-        over_seeds(rows.assign(source=POOLED), lambda subset: parts(subset, severities), by_cause, draws),
-    )
+    masks, pooled = partial(parts, severities=severities), rows.assign(source=evaluated.POOLED)
+    return evaluated.per_seed(rows, masks, measured), evaluated.over_seeds(pooled, masks, by_cause, draws)
 
 
 def read_seconds(files: Paths) -> Frame:
@@ -203,10 +193,11 @@ def read_seconds(files: Paths) -> Frame:
         rows = read_csv(path, ("sample", "start", "seconds"))
         return rows.assign(seconds=number_column(path, rows, "seconds", least=0))
 
-    rows = read_samples(files, read)
+    rows = evaluated.read_samples(files, read)
     named = [row_name(row.method.removeprefix("method_"), row.start) for row in rows.itertuples()]
     seconds = {"seconds": Measure("seconds", (0, inf))}
-    return per_seed(rows.assign(table=NAME, method=named), lambda subset: {ALL: np.ones(len(subset), bool)}, seconds)
+    rows = rows.assign(table=NAME, method=named)
+    return evaluated.per_seed(rows, lambda subset: {ALL: np.ones(len(subset), bool)}, seconds)
 
 
 SECTION = "Beyond the paper: registration methods"
@@ -229,10 +220,9 @@ COSTS = {
 @table(
     SECTION,
     "Table XI: registration methods",
-    """How often each method registers the same pairs correctly, how far it is off and how long it takes. Local methods
-    start at the pair's own initial pose, and again at the pose of a global method. The paper uses ICP alone.
-    Compare only rows of one start: the initial pose is the true one for noise and overlap, so a local method can
-    only lose it, while a global method has to find it.""",
+    """How often each method registers the same pairs correctly, how far it is off and how long it takes. Compare only
+    rows of one start: the pair's own initial pose is the true one for noise and overlap, so a local method can only
+    lose it, while a global method has to find it. The paper uses ICP alone.""",
     **INTERVALS,
     metrics="registration_methods.csv",
     seconds=(read_seconds, "timings/{source}/method_{method}/seed{seed}.csv"),

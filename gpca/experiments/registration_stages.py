@@ -29,22 +29,14 @@ from gpca.rigid import inverse, scale_translation, transform
 
 @dataclass(frozen=True)
 class Staged:
-    """S registrations of one source and seed, with the results of all stages.
-
-    Attributes:
-        h_S_d: embeddings.
-        predictions: of GP-CA.
-        u_S: uncertainty in nats, NaN where it is not known.
-        u_clean: uncertainty that 95 % of the clean pairs stay below, in nats.
-        limits: of the errors, which decide the states.
-    """
+    """S registrations of one source and seed, with the results of all stages."""
 
     registrations: Registrations
-    h_S_d: np.ndarray
-    predictions: Frame
-    u_S: np.ndarray
-    u_clean: float
-    limits: Limits
+    h_S_d: np.ndarray  # embeddings
+    predictions: Frame  # of GP-CA
+    u_S: np.ndarray  # uncertainty in nats, NaN where it is not known
+    u_clean: float  # what 95 % of the clean pairs stay below, in nats
+    limits: Limits  # of the errors, which decide the states
 
     @classmethod
     def load(
@@ -72,10 +64,9 @@ class Staged:
     def choose(self, concept: str, path: str | Path, *others: str) -> int:
         """Row of the sample that is shown: a test sample of the concept whose registration is uncertain.
 
-        Candidates are named right after a registration that failed and is more uncertain than 95 % of the clean pairs;
-        the one with the median score is shown. If the concept has no candidate, the `others` are tried. If they have
-        none either, conditions are dropped one by one: first that it failed, then that it is uncertain (the half that
-        ICP fits worst stays), then that it is named right.
+        It is named right, failed, more uncertain than 95 % of the clean pairs, and of median score. The `others` are
+        tried next; then conditions are dropped one by one: that it failed, that it is uncertain (the half that ICP fits
+        worst stays), that it is named right.
         """
         rows = self.predictions
         for other in (concept, *others):
@@ -107,10 +98,7 @@ class Staged:
         return registrations.target(row), transform(moved, registrations.cloud(row))
 
     def seen(self, row: int) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-        """Clouds before (``init``) and after ICP (``icp``) in the axes of one view.
-
-        Of the views that show the target widest, it is the one in which ICP moves the source most.
-        """
+        """Clouds before and after ICP in the axes of a wide view of the target, that in which the source moves most."""
         pairs = {which: self.clouds(row, which) for which in ("init", "icp")}
         target, source = pairs["icp"]
         moved = pairs["init"][1] - source

@@ -55,10 +55,8 @@ def table7_runtime(run: Run, runtime: Frame, published: Iterable[Number]) -> Tab
     heads = {"component": "Component", "device": "Device", "published_device": "Device (paper)"}
     sheet = TableBuilder("table7_runtime", heads)
     for row in runtime.itertuples():
-        cells = {
-            name: plain_cell(1e3 * getattr(row, f"{name}_s"), 1, int(row.repeats))
-            for name in ("mean", "deviation", "median")
-        }
+        seconds = {"mean": row.mean_s, "deviation": row.deviation_s, "median": row.median_s}
+        cells = {name: plain_cell(1e3 * value, 1, int(row.repeats)) for name, value in seconds.items()}
         number, device = printed.get(row.component), ""
         if number:
             device = number.device
@@ -144,13 +142,12 @@ def draw_runtime(run: Run, runtime: Frame, published: Iterable[Number]) -> Figur
 
 def stages_of(runtime: Frame, published: Iterable[Number]) -> dict[str, dict[str, Stage]]:
     """Times of the stages by what measured them: the paper, and here without and with a GPU."""
-    measured = {
-        (row.component, row.device): Stage(1e3 * row.mean_s, 1e3 * row.deviation_s) for row in runtime.itertuples()
-    }
+    rows = list(runtime.itertuples())
+    measured = {(row.component, row.device): Stage(1e3 * row.mean_s, 1e3 * row.deviation_s) for row in rows}
     printed = printed_seconds(published)
-    of_paper = {component: Stage(1e3 * printed[component].value) for component in OF_ONE_EXPLANATION}
-    series = {f"Paper, {' and '.join(HARDWARE.values())}": of_paper}
-    for device, name in {row.device: row.hardware for row in runtime.itertuples()}.items():
+    paper = {component: Stage(1e3 * printed[component].value) for component in OF_ONE_EXPLANATION}
+    series = {f"Paper, {' and '.join(HARDWARE.values())}": paper}
+    for device, name in {row.device: row.hardware for row in rows}.items():
         stages = series.setdefault(f"Here, {name}", {})
         for component in OF_ONE_EXPLANATION:
             stage = measured.get((component, device), measured.get((component, "CPU")))

@@ -65,8 +65,8 @@ def check(config: dict, _left_out: LeftOut) -> None:
 
 
 def settings_of_explainers(config: Mapping[str, Any]) -> dict[str, dict]:
-    of_diagnosis = config["diagnosis"]["explainers"]
-    return {name: of_diagnosis.get(name) or {} for name in config["scan_causes"]["explainers"]}
+    settings = config["diagnosis"]["explainers"]
+    return {name: settings.get(name) or {} for name in config["scan_causes"]["explainers"]}
 
 
 def reenactment_settings(config: Mapping[str, Any]) -> dict[str, Any]:
@@ -183,23 +183,11 @@ FEWEST_OF_A_CAUSE = 5  # failures, or the cause counts in no mean over causes
     sample_files="scan_causes/{scan_set}/seed{scan_seed}.csv",
     prediction_files="scan_diagnoses/seed{scan_seed}.csv",
 )
-def collect(
-    run: Run,
-    causes_files: Paths,
-    sample_files: Paths,
-    prediction_files: Paths,
-) -> Frame:
+def collect(run: Run, causes_files: Paths, sample_files: Paths, prediction_files: Paths) -> Frame:
     """Measures with intervals over clusters of scenes and seeds, and counts.
 
     Sources are data sets of scans, and all of them together. Conditions are natural registrations of all starts or of
     a kind, and those with noise added. ``difference`` is the paired difference from the best gate.
-
-    Args:
-        causes_files, sample_files: of each data set and seed, in the same order, named ``…/{scans}/seed{seed}.…``.
-        prediction_files: one of each seed.
-
-    Raises:
-        InputError: files that cannot be read, or are of different samples.
     """
     import pandas as pd
 
@@ -213,26 +201,23 @@ def collect(
     rows: list[tuple] = []
     for source in [POOLED, *sources] if len(sources) > 1 else sources:
         for condition, rows_N in conditions.items():
-            of_N = rows_N & ((seen["scans"] == source).to_numpy() | (source == POOLED))
+            mask_N = rows_N & ((seen["scans"] == source).to_numpy() | (source == POOLED))
             for stratum in (EVERY, *sorted(set(seen["stratum"]))):
-                chosen = seen[of_N & ((seen["stratum"] == stratum).to_numpy() | (stratum == EVERY))]
+                chosen = seen[mask_N & ((seen["stratum"] == stratum).to_numpy() | (stratum == EVERY))]
                 if len(chosen):
                     counts = count_ends(chosen, ("pair", "cluster"), "registrations")
                     place = source, condition, stratum, SCANS, TRUTH
-                    own = (len(chosen), counts["clusters"], chosen["seed"].nunique())
+                    sizes = (len(chosen), counts["clusters"], chosen["seed"].nunique())
                     nothing = (np.nan, np.nan, *NO_LEAD)
-                    rows += [(*place, f"count_{kind}", *own, float(counts[kind]), *nothing) for kind in COUNTED]
-            if condition in (NATURAL, ADDED) and of_N.any():
-                parts = {key: every.subset(of_N) for key, every in judged.items()}
-                rows += _measures((source, condition, EVERY), parts, seen["cluster"][of_N].to_numpy(str))
+                    rows += [(*place, f"count_{kind}", *sizes, float(counts[kind]), *nothing) for kind in COUNTED]
+            if condition in (NATURAL, ADDED) and mask_N.any():
+                parts = {key: every.subset(mask_N) for key, every in judged.items()}
+                rows += _measures((source, condition, EVERY), parts, seen["cluster"][mask_N].to_numpy(str))
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 
 def read_scan_causes(path: str | Path) -> Frame:
-    """Read what :func:`collect` returned; a value may lack an interval, and a difference from a gate.
-
-    Raises InputError for a missing, empty or unreadable file, a missing column, a value that is no finite number.
-    """
+    """Read what :func:`collect` returned; a value may lack an interval, and a difference from a gate."""
     return read_numbers(path, COLUMNS, NUMBERS, optional=NUMBERS[4:]).assign(concept=ALL)
 
 
@@ -277,17 +262,17 @@ def _measures(
     values = {key: scan_measures(samples, weights_B_N) for key, samples in judged.items()}
     names = {key: "/".join(key).strip("/") for key in judged}
     for metric, key in product(MEASURED, judged):
-        of_metric = {names[other]: of_other[metric] for other, of_other in values.items() if metric in of_other}
-        value_B = of_metric.get(names[key], np.array([np.nan]))
+        drawn = {names[other]: each[metric] for other, each in values.items() if metric in each}
+        value_B = drawn.get(names[key], np.array([np.nan]))
         if not np.isfinite(value_B[0]):
             continue
         counted_N = counted_of_scans(any_samples, metric)
         drawn_B_n = drawn_B_N[:, counted_N] if metric in (*answers.SHARES, CAUSES) else None
         gates = [names[other] for other in judged if other[1].startswith(GATE) and other != key]
         lead = NO_LEAD
-        gate = best_of(of_metric, gates, metric in answers.SMALLER_IS_BETTER)
+        gate = best_of(drawn, gates, metric in answers.SMALLER_IS_BETTER)
         if gate and key[1] != answers.CEILING and metric != SAMPLES:
-            lead = (gate, *interval(value_B - of_metric[gate], drawn_B_n, difference=True))
+            lead = (gate, *interval(value_B - drawn[gate], drawn_B_n, difference=True))
         counts = int(counted_N.sum()), len(set(cluster_N[counted_N])), len(set(any_samples.seed[counted_N].tolist()))
         yield (*place, *key, metric, *counts, *interval(value_B, drawn_B_n), *lead)
 
@@ -299,10 +284,10 @@ def scan_measures(samples: answers.Judged, weights_B_N: np.ndarray) -> dict[str,
     if samples.names_causes:  # mean over the causes with enough failures of the share whose cause has the largest score
         named_N, recalls = np.array(CONCEPTS)[samples.scores.argmax(axis=1)], []
         for concept in _frequent(samples):
-            of_N = samples.label == concept
+            is_cause_N = samples.label == concept
             with np.errstate(divide="ignore", invalid="ignore"):
-                right_B = (weights_B_N[:, of_N] * (named_N[of_N] == concept)).sum(axis=1)
-                recalls.append(right_B / weights_B_N[:, of_N].sum(axis=1))
+                right_B = (weights_B_N[:, is_cause_N] * (named_N[is_cause_N] == concept)).sum(axis=1)
+                recalls.append(right_B / weights_B_N[:, is_cause_N].sum(axis=1))
         measures[CAUSES] = np.mean(recalls, axis=0) if recalls else np.full(len(weights_B_N), np.nan)
     return measures
 

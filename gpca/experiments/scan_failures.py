@@ -62,8 +62,7 @@ ROW_IN = 0.30
     tables.SECTION,
     "Table XVIII: causes on scans",
     """Registrations of scans to scans by ICP, from disturbed true poses and from the results of a global method. What
-    made them fail is measured by counterfactuals: started from the truth, cropped to what both scans see, with
-    more noise. Explainers have learned from objects, or from other scenes.""",
+    made them fail is measured by counterfactuals.""",
     **MEASURED,
 )
 def table18_scan_causes(run: Run, measured):

@@ -247,8 +247,7 @@ def _notes(run: Run, sheet: Sheet, intervals: Frame, parts: Iterable[str]) -> li
     SECTION,
     "Table XVII: registration of scans",
     """How often each method registers one scan to another, by how much they overlap. Local methods start at the true
-    pose disturbed by a rung of a ladder, and again at the pose of a global method; global methods have no start.
-    Compare only rows of one start: the first rungs of the ladder are near the true pose.""",
+    pose disturbed by a rung of a ladder, and again at a global method's. Compare only rows of one start.""",
     **INTERVALS,
     seconds=(read_seconds, "timings/{scan_set}/method_{scan_method}/seed{scan_seed}.csv"),
 )
@@ -313,9 +312,8 @@ def table17_published(run: Run, intervals):
         for name, entry in entries.items()
         if entry.is_global
     ]
-    columns = {
-        name: show(CLOSE, f"{name}, overlap {low:g} to {high:g} (%)", name) for name, (low, high) in LISTS.items()
-    }
+    title = "{}, overlap {:g} to {:g} (%)"
+    columns = {name: show(CLOSE, title.format(name, *ends), name) for name, ends in LISTS.items()}
     heads = {"by": "By", "method": "Method", "features": "Features"}
     sheet = Sheet("table17_published", heads, rows, columns, intervals)
     over = sheet.over(clusters=SCENES)

@@ -28,10 +28,7 @@ COLUMNS = ("concept", "method", "low", "high", "other_low", "other_high", "sampl
     samples="control_samples/{source}/seed{control_seed}.csv",
 )
 def collect(run: Run, files: Paths, samples: Paths) -> Frame:
-    """Accuracy of every explainer and success of the registrations by severity, over all sources.
-
-    Each range of severities has equally wide bins; pose errors have two ranges, rotation and translation.
-    """
+    """Accuracy of explainers and success of registrations by equally wide bins of severity, over all sources."""
     import pandas as pd
 
     from gpca.pairs.synthesis import RegistrationSettings
@@ -46,9 +43,8 @@ def collect(run: Run, files: Paths, samples: Paths) -> Frame:
     table = table[table["control"] == PAPER].reset_index(drop=True)
     for name in SEVERITIES:  # the first bin where it was not applied
         table[f"bin_{name}"] = np.clip(np.searchsorted(edges[name], table[name], side="right") - 1, 0, bins - 1)
-    joined = predictions.merge(
-        table, on=["source", "seed", "sample"], suffixes=("", "_of_sample"), validate="many_to_one"
-    )
+    keys = ["source", "seed", "sample"]
+    joined = predictions.merge(table, on=keys, suffixes=("", "_of_sample"), validate="many_to_one")
     outcomes = table.assign(explainer=REGISTRATION, right=table["error"] < run.config["success"]["error"])
     both = pd.concat([outcomes, joined[outcomes.columns]])
     records = []

@@ -49,11 +49,7 @@ class Section(ReadingSizes):
 
 
 def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[str, Any]:
-    """Groups of readings, some of which are run only where there is what they read, and the parts of their jobs.
-
-    Those that train encoders for each reading need seeds, and others rows of encoders as published, or from poses of
-    estimators.
-    """
+    """Groups of readings, some of which are run only where there is what they read, and the parts of their jobs."""
     readings, frames = config["readings"], config["real_world"]
     estimated = [name for name, entry in conditions_of(config).items() if entry.get("form") == "results"]
     readable = {
@@ -75,9 +71,7 @@ def names(config: Mapping[str, Any], _sources: Mapping[str, Mapping]) -> dict[st
         "repeats": list(values_of(FRAME_REPEATS).get("repeats", [])),
         "repeated_backbone": list(frames["backbones"]),
         "clouded_backbone": frames["backbones"][0],  # whose encoder sees other clouds
-        "cloud": [
-            name for name in (readings["groups"].get(FRAME_INPUT) or {}).get("input", []) if name != groups.ALIGNED
-        ],
+        "cloud": [name for name in values_of(FRAME_INPUT).get("input", []) if name != groups.ALIGNED],
     }
 
 
@@ -94,10 +88,9 @@ EXPERIMENT = Experiment(
 
 @dataclass(frozen=True)
 class Plain(Column):
-    """Column of numbers with three digits, whatever their unit."""
+    """Column of numbers with three digits, whatever their unit, e.g. ``0.592``."""
 
-    def text(self, cell: Cell) -> str:
-        """E.g. ``0.592``."""
+    def text(self, cell: Cell) -> str:  # noqa: D102
         return f"{cell.mean:.3g}"
 
 
@@ -182,11 +175,8 @@ CHANCE = "chance"
     SECTION,
     "Table XIII: readings of the unstated",
     """Each number of the paper that is not reproduced, and what it would be under other choices that the paper leaves
-    open (readings): the least and the largest value, the nearest reading, how many are close, and which reading of
-    the same choices is close to the most printed numbers.
-
-    "Produced": a reading is close. "Between": none is, but some lie below and some above. "Outside": the number
-    lies beyond all readings. The choices were fixed before they were run, and no reading counts as the
+    open (readings). "Produced": a reading is close. "Between": none is, but some lie below and some above. "Outside":
+    the number lies beyond all readings. The choices were fixed before they were run, and no reading counts as the
     reproduction. Times are not included.""",
     **VERDICTS,
 )
@@ -242,16 +232,12 @@ LETTERS = 52  # of a number's name, which there is room for
     SECTION,
     "Readings of the unstated",
     """Every reading of each group of choices, as its difference from the printed number that is not reproduced: a
-    line of dots per number. In the gray band a reading is close. The axis is linear in this band, logarithmic
-    beyond it, and cut at 30 times what is close.""",
+    line of dots per number. In the gray band, where the axis is linear, a reading is close.""",
     name="readings",
     **VERDICTS,
 )
 def draw_readings(run: Run, judged: Frame) -> Figure:
-    """Readings of each number that is not reproduced as dots in a line, the lines of a group below its name.
-
-    At the right stands how many of a number's readings are close.
-    """
+    """Readings of each number as dots in a line, and how many are close; the lines of a group stand below its name."""
     from gpca.reporting.figures.panels import panels
     from gpca.reporting.figures.style import BLUE, GRAY, LIGHT_GRAY, SMALL_PT, write_title
 
@@ -267,14 +253,14 @@ def draw_readings(run: Run, judged: Frame) -> Figure:
     for group, lines in by_group.items():
         headings.append(len(names))
         names.append(reading_words.group(group))
-        for (of_table, row, column), rows in lines:
+        for (number_table, row, column), rows in lines:
             y = len(names)
             distance_R = np.sort(rows["distance"].to_numpy(float).clip(-FARTHEST, FARTHEST))
             panel.plot(distance_R[[0, -1]], [y, y], color=GRAY, linewidth=0.6)
             panel.scatter(distance_R, np.full(len(rows), y), s=9, color=BLUE, alpha=0.45, linewidths=0, zorder=3)
             count = f"{rows['close'].sum():.0f} of {len(rows)}"
             panel.text(1.01, y, count, transform=panel.get_yaxis_transform(), va="center", fontsize=SMALL_PT)
-            names.append(shorten(f"{of_table}: {row}, {column}", LETTERS, placeholder=" …"))
+            names.append(shorten(f"{number_table}: {row}, {column}", LETTERS, placeholder=" …"))
     panel.set_yticks(range(len(names)), names, fontsize=SMALL_PT)
     for heading in headings:
         panel.get_yticklabels()[heading].set_fontweight("bold")

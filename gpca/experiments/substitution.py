@@ -102,10 +102,7 @@ EXPLAIN = Step(
 
 
 def answers(files: Paths) -> Frame:
-    """Predictions of all files, and whether each is right, and the same as with Monte-Carlo.
-
-    A sample without an estimate is wrong. The cluster is the object's family in its source.
-    """
+    """Predictions of all files, and whether each is right (none without an estimate), and the same as Monte-Carlo's."""
     rows = read_samples(files, lambda path: read_predictions(path, (*LABELS, FAILURE)), ("source",))
     rows = rows.assign(table=rows["explainer"], method=rows["asked_of"])
     failed_N = rows[FAILURE] != ""
@@ -214,8 +211,7 @@ def table14_estimator_explanations(run: Run, intervals):
     SECTION,
     "Table XIV: from each registration method to each other",
     """GP-CA trained on registrations by one method (rows) and asked about the same pairs registered by another
-    (columns). The first row and column are the paper's ICP. If the rows of an explainer are alike, it does not
-    matter which method registered the training pairs.""",
+    (columns). The first row and column are the paper's ICP.""",
     needs=("exchange_registered",),
     intervals="exchange_intervals.csv",
 )

@@ -1,7 +1,4 @@
-"""How useful the uncertainty of learners is: risk over coverage, reliability, uncertainty over distance (Table V).
-
-The paper's learners have a color, as everywhere; the others take theirs in turn.
-"""
+"""How useful the uncertainty of learners is: risk over coverage, reliability, uncertainty over distance (Table V)."""
 
 from __future__ import annotations
 
@@ -31,7 +28,7 @@ COVERAGES = np.linspace(0, 1, 101)
 ENOUGH = 0.1  # the axis ignores smaller shares of the samples, where a single error decides the risk
 DISTANCE_BINS = 10  # of equally many samples
 BESIDE_OTHERS = "gpca"  # stands in the panels of the learners that the paper does not have
-PREDICTIONS = "learners/{source}/{learner}/seed{seed}.csv"
+PREDICTIONS, SET_FILES = "learners/{source}/{learner}/seed{seed}.csv", "shifted/{source}/seed{seed}.npz"
 OTHER_LOOKS: tuple[tuple[str, Any, float], ...] = (
     *((color, "-", 1.1) for color in (style.BLACK, style.GREEN, style.PURPLE, style.GRAY)),
     *((color, (0, (4, 2)), 1.1) for color in (style.BLACK, style.GREEN, style.PURPLE, style.GRAY)),
@@ -43,10 +40,8 @@ OTHER_LOOKS: tuple[tuple[str, Any, float], ...] = (
     SECTION,
     "Risk over coverage",
     """Share of errors among the most confident samples, over the share that is kept. The curve falls towards the left
-    if a classifier knows what it does not know. Of less than 10 % of the samples a single error decides the share,
-    so that the axis may cut a curve there. The paper's classifiers are above, the others below beside GP-CA.
-
-    The area under it, from the first sample on, is the AURC of Table V (the paper's AUC).""",
+    if a classifier knows what it does not know; the axis may cut it below 10 %. The paper's classifiers are above,
+    the others below beside GP-CA. The area under it is the AURC of Table V (the paper's AUC).""",
     learned=(read_learner_predictions, {"prediction_files": PREDICTIONS}),
 )
 def coverage_risk(run: Run, learned: Mapping) -> Figure:
@@ -55,27 +50,23 @@ def coverage_risk(run: Run, learned: Mapping) -> Figure:
     beside = [name for name in paper if name == BESIDE_OTHERS]
     lines = [names for names in (paper, [*beside, *others] if others else []) if names]
     looks = _looks(shown)
-    drawing, axes = panels(len(lines), len(columns), 1.0 + 1.6 * len(lines), sharex=True, sharey=True)
+    drawing, axes = _panels(len(lines), columns, 1.0 + 1.6 * len(lines), "coverage (%)")
     highest = 0.0
-    for line, of_line in zip(axes, lines, strict=True):
-        for panel, source in zip(line, columns, strict=True):
-            for learner in reversed(of_line):
-                risks = []
-                for rows in _of(learned, source, learner, "in_distribution"):
-                    coverage, risk = risk_coverage(-rows["max_score"].to_numpy(), wrong(rows))
-                    risks.append(np.interp(COVERAGES, coverage, risk))
-                if risks:
-                    mean = 100 * np.mean(risks, axis=0)
-                    panel.plot(100 * COVERAGES, mean, **looks[learner])
-                    highest = max(highest, float(mean[COVERAGES >= ENOUGH].max()))
-            drawn = panel.get_lines()
-            if drawn and not any(curve.get_ydata().any() for curve in drawn):
-                panel.text(0.5, 0.5, "no errors", transform=panel.transAxes, ha="center", va="center")
-        line[0].set_ylabel("errors among\nthe covered (%)")
-    for panel, source in zip(axes[0], columns, strict=True):
-        panel.set_title(columns[source])
-    for panel in axes[-1]:
-        panel.set_xlabel("coverage (%)")
+    for (line, column), panel in np.ndenumerate(axes):
+        for learner in reversed(lines[line]):
+            risks = []
+            for rows in _of(learned, list(columns)[column], learner, "in_distribution"):
+                coverage, risk = risk_coverage(-rows["max_score"].to_numpy(), wrong(rows))
+                risks.append(np.interp(COVERAGES, coverage, risk))
+            if risks:
+                mean = 100 * np.mean(risks, axis=0)
+                panel.plot(100 * COVERAGES, mean, **looks[learner])
+                highest = max(highest, float(mean[COVERAGES >= ENOUGH].max()))
+        drawn = panel.get_lines()
+        if drawn and not any(curve.get_ydata().any() for curve in drawn):
+            panel.text(0.5, 0.5, "no errors", transform=panel.transAxes, ha="center", va="center")
+    for panel in axes[:, 0]:
+        panel.set_ylabel("errors among\nthe covered (%)")
     axes[0, 0].set(xlim=(0, 100), ylim=(0, 1.05 * highest or 1))
     _write_legend(drawing, shown, looks)
     return drawing
@@ -84,12 +75,10 @@ def coverage_risk(run: Run, learned: Mapping) -> Figure:
 @figure(
     SECTION,
     "Reliability",
-    """Accuracy over confidence. On the diagonal, 80 % confident means right in 80 % of the cases; above it a
-    classifier is underconfident, below it overconfident. Bars count the samples, on the axis at the right;
-    vertical lines are Wilson's intervals (95 %) of independent samples.
-
-    The number is the calibration error of the samples of all datasets and seeds together (pooled ECE). Table V has
-    the mean of each seed's own for every dataset, in which deviations of opposite sign cancel less.""",
+    """Accuracy over confidence: above the diagonal a classifier is underconfident, below it overconfident. Bars count
+    the samples, on the axis at the right; vertical lines are Wilson's intervals (95 %) of independent samples. The
+    number is the calibration error of the samples of all datasets and seeds together (pooled ECE); Table V has the mean
+    of each seed's own.""",
     learned=(read_learner_predictions, {"prediction_files": PREDICTIONS}),
 )
 def reliability(run: Run, learned: Mapping) -> Figure:
@@ -106,15 +95,10 @@ def reliability(run: Run, learned: Mapping) -> Figure:
     SECTION,
     "Uncertainty over distance to the training samples",
     """Uncertainty over the distance to the training samples, the mean in ten bins of equally many: in distribution,
-    and with the samples of each shift. Bands are 95 % intervals of independent samples, and n counts those of all
-    seeds. The rank correlation ρ of the two is in Table V and in its table under shift.
-
-    The distance is the mean of those to the ten nearest training samples, in the paper's classic (analytical)
-    features, each in units of its standard deviation over the training samples.""",
-    learned=(
-        read_learner_predictions,
-        {"prediction_files": PREDICTIONS, "set_files": "shifted/{source}/seed{seed}.npz"},
-    ),
+    and with the samples of each shift; ρ of Table V is the rank correlation of the two. Bands are 95 % intervals of
+    independent samples, and n counts those of all seeds. The distance is the mean to the ten nearest training samples,
+    in the paper's classic (analytical) features, each in units of its standard deviation over the training samples.""",
+    learned=(read_learner_predictions, {"prediction_files": PREDICTIONS, "set_files": SET_FILES}),
 )
 def uncertainty_vs_distance(run: Run, learned: Mapping) -> Figure:
     learners, columns = _shown(run, learned)
@@ -122,27 +106,24 @@ def uncertainty_vs_distance(run: Run, learned: Mapping) -> Figure:
     shown = {name: learners[name] for name in names}
     looks = _looks(learners)
     parts = {key: sets_of(rows) for key, rows in learned.items() if key[0] in columns and key[1] in shown}
-    down = [name for name in SETS if any(name in of_key for of_key in parts.values())]
+    down = [name for name in SETS if any(name in sets for sets in parts.values())]
     from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
-    drawing, axes = panels(len(down), len(columns), 0.9 + 1.2 * len(down), sharex=True, sharey=True)
+    drawing, axes = _panels(len(down), columns, 0.9 + 1.2 * len(down), "distance to the training samples")
     for row, name in enumerate(down):
         for panel, source in zip(axes[row], columns, strict=True):
             samples = 0
             for learner in reversed(names):
-                of_set = [p[name] for key, p in parts.items() if key[:2] == (source, learner) and name in p]
-                if of_set:
-                    distance, mean, half = distance_curve(of_set)
+                seeds = [sets[name] for key, sets in parts.items() if key[:2] == (source, learner) and name in sets]
+                if seeds:
+                    distance, mean, half = distance_curve(seeds)
                     panel.plot(distance, mean, **looks[learner])
                     band = {"color": looks[learner]["color"], "alpha": 0.15, "linewidth": 0}
                     panel.fill_between(distance, np.maximum(mean - half, 0), mean + half, **band)
-                    samples = sum(map(len, of_set))
+                    samples = sum(map(len, seeds))
             panel.text(0.03, 0.96, f"$n$ = {samples}", transform=panel.transAxes, va="top", fontsize=style.SMALL_PT)
         axes[row, 0].set_ylabel(f"{SETS[name]}\n1 - largest score", fontsize=style.SMALL_PT)
-    for panel, source in zip(axes[0], columns, strict=True):
-        panel.set_title(columns[source])
     for panel in axes[-1]:
-        panel.set_xlabel("distance to the training samples")
         panel.set_xscale("log")
         panel.xaxis.set_major_locator(LogLocator(base=2))
         panel.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
@@ -153,13 +134,22 @@ def uncertainty_vs_distance(run: Run, learned: Mapping) -> Figure:
     return drawing
 
 
-def distance_curve(of_seeds: Sequence) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _panels(rows: int, sources: Mapping[str, str], height_in: float, across: str) -> tuple[Figure, np.ndarray]:
+    """Panels with a column for each source, and what they have across."""
+    drawing, axes = panels(rows, len(sources), height_in, sharex=True, sharey=True)
+    for top, bottom, title in zip(axes[0], axes[-1], sources.values(), strict=True):
+        top.set_title(title)
+        bottom.set_xlabel(across)
+    return drawing, axes
+
+
+def distance_curve(seeds: Sequence) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Median distance and mean of 1 - largest score of `DISTANCE_BINS` bins of equally many samples.
 
     The third array is half the width of the means' 95 % intervals, by the normal distribution of independent samples.
     """
     distance_S, score_S = (
-        np.concatenate([rows[name].to_numpy(float) for rows in of_seeds]) for name in (DISTANCES[0], "max_score")
+        np.concatenate([rows[name].to_numpy(float) for rows in seeds]) for name in (DISTANCES[0], "max_score")
     )
     bins = np.array_split(np.argsort(distance_S, kind="stable"), min(DISTANCE_BINS, len(distance_S)))
     halves = [1.96 * score_S[part].std() / np.sqrt(max(len(part) - 1, 1)) for part in bins]
@@ -170,8 +160,8 @@ def distance_curve(of_seeds: Sequence) -> tuple[np.ndarray, np.ndarray, np.ndarr
 def _looks(shown: Iterable[str]) -> dict[str, dict[str, Any]]:
     """Color, line and width of every learner; those without a look of their own take `OTHER_LOOKS` in turn."""
     others = iter(OTHER_LOOKS)
-    own = {name: style.METHOD_LOOKS.get(name) or next(others, style.OTHER_LOOK) for name in shown}
-    return {name: dict(zip(("color", "linestyle", "linewidth"), look, strict=True)) for name, look in own.items()}
+    looks = {name: style.METHOD_LOOKS.get(name) or next(others, style.OTHER_LOOK) for name in shown}
+    return {name: dict(zip(("color", "linestyle", "linewidth"), look, strict=True)) for name, look in looks.items()}
 
 
 def _paper_first(learners: Iterable[str]) -> list[str]:
@@ -195,6 +185,6 @@ def _shown(run: Run, learned: Mapping) -> tuple[dict[str, str], dict[str, str]]:
     return learners, sources
 
 
-def _of(learned: Mapping, source: str, learner: str, of_set: str) -> list:
-    parts = [rows[rows["set"] == of_set] for key, rows in learned.items() if key[:2] == (source, learner)]
+def _of(learned: Mapping, source: str, learner: str, name: str) -> list:
+    parts = [rows[rows["set"] == name] for key, rows in learned.items() if key[:2] == (source, learner)]
     return [rows for rows in parts if len(rows)]

@@ -10,6 +10,7 @@ from gpca.errors import InputError
 from gpca.evaluation.measures import ALL, POOLED
 from gpca.experiments.guarantee import COLUMNS, collect, guarantee, read_guarantee, table19_guarantee, table19_shift
 from gpca.explainers.registry import CAUSES, explainer_entry
+from gpca.guarantee import answers as asked
 from gpca.guarantee.answers import (
     BY_FAMILY,
     BY_SAMPLE,
@@ -21,13 +22,10 @@ from gpca.guarantee.answers import (
     PLAIN,
     SIZE,
     UNSURE,
-    GuaranteeSettings,
-    Scored,
-    answers_of,
-    conditions,
 )
 from gpca.guarantee.guarantee import STATES
 from gpca.io.csv_file import write_csv
+from gpca.reporting.tables.cells import rows_where
 from tests.config.configs import changed
 from tests.guarantee.scored import scored_samples
 
@@ -67,30 +65,22 @@ def measured(files):
 
 
 def value(measured, condition, source, variant, metric, concept=ALL):
-    rows = measured[
-        (measured["condition"] == condition)
-        & (measured["source"] == source)
-        & (measured["variant"] == variant)
-        & (measured["metric"] == metric)
-        & (measured["concept"] == concept)
-    ]
-    assert len(rows) == 1
-    return rows.iloc[0]
+    named = {"condition": condition, "source": source, "variant": variant, "metric": metric, "concept": concept}
+    [(_, row)] = rows_where(measured, **named).iterrows()
+    return row
 
 
 def test_measures_are_shares_of_the_answers(files, measured):
     assert tuple(measured.columns) == COLUMNS
-    scored = Scored.load(files[0])
-    settings = GuaranteeSettings(**PROMISED)
-    answers = answers_of(scored, conditions(scored)[0], settings)
+    scored = asked.Scored.load(files[0])
+    answers = asked.answers_of(scored, asked.conditions(scored)[0], asked.GuaranteeSettings(**PROMISED))
     state = scored.state[answers.row]
     for variant in (PLAIN, BY_SAMPLE, BY_FAMILY):
         inside = answers.sets[variant]
         holds = (inside & (state[:, None] == np.array(STATES))).any(axis=1)
         assert value(measured, FAMILIES, POOLED, variant, COVERAGE)["value"] == pytest.approx(holds.mean(), abs=1e-6)
-        assert value(measured, FAMILIES, POOLED, variant, SIZE)["value"] == pytest.approx(
-            inside.sum(axis=1).mean(), abs=1e-6
-        )
+        size = value(measured, FAMILIES, POOLED, variant, SIZE)["value"]
+        assert size == pytest.approx(inside.sum(axis=1).mean(), abs=1e-6)
         several = value(measured, FAMILIES, POOLED, variant, COVERAGE, "several")
         assert several["value"] == pytest.approx(holds[state == "several"].mean(), abs=1e-6)
     calls = answers.calls[CONFIDENT]
@@ -109,9 +99,6 @@ def test_promises_stand_beside_what_they_are_of(measured):
     assert set(by_family[by_family["metric"].isin([MISSED, FALSE_ALARMS])]["promised"]) == {0.2}
     inside = rows.dropna(subset=["low", "high"])
     assert (inside["low"] <= inside["value"] + 1e-6).all() and (inside["value"] <= inside["high"] + 1e-6).all()
-
-
-def test_no_interval_of_a_share_has_zero_width(measured):
     shares = measured[measured["metric"].isin([COVERAGE, MISSED, FALSE_ALARMS, UNSURE])].dropna(subset=["low"])
     assert (shares["high"] > shares["low"]).all()
 
