@@ -147,8 +147,8 @@ def diagnose(job: Job) -> None:
                     fault = "is left out: what it would learn from has fewer than two labels"
                     print(f"explainer '{name}', learned from {learned}, {fault}", file=sys.stderr)
                     continue
-                said = prediction_frame(shown, attribution)
-                frames.append(said.assign(scans=data_set_S, learned=learned, explainer=name))
+                predicted = prediction_frame(shown, attribution)
+                frames.append(predicted.assign(scans=data_set_S, learned=learned, explainer=name))
         if not frames:
             remedy = "raise scan_causes.pairs, or let an explainer learn from objects"
             raise InputError("predictions of scans", "no explainer has anything to learn from", remedy)
