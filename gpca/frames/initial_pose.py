@@ -183,7 +183,7 @@ def displace(T_camera_object: np.ndarray, diameter_m: float, settings: InitialPo
 class GlobalRegistration:
     """FPFH and RANSAC (Rusu et al. 2009; Zhou et al. 2018) through Open3D: a stand-in for an estimator.
 
-    Of several runs, refined by point-to-plane ICP, the best has the largest sum of two shares: of measured points on the
+    Of several runs refined by point-to-plane ICP, the best has the highest sum of two shares: of measured points on the
     model, and of the model's points facing the camera that were measured. Many poses explain the points alone.
     """
 
