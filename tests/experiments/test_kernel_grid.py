@@ -89,6 +89,8 @@ def test_rows_and_sources_that_were_not_fitted_are_left_out():
     table = table4_kernels(REAL, part[~part["method"].str.endswith("-200")])
     assert list(table.columns) == ["ycb"]
     assert len(table.rows) == 1
+    text = table4_kernels(REAL, intervals(seeds=1)).markdown()
+    assert "85.0 (80.0 to 87.0)" in text and "Over 1 seed, 200 test samples each" in text
 
 
 def test_the_grid_has_every_combination_with_its_calibration():
@@ -113,11 +115,6 @@ def test_stand_ins_are_said_and_nothing_to_show_is_a_fault(make):
         make(REAL, grid(("cups",)), intervals(("cups",)))
 
 
-def test_one_seed_has_an_interval_over_families_alone():
-    text = table4_kernels(REAL, intervals(seeds=1)).markdown()
-    assert "85.0 (80.0 to 87.0)" in text and "Over 1 seed, 200 test samples each" in text
-
-
 def test_the_figure_is_the_same_bytes_each_time(same_bytes):
     same_bytes(lambda: kernel_learning_curves(run(ycb="YCB", linemod="LINEMOD (procedural stand-in)"), grid()))
 
@@ -126,22 +123,16 @@ def test_the_figure_has_the_accuracies_that_the_paper_prints():
     printed = printed_accuracies("linemod")
     assert set(printed) == set(PRINTED)
     assert printed["rbf", 0.001, 200] == 50.6
-    panels = kernel_learning_curves(LINEMOD, grid()).axes
+    figure = kernel_learning_curves(LINEMOD, grid())
     drawn = [
         sorted(line.get_ydata()[0] for line in panel.get_lines() if line.get_marker() in PRINTED_MARKERS)
-        for panel in panels
+        for panel in figure.axes
     ]
     assert drawn == [sorted(printed.values()), []]  # accuracies; the paper prints no confidence
-
-
-def test_a_kernel_whose_curve_coincides_with_anothers_shows_below_it():
-    figure = kernel_learning_curves(LINEMOD, grid())
+    # A kernel whose curve coincides with another's shows below it.
     lines = [line for line in figure.axes[0].get_lines() if len(line.get_xdata()) > 1]
     widths = {line.get_color(): line.get_linewidth() for line in lines}
     assert widths[COLORS["matern32"]] > widths[COLORS["rbf"]]
     assert lines[0].get_color() == COLORS["matern32"]
-
-
-def test_without_a_grid_of_these_sources_nothing_is_drawn():
     with pytest.raises(InputError, match="have no results for these sources"):
         kernel_learning_curves(run(cups="Cups"), grid())

@@ -8,12 +8,7 @@ from gpca.errors import InputError
 from gpca.evaluation.intervals import wilson_interval
 from gpca.evaluation.measures import COLUMNS as INTERVALS
 from gpca.evaluation.measures import TIDY_COLUMNS
-from gpca.experiments.new_concepts import (
-    new_concept_curves,
-    read_curves_by_concepts,
-    table15_new_concepts,
-    table15_oracle,
-)
+from gpca.experiments import new_concepts
 from tests.figures import words_of
 
 SOURCES = {"ycb": {"title": "YCB", "stand_in": True}}
@@ -30,11 +25,13 @@ NOTHING = pd.DataFrame(columns=list(INTERVALS))
 
 
 def labels_table(metrics, without_labels=NOTHING, sources=SOURCES):
-    return table15_new_concepts(Run(RUN | {"sources": sources}), metrics, without_labels, FAMILIES, CAUSE_FAMILIES)
+    return new_concepts.table15_new_concepts(
+        Run(RUN | {"sources": sources}), metrics, without_labels, FAMILIES, CAUSE_FAMILIES
+    )
 
 
 def oracle_table(metrics, sources=SOURCES):
-    return table15_oracle(Run(RUN | {"sources": sources}), metrics, FAMILIES)
+    return new_concepts.table15_oracle(Run(RUN | {"sources": sources}), metrics, FAMILIES)
 
 
 def rows(setting, strategy, concept, metric, *of_seeds):
@@ -82,13 +79,9 @@ def test_what_needs_no_labels_stands_below_the_encoders(metrics):
     assert labels_table(metrics).best() == table.best()
 
 
-def test_rows_are_of_the_seeds_of_the_new_concepts(metrics):
+def test_rows_are_of_the_seeds_of_the_new_concepts_and_nominal_is_none_of_the_papers(metrics):
     records = labels_table(metrics).records()
     assert [record[3] for record in records if record[1:3] == ("pretrained", "labels_pose")] == [4]
-
-
-def test_nominal_is_no_concept_of_the_papers(metrics):
-    records = labels_table(metrics).records()
     [found] = [record for record in records if record[1:3] == ("pair", "all_labels")]
     assert found[3] == pytest.approx(99)
 
@@ -128,7 +121,8 @@ def test_without_these_sources_there_is_no_table(metrics, table):
 
 
 def drawn(files, sources=SOURCES):
-    return new_concept_curves(Run(RUN | {"sources": sources}), read_curves_by_concepts(files))
+    curves = new_concepts.read_curves_by_concepts(files)
+    return new_concepts.new_concept_curves(Run(RUN | {"sources": sources}), curves)
 
 
 def test_a_line_is_drawn_for_each_embedding_and_a_row_for_each_kind_of_concept(rare_files):
@@ -139,8 +133,5 @@ def test_a_line_is_drawn_for_each_embedding_and_a_row_for_each_kind_of_concept(r
     assert len(rows) == 2
     assert any("nominal" in text for text in rows)
     assert {"Means over 1 seed", "target (90 %)"} <= set(words)
-
-
-def test_without_a_curve_nothing_is_drawn(rare_files):
     with pytest.raises(InputError, match="has no curve of these sources"):
         drawn(rare_files, {"cups": SOURCES["ycb"]})

@@ -1,6 +1,7 @@
 """Table VIII and the figures of recovery."""
 
 import json
+from itertools import product
 
 import numpy as np
 import pandas as pd
@@ -10,13 +11,7 @@ from gpca.errors import InputError
 from gpca.evaluation.measures import AGAINST, KEYS, NUMBERS, tidy
 from gpca.evaluation.measures import COLUMNS as INTERVALS
 from gpca.experiments.recovery import policy_titles, table8_recovery
-from gpca.experiments.recovery_curves import (
-    losses,
-    queued_labels,
-    recovery_costs,
-    recovery_rates,
-    recovery_thresholds,
-)
+from gpca.experiments.recovery_curves import losses, queued_labels, recovery_costs, recovery_rates, recovery_thresholds
 from gpca.experiments.recovery_example import fig1_recovery_example, fig6_mitigation
 from gpca.io.arrays import save_arrays
 from gpca.pairs.perturbation import CONCEPTS
@@ -34,23 +29,12 @@ def metrics():
     for policy, shares in {"gpca": (0.5, 0.75, 0.75), "random": (0.25, 0.5, 0.5)}.items():
         for cause, episodes in (("all", 12), *((cause, 4) for cause in CONCEPTS)):
             values = {f"recovered_within_{k}": share for k, share in enumerate(shares, start=1)}
-            values |= {
-                "episodes": episodes,
-                "tries": 10 * episodes,
-                "acted_first": episodes,
-                "wrong_first": 0.5,
-                "queued": 0.0,
-                "left_alone": 0.125,
-                "actions": 1.5,
-                "cost": 0.03,
-                "nominal": episodes,
-                "acted_nominal": 0.25,
-                "cost_nominal": 0.02,
-            }
+            values |= dict.fromkeys(("episodes", "acted_first", "nominal"), episodes) | {"tries": 10 * episodes}
+            values |= {"wrong_first": 0.5, "queued": 0.0, "left_alone": 0.125, "actions": 1.5}
+            values |= {"cost": 0.03, "acted_nominal": 0.25, "cost_nominal": 0.02}
             for limit in (2, 10):
-                values |= {f"failures_at_{limit}": episodes} | {
-                    f"recovered_within_{k}_at_{limit}": 0.5 for k in (1, 2, 3)
-                }
+                values |= {f"recovered_within_{k}_at_{limit}": 0.5 for k in (1, 2, 3)}
+                values[f"failures_at_{limit}"] = episodes
             for seed in (0, 1):
                 records += [("recovery", "recovery", policy, m, cause, seed, v) for m, v in values.items()]
     return tidy(records, "recovery")
@@ -72,11 +56,7 @@ def intervals():
 
 @pytest.fixture
 def differences():
-    keys = [
-        (metric, against)
-        for metric in ("recovered_within_1", "recovered_within_3")
-        for against in ("sequence", "error")
-    ]
+    keys = product(("recovered_within_1", "recovered_within_3"), ("sequence", "error"))
     rows = [
         ("recovery", "recovery", "gpca", metric, "all", against, "random", 2, 10, 24, 0.125 * n, -0.1, 0.4)
         for n, (metric, against) in enumerate(keys)
@@ -121,6 +101,8 @@ def test_table8_pools_the_seeds_and_holds_the_bounds_over_tables(metrics, interv
 def test_rates_are_drawn(metrics, same_bytes):
     image = same_bytes(lambda: recovery_rates(run_of(), metrics))
     assert np.ptp(image) > 100
+    _, by_cause = recovery_rates(run_of(), metrics).axes
+    assert [text.get_text() for text in by_cause.get_legend().get_texts()] == [f"{c} ($n$ = 8)" for c in CONCEPTS]
     with pytest.raises(InputError, match="have no recovery rates"):
         recovery_rates(run_of("oracle"), metrics)
 
@@ -133,16 +115,12 @@ def test_thresholds_and_costs_are_drawn_for_the_policies_that_there_are(metrics,
     fixed = renamed[renamed["method"] == "error_only"].assign(method="always_denoise")
     both = pd.concat([renamed, fixed])
     by_limit = recovery_thresholds(run, both)
-    assert [text.get_text() for text in by_limit.legends[0].get_texts()] == [
-        titles["gpca_acting"],
-        titles["always_denoise"],
-    ]
+    named = [text.get_text() for text in by_limit.legends[0].get_texts()]
+    assert named == [titles["gpca_acting"], titles["always_denoise"]]
     assert "failures: 24 at 2 %, 24 at 10 %" in by_limit.get_suptitle()
     by_factor = recovery_costs(run, both)
-    assert [text.get_text() for text in by_factor.legends[0].get_texts()] == [
-        titles["error_only"],
-        titles["always_denoise"],
-    ]
+    named = [text.get_text() for text in by_factor.legends[0].get_texts()]
+    assert named == [titles["error_only"], titles["always_denoise"]]
     assert np.ptp(same_bytes(lambda: recovery_costs(run, both))) > 100
     for draw in (recovery_thresholds, recovery_costs):
         with pytest.raises(InputError, match="have no recovery rates"):
@@ -153,11 +131,6 @@ def test_a_loss_by_hand(metrics):
     loss_F = losses(metrics, "gpca", 3, 0.2, 0.1, np.array([1.0, 2.0]))
     assert loss_F[0] == pytest.approx(0.1 * (0.25 + 0.03) + 0.9 * (0.25 * 0.2 + 0.02))
     assert loss_F[1] - loss_F[0] == pytest.approx(0.1 * 0.03 + 0.9 * 0.02)
-
-
-def test_rates_by_cause_say_of_how_many_failures_they_are(metrics):
-    _, by_cause = recovery_rates(run_of(), metrics).axes
-    assert [text.get_text() for text in by_cause.get_legend().get_texts()] == [f"{c} ($n$ = 8)" for c in CONCEPTS]
 
 
 def test_the_mapping_is_drawn_from_the_thresholds(tmp_path, same_bytes):
@@ -180,16 +153,13 @@ def queues():
     return pd.DataFrame(rows, columns=columns)
 
 
-def test_both_orders_of_queued_cases_have_a_band_and_the_axis_ends_above_them(queues):
+def test_both_orders_of_queued_cases_have_a_band_and_the_axis_ends_above_them(queues, same_bytes):
     figure = queued_labels(run_of(), queues)
     assert [text.get_text() for text in figure.texts] == ["Tables of the virtual camera, Tiny: judged on 24 failures"]
     assert len(figure.legends[0].get_texts()) == 2
     for panel in figure.axes:
         assert len(panel.collections) == 2
         assert panel.get_ylim() == pytest.approx((0, 73.5))  # 70 is the largest bound
-
-
-def test_what_queued_cases_teach_is_drawn(queues, same_bytes):
     image = same_bytes(lambda: queued_labels(run_of(), queues))
     flat = same_bytes(lambda: queued_labels(run_of(), queues.assign(error=0.5)))
     assert (image != flat).any()

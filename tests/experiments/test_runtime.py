@@ -35,10 +35,7 @@ def test_every_component_stands_beside_the_printed_value():
         assert measured in text
     assert set(printed_seconds(NUMBERS)) < set(COMPONENTS)
     assert "**" not in text.replace("**Runtime per component on Tiny, and as the paper prints it**", "")
-
-
-def test_the_csv_holds_milliseconds_and_the_number_of_runs():
-    records = {(row[0], row[1], row[3]): row for row in table7_runtime(RUN, RUNTIME, NUMBERS).records()[1:]}
+    records = {(row[0], row[1], row[3]): row for row in table.records()[1:]}  # milliseconds and the number of runs
     assert records["icp", "CPU", "mean"][4] == pytest.approx(1.0)
     assert records["icp", "CPU", "mean"][8] == 100
     assert records["retraining", "CPU", "published"][4:] == (10000.0, "", "", 1, 100, True)
@@ -53,16 +50,13 @@ def test_the_stages_add_up_to_one_explanation():
     assert gpu == cpu | {"features": pytest.approx((0.1, 0.5))}
 
 
-def test_all_times_are_on_one_scale_and_ours_have_their_spread():
+def test_all_times_are_on_one_scale_and_ours_have_their_spread(same_bytes):
     [panel] = draw_runtime(RUN, RUNTIME, NUMBERS).axes
     assert panel.get_xscale() == "log"
     assert [label.get_text() for label in panel.get_yticklabels()][-1] == ALL_STAGES
     spans = [line.get_xdata() for line in panel.get_lines() if len(line.get_xdata()) == 2 and line.get_linewidth() == 1]
     icp = next(span for span in spans if span[0] != span[1])
     assert list(icp) == pytest.approx([0.5, 1.5])
-
-
-def test_the_figure_is_the_same_bytes_each_time(same_bytes):
     same_bytes(lambda: draw_runtime(RUN, RUNTIME, NUMBERS))
 
 

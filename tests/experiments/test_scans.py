@@ -21,17 +21,13 @@ from gpca.experiments.scans import (
 )
 from gpca.io.csv_file import write_csv
 from gpca.process.code_files import ROOT
+from gpca.reporting.tables.cells import rows_where
 from tests.experiments.runs import run_with
 from tests.scans.test_source import write_npz
 
 VIRTUAL = {"title": "Rooms", "kind": "virtual", "rooms": 1}
-ABSENT = {
-    "title": "3DMatch",
-    "kind": "threedmatch",
-    "location": "not/there",
-    "optional": True,
-    "address": "https://example.org",
-}
+ABSENT = {"title": "3DMatch", "kind": "threedmatch", "location": "not/there", "optional": True}
+ABSENT["address"] = "https://example.org"
 
 
 def run_of(rooms=VIRTUAL, data_dir=None):
@@ -61,9 +57,6 @@ def test_data_sets_that_exist_are_registered(config, tmp_path):
     assert titles["virtual_scans"] == "Virtual rooms and objects (procedural stand-in)"
     assert titles["threedmatch"] == "3DMatch and 3DLoMatch"
     check(there, lambda key: set())
-
-
-def test_every_method_of_the_config_has_settings_for_scans(config):
     assert set(config["scans"]["methods"]) == set(config["methods"])
 
 
@@ -74,11 +67,7 @@ def test_every_method_of_the_config_has_settings_for_scans(config):
         ("global_start", "gicp", r"scans.global_start: registration method 'gicp': needs an initial pose"),
         ("global_start", "icp", r"scans.global_start: no registration method 'icp'"),
         ("datasets", {"ycb": {"title": "T", "kind": "virtual", "rooms": 1}}, "scans.datasets.ycb: is the name of a"),
-        (
-            "datasets",
-            {"t": {"title": "T", "kind": "npz", "location": "no"}},
-            r"scans.datasets.t: .*no such file or fol",
-        ),
+        ("datasets", {"t": {"title": "T", "kind": "npz", "location": "no"}}, r"scans.datasets.t: .*no such file or fo"),
     ],
 )
 def test_faults_of_a_config(config, key, value, message):
@@ -127,9 +116,7 @@ def intervals(files):
 
 
 def value(found, **wanted):
-    for column, content in wanted.items():
-        found = found[found[column] == content]
-    [row] = found.to_dict("records")
+    [row] = rows_where(found, **wanted).to_dict("records")
     return row
 
 
@@ -200,8 +187,5 @@ def test_published_recalls_stand_beside_those_of_the_run(intervals, tmp_path):
     assert table.cells[0, "3DLoMatch"].mean == pytest.approx(200 / 3)
     assert "NeurIPS 2024" in table.markdown() and "FCGF" in table.markdown()
     assert 0 not in {row for row, _ in table.best()} or table.cells[0, "3DMatch"].seeds == 1
-
-
-def test_nothing_to_show_is_a_fault(intervals):
     with pytest.raises(InputError, match="has nothing to show"):
         table17_scans(run_of(), intervals[:0], tidy([("t", "s", "m", "seconds", "all", 0, 1.0)], "t"))

@@ -42,7 +42,7 @@ def test_numbers_on_stand_ins_are_shown_as_such_and_reproduced_ones_are_not():
         table13_readings(RUN, rows("reproduced"))
 
 
-def test_each_number_is_a_named_line_below_its_group():
+def test_each_number_is_a_named_line_below_its_group(same_bytes):
     many = pd.concat([rows().assign(row=f"kernel {i}") for i in range(8)], ignore_index=True)
     [panel] = draw_readings(RUN, many).axes
     named = [text.get_text() for text in panel.get_yticklabels()]
@@ -53,9 +53,6 @@ def test_each_number_is_a_named_line_below_its_group():
     [dots] = [dots for dots in panel.collections if (dots.get_offsets()[:, 1] == place).all()]
     assert dots.get_offsets()[:, 0].tolist() == pytest.approx([0.4 / 3, 44.4 / 3])
     assert [text.get_text() for text in panel.texts] == ["0 of 2", "1 of 2"] * 8
-
-
-def test_the_figure_is_the_same_bytes_each_time(same_bytes):
     same_bytes(lambda: draw_readings(RUN, rows()))
     with pytest.raises(InputError, match="has no readings"):
         draw_readings(RUN, rows("reproduced"))
@@ -88,8 +85,5 @@ def test_a_row_is_a_cloud_and_confusions_are_shares_of_the_concept():
     assert "Mean over 2 seeds, the first of the run; with fewer than 3 there is no interval and no bold." in text
     assert "Test samples: all 600, seen 300." in text
     assert "±" not in text and table.best() == set()
-
-
-def test_nothing_to_show_is_refused():
     with pytest.raises(InputError, match="has nothing to show"):
         table6_inputs(RUN, pd.DataFrame(frame_rows("lost/all", accuracy=(1,)), columns=list(TIDY_COLUMNS)))

@@ -6,6 +6,7 @@ import pytest
 from gpca.evaluation.measures import COLUMNS
 from gpca.experiments import registration_methods
 from gpca.experiments.substitution import collect, table14_estimator_explanations, table14_method_matrix
+from gpca.reporting.tables.cells import rows_where
 from tests.experiments.runs import run_with
 
 CONCEPTS = ("noise", "pose", "overlap")
@@ -45,9 +46,7 @@ def path(tmp_path):
 def by_seed(path, **wanted):
     rows, _ = collect(RUN, [path])
     assert set(rows["seed"]) == {3} and set(rows["source"]) == {"ycb"}
-    for column, value in wanted.items():
-        rows = rows[rows[column] == value]
-    return rows.set_index(["method", "concept", "metric"])["value"].to_dict()
+    return rows_where(rows, **wanted).set_index(["method", "concept", "metric"])["value"].to_dict()
 
 
 def test_estimators_are_judged_by_concept_and_beside_monte_carlo(path):
@@ -66,9 +65,6 @@ def test_estimators_are_judged_by_concept_and_beside_monte_carlo(path):
         ("censi", "noise", "test_samples"): 1,
     }
     assert {key: values[key] for key in expected} == expected
-
-
-def test_without_monte_carlo_there_is_no_agreement(path):
     rows = pd.read_csv(path, keep_default_na=False)
     rows[rows["asked_of"] != "monte_carlo"].to_csv(path, index=False)
     assert "agreement" not in {metric for _, _, metric in by_seed(path, table="shap")}
