@@ -70,7 +70,7 @@ def ascend(model: LatentGPs, inputs_N_d: Tensor, targets_N: Tensor, learning_rat
 class GpytorchGPC(GPC):
     """:class:`gpca.classifier.gpc.GPC` by gpytorch: same seeds and results, but fitted once, on the labeled samples."""
 
-    def fit_up_to(
+    def fit_up_to(  # type: ignore[override]  # it starts from nothing
         self, iterations: Iterable[int], h_N_d: np.ndarray, labels_N: np.ndarray, *_start: None
     ) -> Iterator[int]:
         """Yield each number of iterations in rising order; the classifier is then as :meth:`fit` would leave it."""
@@ -90,7 +90,9 @@ class GpytorchGPC(GPC):
             if done in stops:
                 yield done
 
-    def posterior(self, h_N_d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def posterior(  # type: ignore[override]  # it projects nothing
+        self, h_N_d: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Return mean and standard deviation (N, C) of the latent logits q(f(h))."""
         return self._marginals(self._scaler.tensor(h_N_d))
 

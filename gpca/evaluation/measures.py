@@ -108,8 +108,10 @@ def over_seeds(
             subset, drawn = rows[mask_N], draws.subset(rows.index.to_numpy()[mask_N])
             for name, measure in _taken(part, measures) if len(subset) else ():
                 value_B = measure.values(subset, drawn.weights)
-                is_share = measure.limits is SHARE
-                estimate = interval(value_B, drawn.weights[1:]) if is_share else drawn.estimate(value_B, measure.limits)
+                if measure.limits is None:  # a share
+                    estimate = interval(value_B, drawn.weights[1:])
+                else:
+                    estimate = drawn.estimate(value_B, measure.limits)
                 records.append(drawn.record((*keys, name, part), estimate))
     return pd.DataFrame(records, columns=list(COLUMNS))
 

@@ -84,9 +84,8 @@ class ScoringExplainer:
         """Score every registration."""
         started = perf_counter()
         scores_N_C, variances_N_C, bald_N = self.summary(registrations)
-        more = {"variances_N_C": variances_N_C, "bald_N": bald_N}
         seconds = (perf_counter() - started) / len(registrations)
-        return Attribution.scored(self.labels, scores_N_C, seconds=seconds, **more)
+        return Attribution.scored(self.labels, scores_N_C, seconds=seconds, variances_N_C=variances_N_C, bald_N=bald_N)
 
     def summary(self, registrations: Registrations) -> tuple[np.ndarray, np.ndarray | None, np.ndarray | None]:
         """Return scores and, if any, variances (N, C), and BALD (N,)."""

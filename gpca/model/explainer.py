@@ -32,6 +32,7 @@ from gpca.model.location import model_path
 from gpca.model.scene import Scene
 from gpca.objects.canonical import CanonicalFrame, thin
 from gpca.objects.surface import as_points
+from gpca.reenactment.enactment import Enactment
 from gpca.rigid import inverse, transform
 from gpca.seeds import generator, seed_of
 from gpca.uncertainty.estimators.interface import RegisteredPair
@@ -110,7 +111,8 @@ class Explainer:
             outcome = self._aligned(clouds, method, notes)
         T_found = outcome.T_target_source
         voids = voids_of(clouds.source, clouds.target, outcome.fitness, self.model.familiar)
-        diagnosis, enactments = None, []
+        diagnosis = None
+        enactments: list[Enactment] = []
         if diagnose:
             diagnoser = self.model.diagnoser.quick() if fast else self.model.diagnoser
             with _timed(seconds, "diagnosis"):

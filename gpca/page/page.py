@@ -110,8 +110,13 @@ def render(template: str = "index.html.jinja", **content) -> str:
         words = section.removeprefix("Beyond the paper: ")
         return words[:1].upper() + words[1:]
 
-    loader, blocks = FileSystemLoader([TEMPLATES, ASSETS]), {"trim_blocks": True, "lstrip_blocks": True}
-    environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, **blocks)
+    environment = Environment(
+        loader=FileSystemLoader([TEMPLATES, ASSETS]),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
     environment.filters["anchor"] = lambda title: re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-")
     environment.filters["short"] = short
     environment.filters["yaml"] = lambda value: yaml.safe_dump(value, sort_keys=False, allow_unicode=True, width=100)

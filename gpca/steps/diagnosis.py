@@ -79,6 +79,7 @@ def diagnose_frames(job: Job) -> None:
         predictions = []
         for name, settings in job.section("explainers").items():
             attribution = frames.attribution(name, settings or {})
+            assert attribution is not None  # objects have all labels
             predictions.append(prediction_frame(causes.registrations, attribution).assign(explainer=name))
         write_csv(job.predictions, pd.concat(predictions))
 
@@ -194,8 +195,9 @@ class World:
             parts = [(np.arange(len(asked)), training)]
             if training is asked:  # one fold is asked about, and the labeled rows of the others are learned from
                 labeled_S = asked.concept != BORDERLINE
-                of_folds = [self._fold_S == fold for fold in np.unique(self._fold_S)]
-                parts = [(np.flatnonzero(of_S), asked.subset(np.flatnonzero(labeled_S & ~of_S))) for of_S in of_folds]
+                fold_S = np.asarray(self._fold_S)
+                folds = [fold_S == fold for fold in np.unique(fold_S)]
+                parts = [(np.flatnonzero(in_S), asked.subset(np.flatnonzero(labeled_S & ~in_S))) for in_S in folds]
             answers = []
             for rows, learned in parts:
                 if self._fold_S is not None and len(np.unique(learned.concept)) < FEWEST_LABELS:

@@ -156,7 +156,7 @@ class Published:
         methods = zip(*words, arrays["scores"], arrays["named"], strict=True)
         return cls(
             track=track,
-            rows=Rows(**{name: arrays[name] for name in declared}),
+            rows=Rows(axes=None, **{name: arrays[name] for name in declared}),
             limits={name: float(arrays[name]) for name in LIMITS},
             methods=tuple(Method(*each) for each in methods),
             hashes=dict(zip(arrays["files"].tolist(), arrays["sha256"].tolist(), strict=True)),

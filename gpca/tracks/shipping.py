@@ -98,7 +98,7 @@ def _rows(track: Track, run: Path, tested: Mapping[Part, Causes]) -> Rows:
                 arrays["counted"] = numbers(path, rows, "times") == 0
         for name, column in arrays.items():
             columns.setdefault(name, []).append(column)
-    return Rows(**{name: np.concatenate(parts) for name, parts in columns.items()})
+    return Rows(axes=None, **{name: np.concatenate(parts) for name, parts in columns.items()})
 
 
 def _predictions(

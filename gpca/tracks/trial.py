@@ -156,6 +156,7 @@ def _frames(trial: MethodTrial, source: str, seed: int) -> PartPredictions:
     frames.prepare(trial.name)
     started = perf_counter()
     attribution = frames.attribution(trial.name, trial.settings)
+    assert attribution is not None  # objects have all labels
     return PartPredictions.of(attribution, samples.track.labels, (perf_counter() - started) / len(causes))
 
 
