@@ -17,7 +17,7 @@ from gpca.io.files import require_outputs
 from gpca.jobs.arguments import length
 from gpca.model.clouds import read_points, read_pose, read_scan, require_format
 from gpca.model.location import model_path, require_model
-from gpca.objects.mesh_folder import METERS_PER_UNIT
+from gpca.objects.surface import METERS_PER_UNIT
 
 if TYPE_CHECKING:
     from gpca.model.explainer import Explainer

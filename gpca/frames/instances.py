@@ -168,7 +168,9 @@ def read_instances(
     columns |= {name: np.concatenate([of.row[name] for of in seen]) for name in PARTS}
     columns["offsets"] = np.cumsum([0, *(len(of.row["points_m"]) for of in seen)], dtype=np.int64)
     init_from, T_camera_object_init = zip(*poses, strict=True)
-    return Instances(axes=None, **columns, init_from=np.array(init_from), T_camera_object_init=np.array(T_camera_object_init))
+    return Instances(
+        axes=None, **columns, init_from=np.array(init_from), T_camera_object_init=np.array(T_camera_object_init)
+    )
 
 
 PARTS = {"points_m", "pixels"}
