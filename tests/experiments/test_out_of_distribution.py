@@ -27,18 +27,24 @@ from ..pairs.test_shifted_sets import sets
 from ..steps.test_shift import quick
 from .runs import run_with
 
+OTHER = {"noise": "pose", "pose": "overlap", "overlap": "noise"}
+
+
+def written(folder, change=lambda rows, seed: rows):
+    """Predictions of two seeds of a GPC, with a change, and the sets that they are of."""
+    predictions, set_files, rows = [], [], predict_sets(quick, sets())
+    for seed in (0, 1):
+        (path := folder / "shifted/cups" / f"seed{seed}.npz").parent.mkdir(parents=True, exist_ok=True)
+        sets().save(path, ("tiny", 0))
+        set_files.append(path)
+        predictions.append(folder / "learners/cups/gpca" / f"seed{seed}.csv")
+        write_csv(predictions[-1], change(rows, seed))
+    return predictions, set_files
+
 
 @pytest.fixture
 def files(tmp_path):
-    """Predictions of two seeds of a GPC and the sets that they are of."""
-    predictions, set_files = [], []
-    for seed in (0, 1):
-        (path := tmp_path / "shifted/cups" / f"seed{seed}.npz").parent.mkdir(parents=True, exist_ok=True)
-        sets().save(path, ("tiny", 0))
-        set_files.append(path)
-        predictions.append(tmp_path / "learners/cups/gpca" / f"seed{seed}.csv")
-        write_csv(predictions[-1], predict_sets(quick, sets()))
-    return predictions, set_files
+    return written(tmp_path)
 
 
 def edited(path, change):
@@ -53,7 +59,7 @@ def value(metrics, of_set, metric, seed=0):
     return found
 
 
-def test_every_set_and_pair_of_sets_has_finite_diagnostics(files):
+def test_sets_have_finite_diagnostics_by_their_definitions_within_bounds(files):
     metrics = collect(None, *files)[0]
     assert set(metrics["table"]) == {
         TABLE + name
@@ -62,10 +68,6 @@ def test_every_set_and_pair_of_sets_has_finite_diagnostics(files):
     }  # fmt: skip
     assert np.isfinite(metrics["value"]).all()
     assert not metrics.duplicated(["table", "metric", "seed"]).any()
-
-
-def test_the_numbers_are_those_of_the_definitions(files):
-    metrics = collect(None, *files)[0]
     [rows] = [rows for (_, _, seed), rows in read_learner_predictions(*files).items() if seed == 0]
     rows = rows[rows["set"] == "severity"]
     p = rows[["score_noise", "score_pose", "score_overlap"]].to_numpy()
@@ -78,10 +80,6 @@ def test_the_numbers_are_those_of_the_definitions(files):
     distance = sets().distance[sets().rows("severity", "test"), DISTANCES.index("knn_embedding")]
     rho = diagnostics.rank_correlation(rows["entropy"], distance)
     assert value(metrics, "severity", "rho_entropy_knn_embedding") == rho
-
-
-def test_bounds_of_a_seed_hold_its_value(files):
-    metrics = collect(None, *files)[0]
     for name in ("nll", "brier", f"rho_bald_{DISTANCES[0]}"):
         low, middle, high = (value(metrics, "in_distribution", name + end) for end in ("_low", "", "_high"))
         assert low < middle < high
@@ -100,9 +98,9 @@ def test_a_learner_without_bald_has_none_of_its_diagnostics(files):
 def test_all_right_or_all_wrong_is_finite(files, right):
     predictions, set_files = files
     for path in predictions:
-        edited(path, lambda rows: rows.__setitem__(
-            "concept_true", rows["concept_predicted"] if right else rows["concept_predicted"].map(
-                {"noise": "pose", "pose": "overlap", "overlap": "noise"})))  # fmt: skip
+        rows = pd.read_csv(path)
+        predicted = rows["concept_predicted"]
+        write_csv(path, rows.assign(concept_true=predicted if right else predicted.map(OTHER)))
     metrics = collect(None, predictions, set_files)[0]
     assert np.isfinite(metrics["value"]).all()
     assert value(metrics, "severity", "aurc_max_score") == (0 if right else 1)
@@ -136,21 +134,15 @@ def test_bad_predictions_are_one_line(files, change, message):
 
 @pytest.fixture(scope="module")
 def files_of_families(tmp_path_factory):
-    """Predictions of two seeds of a GPC and the sets that they are of."""
-    folder, predictions, set_files = tmp_path_factory.mktemp("learners"), [], []
-    rows = predict_sets(quick, sets())
-    for seed in (0, 1):
-        (path := folder / "shifted/cups" / f"seed{seed}.npz").parent.mkdir(parents=True, exist_ok=True)
-        sets().save(path, ("tiny", 0))
-        set_files.append(path)
-        predictions.append(folder / "learners/cups/gpca" / f"seed{seed}.csv")
-        # Two families, of which one is harder in the second seed.
+    """Predictions of two families, of which one is harder in the second seed."""
+
+    def change(rows, seed):
         family = np.where(rows["sample"] % 2 == 0, "mug", "bowl")
         wrong = (family == "mug") & (seed == 1) & (rows["sample"] % 4 == 0)
-        named = rows["concept_predicted"].where(~wrong, rows["concept_true"].map(
-            {"noise": "pose", "pose": "overlap", "overlap": "noise"}))  # fmt: skip
-        write_csv(predictions[-1], rows.assign(cluster=family, concept_predicted=named))
-    return predictions, set_files
+        named = rows["concept_predicted"].where(~wrong, rows["concept_true"].map(OTHER))
+        return rows.assign(cluster=family, concept_predicted=named)
+
+    return written(tmp_path_factory.mktemp("learners"), change)
 
 
 @pytest.fixture(scope="module")

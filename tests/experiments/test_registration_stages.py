@@ -47,14 +47,10 @@ def test_where_none_is_uncertain_the_fit_is_a_poor_one(stages, stage_files, monk
     row = stages.choose("pose", stage_files[0])
     test = of_test(stages, "pose")
     assert stages.registrations.fitness[row] <= np.median(stages.registrations.fitness[test.index])
-    number = sample_number(stages, row)
+    number = stages.registrations.sample[row]
     assert stages.words(row, "icp") == f"nominal, ADD-S 1.2 % $d$\n$u$ = {number / 10:.1f} nats (clean: < 9.0)"
     of_training = int(stages.registrations.rows("train")[0])
     assert stages.words(of_training, "icp") == "nominal, ADD-S 1.2 % $d$"  # whose uncertainty is not measured
-
-
-def sample_number(stages, row):
-    return stages.registrations.sample[row]
 
 
 def test_states_follow_the_limits_of_the_config(stage_files, monkeypatch):
@@ -67,9 +63,8 @@ def test_states_follow_the_limits_of_the_config(stage_files, monkeypatch):
 def test_uncertainties_of_other_samples_are_refused(stage_files, tmp_path):
     *files, uncertainties, limits = stage_files
     (tmp_path / "seed0.csv").write_text(uncertainties.read_text().replace("\n", "\n99").removesuffix("99"))
-    with pytest.raises(
-        InputError, match=r"seed0\.csv: its samples differ from those of the registrations; regenerate both"
-    ):
+    fault = r"seed0\.csv: its samples differ from those of the registrations; regenerate both"
+    with pytest.raises(InputError, match=fault):
         Staged.load(*files, tmp_path / "seed0.csv", limits)
 
 

@@ -56,9 +56,8 @@ def files(causes, tmp_path_factory):
     folder, random, said = tmp_path_factory.mktemp("scan_causes"), np.random.default_rng(0), []
     tested = causes.subset(causes.rows("test"))
     n = len(tested)
-    tested = replace(
-        tested, registrations=replace(tested.registrations, cluster=np.resize(["hall", "kitchen", "attic"], n))
-    )
+    scenes = np.resize(["hall", "kitchen", "attic"], n)
+    tested = replace(tested, registrations=replace(tested.registrations, cluster=scenes))
     given = {"causes_files": [], "sample_files": [], "prediction_files": [folder / "seed100.csv"]}
     for name in TITLES:
         own = replace(tested, registrations=replace(tested.registrations, axes=(name, 100)))
@@ -128,10 +127,8 @@ def test_counts_are_of_data_sets_conditions_and_strata(measured, causes):
 
 def test_the_tables_show_every_row_and_count_what_they_are_of(measured):
     text = table18_scan_causes(run_of(), measured).markdown()
-    assert (
-        "| All together (" in text
-        and "| Distances of the pair (forest) | other scenes | pair + motion + further runs |" in text
-    )
+    assert "| All together (" in text
+    assert "| Distances of the pair (forest) | other scenes | pair + motion + further runs |" in text
     assert "| Chance | objects | nothing |" in text and "| Inlier RMSE (gate) | other scenes | pair |" in text
     assert "Rooms (procedural stand-in): " in text and " registrations of " in text and "in 3 scenes" in text
     counts = table18_scan_counts(run_of(), measured).markdown()
