@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
@@ -49,6 +49,23 @@ LEVEL = 0.95  # of the region whose coverage is counted
 
 
 @dataclass(frozen=True)
+class EstimatedRow:
+    """A test registration by one method.
+
+    Attributes:
+        columns: those of every row about it: sample, object, method, errors.
+        registered: the input of an estimator.
+        true_twist: (6,) of the true pose about that of the registration, the symmetric one that is nearest.
+        references: by their kind.
+    """
+
+    columns: dict[str, object]
+    registered: RegisteredPair
+    true_twist: np.ndarray
+    references: Mapping[str, Reference]
+
+
+@dataclass(frozen=True, eq=False)
 class DrawnCauses:
     """Registrations of one source and seed with measured causes, and what it takes to draw them again.
 
@@ -64,47 +81,20 @@ class DrawnCauses:
     objects: ObjectClouds
     judges: Judges
 
-
-@dataclass(frozen=True)
-class EstimatedRow:
-    """A test registration by one method.
-
-    Attributes:
-        known: the columns of every row about it: sample, object, method, errors.
-        registered: the input of an estimator.
-        true_twist: (6,) of the true pose about that of the registration, the symmetric one that is nearest.
-        references: by their kind.
-    """
-
-    known: dict[str, object]
-    registered: RegisteredPair
-    true_twist: np.ndarray
-    references: Mapping[str, Reference]
-
-
-class Registering:
-    """Registers rows of the situations by one method."""
-
-    def __init__(self, situations: DrawnCauses, method: str, settings: EstimatorPairSettings) -> None:
-        self.situations, self.method, self._settings = situations, method, settings
-        self._axes = (situations.source, situations.seed, "estimators", method)
-        self._register = make_method(method)
-        self._examples: dict[int, Example] = {}
-
-    def case(self, row: int) -> EstimatedRow:
-        """A test registration with the references."""
-        registrations = self.situations.causes.registrations
-        judge = self.situations.judges.of(registrations, row)
-        registered, T_true, redraws = self._registered(row)
+    def case(self, row: int, method: str, settings: EstimatorPairSettings) -> EstimatedRow:
+        """A test registration by a method with the references."""
+        registrations = self.causes.registrations
+        judge = self.judges.of(registrations, row)
+        registered, T_true, redraws = self._registered(row, method, settings)
         # ADD moves the object, which is the source here: errors are those of the inverse pose.
         error = judge(inverse(registered.T_target_source), inverse(T_true))["add_relative"]
-        known = {
+        columns = {
             "sample": registrations.sample[row],
             "object": registrations.object_name[row],
             "cluster": registrations.cluster[row],
-            "method": self.method,
+            "method": method,
             "add_relative": error,
-            "failed": bool(error >= self._settings.failed or not registered.outcome.fitness),
+            "failed": bool(error >= settings.failed or not registered.outcome.fitness),
             "inlier_rmse": registered.outcome.inlier_rmse,
             "fitness": registered.outcome.fitness,
         }
@@ -112,41 +102,42 @@ class Registering:
         for kind in KINDS:
             started = perf_counter()
             try:
-                twists_n_6 = draw_twists(kind, registered, redraws, self._settings.repeats, *self._axes, "reference")
+                twists_n_6 = draw_twists(kind, registered, redraws, settings.repeats, *self._axes(method), "reference")
             except FailedEstimate:
                 twists_n_6 = np.empty((0, 6))
             references[kind] = Reference(twists_n_6, perf_counter() - started)
-        return EstimatedRow(known, registered, true_twist(registered, T_true, judge, MOVED), references)
+        return EstimatedRow(columns, registered, true_twist(registered, T_true, judge, MOVED), references)
 
-    def example(self, row: int) -> Example:
+    def example(self, row: int, method: str, settings: EstimatorPairSettings) -> Example:
         """A training registration with the results of a few registrations of other data from other starts."""
-        if row not in self._examples:
-            registered, T_true, redraws = self._registered(row)
-            judge = self.situations.judges.of(self.situations.causes.registrations, row)
-            runs = self._settings.train_starts
-            draw = partial(draw_twists, "all", registered, redraws, runs, *self._axes, "examples")
-            self._examples[row] = example(registered, T_true, judge, MOVED, draw, runs)
-        return self._examples[row]
+        registered, T_true, redraws = self._registered(row, method, settings)
+        judge, runs = self.judges.of(self.causes.registrations, row), settings.train_starts
+        draw = partial(draw_twists, "all", registered, redraws, runs, *self._axes(method), "examples")
+        return example(registered, T_true, judge, MOVED, draw, runs)
 
-    def _registered(self, row: int) -> tuple[RegisteredPair, np.ndarray, Redraws]:
+    def _axes(self, method: str) -> tuple:
+        return self.source, self.seed, "estimators", method
+
+    def _registered(
+        self, row: int, method: str, settings: EstimatorPairSettings
+    ) -> tuple[RegisteredPair, np.ndarray, Redraws]:
         """A registration of the model, the source, to the observed cloud; the true pose; what draws the clouds again.
 
         The target's frame is the one in which the causes' track has put the observed cloud: near the model's. The true
         pose takes what was observed there. Raises InputError where the row was drawn with other settings or objects.
         """
-        of, settings = self.situations, self._settings
-        registrations = of.causes.registrations
-        observed = observed_pair(of.causes, row, *self._axes)
+        registrations = self.causes.registrations
+        observed = observed_pair(self.causes, row, *self._axes(method))
         random = generator(*observed.axes, "clouds")
         clouds = (observed.model, observed.observed)
         source, target = (cloud[random.permutation(len(cloud))[: settings.points]] for cloud in clouds)
         pair = Pair(source, target, inverse(observed.T_init), seed=seed_of(*observed.axes, "draws")).with_normals()
-        outcome = self._register(pair)
+        outcome = make_method(method)(pair)
         deviation_6 = start_deviation(settings.start_rotation_deg, settings.start_translation)
-        registered = RegisteredPair(pair, outcome, self.method, deviation_6, lambda: describe(pair, outcome, MOVED))
+        registered = RegisteredPair(pair, outcome, method, deviation_6, lambda: describe(pair, outcome, MOVED))
         T_icp, T_true = (registrations.T_target_source(which, row) for which in ("icp", "true"))
         T_true = T_icp @ inverse(T_true)
-        candidate, surface = drawn_again(of.objects, of.causes, row, of.source, of.seed, of.drawn_by)
+        candidate, surface = drawn_again(self.objects, self.causes, row, self.source, self.seed, self.drawn_by)
         return registered, T_true, Redraws(candidate, surface, T_true, settings.points)
 
 
@@ -198,18 +189,16 @@ def try_estimators(
     if not len(tested):
         raise InputError(f"causes of {situations.source}", "have no test samples", "raise causes.test")
     for method, wanted in settings.methods.items():
-        own = Registering(situations, method, settings)
-        training_sets = {"": (own, situations.causes.rows("train"))}
+        train = situations.causes.rows("train")
+        training_sets = {"": (situations, train)}
         if method == most_tested(settings):
-            training_sets[f"_{estimates.MILD}"] = own, mild(situations, situations.causes.rows("train"))
+            training_sets[f"_{estimates.MILD}"] = situations, mild(situations, train)
             if other is not None:
-                training_sets[f"_{estimates.OTHER_SOURCE}"] = (
-                    Registering(other, method, settings),
-                    other.causes.rows("train"),
-                )
+                training_sets[f"_{estimates.OTHER_SOURCE}"] = other, other.causes.rows("train")
+        lesson = cache(partial(DrawnCauses.example, method=method, settings=settings))  # sets share rows
         examples = {
-            shift: [by.example(row) for row in spaced(of, settings.train)] if learners else []
-            for shift, (by, of) in training_sets.items()
+            shift: [lesson(taken_from, row) for row in spaced(rows, settings.train)] if learners else []
+            for shift, (taken_from, rows) in training_sets.items()
         }
         trained = {name: make_estimator(name, entry, examples[""]) for name, entry in estimators.items()}
         for name in learners:
@@ -218,7 +207,7 @@ def try_estimators(
         for row in progress(
             spaced(tested, wanted), f"estimators on {situations.source}, seed {situations.seed}, {method}"
         ):
-            case = own.case(row)
+            case = situations.case(row, method, settings)
             cases.append(case)
             for kind, reference in case.references.items():
                 lost = "too few of the reference's runs found a correspondence"
@@ -259,8 +248,8 @@ def reference_samples(cases: Sequence[EstimatedRow]) -> ReferenceSamples:
     """The references' results for these registrations, as their file holds them."""
     each = [(case, kind, case.references[kind].twists) for case in cases for kind in KINDS]
     return ReferenceSamples(
-        sample=np.array([case.known["sample"] for case, _, _ in each]),
-        method=np.array([case.known["method"] for case, _, _ in each]),
+        sample=np.array([case.columns["sample"] for case, _, _ in each]),
+        method=np.array([case.columns["method"] for case, _, _ in each]),
         kind=np.array([kind for _, kind, _ in each]),
         twists=np.concatenate([twists for *_, twists in each]).astype(np.float32),
         offsets=np.cumsum([0, *(len(twists) for *_, twists in each)], dtype=np.int64),
@@ -279,7 +268,7 @@ def judged(case: EstimatedRow, answer: CovarianceEstimate, floor: float) -> dict
         numbers["spread"] = predicted_spread(points, sigma_6_6)
         for kind, reference in case.references.items():
             numbers |= {f"{name}_{kind}": value for name, value in compared(sigma_6_6, reference, floor).items()}
-    return {**case.known, "failure": answer.failure} | numbers | estimates.covariance_columns(sigma_6_6)
+    return {**case.columns, "failure": answer.failure} | numbers | estimates.covariance_columns(sigma_6_6)
 
 
 def compared(sigma_6_6: np.ndarray, reference: Reference, floor: float) -> dict[str, float]:

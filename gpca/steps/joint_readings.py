@@ -35,9 +35,9 @@ from gpca.pairs.synthesis import RegistrationSettings, make_registrations
 from gpca.process.progress import progress
 from gpca.seeds import seed_of_file
 from gpca.steps.readings.files import RunFiles, accuracies, diagnostics_of_scores, like_the_training, train_and_test
-from gpca.steps.readings.gpc_start import FITTED, StartedGPC, of_unit_norm, relevant
+from gpca.steps.readings.gpc_start import FITTED, StartedGPC, relevant, to_unit_norm
 from gpca.steps.readings.knobs import accuracies_of_magnitudes, runs_of
-from gpca.steps.readings.labels import NEW
+from gpca.steps.readings.labels import NEW, passes_to
 from gpca.steps.readings.learners import FOREST, SVM, svm_scores
 from gpca.uncertainty.interventions import MIDDLE, UPPER
 from gpca.uncertainty.settings import UncertaintySettings
@@ -73,10 +73,6 @@ class ReadingSamples:
         few = replace(settings, train=0, test=min(job.section("sizes")["samples"], settings.test))
         pairs, _ = make_registrations(ObjectClouds.load(job.objects, job.source), *axes, few)
         return cls(ShiftedSets.load(sets, axes), pairs, axes)
-
-    def train_and_test(self) -> list[Registrations]:
-        """The training samples, and the test samples like them, with their embeddings."""
-        return train_and_test(like_the_training(self.sets))
 
     def test_sets(self) -> Iterator[tuple[str, Registrations, np.ndarray]]:
         """Name, test samples and their rows of the sets whose samples are embedded by the encoder itself."""
@@ -171,7 +167,7 @@ def values(samples: ReadingSamples, severities: str, choices: Choices, settings:
         for joint, value in zip(_combinations(choices, (SEVERITIES, "knobs")), value_R, strict=True):
             yield part_name("knobs", joint), method, "accuracy", ALL, float(value)
     yield from _learner_values(samples, choices)
-    train, test = samples.train_and_test()
+    train, test = train_and_test(like_the_training(samples.sets))
     fits: dict[tuple, GPC] = {}  # starts share those whose relevant choices agree
     starts = list(_combinations(choices, (SEVERITIES, *reading.START)))
     for start in progress(starts, f"joint readings of {' '.join(map(str, samples.axes))}, {severities}"):
@@ -204,10 +200,10 @@ def _learner_values(samples: ReadingSamples, choices: Choices) -> Iterator[Value
         inputs = joint["inputs"]
 
         def scaled(registrations: Registrations, inputs: str = inputs) -> Registrations:
-            h_S_d = of_unit_norm(registrations.embedding) if inputs == "unit_norm" else registrations.embedding
+            h_S_d = to_unit_norm(registrations.embedding) if inputs == "unit_norm" else registrations.embedding
             return replace(registrations, attached={"embedding": h_S_d})
 
-        train = scaled(samples.train_and_test()[0])
+        train = scaled(train_and_test(like_the_training(samples.sets))[0])
         forest = explainer_entry(FOREST).make(*samples.axes)
         forest.fit(train)
         parts = [(name, scaled(part), rows) for name, part, rows in samples.test_sets()]
@@ -277,14 +273,9 @@ def _label_values(
             }
             if strategy == "bald_kmeans":  # passes over these labels, or all, to a new classifier's target accuracy
                 anew = StartedGPC(with_kernel, joint, *samples.axes, "epochs", NEW)
-                labeled_L_d = np.concatenate([task.initial.h, task.pool.h[at_target]])
-                concept_L = np.concatenate([task.initial.concept_N, task.pool.concept_N[at_target]])
                 most = with_kernel.iterations
-                for passes in anew.fit_up_to([*range(LOOK_EVERY, most, LOOK_EVERY), most], labeled_L_d, concept_L):
-                    metrics["epochs_at_target"] = float(passes)
-                    scores_S_C = anew.attribute(task.test.h)[0]
-                    if accuracies(task.test.concept_N, scores_S_C)["accuracy", ALL] >= settings.target:
-                        break
+                looks = [*range(LOOK_EVERY, most, LOOK_EVERY), most]
+                metrics["epochs_at_target"], _ = passes_to(settings.target, anew, task, at_target, looks)
             for metric, value in metrics.items():
                 yield part_name("labels", joint | {"new_share": new_share}), strategy, metric, NEW, value
 

@@ -59,7 +59,7 @@ def test_every_estimator_has_a_row_per_registration_and_so_have_the_references(t
     assert list(rows) == [*REFERENCES, *ESTIMATORS, *OTHERWISE]
     for name in (*REFERENCES, *ESTIMATORS):
         assert rows[name]["method"].tolist() == ["point_to_plane"] * 2 + ["point_to_point"] * 4
-        assert rows[name]["sample"].tolist() == [case.known["sample"] for case in cases]
+        assert rows[name]["sample"].tolist() == [case.columns["sample"] for case in cases]
         assert (rows[name]["seconds"] > 0).all()
     refusal = "the closed form is that of point-to-point, not of 'point_to_plane'"
     assert rows["censi"].loc[:1, "failure"].tolist() == [refusal] * 2
@@ -151,7 +151,7 @@ def test_the_true_twist_leads_to_the_truth(tried, causes, situations):
     _, cases = tried
     registrations = causes.registrations
     for case in cases:
-        [row] = np.flatnonzero((registrations.sample == case.known["sample"]) & (registrations.split == "test"))
+        [row] = np.flatnonzero((registrations.sample == case.columns["sample"]) & (registrations.split == "test"))
         T_true = exp(case.true_twist[None])[0] @ case.registered.T_target_source
         T_expected = registrations.T_target_source("icp", row) @ inverse(registrations.T_target_source("true", row))
         off = inverse(T_expected) @ T_true
@@ -160,15 +160,15 @@ def test_the_true_twist_leads_to_the_truth(tried, causes, situations):
             assert off == pytest.approx(np.eye(4), abs=1e-5)
         assert np.linalg.norm(off[:3, 3]) < 1e-5
         assert judge(inverse(T_true), inverse(T_expected))["add_relative"] < 0.02
-        assert case.known["failed"] == (case.known["add_relative"] >= SETTINGS.failed)
+        assert case.columns["failed"] == (case.columns["add_relative"] >= SETTINGS.failed)
 
 
 def test_the_model_is_registered_to_what_was_observed(tried, causes):
     _, cases = tried
     registrations = causes.registrations
     for case in cases:
-        [row] = np.flatnonzero((registrations.sample == case.known["sample"]) & (registrations.split == "test"))
-        assert case.known["cluster"] == registrations.cluster[row]
+        [row] = np.flatnonzero((registrations.sample == case.columns["sample"]) & (registrations.split == "test"))
+        assert case.columns["cluster"] == registrations.cluster[row]
         for cloud, whole in (
             (case.registered.pair.source, registrations.target(row)),
             (case.registered.pair.target, registrations.cloud(row)),

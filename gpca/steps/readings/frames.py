@@ -7,7 +7,7 @@ of each seed. It has the predictions of encoders as published and of ICP from es
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -70,38 +70,23 @@ def inputs(run_files: RunFiles, readings: Sequence[Reading]) -> Iterator[Row]:
             yield from _rows(wanted, samples, named_S, source, method, seed)
 
 
-def encoders(run_files: RunFiles, readings: Sequence[Reading]) -> Iterator[Row]:
-    """Accuracies of the judged rows, and of the rows whose encoders are as published in their place."""
+def other_rows(run_files: RunFiles, readings: Sequence[Reading]) -> Iterator[Row]:
+    """Accuracies of the judged rows, or of others in their place, which the run may lack.
 
-    def of_architecture(reading: Reading, source: str, method: str) -> tuple[str, str]:
-        encoder, reduction = method.split("-")
-        published = run_files.section("published").get(encoder)
-        return source, method if reading["architecture"] == "judged" else f"{published}-{reduction}"
-
-    yield from _other_rows(run_files, readings, of_architecture)
-
-
-def starts(run_files: RunFiles, readings: Sequence[Reading]) -> Iterator[Row]:
-    """Accuracies of the judged rows, and of the rows whose ICP starts at estimators' poses."""
-    estimated = run_files.section("frames")["estimated"]
-    yield from _other_rows(
-        run_files,
-        readings,
-        lambda reading, source, method: (source if reading["initial_pose"] == "true_pose" else estimated, method),
-    )
-
-
-def _other_rows(
-    run_files: RunFiles, readings: Sequence[Reading], row_of: Callable[[Reading, str, str], tuple[str, str]]
-) -> Iterator[Row]:
-    """Values of each reading's rows as those of the judged ones; rows that the run lacks are left out."""
+    The encoders of the others are as published, or their ICP starts at estimators' poses.
+    """
     shown = {(source, seed): registrations for source, seed, registrations in run_files.loaded()}
-    frames = run_files.section("frames")
+    frames, published = run_files.section("frames"), run_files.section("published")
     for method in frames["methods"]:
+        encoder, reduction = method.split("-")
+        as_published = f"{published.get(encoder)}-{reduction}"
         for reading in readings:
-            other = row_of(reading, frames["source"], method)
+            wanted = (
+                frames["estimated" if reading.get("initial_pose") == "estimated" else "source"],
+                as_published if reading.get("architecture") == "published" else method,
+            )
             for source, name, seed in run_files.predictions:
-                if (source, name) == other:
+                if (source, name) == wanted:
                     named_S = run_files.predicted(source, name, seed)
                     yield from _rows([reading], shown[source, seed], named_S, frames["source"], method, seed)
 

@@ -35,7 +35,7 @@ class UnitNorm(Standardization):
 
     def __call__(self, h_N_d: np.ndarray) -> np.ndarray:
         """Scaled inputs; one of length 0 stays as it is."""
-        return of_unit_norm(h_N_d)
+        return to_unit_norm(h_N_d)
 
 
 class StartedGPC(GPC):
@@ -75,7 +75,7 @@ class StartedGPC(GPC):
         return model.elbo(inputs_N_d[rows], targets_N[rows]) + excess
 
 
-def of_unit_norm(h_N_d: np.ndarray) -> np.ndarray:
+def to_unit_norm(h_N_d: np.ndarray) -> np.ndarray:
     """Embeddings (N, d) of length 1; one of length 0 stays as it is."""
     length_N_1 = np.linalg.norm(h_N_d, axis=1, keepdims=True)
     return h_N_d / np.where(length_N_1 > 0, length_N_1, 1)

@@ -227,14 +227,14 @@ GROUPS = {
     FRAME_ENCODER: Group(
         "Which architecture encodes depth frames",
         {"architecture": Literal["judged", "published"], "objects": ShownObjects},
-        "frames:encoders",
+        "frames:other_rows",
         ("registrations", "predictions"),
         (),
     ),
     FRAME_START: Group(
         "Where ICP starts on depth frames",
         {"initial_pose": Literal["true_pose", "estimated"], "objects": ShownObjects},
-        "frames:starts",
+        "frames:other_rows",
         ("registrations", "predictions"),
         (),
     ),

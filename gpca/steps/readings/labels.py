@@ -5,7 +5,7 @@ The paper does not say whether a retraining starts anew, nor by which samples th
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -90,16 +90,26 @@ def epochs(run_files: RunFiles, readings: Sequence[Reading]) -> Iterator[Row]:
         queried = {"at_target": learned.labels_to(target), "all": learned.queried}
         for reading in progress(readings, f"epochs on {source}, seed {seed}"):
             rows = queried[reading["labels"]]
-            labeled_L_d = np.concatenate([task.initial.h, task.pool.h[rows]])
-            concept_L = np.concatenate([task.initial.concept_N, task.pool.concept_N[rows]])
             settings = replace(rare.gpc, learning_rate=reading["learning_rate"])
-            gpc, passes, reached = GPC(CONCEPTS, settings, source, seed, "epochs"), float(MOST), 0.0
-            for done in gpc.fit_up_to(range(EVERY, MOST + 1, EVERY), labeled_L_d, concept_L):
-                named_N = np.array(CONCEPTS)[gpc.attribute(task.test.h)[0].argmax(axis=1)]
-                if np.mean(named_N == task.test.concept_N) >= target:
-                    passes, reached = float(done), 1.0
-                    break
+            gpc = GPC(CONCEPTS, settings, source, seed, "epochs")
+            passes, reached = passes_to(target, gpc, task, rows, range(EVERY, MOST + 1, EVERY))
             yield reading, source, "bald_kmeans", seed, {("epochs_at_target", NEW): passes, ("reached", NEW): reached}
+
+
+def passes_to(
+    accuracy: float, gpc: GPC, task: LabelingTask[np.ndarray], rows: Sequence[int], looks: Iterable[int]
+) -> tuple[float, float]:
+    """Passes of a new classifier over the initial samples and these rows of the pool to an accuracy, and 1.0.
+
+    Where no look at it finds that accuracy, all passes and 0.0.
+    """
+    h_L_d = np.concatenate([task.initial.h, task.pool.h[rows]])
+    passes, concept_L = 0, np.concatenate([task.initial.concept_N, task.pool.concept_N[rows]])
+    for passes in gpc.fit_up_to(looks, h_L_d, concept_L):
+        named_N = np.array(CONCEPTS)[gpc.attribute(task.test.h)[0].argmax(axis=1)]
+        if np.mean(named_N == task.test.concept_N) >= accuracy:
+            return float(passes), 1.0
+    return float(passes), 0.0
 
 
 def classifiers(run_files: RunFiles, readings: Sequence[Reading]) -> Iterator[Row]:

@@ -42,8 +42,8 @@ def test_the_protocols_start_is_the_classifiers_own_and_others_are_not(halves):
         *({"inducing": "random"}, {"lengthscale": "default"}, {"batch": "minibatch"}),
     ):
         assert np.abs(scores(**choice) - expected).max() > 1e-3
-    np.testing.assert_allclose(np.linalg.norm(gpc_start.of_unit_norm(test.embedding), axis=1), 1, rtol=1e-5)
-    assert not gpc_start.of_unit_norm(np.zeros((1, 3))).any()
+    np.testing.assert_allclose(np.linalg.norm(gpc_start.to_unit_norm(test.embedding), axis=1), 1, rtol=1e-5)
+    assert not gpc_start.to_unit_norm(np.zeros((1, 3))).any()
 
 
 def test_starts_touch_the_small_rate_and_table_v(run_files):
@@ -255,7 +255,7 @@ def over_all(found):
 
 def test_an_encoder_as_published_stands_in_the_place_of_the_judged_one(frame_files):
     found = over_all(
-        rows_of(frames.encoders, frame_files, {"architecture": ["judged", "published"], "objects": OBJECTS})
+        rows_of(frames.other_rows, frame_files, {"architecture": ["judged", "published"], "objects": OBJECTS})
     )
     assert found[("judged", "all"), "dgcnn-none"] == pytest.approx(15 / 18)
     assert found[("published", "all"), "dgcnn-none"] == 1
@@ -265,7 +265,7 @@ def test_an_encoder_as_published_stands_in_the_place_of_the_judged_one(frame_fil
 
 def test_the_same_rows_from_estimators_poses(frame_files):
     choices = {"initial_pose": ["true_pose", "estimated"], "objects": ["all"]}
-    found = over_all(rows_of(frames.starts, frame_files, choices))
+    found = over_all(rows_of(frames.other_rows, frame_files, choices))
     assert found[("true_pose", "all"), "dgcnn-none"] == pytest.approx(15 / 18)
     assert found[("estimated", "all"), "dgcnn-none"] == pytest.approx(1 / 3)
     assert found[("true_pose", "all"), "pointnext-none"] == pytest.approx(15 / 18)
