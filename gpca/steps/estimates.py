@@ -195,9 +195,9 @@ def try_estimators(
             training_sets[f"_{estimates.MILD}"] = situations, mild(situations, train)
             if other is not None:
                 training_sets[f"_{estimates.OTHER_SOURCE}"] = other, other.causes.rows("train")
-        lesson = cache(partial(DrawnCauses.example, method=method, settings=settings))  # sets share rows
+        example_of = cache(partial(DrawnCauses.example, method=method, settings=settings))  # sets share rows
         examples = {
-            shift: [lesson(taken_from, row) for row in spaced(rows, settings.train)] if learners else []
+            shift: [example_of(taken_from, row) for row in spaced(rows, settings.train)] if learners else []
             for shift, (taken_from, rows) in training_sets.items()
         }
         trained = {name: make_estimator(name, entry, examples[""]) for name, entry in estimators.items()}
