@@ -7,6 +7,7 @@ import trimesh
 from gpca.errors import InputError
 from gpca.frames.dataset import datasets_of, simplified
 from gpca.frames.instances import Instances, require_of_objects
+from gpca.io.arrays import save_arrays
 from gpca.objects.surface import Surface
 
 
@@ -42,6 +43,35 @@ def test_frames_of_one_scene_cannot_be_split(tiny):
     alike = changed_columns(tiny[0], {"scene": np.zeros(len(tiny[0]), int)})
     with pytest.raises(InputError, match="all are from one scene"):
         alike.split("tiny", 0, 0.4)
+
+
+def test_instances_survive_their_file(tiny, tmp_path):
+    instances, _ = tiny
+    instances.save(tmp_path / "instances.npz", ("tiny", None))
+    loaded = Instances.load(tmp_path / "instances.npz")
+    for field in fields(Instances):
+        assert np.array_equal(getattr(loaded, field.name), getattr(instances, field.name))
+
+
+def save(tiny, path, **changes):
+    arrays = {field.name: getattr(tiny[0], field.name) for field in fields(Instances) if field.name != "axes"}
+    save_arrays(path, arrays | {name: change(arrays[name]) for name, change in changes.items()}, ("tiny", None))
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "expected"),
+    [
+        ("offsets", lambda a: a[:-1], r"'offsets' is \d+, not \d+"),
+        ("offsets", lambda a: a[::-1], "'offsets' do not match"),
+        ("points_m", lambda a: np.full_like(a, np.nan), "'points_m' contains NaN"),
+        ("T_camera_object_init", lambda a: a[:, :3], "'T_camera_object_init' is"),
+        ("symmetric", lambda a: a.astype(str), "array 'symmetric' has type <U"),
+    ],
+)
+def test_a_faulty_file_is_refused(tiny, tmp_path, name, change, expected):
+    save(tiny, tmp_path / "instances.npz", **{name: change})
+    with pytest.raises(InputError, match=expected):
+        Instances.load(tmp_path / "instances.npz")
 
 
 @pytest.mark.parametrize(
