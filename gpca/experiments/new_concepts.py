@@ -24,7 +24,7 @@ from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.figures.style import BLUE, GRAY, GREEN, SKY_BLUE, VERMILION
 from gpca.reporting.sheet import Row, Sheet, Show, crossed
 from gpca.reporting.tables.builder import cautious_over
-from gpca.reporting.tables.cells import cell_of_repeats, clustered_cell, plain_cell, rows_where
+from gpca.reporting.tables.cells import cell_of_repeats, clustered_cell, plain_cell, rows_where, where
 from gpca.reporting.tables.table import Cell, Column, Table
 from gpca.reporting.words import plural
 
@@ -166,12 +166,12 @@ def table15_new_concepts(
     ]
     columns = labels | {"within": within} | accuracies | with_causes
     sheet = Sheet("table15_new_concepts", HEADS, rows, columns, metrics, more=share_within, cell=cell)
-    for row in crossed(("source", run.source_titles), ("method", NO_LABELS)):
-        accuracy = clustered_cell(without_labels, metric="accuracy", concept=ALL, **row.where)
+    for without in crossed(("source", run.source_titles), ("method", NO_LABELS)):
+        accuracy = clustered_cell(where(without_labels, without.where), metric="accuracy", concept=ALL)
         cells = {"all_labels": accuracy}  # as of the whole pool, and 0 labels where it is enough
         if accuracy and accuracy.mean >= 100 * learning["target"]:
             cells |= dict.fromkeys(labels, plain_cell(0, accuracy.seeds, accuracy.test_samples))
-        sheet.add_row(row.labels, cells, rival=False)
+        sheet.add_row(without.labels, cells, rival=False)
     fewer = {}  # datasets with fewer seeds of Geometry than of the rest
     for (row, key), shown in sheet.cells.items():
         if key == GEOMETRY and shown.seeds < sheet.seeds:

@@ -173,7 +173,8 @@ def _other_cloud(**declared: Any) -> Step:
     def modules(plan: Plan) -> list[str]:
         return [encoder_module(plan.config["encoders"][plan.names["clouded_backbone"]])]
 
-    return Step(**{"params": {"source": REAL_WORLD}, "priority": 11} | declared, settings=settings, modules=modules)
+    given: dict[str, Any] = {"params": {"source": REAL_WORLD}, "priority": 11} | declared
+    return Step(**given, settings=settings, modules=modules)
 
 
 PRETRAIN = _other_cloud(
