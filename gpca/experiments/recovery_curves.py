@@ -122,7 +122,7 @@ def recovery_thresholds(run: Run, metrics: Frame) -> Figure:
         panel.minorticks_off()
         panel.set(title=f"within {plural(k, 'action')}", ylim=(-2, 102), xlabel="error allowed (% of the diameter)")
     drawn[0].set_ylabel("recovered (%)")
-    legend_below(drawing, *drawn[0].get_legend_handles_labels(), columns=3)
+    legend_below(drawing, drawn[0].get_legend_handles_labels()[0], columns=3)
     counts = [pool_share(metrics, next(iter(shown)), at("recovered_within_1", limit)) for limit in curve]
     of = ", ".join(f"{count[1]} at {100 * limit:g} %" for limit, count in zip(curve, counts, strict=True) if count)
     style.write_title(drawing, f"{tables_title(run)}: failures: {of}")
@@ -155,7 +155,7 @@ def recovery_costs(run: Run, metrics: Frame) -> Figure:
         panel.set_xticks([0.3, 1, 3], ["0.3", "1", "3"])
         panel.minorticks_off()
     drawn[0].set_ylabel("loss per registration")
-    legend_below(drawing, *drawn[0].get_legend_handles_labels(), columns=3)
+    legend_below(drawing, drawn[0].get_legend_handles_labels()[0], columns=3)
     style.write_title(drawing, tables_title(run))
     return drawing
 
