@@ -11,12 +11,14 @@ from gpca.causes.judged import CEILING
 from gpca.causes.settings import CauseSettings
 from gpca.causes.truth import FAILED
 from gpca.classifier.scores import Attribution
+from gpca.config.check import check
 from gpca.errors import InputError
 from gpca.evaluation.measures import POOLED
 from gpca.experiments.cause_figures import draw_reenactment, usual_failure
 from gpca.experiments.reenactment import EXPERIMENT, MEASURED, collect_oracles, in_words, table9_oracle
 from gpca.reenactment.dataset import Reenactments, reenact_all
 from gpca.reenactment.settings import EVERYTHING, KNOWN, NOTHING, ReenactmentSettings
+from tests.config.configs import changed
 from tests.conftest import FEW_CAUSES
 from tests.experiments.runs import run_with
 from tests.figures import assert_words_are_large_enough_and_inside, words_of
@@ -33,9 +35,8 @@ def test_oracles_are_asked_about_the_named_sources_and_the_first_seeds():
 
 
 def test_a_source_that_there_is_not_is_refused():
-    config = CONFIG | {"oracles": {"sources": ["c"], "seeds": 1}}
     with pytest.raises(InputError, match=r"oracles\.sources"):
-        EXPERIMENT.check(config, lambda kind: set())
+        check(changed("oracles.sources", ["c"]))
 
 
 @pytest.fixture(scope="module")
