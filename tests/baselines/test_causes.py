@@ -128,7 +128,7 @@ def test_a_gate_alarms_where_its_number_is_bad(seen):
 
 
 def test_every_kind_of_explainer_has_its_own_names():
-    assert explainer_module("gpca", CAUSES) == "baselines.aligned_source"
+    assert explainer_module("gpca", CAUSES) == "baselines.gaussian_processes"
     assert explainer_module("gpca") == "gpca.explainers.gpca"
     with pytest.raises(InputError, match="explainer 'shap_oracle': unknown; choose one of"):
         explainer_entry("shap_oracle", CAUSES)
