@@ -51,6 +51,6 @@ def write_run(folder, causes, source="four", seed=100):
     paths = []
     for name, scores in files.items():
         paths.append(folder / "diagnoses" / source / name / f"seed{seed}.csv")
-        attribution = Attribution.scored(LABELS, scores / scores.sum(axis=1, keepdims=True), seconds=0.0)
+        attribution = Attribution.of_scores(LABELS, scores / scores.sum(axis=1, keepdims=True), seconds=0.0)
         write_predictions(paths[-1], causes.registrations, attribution)
     return paths, [truth]

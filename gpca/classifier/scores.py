@@ -22,7 +22,7 @@ class Attribution:
     icp_seconds_N: np.ndarray  # the part of it inside ICP
 
     @classmethod
-    def scored(
+    def of_scores(
         cls,
         concepts: tuple[str, ...],
         scores_N_C: np.ndarray,

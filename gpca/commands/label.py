@@ -169,7 +169,7 @@ def _finish(session: Session, registrations: Registrations | Queue, model: Model
         print(f"{options.out}: the model whose GP-CA has learned them; the diagnosis is as before")
     if options.predictions and isinstance(registrations, Registrations):
         scores_N_C, variances_N_C, bald_N = session.gpc.attribute(session.h_S_d)
-        attribution = Attribution.scored(session.gpc.classes, scores_N_C, seconds=0.0)
+        attribution = Attribution.of_scores(session.gpc.classes, scores_N_C, seconds=0.0)
         attribution = replace(attribution, variances_N_C=variances_N_C, bald_N=bald_N)
         inputs = [options.registrations, options.embeddings, *([options.labels] if options.labels.is_file() else [])]
         with record_provenance([options.predictions], inputs, options.settings):

@@ -9,6 +9,8 @@ WORDS = {  # field of a group's choices -> what its values are called
         "divergence": "KL divergence",
         "divergence_reversed": "reversed KL divergence",
         "log_determinant": "log determinant",
+        "trace": "trace",
+        "residual": "residual",
         "inlier_rmse": "inlier RMSE",
         "inlier_rmse_of_one": "inlier RMSE of one run",
     },

@@ -85,7 +85,9 @@ class ScoringExplainer:
         started = perf_counter()
         scores_N_C, variances_N_C, bald_N = self.summary(registrations)
         seconds = (perf_counter() - started) / len(registrations)
-        return Attribution.scored(self.labels, scores_N_C, seconds=seconds, variances_N_C=variances_N_C, bald_N=bald_N)
+        return Attribution.of_scores(
+            self.labels, scores_N_C, seconds=seconds, variances_N_C=variances_N_C, bald_N=bald_N
+        )
 
     def summary(self, registrations: Registrations) -> tuple[np.ndarray, np.ndarray | None, np.ndarray | None]:
         """Return scores and, if any, variances (N, C), and BALD (N,)."""

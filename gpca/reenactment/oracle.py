@@ -35,7 +35,7 @@ def ask_oracles(
         true, _ = drawn_again(objects, causes, row, source, seed, truth)
         for name, scores_4 in verdicts(pair, true, settings, truth).items():
             scores[name].append(scores_4)
-    return {name: Attribution.scored(LABELS, np.array(rows), seconds=0.0) for name, rows in scores.items()}
+    return {name: Attribution.of_scores(LABELS, np.array(rows), seconds=0.0) for name, rows in scores.items()}
 
 
 def verdicts(

@@ -208,7 +208,7 @@ class World:
             order = np.argsort(np.concatenate([rows for rows, _ in parts]))
             all_scores.append(np.concatenate([answer.scores_N_C for answer in answers])[order])
             all_abstained.append(np.concatenate([answer.abstained_N for answer in answers])[order])
-        return Attribution.scored(
+        return Attribution.of_scores(
             LABELS,
             np.mean(all_scores, axis=0),
             seconds=0.0,

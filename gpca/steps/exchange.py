@@ -183,7 +183,7 @@ class Exchange:
                         test_estimates.attach_to(test.without_labels(), estimated, conditions, floor)
                     )
                     scores_S_C[estimated], abstained_S[estimated] = attributed.scores_N_C, attributed.abstained_N
-                attribution = Attribution.scored(CONCEPTS, scores_S_C, seconds=0.0, abstained_N=abstained_S)
+                attribution = Attribution.of_scores(CONCEPTS, scores_S_C, seconds=0.0, abstained_N=abstained_S)
                 yield labeled(prediction_frame(test, attribution), (ESTIMATOR, estimator, estimator, name), failure_S)
 
 

@@ -101,7 +101,7 @@ def evaluate_grid(
     for name, rate, counts, gpc in fits:
         for iterations in gpc.fit_up_to(counts, h_S_d[train], concept_S[train]):
             scores_N_C, variances_N_C, bald_N = gpc.attribute(h_S_d[test])
-            attribution = Attribution.scored(
+            attribution = Attribution.of_scores(
                 CONCEPTS, scores_N_C, seconds=0.0, variances_N_C=variances_N_C, bald_N=bald_N
             )
             setting = dict(zip(SETTING, (name, rate, iterations), strict=True))

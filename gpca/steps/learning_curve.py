@@ -155,7 +155,7 @@ def learning_curve(
         fit = _fit_trees if name == "trees" else _fit_gpca
         learned, given = pool.subset(orders[i][:size]), (source, seed, "learning curve", name, size, i)
         scores_N_4 = fit(learned, tested.features, settings.classifier, *given)
-        attribution = Attribution.scored(LABELS, scores_N_4, seconds=0.0)
+        attribution = Attribution.of_scores(LABELS, scores_N_4, seconds=0.0)
         judged = judged_by(prediction_frame(truth.registrations, attribution), truth, seed)
         rows.append((name, size, i, *values(judged)))
     return pd.DataFrame(rows, columns=list(CURVE_COLUMNS))

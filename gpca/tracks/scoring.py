@@ -108,7 +108,7 @@ def _measured(
         for name, method in methods.items():
             right_N = concept_N == method.labels_named(CONCEPTS)
             values = {each: weighted_mean(right_N[mask_N], weights_B_N[:, mask_N]) for each, mask_N in masks.items()}
-            entropy_N = Attribution.scored(CONCEPTS, method.scores, seconds=0.0).entropy_N
+            entropy_N = Attribution.of_scores(CONCEPTS, method.scores, seconds=0.0).entropy_N
             values["auroc_error"] = ranking(entropy_N, ~right_N, weights_B_N)["area"]
             measured[name] = values, masks | {"auroc_error": masks["accuracy"]}
         return measured

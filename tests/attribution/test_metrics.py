@@ -61,7 +61,7 @@ def test_what_the_suite_writes_is_collected(tmp_path):
     """So the two ends of the prediction file cannot drift apart."""
     scores = np.array([[0.7, 0.2, 0.1], [0.1, 0.8, 0.1]])
     abstained = np.array([False, True])
-    attribution = Attribution.scored(CONCEPTS, scores, seconds=0.1, icp_calls=[3, 4], abstained_N=abstained)
+    attribution = Attribution.of_scores(CONCEPTS, scores, seconds=0.1, icp_calls=[3, 4], abstained_N=abstained)
     labels = {"split": ["test"] * 2, "object_name": ["cat"] * 2, "cluster": ["pet"] * 2, "concept": ["noise", "pose"]}
     path = tmp_path / "ycb" / "gpca" / "seed0.csv"
     written_by_the_suite(path, SimpleNamespace(sample=np.arange(2), **labels), attribution)

@@ -14,7 +14,7 @@ from gpca.pairs.perturbation import CONCEPTS
 def attribution(n, seed=0, **changed):
     random = np.random.default_rng(seed)
     given = {"variances_N_C": random.uniform(size=(n, 3)), "bald_N": random.uniform(size=n), "icp_calls": np.arange(n)}
-    return Attribution.scored(CONCEPTS, random.dirichlet([1, 1, 1], n), seconds=0.0, **(given | changed))
+    return Attribution.of_scores(CONCEPTS, random.dirichlet([1, 1, 1], n), seconds=0.0, **(given | changed))
 
 
 def prediction_file(path, **columns):

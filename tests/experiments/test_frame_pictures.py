@@ -54,7 +54,7 @@ def results(tiny, tmp_path_factory):
     test = registrations.rows("test")
     for row, top in ((test[0], 0.6), (test[3], 0.9)):
         scores_N_C[row] = np.roll(np.where(scores_N_C[row] > 0.5, top, (1 - top) / 2), 1)
-    attribution = Attribution.scored(CONCEPTS, scores_N_C, seconds=0.0)
+    attribution = Attribution.of_scores(CONCEPTS, scores_N_C, seconds=0.0)
     instances.save(folder / "instances.npz", ("tiny", None))
     registrations.save(folder / "registrations.npz")
     write_csv(folder / "poses.csv", poses)

@@ -112,7 +112,7 @@ def files(causes, tmp_path_factory):
         own.save(truths[-1])
         for name, scores in says.items():
             predictions.append(folder / "oracles" / source / name / "seed100.csv")
-            attribution = Attribution.scored(LABELS, scores / scores.sum(axis=1, keepdims=True), seconds=0.0)
+            attribution = Attribution.of_scores(LABELS, scores / scores.sum(axis=1, keepdims=True), seconds=0.0)
             write_predictions(predictions[-1], own.registrations, attribution)
     return predictions, truths
 

@@ -45,9 +45,9 @@ def answers(causes, random):
     guessed = random.dirichlet(np.ones(4), size=len(label))
     none = np.ones(len(label), bool)
     return {
-        ("scans", KNOWING): Attribution.scored(LABELS, known, seconds=0.0),
-        ("objects", GUESSING): Attribution.scored(LABELS, guessed, seconds=0.0),
-        ("scans", "gate_rmse"): Attribution.scored(LABELS, gate, seconds=0.0, abstained_N=none),
+        ("scans", KNOWING): Attribution.of_scores(LABELS, known, seconds=0.0),
+        ("objects", GUESSING): Attribution.of_scores(LABELS, guessed, seconds=0.0),
+        ("scans", "gate_rmse"): Attribution.of_scores(LABELS, gate, seconds=0.0, abstained_N=none),
     }
 
 

@@ -61,7 +61,7 @@ def stub(concept):
         assert np.isnan(registrations.T_target_source_true).all()
         explain.asked += registrations.sample.tolist()
         scores = np.tile(np.where(np.array(CONCEPTS) == concept, 0.8, 0.1), (len(registrations), 1))
-        said = Attribution.scored(CONCEPTS, scores, seconds=0.5)
+        said = Attribution.of_scores(CONCEPTS, scores, seconds=0.5)
         return replace(said, bald_N=np.full(len(registrations), 0.1))
 
     explain.asked = []

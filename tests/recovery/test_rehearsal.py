@@ -45,7 +45,7 @@ def test_half_of_the_rehearsed_failures_are_above_the_threshold_unless_one_is_de
 
 
 def test_the_summary_says_how_often_each_explainer_is_right(rehearsal):
-    said = Attribution.scored(CONCEPTS, np.tile([0.8, 0.1, 0.1], (30, 1)), seconds=0.0)
+    said = Attribution.of_scores(CONCEPTS, np.tile([0.8, 0.1, 0.1], (30, 1)), seconds=0.0)
     explainers = LoopExplainers({}, {}, {}, {"gpca": said}, np.array([CONCEPTS[0]] * 15 + [CONCEPTS[1]] * 15))
     gate = FailureGate(None, 0.75)
     means = Means(robot_policy(SECTION, rehearsal), ("denoise", "new_view"), None, ("new_view", "denoise"), gate)

@@ -26,7 +26,7 @@ class Nearest:
         apart = np.abs(registrations.embedding[:, None] - self.h[None]).sum(axis=2)
         named = self.concept[apart.argmin(axis=1)]
         scores = np.array([[name == each for each in CONCEPTS] for name in named], float)
-        return Attribution.scored(CONCEPTS, scores * 0.8 + 0.1, seconds=0.0)
+        return Attribution.of_scores(CONCEPTS, scores * 0.8 + 0.1, seconds=0.0)
 
 
 class Head(Nearest):
@@ -38,7 +38,7 @@ class Head(Nearest):
         pass
 
     def explain(self, registrations):
-        return Attribution.scored(CONCEPTS, registrations.attached["head_logits"], seconds=0.0)
+        return Attribution.of_scores(CONCEPTS, registrations.attached["head_logits"], seconds=0.0)
 
 
 @pytest.fixture(scope="session")

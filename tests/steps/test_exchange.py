@@ -43,7 +43,7 @@ class Nearest:
 
     def explain(self, registrations):
         named = self.concept[np.abs(registrations.embedding[:, None] - self.h[None]).sum(axis=2).argmin(axis=1)]
-        return Attribution.scored(
+        return Attribution.of_scores(
             CONCEPTS, np.array([[name == c for c in CONCEPTS] for name in named], float), seconds=0
         )
 

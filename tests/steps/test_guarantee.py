@@ -44,7 +44,7 @@ def write_measurements(folder, causes, axes, random):
     verdict = {"verdict": random.dirichlet(np.ones(4), size=n)}
     Reenactments(**arrays | names | verdict, axes=axes).save(paths["reenactments"])
     paths["diagnoses"] = folder / "diagnoses" / source / "gpca" / f"seed{seed}.csv"
-    attribution = Attribution.scored(LABELS, random.dirichlet(np.ones(4), size=n), seconds=0.0)
+    attribution = Attribution.of_scores(LABELS, random.dirichlet(np.ones(4), size=n), seconds=0.0)
     write_predictions(paths["diagnoses"], registrations, attribution)
     return paths
 
@@ -68,7 +68,7 @@ def files(causes, tmp_path_factory):
     numbers = frames.registrations.sample
     samples = {"sample": numbers, "instance": numbers // 2, "truth": "annotated"}
     write_csv(given["frame_samples"][0], pd.DataFrame(samples))
-    attribution = Attribution.scored(LABELS, random.dirichlet(np.ones(4), size=len(frames)), seconds=0.0)
+    attribution = Attribution.of_scores(LABELS, random.dirichlet(np.ones(4), size=len(frames)), seconds=0.0)
     said = prediction_frame(frames.registrations, attribution).assign(explainer="gpca")
     write_csv(given["frame_predictions"][0], said)
     return given | {"scores": [folder / "guarantee" / f"{name}.csv" for name in EXPLAINERS]}

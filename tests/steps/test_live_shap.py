@@ -91,7 +91,7 @@ def test_registering_live_gives_the_values_of_the_table(registrations):
 
 
 def test_metrics_tell_how_far_both_are_apart():
-    tabled = Attribution.scored(CONCEPTS, np.array([[1.0, 2, 0], [0, -4, 1]]), seconds=0.0, icp_calls=104)
+    tabled = Attribution.of_scores(CONCEPTS, np.array([[1.0, 2, 0], [0, -4, 1]]), seconds=0.0, icp_calls=104)
     metrics = compared(np.array([[1.0, 2.5, 0], [3, -4, 1]]), np.array([117, 130]), tabled)
     assert metrics == {
         "largest_value": 4, "largest_difference": 3, "named_alike": 0.5, "live_icp_calls": 123.5, "icp_calls": 104,

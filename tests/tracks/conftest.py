@@ -36,7 +36,7 @@ def run(causes, tmp_path_factory):
     pose_S_4 = np.tile([0.1, 0.1, 0.7, 0.1], (len(causes), 1))
     for name, scores_S_4 in {"chance": pose_S_4, "rule": knowing_scores(causes)}.items():
         path = folder / f"diagnoses/{SOURCE}/{name}/seed{SEED}.csv"
-        write_predictions(path, causes.registrations, Attribution.scored(LABELS, scores_S_4, seconds=0.0))
+        write_predictions(path, causes.registrations, Attribution.of_scores(LABELS, scores_S_4, seconds=0.0))
     return folder
 
 

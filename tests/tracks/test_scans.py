@@ -69,7 +69,7 @@ def folder(causes, full, tmp_path_factory):
             ("scans", "rule"): knowing_scores(tested),
             ("objects", "residuals"): pose_n_4,
         }.items():
-            frame = prediction_frame(tested.registrations, Attribution.scored(LABELS, scores, seconds=0.0))
+            frame = prediction_frame(tested.registrations, Attribution.of_scores(LABELS, scores, seconds=0.0))
             said.append(frame.assign(scans=name, learned=learned, explainer=explainer))
     write_csv(folder / f"scan_diagnoses/seed{SEED}.csv", pd.concat(said))
     for source in full["sources"]:

@@ -64,7 +64,7 @@ def run_files(embedded, tmp_path_factory):
     # Right but for the first test sample of each concept.
     scores_S_3 = 0.8 * (embedded.concept[:, None] == np.array(CONCEPTS)) + 0.1
     scores_S_3[embedded.rows("test")[:3]] = np.roll(scores_S_3[embedded.rows("test")[:3]], 1, axis=1)
-    write_predictions(paths["predictions"], embedded, Attribution.scored(CONCEPTS, scores_S_3, seconds=0.0))
+    write_predictions(paths["predictions"], embedded, Attribution.of_scores(CONCEPTS, scores_S_3, seconds=0.0))
     arrays = {"h": embedded.embedding, "sample": embedded.sample, "split": embedded.split}
     save_arrays(paths["embeddings"], arrays, embedded.axes)
     return RunFiles(

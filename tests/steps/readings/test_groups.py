@@ -231,9 +231,9 @@ def frame_files(run_files, embedded, tmp_path):
     moved = replace(embedded, axes=("tiny_estimated", 0))
     paths = {name: tmp_path / f"{name}.csv" for name in ("wide", "estimated")}
     scores_S_3 = 0.8 * (embedded.concept[:, None] == CONCEPTS) + 0.1
-    write_predictions(paths["wide"], embedded, Attribution.scored(CONCEPTS, scores_S_3, seconds=0.0))
+    write_predictions(paths["wide"], embedded, Attribution.of_scores(CONCEPTS, scores_S_3, seconds=0.0))
     scores_S_3[:] = [0.8, 0.1, 0.1]
-    write_predictions(paths["estimated"], moved, Attribution.scored(CONCEPTS, scores_S_3, seconds=0.0))
+    write_predictions(paths["estimated"], moved, Attribution.of_scores(CONCEPTS, scores_S_3, seconds=0.0))
     moved.save(tmp_path / "estimated.npz")
     judged = run_files.predictions["tiny", "gpca_paper", 0]  # right but for the first of each concept
     return replace(
