@@ -170,7 +170,7 @@ class Explainer:
             scene=Scene(
                 *(clouds.source, clouds.target, T_found, clouds.frame),
                 *(self.model.icp.correspondence_distance, Limits().failed),
-                *(enactments, self.model.diagnoser.truth),
+                *((enactments, self.model.diagnoser.truth) if enactments else ()),
             ),
         )
 
