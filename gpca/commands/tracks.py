@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from gpca.errors import InputError, require_known
-from gpca.io.files import require_outputs
+from gpca.io.files import require_outputs, whole_file
 from gpca.jobs.arguments import COUNT
 from gpca.tracks import leaderboard
 from gpca.tracks.published import FOLDER, Published
@@ -113,6 +113,8 @@ def add_leaderboard_arguments(parser: ArgumentParser) -> None:
 
 def run_leaderboard(options: Namespace) -> int:
     """Check all submissions and write the page; faults are lines on stderr, with status 2."""
+    from gpca.page.page import render
+
     page = options.out or options.submissions / "index.html"
     if not options.check:
         require_outputs([page])
@@ -123,7 +125,9 @@ def run_leaderboard(options: Namespace) -> int:
     counts = ", ".join(f"{len(entries)} of the track {track}" for track, entries in submissions.items()) or "none"
     print(f"submissions: {counts}")
     if not options.check:
-        leaderboard.write_page(submissions, page)
+        with whole_file(page) as partial:
+            text = render("leaderboard.html.jinja", boards=leaderboard.boards(submissions))
+            partial.write_text(text, encoding="utf-8")
         print(page)
     return 0
 

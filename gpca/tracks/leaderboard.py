@@ -15,7 +15,6 @@ from gpca.experiments.cause_tables import AGAIN, SHOWN
 from gpca.experiments.frame_causes import FEWEST_FAILURES, STARTS, STATE
 from gpca.experiments.scan_failures import COLUMNS as SCAN_COLUMNS
 from gpca.experiments.scan_failures import NOT_COMPARED
-from gpca.io.files import whole_file
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.reporting.tables.builder import TableBuilder
 from gpca.reporting.tables.cells import interval_cell, plain_cell, rows_where
@@ -168,17 +167,13 @@ def read_submissions(folder: Path) -> tuple[dict[str, list[Submission]], list[st
     return submissions, faults
 
 
-def write_page(submissions: Mapping[str, Sequence[Submission]], path: Path) -> None:
-    """Write the page of all published tracks."""
-    from gpca.page.page import render
-
-    boards = [
+def boards(submissions: Mapping[str, Sequence[Submission]]) -> list[dict[str, Any]]:
+    """Return :func:`board_of` of all published tracks, with the submissions by the name of the track."""
+    return [
         board_of(Published.load(track), submissions.get(name, ()))
         for name, track in TRACKS.items()
         if (PUBLISHED / f"{name}.npz").is_file()
     ]
-    with whole_file(path) as partial:
-        partial.write_text(render("leaderboard.html.jinja", boards=boards), encoding="utf-8")
 
 
 def board_of(published: Published, submissions: Sequence[Submission]) -> dict[str, Any]:
