@@ -96,7 +96,7 @@ def promise(guarantee: Guaranteed | None) -> str:
     return section(
         "What is guaranteed",
         f'<ul class="chips" aria-label="Set of states">{chips}</ul>'
-        f"<p>The true state is one of those marked: {guarantee.level:.0%} of such sets hold it. {counted}</p>"
+        f"<p>The true state is one of those marked: {guarantee.level:.0%} of such sets contain it. {counted}</p>"
         f"<p>Failure alarm: {call}. {risk}</p>",
     )
 

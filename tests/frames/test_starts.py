@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from gpca.errors import InputError
 from gpca.frames.dataset import Dataset, read_models
-from gpca.frames.starts import CARRIED, GLOBAL, LADDER, NATIVE, TRANSPLANTED, all_starts
+from gpca.frames.starts import CARRIED, GLOBAL, LADDER, NATIVE, TRANSPLANTED, Starts, all_starts
 from gpca.objects.canonical import CARRIED as IS_CARRIED
 from gpca.objects.canonical import Place
 from gpca.rigid import inverse, rotation_angle_rad
@@ -82,3 +83,16 @@ def test_global_registration_is_an_estimate_in_the_image(read):
     found = starts(with_results=False, instances=replace(instances, init_from=np.full(len(instances), GLOBAL)))
     assert set(found.kind) == {NATIVE}
     assert (found.T_camera_object_init == instances.T_camera_object_init).all()
+
+
+def test_a_file_of_starts_is_read_as_it_was_written_and_for_its_seed_alone(read, tmp_path):
+    starts, _, _ = read
+    found, path = starts(rungs=[(30.0, 0.1)]), tmp_path / "starts.npz"
+    found.save(path, ("tiny", 100))
+    again = Starts.load(path, ("tiny", 100))
+    assert all(np.array_equal(again.arrays[name], values) for name, values in found.arrays.items())
+    with pytest.raises(InputError, match="seed 100"):
+        Starts.load(path, ("tiny", 101))
+    np.savez(path, **dict(np.load(path)) | {"T_camera_object_init": np.zeros((len(found), 4, 3))})
+    with pytest.raises(InputError, match="array 'T_camera_object_init' is"):
+        Starts.load(path, ("tiny", 100))

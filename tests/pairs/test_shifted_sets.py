@@ -19,6 +19,13 @@ def sets(n=12):
     return ShiftedSets(names, split, np.tile(np.arange(n), 6), concept, cup, cup, h, distance)
 
 
+def test_a_file_gives_back_what_was_saved(tmp_path):
+    sets().save(tmp_path / "seed0.npz", ("tiny", 0))
+    loaded = ShiftedSets.load(tmp_path / "seed0.npz")
+    for name, array in sets().arrays.items():
+        assert np.array_equal(getattr(loaded, name), array)
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [

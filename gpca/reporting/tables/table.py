@@ -72,7 +72,7 @@ class Table:
     columns: Mapping[str, Column]
     cells: Mapping[tuple[int, str], Cell]  # by row number and column key; a missing one is shown as a dash
     footnotes: tuple[str, ...] = ()
-    compared: tuple[Sequence[tuple[int, str]], ...] = ()  # groups of such keys; the best mean of each is bold
+    compared: tuple[Sequence[tuple[int, str]], ...] = ()  # groups of cells; the best mean in each is bold
 
     def best(self) -> set[tuple[int, str]]:
         """Return the keys of the cells with the best printed mean of their group, which takes seeds for an interval.
