@@ -13,6 +13,12 @@ def forget():
     _imports.cache_clear()
 
 
+def lies_outside(module):
+    """Whether a file outside the checkout and the environment defines a module; C defines some, in no file at all."""
+    places = [module.__file__] if getattr(module, "__file__", None) else getattr(module, "__path__", [])
+    return any(not place.startswith((str(ROOT), sys.prefix, sys.base_prefix)) for place in places)
+
+
 @pytest.fixture
 def apart(monkeypatch):
     """No plugin is known, and those that the test brings are forgotten at its end."""
@@ -22,8 +28,7 @@ def apart(monkeypatch):
     forget()
     yield
     for name in set(sys.modules) - modules:
-        file = getattr(sys.modules[name], "__file__", None) or ""
-        if not file.startswith((str(ROOT), sys.prefix, sys.base_prefix)):
+        if lies_outside(sys.modules[name]):
             del sys.modules[name]
     plugins.ROOTS.clear()
     plugins.ROOTS.update(roots)

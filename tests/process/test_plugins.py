@@ -1,6 +1,7 @@
 """Code from outside: files and modules that a config names, and installed packages that announce themselves."""
 
 import sys
+from types import ModuleType
 
 import pytest
 
@@ -14,6 +15,7 @@ from gpca.process.code_files import code_files
 from gpca.process.plugins import load, named, use
 
 from ..config.configs import load as load_config
+from ..plugins_apart import lies_outside
 
 EXPLAINER = """
 from gpca.explainers.interface import ExplainerEntry, ScoringExplainer
@@ -167,3 +169,13 @@ def test_a_package_that_cannot_be_imported_is_named(folder, monkeypatch):
 def test_a_file_is_imported_once(folder):
     write(folder, {"once": "SOURCES = {}\n"})
     assert load("once.py") is load(str(folder / "once.py")) is sys.modules["once"]
+
+
+def test_the_tests_forget_plugins_and_no_module_of_a_library(folder):
+    write(folder, {"own": "SOURCES = {}\n", "helpers/helper": ""})
+    load("own.py")
+    from helpers import helper
+
+    assert all(lies_outside(sys.modules[name]) for name in ("own", "helpers", helper.__name__))
+    # torch defines torch._C._functorch so, and imports it when it first needs it.
+    assert not any(map(lies_outside, (pytest, sys, ModuleType("of_c"), sys.modules[__name__])))
