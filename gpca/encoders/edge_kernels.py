@@ -94,7 +94,7 @@ def _collect_up_to(row, above, out):
 def _collect_with_ties(row, below, above, out):
     filled = 0
     for j in range(row.size):
-        if row[j] <= below:
+        if filled < out.size and row[j] <= below:  # more than fit, where they are -inf
             out[filled] = j
             filled += 1
     for j in range(row.size):

@@ -53,7 +53,8 @@ def test_a_mesh_is_sampled_in_its_own_frame_and_measured_by_its_vertices(tmp_pat
     ("make", "unit", "message"),
     [
         (lambda f: f / "lost.ply", "m", "lost.ply: no such file; give one of .ply"),
-        (lambda f: written(f, "few.ply", POINTS[:10]), "m", "few.ply: has 10 points; give 64 or more"),
+        (lambda f: written(f, "few.ply", POINTS[:63]), "m", "few.ply: has 63 points; give 64 or more"),
+        (lambda f: written(f, "one.ply", POINTS[:1]), "m", "one.ply: has 1 points"),
         (lambda f: written(f, "few.pcd", POINTS[:10]), "m", "few.pcd: has 10 points"),
         (lambda f: written(f, "nan.ply", np.where(POINTS > 0.29, np.nan, POINTS)), "m", "nan.ply: .* contain NaN"),
         (
