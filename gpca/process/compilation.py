@@ -1,59 +1,12 @@
-"""Numba with a cache of compiled loops per state of their code.
-
-Numba itself checks a function's own file only, not the modules that it imports. The caches name a loop by its
-package, not by its path as numba does, so that a copied or moved checkout keeps its compiled loops.
-"""
+"""Loops that numba compiles, which is imported when the first of them is called."""
 
 from __future__ import annotations
 
-import hashlib
-import os
-import sys
-import tempfile
-from functools import cache
-from pathlib import Path
-from typing import Any
+from collections.abc import Callable
+from functools import cached_property, update_wrapper
+from typing import Any, ClassVar
 
-from gpca.process.code_files import ROOT, code_files
-
-VARIABLE = "NUMBA_CACHE_DIR"
 NOTICE = "compiling loops, which takes up to half a minute; later calls load what is kept of them"
-
-
-def _cache_folder() -> Path:
-    loops = [path for path in sorted(ROOT.glob("gpca/**/*.py")) if b"njit" in path.read_bytes()]
-    modules = (".".join(path.relative_to(ROOT).with_suffix("").parts) for path in loops)
-    code = b"".join(Path(file).read_bytes() for file in code_files(*modules))
-    state = f"loops-{hashlib.sha256(code).hexdigest()[:16]}"
-    if given := os.environ.get(VARIABLE):  # by the user, or by the parent process with the state
-        return Path(given) if Path(given).name == state else Path(given, state)
-    user = Path(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"))
-    for folder in (Path(__file__).parent / "__pycache__", user / "gpca"):
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            with tempfile.TemporaryFile(dir=folder):
-                return folder / state
-        except OSError:  # not writable
-            continue
-    folder = Path(tempfile.gettempdir(), f"gpca-numba-{os.getuid()}")  # for this user alone, as the code in it is run
-    try:
-        folder.mkdir(mode=0o700, exist_ok=True)
-        is_ours = not folder.is_symlink() and folder.stat().st_uid == os.getuid()
-    except OSError:
-        is_ours = False
-    return (folder if is_ours else Path(tempfile.mkdtemp(prefix="gpca-numba-"))) / state
-
-
-os.environ[VARIABLE] = str(_cache_folder())  # numba reads the variable when it is imported
-
-from numba import config, njit, prange  # noqa: E402
-from numba.core.caching import UserProvidedCacheLocator  # noqa: E402
-from numba.core.event import Listener, register  # noqa: E402
-
-setattr(config, "CACHE_DIR", os.environ[VARIABLE])  # noqa: B010 - numba may have been imported before
-
-__all__ = ["INNER_LOOP", "NOTICE", "OVER_CLOUDS", "njit", "prange", "say_when_compiling"]
-
 # Without numba's reference counting (`_nrt`), which takes longer than the search in the loops of ICP, as it counts for
 # every array taken out of a tuple. Such functions cannot allocate arrays.
 INNER_LOOP: dict[str, Any] = {
@@ -69,38 +22,37 @@ OVER_CLOUDS: dict[str, Any] = {
     "error_model": "numpy",
     "fastmath": {"contract", "nsz", "nnan"},
 }
+prange = range  # until numba is there
 
 
-class PackageLocator(UserProvidedCacheLocator):
-    """Keeps the loops of one of our packages in a folder of its name."""
+class Loop:
+    """A compiled function of arrays and numbers; `py_func` is what was written."""
 
-    @classmethod
-    def from_function(cls, py_func: Any, py_file: str) -> PackageLocator | None:
-        """Return the locator of one of our functions; None leaves others to numba."""
-        return super().from_function(py_func, py_file) if Path(py_file).is_relative_to(ROOT) else None
+    announced: ClassVar[bool] = False  # whether the next compilation is told
 
-    @classmethod
-    def get_suitable_cache_subpath(cls, py_file: str) -> str:
-        """Return the name of the file's package."""
-        return ".".join(Path(py_file).relative_to(ROOT).parent.parts)
+    def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
+        update_wrapper(self, function)
+        self.py_func, self._options = function, options
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Run the loop."""
+        return self.dispatcher(*arguments)
+
+    @cached_property
+    def dispatcher(self) -> Any:
+        """What numba makes of the function."""
+        from gpca.process import numba_cache
+
+        if self._options.get("parallel"):
+            self.py_func.__globals__["prange"] = numba_cache.prange
+        return numba_cache.njit(**self._options)(self.py_func)
 
 
-setattr(config, "CACHE_LOCATOR_CLASSES", f"{__name__}.{PackageLocator.__name__},{UserProvidedCacheLocator.__name__}")  # noqa: B010
+def njit(**options: Any) -> Callable[[Callable[..., Any]], Loop]:
+    """Return a decorator that makes a loop of a function, by options of numba's decorator of that name."""
+    return lambda function: Loop(function, options)
 
 
-@cache
 def say_when_compiling() -> None:
-    """Print one line to stderr when the first loop is compiled rather than loaded."""
-    register("numba:compile", _Notice())
-
-
-class _Notice(Listener):
-    printed = False
-
-    def on_start(self, event: object) -> None:
-        if not self.printed:
-            print(NOTICE, file=sys.stderr, flush=True)
-        self.printed = True
-
-    def on_end(self, event: object) -> None:
-        """Do nothing."""
+    """Print one line to stderr when the next loop is compiled rather than loaded."""
+    Loop.announced = True

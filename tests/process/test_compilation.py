@@ -11,7 +11,7 @@ import pytest
 from gpca.process.compilation import NOTICE
 from tests.documents import ROOT
 
-CODE = "import numba, gpca.process.compilation; print(numba.config.CACHE_DIR)"
+CODE = "import numba, gpca.process.numba_cache; print(numba.config.CACHE_DIR)"
 
 
 def imported(folder, code=CODE, **variables):
@@ -32,6 +32,7 @@ def package(tmp_path):
         "process/plugins.py",
         "process/__init__.py",
         "process/compilation.py",
+        "process/numba_cache.py",
     ):
         (tmp_path / "gpca" / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / "gpca" / name, tmp_path / "gpca" / name)
@@ -80,7 +81,7 @@ def test_a_first_call_says_that_it_compiles_and_later_ones_do_not(package):
 
 
 def test_a_copy_elsewhere_takes_along_what_was_compiled(package, tmp_path_factory):
-    code = "from gpca.upper import upper; print(upper(1), *upper.stats.cache_hits.values())"
+    code = "from gpca.upper import upper; print(upper(1), *upper.dispatcher.stats.cache_hits.values())"
     assert imported(package, code).stdout.strip() == "20"
     copy = shutil.copytree(package, tmp_path_factory.mktemp("elsewhere") / "copy")
     assert imported(copy, code).stdout.strip() == "20 1"
@@ -89,13 +90,13 @@ def test_a_copy_elsewhere_takes_along_what_was_compiled(package, tmp_path_factor
 def test_loops_of_others_are_kept_too(package, tmp_path_factory):
     elsewhere = tmp_path_factory.mktemp("elsewhere")
     (elsewhere / "theirs.py").write_text("from numba import njit\n@njit(cache=True)\ndef f(x):\n    return x\n")
-    code = f"import sys; import gpca.process.compilation; sys.path.insert(0, {str(elsewhere)!r})\n"
+    code = f"import sys; import gpca.process.numba_cache; sys.path.insert(0, {str(elsewhere)!r})\n"
     code += "from theirs import f; print(f(1), *f.stats.cache_hits.values())"
     assert [imported(package, code).stdout.strip() for _ in range(2)] == ["1", "1 1"]
 
 
 def test_a_loop_is_compiled_anew_when_a_module_beneath_its_own_has_changed(package):
-    code = "from gpca.upper import upper; print(upper(1), *upper.stats.cache_hits.values())"
+    code = "from gpca.upper import upper; print(upper(1), *upper.dispatcher.stats.cache_hits.values())"
     printed = []
     for added in (1, 1, 2):
         write_lower(package, added)

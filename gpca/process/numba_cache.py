@@ -1,0 +1,85 @@
+"""Numba with a cache of compiled loops per state of their code, imported when the first loop is compiled.
+
+Numba itself checks a function's own file only, not the modules that it imports. The caches name a loop by its
+package, not by its path as numba does, so that a copied or moved checkout keeps its compiled loops.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from numba import config, njit, prange, types
+from numba.core.caching import UserProvidedCacheLocator
+from numba.core.event import Listener, register
+from numba.extending import typeof_impl
+
+from gpca.process.code_files import ROOT, code_files
+from gpca.process.compilation import NOTICE, Loop
+
+__all__ = ["njit", "prange"]
+
+VARIABLE = "NUMBA_CACHE_DIR"
+
+
+def _cache_folder() -> Path:
+    loops = [path for path in sorted(ROOT.glob("gpca/**/*.py")) if b"njit" in path.read_bytes()]
+    modules = (".".join(path.relative_to(ROOT).with_suffix("").parts) for path in loops)
+    code = b"".join(Path(file).read_bytes() for file in code_files(*modules))
+    state = f"loops-{hashlib.sha256(code).hexdigest()[:16]}"
+    if given := os.environ.get(VARIABLE):  # by the user, or by the parent process with the state
+        return Path(given) if Path(given).name == state else Path(given, state)
+    user = Path(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"))
+    for folder in (Path(__file__).parent / "__pycache__", user / "gpca"):
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryFile(dir=folder):
+                return folder / state
+        except OSError:  # not writable
+            continue
+    folder = Path(tempfile.gettempdir(), f"gpca-numba-{os.getuid()}")  # for this user alone, as the code in it is run
+    try:
+        folder.mkdir(mode=0o700, exist_ok=True)
+        is_ours = not folder.is_symlink() and folder.stat().st_uid == os.getuid()
+    except OSError:
+        is_ours = False
+    return (folder if is_ours else Path(tempfile.mkdtemp(prefix="gpca-numba-"))) / state
+
+
+class PackageLocator(UserProvidedCacheLocator):
+    """Keeps the loops of one of our packages in a folder of its name."""
+
+    @classmethod
+    def from_function(cls, py_func: Any, py_file: str) -> PackageLocator | None:
+        """Return the locator of one of our functions; None leaves others to numba."""
+        return super().from_function(py_func, py_file) if Path(py_file).is_relative_to(ROOT) else None
+
+    @classmethod
+    def get_suitable_cache_subpath(cls, py_file: str) -> str:
+        """Return the name of the file's package."""
+        return ".".join(Path(py_file).relative_to(ROOT).parent.parts)
+
+
+class _Notice(Listener):
+    def on_start(self, event: object) -> None:
+        if Loop.announced:
+            print(NOTICE, file=sys.stderr, flush=True)
+        Loop.announced = False
+
+    def on_end(self, event: object) -> None:
+        """Do nothing."""
+
+
+@typeof_impl.register(Loop)
+def _type_of_loop(loop: Loop, context: object) -> types.Dispatcher:
+    return types.Dispatcher(loop.dispatcher)  # where another loop calls it
+
+
+os.environ[VARIABLE] = str(_cache_folder())  # read by numba whenever such a variable has changed, and by children
+setattr(config, "CACHE_DIR", os.environ[VARIABLE])  # noqa: B010 - numba may have been imported before
+setattr(config, "CACHE_LOCATOR_CLASSES", f"{__name__}.{PackageLocator.__name__},{UserProvidedCacheLocator.__name__}")  # noqa: B010
+register("numba:compile", _Notice())
