@@ -2,8 +2,9 @@
 
 The pigeonhole bootstrap (Owen 2007) draws clusters (families of objects, scenes, rendered tables) and seeds with
 replacement and weights a sample by the product of the two counts. A share has the farther bounds of it and of Wilson's
-interval for independent samples, because few clusters may agree by chance. Where all draws agree, Wilson's interval
-counts a cluster once in each seed. docs/comparison.md states this rule, benchmarks/intervals.py checks its coverage.
+interval for independent samples, because few clusters may agree by chance; an instance that counts once in the share,
+whatever its number of starts, is one of them. Where all draws agree, Wilson's interval counts a cluster once in each
+seed. docs/comparison.md states this rule, benchmarks/intervals.py checks its coverage.
 """
 
 from __future__ import annotations
@@ -58,7 +59,7 @@ def interval(
         drawn_B_N: (B, N) for a share: how often each draw contains each of its N samples. Without it, the interval is
             that of the bootstrap alone.
         difference: the statistic is a difference of two shares of the same samples.
-        samples: their number where a column of `drawn_B_N` stands for several.
+        samples: the number of independent ones, where a column of `drawn_B_N` is not one of them.
     """
     value, (low, high) = float(value_B[0]), quantile_bounds(value_B[1:], level)
     if drawn_B_N is None or np.isnan(low):
@@ -141,6 +142,7 @@ class Clustered:
     seed: np.ndarray
     cluster: np.ndarray
     weights: np.ndarray  # (1 + B, N): ones for the samples themselves, then the counts of each draw
+    instance: np.ndarray | None = None  # (N,) that counts once, whatever its number of samples; None: each sample does
 
     @classmethod
     def drawn(cls, seed_N: Iterable, cluster_N: Iterable, *axes: object) -> Clustered:
@@ -154,16 +156,30 @@ class Clustered:
 
     def subset(self, rows: np.ndarray) -> Clustered:
         """The given rows, or those of a mask, with their draws."""
-        return Clustered(self.seed[rows], self.cluster[rows], self.weights[:, rows])
+        instance_n = None if self.instance is None else self.instance[rows]
+        return Clustered(self.seed[rows], self.cluster[rows], self.weights[:, rows], instance_n)
 
     @property
     def counts(self) -> tuple[int, int, int]:
         """Numbers of seeds, clusters and samples."""
         return len(np.unique(self.seed)), len(np.unique(self.cluster)), len(self)
 
+    @property
+    def independent(self) -> int:
+        """Number of instances, or of samples where each counts."""
+        return len(self) if self.instance is None else len(np.unique(self.instance))
+
+    @property
+    def once(self) -> np.ndarray:
+        """Weights (N,) by which an instance counts once."""
+        if self.instance is None:
+            return np.ones(len(self))
+        _, instance_N, count = np.unique(self.instance, return_inverse=True, return_counts=True)
+        return 1 / count[instance_N]
+
     def share(self, right_N: np.ndarray) -> Estimate:
         """Share of the samples that are right."""
-        return interval(weighted_mean(right_N, self.weights), self.weights[1:])
+        return interval(weighted_mean(right_N, self.weights * self.once), self.weights[1:], samples=self.independent)
 
     def difference(self, right_N: np.ndarray, other_N: np.ndarray) -> Estimate:
         """Share that is right minus another share of the same samples, paired by draw."""

@@ -136,7 +136,7 @@ def compared(
     rows = []
     for method, value_B in values.items():
         names = (*keys, method, metric, part)
-        value, *bounds = interval(value_B, drawn_B_N)
+        value, *bounds = interval(value_B, drawn_B_N, samples=draws.independent)
         if limits is not SHARE:
             bounds = np.clip(bounds, *limits).tolist()
         rows.append((*names, "", "", *draws.counts, value, *bounds))

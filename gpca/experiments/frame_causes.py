@@ -165,10 +165,10 @@ def collect(
             continue
         scene_N = starts["scene"].to_numpy(str)
         drawn_B_N = pigeonhole_weights(generator("frame cause intervals", kind), scene_N)
-        draws = Clustered(starts["seed"].to_numpy(), scene_N, np.vstack([np.ones(len(starts)), drawn_B_N]))
-        once_N = 1 / starts.groupby("instance")["instance"].transform("size").to_numpy(float)
+        ones_N, instance_N = np.ones(len(starts)), starts["instance"].to_numpy()
+        draws = Clustered(starts["seed"].to_numpy(), scene_N, np.vstack([ones_N, drawn_B_N]), instance_N)
 
-        def measured(each: Judged, weights_B_N: np.ndarray, once_N: np.ndarray = once_N) -> dict[str, np.ndarray]:
+        def measured(each: Judged, weights_B_N: np.ndarray, once_N: np.ndarray = draws.once) -> dict[str, np.ndarray]:
             # The number of samples also where nothing else can be measured.
             return measure(each, weights_B_N * once_N) | {SAMPLES: np.full(len(weights_B_N), float(len(each)))}
 

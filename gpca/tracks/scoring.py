@@ -6,6 +6,7 @@ All methods are measured on the same samples and the same bootstrap draws.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -30,7 +31,7 @@ AGAINST = ("against", "difference", "difference_low", "difference_high")  # of t
 HARD_MEASURES = ("accuracy", *(f"recall_{concept}" for concept in CONCEPTS), "auroc_error")
 SHARES_OF_SAMPLES = (*SHARES, *HARD_MEASURES, SCAN_MEASURE)  # Wilson's interval in the place of one without width
 Arrays = dict[str, np.ndarray]
-Group = tuple[str, np.ndarray, Clustered, np.ndarray]
+Group = tuple[str, np.ndarray, Clustered]
 
 
 def score(published: Published, submitted: Mapping[str, Method]) -> tuple[pd.DataFrame, pd.DataFrame]:
@@ -46,28 +47,28 @@ def score(published: Published, submitted: Mapping[str, Method]) -> tuple[pd.Dat
     rows: list[tuple] = []
     differences: list[tuple] = []
     methods = {method.name: method for method in published.methods} | dict(submitted)
-    for group, chosen, draws, once_N in groups_of(published):
-        drawn_B_N = draws.weights[1:]
+    for group, chosen, draws in groups_of(published):
         complete = {name: method for name, method in methods.items() if np.isfinite(method.scores[chosen]).all()}
-        measured = _measured(published, complete, chosen, draws.weights * once_N)
+        measured = _measured(published, complete, chosen, draws.weights * draws.once)
         for name, (values, masks) in measured.items():
             for metric, value_B in values.items():
                 if np.isfinite(value_B[0]):
-                    samples = drawn_B_N[:, masks[metric]] if metric in SHARES_OF_SAMPLES else None
-                    keys = (group, name, metric, int(masks[metric].sum()), draws.counts[0])
-                    rows.append((*keys, *interval(value_B, samples)))
+                    own = draws.subset(masks[metric])
+                    drawn_B_n = own.weights[1:] if metric in SHARES_OF_SAMPLES else None
+                    estimate = interval(value_B, drawn_B_n, samples=own.independent)
+                    rows.append((group, name, metric, len(own), draws.counts[0], *estimate))
         ranked = [name for name, (values, _) in measured.items() if headline in values]
         for against in (name for name in submitted if name in ranked):
             for name in (name for name in ranked if name not in (against, CEILING)):
                 values, masks = measured[name]
                 difference_B = values[headline] - measured[against][0][headline]
-                estimate = interval(difference_B, drawn_B_N[:, masks[headline]], difference=True)
+                estimate = interval(difference_B, draws.weights[1:, masks[headline]], difference=True)
                 differences.append((group, name, against, *estimate))
     return (pd.DataFrame(rows, columns=list(COLUMNS)), pd.DataFrame(differences, columns=["group", "method", *AGAINST]))
 
 
 def groups_of(published: Published) -> Iterator[Group]:
-    """Yield each separately scored group: name, rows, their draws, which are those of the run's tables, weights (N,).
+    """Yield each separately scored group: name, rows, and their draws, which are those of the run's tables.
 
     Groups are the kinds of starts of depth frames, in which an instance counts once whatever its number of starts, and
     the data sets of scans, also pooled.
@@ -76,14 +77,12 @@ def groups_of(published: Published) -> Iterator[Group]:
 
     def group(name: str, mask_N: np.ndarray, cluster_N: np.ndarray, *axes: str) -> Group:
         chosen = np.flatnonzero(mask_N)
-        draws = Clustered.drawn(rows.seed[chosen], cluster_N[chosen], track.draws, name, *axes)
-        return name, chosen, draws, np.ones(len(chosen))
+        return name, chosen, Clustered.drawn(rows.seed[chosen], cluster_N[chosen], track.draws, name, *axes)
 
     if track.name == FRAMES_TRACK:
         for kind in dict.fromkeys(rows.start[rows.counted].tolist()):
-            name, chosen, draws, _ = group(kind, (rows.start == kind) & rows.counted, rows.scene)
-            _, instance_N, count = np.unique(rows.instance[chosen], return_inverse=True, return_counts=True)
-            yield name, chosen, draws, 1 / count[instance_N]
+            name, chosen, draws = group(kind, (rows.start == kind) & rows.counted, rows.scene)
+            yield name, chosen, replace(draws, instance=rows.instance[chosen])
     elif track.name == SCANS_TRACK:
         names = list(dict.fromkeys(rows.source.tolist()))
         for name in [POOLED, *names] if len(names) > 1 else names:

@@ -1,11 +1,13 @@
 """Intervals over clusters and seeds."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from gpca.errors import InputError
 from gpca.evaluation.intervals import Clustered, interval, pigeonhole_weights, quantile_bounds, wilson_interval
-from gpca.evaluation.measures import AGAINST, COLUMNS, intervals, read_clustered
+from gpca.evaluation.measures import AGAINST, COLUMNS, SHARE, compared, intervals, read_clustered
 from gpca.io.csv_file import write_csv
 from gpca.seeds import generator
 
@@ -40,6 +42,18 @@ def test_a_share_is_as_wide_as_its_clusters_make_it_or_wilsons(samples):
     assert width["clusters"] > 1.5 * width["apart"] > 0
     assert samples.share(np.ones(24)) == (1, *wilson_interval(6, 6))
     assert samples.subset(CLUSTER == "can").share(np.zeros(8)) == (0, *wilson_interval(0, 2))
+
+
+def test_an_instance_with_several_starts_counts_once_in_a_share_and_in_its_interval():
+    right, starts = np.array([1, 0, 0, 0, 1, 1]), np.arange(1, 7)
+    alike = Clustered.drawn(np.zeros(6), np.repeat(["cup", "can"], 3), "tiny")
+    several = replace(alike.subset(np.repeat(np.arange(6), starts)), instance=np.repeat(np.arange(6), starts))
+    assert several.share(np.repeat(right, starts)) == pytest.approx(alike.share(right))
+    for samples in (alike, several):
+        values = {"rule": np.append(0.5, np.tile([0.4, 0.6], 250))}
+        [row] = compared(("t", "ycb"), "accuracy", "all", values, samples, SHARE)
+        assert row[-2:] == wilson_interval(3, 6)
+    assert several.subset(slice(1, None)).independent == 5
 
 
 def test_a_difference_is_paired_a_mean_has_limits_and_one_cluster_says_nothing(samples):

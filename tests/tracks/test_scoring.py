@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from gpca.causes.judged import CEILING
@@ -10,7 +11,7 @@ from gpca.evaluation.measures import POOLED
 from gpca.experiments.diagnosis import collect
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.tracks.leaderboard import MARK, as_text, table_of
-from gpca.tracks.published import Method
+from gpca.tracks.published import Method, Rows
 from gpca.tracks.scoring import groups_of, score
 from gpca.tracks.track import TRACKS
 
@@ -85,11 +86,24 @@ def test_starts_of_depth_frames_are_scored_by_kind_and_an_instance_counts_once(s
     start, counted = np.resize(["native", "ladder"], n), np.arange(n) != 0
     rows = replace(shipped.rows, start=start, instance=np.arange(n) // 4, counted=counted)
     frames = replace(shipped, track=TRACKS["frames"], rows=rows)
-    groups = {kind: (chosen, once_N) for kind, chosen, _, once_N in groups_of(frames)}
+    groups = {kind: (chosen, draws) for kind, chosen, draws in groups_of(frames)}
     assert set(groups) == {"native", "ladder"}
     assert 0 not in groups["native"][0]
-    for chosen, once_N in groups.values():
-        assert once_N.sum() == pytest.approx(len(set(rows.instance[chosen])))
+    for chosen, draws in groups.values():
+        assert draws.once.sum() == pytest.approx(len(set(rows.instance[chosen])))
     scores, _ = score(frames, {})
     assert set(scores["group"]) == {"native", "ladder"}
     assert "Ladder of errors" in as_text(table_of(frames, {}, *score(frames, {})))
+
+
+def test_more_starts_of_the_same_instances_make_no_interval_narrower(shipped):
+    n, tables = len(shipped.rows), []
+    for starts in (1, 3):
+        again = np.tile(np.arange(n), starts)
+        arrays = {name: array[again] for name, array in shipped.rows.arrays.items()}
+        starts_of = {"start": np.full(n * starts, "native"), "instance": again, "scene": again.astype(str)}
+        rows = Rows(**arrays | starts_of | {"counted": again >= 0})
+        methods = tuple(replace(each, scores=each.scores[again], named=each.named[again]) for each in shipped.methods)
+        frames = replace(shipped, track=TRACKS["frames"], rows=rows, methods=methods)
+        tables.append(score(frames, {})[0].drop(columns="samples"))
+    pd.testing.assert_frame_equal(*tables)
