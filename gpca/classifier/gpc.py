@@ -9,18 +9,22 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict
+from typing import TYPE_CHECKING
 
 import numpy as np
-import torch
 
 from gpca.classifier.latents import Latents, Projection, Sites, elbo, refine
+from gpca.classifier.prior import Covariance, Prior, Standardization
 from gpca.classifier.scores import score_marginals, summarize_marginals
 from gpca.classifier.settings import GPCSettings
-from gpca.classifier.sparse_gp import Prior, SparseGPs, Standardization, Start, make_covariance
 from gpca.errors import InputError
-from gpca.portable import Adam
 from gpca.process.progress import progress
 from gpca.seeds import generator
+
+if TYPE_CHECKING:
+    import torch
+
+    from gpca.classifier.sparse_gp import SparseGPs, Start
 
 
 class GPC:
@@ -55,14 +59,19 @@ class GPC:
 
         The fit may start from the result of a classifier `before` of the same classes.
         """
+        import torch
+
+        from gpca.classifier.sparse_gp import SparseGPs, Start
+        from gpca.portable import Adam
+
         if before is None:
             around_R_d = h_N_d if around_R_d is None else around_R_d
             self._scaler = self.scaling(around_R_d)
-            start = self.start(self._scaler.tensor(around_R_d))
+            start = self.start(torch.from_numpy(self._scaler.single(around_R_d)))
         else:
             self._scaler = before._scaler
             start = Start.after(before._prior, self._axes)
-        inputs_N_d = self._scaler.tensor(h_N_d)
+        inputs_N_d = torch.from_numpy(self._scaler.single(h_N_d))
         targets_N = self._targets(labels_N)
         random = torch.Generator().manual_seed(start.seed)
         model = SparseGPs(start.covariance, start.inducing_M_d, random)
@@ -75,7 +84,7 @@ class GPC:
             (-self.objective(model, inputs_N_d, torch.from_numpy(targets_N), random)).backward()
             optimizer.step()
             if done in stops:
-                self._prior = Prior.of(model)
+                self._prior = model.prior()
                 self._latents = model.latents()
                 self._labeled = self.project(h_N_d)
                 self._targets_N = targets_N
@@ -88,6 +97,8 @@ class GPC:
 
     def start(self, inputs_R_d: torch.Tensor) -> Start:
         """Return the start of a fit around scaled inputs; overridden by a reading of the paper."""
+        from gpca.classifier.sparse_gp import Start
+
         return Start.of(inputs_R_d, len(self.classes), self.settings, self._axes)
 
     def objective(
@@ -128,12 +139,12 @@ class GPC:
 
     def _set_prior(self, prior: Prior) -> None:
         self._prior = prior
-        self._labeled = prior.project(torch.from_numpy(self._labeled.inputs_N_d))
+        self._labeled = prior.project(self._labeled.inputs_N_d)
         self.refine()
 
     def project(self, h_N_d: np.ndarray | Projection) -> Projection:
         """Project embeddings on the inducing inputs, once for several uses."""
-        return h_N_d if isinstance(h_N_d, Projection) else self._prior.project(self._scaler.tensor(h_N_d))
+        return h_N_d if isinstance(h_N_d, Projection) else self._prior.project(self._scaler.single(h_N_d))
 
     @property
     def learned_N_d(self) -> np.ndarray:
@@ -146,8 +157,14 @@ class GPC:
 
     def mean_logits(self, h_N_d: torch.Tensor) -> torch.Tensor:
         """Return the means (N, C) of the latent logits, differentiable in the embeddings."""
+        import torch
+
         scaled_N_d = (h_N_d - torch.from_numpy(self._scaler.mean_d)) / torch.from_numpy(self._scaler.scale_d)
-        return self._prior.means(scaled_N_d, self._latents.mean_C_M)
+        inducing_M_d = torch.from_numpy(self._prior.inducing_M_d).double()
+        weights_C_M = torch.from_numpy(self._prior.inducing_weights(self._latents.mean_C_M))
+        return torch.einsum(
+            "cmn,cm->nc", self._prior.covariance.between(inducing_M_d, scaled_N_d.double()), weights_C_M
+        )
 
     def attribute(self, h_N_d: np.ndarray | Projection) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return scores_N_C, variances_N_C and bald_N from M posterior draws (Eqs. 4, 5, 7).
@@ -164,32 +181,32 @@ class GPC:
         return generator(*self._axes, "draws").normal(size=(self.settings.draws, len(self.classes)))
 
     def state(self) -> dict[str, object]:
-        """Return tensors, numbers and names for :meth:`from_state`."""
+        """Return arrays, numbers and names for :meth:`from_state`."""
+        covariance = self._prior.covariance
         return {
             "classes": list(self.classes),
             "settings": asdict(self.settings),
             "axes": list(self._axes),
-            "scaler_mean": torch.from_numpy(self._scaler.mean_d),
-            "scaler_scale": torch.from_numpy(self._scaler.scale_d),
-            "kernel": self._prior.covariance.state_dict(),
+            "scaler_mean": self._scaler.mean_d,
+            "scaler_scale": self._scaler.scale_d,
+            "kernel": {"scale": covariance.scale_C, "parameter": covariance.parameter_C},
             "inducing": self._prior.inducing_M_d,
-            "mean": torch.from_numpy(self._latents.mean_C_M),
-            "covariance": torch.from_numpy(self._latents.covariance_C_M_M),
-            "labelled": torch.from_numpy(self._labeled.inputs_N_d),
-            "targets": torch.from_numpy(self._targets_N),
+            "mean": self._latents.mean_C_M,
+            "covariance": self._latents.covariance_C_M_M,
+            "labelled": self._labeled.inputs_N_d,
+            "targets": self._targets_N,
         }
 
     @classmethod
     def from_state(cls, state: dict) -> GPC:
         """Return the classifier of a :meth:`state`: it gives the same attributions and can be trained further."""
         gpc = cls(tuple(state["classes"]), GPCSettings(**state["settings"]), *state["axes"])
-        gpc._scaler = Standardization(state["scaler_mean"].numpy(), state["scaler_scale"].numpy())
-        covariance = make_covariance(gpc.settings.kernel, len(gpc.classes), lengthscale=1.0).requires_grad_(False)
-        covariance.load_state_dict(state["kernel"])
-        gpc._prior = Prior(covariance, state["inducing"])
-        gpc._latents = Latents(state["mean"].numpy(), state["covariance"].numpy())
+        gpc._scaler = Standardization(state["scaler_mean"], state["scaler_scale"])
+        kernel = state["kernel"]
+        gpc._prior = Prior(Covariance(gpc.settings.kernel, kernel["scale"], kernel["parameter"]), state["inducing"])
+        gpc._latents = Latents(state["mean"], state["covariance"])
         gpc._labeled = gpc._prior.project(state["labelled"])
-        gpc._targets_N = state["targets"].numpy()
+        gpc._targets_N = state["targets"]
         return gpc
 
     def _targets(self, labels_N: np.ndarray) -> np.ndarray:

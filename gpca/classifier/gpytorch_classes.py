@@ -6,6 +6,7 @@ Both start at the same place and draw the same random numbers in the same order,
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator
 
 import gpytorch
@@ -16,10 +17,43 @@ from torch.overrides import TorchFunctionMode
 
 from gpca.classifier.gpc import GPC
 from gpca.classifier.latents import expected_log_likelihood
-from gpca.classifier.sparse_gp import Standardization, Start
+from gpca.classifier.prior import Covariance, Standardization
+from gpca.classifier.sparse_gp import Start
 from gpca.errors import InputError
 from gpca.portable import Adam, square_root
 from gpca.process.progress import progress
+
+
+class ScaledPolynomial(gpytorch.kernels.PolynomialKernel):
+    """The covariance (xᵀx' / d + c)²."""
+
+    def __init__(self, **options) -> None:
+        super().__init__(power=2, **options)
+
+    def forward(self, x1: Tensor, x2: Tensor, **options) -> Tensor:
+        """Return the covariance of the inputs."""
+        width = math.sqrt(x1.shape[-1])
+        return super().forward(x1 / width, x2 / width, **options)
+
+
+KERNELS = {
+    "rbf": gpytorch.kernels.RBFKernel,
+    "matern32": lambda **options: gpytorch.kernels.MaternKernel(nu=1.5, **options),
+    "polynomial": ScaledPolynomial,
+}
+
+
+def gpytorch_kernel(covariance: Covariance) -> gpytorch.kernels.ScaleKernel:
+    """Return gpytorch's form of a covariance."""
+    batch = torch.Size([len(covariance.scale_C)])
+    kernel = gpytorch.kernels.ScaleKernel(KERNELS[covariance.form](batch_shape=batch), batch_shape=batch)
+    kernel.outputscale = torch.from_numpy(covariance.scale_C).float()
+    parameter_C = torch.from_numpy(covariance.parameter_C).float()
+    if kernel.base_kernel.has_lengthscale:
+        kernel.base_kernel.lengthscale = parameter_C[:, None, None]
+    else:
+        kernel.base_kernel.offset = parameter_C[:, None]
+    return kernel
 
 
 class LatentGPs(gpytorch.models.ApproximateGP):
@@ -75,10 +109,10 @@ class GpytorchGPC(GPC):
     ) -> Iterator[int]:
         """Yield each number of iterations in rising order; the classifier is then as :meth:`fit` would leave it."""
         self._scaler = Standardization.of(h_N_d)
-        self._inputs_N_d = self._scaler.tensor(h_N_d)
+        self._inputs_N_d = torch.from_numpy(self._scaler.single(h_N_d))
         self._targets_N = self._targets(labels_N)
         start = Start.of(self._inputs_N_d, len(self.classes), self.settings, self._axes)
-        self._model = LatentGPs(start.covariance, start.inducing_M_d)
+        self._model = LatentGPs(gpytorch_kernel(start.covariance), start.inducing_M_d)
         steps = ascend(self._model, self._inputs_N_d, torch.from_numpy(self._targets_N), self.settings.learning_rate)
         state = torch.Generator().manual_seed(start.seed).get_state()
         stops = sorted(set(iterations))
@@ -94,7 +128,7 @@ class GpytorchGPC(GPC):
         self, h_N_d: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return mean and standard deviation (N, C) of the latent logits q(f(h))."""
-        return self._marginals(self._scaler.tensor(h_N_d))
+        return self._marginals(torch.from_numpy(self._scaler.single(h_N_d)))
 
     def elbo(self) -> float:
         """Return the evidence lower bound per labeled sample in nats."""

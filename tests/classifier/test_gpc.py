@@ -7,8 +7,8 @@ import torch
 from sklearn.preprocessing import StandardScaler
 
 from gpca.classifier.gpc import GPC
+from gpca.classifier.prior import COVARIANCES, Standardization
 from gpca.classifier.settings import GPCSettings
-from gpca.classifier.sparse_gp import COVARIANCES, Standardization
 from gpca.errors import InputError
 
 CLASSES = ("noise", "pose", "overlap")
@@ -221,7 +221,7 @@ def test_a_class_without_a_name_of_its_own_is_not_added(gpc, name):
 def kernel_parameters(gpc):
     """Outputscale and lengthscale (2, C) of each class's kernel."""
     kernel = gpc._prior.covariance
-    return np.stack([kernel.outputscale.numpy(), kernel.base_kernel.lengthscale.numpy().ravel()])
+    return np.stack([kernel.scale_C, kernel.parameter_C])
 
 
 @pytest.mark.parametrize("kernel", ["rbf", "matern32"])
@@ -248,7 +248,7 @@ def test_the_kernel_of_an_added_class_is_the_mean_of_the_others_and_leveling_cha
 
 def test_inducing_inputs_lie_around_the_embeddings_named():
     def nearest_centers(gpc):
-        inducing = gpc._prior.inducing_M_d.numpy() * gpc._scaler.scale_d + gpc._scaler.mean_d
+        inducing = gpc._prior.inducing_M_d * gpc._scaler.scale_d + gpc._scaler.mean_d
         return np.linalg.norm(inducing[:, None] - CENTERS, axis=2).argmin(axis=1)
 
     of_labeled = GPC(CLASSES, QUICK, "blobs", 0).fit(H[SEEN], LABELS[SEEN])

@@ -9,8 +9,8 @@ import torch
 
 from gpca.classifier.gpc import GPC
 from gpca.classifier.gpytorch_classes import GpytorchGPC, SameRoots
+from gpca.classifier.prior import COVARIANCES
 from gpca.classifier.settings import GPCSettings
-from gpca.classifier.sparse_gp import COVARIANCES
 from gpca.errors import InputError
 from gpca.portable import square_root
 from tests.vendor_guard import VendorGuard

@@ -8,10 +8,10 @@ from scipy.stats import norm, qmc
 from torch.distributions import MultivariateNormal, kl_divergence
 
 from gpca.classifier.gpc import GPC
-from gpca.classifier.gpytorch_classes import LatentGPs
+from gpca.classifier.gpytorch_classes import LatentGPs, gpytorch_kernel
 from gpca.classifier.latents import Latents, Projection, Sites, elbo, refine
 from gpca.classifier.settings import GPCSettings
-from gpca.classifier.sparse_gp import Prior
+from gpca.classifier.sparse_gp import SparseGPs
 
 CLASSES = ("noise", "pose", "overlap")
 QUICK = GPCSettings(learning_rate=0.05, iterations=40, inducing=12, draws=200)
@@ -34,10 +34,10 @@ def trained():
     """A GPC as its fit left it, and gpytorch's model with the same parameters."""
     models = []
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Prior, "of", lambda model, of=Prior.of: models.append(model) or of(model))
+        patch.setattr(SparseGPs, "prior", lambda model, prior=SparseGPs.prior: models.append(model) or prior(model))
         gpc = GPC(CLASSES, QUICK, "blobs", 0).fit(H, LABELS)
     (model,) = models
-    reference = LatentGPs(model.covariance, model.inducing_M_d.detach())
+    reference = LatentGPs(gpytorch_kernel(model.covariance.learned()), model.inducing_M_d.detach())
     reference.strategy.variational_params_initialized.fill_(1)  # or gpytorch would set them to the prior's
     distribution = reference.strategy._variational_distribution
     with torch.no_grad():
@@ -87,7 +87,7 @@ def assert_equal_posterior(one, other, tolerance):
 def test_the_marginals_are_those_of_gpytorchs_model(trained, n):
     gpc, model = trained
     with torch.no_grad():
-        expected = model(gpc._scaler.tensor(H_TEST[:n]))
+        expected = model(torch.from_numpy(gpc._scaler.single(H_TEST[:n])))
     mean, deviation = gpc.posterior(H_TEST[:n])
     assert mean.shape == (n, 3)
     assert np.abs(mean - expected.mean.numpy()).max() < 1e-4

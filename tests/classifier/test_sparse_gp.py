@@ -1,60 +1,82 @@
 import math
 from itertools import islice
 
+import numpy as np
 import pytest
 import torch
 
-from gpca.classifier.gpytorch_classes import LatentGPs, ascend
-from gpca.classifier.sparse_gp import COVARIANCES, Prior, SparseGPs, cross_covariance, make_covariance, variance
+from gpca.classifier.gpytorch_classes import LatentGPs, ascend, gpytorch_kernel
+from gpca.classifier.prior import COVARIANCES, Covariance
+from gpca.classifier.sparse_gp import LearnedCovariance, SparseGPs, _cholesky
+from gpca.errors import InputError
 
 RANDOM = torch.Generator().manual_seed(0)
 A, B = torch.randn(7, 12, generator=RANDOM), torch.randn(5, 12, generator=RANDOM)
 
 
 def unlike(name):
-    """Three kernels with parameters of their own."""
-    kernel = make_covariance(name, 3, lengthscale=3.0)
-    kernel.outputscale = torch.tensor([0.5, 1.0, 2.0])
-    if kernel.base_kernel.has_lengthscale:
-        kernel.base_kernel.lengthscale = torch.tensor([2.0, 3.0, 5.0])[:, None, None]
-    else:
-        kernel.base_kernel.offset = torch.tensor([0.1, 0.7, 2.0])[:, None]
-    return kernel
+    """Three covariances with parameters of their own."""
+    parameter_C = np.array([0.1, 0.7, 2.0] if name == "polynomial" else [2.0, 3.0, 5.0])
+    return Covariance(name, np.array([0.5, 1.0, 2.0]), parameter_C)
 
 
 @pytest.mark.parametrize("name", COVARIANCES)
 def test_covariances_and_their_gradients_are_gpytorchs(name):
-    ours, theirs = unlike(name), unlike(name)
+    ours, theirs = LearnedCovariance(unlike(name)), gpytorch_kernel(unlike(name))
     gradients = []
-    for kernel, value in ((ours, cross_covariance(ours, A, B)), (theirs, theirs(A, B).to_dense())):
+    for kernel, value in ((ours, ours(A, B)), (theirs, theirs(A, B).to_dense())):
         (value * torch.arange(3.0)[:, None, None]).sum().backward()
-        gradients.append([parameter.grad for parameter in kernel.parameters()])
-    assert torch.allclose(cross_covariance(ours, A, B), theirs(A, B).to_dense(), atol=1e-5)
+        gradients.append([parameter.grad.ravel() for parameter in kernel.parameters()])
+    assert torch.allclose(ours(A, B), theirs(A, B).to_dense(), atol=1e-5)
     for own, their in zip(*gradients, strict=True):
         assert torch.allclose(own, their, rtol=1e-3, atol=1e-4)
 
 
 @pytest.mark.parametrize("name", COVARIANCES)
+def test_a_learned_covariance_is_the_same_on_arrays_and_tensors_in_double_precision(name):
+    learned = LearnedCovariance(unlike(name))
+    covariance, inputs = learned.learned(), (A.double(), B.double())
+    on_arrays_C_A_B = covariance.between(*(part.numpy() for part in inputs))
+    assert on_arrays_C_A_B == pytest.approx(learned(A, B).detach().numpy(), abs=1e-5)
+    assert on_arrays_C_A_B == pytest.approx(covariance.between(*inputs).numpy(), rel=1e-12)
+    assert covariance.scale_C == pytest.approx(unlike(name).scale_C, rel=1e-6)
+    assert covariance.parameter_C == pytest.approx(unlike(name).parameter_C, rel=1e-6)
+
+
+@pytest.mark.parametrize("name", COVARIANCES)
 @pytest.mark.parametrize("n", [3, 7])  # as many inputs as latents, and more
 def test_the_variance_is_the_covariances_diagonal(name, n):
-    kernel = unlike(name)
-    diagonal = cross_covariance(kernel, A[:n], A[:n]).diagonal(dim1=1, dim2=2)
-    assert variance(kernel, A[:n]).shape == (3, n)
-    assert torch.allclose(variance(kernel, A[:n]), diagonal, atol=1e-5)
+    learned = LearnedCovariance(unlike(name))
+    diagonal = learned(A[:n], A[:n]).diagonal(dim1=1, dim2=2)
+    assert learned.variance(A[:n]).shape == (3, n)
+    assert torch.allclose(learned.variance(A[:n]), diagonal, atol=1e-5)
+    in_double = A[:n].double().numpy()
+    diagonal_C_A = np.diagonal(learned.learned().between(in_double, in_double), axis1=1, axis2=2)
+    assert learned.learned().variance(in_double) == pytest.approx(diagonal_C_A)
 
 
 @pytest.mark.parametrize("name", COVARIANCES)
 def test_gradients_stay_finite_where_inputs_coincide(name):
-    inputs = A[[0, 0, 1]].clone().requires_grad_()
-    cross_covariance(unlike(name), inputs, inputs).sum().backward()
-    assert torch.isfinite(inputs.grad).all()
+    for form, precision in ((LearnedCovariance(unlike(name)), A.dtype), (unlike(name).between, torch.float64)):
+        inputs = A[[0, 0, 1]].to(precision, copy=True).requires_grad_()
+        form(inputs, inputs).sum().backward()
+        assert torch.isfinite(inputs.grad).all()
 
 
 def test_the_polynomial_is_that_of_inputs_divided_by_the_root_of_their_number():
-    kernel = make_covariance("polynomial", 1, lengthscale=1.0)
     x = torch.ones(1, 400)
-    expected = kernel.outputscale * (1 + math.log(2)) ** 2  # an offset starts at softplus(0)
-    assert cross_covariance(kernel, x, x).item() == pytest.approx(expected.item(), rel=1e-6)
+    expected = math.log(2) * (1 + math.log(2)) ** 2  # scale and offset start at softplus(0)
+    assert LearnedCovariance(Covariance.start("polynomial", 1, 5.0))(x, x).item() == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize("worst", [1e-9, 1e-3])
+def test_a_covariance_that_rounding_made_indefinite_is_mended_within_limits(worst):
+    K_C_M_M = torch.diag(torch.tensor([1.0, -worst])).double()[None]
+    if worst == 1e-9:
+        assert torch.allclose(_cholesky(K_C_M_M)[0] @ _cholesky(K_C_M_M)[0].mT, K_C_M_M[0], atol=1e-7)
+    else:
+        with pytest.raises(InputError, match="not positive definite"):
+            _cholesky(K_C_M_M)
 
 
 CENTERS = torch.randn(3, 16, generator=torch.Generator().manual_seed(0))
@@ -63,7 +85,7 @@ INPUTS = CENTERS[TARGETS] + 0.7 * torch.randn(90, 16, generator=torch.Generator(
 
 
 def fitted(name, iterations, learning_rate=0.05, inputs=INPUTS, targets=TARGETS):
-    model = SparseGPs(make_covariance(name, 3, 4.0), inputs[:9], torch.Generator().manual_seed(5))
+    model = SparseGPs(Covariance.start(name, 3, 4.0), inputs[:9], torch.Generator().manual_seed(5))
     optimizer = torch.optim.Adam(model.parameters(), lr=learning_rate)
     losses = []
     for _ in range(iterations):
@@ -80,7 +102,7 @@ def test_from_the_same_numbers_every_loss_is_gpytorchs(name):
     model, losses = fitted(name, 30)
     with torch.random.fork_rng():
         torch.manual_seed(5)
-        reference = LatentGPs(make_covariance(name, 3, 4.0), INPUTS[:9].clone())
+        reference = LatentGPs(gpytorch_kernel(Covariance.start(name, 3, 4.0)), INPUTS[:9].clone())
         expected = list(islice(ascend(reference, INPUTS, TARGETS, 0.05), 30))
     assert losses == pytest.approx(expected, rel=1e-4)
     assert losses[-1] < losses[0] - 0.1
@@ -94,7 +116,7 @@ def test_from_the_same_numbers_every_loss_is_gpytorchs(name):
 @pytest.mark.parametrize("name", COVARIANCES)
 def test_prior_and_latents_give_the_marginals_of_the_model(name):
     model, _ = fitted(name, 5)
-    mean_N_C, deviation_N_C = model.latents().marginals(Prior.of(model).project(INPUTS))
+    mean_N_C, deviation_N_C = model.latents().marginals(model.prior().project(INPUTS.numpy()))
     mean_C_N, variance_C_N = (part.detach().numpy() for part in model.marginals(INPUTS))
     assert mean_N_C == pytest.approx(mean_C_N.T, abs=1e-3)
     assert deviation_N_C**2 == pytest.approx(variance_C_N.T, abs=1e-3)

@@ -7,8 +7,8 @@ from typing import get_args
 import pytest
 from pydantic import TypeAdapter
 
+from gpca.classifier.prior import COVARIANCES
 from gpca.classifier.settings import Kernel
-from gpca.classifier.sparse_gp import COVARIANCES
 from gpca.config.schema import DESIGNS, Reductions, whole_config
 from gpca.encoders.reduction import REDUCTIONS
 from gpca.encoders.registry import ENCODERS, OPTIONS

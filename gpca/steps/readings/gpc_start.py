@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -13,8 +12,9 @@ import numpy as np
 import torch
 
 from gpca.classifier.gpc import GPC
+from gpca.classifier.prior import Covariance, Standardization
 from gpca.classifier.settings import GPCSettings
-from gpca.classifier.sparse_gp import SparseGPs, Standardization, Start, make_covariance
+from gpca.classifier.sparse_gp import SparseGPs, Start
 from gpca.pairs.dataset import Registrations
 from gpca.pairs.perturbation import CONCEPTS
 from gpca.process.progress import progress
@@ -23,7 +23,6 @@ from gpca.steps.readings.files import Row, RunFiles, accuracies, table5, train_a
 from gpca.steps.readings.groups import Reading
 
 BATCH = 64  # samples of a minibatch
-DEFAULT_LENGTHSCALE = math.log(2)  # gpytorch's
 # Kernel, rate and iterations of the rows of Table IV whose numbers are missed, and of those that other tables show.
 FITTED = (("rbf", 0.001, 200), ("polynomial", 0.001, 200), ("rbf", 0.01, 100), ("matern32", 0.01, 200))
 SHOWN_AS = {("rbf", 0.01, 100): "gpca_paper", ("matern32", 0.01, 200): "gpca_matern"}  # in Tables I and II, and in V
@@ -60,7 +59,7 @@ class StartedGPC(GPC):
             random = torch.Generator().manual_seed(seed_of(*self._axes, "random inducing inputs"))
             inducing_M_d = torch.randn((self.settings.inducing, inputs_R_d.shape[1]), generator=random)
         if self._reading["lengthscale"] == "default":
-            covariance = make_covariance(self.settings.kernel, len(self.classes), DEFAULT_LENGTHSCALE)
+            covariance = Covariance.start(self.settings.kernel, len(self.classes))
         return Start(covariance, inducing_M_d, start.seed)
 
     def objective(
