@@ -56,7 +56,7 @@ def main(arguments: list[str] | None = None) -> None:
         source, target = pairs[repeat % len(pairs)]
         elapsed, explanation = timed(explain, source, target)
         plain_elapsed, (scores_C, variances_C, _) = timed(plain.explain, source, target)
-        all_draws_elapsed, _ = timed(plain.explain, source, target, explainer.model.encoder_settings.draws)
+        all_draws_elapsed, _ = timed(plain.explain, source, target, explainer.model.encoder.settings.draws)
         if repeat < WARM_UP:
             continue
         ours_s.append(elapsed)
@@ -142,6 +142,7 @@ def make_explainer(options: argparse.Namespace):
     from gpca.causes.policy import RecoveryPolicy
     from gpca.classifier.gpc import GPC
     from gpca.classifier.settings import GPCSettings
+    from gpca.encoders.inference import TrainedEncoder
     from gpca.encoders.registry import EncoderSettings
     from gpca.encoders.training import make_model
     from gpca.model.clouds import Familiarity
@@ -159,7 +160,7 @@ def make_explainer(options: argparse.Namespace):
     gpc = GPC(CONCEPTS, GPCSettings(learning_rate=0.1, draws=options.draws), "benchmark", 0)
     gpc.fit(h_N_d, np.array([CONCEPTS[n % 3] for n in range(TRAINING)]))
     familiar = Familiarity.of(make_pair(options.points, "training", n)[:2] for n in range(TRAINING))
-    parts = (None, encoder, settings, gpc, ICPSettings(), options.points, RecoveryPolicy())
+    parts = (None, TrainedEncoder.of(encoder, settings), gpc, ICPSettings(), options.points, RecoveryPolicy())
     model = Model(*parts, "ellipsoids", stand_in=True, familiar=familiar)
     return Explainer(model, device="cpu")
 
@@ -168,21 +169,21 @@ class PlainComposition:
     """The same model by the usual means."""
 
     def __init__(self, model) -> None:
-        from copy import deepcopy
-
+        import numpy as np
         import torch
 
         from benchmarks.edge_conv import per_edge_form
-        from gpca.classifier.gpytorch_classes import LatentGPs
+        from gpca.classifier.gpytorch_classes import LatentGPs, gpytorch_kernel
 
         self._model = model
-        self._encoder = per_edge_form(model.encoder).eval()
+        self._encoder = per_edge_form(model.encoder.module).eval()
         state = model.gpc.state()
         self._mean, self._scale = state["scaler_mean"], state["scaler_scale"]
-        self._gps = LatentGPs(deepcopy(model.gpc._prior.covariance), state["inducing"].clone())
+        kernel = gpytorch_kernel(model.gpc._prior.covariance)
+        self._gps = LatentGPs(kernel, torch.from_numpy(state["inducing"].copy()))
         strategy, posterior = self._gps.strategy, self._gps.strategy._variational_distribution
-        posterior.variational_mean.data = state["mean"].float()
-        posterior.chol_variational_covar.data = torch.linalg.cholesky(state["covariance"]).float()
+        posterior.variational_mean.data = torch.from_numpy(state["mean"]).float()
+        posterior.chol_variational_covar.data = torch.from_numpy(np.linalg.cholesky(state["covariance"])).float()
         strategy.variational_params_initialized.fill_(1)  # else the first call sets them to the prior's
         self._gps.eval()
 
@@ -201,7 +202,7 @@ class PlainComposition:
         cloud = torch.from_numpy(transform(T_icp, source).astype(np.float32))
         with torch.no_grad():
             h_1_d = torch.stack([self._encoder(cloud[None]) for _ in range(draws)]).mean(dim=0)
-            inputs_1_d = ((h_1_d - self._mean) / self._scale).float()
+            inputs_1_d = ((h_1_d - torch.from_numpy(self._mean)) / torch.from_numpy(self._scale)).float()
             logits_M_C = self._gps(inputs_1_d).sample(torch.Size([self._model.gpc.settings.draws]))[:, 0]
             p_M_C = torch.softmax(logits_M_C, dim=1)
             scores_C = p_M_C.mean(dim=0)

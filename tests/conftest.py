@@ -97,6 +97,7 @@ def model(registrations, diagnoser):
     from gpca.causes.policy import RecoveryPolicy, Thresholds
     from gpca.classifier.gpc import GPC
     from gpca.classifier.settings import GPCSettings
+    from gpca.encoders.inference import TrainedEncoder
     from gpca.encoders.registry import EncoderSettings
     from gpca.encoders.training import embed, make_model
     from gpca.model.clouds import Familiarity
@@ -112,7 +113,8 @@ def model(registrations, diagnoser):
     gpc.fit(h_S_d, train.concept)
     policy = RecoveryPolicy(Thresholds(uncertain=1.0, dominant=0.4))
     familiar = Familiarity.of((train.cloud(row), train.target(row)) for row in range(len(train)))
-    return Model(diagnoser, network.encoder, settings, gpc, ICPSettings(), 256, policy, "Tiny", True, familiar)
+    encoder = TrainedEncoder.of(network.encoder, settings)
+    return Model(diagnoser, encoder, gpc, ICPSettings(), 256, policy, "Tiny", True, familiar)
 
 
 @pytest.fixture(scope="session")

@@ -38,12 +38,14 @@ class Covariance:
 
     def between(self, a_A_d: Any, b_B_d: Any) -> Any:
         """Return k_c(a, b), (C, A, B), of arrays, or of tensors with their gradients."""
-        if isinstance(a_A_d, np.ndarray):
-            xp, root = np, np.sqrt
-        else:
-            import torch as xp
+        xp: Any = np
+        root: Callable[[Any], Any] = np.sqrt
+        if not isinstance(a_A_d, np.ndarray):
+            import torch
 
-            from gpca.portable import square_root as root
+            from gpca.portable import square_root
+
+            xp, root = torch, square_root
         scale_C_1_1, parameter_C_1_1 = (xp.asarray(part[:, None, None]) for part in (self.scale_C, self.parameter_C))
         if self.form == "polynomial":  # divided by d, as plain inner products of some hundred dimensions learn nothing
             return scale_C_1_1 * (a_A_d @ b_B_d.T / a_A_d.shape[1] + parameter_C_1_1) ** 2

@@ -89,13 +89,10 @@ def run_explain(options: Namespace) -> int:
 
         explain = partial(explain_scans, voxel=options.voxel, method=options.method)
     else:
-        import torch
-
         from gpca.model.explainer import Explainer
         from gpca.model.file import Model
         from gpca.uncertainty.settings import MONTE_CARLO, UncertaintySettings
 
-        torch.set_num_threads(options.threads)
         model = Model.load(path)
         explainer, learned = Explainer(model), f"model {path}: {model.learning}"
         names["model"] = str(path)

@@ -12,8 +12,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import torch
-
 from gpca.active_learning.labeling import SKIPPED, LabelFile, Question, Queue, Session, is_queue, require_name
 from gpca.attribution.predictions import write_predictions
 from gpca.classifier.scores import Attribution
@@ -53,7 +51,6 @@ def add_label_arguments(parser: ArgumentParser) -> None:
 
 
 def run_label(options: Namespace) -> None:
-    torch.set_num_threads(options.threads)
     settings = read_settings(GPCSettings, {"learning_rate": 0.2, "iterations": 150} | options.settings)
     read = [options.registrations, options.embeddings, options.answers, options.model]
     outputs = [options.labels, options.picture, options.predictions, options.out]

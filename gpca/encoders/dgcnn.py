@@ -21,10 +21,9 @@ import torch
 from torch import nn
 
 from gpca.encoders import edge_kernels
-from gpca.encoders.layers import BatchNorm, PointLinear, linear, product
-from gpca.errors import InputError
+from gpca.encoders.inference import NEGATIVE_SLOPE, WIDTHS, embed_clouds, nearest
+from gpca.encoders.layers import BatchNorm, PointLinear, linear
 
-NEGATIVE_SLOPE = 0.2
 CHANNELS, MOTION = 7, 5  # numbers per point of a pair, and of ICP's motion when all of it is given
 SCALE = 0.1  # of all channels but the coordinates, so that neighbors in the first graph are neighbors on the surface
 
@@ -36,10 +35,9 @@ class DGCNN(nn.Module):
     nor scaled nor turned, which would erase the concepts. `k` counts the point itself; `inputs` are numbers per point.
     """
 
-    def __init__(
-        self, k: int = 20, point_features: int = 256, widths: Sequence[int] = (64, 64, 128, 256), inputs: int = 3
-    ) -> None:
+    def __init__(self, k: int = 20, point_features: int = 256, widths: Sequence[int] = WIDTHS, inputs: int = 3) -> None:
         super().__init__()
+        self.k = k
         self.edge_convs = nn.ModuleList(
             EdgeConv(before, after, k) for before, after in zip((inputs, *widths[:-1]), widths, strict=True)
         )
@@ -53,6 +51,10 @@ class DGCNN(nn.Module):
             x_B_N_F, sizes = clouds, None
         else:
             x_B_N_F, sizes = torch.cat(list(clouds))[None], [len(cloud) for cloud in clouds]
+        wants_gradient = torch.is_grad_enabled() and x_B_N_F.requires_grad
+        if x_B_N_F.device.type == "cpu" and not self.training and not wants_gradient:
+            weights = {name: part.detach().numpy() for name, part in self.state_dict().items()}
+            return torch.from_numpy(embed_clouds(weights, self.k, x_B_N_F.detach().contiguous().numpy(), sizes))
         batch, n, _ = x_B_N_F.shape
         features = []
         for edge_conv in self.edge_convs:
@@ -103,12 +105,8 @@ class EdgeConv(nn.Module):
         neighbors_B_N_k = knn_indices(x_B_N_F, self.k, sizes)
         w1, w2 = self.weight.chunk(2, dim=1)
         ac_B_N_2F = linear(x_B_N_F, torch.cat([w1, w2 - w1]))
-        wants_gradient = torch.is_grad_enabled() and x_B_N_F.requires_grad
-        if ac_B_N_2F.device.type != "cpu" or (wants_gradient and not self.training):
+        if ac_B_N_2F.device.type != "cpu" or not self.training:
             return _edge_max_plain(ac_B_N_2F, neighbors_B_N_k, self.norm)
-        if not self.training:
-            arrays = _numpy(ac_B_N_2F, neighbors_B_N_k, *self.norm.scale_and_shift())
-            return torch.from_numpy(edge_kernels.gather_max_affine(*arrays, NEGATIVE_SLOPE))
         out_B_N_F, mean_F, variance_F = _EdgeMax.apply(
             ac_B_N_2F, neighbors_B_N_k, self.norm.weight, self.norm.bias, self.norm.eps
         )
@@ -117,25 +115,16 @@ class EdgeConv(nn.Module):
 
 
 def knn_indices(x_B_N_F: torch.Tensor, k: int, sizes: Sequence[int] | None = None) -> torch.Tensor:
-    """Return the indices (B, N, k), in any order, of each point's k nearest points in feature space, itself included.
-
-    With `sizes`, B is 1 and the points are concatenated clouds, each searched within its own points.
-    """
+    """Return the indices (B, N, k) of :func:`gpca.encoders.inference.nearest`."""
+    if x_B_N_F.device.type == "cpu":
+        return torch.from_numpy(nearest(x_B_N_F.detach().contiguous().numpy(), k, sizes))
     if sizes is not None:
         clouds = zip(x_B_N_F.split(list(sizes), 1), np.cumsum([0, *sizes[:-1]]), strict=True)
         return torch.cat([knn_indices(x_1_n_F, k) + int(start) for x_1_n_F, start in clouds], dim=1)
     x_B_N_F = x_B_N_F.detach()
-    n_points = x_B_N_F.shape[1]
-    if n_points < k:
-        fault = f"has fewer than {k} neighbors per point"
-        raise InputError(f"cloud of {n_points} points", fault, "raise draw_points or lower k")
-    # |x_j|² - 2 x_i·x_j, as one product of [x_i ; 1] and [-2 x_j ; |x_j|²]: |x_i|² is the same for a whole row and does
-    # not change which points are nearest.
-    rows_B_N_G = torch.cat([x_B_N_F, x_B_N_F.new_ones((*x_B_N_F.shape[:2], 1))], dim=-1)
-    columns_B_N_G = torch.cat([-2 * x_B_N_F, (x_B_N_F * x_B_N_F).sum(-1, keepdim=True)], dim=-1)
-    if x_B_N_F.device.type == "cpu":
-        return torch.from_numpy(edge_kernels.smallest_k(product(rows_B_N_G, columns_B_N_G.mT).numpy(), k))
-    return (rows_B_N_G @ columns_B_N_G.mT).topk(k, dim=-1, largest=False, sorted=False).indices
+    columns_B_N = (x_B_N_F * x_B_N_F).sum(-1)
+    distances_B_N_N = columns_B_N[:, None] - 2 * x_B_N_F @ x_B_N_F.mT  # less |x_i|², the same for a whole row
+    return distances_B_N_N.topk(k, dim=-1, largest=False, sorted=False).indices
 
 
 class _EdgeMax(torch.autograd.Function):

@@ -103,23 +103,19 @@ class BoostedQuestion:
         return expit(self.baseline + self.number[at_N_T].sum(axis=1))
 
     def state(self) -> dict[str, object]:
-        """Return numbers and tensors for :meth:`from_state`."""
-        import torch
-
-        return {"baseline": self.baseline} | {name: torch.from_numpy(getattr(self, name)) for name in PARTS}
+        """Return numbers and arrays for :meth:`from_state`."""
+        return {"baseline": self.baseline} | {name: getattr(self, name) for name in PARTS}
 
     @classmethod
     def from_state(cls, state: dict) -> BoostedQuestion:
         """Return the trees of a :meth:`state`."""
-        return cls(state["baseline"], *(state[name].numpy() for name in PARTS))
+        return cls(state["baseline"], *(state[name] for name in PARTS))
 
 
 def require_trees(state: dict, features: int) -> None:
     """Raise a ValueError unless a :meth:`BoostedQuestion.state` holds terminating trees on this many features."""
-    import torch
-
     parts = roots, feature, number, right = [state[name] for name in PARTS]
-    kinds = (torch.int32, torch.int16, torch.float64, torch.int32)
+    kinds = (np.int32, np.int16, np.float64, np.int32)
     if any(part.ndim != 1 or part.dtype != kind for part, kind in zip(parts, kinds, strict=True)):
         raise ValueError("its trees have parts of a different shape or type")
     n = len(feature)
@@ -129,8 +125,8 @@ def require_trees(state: dict, features: int) -> None:
         raise ValueError("its trees have nodes that are missing")
     if not ((feature >= LEAF) & (feature < features)).all():
         raise ValueError("its trees ask for features that there are not")
-    node = torch.arange(n)
-    if not torch.where(feature == LEAF, right == node, (right > node) & (right < n)).all():
+    node = np.arange(n)
+    if not np.where(feature == LEAF, right == node, (right > node) & (right < n)).all():
         raise ValueError("its trees do not end")
 
 

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import torch
 from scipy.special import ndtri
 
 from gpca.causes.truth import FAILED, NOMINAL
@@ -57,15 +56,15 @@ class NormalizedFeatures:
             ranks.append(ranks_N)
         return ndtri(np.column_stack(ranks)).clip(-FARTHEST, FARTHEST)
 
-    def state(self) -> torch.Tensor:
+    def state(self) -> np.ndarray:
         """Return the quantiles (Q, F) for :meth:`from_state`."""
-        return torch.from_numpy(self._quantiles_Q_F)
+        return self._quantiles_Q_F
 
     @classmethod
-    def from_state(cls, quantiles_Q_F: torch.Tensor) -> NormalizedFeatures:
+    def from_state(cls, quantiles_Q_F: np.ndarray) -> NormalizedFeatures:
         """Return the normalization of a :meth:`state`."""
         normalized = cls()
-        normalized._quantiles_Q_F = quantiles_Q_F.numpy()
+        normalized._quantiles_Q_F = quantiles_Q_F
         return normalized
 
 
@@ -120,10 +119,11 @@ class PairClassifier:
         The unit is the quantile `USUAL` of the same distance among the training samples, so 1 % of these exceed 1.
         """
         learned = self._failure.learned_N_d
-        return _to_nearest(self._failure.project(inputs_N_F).inputs_N_d, learned, 0) / self._usual_distance
+        return _to_nearest(self._failure.project(inputs_N_F).inputs_N_d, learned, 0) / self.usual_distance
 
     @cached_property
-    def _usual_distance(self) -> float:
+    def usual_distance(self) -> float:
+        """The quantile `USUAL`; a model file keeps it, as all distances among the samples take a fifth of a second."""
         learned = self._failure.learned_N_d
         return float(np.quantile(_to_nearest(learned, learned, 1), USUAL))
 
@@ -133,13 +133,14 @@ class PairClassifier:
         return len(self._failure.learned_N_d)
 
     def state(self) -> dict[str, object]:
-        """Return tensors, numbers and names for :meth:`from_state`; the same inputs of all four as one tensor."""
+        """Return arrays, numbers and names for :meth:`from_state`; the same inputs of all four as one array."""
         failure, *causes = (gpc.state() for gpc in (self._failure, *self._causes))
         for gpc, state in zip(self._causes, causes, strict=True):
             if np.array_equal(gpc.learned_N_d, self._failure.learned_N_d):
                 state["labelled"] = failure["labelled"]
         trees = {"trees": [trees.state() for trees in self._trees]} if self._trees else {}
-        return {"quantiles": self.normalized.state(), "failure": failure, "causes": causes, **trees}
+        usual = {"usual_distance": self.usual_distance}
+        return {"quantiles": self.normalized.state(), "failure": failure, "causes": causes, **usual, **trees}
 
     @classmethod
     def from_state(cls, state: dict) -> PairClassifier:
@@ -149,6 +150,8 @@ class PairClassifier:
         made._failure = GPC.from_state(state["failure"])
         made._causes = [GPC.from_state(part) for part in state["causes"]]
         made._trees = [BoostedQuestion.from_state(part) for part in state.get("trees", ())]
+        if "usual_distance" in state:  # added by version 5
+            made.usual_distance = state["usual_distance"]
         return made
 
 

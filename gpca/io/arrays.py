@@ -67,8 +67,7 @@ def load_arrays(
             members = _checked_members(archive, path, shapes, kinds, optional, remedy)
             arrays = {}
             for name, info in members.items():
-                with archive.open(info) as stream:
-                    arrays[name] = np.lib.format.read_array(stream, allow_pickle=False)
+                arrays[name] = _read(archive, info)
     except InputError:
         raise
     except Exception as fault:  # numpy and zipfile raise errors of many kinds for a damaged archive
@@ -95,6 +94,29 @@ def axes_in(arrays: Mapping[str, np.ndarray]) -> Axes:
     return str(arrays["source"]), int(arrays["seed"]) if "seed" in arrays else None
 
 
+def read_member(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> np.ndarray:
+    """Return an array of numbers or flags; a ValueError for any other, and for one that is shorter than it says."""
+    _, dtype = _header(archive, info)
+    if dtype.kind not in f"b{REAL}" or not dtype.isnative:
+        raise ValueError(f"array '{info.filename}' has type {dtype}")
+    return _read(archive, info)
+
+
+def _read(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> np.ndarray:
+    with archive.open(info) as stream:
+        return np.lib.format.read_array(stream, allow_pickle=False)
+
+
+def _header(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> tuple[tuple[int, ...], np.dtype]:
+    """Return shape and type of an array that is as long as its header says."""
+    with archive.open(info) as stream:
+        head = io.BytesIO(stream.read(_LONGEST_HEADER))  # which may claim to be gigabytes long itself
+    shape, _, dtype = _HEADERS[np.lib.format.read_magic(head)](head)
+    if not dtype.hasobject and head.tell() + math.prod(shape) * dtype.itemsize != info.file_size:
+        raise ValueError(f"array '{info.filename}' is not as long as its header says")
+    return shape, dtype
+
+
 def _checked_members(archive, path, shapes, kinds, optional, remedy) -> dict[str, zipfile.ZipInfo]:
     """Return the member of each array, once its header is found to be right."""
     listed = archive.namelist()
@@ -108,10 +130,7 @@ def _checked_members(archive, path, shapes, kinds, optional, remedy) -> dict[str
         members[name] = info = archive.getinfo(f"{name}.npy")
         if info.compress_type not in _BOUNDED:
             raise InputError(path, f"array '{name}' uses a compression that npz does not support", remedy)
-        with archive.open(info) as stream:
-            head = io.BytesIO(stream.read(_LONGEST_HEADER))  # which may claim to be gigabytes long itself
-        read = _HEADERS[np.lib.format.read_magic(head)]
-        actual, _, dtype = read(head)
+        actual, dtype = _header(archive, info)
         if dtype.hasobject:
             raise InputError(path, "contains pickled objects, which are never loaded", remedy)
         expected: list[int | str] = []
@@ -130,7 +149,5 @@ def _checked_members(archive, path, shapes, kinds, optional, remedy) -> dict[str
         if (dtype.kind == "f" and dtype.itemsize not in _FLOAT_BYTES) or not dtype.isnative:
             # Half precision has lost digits, and neither torch nor LAPACK calculates with more than double.
             raise InputError(path, f"array '{name}' has type {dtype}, not float32 or float64", remedy)
-        if head.tell() + math.prod(actual) * dtype.itemsize != info.file_size:
-            raise ValueError(f"array '{name}' is not as long as its header says")
     require_memory(sum(info.file_size for info in members.values()), path.stat().st_size, path, remedy)
     return members

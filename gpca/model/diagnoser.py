@@ -8,10 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
-from sys import intern
 
 import numpy as np
-import torch
 
 from gpca.alignment.batched_icp import BatchedICP
 from gpca.alignment.icp import ICPSettings
@@ -115,11 +113,11 @@ class Diagnoser:
         return reenactment_features(Reenactments.of_rows([row], self.truth))[0], reenacted, enactments
 
     def state(self) -> dict[str, object]:
-        """Return tensors, numbers and names for :meth:`from_state`."""
+        """Return arrays, numbers and names for :meth:`from_state`."""
         return {
             "reads": READS,
             "classifier": self.classifier.state(),
-            "error_weights": torch.from_numpy(self.error_weights),
+            "error_weights": self.error_weights,
             "threshold": self.threshold,
             "points": self.points,
             "runs": {name: value for name, value in asdict(self.runs).items() if name != "icp"},
@@ -135,15 +133,14 @@ class Diagnoser:
         """Return the diagnoser of a :meth:`state`."""
         return cls(
             classifier=PairClassifier.from_state(state["classifier"]),
-            error_weights=state["error_weights"].numpy(),
+            error_weights=state["error_weights"],
             threshold=state["threshold"],
             points=state["points"],
             runs=UncertaintySettings(**state["runs"], icp=ICPSettings(**state["icp"])),
             moved=state["moved"],
             reenactment=ReenactmentSettings(**state["reenactment"]),
             guarantee=Guarantee.from_dict(state["guarantee"]),
-            # Interned names are shared objects, which pickle writes once: equal models then give equal bytes.
-            held_out={intern(name): value for name, value in state["held_out"].items()},
+            held_out=state["held_out"],
         )
 
 

@@ -12,7 +12,6 @@ from pathlib import Path
 from time import perf_counter
 
 import numpy as np
-import torch
 
 from gpca.alignment.icp import clipped_cost
 from gpca.alignment.methods.interface import Outcome, Pair
@@ -21,7 +20,6 @@ from gpca.causes.policy import NOTHING, Decision, RecoveryPolicy
 from gpca.causes.settings import Limits
 from gpca.causes.truth import NOMINAL
 from gpca.classifier.scores import entropy
-from gpca.encoders.training import best_device
 from gpca.errors import InputError
 from gpca.model.clouds import OR_SCANS, Clouds, voids_of
 from gpca.model.diagnoser import QUICK_HYPOTHESES, QUICK_POINTS
@@ -51,7 +49,7 @@ class Explainer:
     Args:
         model: by default, the one found by :func:`gpca.model.location.model_path`.
         policy: turns scores into an action; by default, the model's own.
-        device: device of the encoder; by default, a GPU if torch finds one.
+        device: device of torch for the encoder; by default, the CPU without torch.
     """
 
     def __init__(
@@ -59,8 +57,7 @@ class Explainer:
     ) -> None:
         self.model = Model.load(model_path()) if model is None else model
         self.policy = self.model.policy if policy is None else policy
-        self._device = best_device() if device is None else torch.device(device)
-        self.model.encoder.to(self._device)
+        self._device = device
 
     @classmethod
     def load(cls, path: str | Path | None = None) -> Explainer:
@@ -208,21 +205,20 @@ class Explainer:
             except InputError as fault:
                 raise InputError(f"pair {number}", str(fault)) from fault
 
-    @torch.inference_mode()
     def embed(self, aligned: np.ndarray) -> np.ndarray:
         """Return the embedding (1, d) of an aligned source cloud (N, 3) in the canonical frame.
 
         It is the mean over as many random draws as in training, or one if the cloud has the encoder's number of points.
         """
-        settings = self.model.encoder_settings
+        settings = self.model.encoder.settings
         n = settings.draw_points
         draws = 1 if len(aligned) == n else settings.draws
         rows_D_N = [
             generator("explanation", "draw", draw).choice(len(aligned), n, replace=len(aligned) < n, shuffle=False)
             for draw in range(draws)
         ]
-        clouds_D_N_3 = torch.from_numpy(aligned.astype(np.float32)[np.array(rows_D_N)])
-        return self.model.encoder(clouds_D_N_3.to(self._device)).mean(dim=0, keepdim=True).cpu().numpy()
+        h_D_d = self.model.encoder(aligned.astype(np.float32)[np.array(rows_D_N)], self._device)
+        return h_D_d.mean(axis=0, keepdims=True)
 
     def _aligned(self, clouds: Clouds, method: str | None, notes: list[str]) -> Outcome:
         """Register by the model's own ICP or by the given method; a failure adds a note."""

@@ -1,4 +1,4 @@
-"""The model file, which contains tensors, numbers and names only, so that loading it executes no code.
+"""The model file, which contains arrays, numbers and names only, so that loading it executes no code.
 
 A model may come from anywhere, so its contents are checked when it is loaded.
 """
@@ -6,13 +6,13 @@ A model may come from anywhere, so its contents are checked when it is loaded.
 from __future__ import annotations
 
 import re
+import zipfile
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import get_args
 
-import torch
-from torch import nn
+import numpy as np
 
 from gpca.alignment.icp import ICPSettings
 from gpca.causes.descriptors import WIDTHS
@@ -21,14 +21,15 @@ from gpca.causes.settings import Moved
 from gpca.causes.truth import FAILED, NOMINAL
 from gpca.classifier.gpc import GPC
 from gpca.classifier.settings import GPCSettings
-from gpca.classifier.sparse_gp import make_covariance
-from gpca.encoders.registry import EncoderSettings, make_encoder
-from gpca.encoders.tensor_file import read_tensors, require_like, write_tensors
+from gpca.encoders.inference import TrainedEncoder
+from gpca.encoders.registry import EncoderSettings
 from gpca.errors import InputError
 from gpca.evaluation.conformal import Nonconformity
 from gpca.explainers.classifiers import require_trees
 from gpca.explainers.pair_classifier import ABSENT, PRESENT
 from gpca.guarantee.guarantee import STATES, Guarantee
+from gpca.io.array_tree import TEXT, read_tree, write_tree
+from gpca.model import torch_file
 from gpca.model.clouds import MEASURES, Familiarity
 from gpca.model.diagnoser import READS, Diagnoser
 from gpca.model.location import REMEDY, require_model
@@ -39,7 +40,7 @@ from gpca.reenactment.settings import ReenactmentSettings
 from gpca.settings import read_settings
 from gpca.uncertainty.settings import FEWEST_STARTS, UncertaintySettings
 
-FORMAT, VERSION = "GP-CA model", 4
+FORMAT, VERSION = "GP-CA model", 5
 FEATURE_COUNT = len(FEATURES) + sum(WIDTHS[group] for group in DESCRIBED)  # of a diagnoser
 ASYMMETRY = 1e-9  # of a covariance, whose prior is the identity
 # Upper bounds on the work of one explanation. A score is a mean over the draws of the classifier, so that a million
@@ -57,8 +58,7 @@ class Model:
     """A diagnoser of registrations and the paper's GP-CA."""
 
     diagnoser: Diagnoser  # reads the pair after ICP, trained on measured causes of all sources
-    encoder: nn.Module  # maps clouds (B, N, 3) to embeddings (B, d); in evaluation mode
-    encoder_settings: EncoderSettings  # number of points per draw and of draws per embedding, among others
+    encoder: TrainedEncoder  # maps clouds (B, N, 3) to embeddings (B, d)
     gpc: GPC  # the classifier; its classes are the concepts
     icp: ICPSettings  # settings of ICP
     cloud_points: int  # maximum number of points of source and target
@@ -77,12 +77,12 @@ class Model:
 
     def save(self, path: str | Path) -> None:
         """Write the file; equal models give equal bytes."""
-        settings = {name: value for name, value in asdict(self.encoder_settings).items() if value is not None}
+        settings = {name: value for name, value in asdict(self.encoder.settings).items() if value is not None}
         content = {
             "format": FORMAT,
             "version": VERSION,
             "diagnoser": self.diagnoser.state(),
-            "encoder": self.encoder.state_dict(),
+            "encoder": dict(self.encoder.weights),
             "encoder_settings": {"points" if key == "draw_points" else key: value for key, value in settings.items()},
             "gpc": self.gpc.state(),
             "icp": asdict(self.icp),
@@ -95,31 +95,32 @@ class Model:
         }
         if self.learned_from:
             content["learned_from"] = list(self.learned_from)
-        write_tensors(path, content)
+        write_tree(path, content)
 
     @classmethod
     def load(cls, path: str | Path) -> Model:
         """Read the file."""
         require_model(path)
         try:
-            content = read_tensors(path)
-        except Exception as fault:  # torch raises errors of many kinds for a damaged or foreign file
+            with zipfile.ZipFile(path) as archive:
+                is_tree = TEXT in archive.namelist()
+            content = read_tree(path) if is_tree else torch_file.read_torch_file(path)
+        except Exception as fault:  # pickle, zipfile and numpy raise errors of many kinds for a damaged or foreign file
             why = f" ({fault})" if isinstance(fault, ValueError) else ""
             raise InputError(path, f"is damaged or not a model{why}", REMEDY) from fault
         if not isinstance(content, Mapping) or content.get("format") != FORMAT:
             raise InputError(path, "is not a model", REMEDY)
-        if (version := content.get("version")) != VERSION:
+        if (version := content.get("version")) not in (VERSION, torch_file.VERSION):
             raise InputError(path, f"is a model of version {version}, not {VERSION}", REMEDY)
         try:
+            content = content if version == VERSION else torch_file.upgraded(content)
             encoder_settings = dict(content["encoder_settings"])
             settings = EncoderSettings(draw_points=encoder_settings.pop("points"), **encoder_settings)
-            _require_possible(content, settings)
-            encoder = make_encoder(settings.backbone, settings.options)
-            encoder.load_state_dict(content["encoder"])
+            encoder = TrainedEncoder(settings, content["encoder"])
+            _require_possible(content, encoder)
             return cls(
                 diagnoser=Diagnoser.from_state(content["diagnoser"]),
-                encoder=encoder.eval(),
-                encoder_settings=settings,
+                encoder=encoder,
                 gpc=GPC.from_state(content["gpc"]),
                 icp=ICPSettings(**content["icp"]),
                 cloud_points=content["points"],
@@ -142,8 +143,9 @@ def _require_count(name: str, count: object, least: int, most: int) -> None:
     _require(type(count) is int and least <= count <= most, f"{name}: {count!r} is not a number from {least} to {most}")
 
 
-def _require_possible(content: Mapping, settings: EncoderSettings) -> None:
-    """Raise a ValueError that names any impossible content of a model file with these encoder settings."""
+def _require_possible(content: Mapping, encoder: TrainedEncoder) -> None:
+    """Raise a ValueError that names any impossible content of a model file with this encoder."""
+    settings = encoder.settings
     read_settings(EncoderSettings, vars(settings))
     read_settings(GPCSettings, content["gpc"]["settings"])
     read_settings(ICPSettings, content["icp"])
@@ -173,10 +175,7 @@ def _require_possible(content: Mapping, settings: EncoderSettings) -> None:
         _require(is_name and action not in (NOTHING, QUEUE), fault)
     _require(len(set(treatments.values())) == len(treatments), "treatments: one action treats two concepts")
     _require(type(content["stand_in"]) is bool, "stand_in is neither true nor false")
-    with torch.device("meta"):  # the options may ask for more than the memory
-        encoder = make_encoder(settings.backbone, settings.options)
-    require_like(content["encoder"], encoder.state_dict(), "encoder")
-    _require_classifier(content["gpc"], CONCEPTS, encoder.embedding_size)
+    _require_classifier(content["gpc"], CONCEPTS, encoder.require_weights())
 
 
 def _is_line(text: object) -> bool:
@@ -197,8 +196,10 @@ def _require_diagnoser(state: Mapping) -> None:
     _require_count("re-enactments", settings.calls(starts), 1, MOST_RUNS)
     quantiles, threshold = classifier["quantiles"], state["threshold"]
     sized = quantiles.ndim == 2 and len(quantiles) > 1 and quantiles.shape[1] == FEATURE_COUNT
-    _require(sized, f"'quantiles' has shape {tuple(quantiles.shape)}, not {FEATURE_COUNT} descriptors")
-    _require(not (quantiles.diff(dim=0) < 0).any(), "'quantiles' decrease")
+    _require(sized, f"'quantiles' has shape {quantiles.shape}, not {FEATURE_COUNT} descriptors")
+    _require(not (np.diff(quantiles, axis=0) < 0).any(), "'quantiles' decrease")
+    usual = classifier.get("usual_distance", 1.0)
+    _require(type(usual) is float and 0 < usual < MOST_DRAWS, f"usual_distance: {usual!r} is not a distance")
     _require_shape("error_weights", state["error_weights"], (FEATURE_COUNT + 1,))
     _require(type(threshold) is float and 0 <= threshold <= 2, f"threshold: {threshold!r} is not a probability")
     causes = [(cause, (ABSENT, PRESENT)) for cause in classifier["causes"]]
@@ -217,8 +218,8 @@ def _require_diagnoser(state: Mapping) -> None:
         _require(is_measure, f"held_out: {str(name)[:40]!r} is not the name of a measure with a value")
 
 
-def _require_shape(name: str, tensor: torch.Tensor, shape: tuple[int, ...]) -> None:
-    _require(tuple(tensor.shape) == shape, f"'{name}' has shape {tuple(tensor.shape)}, not {shape}")
+def _require_shape(name: str, array: np.ndarray, shape: tuple[int, ...]) -> None:
+    _require(array.shape == shape, f"'{name}' has shape {array.shape}, not {shape}")
 
 
 def _require_classifier(state: Mapping, classes: tuple[str, ...], d: int) -> None:
@@ -228,21 +229,23 @@ def _require_classifier(state: Mapping, classes: tuple[str, ...], d: int) -> Non
     shapes = {"scaler_mean": (d,), "scaler_scale": (d,), "inducing": (m, d), "labelled": (n, d), "targets": (n,)}
     for name, shape in (shapes | {"mean": (n_classes, m), "covariance": (n_classes, m, m)}).items():
         _require_shape(name, state[name], shape)
-        _require(name == "targets" or state[name].is_floating_point(), f"'{name}' does not hold real numbers")
+        _require(name == "targets" or state[name].dtype.kind == "f", f"'{name}' does not hold real numbers")
     axes = state["axes"]
     named = not isinstance(axes, str) and all(isinstance(axis, str | int) for axis in axes)
     _require(named, "the names of its seed are neither texts nor numbers")
-    kernel = make_covariance(state["settings"]["kernel"], n_classes, lengthscale=1.0).state_dict()
-    require_like(state["kernel"], kernel, "kernel")
-    bounds = [name for name in kernel if name.endswith("_bound")]
-    _require(
-        all(torch.equal(state["kernel"][name], kernel[name]) for name in bounds), "its kernel has different bounds"
-    )
+    _require(set(state["kernel"]) == {"scale", "parameter"}, "its kernel has different parts")
+    for name, values in state["kernel"].items():
+        _require_shape(name, values, (n_classes,))
+        _require(values.dtype.kind == "f" and (values > 0).all(), f"'{name}' of its kernel is not above 0")
     _require((state["scaler_scale"] > 0).all(), "'scaler_scale' contains values that are not above 0")
-    covariance = state["covariance"].double()
-    symmetric = not (covariance - covariance.mT).abs().max() > ASYMMETRY  # Cholesky reads one triangle alone
-    positive = symmetric and not torch.linalg.cholesky_ex(covariance).info.any()
+    covariance = state["covariance"].astype(np.float64)
+    # Cholesky reads one triangle alone.
+    symmetric = not covariance.size or np.abs(covariance - np.swapaxes(covariance, 1, 2)).max() <= ASYMMETRY
+    try:
+        positive = bool(symmetric) and np.linalg.cholesky(covariance) is not None
+    except np.linalg.LinAlgError:
+        positive = False
     _require(positive, "'covariance' is not symmetric and positive definite")
     targets = state["targets"]
-    possible = not targets.is_floating_point() and ((targets >= 0) & (targets < n_classes)).all()
+    possible = targets.dtype.kind == "i" and ((targets >= 0) & (targets < n_classes)).all()
     _require(possible, "'targets' names a missing concept")

@@ -118,6 +118,7 @@ def model(job: Job) -> None:
     from gpca.causes.policy import RecoveryPolicy
     from gpca.classifier.gpc import GPC
     from gpca.classifier.settings import GPCSettings
+    from gpca.encoders.inference import TrainedEncoder
     from gpca.encoders.training import load_model
     from gpca.model.clouds import Familiarity
     from gpca.model.diagnoser import TrainingSet, learn
@@ -144,8 +145,7 @@ def model(job: Job) -> None:
         gpc = GPC(CONCEPTS, GPCSettings(**job.section("gpc")), *axes)
         Model(
             diagnoser=diagnoser,
-            encoder=load_model(job.encoder, settings, axes=axes).encoder,
-            encoder_settings=settings,
+            encoder=TrainedEncoder.of(load_model(job.encoder, settings, axes=axes).encoder, settings),
             gpc=gpc.fit(h_S_d[train], registrations.concept[train]),
             icp=ICPSettings(**icp),
             cloud_points=job.section("registrations").get("cloud_points", 2048),
