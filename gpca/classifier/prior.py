@@ -79,11 +79,11 @@ class Prior:
 
     def project(self, inputs_N_d: np.ndarray) -> Projection:
         """Return weights L⁻¹ k(Z, x) and residual variance k(x, x) - |weights|² of standardized inputs."""
-        in_double_N_d = inputs_N_d.astype(np.float64)
-        K_C_M_N = self.covariance.between(self.inducing_M_d.astype(np.float64), in_double_N_d)
+        double_N_d = inputs_N_d.astype(np.float64)
+        K_C_M_N = self.covariance.between(self.inducing_M_d.astype(np.float64), double_N_d)
         pairs = zip(self._cholesky_C_M_M, K_C_M_N, strict=True)
         weights_C_M_N = np.stack([solve_triangular(L, K, lower=True) for L, K in pairs])
-        residual_C_N = self.covariance.variance(in_double_N_d) + JITTER - np.square(weights_C_M_N).sum(axis=1)
+        residual_C_N = self.covariance.variance(double_N_d) + JITTER - np.square(weights_C_M_N).sum(axis=1)
         return Projection(inputs_N_d, np.swapaxes(weights_C_M_N, 1, 2), np.maximum(residual_C_N, 0))
 
     def inducing_weights(self, mean_C_M: np.ndarray) -> np.ndarray:

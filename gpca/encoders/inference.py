@@ -129,8 +129,8 @@ def expected_shapes(point_features: int = 256, inputs: int = 3, widths: Sequence
 
 
 def _norm_shapes(name: str, features: int) -> dict[str, tuple]:
-    of_features = ("weight", "bias", "running_mean", "running_var")
-    return {f"{name}.{part}": (features,) for part in of_features} | {f"{name}.num_batches_tracked": ()}
+    parts = ("weight", "bias", "running_mean", "running_var")
+    return {f"{name}.{part}": (features,) for part in parts} | {f"{name}.num_batches_tracked": ()}
 
 
 def _product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
