@@ -17,8 +17,7 @@ from gpca.classifier.settings import GPCSettings
 from gpca.errors import InputError
 from gpca.io.arrays import TEXT, WHOLE, save_arrays
 from gpca.io.container import Container, array
-from gpca.io.csv_file import read_csv
-from gpca.io.files import Axes
+from gpca.io.files import Axes, require_file
 from gpca.numerals import whole
 from gpca.pairs.dataset import ragged
 from gpca.seeds import generator
@@ -94,18 +93,25 @@ class LabelFile:
     def __init__(self, path: str | Path, samples: Mapping[Key, object]) -> None:
         self.path = Path(path)
         self.labels: dict[Key, str] = {}
-        written = self.path.read_text(encoding="utf-8", errors="replace").strip() if self.path.is_file() else ""
-        if written in ("", ",".join(LABEL_COLUMNS)):
+        if not self.path.exists() or (self.path.is_file() and not self.path.stat().st_size):
             return
-        rows = read_csv(self.path, LABEL_COLUMNS, remedy="correct or remove the line")
-        for line, (sample, split, concept) in enumerate(rows[list(LABEL_COLUMNS)].itertuples(index=False), start=2):
+        remedy = "correct or remove the line"
+        require_file(self.path, "no such file", remedy)
+        with self.path.open(newline="", encoding="utf-8-sig", errors="replace") as file:
+            head, *rows = [*filter(None, csv.reader(file))] or [[*LABEL_COLUMNS]]
+        if head != [*LABEL_COLUMNS]:
+            raise InputError(self.path, f"has the columns {','.join(head)[:80]}", f"give {','.join(LABEL_COLUMNS)}")
+        for line, row in enumerate(rows, start=2):
             where = f"{self.path}, line {line}"
+            if len(row) != len(LABEL_COLUMNS):
+                raise InputError(where, f"has {len(row)} entries, not {len(LABEL_COLUMNS)}", remedy)
+            sample, split, concept = row
             try:
                 key = (split, whole(sample))
             except ValueError:
                 key = (split, -1)
             if key not in samples:
-                raise InputError(where, f"no sample '{sample[:40]}' of split '{split}'", "remove the line")
+                raise InputError(where, f"no sample {sample[:40]!r} of split {split[:40]!r}", "remove the line")
             concept = concept.strip()
             if concept != SKIPPED:
                 require_name(concept, where)

@@ -59,7 +59,10 @@ def test_a_file_without_answers_is_a_start_and_the_same_answer_twice_no_conflict
         ("-3,train,pose\n", r"line 2: no sample '-3'"),
         ("٣,train,pose\n", r"line 2: no sample '٣'"),
         ("3,train,two words\n", r"line 2: 'two words' is not a valid concept name"),
-        ("3,tra", r"line 2: column 'split' contains a split that is neither train nor test"),
+        ("3,tra", r"line 2: has 2 entries, not 3; correct or remove the line"),
+        ("3,tra,pose\n", r"line 2: no sample '3' of split 'tra'"),
+        ("3,train,pose,1\n", r"line 2: has 4 entries, not 3"),
+        ('3,train,"po\nse"\n', r"line 2: 'po.*se' is not a valid concept name"),
     ],
 )
 def test_a_damaged_file_is_named_with_its_line(path, lines, message):
