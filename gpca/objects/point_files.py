@@ -26,7 +26,8 @@ from gpca.io.files import require_file, require_memory
 from gpca.numerals import whole
 from gpca.objects.canonical import require_points
 from gpca.objects.downloads import open_archive
-from gpca.objects.mesh_folder import LARGEST_TEXT_BYTES, files_in
+from gpca.objects.mesh_folder import files_in
+from gpca.objects.mesh_formats import LARGEST_TEXT_BYTES
 from gpca.objects.surface import Surface, evenly, instance_of, meters_per, view_order
 
 SCALARS = {"f4", "f8", *(f"{sign}{size}" for sign in "iu" for size in (1, 2, 4, 8))}

@@ -49,6 +49,15 @@ def test_mesh_is_centred_uniform_and_measured():
     assert len({(a, s) for a, s in zip(axis[:2000], np.sign(normals[rows, axis])[:2000], strict=True)}) == 6
 
 
+def test_points_on_a_mesh_are_those_that_trimesh_draws():
+    torus = trimesh.creation.torus(0.1, 0.02)
+    for seed in range(3):
+        random, theirs = np.random.default_rng(seed), np.random.default_rng(seed)
+        drawn = canonical.sample_surface(np.asarray(torus.vertices), np.asarray(torus.faces), 1000 + seed, random)
+        for ours, expected in zip(drawn, trimesh.sample.sample_surface(torus, 1000 + seed, seed=theirs), strict=True):
+            assert np.array_equal(ours, expected)
+
+
 def test_draw_depends_on_names_alone():
     first = canonical_cloud(box(), "source", 100)[0]
     assert np.array_equal(first, canonical_cloud(box(), "source", 100)[0])

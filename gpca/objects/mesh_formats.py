@@ -1,0 +1,371 @@
+"""Readers of PLY, OBJ, STL and OFF. A file must hold what it declares.
+
+Rows that are too wide, lists of another length, misspelled keywords and an early end are faults. Vertices and faces are
+those of trimesh, in its order, without its import, which takes longer than an explanation.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from operator import itemgetter
+from typing import IO, Any, NamedTuple
+
+import numpy as np
+
+from gpca.errors import InputError
+from gpca.numerals import decimal
+
+OFF_VERTEX_COLUMNS = (3, 6, 7)  # coordinates, alone or with a color
+OFF_COLOR_COLUMNS = (0, 1, 3, 4)  # of a face
+OBJ_VERTEX_COLUMNS = (3, 4, 6, 7)  # coordinates, alone, with a weight, with a color, with both
+# Exporters write the vertices that their faces use. A file that ends early leaves more unused than a modeler does; an
+# OBJ states its number of faces in no other way.
+LARGEST_UNUSED_SHARE = 0.1
+# Text takes a hundred times as long to parse as numbers in binary. A scan of a million triangles has 80 MB of text.
+LARGEST_TEXT_BYTES = 250 * 10**6
+LONGEST_LINE = 2**20  # bytes; a file with longer ones is not text
+AXES, NORMALS = (b"x", b"y", b"z"), (b"nx", b"ny", b"nz")
+CORNERS = (b"vertex_index", b"vertex_indices")  # names of the corners of a face in PLY
+PLY_ORDERS = {b"ascii": "", b"binary_little_endian": "<", b"binary_big_endian": ">"}  # of bytes
+PLY_KINDS = {
+    **{b"char": "i1", b"uchar": "u1", b"short": "i2", b"ushort": "u2"},
+    **{b"int": "i4", b"uint": "u4", b"float": "f4", b"double": "f8"},
+    **{
+        b"%sint%d" % (sign, 8 * size): f"{'u' * len(sign) or 'i'}{size}"
+        for sign in (b"", b"u")
+        for size in (1, 2, 4, 8)
+    },
+    **{b"float%d" % (8 * size): f"f{size}" for size in (2, 4, 8)},
+}
+# The keywords of the lines of a facet, and how many numbers follow.
+STL_FACET = ((b"facet normal", 3), (b"outer loop", 0), *[(b"vertex", 3)] * 3, (b"endloop", 0), (b"endfacet", 0))
+STL_HEAD_BYTES = 84  # of binary STL; the head ends with the number of facets
+STL_FACETS = np.dtype([("normal", "<f4", 3), ("vertices", "<f4", (3, 3)), ("attributes", "<u2")])
+QUAD = ((0, 1, 2), (2, 3, 0))  # the triangles of a quad; other polygons are fans
+
+
+class Shape(NamedTuple):
+    """What a file holds, in its own unit."""
+
+    vertices: np.ndarray  # (V, 3) float64
+    faces: np.ndarray  # (F, 3) int64, none for a cloud
+    normals: np.ndarray | None = None  # (V, 3) float64, of any length
+
+
+class _Property(NamedTuple):
+    name: bytes
+    kind: str
+    length_kind: str | None  # of a list
+
+
+class _Element(NamedTuple):
+    name: str
+    rows: int
+    properties: list[_Property]
+
+    @property
+    def corners(self) -> bytes | None:
+        """The list of the corners of faces: by its name, or the only property."""
+        lists = [each.name for each in self.properties if each.length_kind]
+        known = [name for name in lists if name in CORNERS] or lists[: len(self.properties) == 1]
+        return known[0] if self.name == "face" and known else None
+
+
+def _read_ply(file: IO[bytes]) -> Shape:
+    order, elements = _ply_header(file)
+    columns = _ply_binary(file, order, elements) if order else _ply_text(file, elements)
+    vertex = columns.get("vertex", dict.fromkeys(AXES, np.zeros(0)))
+    if not set(AXES) <= set(vertex):
+        raise ValueError("its vertices lack x, y or z")
+    vertices = np.stack([vertex[axis] for axis in AXES], axis=1, dtype=np.float64)
+    has_normals = set(NORMALS) <= set(vertex)
+    normals = np.stack([vertex[axis] for axis in NORMALS], axis=1, dtype=np.float64) if has_normals else None
+    faces = np.zeros((0, 3), np.int64)
+    for element in elements:
+        if element.name == "face":
+            if element.corners is None:
+                raise ValueError("its faces have no list 'vertex_indices'")
+            faces = _triangles(columns["face"][element.corners])
+    return Shape(vertices, faces, normals)
+
+
+def _ply_header(file: IO[bytes]) -> tuple[str, list[_Element]]:
+    """Return the order of bytes, none for text, and the elements that have rows."""
+    elements: dict[str, _Element] = {}
+    form = b""
+    lines = _bounded_lines(file)
+    if next(lines, b"").strip() != b"ply":
+        raise ValueError("it does not begin with 'ply'")
+    properties: list[_Property] | None = None
+    for line in lines:
+        match line.split():
+            case [b"end_header", *_]:
+                if form not in PLY_ORDERS:
+                    raise ValueError(f"its format {_shown(form)} is unknown")
+                return PLY_ORDERS[form], [element for element in elements.values() if element.rows]
+            case [b"format", form, *_]:
+                pass
+            case [b"element", word, count]:
+                if (name := word.decode("ascii", "replace")) in elements:
+                    raise ValueError(f"its header declares element {name} twice")
+                properties = []
+                elements[name] = _Element(name, _count(count), properties)
+            case ([b"property", kind, name] | [b"property", b"list", _, kind, name]) as words if properties is not None:
+                if name in (before.name for before in properties):
+                    raise ValueError(f"its header declares property {_shown(name)} twice in one element")
+                for word in words[1:-1]:
+                    if word not in (b"list", *PLY_KINDS):
+                        raise ValueError(f"its header contains the unknown type {_shown(word)}")
+                length_kind = PLY_KINDS[words[2]] if len(words) == 5 else None
+                properties.append(_Property(name, PLY_KINDS[kind], length_kind))
+            case [b"format" | b"element" | b"property", *_]:
+                raise ValueError(f"its header contains {_shown(line.strip())}")
+    raise ValueError("its header has no end")
+
+
+def _ply_text(file: IO[bytes], elements: list[_Element]) -> dict[str, dict[bytes, Any]]:
+    rows = (row.split() for row in _lines(file) if row.strip())
+    data = {}
+    for element in elements:
+        corners, wanted = element.corners, (*AXES, *NORMALS, element.corners)
+        kept: dict[bytes, list] = {each.name: [] for each in element.properties if each.name in wanted}
+        for i in range(element.rows):
+            row, place, subject = next(rows, None), 0, f"row {i + 1} of {element.rows} of element {element.name}"
+            if row is None:
+                raise ValueError(f"{subject} is missing")
+            for name, _, length_kind in element.properties:
+                start, length = place, 1
+                if length_kind and place < len(row):
+                    start, length = place + 1, _count(row[place])
+                values, place = row[start : start + length], start + length
+                if name == corners:
+                    if length < 3:
+                        raise ValueError(f"{subject} has {length} corners")
+                    if not all(word.isdigit() for word in values):
+                        raise ValueError(f"{subject} has a corner that is not a number of a vertex")
+                    kept[name].append([int(word) for word in values])
+                elif name in kept:
+                    kept[name].append(b" ".join(values))
+            if place != len(row):
+                raise ValueError(f"{subject} does not match its header")
+        data[element.name] = {
+            name: _numbers(kept[name], 1)[:, 0].astype(kind) if name != corners else kept[name]
+            for name, kind, _ in element.properties
+            if name in kept
+        }
+    if next(rows, None) is not None:
+        raise ValueError("more rows than the header states")
+    return data
+
+
+def _ply_binary(file: IO[bytes], order: str, elements: list[_Element]) -> dict[str, dict[bytes, Any]]:
+    content, place, data = file.read(), 0, {}
+    for element in elements:
+        fields: list[tuple] = []  # named by their position; lists are as long as the first
+        for i, (_, kind, length_kind) in enumerate(element.properties):
+            length: tuple[int, ...] = ()
+            if length_kind:
+                start = place + np.dtype(fields).itemsize
+                length = (int(np.frombuffer(content, order + length_kind, 1, start)[0]),)
+                fields.append((f"{i} length", order + length_kind))
+            fields.append((str(i), order + kind, length))
+        rows = np.frombuffer(content, np.dtype(fields), element.rows, place)
+        for i, (name, _, length_kind) in enumerate(element.properties):
+            if not length_kind:
+                continue
+            lengths = rows[f"{i} length"]
+            if (lengths != lengths[0]).any():
+                raise ValueError(f"lists of element {element.name} differ in length")
+            if name == element.corners and lengths[0] < 3:
+                raise ValueError(f"element {element.name} has rows of {lengths[0]} corners")
+        data[element.name] = {name: rows[str(i)] for i, (name, *_) in enumerate(element.properties)}
+        place += rows.nbytes
+    if place != len(content):
+        raise ValueError(f"its header states {place} bytes of data, but it has {len(content)}")
+    return data
+
+
+def _read_off(file: IO[bytes]) -> Shape:
+    rows = (words for words in (line.split(b"#")[0].split() for line in _lines(file)) if words)
+    head = next(rows, [b""])
+    if not head[0].startswith((b"OFF", b"COFF")):
+        raise ValueError("it does not begin with 'OFF'")
+    # The counts may stand in the line of the word OFF or COFF, even without a space.
+    counts = [word for word in (head[0].lstrip(b"COF"), *head[1:]) if word] or next(rows, [])
+    vertices, faces = (_count(word) for word in counts[:2])
+    points, polygons = [], []
+    for i in range(vertices):
+        if len(row := next(rows, [])) not in OFF_VERTEX_COLUMNS:
+            raise ValueError(f"vertex {i + 1} of {vertices} is missing or does not have 3 coordinates")
+        points.append([decimal(word.decode("utf-8", "replace")) for word in row][:3])
+    for i in range(faces):
+        row = next(rows, [b"0"])
+        corners = _count(row[0])
+        whole = len(row) - 1 - corners in OFF_COLOR_COLUMNS and all(word.isdigit() for word in row[1 : 1 + corners])
+        if 0 < corners < 3:
+            raise ValueError(f"face {i + 1} of {faces} has {corners} corners")
+        if not corners or not whole:
+            raise ValueError(f"face {i + 1} of {faces} is missing or does not have its stated length")
+        polygons.append([int(word) for word in row[1 : 1 + corners]])
+    if next(rows, None) is not None:
+        raise ValueError("more rows than it declares")
+    return Shape(np.array(points).reshape(-1, 3), _triangles(polygons))
+
+
+def _read_obj(file: IO[bytes]) -> Shape:
+    rows: list[bytes] = []  # of vertices
+    groups: dict[bytes, list] = {}  # faces of each material: numbers of vertex, texture and normal of their corners
+    widths: dict[bytes, set[int]] = {}  # how many numbers its faces have
+    material, relative_at, others, has_normals, before = b"", -1, False, False, b""
+    for number, line in enumerate(_lines(file), start=1):
+        line = before + line.split(b"#")[0].rstrip()
+        before = line[:-1] + b" " if line.endswith(b"\\") else b""  # it continues in the next line
+        if before or not line.strip():
+            continue
+        keyword, *words = line.split()
+        if keyword == b"v":
+            if len(words) not in OBJ_VERTEX_COLUMNS or (len(words) == 4 and float(words[3]) != 1):
+                raise ValueError(f"line {number}: a vertex has {len(words)} numbers or a weight other than 1")
+            rows.append(b" ".join(words[:3]))
+        elif keyword == b"f":
+            corners = [[int(field or b"0") for field in [*word.split(b"/"), b"", b""][:3]] for word in words]
+            vertices = [vertex for vertex, *_ in corners]
+            if len(corners) < 3 or 0 in vertices:
+                raise ValueError(f"line {number}: a face has {len(corners)} corners or refers to vertex 0")
+            if min(vertices) < 0:
+                relative_at = len(rows)
+            groups.setdefault(material, []).append(corners)
+            widths.setdefault(material, set()).add(len(line.replace(b"/", b" ").split()))
+        elif keyword == b"usemtl":
+            material = b" ".join(words)
+        has_normals |= keyword == b"vn"
+        others |= keyword in (b"l", b"p")  # lines and points use vertices, too
+    if not groups:
+        raise InputError(file.name, "has no faces", "export it again, or give the points as PLY")
+    # The materials stand in reverse, and a vertex is repeated for each of its textures and normals.
+    corners_K_3 = [
+        _triangles(groups[name], by_length=len(widths[name]) == 1).reshape(-1, 3) for name in reversed(groups)
+    ]
+    for vertex_K in (corners[:, 0] for corners in corners_K_3):
+        vertex_K += np.where(vertex_K < 0, len(rows), -1)
+    used = np.unique(np.concatenate(corners_K_3)[:, 0])
+    if used[0] < 0 or used[-1] >= len(rows):
+        raise ValueError("a face refers to a missing vertex")
+    if relative_at not in (-1, len(rows)):
+        raise ValueError("faces use relative numbers before the last vertex; export it with absolute numbers")
+    if not others and len(used) < (1 - LARGEST_UNUSED_SHARE) * len(rows):
+        raise ValueError(f"{len(rows) - len(used)} of {len(rows)} vertices belong to no face, as in a truncated file")
+    chosen, faces, count = [], [], 0
+    for vertex_K, texture_K, normal_K in (corners.T for corners in corners_K_3):
+        key_K, with_texture = vertex_K, texture_K.all()
+        for number_K, counts in (
+            (texture_K, with_texture),
+            (normal_K, normal_K.all() and (with_texture or has_normals)),
+        ):
+            if counts:
+                number_K = number_K - number_K.min()
+                key_K = np.unique(key_K * (number_K.max() + 1) + number_K, return_inverse=True)[1]
+        _, first, inverse_K = np.unique(key_K, return_index=True, return_inverse=True)
+        chosen.append(vertex_K[first])
+        faces.append(count + inverse_K.reshape(-1, 3))
+        count += len(first)
+    return Shape(_numbers(rows, 3)[np.concatenate(chosen)], np.concatenate(faces))
+
+
+def _read_stl(file: IO[bytes]) -> Shape:
+    head, size = file.read(STL_HEAD_BYTES), file.seek(0, os.SEEK_END)
+    if size == STL_HEAD_BYTES + STL_FACETS.itemsize * int.from_bytes(head[80:], "little"):
+        file.seek(STL_HEAD_BYTES)
+        return _loose(np.frombuffer(file.read(), STL_FACETS)["vertices"])
+    if not head.lstrip().lower().startswith(b"solid"):
+        raise ValueError("it neither begins with 'solid' nor has the length that its number of facets needs")
+    file.seek(0)
+    rows, place, keyword = [], 0, b"solid"  # within the facet, and of the line before
+    for number, line in enumerate(_lines(file), start=1):
+        words = line.lower().split()
+        if not words:
+            continue
+        if place == 0 and words[0] in (b"solid", b"endsolid"):
+            keyword = words[0]
+            continue
+        keyword, wanted = STL_FACET[place]
+        length = len(keyword.split())
+        if (written := b" ".join(words[:length])) != keyword:
+            raise ValueError(f"line {number}: {_shown(written)} stands where {_shown(keyword)} should")
+        if (numbers := len(words) - length) != wanted:
+            raise ValueError(f"line {number}: {_shown(keyword)} has {numbers} numbers")
+        if wanted and keyword == b"vertex":
+            rows.append(b" ".join(words[1:]))
+        place = (place + 1) % len(STL_FACET)
+    if keyword != b"endsolid":
+        raise ValueError("it ends before 'endsolid'")
+    return _loose(_numbers(rows, 3))
+
+
+def _loose(corners: np.ndarray) -> Shape:
+    """Return triangles none of which share a vertex."""
+    vertices = corners.reshape(-1, 3).astype(np.float64)
+    return Shape(vertices, np.arange(len(vertices)).reshape(-1, 3))
+
+
+READERS: dict[str, Callable[[IO[bytes]], Shape]] = {  # ValueError for a file that does not hold what it declares
+    ".ply": _read_ply,
+    ".obj": _read_obj,
+    ".stl": _read_stl,
+    ".off": _read_off,
+}
+
+
+def _triangles(polygons: np.ndarray | list, by_length: bool = True) -> np.ndarray:
+    """Return the triangles (F, 3, ...) of polygons: those of triangles, first and second halves of quads, then fans.
+
+    Not `by_length`, they are in the order of the polygons.
+    """
+    if isinstance(polygons, np.ndarray) and polygons.shape[1] == 3:
+        return polygons.astype(np.int64)
+    parts = [
+        (min(len(polygon), 5), half if len(polygon) == 4 else 0, [polygon[i] for i in corners])
+        for polygon in polygons
+        for half, corners in enumerate(QUAD if len(polygon) == 4 else _fan(len(polygon)))
+    ]
+    if by_length:
+        parts.sort(key=itemgetter(0, 1))
+    return np.array([triangle for *_, triangle in parts] or np.zeros((0, 3)), np.int64)
+
+
+def _fan(corners: int) -> list[tuple[int, int, int]]:
+    return [(0, i, i + 1) for i in range(1, corners - 1)]
+
+
+def _numbers(rows: list[bytes], columns: int) -> np.ndarray:
+    """Parse rows of text as C does: Python's float() takes underscores, too."""
+    table = np.loadtxt(rows, np.float64, comments=None, ndmin=2) if rows else np.zeros((0, columns))
+    if table.shape != (len(rows), columns):
+        raise ValueError(f"its rows do not have {columns} numbers")
+    return table
+
+
+def _lines(file: IO[bytes]) -> Iterator[bytes]:
+    """Yield the remaining lines of a text file; InputError where it has too much text to parse."""
+    if (size := os.fstat(file.fileno()).st_size) > LARGEST_TEXT_BYTES:
+        fault = f"has {size / 1e6:.0f} MB of text, more than the limit of {LARGEST_TEXT_BYTES / 1e6:.0f} MB"
+        raise InputError(file.name, fault, "export it as binary PLY, or with fewer faces")
+    yield from _bounded_lines(file)
+
+
+def _bounded_lines(file: IO[bytes]) -> Iterator[bytes]:
+    while line := file.readline(LONGEST_LINE):
+        if len(line) == LONGEST_LINE:
+            raise ValueError(f"a line is longer than {LONGEST_LINE} bytes, so it is not text")
+        yield line
+
+
+def _count(word: bytes) -> int:
+    if not word.isdigit():
+        raise ValueError(f"{_shown(word)} is not a count")
+    return int(word)
+
+
+def _shown(word: bytes) -> str:
+    return f"'{word[:40].decode('ascii', 'replace')}'"
