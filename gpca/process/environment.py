@@ -16,7 +16,24 @@ if TYPE_CHECKING:
     import numpy as np
 
 MODULES = {  # extra of pyproject.toml -> modules of its packages, which `gpca explain` does without
-    "suite": ("manifold3d", "open3d", "PIL", "pooch", "requests", "SALib", "shap", "shapely", "skactiveml", "umap"),
+    "suite": (
+        "gpytorch",
+        "manifold3d",
+        "numba",
+        "open3d",
+        "pandas",
+        "PIL",
+        "pooch",
+        "requests",
+        "SALib",
+        "skactiveml",
+        "sklearn",
+        "shap",
+        "shapely",
+        "torch",
+        "trimesh",
+        "umap",
+    ),
     "workflow": ("docutils", "jinja2", "markupsafe", "matplotlib", "snakemake"),
 }
 SYSTEM_PACKAGES = {  # shared library -> package of Debian and Ubuntu, of Fedora

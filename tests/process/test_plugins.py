@@ -1,6 +1,7 @@
 """Code from outside: files and modules that a config names, and installed packages that announce themselves."""
 
 import sys
+from importlib import import_module
 from types import ModuleType
 
 import pytest
@@ -174,7 +175,7 @@ def test_a_file_is_imported_once(folder):
 def test_the_tests_forget_plugins_and_no_module_of_a_library(folder):
     write(folder, {"own": "SOURCES = {}\n", "helpers/helper": ""})
     load("own.py")
-    from helpers import helper
+    helper = import_module("helpers.helper")
 
     assert all(lies_outside(sys.modules[name]) for name in ("own", "helpers", helper.__name__))
     # torch defines torch._C._functorch so, and imports it when it first needs it.
