@@ -10,6 +10,7 @@ import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, fields
+from functools import cache
 from typing import Annotated
 
 import numpy as np
@@ -44,10 +45,8 @@ class UMAP:
         """Return the transform of new samples; training samples pass it too, so that train and test agree."""
         seed = seed_of(*axes, "umap") % 2**32
         with warnings.catch_warnings(action="ignore"):
-            from umap import UMAP as UmapLearn
-
             random = {"random_state": seed, "transform_seed": seed, "n_jobs": 1}
-            model = UmapLearn(self.neighbours, self.components, **random).fit(z_train_N_d.astype(np.float32))
+            model = _umap_learn()(self.neighbours, self.components, **random).fit(z_train_N_d.astype(np.float32))
 
         def transform(z_S_d: np.ndarray) -> np.ndarray:
             # One by one: rows transformed together share random numbers and a threshold on their graph.
@@ -145,6 +144,20 @@ def make_reduction(name: str, settings: dict):
         remedy = f"its settings are {', '.join(names) or 'none'}"
         raise InputError(f"reduction '{name}'", f"has no setting '{unknown[0]}'", remedy)
     return reduction(**settings) if reduction else None
+
+
+@cache
+def _umap_learn() -> type:
+    """Return umap-learn's class, whose loops are kept compiled: it would compile them in each process, for 12 s."""
+    from numba.core.dispatcher import Dispatcher
+    from umap import UMAP as UmapLearn
+    from umap import distances, layouts, umap_, utils
+
+    for module in (distances, layouts, umap_, utils):
+        for loop in vars(module).values():
+            if isinstance(loop, Dispatcher) and not loop.signatures:
+                loop.enable_caching()
+    return UmapLearn
 
 
 @contextmanager
