@@ -87,7 +87,7 @@ def plain_log_likelihood(model, observed, least_width: float) -> float:
     """Return the mean log-likelihood of the mixture after as many iterations, of every partner of every point."""
     import numpy as np
 
-    from gpca.reenactment.mixture import (
+    from gpca.reenactment.mixture_kernels import (
         FEWEST_OUTLIERS,
         FIRST_OUTLIERS,
         FIRST_WIDTH,

@@ -15,6 +15,7 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from gpca.alignment.icp import CONVERGED, ICP, ICPSettings, require_cloud
+from gpca.alignment.icp_kernels import LISTED, align_all, plane_all, pull_all
 from gpca.rigid import rigid_motion
 
 MOST_LISTS = 1 << 16  # beyond that, queries in new voxels search the cells
@@ -41,8 +42,6 @@ class Target(NamedTuple):
 
 def make_target(points: np.ndarray, distance: float) -> Target:
     """Sort points (P, 3) for searches within `distance`, in the unit of the points."""
-    from gpca.alignment.icp_kernels import LISTED
-
     low, high = points.min(axis=0).astype(np.float64), points.max(axis=0)
     extent = max(float((high - low).max()), 1e-9)
     # The points lie on a surface: their number grows with the square of the extent.
@@ -96,12 +95,10 @@ class BatchedICP:
         require_cloud("source cloud", source)
         poses_n = np.array(T_target_source_init_n, np.float64)
         if self._settings.method == "point_to_point":
-            from gpca.alignment.icp_kernels import align_all
-
             fitness_n, rmse_n = np.empty(len(poses_n)), np.empty(len(poses_n))
             source = np.ascontiguousarray(source, np.float64)
             iterations = self._settings.max_iterations if max_iterations is None else max_iterations
-            align_all(source, self._target, poses_n, fitness_n, rmse_n, iterations)
+            align_all(source, self._target, poses_n, fitness_n, rmse_n, iterations, CONVERGED)
             return poses_n, fitness_n, rmse_n
         runs = [self._icp.register(source, pose) for pose in poses_n]
         fitness_n, rmse_n = np.array([(run.fitness, run.inlier_rmse) for run in runs]).T
@@ -116,8 +113,6 @@ def pulls(
     r = y - q is the offset of the moved point y from its neighbor q; the mean is half the gradient of the mean of |r|²
     by a twist on the left of each pose (n, 4, 4).
     """
-    from gpca.alignment.icp_kernels import pull_all
-
     n = len(T_target_source_n)
     pulls_n_6, fitness_n, rmse_n = np.empty((n, 6)), np.empty(n), np.empty(n)
     source = np.ascontiguousarray(source, np.float64)
@@ -145,8 +140,6 @@ class BatchedPlaneICP:
 
     def sums(self, source: np.ndarray, poses_n: np.ndarray) -> tuple[np.ndarray, ...]:
         """Return Σ JᵀJ (n, 6, 6) and Σ Jᵀd (n, 6) of the plane distances d, fitness (n,) and inlier RMSE (n,)."""
-        from gpca.alignment.icp_kernels import plane_all
-
         n = len(poses_n)
         sums = np.empty((n, 6, 6)), np.empty((n, 6)), np.empty(n), np.empty(n)
         plane_all(source, self._target, self._normals, np.ascontiguousarray(poses_n), *sums)

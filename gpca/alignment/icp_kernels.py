@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from gpca.alignment.icp import CONVERGED
 from gpca.process.compilation import INNER_LOOP, njit
 
 LISTED = 16  # target points per voxel
+TARGET = "( d2 l1 d1 d l1 d l1 i1 i2 d3 d1 l1 d )"  # types of the fields of a target, see `njit`
 
 
 @njit(forceinline=True, **INNER_LOOP)
@@ -160,9 +160,12 @@ def _reached(low, cell, x, y, z, window):
     return window * cell + wall
 
 
-@njit(cache=True)
-def align_all(source, target, poses, fitness, rmse, max_iterations):
-    """Align the source (N, 3) from every pose (n, 4, 4), in place; fill fitness (n,) and inlier RMSE (n,)."""
+@njit(ahead=f"d2 {TARGET} d3 d1 d1 l d", cache=True)
+def align_all(source, target, poses, fitness, rmse, max_iterations, converged):
+    """Align the source (N, 3) from every pose (n, 4, 4), in place; fill fitness (n,) and inlier RMSE (n,).
+
+    A run has converged where both change by less than `converged`.
+    """
     room = np.empty(LISTED)
     moments, matrices = np.empty((4, 4)), np.empty((8, 4))
     neighbor = np.empty(len(source), np.int64)
@@ -177,11 +180,11 @@ def align_all(source, target, poses, fitness, rmse, max_iterations):
                 move(pose, moments, matrices)
             old_fitness, old_rmse = fitness[n], rmse[n]
             fitness[n], rmse[n] = _correspond(source, target, pose, moments, room, neighbor, held)
-            if abs(old_fitness - fitness[n]) < CONVERGED and abs(old_rmse - rmse[n]) < CONVERGED:
+            if abs(old_fitness - fitness[n]) < converged and abs(old_rmse - rmse[n]) < converged:
                 break
 
 
-@njit(cache=True)
+@njit(ahead=f"d2 {TARGET} d3 d2 d1 d1", cache=True)
 def pull_all(source, target, poses, pulls, fitness, rmse):
     """At every pose (n, 4, 4), fill the mean of [y × r, r] (n, 6) over correspondences, r = y - q of the moved source.
 
@@ -199,7 +202,7 @@ def pull_all(source, target, poses, pulls, fitness, rmse):
             pulls[n, 3 + i] = moments[3, i] - moments[i, 3]
 
 
-@njit(cache=True)
+@njit(ahead=f"d2 {TARGET} d2 d3 d3 d2 d1 d1", cache=True)
 def plane_all(source, target, normals, poses, hessians, gradients, fitness, rmse):
     """At every pose fill Σ JᵀJ (n, 6, 6), Σ Jᵀd (n, 6) over correspondences, d = n·(y - q), J = [y × n, n].
 

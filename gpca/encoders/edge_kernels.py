@@ -2,7 +2,8 @@
 
 All arrays are C-contiguous float32 (float64 in gradient checks). ``ac`` (B, N, 2F) holds A in its first F and C in its
 last F channels. Clouds run in parallel; sums are made within one cloud and clouds are added in order, so the number of
-threads changes no bit. Inner loops run over channels, where they vectorize.
+threads changes no bit. Inner loops run over channels, where they vectorize. A pass fills the arrays that the function
+of its name makes.
 """
 
 from __future__ import annotations
@@ -12,25 +13,28 @@ import numpy as np
 from gpca.process.compilation import OVER_CLOUDS, njit, prange
 
 
-@njit(**OVER_CLOUDS)
-def smallest_k(distances, k):
+def smallest_k(distances: np.ndarray, k: int) -> np.ndarray:
     """Return for every row of ``distances`` (B, N, M) the columns of its k smallest entries, ties to the lower column.
 
     Searches for a value that exactly k entries do not exceed: counting vectorizes, which is about ten times faster than
     keeping the k best while scanning. Rows are independent, so one cloud occupies several threads.
     """
     batch, n, columns = distances.shape
-    rows = distances.reshape(batch * n, columns)
     # Not np.empty: a row with NaN fills too few slots, but the rest must still be indices of points.
     chosen = np.zeros((batch * n, k), np.int32)
-    for i in prange(batch * n):
+    _smallest_k(distances.reshape(batch * n, columns), k, chosen)
+    return chosen.reshape(batch, n, k)
+
+
+@njit(ahead="f2 l i2", **OVER_CLOUDS)
+def _smallest_k(rows, k, chosen):
+    for i in prange(len(rows)):
         row = rows[i]
         below, above, count = _bracket(row, k)
         if count == k:
             _collect_up_to(row, above, chosen[i])
         else:
             _collect_with_ties(row, below, above, chosen[i])
-    return chosen.reshape(batch, n, k)
 
 
 @njit(cache=True, error_model="numpy")
@@ -103,21 +107,25 @@ def _collect_with_ties(row, below, above, out):
             filled += 1
 
 
-@njit(**OVER_CLOUDS)
-def gather_extreme_and_sums(ac, neighbors, gamma):
+def gather_extreme_and_sums(ac: np.ndarray, neighbors: np.ndarray, gamma: np.ndarray) -> tuple[np.ndarray, ...]:
     """Pass once over all edges y_ij = A_j + C_i: extreme, extreme_at, edge_sums (B, N, F), mean and variance (F,).
 
     The extreme is max_j y_ij where gamma >= 0 and min_j y_ij elsewhere, reached at the point j; edge_sums are Σ_j y_ij.
     Mean and biased variance are over all B·N·k edges, in float64.
     """
+    shape = (*neighbors.shape[:2], len(gamma))
+    filled = np.empty(shape, ac.dtype), np.empty(shape, np.int32), np.empty(shape, ac.dtype)
+    mean, variance = np.zeros((2, len(gamma)))
+    _gather_extreme_and_sums(ac, neighbors, np.where(gamma >= 0, 1, -1).astype(ac.dtype), *filled, mean, variance)
+    return *filled, mean, variance
+
+
+@njit(ahead="f3 i3 f1 f3 i3 f3 d1 d1", **OVER_CLOUDS)
+def _gather_extreme_and_sums(ac, neighbors, sign, extreme, extreme_at, edge_sums, mean, variance):
     batch, n, k = neighbors.shape
-    features = ac.shape[2] // 2
-    extreme = np.empty((batch, n, features), ac.dtype)
-    extreme_at = np.empty((batch, n, features), np.int32)
-    edge_sums = np.empty((batch, n, features), ac.dtype)
+    features = len(sign)
     sums = np.zeros((batch, features), np.float64)
     squares = np.zeros((batch, features), np.float64)
-    sign = np.where(gamma >= 0, 1, -1).astype(ac.dtype)
     for b in prange(batch):
         square = np.empty(features, ac.dtype)
         for i in range(n):
@@ -144,37 +152,49 @@ def gather_extreme_and_sums(ac, neighbors, gamma):
                 sums[b, f] += total[f]
                 squares[b, f] += square[f]
     edges = batch * n * k
-    mean = np.zeros(features, np.float64)
-    variance = np.zeros(features, np.float64)
-    for b in range(batch):
-        mean += sums[b] / edges
-        variance += squares[b] / edges
-    variance = np.maximum(variance - mean * mean, 0.0)
-    return extreme, extreme_at, edge_sums, mean, variance
+    for f in range(features):
+        for b in range(batch):
+            mean[f] += sums[b, f] / edges
+            variance[f] += squares[b, f] / edges
+        variance[f] = np.maximum(variance[f] - mean[f] * mean[f], 0.0)
 
 
-@njit(**OVER_CLOUDS)
-def normalize_activate(extreme, mean, inverse_std, gamma, beta, slope):
-    """Return act(γ (extreme - μ)/σ + β), the layer's output (B, N, F)."""
-    batch, n, features = extreme.shape
-    scale = gamma * inverse_std
-    shift = beta - scale * mean
-    slope = extreme.dtype.type(slope)
+def normalize_activate(extreme: np.ndarray, *others: np.ndarray | float) -> np.ndarray:
+    """Return act(γ (extreme - μ)/σ + β), the layer's output (B, N, F), by μ, 1/σ, γ, β and the slope."""
     out = np.empty_like(extreme)
+    _normalize_activate(extreme, *others, out)
+    return out
+
+
+@njit(ahead="f3 f1 f1 f1 f1 d f3", **OVER_CLOUDS)
+def _normalize_activate(extreme, mean, inverse_std, gamma, beta, slope, out):
+    batch, n, features = extreme.shape
+    scale, shift = np.empty_like(gamma), np.empty_like(gamma)
+    for f in range(features):
+        scale[f] = gamma[f] * inverse_std[f]
+        shift[f] = beta[f] - scale[f] * mean[f]
+    slope = extreme.dtype.type(slope)
     for b in prange(batch):
         for i in range(n):
             for f in range(features):
                 z = extreme[b, i, f] * scale[f] + shift[f]
                 out[b, i, f] = z if z > 0 else slope * z
+
+
+def gather_max_affine(ac: np.ndarray, *others: np.ndarray | float) -> np.ndarray:
+    """Return max_j act(scale · (A_j + C_i) + shift), (B, N, F), in one pass without statistics, for inference.
+
+    The others are the neighbors, scale, shift and slope.
+    """
+    out = np.empty((*ac.shape[:2], ac.shape[2] // 2), ac.dtype)
+    _gather_max_affine(ac, *others, out)
     return out
 
 
-@njit(**OVER_CLOUDS)
-def gather_max_affine(ac, neighbors, scale, shift, slope):
-    """Return max_j act(scale · (A_j + C_i) + shift), (B, N, F), in one pass without statistics, for inference."""
+@njit(ahead="f3 i3 f1 f1 d f3", **OVER_CLOUDS)
+def _gather_max_affine(ac, neighbors, scale, shift, slope, out):
     batch, n, k = neighbors.shape
-    features = ac.shape[2] // 2
-    out = np.empty((batch, n, features), ac.dtype)
+    features = len(scale)
     slope = ac.dtype.type(slope)
     for b in prange(batch):
         scaled = np.empty((n, features), ac.dtype)
@@ -192,14 +212,12 @@ def gather_max_affine(ac, neighbors, scale, shift, slope):
             for f in range(features):
                 z = best[f] + scale[f] * ac[b, i, features + f] + shift[f]
                 best[f] = z if z > 0 else slope * z
-    return out
 
 
-@njit(**OVER_CLOUDS)
-def edge_max_backward(
-    grad_out, ac, neighbors, extreme, extreme_at, edge_sums, mean, inverse_std, gamma, out, n_edges, slope
-):
+def edge_max_backward(grad_out: np.ndarray, ac: np.ndarray, *others: np.ndarray | float) -> tuple[np.ndarray, ...]:
     """Return grad_ac (B, N, 2F), grad_gamma (F,), grad_beta (F,) of :func:`normalize_activate`.
+
+    The others are what the pass below names, from the neighbors to the slope.
 
     With g the gradient at the extreme edges and ŷ the normalized edges, batch norm over E edges gives
 
@@ -207,6 +225,16 @@ def edge_max_backward(
 
     summed over the edges that leave i it is ∂L/∂C_i, over those that arrive at j it is ∂L/∂A_j.
     """
+    grad_ac, (grad_gamma, grad_beta) = np.empty_like(ac), np.zeros((2, ac.shape[2] // 2))
+    _edge_max_backward(grad_out, ac, *others, grad_ac, grad_gamma, grad_beta)
+    return grad_ac, grad_gamma.astype(ac.dtype), grad_beta.astype(ac.dtype)
+
+
+@njit(ahead="f3 f3 i3 f3 i3 f3 f1 f1 f1 f3 l d f3 d1 d1", **OVER_CLOUDS)
+def _edge_max_backward(
+    grad_out, ac, neighbors, extreme, extreme_at, edge_sums, mean, inverse_std, gamma, out, n_edges, slope,
+    grad_ac, grad_gamma, grad_beta,
+):  # fmt: skip
     batch, n, k = neighbors.shape
     features = gamma.shape[0]
     dtype = ac.dtype
@@ -221,17 +249,15 @@ def edge_max_backward(
                 grad[b, i, f] = g
                 beta_parts[b, f] += g
                 gamma_parts[b, f] += g * ((extreme[b, i, f] - mean[f]) * inverse_std[f])
-    grad_gamma = np.zeros(features, np.float64)
-    grad_beta = np.zeros(features, np.float64)
-    for b in range(batch):
-        grad_gamma += gamma_parts[b]
-        grad_beta += beta_parts[b]
-    scale = gamma * inverse_std
     # per edge: γ/σ [ g - (β' + (y - μ)/σ γ')/E ]  =  scale g - constant - linear y
-    linear = (scale * inverse_std * grad_gamma / n_edges).astype(dtype)
-    constant = (scale * grad_beta / n_edges).astype(dtype) - linear * mean
-
-    grad_ac = np.empty((batch, n, 2 * features), dtype)
+    scale, linear, constant = np.empty(features, dtype), np.empty(features, dtype), np.empty(features, dtype)
+    for f in range(features):
+        for b in range(batch):
+            grad_gamma[f] += gamma_parts[b, f]
+            grad_beta[f] += beta_parts[b, f]
+        scale[f] = gamma[f] * inverse_std[f]
+        linear[f] = scale[f] * inverse_std[f] * grad_gamma[f] / n_edges
+        constant[f] = dtype.type(scale[f] * grad_beta[f] / n_edges) - linear[f] * mean[f]
     for b in prange(batch):
         degree = np.zeros(n, np.int32)
         arriving_c = np.zeros((n, features), dtype)
@@ -255,4 +281,3 @@ def edge_max_backward(
                 grad_ac[b, i, features + f] = (
                     scale[f] * grad[b, i, f] - leaving * constant[f] - linear[f] * edge_sums[b, i, f]
                 )
-    return grad_ac, grad_gamma.astype(dtype), grad_beta.astype(dtype)

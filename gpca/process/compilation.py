@@ -1,12 +1,32 @@
-"""Loops that numba compiles, which is imported when the first of them is called."""
+"""Loops in machine code: of a library that is compiled ahead of time, else of numba, imported at the first such call.
+
+:mod:`gpca.process.build_loops` makes the library. It holds the loops for one signature each, with the bits of numba's
+code, and is used where its sources are those of this package and the processor has its instructions.
+"""
 
 from __future__ import annotations
 
+import ctypes
+import hashlib
+import os
 from collections.abc import Callable
-from functools import cached_property, update_wrapper
+from functools import cache, cached_property, update_wrapper
+from pathlib import Path
 from typing import Any, ClassVar
 
+import numpy as np
+
+from gpca.process.processor import may_pin
+
 NOTICE = "compiling loops, which takes up to half a minute; later calls load what is kept of them"
+REMEDY = "; 'python -m gpca.process.build_loops' compiles most of them once and for all"
+LIBRARY = Path(__file__).with_name("loops.so")
+MODULES = (  # of the loops that are compiled ahead of time; they need nothing but each other
+    "gpca.alignment.icp_kernels",
+    "gpca.encoders.edge_kernels",
+    "gpca.reenactment.mixture_kernels",
+    "gpca.reenactment.surface_kernels",
+)
 # Without numba's reference counting (`_nrt`), which takes longer than the search in the loops of ICP, as it counts for
 # every array taken out of a tuple. Such functions cannot allocate arrays.
 INNER_LOOP: dict[str, Any] = {
@@ -23,34 +43,90 @@ OVER_CLOUDS: dict[str, Any] = {
     "fastmath": {"contract", "nsz", "nnan"},
 }
 prange = range  # until numba is there
+_CODES: dict[type, str] = {bool: "?", int: "l", float: "d", np.float64: "d"}
+_RESULTS = (ctypes.c_void_p * 2)()  # where machine code writes None and errors
 
 
 class Loop:
-    """A compiled function of arrays and numbers; `py_func` is what was written."""
+    """A compiled function; `py_func` is what was written, `ahead` the types that :func:`njit` was given."""
 
-    announced: ClassVar[bool] = False  # whether the next compilation is told
+    announced: ClassVar[bool] = False  # whether numba's next compilation prints a line
 
-    def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
+    def __init__(self, function: Callable[..., Any], ahead: str, options: dict[str, Any]) -> None:
         update_wrapper(self, function)
-        self.py_func, self._options = function, options
+        self.py_func, self.ahead, self.options = function, ahead, options
+        self.symbol = f"{function.__module__}.{function.__name__}"
 
     def __call__(self, *arguments: Any) -> Any:
         """Run the loop."""
+        if self._machine_code is not None:
+            numbers: list[Any] = [ctypes.addressof(_RESULTS), ctypes.addressof(_RESULTS) + 8]
+            if " ".join([_unfold(argument, numbers) for argument in arguments]) == self.ahead:
+                return self._run(numbers)
         return self.dispatcher(*arguments)
+
+    def _run(self, numbers: list[Any]) -> None:
+        code = self._machine_code
+        if not code.argtypes:
+            code.argtypes = [ctypes.c_double if isinstance(n, float) else ctypes.c_int64 for n in numbers]
+        if code(*numbers):
+            raise RuntimeError(f"{self.symbol} failed, as for want of memory or in a division by zero")
+
+    @cached_property
+    def _machine_code(self) -> Any:
+        serial = not self.options.get("parallel") or os.environ.get("NUMBA_NUM_THREADS", "1") == "1"
+        found = library() if self.ahead and serial else None
+        return found and found[self.symbol]
 
     @cached_property
     def dispatcher(self) -> Any:
         """What numba makes of the function."""
         from gpca.process import numba_cache
 
-        if self._options.get("parallel"):
+        if self.options.get("parallel"):
             self.py_func.__globals__["prange"] = numba_cache.prange
-        return numba_cache.njit(**self._options)(self.py_func)
+        return numba_cache.njit(**self.options)(self.py_func)
 
 
-def njit(**options: Any) -> Callable[[Callable[..., Any]], Loop]:
-    """Return a decorator that makes a loop of a function, by options of numba's decorator of that name."""
-    return lambda function: Loop(function, options)
+def njit(ahead: str = "", **options: Any) -> Callable[[Callable[..., Any]], Loop]:
+    """Return a decorator that makes a loop of a function, by options of numba's decorator of that name.
+
+    Args:
+        ahead: for machine code ahead of time, of a function that returns nothing: NumPy's letters of the arguments'
+            types, an array's with the number of its axes, as in "d2 l d"; those of a tuple's fields in "( ... )".
+        options: of numba.
+    """
+    return lambda function: Loop(function, ahead, options)
+
+
+def _unfold(argument: Any, numbers: list[Any]) -> str:
+    """Append what numba's machine code is given of an argument; return its type, "" where it has no such code."""
+    if isinstance(argument, tuple):
+        return f"( {' '.join([_unfold(field, numbers) for field in argument])} )"
+    if isinstance(argument, np.ndarray) and argument.flags.c_contiguous and argument.dtype.isnative:
+        data = argument.ctypes.data
+        numbers += (0, 0, argument.size, argument.itemsize, data, *argument.shape, *argument.strides)
+        return f"{argument.dtype.char}{argument.ndim}"
+    numbers.append(argument)
+    return _CODES.get(type(argument), "")
+
+
+@cache
+def library() -> ctypes.PyDLL | None:
+    """Return the library, None where it is missing, of other sources, or for another processor."""
+    try:
+        found = ctypes.PyDLL(str(LIBRARY)) if may_pin() else None
+    except OSError:
+        return None
+    return found if found and ctypes.c_char_p.in_dll(found, "state").value == state().encode() else None
+
+
+def state() -> str:
+    """Return the SHA-256 of the sources of the library."""
+    package = Path(__file__).parents[2]
+    files = [package.joinpath(*module.split(".")).with_suffix(".py") for module in MODULES]
+    files += [Path(__file__), Path(__file__).with_name("build_loops.py")]
+    return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
 
 
 def say_when_compiling() -> None:

@@ -19,7 +19,8 @@ from numba.core.event import Listener, register
 from numba.extending import typeof_impl
 
 from gpca.process.code_files import ROOT, code_files
-from gpca.process.compilation import NOTICE, Loop
+from gpca.process.compilation import NOTICE, REMEDY, Loop, library
+from gpca.process.processor import may_pin
 
 __all__ = ["njit", "prange"]
 
@@ -67,7 +68,7 @@ class PackageLocator(UserProvidedCacheLocator):
 class _Notice(Listener):
     def on_start(self, event: object) -> None:
         if Loop.announced:
-            print(NOTICE, file=sys.stderr, flush=True)
+            print(NOTICE + (REMEDY if may_pin() and not library() else ""), file=sys.stderr, flush=True)
         Loop.announced = False
 
     def on_end(self, event: object) -> None:

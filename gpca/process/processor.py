@@ -45,10 +45,15 @@ def pin_instructions() -> str:
 
     Nothing is set, and "native" returned, if the processor lacks the level or GPCA_INSTRUCTIONS is "native".
     """
-    if os.environ.get(INSTRUCTIONS_VARIABLE) == "native" or not _flags() >= _REQUIRED_FLAGS:
+    if not may_pin():
         return "native"
     os.environ.update(_PINS)
     return COMMON_LEVEL
+
+
+def may_pin() -> bool:
+    """Return whether the processor has the common level, and the user does not ask for more."""
+    return os.environ.get(INSTRUCTIONS_VARIABLE) != "native" and _flags() >= _REQUIRED_FLAGS
 
 
 def instructions() -> str:

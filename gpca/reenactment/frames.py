@@ -29,7 +29,8 @@ from gpca.reenactment import hypotheses as search
 from gpca.reenactment.dataset import Reenactments, reenact_all
 from gpca.reenactment.enactment import Enactment, enact
 from gpca.reenactment.hypotheses import Hypothesis
-from gpca.reenactment.mixture import LARGEST_WIDTH, Anchor, Mixture
+from gpca.reenactment.mixture import Anchor, Mixture
+from gpca.reenactment.mixture_kernels import LARGEST_WIDTH
 from gpca.reenactment.settings import ReenactmentSettings
 from gpca.reenactment.surface import ModelSurface
 from gpca.rigid import inverse, scale_translation, transform

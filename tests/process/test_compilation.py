@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from gpca.process.compilation import NOTICE
+from gpca.process.compilation import NOTICE, REMEDY
 from tests.documents import ROOT
 
 CODE = "import numba, gpca.process.numba_cache; print(numba.config.CACHE_DIR)"
@@ -33,6 +33,7 @@ def package(tmp_path):
         "process/__init__.py",
         "process/compilation.py",
         "process/numba_cache.py",
+        "process/processor.py",
     ):
         (tmp_path / "gpca" / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / "gpca" / name, tmp_path / "gpca" / name)
@@ -77,7 +78,7 @@ def test_without_a_place_of_its_own_the_folder_is_a_temporary_one_of_this_user(p
 def test_a_first_call_says_that_it_compiles_and_later_ones_do_not(package):
     code = "from gpca.process.compilation import say_when_compiling as say; say(); say(); "
     code += "from gpca.upper import upper; upper(1); upper(1.0)"
-    assert [imported(package, code).stderr for _ in range(2)] == [f"{NOTICE}\n", ""]
+    assert [imported(package, code).stderr for _ in range(2)] == [f"{NOTICE}{REMEDY}\n", ""]
 
 
 def test_a_copy_elsewhere_takes_along_what_was_compiled(package, tmp_path_factory):

@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from gpca.reenactment.mixture import FIRST_OUTLIERS, REACH, Anchor, Mixture
+from gpca.reenactment.mixture import Anchor, Mixture
+from gpca.reenactment.mixture_kernels import FIRST_OUTLIERS, REACH
 from gpca.rigid import exp, inverse, transform
 
 RANDOM = np.random.default_rng(100)
