@@ -1,17 +1,22 @@
-"""Settings: types of a settings class, or of a function's arguments, that pydantic checks.
+"""Settings: types of a settings class, or of a function's arguments, that pydantic checks and names the faults of.
 
-A settings class is a frozen dataclass with fields such as ``batch: Annotated[int, Bounds(minimum=2)]``.
+A settings class is a frozen dataclass with fields such as ``batch: Annotated[int, Bounds(minimum=2)]``. What plainly
+fits is read without pydantic, whose import takes longer than most of an explanation.
 """
 
 from __future__ import annotations
 
 import json
+import operator
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, fields, is_dataclass
 from difflib import get_close_matches
 from functools import cache, partial
 from inspect import Parameter, isclass, signature
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, get_type_hints
+from math import isfinite
+from types import UnionType
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from gpca.errors import InputError
 
@@ -20,6 +25,7 @@ if TYPE_CHECKING:
     from pydantic_core import CoreSchema, ErrorDetails
 
 T = TypeVar("T")
+Scalar = bool | int | float | str | None
 LARGEST = {"int": 10**6, "float": 1e12}  # larger numbers are typos, which would end hours later or in no memory
 PYDANTIC = {  # JSON schema -> pydantic
     **{"minimum": "ge", "maximum": "le", "exclusiveMinimum": "gt", "exclusiveMaximum": "lt"},
@@ -39,6 +45,12 @@ class Bounds:
         schema: dict[str, Any] = dict(handler(kind))
         upper = {} if {"le", "lt"} & self._bounds.keys() else {"le": LARGEST[schema["type"]]}
         return schema | self._bounds | upper
+
+    def hold(self, number: float) -> bool:
+        """Return whether a number is in the range; a multiple is left to pydantic."""
+        compare = {"ge": operator.ge, "le": operator.le, "gt": operator.gt, "lt": operator.lt}
+        bounds = {"le": LARGEST[type(number).__name__]} | self._bounds
+        return all(compare[name](number, bound) for name, bound in bounds.items())
 
 
 Count = Annotated[int, Bounds(minimum=1)]
@@ -124,6 +136,8 @@ class ArgumentsOf:
 
 def read_settings(kind: type[T], settings: Mapping[str, Any], subject: str = "setting") -> T:
     """Return an instance of a settings class from a section of a config."""
+    with suppress(LookupError, TypeError, ValueError):
+        return _fitted(kind, settings)
     from pydantic import ValidationError
 
     def as_json(value: Any) -> Any:  # what no config can hold becomes its text
@@ -134,6 +148,37 @@ def read_settings(kind: type[T], settings: Mapping[str, Any], subject: str = "se
         return adapter.validate_json(json.dumps([settings], default=as_json))[0]
     except ValidationError as fault:
         raise _input_error(fault.errors(), settings, adapter, subject) from None
+
+
+def _fitted(kind: Any, value: Any) -> Any:
+    """Return what pydantic makes of a value that plainly fits its type; LookupError for what it should look at."""
+    origin, parts = get_origin(kind), get_args(kind)
+    if origin is Annotated and all(isinstance(mark, Bounds) and mark.hold(value) for mark in parts[1:]):
+        return _fitted(parts[0], value)
+    if origin is Literal and any(type(value) is type(part) and value == part for part in parts):
+        return value
+    if origin in (Union, UnionType):
+        for part in parts:
+            with suppress(LookupError, TypeError, ValueError):
+                return _fitted(part, value)
+    if origin is tuple and isinstance(value, list | tuple):
+        kinds = [parts[0]] * len(value) if parts[-1] is ... else parts
+        return tuple(_fitted(part, inner) for part, inner in zip(kinds, value, strict=True))
+    if kind is dict and type(value) is dict:
+        return {_fitted(str, name): _fitted(Scalar, inner) for name, inner in value.items()}
+    if isclass(kind) and is_dataclass(kind) and isinstance(value, Mapping):
+        hints = _hints(kind)
+        return kind(**{name: _fitted(hints[name], inner) for name, inner in value.items()})
+    if kind is float and type(value) is int:
+        return float(value)
+    if kind in get_args(Scalar) and type(value) is kind and (kind is not float or isfinite(value)):
+        return value
+    raise LookupError(kind)
+
+
+@cache
+def _hints(kind: Any) -> dict[str, Any]:
+    return get_type_hints(kind, include_extras=True)
 
 
 def require_arguments(subject: str, function: Callable, leading: int, settings: Mapping[str, object]) -> None:

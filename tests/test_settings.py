@@ -52,6 +52,30 @@ def test_a_class_is_made_with_all_that_it_holds():
     assert made == Outer("x", Inner(ends=(2, 3)), kinds=("b", "a"), by_name={"left": Inner(size=1)})
 
 
+@dataclass(frozen=True)
+class Plain:
+    sizes: tuple[Share, ...] = ()
+    pairs: tuple[tuple[int, str], ...] = ()
+    count: Count | None = None
+    inner: Inner | None = None
+    options: dict | None = None
+    name: Literal["a", "b"] | bool | None = None
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"sizes": [0, 0.5, 1], "pairs": [[1, "a"]], "count": 3, "inner": {"size": 4, "ends": (1, 2.5)}},
+        {"options": {"k": 3, "rate": 0.1, "on": True, "what": None, "name": "x"}, "name": "b", "count": None},
+        {"options": {"deep": {"k": (1, 2)}}, "name": True, "sizes": ()},
+    ],
+)
+def test_what_is_read_without_pydantic_is_what_pydantic_makes_of_it(settings, monkeypatch):
+    plain = read_settings(Plain, settings)
+    monkeypatch.setattr("gpca.settings._fitted", lambda kind, value: {}[kind])  # nothing fits
+    assert repr(read_settings(Plain, settings)) == repr(plain)
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [

@@ -6,13 +6,15 @@ import json
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
-import yaml
 
 from gpca.errors import InputError
 from gpca.io.files import require_file
+
+if TYPE_CHECKING:
+    import yaml
 
 LARGEST_CONFIG_BYTES = 2**18  # fifteen times the longest config of the suite
 MOST_ENTRIES = 100_000  # with all aliases expanded; the suite's configs have a thousand
@@ -31,6 +33,8 @@ LARGEST_JSON_BYTES = 2**26  # ten times the largest scene of the BOP benchmark
 
 def load_own_yaml(path: Path) -> Any:
     """Return the content of a YAML file of the package, by libyaml if available, in a fifth of the time."""
+    import yaml
+
     loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
     return yaml.load(path.read_text(encoding="utf-8"), Loader=loader)
 
@@ -61,6 +65,8 @@ def read_mapping(path: str | Path) -> dict[str, Any]:
 
 def read_scalar(text: str) -> Any:
     """Return the number, boolean or null that every YAML version reads in a text, else the text."""
+    import yaml
+
     try:
         value = yaml.safe_load(text)
     except (yaml.YAMLError, ValueError):  # a name or a path
@@ -85,6 +91,8 @@ def require_plain(part: Mapping | list, subject: object, path: tuple = ()) -> No
 
 
 def _parse_yaml(text: str, path: Path) -> Any:
+    import yaml
+
     try:
         loader = yaml.SafeLoader(text)
         node = loader.get_single_node()
@@ -104,6 +112,8 @@ def _parse_yaml(text: str, path: Path) -> Any:
 
 def _size(node: yaml.Node, sizes: dict[int, int | None], path: Path) -> int:
     """Return the number of entries of a node with all aliases expanded."""
+    import yaml
+
     line = f"line {node.start_mark.line + 1}"
     if isinstance(node, yaml.ScalarNode):
         if node.tag != _MERGE:
