@@ -25,11 +25,6 @@ VOCABULARIES = {"w3id.org", "spdx.org"}  # of the RO-Crate: names of terms and l
 DATA = {"rgbd-dataset.cs.washington.edu", "huggingface.co", "3dmatch.cs.princeton.edu", "graphics.stanford.edu"}
 
 
-BESIDE_A_CLONE = "gp-ca-bench/config/smoke.yaml my_parts.yaml"  # which tests/workflow/test_tasks.py runs
-SHOWN = ("my_run.yaml", "fewer.yaml", "my_lab.yaml", BESIDE_A_CLONE)
-WHOLE = ("", "config/full.yaml", "config/smoke.yaml", "config/stand_ins.yaml")
-
-
 # --- links, commands, numbers ---
 
 
@@ -84,54 +79,6 @@ def test_every_python_command_names_something_that_is_there(command):
         assert name not in COMMANDS or flags <= options_of(name)
     else:
         assert find_spec(words[1]) is not None
-
-
-def snakemake_plans():
-    """Options and targets of as few plans as cover every `snakemake` command.
-
-    Commands of one config share a plan, with the options of all of them, unless they give an option two values. That
-    each config can be planned without any option, and wholly, is for tests/workflow/test_load.py.
-    """
-    parser = ArgumentParser()
-    for option in ("--profile", "--configfile", "--config"):
-        parser.add_argument(option, **({"nargs": "+"} if option == "--configfile" else {}))
-    for option in ("-j", "-q", "-s", "--report"):  # a report is not made in a dry run
-        parser.add_argument(option, dest="unplanned")
-    parser.add_argument("-n", "--report-after-run", action="store_true", dest="unplanned")
-    parser.add_argument("targets", nargs="*")
-    plans = []
-    for command in commands("snakemake "):
-        given = vars(parser.parse_intermixed_args(shlex.split(command)[1:]))
-        given["configfile"] = " ".join(given["configfile"] or ())
-        named = {name: given[name] for name in ("profile", "configfile", "config") if given[name]}
-        if given["configfile"] in WHOLE:
-            given["targets"] = set(given["targets"]) - {"all"}
-        # An option is spoken of; or a config that a page shows, which tests/workflow/test_tasks.py plans.
-        if not given["targets"] or given["configfile"] in SHOWN:
-            continue
-        for plan in plans:
-            same = plan[0].get("configfile") == named.get("configfile")
-            if same and all(plan[0].get(name, value) == value for name, value in named.items()):
-                break
-        else:
-            plan = ({}, set())
-            plans.append(plan)
-        plan[0].update(named)
-        plan[1].update(given["targets"])
-    return plans
-
-
-@pytest.mark.parametrize(("options", "targets"), snakemake_plans(), ids=lambda part: " ".join(sorted(part)))
-def test_every_snakemake_command_can_be_planned(options, targets, tmp_path):
-    if "profile" in options:
-        executor = yaml.safe_load((ROOT / options["profile"] / "config.yaml").read_text())["executor"]
-        pytest.importorskip(f"snakemake_executor_plugin_{executor.replace('-', '_')}")
-    words = [word for name, value in options.items() for word in (f"--{name}", *value.split())]
-    words = [word.replace("data_dir=/data", f"data_dir={tmp_path}") for word in (*words, "--", *sorted(targets))]
-    plan = subprocess.run(
-        [sys.executable, "-m", "snakemake", "--dry-run", "--quiet", *words], cwd=ROOT, capture_output=True, text=True
-    )
-    assert plan.returncode == 0, plan.stderr
 
 
 def test_every_page_of_the_docs_is_in_the_index():

@@ -1,6 +1,9 @@
 import inspect
 import re
+import shlex
+from argparse import ArgumentParser
 from copy import deepcopy
+from pathlib import Path
 
 import pytest
 
@@ -11,6 +14,7 @@ from gpca.experiments.run import names_of
 from gpca.process.registry import load
 
 from ..config.configs import load as load_config
+from ..documents import commands
 from .conftest import ROOT
 
 RULES = sorted((ROOT / "workflow/rules").rglob("*.smk"))
@@ -21,12 +25,48 @@ def all_of(patterns):
     return [path for files in patterns.values() for path in ([files] if isinstance(files, str) else files)]
 
 
-@pytest.mark.parametrize("config", ["default", "smoke", "full", "stand_ins"])
-def test_every_config_loads_offline_and_asks_for_all_results(project, planned, config):
+BESIDE_A_CLONE = "gp-ca-bench/config/smoke.yaml my_parts.yaml"
+SHOWN = ("my_run.yaml", "fewer.yaml", "my_lab.yaml", BESIDE_A_CLONE)  # on a page: test_tasks.py plans them
+CONFIGS = {
+    "default": "config/config.yaml", "smoke": "config/smoke.yaml", "full": "config/full.yaml",
+    "stand_ins": "config/stand_ins.yaml", "bop": "config/full.yaml config/bop.yaml",
+}  # fmt: skip
+
+
+def documented():
+    """Targets and `--config` of the `snakemake` commands of all pages by their config files, which are planned once."""
+    parser = ArgumentParser()
+    parser.add_argument("--configfile", nargs="+", default=["config/config.yaml"])
+    for option in ("--config", "--profile", "-j", "-q", "-s", "--report"):  # a report is not made in a dry run
+        parser.add_argument(option)
+    parser.add_argument("-n", "--report-after-run", action="store_true")
+    parser.add_argument("targets", nargs="*")
+    found = {}
+    for command in commands("snakemake "):
+        given = parser.parse_intermixed_args(shlex.split(command)[1:])
+        targets = set(given.targets) - {"all"}
+        if targets and (files := " ".join(given.configfile)) not in SHOWN:
+            assert files in CONFIGS.values() and not given.profile, command
+            values, of_files = found.setdefault(files, (set(), set()))
+            values.update({given.config} - {None})
+            of_files.update(targets)
+    return found
+
+
+DOCUMENTED = documented()
+
+
+@pytest.mark.parametrize("config", CONFIGS)
+def test_every_config_loads_offline_and_asks_for_all_results(project, planned, tmp_path_factory, config):
+    """Beside them for what the pages say of that config."""
+    files = CONFIGS[config]
+    values, targets = DOCUMENTED.get(files, ((), ()))
+    values = [value.replace("data_dir=/data", f"data_dir={tmp_path_factory.mktemp('data')}") for value in values]
     if config != "smoke":
-        file = "config" if config == "default" else config
-        planned = project.dry_run("all", "--configfile", f"config/{file}.yaml")
-    settings = without_false(load_config(*{"smoke", "full", "stand_ins"} & {config}))
+        options = ["--config", *values] if values else []
+        planned = project.dry_run("all", *sorted(targets), "--configfile", *files.split(), *options)
+    assert config != "smoke" or files not in DOCUMENTED
+    settings = without_false(load_config(*(Path(file).stem for file in files.split() if config != "default")))
     names = names_of(settings, check(deepcopy(settings)))
     asked = {path for result in results_of(names) for path in (*result.all_files, *all_of(result.files(names)))}
     asked |= {
@@ -41,7 +81,7 @@ def test_every_config_loads_offline_and_asks_for_all_results(project, planned, c
     assert ("render_scenes" in planned.jobs) == (config in ("smoke", "stand_ins"))
     # Repeats on depth frames have a job for each kind and backbone, encoders as published fewer seeds.
     published = {path for path in planned.outputs if "predictions/real_rgbd/dgcnn_1024-pca/" in path}
-    assert (planned.jobs["repeat_on_frames"], len(published)) == ((12, 2) if config == "full" else (0, 0))
+    assert (planned.jobs["repeat_on_frames"], len(published)) == ((12, 2) if "full" in files else (0, 0))
     assert "profiles/default" in planned.messages
     assert not (project.folder / "results").exists()
 
