@@ -16,16 +16,25 @@ max_score_difference.
 
 With a model of your own, whole explanations by it are timed in turn: with the diagnosis, with the fast one, with none.
 The last line is then a JSON object of their medians: median_ms, median_ms_fast, median_ms_gpca_alone.
+
+    python benchmarks/latency.py --installed env/bin/python [other/bin/python ...] [--repeats 5]
+
+Whole commands `gpca explain` are timed in turn, by Pythons in whose environments the package is installed: the first
+call in a fresh home, and later ones. Of each environment, the last lines are JSON objects: CPU seconds and peak memory
+of both (medians), size and number of its packages.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import os
+import subprocess
 import sys
 from functools import partial
 from pathlib import Path
 from statistics import median
+from tempfile import TemporaryDirectory
 from time import perf_counter
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -35,11 +44,21 @@ from gpca.process.processor import prepare  # noqa: E402
 
 WARM_UP = 3
 TRAINING = 45  # registrations that the classifier is fitted to
+SIZE = """
+from importlib.metadata import distributions
+from pathlib import Path
+from sysconfig import get_paths
+files = [path.stat().st_size for path in Path(get_paths()["purelib"]).rglob("*") if path.is_file()]
+print(sum(files), len([*distributions()]))
+"""
 
 
 def main(arguments: list[str] | None = None) -> None:
     options = parse(arguments)
     prepare(options.threads)
+    if options.installed:
+        time_processes(options)
+        return
     import numpy as np
     import torch
 
@@ -108,11 +127,51 @@ def time_model(options: argparse.Namespace) -> None:
     print(json.dumps({names[kind]: float(f"{1e3 * median(of_kind):.4g}") for kind, of_kind in seconds.items()}))
 
 
+def time_processes(options: argparse.Namespace) -> None:
+    """Print what whole commands take by each of the given Pythons."""
+    import numpy as np
+
+    taken: dict[Path, dict[str, list[tuple[float, float]]]] = {}
+    with TemporaryDirectory() as folder:
+        for role, cloud in zip(("source", "target"), make_pair(2000, "latency", 0), strict=True):
+            np.save(Path(folder, f"{role}.npy"), 100 * cloud)
+        for repeat in range(options.repeats):
+            for python in options.installed:
+                home = Path(folder, f"{python.absolute().as_posix().replace('/', '_')}-{repeat}")
+                home.mkdir()
+                for call in ("first", "later"):
+                    taken.setdefault(python, {}).setdefault(call, []).append(run_command(python, home))
+    for python, calls in taken.items():
+        result = {
+            f"{call}_{unit}": median(values)
+            for call, pairs in calls.items()
+            for unit, values in zip(("cpu_s", "peak_mb"), zip(*pairs, strict=True), strict=True)
+        }
+        asked = subprocess.run([python, "-c", SIZE], capture_output=True, text=True, check=True).stdout.split()
+        result |= {"packages_mb": int(asked[0]) / 1e6, "packages": int(asked[1])}
+        print(json.dumps({"python": str(python)} | {name: float(f"{value:.3g}") for name, value in result.items()}))
+
+
+def run_command(python: Path, home: Path) -> tuple[float, float]:
+    """Return CPU seconds and peak memory (MB) of an explanation of the pair in the folder of a user's home."""
+    command = [python.absolute(), "-m", "gpca", "explain", "../source.npy", "../target.npy", "--unit", "mm", "--json"]
+    folders = {name: str(home) for name in ("HOME", "XDG_CACHE_HOME", "NUMBA_CACHE_DIR")}
+    environment = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "GPCA_MODEL")}
+    process = subprocess.Popen(command, cwd=home, env=environment | folders, stdout=subprocess.PIPE)
+    assert process.stdout is not None
+    process.stdout.read()
+    _, status, usage = os.wait4(process.pid, 0)
+    if status:
+        raise SystemExit(f"{python}: the command failed")
+    return usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1e3
+
+
 def parse(arguments: list[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     for name, default in {"threads": 1, "points": 512, "pairs": 12, "repeats": 50, "draws": 1000}.items():
         parser.add_argument(f"--{name}", type=int, default=default, help=f"default {default}")
     parser.add_argument("--model", type=Path, help="model file whose explanations are timed")
+    parser.add_argument("--installed", type=Path, nargs="+", help="Pythons whose whole commands are timed")
     options = parser.parse_args(arguments)
     if options.points < 64 or options.draws < 2 or min(options.threads, options.pairs, options.repeats) < 1:
         parser.error("points must be at least 64, draws 2 and the others 1")

@@ -248,6 +248,19 @@ def test_latency_times_a_model_of_ones_own(model, tmp_path, capsys):
     assert any(line.startswith("diagnosis ") for line in lines)
 
 
+def test_latency_times_whole_commands_of_an_installed_package(tmp_path, capsys):
+    from benchmarks import latency
+
+    python = tmp_path / "python"
+    python.write_text(f'#!/bin/sh\nPYTHONPATH="{ROOT}" exec "{sys.executable}" "$@"\n')
+    python.chmod(0o755)
+    latency.main(["--installed", str(python), "--repeats", "1"])
+    said = json.loads(capsys.readouterr().out)
+    assert said.pop("python") == str(python)
+    assert [*said] == ["first_cpu_s", "first_peak_mb", "later_cpu_s", "later_peak_mb", "packages_mb", "packages"]
+    assert all(value > 0 for value in said.values())
+
+
 def test_latency_compares_explanations_of_equal_scores(capsys):
     from benchmarks import latency
 
