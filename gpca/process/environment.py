@@ -71,7 +71,12 @@ def system_library_hint(message: str) -> str | None:
 
 
 def require_open3d() -> ModuleType:
-    """Import and return Open3D; the line of an InputError names the extra, or the missing system library."""
+    """Import and return Open3D; the line of an InputError names the extra, or the missing system library.
+
+    Its windows and its learning stay out: they are nine tenths of its seconds, in Dash, scikit-learn and IPython.
+    """
+    unused = [name for name in ("open3d.ml", "open3d.visualization") if name not in sys.modules]
+    sys.modules.update({name: ModuleType(name) for name in unused})
     try:
         import open3d
     except (ImportError, OSError) as fault:
@@ -79,6 +84,9 @@ def require_open3d() -> ModuleType:
             raise InputError("Open3D", "is not installed", remedy("suite")) from fault
         hint = system_library_hint(str(fault)) or "run 'make environment', on Python 3.11 or 3.12"
         raise InputError("Open3D", f"cannot be imported ({fault})", hint) from fault
+    finally:
+        for name in unused:  # so that another who asks for them gets them
+            del sys.modules[name]
     return open3d
 
 

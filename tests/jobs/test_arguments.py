@@ -100,6 +100,17 @@ def test_open3d_imports_here():
     assert require_open3d().__version__.startswith("0.19")
 
 
+def test_open3d_comes_without_its_windows_which_others_may_import_later():
+    code = (
+        "import sys; from gpca.process.environment import require_open3d as o3d\n"
+        "assert o3d().geometry.PointCloud().is_empty()\n"
+        "print({'dash', 'IPython', 'matplotlib', 'pandas', 'scipy', 'sklearn'} & set(sys.modules))\n"
+        "import open3d.visualization; assert o3d().visualization.Visualizer\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT)
+    assert (done.stdout, done.returncode) == ("set()\n", 0), done.stderr
+
+
 @pytest.mark.parametrize(
     ("package", "expected"),
     [
