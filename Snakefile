@@ -1,6 +1,8 @@
 # GP-CA Bench. `snakemake -j2 all` makes all that the config names; each table, figure and stage is a target: `table2`.
+import gc
 import sys
 
+gc.set_threshold(100_000)  # what a plan makes is kept: searching it for garbage is a seventh of its seconds
 sys.path.insert(0, str(workflow.current_basedir))
 from gpca.config.check import read
 from gpca.config.jobs import clear_leftovers, export_to_jobs

@@ -19,7 +19,6 @@ from typing import Any
 
 from gpca.declarations.plan import Run
 from gpca.encoders.registry import encoders
-from gpca.process.code_files import code_files
 
 BRACED = re.compile(r"{(\*?)(\w+)}")
 OUTSIDE = "outside_"  # with a name behind it, the wildcard of entries from outside the suite
@@ -105,7 +104,7 @@ class Rule:
     run: str
     inputs: dict[str, Any]
     data: dict[str, Any]  # inputs from outside the run
-    code: Any
+    modules: Any  # of its code
     outputs: dict[str, Any]
     settings: Any
     params: dict[str, Any]
@@ -160,9 +159,9 @@ def _rule(step: Step, plan: Plan, name: str) -> Rule:
             for key, files in step.inputs.items()
         },
         data={"data": lambda wildcards: [*map(str, step.data(plan, wildcards))]} if step.data else {},
-        code=(lambda wildcards: code_files(*modules, *step.modules_of_job(plan, wildcards)))
+        modules=(lambda wildcards: (*modules, *step.modules_of_job(plan, wildcards)))
         if step.modules_of_job
-        else code_files(*modules),
+        else modules,
         outputs={key: _files(step, plan, pattern) for key, pattern in step.outputs.items()},
         settings=later(_as_json, step, plan) if callable(step.settings) else _as_json(step, plan, None),
         params={plural(listed): list(values[listed] or ()) for star, listed in in_outputs if star}
@@ -204,7 +203,7 @@ def _rule_outside(step: Step, plan: Plan, name: str, outside: Sequence[str]) -> 
     return replace(
         rule,
         inputs=rule.inputs | dynamic,
-        code=lambda wildcards: code_files(step.run, *step.modules(of(wildcards))),
+        modules=lambda wildcards: (step.run, *step.modules(of(wildcards))),
         settings=lambda wildcards: _as_json(step, of(wildcards), wildcards),
         params=rule.params | given | {plural(name): lambda wildcards: [getattr(wildcards, wildcard)]},
         constraints=rule.constraints | {wildcard: "|".join(outside) or "none"},

@@ -28,28 +28,29 @@ def code_files(*modules: str) -> list[str]:
     are below the working directory, else absolute. Modules that are chosen by name at run time (kinds of source,
     encoders, explainers) must be given.
     """
-    reached: set[str] = set()
+    reached: dict[str, str] = {}  # module -> its file
     open_modules = list(modules)
     while open_modules:
         module = open_modules.pop()
         if module not in reached:
-            reached.add(module)
-            open_modules += _imports(module)
-    files = {_file_of(module.split(":")[0]) for module in reached}
-    for module in reached.intersection(BESIDE):
-        files.update(_file_of(module).parent.glob(BESIDE[module]))
+            reached[module], imported = _imports(module)
+            open_modules += imported
+    files = {*reached.values()}
+    for module in BESIDE.keys() & reached:
+        files.update(map(str, Path(reached[module]).parent.glob(BESIDE[module])))
     working = Path.cwd().resolve()  # as ROOT is
-    seen = ROOT.relative_to(working) if ROOT.is_relative_to(working) else ROOT
-    prefixes = {ROOT: seen, working: Path()}  # where files are -> what their names begin with
-    inside = {file: next((folder for folder in prefixes if file.is_relative_to(folder)), None) for file in files}
-    return sorted(str(prefixes[at] / file.relative_to(at) if at else file) for file, at in inside.items())
+    seen = str(ROOT.relative_to(working) / "_")[:-1] if ROOT.is_relative_to(working) else f"{ROOT}/"
+    prefixes = {f"{ROOT}/": seen, f"{working}/": ""}  # where files are -> what their names begin with
+    inside = {file: next((folder for folder in prefixes if file.startswith(folder)), "") for file in files}
+    return sorted(prefixes.get(at, "") + file.removeprefix(at) for file, at in inside.items())
 
 
 _HOLD_STATEMENTS = (ast.stmt, ast.excepthandler, ast.match_case)  # imports are statements, not expressions
 
 
 @cache
-def _imports(module: str) -> tuple[str, ...]:
+def _imports(module: str) -> tuple[str, tuple[str, ...]]:
+    """Return the file of a module, and the project modules that it imports."""
     names: set[str] = set()
     module, _, function = module.partition(":")
     file = _file_of(module)
@@ -75,7 +76,8 @@ def _imports(module: str) -> tuple[str, ...]:
             for first in {name.split(".")[0] for name in names} - {*PACKAGES}:
                 if (folder / f"{first}.py").is_file() or (folder / first).is_dir():
                     ROOTS.setdefault(first, folder)
-    return tuple(sorted(name for name in names if _is_followed(name, top) and _file(name) is not None))
+    followed = (name for name in names if _is_followed(name, top) and _file(name) is not None)
+    return str(file), tuple(sorted(followed))
 
 
 def _statements_for(tree: ast.Module, function: str) -> list[ast.AST]:

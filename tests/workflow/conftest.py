@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks.kills import results, temporary_folders
+from gpca.process.code_stamps import FOLDER
 
 from . import forks
 
@@ -100,9 +101,15 @@ class Project:
             files = {
                 name: set(paths.split(", ")) for name, paths in re.findall(r"^    (input|output): (.+)$", job, re.M)
             }
-            plan.append((job.split(":")[0], files.get("input", set()), files.get("output", set())))
+            inputs = {path for each in files.get("input", ()) for path in (each, *self.stamped(each))}
+            plan.append((job.split(":")[0], inputs, files.get("output", set())))
         outputs = {path for _, _, written in plan for path in written}
         return DryRun(jobs, outputs, tuple(plan), done.stderr)
+
+    def stamped(self, path):
+        """The files of code that a stamp among the inputs stands for."""
+        lines = (self.folder / path).read_text().splitlines() if path.startswith(f"{FOLDER}/") else ()
+        return [line.split("  ", 1)[1] for line in lines]
 
     def start(self, *arguments):
         """Start Snakemake as the leader of a process group of its own."""

@@ -11,7 +11,7 @@ rule causes:
 rule sample_causes:
     input:
         objects="<results>/objects/{source}.npz",
-        code=code_files("gpca.steps.causes:causes"),
+        code=code_stamp("gpca.steps.causes:causes"),
     output:
         causes="<results>/causes/{source}/seed{seed}.npz",
         candidates="<results>/causes/{source}/seed{seed}.csv",
@@ -35,7 +35,7 @@ rule describe:
     input:
         causes="<results>/causes/{source}/seed{seed}.npz",
         causes_timings="<results>/timings/{source}/causes/seed{seed}.csv",
-        code=code_files("gpca.steps.causes:describe"),
+        code=code_stamp("gpca.steps.causes:describe"),
     output:
         descriptors="<results>/descriptors/{source}/seed{seed}.npz",
         timings="<results>/timings/{source}/descriptors/seed{seed}.csv",
@@ -56,7 +56,7 @@ rule reenact:
     input:
         causes="<results>/causes/{source}/seed{seed}.npz",
         causes_timings="<results>/timings/{source}/causes/seed{seed}.csv",
-        code=code_files("gpca.steps.causes:reenact"),
+        code=code_stamp("gpca.steps.causes:reenact"),
     output:
         reenactments="<results>/reenactments/{source}/seed{seed}.npz",
         timings="<results>/timings/{source}/reenactments/seed{seed}.csv",
@@ -81,7 +81,7 @@ rule train_on_causes:
     input:
         causes="<results>/causes/{source}/seed{seed}.npz",
         causes_timings="<results>/timings/{source}/causes/seed{seed}.csv",
-        code=code_files(
+        code=code_stamp(
             "gpca.steps.causes:train_on_causes", backbone_module(DIAGNOSIS["encoder"])
         ),
     output:

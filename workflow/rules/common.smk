@@ -7,7 +7,7 @@ from gpca.experiments.claims import compared_sources
 from gpca.explainers.interface import BARE, REENACTED
 from gpca.explainers.registry import CAUSES, explainer_entry, explainer_module
 from gpca.alignment.methods.registry import method_module
-from gpca.process.code_files import code_files
+from gpca.process.code_stamps import code_stamp
 from gpca.encoders.registry import encoders
 from gpca.objects.source import find_file
 from gpca.experiments.frames import pretraining_of
@@ -83,13 +83,20 @@ def backbone_module(settings):
 
 
 def encoder_code(step):
-    return lambda wildcards: code_files(
+    return lambda wildcards: code_stamp(
         f"gpca.steps.pairs:{step}", encoder_module(wildcards.backbone)
     )
 
 
+def code_of(modules):
+    """Return the stamp of modules, or of those of a job."""
+    if callable(modules):
+        return lambda wildcards: code_stamp(*modules(wildcards))
+    return code_stamp(*modules)
+
+
 def collector_code(function):
-    return code_files(function.split(":")[0], "gpca.jobs.job")
+    return code_stamp(function.split(":")[0], "gpca.jobs.job")
 
 
 def below_results(files):

@@ -64,7 +64,7 @@ rule comparison:
         collected=[f"<results>/{name}" for name in COMPARED],
         predictions=COMPARED_PREDICTIONS,
         readings="<results>/readings.csv",
-        code=code_files(
+        code=code_stamp(
             "gpca.comparison.claims",
             "gpca.comparison.readings",
             "gpca.experiments.reading_words",
@@ -112,7 +112,7 @@ rule page:
         causes=collect(
             f"<results>/causes/{{source}}/seed{SEEDS[0]}.npz", source=MEASURED
         ),
-        code=code_files("gpca.page.page", "gpca.page.crate", "gpca.jobs.job"),
+        code=code_stamp("gpca.page.page", "gpca.page.crate", "gpca.jobs.job"),
     output:
         page="<results>/index.html",
         crate="<results>/ro-crate-metadata.json",

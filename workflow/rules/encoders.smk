@@ -163,7 +163,7 @@ rule reduce_embeddings:
             "<results>/embeddings/{{source}}/{{backbone}}/none/seed{seed}.npz",
             seed=SEEDS,
         ),
-        code=code_files("gpca.steps.pairs:reduce"),
+        code=code_stamp("gpca.steps.pairs:reduce"),
     output:
         out=collect(
             "<results>/embeddings/{{source}}/{{backbone}}/{{reduction}}/seed{seed}.npz",
@@ -192,7 +192,7 @@ use rule reduce_embeddings as reduce_published with:
             "<results>/embeddings/{{source}}/{{backbone}}/none/seed{seed}.npz",
             seed=NAMES["published_seed"],
         ),
-        code=code_files("gpca.steps.pairs:reduce"),
+        code=code_stamp("gpca.steps.pairs:reduce"),
     output:
         out=collect(
             "<results>/embeddings/{{source}}/{{backbone}}/{{reduction}}/seed{seed}.npz",

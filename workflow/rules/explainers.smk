@@ -20,7 +20,7 @@ rule attribute:
         registrations=collect(
             "<results>/registrations/{{source}}/seed{seed}.npz", seed=SEEDS
         ),
-        code=lambda wildcards: code_files(
+        code=lambda wildcards: code_stamp(
             "gpca.steps.pairs:attribute",
             explainer_module(explainer_of(wildcards.explainer, NAMES)),
         ),
@@ -57,7 +57,7 @@ use rule attribute as attribute_published with:
             "<results>/registrations/{{source}}/seed{seed}.npz",
             seed=NAMES["published_seed"],
         ),
-        code=code_files("gpca.steps.pairs:attribute", explainer_module("gpca")),
+        code=code_stamp("gpca.steps.pairs:attribute", explainer_module("gpca")),
     output:
         predictions=collect(
             "<results>/predictions/{{source}}/{{explainer}}/seed{seed}.csv",
@@ -88,7 +88,7 @@ use rule attribute as attribute_one_encoder with:
         registrations=[
             f"<results>/registrations/{FRAMES}/seed{SEEDS[0]}.npz" for _ in SEEDS
         ],
-        code=code_files("gpca.steps.pairs:attribute", explainer_module("gpca")),
+        code=code_stamp("gpca.steps.pairs:attribute", explainer_module("gpca")),
     wildcard_constraints:
         source=ONE_ENCODER,
     params:

@@ -13,7 +13,7 @@ rule measure_frame_causes:
         splits=split_file("scenes") if REAL_WORLD["datasets"] else [],
         instances=f"<results>/instances/{FRAMES}.npz",
         objects=f"<results>/objects/{FRAMES}.npz",
-        code=code_files("gpca.steps.frames:frame_causes"),
+        code=code_stamp("gpca.steps.frames:frame_causes"),
     output:
         frame_causes="<results>/frame_causes/seed{seed}.npz",
         samples="<results>/frame_causes/seed{seed}.csv",
@@ -42,7 +42,7 @@ rule reenact_frames:
         objects=f"<results>/objects/{FRAMES}.npz",
         frame_causes="<results>/frame_causes/seed{seed}.npz",
         starts="<results>/frame_starts/seed{seed}.npz",
-        code=code_files("gpca.steps.frames:reenact_frames"),
+        code=code_stamp("gpca.steps.frames:reenact_frames"),
     output:
         reenactments=f"<results>/reenactments/{FRAMES}/seed{{seed}}.npz",
     log:

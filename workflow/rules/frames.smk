@@ -26,7 +26,7 @@ wildcard_constraints:
 
 rule render_scenes:
     input:
-        code=code_files("gpca.steps.frames:scenes"),
+        code=code_stamp("gpca.steps.frames:scenes"),
     output:
         out=directory(f"<results>/scenes/{FRAMES}"),
     log:
@@ -48,7 +48,7 @@ rule instances:
     input:
         **FRAMES_FROM,
         splits=split_file("scenes") if REAL_WORLD["datasets"] else [],
-        code=code_files("gpca.steps.frames:instances"),
+        code=code_stamp("gpca.steps.frames:instances"),
     output:
         instances="<results>/instances/{frames}.npz",
         objects="<results>/objects/{frames}.npz",
@@ -80,7 +80,7 @@ rule register_frames:
     input:
         instances="<results>/instances/{frames}.npz",
         objects="<results>/objects/{frames}.npz",
-        code=code_files("gpca.steps.frames:frame_registrations"),
+        code=code_stamp("gpca.steps.frames:frame_registrations"),
     output:
         registrations="<results>/registrations/{frames}/seed{seed}.npz",
         poses="<results>/poses/{frames}/seed{seed}.csv",

@@ -40,7 +40,7 @@ use rule reenact as reenact_model_causes with:
     input:
         causes="<results>/model_causes/{source}/seed{seed}.npz",
         causes_timings="<results>/timings/{source}/model_causes/seed{seed}.csv",
-        code=code_files("gpca.steps.causes:reenact"),
+        code=code_stamp("gpca.steps.causes:reenact"),
     output:
         reenactments="<results>/model_reenactments/{source}/seed{seed}.npz",
         timings="<results>/timings/{source}/model_reenactments/seed{seed}.csv",
@@ -72,7 +72,7 @@ rule model:
             source=SOURCES,
             seed=SEEDS[0],
         ),
-        code=code_files("gpca.steps.causes:model", encoder_module(MODEL_ENCODER)),
+        code=code_stamp("gpca.steps.causes:model", encoder_module(MODEL_ENCODER)),
     output:
         out="<results>/model.pt",
     log:

@@ -18,7 +18,7 @@ rule sample_objects:
     input:
         data=lambda wildcards: data_files(SAMPLED_OBJECTS[wildcards.source]),
         splits=split_file("objects"),
-        code=lambda wildcards: code_files(
+        code=lambda wildcards: code_stamp(
             "gpca.steps.pairs:objects",
             *source_modules(SAMPLED_OBJECTS[wildcards.source]),
         ),

@@ -11,7 +11,7 @@ rule registrations:
 rule register:
     input:
         objects="<results>/objects/{source}.npz",
-        code=code_files("gpca.steps.pairs:registrations"),
+        code=code_stamp("gpca.steps.pairs:registrations"),
     output:
         registrations="<results>/registrations/{source}/seed{seed}.npz",
         timings="<results>/timings/{source}/icp/seed{seed}.csv",

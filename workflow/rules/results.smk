@@ -28,7 +28,7 @@ for result in RESULTS:
             result.name
         input:
             **below_results(result.files(NAMES)),
-            code=code_files(*result.modules, "gpca.jobs.job"),
+            code=code_stamp(*result.modules, "gpca.jobs.job"),
         output:
             **outputs(result),
         log:

@@ -3,7 +3,7 @@ rule time_stages:
     input:
         **MODEL_INPUTS,
         model="<results>/model.pt",
-        code=code_files("gpca.steps.runtime", encoder_module(MODEL_ENCODER)),
+        code=code_stamp("gpca.steps.runtime", encoder_module(MODEL_ENCODER)),
     output:
         out="<results>/runtime.csv",
     log:

@@ -26,7 +26,7 @@ for step in steps():
             input:
                 **below_results(made.inputs),
                 **made.data,
-                code=made.code,
+                code=code_of(made.modules),
             output:
                 **below_results(made.outputs),
             log:

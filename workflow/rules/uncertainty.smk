@@ -14,7 +14,7 @@ rule run_icp:
         registrations=collect(
             "<results>/registrations/{{source}}/seed{seed}.npz", seed=SEEDS
         ),
-        code=code_files("gpca.steps.pairs:uncertainty"),
+        code=code_stamp("gpca.steps.pairs:uncertainty"),
     output:
         outcomes=collect(
             "<results>/uncertainty/{{source}}/{{design}}/seed{seed}.npz", seed=SEEDS

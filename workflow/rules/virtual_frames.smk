@@ -7,7 +7,7 @@ use rule render_scenes as render_models with:
     input:
         **FRAMES_FROM,
         splits=split_file("scenes"),
-        code=code_files("gpca.steps.frames:scenes"),
+        code=code_stamp("gpca.steps.frames:scenes"),
     output:
         out=directory(f"<results>/scenes/{VIRTUAL}"),
     log:
@@ -31,7 +31,7 @@ use rule render_scenes as render_models with:
 use rule instances as virtual_instances with:
     input:
         scenes=f"<results>/scenes/{VIRTUAL}",
-        code=code_files("gpca.steps.frames:instances"),
+        code=code_stamp("gpca.steps.frames:instances"),
     output:
         instances=f"<results>/instances/{VIRTUAL}.npz",
         objects=f"<results>/objects/{VIRTUAL}.npz",
@@ -51,7 +51,7 @@ use rule register_frames as register_virtual_frames with:
     input:
         instances=f"<results>/instances/{VIRTUAL}.npz",
         objects=f"<results>/objects/{VIRTUAL}.npz",
-        code=code_files("gpca.steps.frames:frame_registrations"),
+        code=code_stamp("gpca.steps.frames:frame_registrations"),
     output:
         registrations=f"<results>/registrations/{VIRTUAL}/seed{{seed}}.npz",
         poses=f"<results>/poses/{VIRTUAL}/seed{{seed}}.csv",
