@@ -53,10 +53,10 @@ def score(published: Published, submitted: Mapping[str, Method]) -> tuple[pd.Dat
         for name, (values, masks) in measured.items():
             for metric, value_B in values.items():
                 if np.isfinite(value_B[0]):
-                    own = draws.subset(masks[metric])
-                    drawn_B_n = own.weights[1:] if metric in SHARES_OF_SAMPLES else None
-                    estimate = interval(value_B, drawn_B_n, samples=own.independent)
-                    rows.append((group, name, metric, len(own), draws.counts[0], *estimate))
+                    subset = draws.subset(masks[metric])
+                    drawn_B_n = subset.weights[1:] if metric in SHARES_OF_SAMPLES else None
+                    estimate = interval(value_B, drawn_B_n, samples=subset.independent)
+                    rows.append((group, name, metric, len(subset), draws.counts[0], *estimate))
         ranked = [name for name, (values, _) in measured.items() if headline in values]
         for against in (name for name in submitted if name in ranked):
             for name in (name for name in ranked if name not in (against, CEILING)):
