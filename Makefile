@@ -67,7 +67,8 @@ lint: environment ## ruff, snakefmt, mypy and snakemake's own linter
 check-reference: environment ## compare the numbers of results/CHECKED with its reference; reruns nothing
 	$(RUN) python -m gpca check-reference results/$(CHECKED)
 
-environment: .venv/complete ## only the virtual environment
+environment: .venv/complete ## only the virtual environment, and the loops that are compiled ahead of their first call
+	@.venv/bin/python -m gpca.process.build_loops || true
 
 docs: environment ## the site of the docs, build/docs/html/index.html, with packages of its own beside those of .venv
 	rm -rf build/docs
@@ -107,6 +108,7 @@ endef
 	    exit 2
 	fi
 	.venv/bin/python -m gpca.process.environment
+	rm -f gpca/process/loops.so # numba may be another
 	touch $@
 
 lock: ## renew environment.lock and environment.hashes from what pyproject.toml names, in a fresh environment

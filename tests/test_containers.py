@@ -24,7 +24,7 @@ def test_both_install_what_the_check_of_every_commit_takes_for_granted():
     assert libraries == {"libgl1", "libx11-6", "libgomp1"}
     workflow = yaml.safe_load((ROOT / ".github/workflows/ci.yml").read_text())["jobs"]["check"]
     [given] = re.findall(r"--no-install-recommends (.+)", workflow["steps"][0]["run"])
-    assert packages(DOCKER) == packages(APPTAINER) == libraries | {"python3-venv", *given.split()}
+    assert packages(DOCKER) == packages(APPTAINER) == libraries | {"gcc", "libc6-dev", "python3-venv", *given.split()}
     for recipe in (DOCKER, APPTAINER):
         assert f"debian:{workflow['container'].removeprefix('debian:')}-slim" in recipe
 

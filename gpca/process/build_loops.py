@@ -11,7 +11,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -35,7 +35,7 @@ void NRT_MemInfo_call_dtor(void *memory) { free(memory); }
 """
 
 
-def build(loops: Iterable[Loop], path: Path, compiler: str) -> None:
+def build(loops: list[Loop], path: Path, compiler: str) -> None:
     """Write the library of loops."""
     import llvmlite.binding as llvm
 
@@ -76,40 +76,41 @@ def _types(words: Iterator[str]) -> tuple[Any, ...]:
     import numpy as np
     from numba import from_dtype, types
 
-    found: list[Any] = []
+    all_types: list[Any] = []
     for word in words:
         if word == ")":
             break
         if word == "(":
-            found.append(types.Tuple(_types(words)))
+            all_types.append(types.Tuple(_types(words)))
         else:
             scalar = from_dtype(np.dtype(word[0]))
-            found.append(types.Array(scalar, int(word[1:]), "C") if word[1:] else scalar)
-    return tuple(found)
+            all_types.append(types.Array(scalar, int(word[1:]), "C") if word[1:] else scalar)
+    return tuple(all_types)
 
 
-def main() -> None:
-    """Write the library where it is missing or of other sources; a line says why there can be none."""
+def main() -> int:
+    """Write the library where it is missing or of other sources; 1 after a line that says why there can be none."""
     compiler = next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
     if pin_instructions() != COMMON_LEVEL:
         fault = f"this processor, or GPCA_INSTRUCTIONS, is not for {COMMON_LEVEL}"
     elif library():
-        return
+        return 0
     elif compiler is None:
         fault = "there is no C compiler, such as gcc"
     else:
-        fault = ""
-        print(f"compiling loops into {LIBRARY}, which takes half a minute", flush=True)
-        with tempfile.TemporaryDirectory() as folder:
-            os.environ["NUMBA_CACHE_DIR"] = folder  # all is compiled anew
-            loops = [loop for module in map(import_module, MODULES) for loop in vars(module).values()]
-            try:
-                build((loop for loop in loops if isinstance(loop, Loop) and loop.ahead), LIBRARY, compiler)
-            except (OSError, subprocess.CalledProcessError) as error:
-                fault = str(error)
-    if fault:
-        print(f"no loops are compiled ahead of their first call: {fault}", file=sys.stderr)
+        print(f"compiling loops into {LIBRARY}, which takes up to half a minute", flush=True)
+        modules = map(import_module, MODULES)
+        loops = [loop for module in modules for loop in vars(module).values() if isinstance(loop, Loop) and loop.ahead]
+        try:
+            with tempfile.TemporaryDirectory() as folder:
+                os.environ["NUMBA_CACHE_DIR"] = folder  # all is compiled anew
+                build(loops, LIBRARY, compiler)
+            return 0
+        except (ImportError, OSError, subprocess.CalledProcessError) as error:
+            fault = str(error)
+    print(f"no loops are compiled ahead of their first call: {fault}", file=sys.stderr)
+    return 1
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -75,8 +75,8 @@ class Loop:
     @cached_property
     def _machine_code(self) -> Any:
         serial = not self.options.get("parallel") or os.environ.get("NUMBA_NUM_THREADS", "1") == "1"
-        found = library() if self.ahead and serial else None
-        return found and found[self.symbol]
+        loops = library() if self.ahead and serial else None
+        return loops and loops[self.symbol]
 
     @cached_property
     def dispatcher(self) -> Any:
@@ -115,10 +115,10 @@ def _unfold(argument: Any, numbers: list[Any]) -> str:
 def library() -> ctypes.PyDLL | None:
     """Return the library, None where it is missing, of other sources, or for another processor."""
     try:
-        found = ctypes.PyDLL(str(LIBRARY)) if may_pin() else None
+        loops = ctypes.PyDLL(str(LIBRARY)) if may_pin() else None
     except OSError:
         return None
-    return found if found and ctypes.c_char_p.in_dll(found, "state").value == state().encode() else None
+    return loops if loops and ctypes.c_char_p.in_dll(loops, "state").value == state().encode() else None
 
 
 def state() -> str:
